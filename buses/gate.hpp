@@ -1,0 +1,65 @@
+// The one gate that every motion frame passes (design rule: a pure function decides at the bind).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+
+#include "buses/clock.hpp"
+#include "buses/error.hpp"
+
+namespace axisd {
+
+/// How urgently an axis is to stop; a higher one replaces a lower one that is still pending.
+enum class StopKind : std::uint8_t { none, halt, stop, quick_stop };
+
+/// The motion epoch of one axis. Thread: any (atomics only).
+///
+/// The epoch rises with every stop, halt, disable, lease loss, offline, reboot and reload. A motion frame that was
+/// prepared in an older epoch is never sent.
+class AxisGate {
+ public:
+  [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
+  /// Makes every motion frame prepared until now unsendable.
+  void raise() { epoch_.fetch_add(1, std::memory_order_acq_rel); }
+
+  /// The lane of stops: raises the epoch at once, so that the very next bind already refuses motion, and leaves
+  /// the kind for the core thread, which must be woken by the caller.
+  void request_stop(StopKind kind) {
+    raise();
+    auto pending = pending_stop_.load(std::memory_order_relaxed);
+    while (pending < kind && !pending_stop_.compare_exchange_weak(pending, kind, std::memory_order_acq_rel)) {
+    }
+  }
+  /// Thread: core. The pending request, or `none`.
+  StopKind take_stop_request() { return pending_stop_.exchange(StopKind::none, std::memory_order_acq_rel); }
+
+  [[nodiscard]] std::uint64_t fencing_token() const { return fencing_token_.load(std::memory_order_acquire); }
+  void set_fencing_token(std::uint64_t token) { fencing_token_.store(token, std::memory_order_release); }
+
+ private:
+  std::atomic<std::uint64_t> epoch_{1};
+  std::atomic<std::uint64_t> fencing_token_{0};
+  std::atomic<StopKind> pending_stop_{StopKind::none};
+};
+
+/// What a motion frame carries to its bind.
+struct MotionGuard {
+  std::shared_ptr<const AxisGate> gate;  ///< null: not a motion frame, always sendable
+  std::uint64_t epoch = 0;
+  std::uint64_t fencing_token = 0;              ///< 0: given without a lease
+  TimePoint not_after = TimePoint::max();       ///< validity of the request
+};
+
+enum class Verdict : std::uint8_t { send, superseded, expired, lease_lost };
+
+/// Decides, at the moment a frame would go out, whether it still may. Pure.
+inline Verdict may_send(const MotionGuard& guard, TimePoint now) {
+  if (!guard.gate) return Verdict::send;
+  if (guard.gate->epoch() != guard.epoch) return Verdict::superseded;
+  if (now > guard.not_after) return Verdict::expired;
+  if (guard.gate->fencing_token() != guard.fencing_token) return Verdict::lease_lost;
+  return Verdict::send;
+}
+
+}  // namespace axisd

@@ -1,0 +1,74 @@
+// The seam between the core's bus and whatever carries frames: a worker thread on a tty, or a virtual wire.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "buses/modbus_rtu/frame.hpp"
+#include "buses/transaction.hpp"
+
+namespace axisd::modbus_rtu {
+
+/// One exchange as the line sees it. The core owns it and leaves it alone while it is armed or under way.
+struct Exchange {
+  Request request;
+  Frame frame;            ///< encoded request with CRC
+  MotionGuard guard;
+  TimePoint deadline = TimePoint::max();
+  Duration reply_timeout{};   ///< from the last byte of the request to the last byte of the reply
+  Duration turnaround_max{};  ///< from the last byte of the request; after it a stop may cut the wait
+};
+
+enum class ExchangeStatus : std::uint8_t {
+  replied,      ///< `reply` answers the request (a match or an exception)
+  timeout,      ///< sent completely; no valid reply within the timeout
+  cut,          ///< like timeout, but the wait was cut short by cut_wait() past turnaround_max
+  corrupt,      ///< sent completely; only damaged bytes came back
+  not_sent,     ///< refused at the bind: `verdict` says why; no byte went out
+  io_error,     ///< the port failed; `native_error` is errno. Some bytes may have gone out.
+};
+
+struct ExchangeResult {
+  ExchangeStatus status = ExchangeStatus::io_error;
+  Verdict verdict = Verdict::send;
+  Reply reply{};
+  Frame reply_frame{};      ///< raw bytes, for traces
+  int native_error = 0;
+  int foreign_frames = 0;   ///< discarded while waiting
+  TimePoint request_begin{};  ///< first byte out (at the bind)
+  TimePoint request_end{};    ///< last byte out (computed from the baud rate)
+  TimePoint reply_begin{};    ///< first byte in; unset without a reply
+  TimePoint reply_end{};      ///< last byte in, or the end of the wait
+};
+
+/// State of the port below.
+struct PortStatus {
+  bool open = false;
+  std::optional<Error> error;  ///< why it is not open
+};
+
+/// Carries one exchange at a time, with the mandatory silence before each. All calls from the core thread; both
+/// callbacks arrive on the core thread.
+class Line {
+ public:
+  using ResultHandler = std::function<void(const ExchangeResult&)>;
+  using PortHandler = std::function<void(const PortStatus&)>;
+  virtual ~Line() = default;
+
+  /// Sets the callbacks and starts opening the port (again and again, with back-off).
+  virtual void start(ResultHandler on_result, PortHandler on_port) = 0;
+  /// Puts `exchange` into the one-place slot. It is bound, and its guard checked, when the silence has passed.
+  /// Precondition: the port is open, the slot is empty and nothing is under way. Ends with exactly one on_result,
+  /// unless revoke() succeeds.
+  virtual void arm(const Exchange& exchange) = 0;
+  /// Takes the armed exchange back. False: it was already bound, its result will come.
+  virtual bool revoke() = 0;
+  /// A stop waits: end the wait for a silent node as soon as its turnaround_max has passed without a byte.
+  virtual void cut_wait() = 0;
+  /// Time of the last progress of the line's own thread (for the watchdog). Thread: any.
+  [[nodiscard]] virtual TimePoint last_progress() const = 0;
+};
+
+}  // namespace axisd::modbus_rtu

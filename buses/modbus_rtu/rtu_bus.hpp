@@ -1,0 +1,79 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "buses/modbus_rtu/line.hpp"
+#include "buses/modbus_rtu/settings.hpp"
+#include "buses/modbus_rtu/transaction_queue.hpp"
+#include "buses/signal.hpp"
+#include "buses/task.hpp"
+
+namespace axisd::modbus_rtu {
+
+/// A successful exchange with its times.
+struct Answer {
+  std::vector<std::uint16_t> registers;  ///< of a read
+  TimePoint sent_at;                     ///< first byte of the request on the wire
+  TimePoint answered_at;                 ///< last byte of the reply
+};
+
+/// Counters of one bus. Read on the core thread.
+struct BusCounters {
+  std::uint64_t transactions = 0, timeouts = 0, corrupt = 0, exceptions = 0, foreign_frames = 0, dropped_expired = 0,
+      dropped_superseded = 0, io_errors = 0;
+};
+
+/// What went over the wire, for traces. Called on the core thread after each exchange; must not block.
+using ExchangeObserver = std::function<void(const std::string& bus, const Exchange&, const ExchangeResult&)>;
+
+/// One RS-485 line on the core thread: queues transactions, hands the line one at a time, and tells each caller
+/// exactly once how its transaction ended. Thread: core.
+class RtuBus {
+ public:
+  RtuBus(Executor executor, Clock& clock, LineSettings settings, std::unique_ptr<Line> line);
+  ~RtuBus();
+  RtuBus(const RtuBus&) = delete;
+
+  void start(ExchangeObserver observer = {});
+
+  /// Queues one request and waits for its end. Errors: `superseded`, `expired`, `lease_lost` (not sent), `bus_down`,
+  /// `refused` (native_code is the exception), `no_reply` (outcome unknown).
+  Task<Result<Answer>> transact(Request request, TransactionOptions options);
+
+  /// Moves queued frames whose gate was raised out of the way and takes an armed one back. Called for each stop
+  /// before its frame is queued.
+  void purge_superseded();
+
+  [[nodiscard]] const LineSettings& settings() const { return settings_; }
+  [[nodiscard]] const PortStatus& port() const { return port_; }
+  /// Fires when the port opens or is lost.
+  [[nodiscard]] Signal& port_changed() { return port_changed_; }
+  [[nodiscard]] const BusCounters& counters() const { return counters_; }
+  [[nodiscard]] TimePoint last_progress() const { return line_->last_progress(); }
+
+ private:
+  void pump();
+  void on_result(const ExchangeResult& result);
+  void on_port(const PortStatus& status);
+  void reap_expired();
+  void finish(Transaction& transaction, const ExchangeResult& result);
+
+  Executor executor_;
+  Clock* clock_;
+  LineSettings settings_;
+  std::unique_ptr<Line> line_;
+  PortStatus port_;
+  Signal port_changed_;
+  TransactionQueue queue_;
+  std::unique_ptr<Transaction> current_;  ///< armed or under way
+  bool pump_posted_ = false;
+  Clock::Timer expiry_;
+  BusCounters counters_;
+  ExchangeObserver observer_;
+};
+
+}  // namespace axisd::modbus_rtu

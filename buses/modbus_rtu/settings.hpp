@@ -1,0 +1,35 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "buses/clock.hpp"
+
+namespace axisd::modbus_rtu {
+
+enum class Parity : std::uint8_t { none, even, odd };
+
+/// Serial format "8N1", "8N2", "8E1" or "8O1".
+struct Format {
+  Parity parity = Parity::none;
+  int stop_bits = 1;
+  [[nodiscard]] int bits_per_character() const { return 1 + 8 + (parity == Parity::none ? 0 : 1) + stop_bits; }
+};
+
+/// One RS-485 line as the YAML describes it.
+struct LineSettings {
+  std::string name;                 ///< bus name
+  std::string port;                 ///< device path, or "sim"
+  int baud = 115200;                ///< bit/s; any rate the adapter can do
+  Format format{};
+  Duration turnaround_max = std::chrono::milliseconds(20);  ///< longest time a node takes before its first byte
+  [[nodiscard]] bool simulated() const { return port == "sim"; }
+};
+
+/// Time that `bytes` characters take on the wire.
+Duration wire_time(const LineSettings& line, std::size_t bytes);
+/// Silence before each request: 3.5 characters, 1.75 ms above 19200 baud (Modbus over serial line 2.5.1.1).
+Duration silence(const LineSettings& line);
+
+}  // namespace axisd::modbus_rtu

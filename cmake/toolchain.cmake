@@ -1,0 +1,22 @@
+# Compiler settings for every target.
+find_program(AXISD_CCACHE ccache)
+if(AXISD_CCACHE)
+  # A base directory and no hashed working directory: clones at other places share one cache.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1
+                                  ${AXISD_CCACHE})
+  set(CMAKE_C_COMPILER_LAUNCHER ${CMAKE_CXX_COMPILER_LAUNCHER})
+endif()
+
+add_compile_options(-Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+                    -ffile-prefix-map=${CMAKE_SOURCE_DIR}/= -fdebug-compilation-dir=.)
+if(CMAKE_BUILD_TYPE STREQUAL "Debug")
+  add_compile_options(-O1 -g1)
+  add_compile_definitions(_GLIBCXX_ASSERTIONS)
+endif()
+add_compile_definitions(AXISD_VERSION="${PROJECT_VERSION}" SPDLOG_FMT_EXTERNAL BOOST_ASIO_NO_DEPRECATED)
+add_link_options(-fuse-ld=lld-19)
+
+if(AXISD_SANITIZE)
+  add_compile_options(-fsanitize=${AXISD_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${AXISD_SANITIZE})
+endif()

@@ -1,0 +1,66 @@
+// The whole machine as one YAML file describes it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "buses/modbus_rtu/settings.hpp"
+#include "devices/axis/settings.hpp"
+
+namespace axisd::config {
+
+struct TlsSettings {
+  std::string certificate, key, client_ca;  ///< PEM files
+};
+
+struct ServerSettings {
+  std::string listen = "localhost:7443";  ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
+  std::optional<TlsSettings> tls;
+};
+
+/// `simulate:` of an axis on a simulated bus: the mechanics around its drive, user units, from the power-up position.
+struct SimulationSettings {
+  std::optional<double> home_switch;      ///< position of the home switch (active for `home_width` units)
+  double home_width = 1;
+  std::optional<double> positive_limit, negative_limit;
+  double start_position = 0;              ///< where the load stands at power-up
+};
+
+struct AxisEntry {
+  AxisSettings axis;
+  SimulationSettings simulation;
+};
+
+struct Configuration {
+  std::string machine;
+  std::string state_directory;  ///< where the daemon keeps its persistent state
+  ServerSettings server;
+  std::vector<modbus_rtu::LineSettings> buses;
+  std::vector<AxisEntry> axes;
+};
+
+/// One finding in a configuration file.
+struct Diagnostic {
+  std::string file;
+  int line = 0, column = 0;  ///< 1-based
+  std::string message;       ///< with the offending text
+  std::string suggestion;    ///< empty if there is none
+};
+std::string to_string(const Diagnostic& diagnostic);  ///< "demo.yaml:12:5: unknown key 'velocty'; did you mean ..."
+
+struct LoadResult {
+  std::optional<Configuration> configuration;  ///< set if there is no diagnostic
+  std::vector<Diagnostic> diagnostics;         ///< all errors at once, in the order of the file
+};
+
+/// Reads and checks a file completely. Never throws.
+LoadResult load_file(const std::string& path);
+LoadResult load_text(std::string_view text, const std::string& file_name);
+
+/// JSON Schema (draft 2020-12) of the file, generated from the definitions that the loader uses.
+std::string json_schema();
+
+}  // namespace axisd::config

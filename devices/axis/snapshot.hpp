@@ -1,0 +1,74 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "buses/error.hpp"
+#include "devices/axis/command.hpp"
+#include "devices/drive.hpp"
+
+namespace axisd {
+
+/// PLCopen Motion Control part 1, state diagram. `offline` is not a state but stands beside (LinkState).
+enum class AxisState : std::uint8_t { disabled, standstill, homing, discrete_motion, continuous_motion,
+                                      synchronized_motion, stopping, error_stop };
+std::string_view to_string(AxisState state);
+
+/// What is known about the way to the drive.
+enum class LinkState : std::uint8_t { offline, configuring, online };
+std::string_view to_string(LinkState state);
+
+enum class PositionTrust : std::uint8_t { unknown, set, homed, restored };
+std::string_view to_string(PositionTrust trust);
+
+struct TerminalState {
+  std::string name;      ///< "X0"
+  std::string function;  ///< as configured; empty without one
+  bool active = false;
+};
+
+/// Everything known about an axis at one moment. Immutable once published; user units, axis direction.
+struct AxisSnapshot {
+  std::string name;
+  std::string bus;
+  std::uint8_t node = 0;
+  std::string model;
+  std::string unit;
+  bool simulated = false;
+
+  AxisState state = AxisState::disabled;
+  LinkState link = LinkState::offline;
+  std::optional<Error> link_error{};  ///< why it is not online
+  std::optional<Error> fault{};       ///< why it is in ErrorStop
+  bool enabled = false;               ///< the drive's power stage
+  bool enabled_by_us = false;         ///< false with enabled: found energised
+  bool stop_held = false;             ///< Stopping until ReleaseStop
+  bool inhibited = false;             ///< StopAll holds the machine
+
+  double position = 0;
+  double velocity = 0;
+  std::optional<double> target{};     ///< of the current motion
+  bool moving = false;
+  bool positive_direction = true;     ///< of the last motion
+  bool in_position = false;
+  bool homed = false;                 ///< the drive's homing bit
+  PositionTrust trust = PositionTrust::unknown;
+  PositionSource position_source = PositionSource::unspecified;
+  std::uint16_t alarm_code = 0;
+  std::string alarm_name{};
+  std::vector<TerminalState> inputs{}, outputs{};
+  std::optional<DriveIdentity> identity{};
+  int reboots = 0;                    ///< seen since the daemon started
+
+  TimePoint sampled_after{};          ///< the drive values are from between these two
+  TimePoint sampled_before{};
+  WallTime measured_at{};
+  std::string command_id{};           ///< current command, if any
+  std::uint64_t revision = 0;         ///< rises with every publication
+};
+using AxisSnapshotPtr = std::shared_ptr<const AxisSnapshot>;
+
+}  // namespace axisd

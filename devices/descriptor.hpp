@@ -1,0 +1,113 @@
+// What a model folder exports: data that the loader, the schema, the documentation, `check` and `budget` walk.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "buses/gate.hpp"
+#include "buses/task.hpp"
+#include "devices/drive.hpp"
+
+namespace axisd {
+
+namespace modbus_rtu {
+class RtuBus;
+}
+
+enum class BusKind : std::uint8_t { modbus_rtu, canopen };
+
+struct TerminalSpec {
+  std::string_view name;  ///< "X0"; its index in the list is its bit in DriveSample
+};
+
+/// A function that a terminal can have. `mirror` names the function that an inverted axis needs instead (M18).
+struct TerminalFunctionSpec {
+  std::string_view name;  ///< "positive_limit"
+  std::uint16_t code;
+  std::string_view mirror;      ///< empty: direction does not matter
+  bool starts_motion = false;   ///< M3: written only while released and the input is inactive
+};
+
+enum class Access : std::uint8_t { ro, rw, rw_saved, wo };
+/// One register of the catalogue.
+struct ParameterSpec {
+  std::uint32_t address;
+  std::string_view name;  ///< "start_speed"
+  Access access;
+  std::int32_t minimum, maximum;
+  std::optional<std::int32_t> default_value;
+  std::string_view unit;
+  std::string_view description;
+};
+
+/// How an alarm goes away.
+enum class AlarmReset : std::uint8_t { power_cycle, by_itself, by_command };
+struct AlarmSpec {
+  std::uint16_t code;
+  std::string_view name;    ///< "overcurrent"
+  AlarmReset reset;
+  std::string_view remedy;  ///< what to do
+};
+
+/// A key that this model adds to the YAML's `drive:` section.
+struct SettingSpec {
+  std::string_view key;
+  std::string_view kind;  ///< "enum", "integer", "boolean"
+  std::span<const std::string_view> choices;  ///< of an enum
+  std::int64_t minimum = 0, maximum = 0;
+  std::string_view default_value;             ///< empty: the drive's value is left alone
+  std::string_view description;
+};
+
+/// Ranges that hold for every command of this model.
+struct Capabilities {
+  std::span<const std::int32_t> pulses_per_revolution;  ///< permitted microstep settings
+  int minimum_rpm = 1, maximum_rpm = 3000;
+  std::int64_t maximum_pulse_rate_hz = 200'000;         ///< M11
+  int minimum_start_rpm = 2, maximum_start_rpm = 300;
+  int minimum_time_ms = 0, maximum_time_ms = 2000;
+  int minimum_homing_rpm = 5, maximum_homing_rpm = 3000, minimum_search_rpm = 5, maximum_search_rpm = 300;
+  int minimum_homing_time_ms = 30;
+  std::int32_t maximum_homing_offset_pulses = 65535;
+  PositionSource position_source = PositionSource::unspecified;
+  bool closed_loop = false;
+  bool communication_watchdog = false;
+};
+
+/// Everything a factory needs to build a drive.
+struct DriveContext {
+  Executor executor;
+  Clock* clock = nullptr;
+  modbus_rtu::RtuBus* rtu = nullptr;  ///< of the axis's bus, for modbus_rtu models
+  std::uint8_t node = 0;
+  DriveSetup setup;
+};
+
+struct DriveDescriptor {
+  std::string_view model;  ///< name in the YAML: "ykd2405pr"
+  std::string_view title;
+  BusKind bus = BusKind::modbus_rtu;
+  std::span<const std::int32_t> bauds;  ///< rates the drive can be set to
+  std::uint8_t minimum_node = 1, maximum_node = 127;
+  std::span<const TerminalSpec> inputs, outputs;
+  std::span<const TerminalFunctionSpec> input_functions, output_functions;
+  std::span<const ParameterSpec> parameters;
+  std::span<const AlarmSpec> alarms;
+  std::span<const SettingSpec> settings;
+  Capabilities capabilities;
+  std::unique_ptr<Drive> (*make)(DriveContext context) = nullptr;
+};
+
+/// All models, generated from the folders. The pointers live as long as the program.
+std::span<const DriveDescriptor* const> drive_models();
+/// nullptr if there is none of that name.
+const DriveDescriptor* find_drive_model(std::string_view model);
+/// nullptr if the model has no such function.
+const TerminalFunctionSpec* find_function(std::span<const TerminalFunctionSpec> functions, std::string_view name);
+
+}  // namespace axisd

@@ -1,0 +1,117 @@
+// The contract between an axis and the model-specific code that speaks to one node.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "buses/error.hpp"
+#include "buses/gate.hpp"
+#include "buses/task.hpp"
+#include "buses/transaction.hpp"
+#include "devices/axis/settings.hpp"
+
+namespace axisd {
+
+struct DriveDescriptor;
+
+/// What the drive itself says it is doing.
+enum class DriveMode : std::uint8_t { positioning, homing, multi_position, multi_velocity };
+enum class PositionSource : std::uint8_t { unspecified, commanded, encoder };
+
+/// One coherent reading of a drive. Pulses and directions are the drive's.
+struct DriveSample {
+  TimePoint asked_at;   ///< first byte of the request: everything below is at least this fresh
+  TimePoint measured_at;  ///< last byte of the reply
+  DriveMode mode = DriveMode::positioning;
+  bool moving = false;
+  bool in_position = false;
+  bool homed = false;
+  bool enabled = false;
+  std::uint16_t alarm_code = 0;  ///< 0: none
+  std::int32_t position_pulses = 0;
+  std::int32_t velocity_rpm = 0;  ///< signed as the drive reports it
+  bool negative_direction = false;
+  std::uint32_t inputs = 0;   ///< bit per terminal, in the descriptor's order; 1 active
+  std::uint32_t outputs = 0;
+};
+
+struct DriveIdentity {
+  std::uint16_t model_code = 0;
+  std::string version;
+};
+
+/// A positioning move, in drive units.
+struct MoveProfile {
+  std::int32_t target_pulses = 0;  ///< counter value, or signed distance if `relative`
+  bool relative = false;           ///< the drive's own relative mode; for endless axes only
+  int velocity_rpm = 0;            ///< > 0
+  int start_rpm = 5;
+  Duration acceleration_time{}, deceleration_time{};
+};
+
+struct VelocityProfile {
+  int velocity_rpm = 0;  ///< signed
+  int start_rpm = 5;
+  Duration acceleration_time{}, deceleration_time{};
+};
+
+struct HomingProfile {
+  HomingMethod method = HomingMethod::home_positive;  ///< drive direction
+  int velocity_rpm = 0;
+  int search_velocity_rpm = 0;
+  Duration acceleration_time{};
+  std::int32_t offset_pulses = 0;
+};
+
+/// What the axis wants the drive to be, in drive direction (already mirrored for inverted axes, M18).
+struct DriveSetup {
+  std::int64_t pulses_per_revolution = 0;
+  std::vector<TerminalSettings> inputs, outputs;
+  std::optional<HomingProfile> homing;
+  bool persist = false;
+  Duration reboot_guard{};
+  std::map<std::string, SettingValue> model_settings;
+};
+
+/// One drive. All sequences are coroutines of the core thread. Errors carry bus, node, register and native code;
+/// `outcome` says what is known about the execution. Thread: core.
+class Drive {
+ public:
+  virtual ~Drive() = default;
+
+  /// Reads and verifies the identity. Errors: wrong_model, no_reply, bus_down, refused.
+  virtual Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) = 0;
+
+  /// Brings the drive's configuration to `setup`: compares, writes what differs, verifies all of it, and marks this
+  /// power cycle with a canary (M3, M6). Never touches the power stage or starts anything. Functions that can start
+  /// motion are written only while the drive is released. Errors: misconfigured, refused, no_reply, moving, ...
+  virtual Task<Result<void>> configure() = 0;
+
+  /// One block read of the whole state.
+  virtual Task<Result<DriveSample>> read_state(TransactionClass transaction_class) = 0;
+
+  /// Reads the canary (M7). Error `rebooted` if the drive lost its memory since configure().
+  virtual Task<Result<void>> check_continuity(TransactionClass transaction_class) = 0;
+
+  /// Power stage. enable() includes a canary check. Errors as above.
+  virtual Task<Result<void>> enable(MotionGuard guard) = 0;
+  virtual Task<Result<void>> disable() = 0;
+
+  /// Canary, fresh block, trigger (M6): returns once the trigger was acknowledged. `rebooted`: nothing was sent.
+  /// outcome `unknown`: the trigger was sent without a reply; the caller must read back before anything else (M8).
+  virtual Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) = 0;
+  virtual Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) = 0;
+  virtual Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) = 0;
+
+  /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop does not) in class `stop`.
+  virtual Task<Result<void>> stop(StopKind kind) = 0;
+
+  virtual Task<Result<void>> clear_alarm() = 0;
+  /// Sets the drive's position counter to zero; only at standstill. Verified by the caller's next sample.
+  virtual Task<Result<void>> clear_position(MotionGuard guard) = 0;
+};
+
+}  // namespace axisd

@@ -1,0 +1,75 @@
+// What the API sees of a machine. Implemented by the daemon's composition; every call is safe from any thread.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "buses/modbus_rtu/rtu_bus.hpp"
+#include "devices/axis/command.hpp"
+#include "devices/axis/snapshot.hpp"
+
+namespace axisd {
+
+/// How far a caller wants to follow a command before it gets its answer.
+enum class WaitUntil : std::uint8_t { accepted, started, done };
+
+struct BusStatus {
+  std::string name, port;
+  int baud = 0;
+  bool open = false;
+  bool simulated = false;
+  std::optional<Error> error;
+  modbus_rtu::BusCounters counters;
+};
+
+struct MachineInfo {
+  std::string machine;      ///< name from the YAML
+  std::string version;
+  std::string instance_id;  ///< new with every start
+  bool inhibited = false;   ///< StopAll is latched
+  std::string inhibited_by;
+};
+
+/// Thread: any. Callbacks arrive on the core thread and must only hand over.
+class Machine {
+ public:
+  using CommandCallback = std::function<void(Result<Command>)>;
+  virtual ~Machine() = default;
+
+  [[nodiscard]] virtual std::vector<std::string> axis_names() const = 0;
+  /// The latest state, without waiting for the core. nullptr: unknown axis.
+  [[nodiscard]] virtual AxisSnapshotPtr snapshot(std::string_view axis) const = 0;
+  [[nodiscard]] virtual MachineInfo info() const = 0;
+
+  /// Validates and starts a command; calls back exactly once: with an error if it was not accepted, else when it
+  /// reached `until` or ended. Ending the call early never changes the command. Stops take their own lane.
+  virtual void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
+                      CommandCallback callback) = 0;
+  /// Extends the hold of the axis's current jog or held velocity command (by repeating it); part of submit(Jog).
+
+  /// Ends Stopping with hold (MC_Stop with Execute going false).
+  virtual void release_stop(std::string axis, CommandCallback callback) = 0;
+  /// Stops all axes and latches the inhibit (M14). Calls back with the stop command of each axis.
+  virtual void stop_all(std::string client, WaitUntil until,
+                        std::function<void(std::vector<Result<Command>>)> callback) = 0;
+  virtual void release_inhibit(std::string client, std::function<void(Result<void>)> callback) = 0;
+
+  /// A known command; calls back at once. Errors: unknown_command.
+  virtual void get_command(std::string id, CommandCallback callback) = 0;
+  /// Calls back at each change of the command until it has ended (the last call) or the returned token is dropped.
+  virtual std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) = 0;
+  virtual void cancel_command(std::string id, CommandCallback callback) = 0;
+
+  virtual void buses(std::function<void(std::vector<BusStatus>)> callback) = 0;
+
+  /// Called on the core thread whenever any snapshot was published; set once before serving.
+  virtual void on_published(std::function<void()> notify) = 0;
+  [[nodiscard]] virtual WallTime wall(TimePoint t) const = 0;
+  [[nodiscard]] virtual TimePoint now() const = 0;
+};
+
+}  // namespace axisd

@@ -1,0 +1,62 @@
+// A simulated drive: pure, in the time that it is given, true to the drive's manual. It knows no driver code.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "buses/clock.hpp"
+
+namespace axisd::simulation {
+
+/// The points that the manuals leave open ("not said", "likely" in facts); every test must pass either way.
+/// Each simulator documents which names it understands and their default. Set before the first frame.
+using Switches = std::map<std::string, bool, std::less<>>;
+
+/// One node on an RS-485 line. Not thread-safe: owned by its line.
+class SimulatedRtuNode {
+ public:
+  virtual ~SimulatedRtuNode() = default;
+  [[nodiscard]] virtual std::uint8_t address() const = 0;
+  /// Lets time pass until `now` (motor, timers, alarms). Calls never go backwards.
+  virtual void advance(TimePoint now) = 0;
+  /// A complete frame on the wire, for any node, ending at the time of the last advance(). The reply, or nothing.
+  virtual std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) = 0;
+
+  /// The power supply: off clears RAM, position and the power stage; on boots for the model's boot time (silent).
+  virtual void set_power(bool on) = 0;
+  /// Drives the level of an input terminal ("X3") from outside, over any virtual switch on it.
+  virtual void set_input(std::string_view terminal, std::optional<bool> active) = 0;
+  /// Raises alarm `code` (0: the cause goes away).
+  virtual void raise_alarm(int code) = 0;
+  /// Position of the virtual machine in pulses, independent of the drive's counter: where the load really is.
+  [[nodiscard]] virtual std::int64_t shaft_pulses() const = 0;
+  [[nodiscard]] virtual bool shaft_moving() const = 0;
+  /// How many times a start of motion (start command, homing, terminal) was executed since creation.
+  [[nodiscard]] virtual int starts() const = 0;
+  [[nodiscard]] virtual std::uint16_t peek(std::uint16_t address) const = 0;   ///< register, without access rules
+  virtual void poke(std::uint16_t address, std::uint16_t value) = 0;
+};
+
+/// The mechanics around a simulated drive, in pulses of the shaft from its position at creation.
+struct Mechanics {
+  std::optional<std::int64_t> home_switch_from, home_switch_to;  ///< active between these
+  std::optional<std::int64_t> positive_limit_from;               ///< active at and beyond
+  std::optional<std::int64_t> negative_limit_from;               ///< active at and below
+};
+
+struct SimulatedNodeSettings {
+  std::uint8_t address = 1;
+  Mechanics mechanics{};
+  Switches switches{};
+  bool powered = true;
+  /// EEPROM contents that differ from the factory's (register -> value), as a commissioned drive would have.
+  std::map<std::uint16_t, std::uint16_t> eeprom{};
+};
+
+}  // namespace axisd::simulation
