@@ -1,0 +1,73 @@
+// What must survive a restart, as the axes and the machine see it. The file behind it is daemon/store's
+// business.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "buses/clock.hpp"
+#include "buses/error.hpp"
+#include "devices/axis/snapshot.hpp"
+
+namespace axisd {
+
+/// How an axis's position follows from its drive's counter, and by what the drive is recognised as unchanged
+/// (M20).
+struct OffsetRecord {
+  std::int64_t offset_pulses = 0;                ///< axis position in pulses = unwrapped counter + offset
+  PositionTrust trust = PositionTrust::unknown;  ///< as it was; only the axis may turn it into `restored`
+  std::array<std::uint16_t, 6> canary{};         ///< what 0x0020..0x0025 were last written with (M6)
+  std::int64_t last_position_pulses = 0;         ///< the drive's counter at standstill when this was saved
+  std::int64_t pulses_per_revolution = 0;        ///< another value in the configuration voids the record
+  bool invert = false;                           ///< likewise
+  bool operator==(const OffsetRecord&) const = default;
+};
+
+/// The machine-wide latch of StopAll (M14).
+struct InhibitRecord {
+  bool active = false;
+  std::string by;  ///< who latched it (or released it)
+  WallTime since{};
+  bool operator==(const InhibitRecord&) const = default;
+};
+
+struct AxisRecord {
+  std::optional<OffsetRecord> offset;
+  std::uint64_t eeprom_writes = 0;  ///< since the axis was first configured on this computer
+  bool operator==(const AxisRecord&) const = default;
+};
+
+/// Everything that is kept.
+struct StoredState {
+  std::uint64_t start_count =
+      0;  ///< rises with every start of the daemon, also after a damaged file: fencing epoch
+  InhibitRecord inhibit;
+  std::map<std::string, AxisRecord> axes;  ///< by name; also axes that the configuration no longer has
+  bool operator==(const StoredState&) const = default;
+};
+
+/// Saves what must survive. Calls return at once; nothing waits for the disk, a stop least of all. `done`
+/// (may be empty) is called exactly once, later, on the core thread: when the change is durable, or with
+/// Error `storage`. After an error the saved offset of that axis is void (neither old nor new is certain), an
+/// inhibit stays latched, and counts are kept for the next save. Thread: core.
+class Persistence {
+ public:
+  using Callback = std::function<void(Result<void>)>;
+  virtual ~Persistence() = default;
+
+  /// What was kept when the daemon started; does not follow later saves. Thread: any.
+  [[nodiscard]] virtual const StoredState& loaded() const = 0;
+
+  virtual void save_offset(std::string axis, OffsetRecord offset, Callback done) = 0;
+  /// The position is no longer known: after a restart there is nothing to restore.
+  virtual void forget_offset(std::string axis, Callback done) = 0;
+  virtual void save_inhibit(InhibitRecord inhibit, Callback done) = 0;
+  /// `writes` more registers were saved to the drive's EEPROM.
+  virtual void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) = 0;
+};
+
+}  // namespace axisd
