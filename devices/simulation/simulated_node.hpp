@@ -25,13 +25,17 @@ class SimulatedRtuNode {
   [[nodiscard]] virtual std::uint8_t address() const = 0;
   /// Lets time pass until `now` (motor, timers, alarms). Calls never go backwards.
   virtual void advance(TimePoint now) = 0;
-  /// A complete frame on the wire, for any node, ending at the time of the last advance(). The reply, or nothing.
+  /// A complete frame on the wire, for any node, ending at the time of the last advance(). The reply, or
+  /// nothing.
   virtual std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) = 0;
 
-  /// The power supply: off clears RAM, position and the power stage; on boots for the model's boot time (silent).
+  /// The power supply: off clears RAM, position and the power stage; on boots for the model's boot time
+  /// (silent).
   virtual void set_power(bool on) = 0;
-  /// Drives the level of an input terminal ("X3") from outside, over any virtual switch on it.
+  /// Drives the level of an input terminal ("X3") from outside (true: high), over any virtual switch on it;
+  /// nothing gives it back to the switch. Unknown terminals are ignored: see has_input().
   virtual void set_input(std::string_view terminal, std::optional<bool> active) = 0;
+  [[nodiscard]] virtual bool has_input(std::string_view) const { return true; }
   /// Raises alarm `code` (0: the cause goes away).
   virtual void raise_alarm(int code) = 0;
   /// Position of the virtual machine in pulses, independent of the drive's counter: where the load really is.
@@ -39,8 +43,11 @@ class SimulatedRtuNode {
   [[nodiscard]] virtual bool shaft_moving() const = 0;
   /// How many times a start of motion (start command, homing, terminal) was executed since creation.
   [[nodiscard]] virtual int starts() const = 0;
-  [[nodiscard]] virtual std::uint16_t peek(std::uint16_t address) const = 0;   ///< register, without access rules
+  [[nodiscard]] virtual std::uint16_t peek(
+      std::uint16_t address) const = 0;  ///< register, without access rules
   virtual void poke(std::uint16_t address, std::uint16_t value) = 0;
+  /// Registers written to EEPROM since creation.
+  [[nodiscard]] virtual std::uint64_t eeprom_writes() const { return 0; }
 };
 
 /// The mechanics around a simulated drive, in pulses of the shaft from its position at creation.
@@ -50,6 +57,15 @@ struct Mechanics {
   std::optional<std::int64_t> negative_limit_from;               ///< active at and below
 };
 
+enum class SwitchKind : std::uint8_t { home, positive_limit, negative_limit };
+
+/// A switch of the mechanics on a particular terminal. Without one, the switch is wired to whichever terminal
+/// has its function, with the level that this terminal takes as active.
+struct Wire {
+  SwitchKind kind = SwitchKind::home;
+  bool normally_closed = false;  ///< low level when the switch is active
+};
+
 struct SimulatedNodeSettings {
   std::uint8_t address = 1;
   Mechanics mechanics{};
@@ -57,6 +73,8 @@ struct SimulatedNodeSettings {
   bool powered = true;
   /// EEPROM contents that differ from the factory's (register -> value), as a commissioned drive would have.
   std::map<std::uint16_t, std::uint16_t> eeprom{};
+  std::map<std::string, Wire, std::less<>> wires{};     ///< terminal -> switch
+  Duration boot_time = std::chrono::milliseconds(300);  ///< silent after power-up; the manuals give no figure
 };
 
 }  // namespace axisd::simulation

@@ -4,19 +4,36 @@
 #include <span>
 #include <string_view>
 
+#include "buses/error.hpp"
+#include "devices/descriptor.hpp"
 #include "devices/simulation/simulated_node.hpp"
 
 namespace axisd::simulation {
+
+/// One open point of a manual that a simulator decides (see Switches).
+struct SwitchSpec {
+  std::string_view name;
+  bool default_value = false;
+  std::string_view meaning;  ///< of the position on
+};
 
 /// What a model folder exports for its simulator.
 struct Simulator {
   std::string_view model;  ///< as in the YAML: "ykd2405pr"
   std::unique_ptr<SimulatedRtuNode> (*make)(SimulatedNodeSettings settings) = nullptr;
+  std::span<const SwitchSpec> switches{};
+  std::span<const TerminalSpec> inputs{};
 };
 
 /// All simulated models, generated from the folders.
 std::span<const Simulator* const> simulators();
 /// nullptr if there is none of that name.
 const Simulator* find_simulator(std::string_view model);
+
+/// Makes a node. Errors: unknown model, switch or terminal of a wire; an address outside 1..127.
+Result<std::unique_ptr<SimulatedRtuNode>> make_node(std::string_view model, SimulatedNodeSettings settings);
+/// The same for a simulator at hand.
+Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,
+                                                    SimulatedNodeSettings settings);
 
 }  // namespace axisd::simulation
