@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,15 +24,15 @@ struct Answer {
 
 /// Counters of one bus. Read on the core thread.
 struct BusCounters {
-  std::uint64_t transactions = 0, timeouts = 0, corrupt = 0, exceptions = 0, foreign_frames = 0, dropped_expired = 0,
-      dropped_superseded = 0, io_errors = 0;
+  std::uint64_t transactions = 0, timeouts = 0, corrupt = 0, exceptions = 0, foreign_frames = 0,
+                dropped_expired = 0, dropped_superseded = 0, io_errors = 0;
 };
 
 /// What went over the wire, for traces. Called on the core thread after each exchange; must not block.
 using ExchangeObserver = std::function<void(const std::string& bus, const Exchange&, const ExchangeResult&)>;
 
-/// One RS-485 line on the core thread: queues transactions, hands the line one at a time, and tells each caller
-/// exactly once how its transaction ended. Thread: core.
+/// One RS-485 line on the core thread: queues transactions, hands the line one at a time, and tells each
+/// caller exactly once how its transaction ended. Thread: core.
 class RtuBus {
  public:
   RtuBus(Executor executor, Clock& clock, LineSettings settings, std::unique_ptr<Line> line);
@@ -40,12 +41,12 @@ class RtuBus {
 
   void start(ExchangeObserver observer = {});
 
-  /// Queues one request and waits for its end. Errors: `superseded`, `expired`, `lease_lost` (not sent), `bus_down`,
-  /// `refused` (native_code is the exception), `no_reply` (outcome unknown).
+  /// Queues one request and waits for its end. Errors: `superseded`, `expired`, `lease_lost` (not sent),
+  /// `bus_down`, `refused` (native_code is the exception), `no_reply` (outcome unknown).
   Task<Result<Answer>> transact(Request request, TransactionOptions options);
 
-  /// Moves queued frames whose gate was raised out of the way and takes an armed one back. Called for each stop
-  /// before its frame is queued.
+  /// Moves queued frames whose gate was raised out of the way and takes an armed one back. Called for each
+  /// stop before its frame is queued.
   void purge_superseded();
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
@@ -56,11 +57,24 @@ class RtuBus {
   [[nodiscard]] TimePoint last_progress() const { return line_->last_progress(); }
 
  private:
+  /// A read that timed out: its reply may still come, and an FC03 reply does not say which registers it
+  /// carries.
+  struct LateRead {
+    std::uint16_t address;
+    std::uint16_t count;
+  };
+
+  Task<Result<Answer>> exchange(Request request, TransactionOptions options);
+  [[nodiscard]] bool needs_resync(const Request& request) const;
   void pump();
+  void arm_next();
   void on_result(const ExchangeResult& result);
   void on_port(const PortStatus& status);
-  void reap_expired();
-  void finish(Transaction& transaction, const ExchangeResult& result);
+  void reap(TimePoint now);
+  void end(TransactionPtr transaction, const ExchangeResult& result);
+  void count(const ExchangeResult& result);
+  void note_late_read(const Request& request, const ExchangeResult& result);
+  [[nodiscard]] Result<Answer> answer(const Transaction& transaction, const ExchangeResult& result) const;
 
   Executor executor_;
   Clock* clock_;
@@ -69,8 +83,8 @@ class RtuBus {
   PortStatus port_;
   Signal port_changed_;
   TransactionQueue queue_;
-  std::unique_ptr<Transaction> current_;  ///< armed or under way
-  bool pump_posted_ = false;
+  TransactionPtr current_;  ///< armed or under way
+  std::map<std::uint8_t, LateRead> late_reads_;
   Clock::Timer expiry_;
   BusCounters counters_;
   ExchangeObserver observer_;

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "buses/modbus_rtu/line.hpp"
+#include "buses/transaction.hpp"
+
+namespace axisd::modbus_rtu {
+
+/// A queued exchange and whom to tell how it ended.
+struct Transaction {
+  Exchange exchange;
+  TransactionClass transaction_class = TransactionClass::parameters;
+  std::uint64_t sequence = 0;  ///< order of arrival; set by the queue
+  /// Called exactly once each. Several: identical reads that were merged.
+  std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
+};
+using TransactionPtr = std::unique_ptr<Transaction>;
+
+/// Order of one bus: strict classes, earliest deadline within a class, then order of arrival. So that the
+/// lowest classes are never starved, every `reservation`-th pop takes the head of the highest waiting class
+/// *below* the one that would be next (never instead of a stop). Pure: no I/O, no clock of its own.
+class TransactionQueue {
+ public:
+  explicit TransactionQueue(int reservation = 8) : reservation_(reservation) {}
+
+  /// A read equal to one that waits joins it (and lends it its urgency); everything else is queued.
+  void push(TransactionPtr transaction);
+  /// Returns one that pop() gave out but that was not sent, to its old place.
+  void put_back(TransactionPtr transaction);
+  /// The next one, or nullptr.
+  TransactionPtr pop();
+  /// Class of the next one by strict order.
+  [[nodiscard]] std::optional<TransactionClass> top_class() const;
+  /// Takes out all whose deadline has passed, or whose guard forbids sending.
+  std::vector<TransactionPtr> take_unsendable(TimePoint now);
+  std::vector<TransactionPtr> take_all();
+  /// Earliest deadline of all, or TimePoint::max().
+  [[nodiscard]] TimePoint next_deadline() const;
+  [[nodiscard]] std::size_t size() const;
+
+ private:
+  using Lane = std::deque<TransactionPtr>;
+  Lane& lane(TransactionClass transaction_class) {
+    return lanes_.at(static_cast<std::size_t>(transaction_class));
+  }
+  bool merge(Transaction& transaction);
+  void insert(TransactionPtr transaction);
+
+  std::array<Lane, transaction_class_count> lanes_;
+  int reservation_;
+  int popped_since_reservation_ = 0;
+  std::uint64_t last_sequence_ = 0;
+};
+
+}  // namespace axisd::modbus_rtu
