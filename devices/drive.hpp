@@ -1,6 +1,7 @@
 // The contract between an axis and the model-specific code that speaks to one node.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -45,8 +46,7 @@ struct DriveIdentity {
 
 /// A positioning move, in drive units.
 struct MoveProfile {
-  std::int32_t target_pulses = 0;  ///< counter value, or signed distance if `relative`
-  bool relative = false;           ///< the drive's own relative mode; for endless axes only
+  std::int32_t target_pulses = 0;  ///< counter value
   int velocity_rpm = 0;            ///< > 0
   int start_rpm = 5;
   Duration acceleration_time{}, deceleration_time{};
@@ -76,6 +76,10 @@ struct DriveSetup {
   std::map<std::string, SettingValue> model_settings;
 };
 
+/// Contents of drive memory that no power-up leaves behind: finding them proves that the drive kept its memory, and
+/// with it its position and configuration (M6, M7, M20).
+using ContinuityMark = std::array<std::uint16_t, 6>;
+
 /// One drive. All sequences are coroutines of the core thread. Errors carry bus, node, register and native code;
 /// `outcome` says what is known about the execution. Thread: core.
 class Drive {
@@ -95,6 +99,10 @@ class Drive {
 
   /// Reads the canary (M7). Error `rebooted` if the drive lost its memory since configure().
   virtual Task<Result<void>> check_continuity(TransactionClass transaction_class) = 0;
+
+  /// What the drive's memory holds now, if that is known; and, after a restart of the daemon, what it should hold.
+  [[nodiscard]] virtual std::optional<ContinuityMark> continuity_mark() const = 0;
+  virtual void expect_mark(const ContinuityMark& mark) = 0;
 
   /// Power stage. enable() includes a canary check. Errors as above.
   virtual Task<Result<void>> enable(MotionGuard guard) = 0;

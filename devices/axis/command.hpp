@@ -14,8 +14,20 @@
 
 namespace axisd {
 
-enum class CommandKind : std::uint8_t { enable, disable, home, move_absolute, move_relative, move_velocity, jog, halt,
-                                        stop, quick_stop, reset, set_position };
+enum class CommandKind : std::uint8_t {
+  enable,
+  disable,
+  home,
+  move_absolute,
+  move_relative,
+  move_velocity,
+  jog,
+  halt,
+  stop,
+  quick_stop,
+  reset,
+  set_position
+};
 std::string_view to_string(CommandKind kind);
 
 /// Accepted -> active -> exactly one of the four ends.
@@ -25,9 +37,9 @@ inline bool ended(CommandState state) { return state >= CommandState::done; }
 
 /// Values of a motion in user units; unset ones do not apply.
 struct MotionValues {
-  std::optional<double> position;      ///< absolute target
-  std::optional<double> distance;      ///< relative
-  std::optional<double> velocity;      ///< units per second; signed for velocity and jog
+  std::optional<double> position;  ///< absolute target
+  std::optional<double> distance;  ///< relative
+  std::optional<double> velocity;  ///< units per second; signed for velocity and jog
   std::optional<double> search_velocity;
   std::optional<Duration> acceleration_time, deceleration_time;
   std::optional<Duration> hold;
@@ -61,16 +73,36 @@ struct CommandOptions {
 struct EnableRequest {};
 struct DisableRequest {};
 struct HomeRequest {};
-struct MoveAbsoluteRequest { double position = 0; MotionValues with{}; };   ///< `with`: velocity and times only
-struct MoveRelativeRequest { double distance = 0; MotionValues with{}; };
-struct MoveVelocityRequest { double velocity = 0; std::optional<Duration> hold{}; MotionValues with{}; };
-struct JogRequest { double velocity = 0; Duration hold = milliseconds(300); MotionValues with{}; };
-struct StopRequest { StopKind kind = StopKind::stop; bool hold = false; };  ///< halt, stop or quick_stop
+struct MoveAbsoluteRequest {
+  double position = 0;
+  MotionValues with{};
+};  ///< `with`: velocity and times only
+struct MoveRelativeRequest {
+  double distance = 0;
+  MotionValues with{};
+};
+struct MoveVelocityRequest {
+  double velocity = 0;
+  std::optional<Duration> hold{};
+  MotionValues with{};
+};
+struct JogRequest {
+  double velocity = 0;
+  Duration hold = milliseconds(300);
+  MotionValues with{};
+};
+struct StopRequest {
+  StopKind kind = StopKind::stop;
+  bool hold = false;
+};  ///< halt, stop or quick_stop
 struct ResetRequest {};
-struct SetPositionRequest { double position = 0; };
+struct SetPositionRequest {
+  double position = 0;
+};
 
-using Action = std::variant<EnableRequest, DisableRequest, HomeRequest, MoveAbsoluteRequest, MoveRelativeRequest,
-                            MoveVelocityRequest, JogRequest, StopRequest, ResetRequest, SetPositionRequest>;
+using Action =
+    std::variant<EnableRequest, DisableRequest, HomeRequest, MoveAbsoluteRequest, MoveRelativeRequest,
+                 MoveVelocityRequest, JogRequest, StopRequest, ResetRequest, SetPositionRequest>;
 CommandKind kind_of(const Action& action);
 
 }  // namespace axisd

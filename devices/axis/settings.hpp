@@ -20,14 +20,14 @@ enum class HomingMethod : std::uint8_t { home_positive, home_negative, positive_
 
 /// One terminal as the YAML assigns it: `X1: { function: positive_limit, active: low }`.
 struct TerminalSettings {
-  std::string terminal;   ///< "X0", "PU", "Y1"
-  std::string function;   ///< by the descriptor's name; axis direction
+  std::string terminal;  ///< "X0", "PU", "Y1"
+  std::string function;  ///< by the descriptor's name; axis direction
   bool active_low = false;
 };
 
 struct LimitSettings {
   std::optional<double> position_minimum, position_maximum;  ///< user units; both or none
-  double velocity = 0;                          ///< user units per second, > 0, required
+  double velocity = 0;                                       ///< user units per second, > 0, required
   Duration acceleration_time = milliseconds(100);  ///< from start speed to velocity; the drives take a time
   std::optional<Duration> deceleration_time;       ///< default: acceleration_time
   int start_speed_rpm = 5;                         ///< r/min, 0x0020 of the RS-485 models
@@ -38,10 +38,10 @@ struct HomingSettings {
   double velocity = 0;         ///< user units per second
   double search_velocity = 0;  ///< user units per second
   Duration acceleration_time = milliseconds(100);
-  double position = 0;         ///< position at home, user units
-  double offset = 0;           ///< signed compensation after home, user units (0x0035/0x0036)
-  std::optional<double> backoff;      ///< bounded move away from an already active switch, user units > 0
-  std::optional<double> max_travel;   ///< user units > 0
+  double position = 0;               ///< position at home, user units
+  double offset = 0;                 ///< signed compensation after home, user units (0x0035/0x0036)
+  std::optional<double> backoff;     ///< bounded move away from an already active switch, user units > 0
+  std::optional<double> max_travel;  ///< user units > 0
   Duration timeout = std::chrono::seconds(60);
 };
 
@@ -60,16 +60,16 @@ struct AxisSettings {
   std::optional<HomingSettings> homing{};
   std::vector<TerminalSettings> inputs{}, outputs{};
   LeaseLossPolicy on_lease_loss = LeaseLossPolicy::halt;
-  bool vertical = false;             ///< `load: vertical` (M2)
+  bool vertical = false;                 ///< `load: vertical` (M2)
   bool stop_escalation_release = false;  ///< `stop_escalation: release` (M13)
-  bool require_trust = true;         ///< absolute moves need a trusted position
-  double jog_travel = 0;             ///< user units; longest jog of an axis whose position is unknown (M16)
-  double position_tolerance = 0;     ///< user units; 0: one pulse
+  bool require_trust = true;             ///< absolute moves need a trusted position
+  double jog_travel = 0;          ///< user units; longest jog of an axis whose position is unknown (M16)
+  double position_tolerance = 0;  ///< user units; 0: one pulse
   Duration poll_moving = milliseconds(20);
   Duration poll_idle = milliseconds(200);
-  Duration reboot_guard = milliseconds(100);  ///< M6; below the drive's shortest boot time
-  Duration stop_margin = milliseconds(300);   ///< beyond the deceleration time, before escalating
-  bool persist = false;                       ///< save configuration to the drive's EEPROM
+  Duration reboot_guard = milliseconds(100);             ///< M6; below the drive's shortest boot time
+  Duration stop_margin = milliseconds(300);              ///< beyond the deceleration time, before escalating
+  bool persist = false;                                  ///< save configuration to the drive's EEPROM
   std::map<std::string, SettingValue> model_settings{};  ///< by the descriptor's schema
 };
 

@@ -13,8 +13,16 @@
 namespace axisd {
 
 /// PLCopen Motion Control part 1, state diagram. `offline` is not a state but stands beside (LinkState).
-enum class AxisState : std::uint8_t { disabled, standstill, homing, discrete_motion, continuous_motion,
-                                      synchronized_motion, stopping, error_stop };
+enum class AxisState : std::uint8_t {
+  disabled,
+  standstill,
+  homing,
+  discrete_motion,
+  continuous_motion,
+  synchronized_motion,
+  stopping,
+  error_stop
+};
 std::string_view to_string(AxisState state);
 
 /// What is known about the way to the drive.
@@ -50,24 +58,24 @@ struct AxisSnapshot {
 
   double position = 0;
   double velocity = 0;
-  std::optional<double> target{};     ///< of the current motion
+  std::optional<double> target{};  ///< of the current motion
   bool moving = false;
-  bool positive_direction = true;     ///< of the last motion
+  bool positive_direction = true;  ///< of the last motion
   bool in_position = false;
-  bool homed = false;                 ///< the drive's homing bit
+  bool homed = false;  ///< the drive's homing bit
   PositionTrust trust = PositionTrust::unknown;
   PositionSource position_source = PositionSource::unspecified;
   std::uint16_t alarm_code = 0;
   std::string alarm_name{};
   std::vector<TerminalState> inputs{}, outputs{};
   std::optional<DriveIdentity> identity{};
-  int reboots = 0;                    ///< seen since the daemon started
+  int reboots = 0;  ///< seen since the daemon started
 
-  TimePoint sampled_after{};          ///< the drive values are from between these two
+  TimePoint sampled_after{};  ///< the drive values are from between these two
   TimePoint sampled_before{};
   WallTime measured_at{};
-  std::string command_id{};           ///< current command, if any
-  std::uint64_t revision = 0;         ///< rises with every publication
+  std::string command_id{};    ///< current command, if any
+  std::uint64_t revision = 0;  ///< rises with every publication
 };
 using AxisSnapshotPtr = std::shared_ptr<const AxisSnapshot>;
 

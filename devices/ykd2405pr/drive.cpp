@@ -43,6 +43,10 @@ class Ykd2405prDrive final : public Drive {
   Task<Result<void>> configure() override;
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
+  [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override {
+    return expected_.size() == 1 ? std::optional(expected_.front()) : std::nullopt;
+  }
+  void expect_mark(const ContinuityMark& mark) override { expected_ = {mark}; }
   Task<Result<void>> enable(MotionGuard guard) override;
   Task<Result<void>> disable() override;
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
@@ -248,9 +252,8 @@ Task<Result<void>> Ykd2405prDrive::disable() {
 }
 
 Task<Result<void>> Ykd2405prDrive::start_move(MoveProfile profile, MotionGuard guard) {
-  // 7.6.1: bit 0 position mode, bit 2 absolute.
-  const auto value = static_cast<std::uint16_t>(profile.relative ? 1 : 5);
-  co_return co_await start(encode(profile), std::nullopt, {reg::start, value}, std::move(guard));
+  // 7.6.1: bit 0 position mode, bit 2 absolute. An absolute start that arrives twice goes nowhere the second time.
+  co_return co_await start(encode(profile), std::nullopt, {reg::start, 5}, std::move(guard));
 }
 
 Task<Result<void>> Ykd2405prDrive::start_velocity(VelocityProfile profile, MotionGuard guard) {

@@ -1,0 +1,59 @@
+// Names of the axis vocabulary, as they appear in logs and on the command line.
+#include <array>
+#include <utility>
+
+#include "devices/axis/command.hpp"
+#include "devices/axis/snapshot.hpp"
+
+namespace axisd {
+
+std::string_view to_string(CommandKind kind) {
+  static constexpr auto names = std::to_array<std::string_view>(
+      {"enable", "disable", "home", "move_absolute", "move_relative", "move_velocity", "jog", "halt", "stop",
+       "quick_stop", "reset", "set_position"});
+  return names.at(std::to_underlying(kind));
+}
+
+std::string_view to_string(CommandState state) {
+  static constexpr auto names =
+      std::to_array<std::string_view>({"accepted", "active", "done", "aborted", "error", "unknown"});
+  return names.at(std::to_underlying(state));
+}
+
+std::string_view to_string(AxisState state) {
+  static constexpr auto names =
+      std::to_array<std::string_view>({"Disabled", "Standstill", "Homing", "DiscreteMotion",
+                                       "ContinuousMotion", "SynchronizedMotion", "Stopping", "ErrorStop"});
+  return names.at(std::to_underlying(state));
+}
+
+std::string_view to_string(LinkState state) {
+  static constexpr auto names = std::to_array<std::string_view>({"offline", "configuring", "online"});
+  return names.at(std::to_underlying(state));
+}
+
+std::string_view to_string(PositionTrust trust) {
+  static constexpr auto names = std::to_array<std::string_view>({"unknown", "set", "homed", "restored"});
+  return names.at(std::to_underlying(trust));
+}
+
+CommandKind kind_of(const Action& action) {
+  struct Kind {
+    CommandKind operator()(const EnableRequest&) const { return CommandKind::enable; }
+    CommandKind operator()(const DisableRequest&) const { return CommandKind::disable; }
+    CommandKind operator()(const HomeRequest&) const { return CommandKind::home; }
+    CommandKind operator()(const MoveAbsoluteRequest&) const { return CommandKind::move_absolute; }
+    CommandKind operator()(const MoveRelativeRequest&) const { return CommandKind::move_relative; }
+    CommandKind operator()(const MoveVelocityRequest&) const { return CommandKind::move_velocity; }
+    CommandKind operator()(const JogRequest&) const { return CommandKind::jog; }
+    CommandKind operator()(const StopRequest& stop) const {
+      if (stop.kind == StopKind::halt) return CommandKind::halt;
+      return stop.kind == StopKind::quick_stop ? CommandKind::quick_stop : CommandKind::stop;
+    }
+    CommandKind operator()(const ResetRequest&) const { return CommandKind::reset; }
+    CommandKind operator()(const SetPositionRequest&) const { return CommandKind::set_position; }
+  };
+  return std::visit(Kind{}, action);
+}
+
+}  // namespace axisd

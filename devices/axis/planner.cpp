@@ -1,0 +1,214 @@
+#include "devices/axis/planner.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace axisd {
+
+namespace {
+
+std::unexpected<Error> out_of_range(std::string message, double minimum, double maximum, std::string unit) {
+  return fail(Error{.reason = Reason::out_of_range,
+                    .message = std::move(message),
+                    .remedy = "choose a value in the permitted range",
+                    .permitted = Range{.minimum = minimum, .maximum = maximum, .unit = std::move(unit)}});
+}
+
+int milliseconds_of(Duration time) {
+  return static_cast<int>(std::chrono::duration_cast<milliseconds>(time).count());
+}
+
+}  // namespace
+
+Planner::Planner(const AxisSettings& settings, const DriveDescriptor& descriptor, const Scale& scale)
+    : settings_(&settings), capabilities_(&descriptor.capabilities), scale_(&scale) {}
+
+int Planner::maximum_rpm() const {
+  const auto by_pulse_rate =
+      capabilities_->maximum_pulse_rate_hz * 60 / settings_->scale.pulses_per_revolution;
+  return static_cast<int>(std::min<std::int64_t>(capabilities_->maximum_rpm, by_pulse_rate));
+}
+
+double Planner::maximum_velocity() const {
+  return std::min(settings_->limits.velocity, std::abs(scale_->velocity_to_units(maximum_rpm())));
+}
+
+double Planner::minimum_velocity() const {
+  // The start speed may not be above the speed, and has a lower bound of its own.
+  return std::abs(
+      scale_->velocity_to_units(std::max(capabilities_->minimum_rpm, capabilities_->minimum_start_rpm)));
+}
+
+Result<Duration> Planner::ramp(std::optional<Duration> asked, Duration fallback, const char* name) const {
+  const auto time = asked.value_or(fallback);
+  const auto low = milliseconds(capabilities_->minimum_time_ms);
+  const auto high = milliseconds(capabilities_->maximum_time_ms);
+  if (time < low || time > high)
+    return out_of_range(fmt::format("{} of {} ms", name, milliseconds_of(time)), milliseconds_of(low),
+                        milliseconds_of(high), "ms");
+  return milliseconds(milliseconds_of(time));
+}
+
+Result<Plan> Planner::profile(double velocity, const MotionValues& asked) const {
+  const auto speed = std::abs(velocity);
+  const auto unit = settings_->scale.unit + "/s";
+  // A little beyond the limit is the limit, written with fewer digits.
+  if (!std::isfinite(velocity) || speed > maximum_velocity() * (1 + 1e-9) ||
+      speed < minimum_velocity() * (1 - 1e-9))
+    return out_of_range(fmt::format("velocity {} {}", speed, unit), minimum_velocity(), maximum_velocity(),
+                        unit);
+  const auto& limits = settings_->limits;
+  const auto acceleration = ramp(asked.acceleration_time, limits.acceleration_time, "acceleration time");
+  if (!acceleration) return fail(acceleration.error());
+  const auto deceleration =
+      ramp(asked.deceleration_time,
+           asked.acceleration_time.value_or(limits.deceleration_time.value_or(limits.acceleration_time)),
+           "deceleration time");
+  if (!deceleration) return fail(deceleration.error());
+
+  Plan plan;
+  // Never faster than asked: rounded down, except where the request is that very speed.
+  const auto rpm = std::abs(scale_->velocity_to_rpm(speed));
+  plan.velocity_rpm = std::min(maximum_rpm(), static_cast<int>(std::floor(rpm + 1e-6)));
+  plan.velocity_rpm = std::max(plan.velocity_rpm, capabilities_->minimum_start_rpm);
+  plan.start_rpm = std::clamp(std::min(limits.start_speed_rpm, plan.velocity_rpm),
+                              capabilities_->minimum_start_rpm, capabilities_->maximum_start_rpm);
+  plan.acceleration_time = *acceleration;
+  plan.deceleration_time = *deceleration;
+  plan.granted.velocity = std::abs(scale_->velocity_to_units(plan.velocity_rpm));
+  plan.granted.acceleration_time = *acceleration;
+  plan.granted.deceleration_time = *deceleration;
+  return plan;
+}
+
+Result<void> Planner::check_soft_limits(double target, double from) const {
+  const auto& limits = settings_->limits;
+  if (!limits.position_minimum || !limits.position_maximum) return {};
+  // Half a pulse beyond is the limit itself, rounded.
+  const auto slack = 0.5 / std::abs(scale_->pulses_per_unit());
+  const bool above = target > *limits.position_maximum + slack;
+  const bool below = target < *limits.position_minimum - slack;
+  if (!above && !below) return {};
+  // Beyond the limit already: moving back towards the range is always allowed.
+  if ((above && target < from) || (below && target > from)) return {};
+  return fail(Error{
+      .reason = Reason::soft_limit,
+      .message = fmt::format("target {:.6g} {} is beyond a software limit", target, settings_->scale.unit),
+      .remedy = "choose a target within the limits",
+      .permitted = Range{.minimum = *limits.position_minimum,
+                         .maximum = *limits.position_maximum,
+                         .unit = settings_->scale.unit}});
+}
+
+Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
+                           const PositionTracker& tracker) const {
+  if (const auto allowed = check_soft_limits(target.position, tracker.position()); !allowed)
+    return fail(allowed.error());
+  // One move spans at most half the 32-bit counter; the counter itself is re-zeroed before it could overflow.
+  constexpr std::int64_t longest = std::int64_t{1} << 30U;
+  const auto distance = static_cast<double>(target.counter) - static_cast<double>(tracker.counter());
+  if (std::abs(distance) > static_cast<double>(longest)) {
+    const auto reach = static_cast<double>(longest) / std::abs(scale_->pulses_per_unit());
+    return out_of_range(fmt::format("target {:.6g} {}", target.position, settings_->scale.unit),
+                        tracker.position() - reach, tracker.position() + reach, settings_->scale.unit);
+  }
+  plan.target = target.position;
+  plan.target_counter = target.counter;
+  plan.positive = (distance >= 0) != settings_->scale.invert;
+  plan.granted.position = scale_->to_units(target.counter + tracker.offset());
+  const auto per_second = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
+  plan.predicted =
+      move_duration(std::abs(distance), plan.start_rpm * per_second, plan.velocity_rpm * per_second,
+                    plan.acceleration_time, plan.deceleration_time);
+  return plan;
+}
+
+Result<std::optional<HomingProfile>> Planner::homing() const {
+  if (!settings_->homing) return std::optional<HomingProfile>{};
+  const auto& homing = *settings_->homing;
+  const auto to_rpm = [&](double velocity) {
+    return static_cast<int>(std::floor(std::abs(scale_->velocity_to_rpm(velocity)) + 1e-6));
+  };
+  const auto unit = settings_->scale.unit + "/s";
+  const auto units = [&](int rpm) { return std::abs(scale_->velocity_to_units(rpm)); };
+  const auto highest = std::min(capabilities_->maximum_homing_rpm, maximum_rpm());
+  const auto highest_search = std::min(capabilities_->maximum_search_rpm, maximum_rpm());
+  HomingProfile profile{.method = settings_->scale.invert ? mirrored(homing.method) : homing.method,
+                        .velocity_rpm = to_rpm(homing.velocity),
+                        .search_velocity_rpm = to_rpm(homing.search_velocity),
+                        .acceleration_time = homing.acceleration_time,
+                        .offset_pulses = static_cast<std::int32_t>(std::clamp<std::int64_t>(
+                            scale_->to_pulses(homing.offset), -1'000'000'000, 1'000'000'000))};
+  if (profile.velocity_rpm < capabilities_->minimum_homing_rpm || profile.velocity_rpm > highest)
+    return out_of_range(fmt::format("homing velocity {} {}", homing.velocity, unit),
+                        units(capabilities_->minimum_homing_rpm), units(highest), unit);
+  if (profile.search_velocity_rpm < capabilities_->minimum_search_rpm ||
+      profile.search_velocity_rpm > highest_search)
+    return out_of_range(fmt::format("homing search_velocity {} {}", homing.search_velocity, unit),
+                        units(capabilities_->minimum_search_rpm), units(highest_search), unit);
+  if (std::abs(profile.offset_pulses) > capabilities_->maximum_homing_offset_pulses) {
+    const auto reach = capabilities_->maximum_homing_offset_pulses / std::abs(scale_->pulses_per_unit());
+    return out_of_range(fmt::format("homing offset {} {}", homing.offset, settings_->scale.unit), -reach,
+                        reach, settings_->scale.unit);
+  }
+  return profile;
+}
+
+Duration move_duration(double pulses, double start_speed, double speed, Duration acceleration_time,
+                       Duration deceleration_time) {
+  const auto seconds = [](Duration time) { return std::chrono::duration<double>(time).count(); };
+  const auto to_duration = [](double time) {
+    return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(time));
+  };
+  if (pulses <= 0 || speed <= 0) return Duration{0};
+  const auto ramps = seconds(acceleration_time) + seconds(deceleration_time);
+  const auto mean = (start_speed + speed) / 2;
+  const auto in_ramps = mean * ramps;
+  if (in_ramps <= pulses) return to_duration(ramps + (pulses - in_ramps) / speed);
+  // Too short to reach the speed: the ramps meet earlier. Bounded from above by the start speed all the way.
+  return to_duration(std::min(ramps * std::sqrt(pulses / in_ramps) * 2, pulses / std::max(start_speed, 1.0)));
+}
+
+HomingMethod mirrored(HomingMethod method) {
+  switch (method) {
+    case HomingMethod::home_positive:
+      return HomingMethod::home_negative;
+    case HomingMethod::home_negative:
+      return HomingMethod::home_positive;
+    case HomingMethod::positive_limit:
+      return HomingMethod::negative_limit;
+    case HomingMethod::negative_limit:
+      return HomingMethod::positive_limit;
+  }
+  return method;
+}
+
+Result<DriveSetup> drive_setup(const AxisSettings& settings, const DriveDescriptor& descriptor) {
+  const Scale scale(settings.scale);
+  const auto homing = Planner(settings, descriptor, scale).homing();
+  if (!homing) return fail(homing.error());
+  DriveSetup setup{.pulses_per_revolution = settings.scale.pulses_per_revolution,
+                   .inputs = settings.inputs,
+                   .outputs = settings.outputs,
+                   .homing = *homing,
+                   .persist = settings.persist,
+                   .reboot_guard = settings.reboot_guard,
+                   .model_settings = settings.model_settings};
+  if (settings.scale.invert) {
+    const auto mirror = [](std::vector<TerminalSettings>& terminals,
+                           std::span<const TerminalFunctionSpec> functions) {
+      for (auto& terminal : terminals)
+        if (const auto* function = find_function(functions, terminal.function);
+            function && !function->mirror.empty())
+          terminal.function = function->mirror;
+    };
+    mirror(setup.inputs, descriptor.input_functions);
+    mirror(setup.outputs, descriptor.output_functions);
+  }
+  return setup;
+}
+
+}  // namespace axisd

@@ -1,0 +1,65 @@
+// From what a client asks to what a drive is given, with everything that could forbid it. Pure.
+#pragma once
+
+#include <cstdint>
+
+#include "devices/axis/command.hpp"
+#include "devices/axis/position_tracker.hpp"
+#include "devices/axis/settings.hpp"
+#include "devices/descriptor.hpp"
+#include "devices/units/scale.hpp"
+
+namespace axisd {
+
+/// What a motion will be: drive values, what was granted, and how long it should take.
+struct Plan {
+  MotionValues granted{};
+  int velocity_rpm = 0;  ///< drive direction: signed for velocity, positive for positioning
+  int start_rpm = 0;
+  Duration acceleration_time{}, deceleration_time{};
+  std::int64_t target_counter = 0;  ///< unwrapped; positioning only
+  double target = 0;                ///< user units
+  bool positive = true;             ///< axis direction
+  bool endless = false;             ///< drive speed mode
+  Duration predicted{};             ///< from start to standstill; 0 if endless
+};
+
+class Planner {
+ public:
+  Planner(const AxisSettings& settings, const DriveDescriptor& descriptor, const Scale& scale);
+
+  /// Ramps and speed of any motion. `velocity` in user units per second, sign ignored. Errors: out_of_range
+  /// with the permitted range in the axis's unit.
+  [[nodiscard]] Result<Plan> profile(double velocity, const MotionValues& asked) const;
+  /// Completes a profile for a move to `target`. Errors: out_of_range, soft_limit.
+  [[nodiscard]] Result<Plan> move(Plan plan, const PositionTracker::Target& target,
+                                  const PositionTracker& tracker) const;
+  [[nodiscard]] Result<void> check_soft_limits(double target, double from) const;
+
+  [[nodiscard]] double maximum_velocity() const;  ///< of limits and drive, user units per second
+  [[nodiscard]] double minimum_velocity() const;
+  /// Highest motor speed at this microstep setting: min(3000, 12,000,000 / pulses per revolution) r/min
+  /// (M11).
+  [[nodiscard]] int maximum_rpm() const;
+  /// Homing in drive direction and drive units; nullopt without `homing:`. Errors: out_of_range.
+  [[nodiscard]] Result<std::optional<HomingProfile>> homing() const;
+
+ private:
+  [[nodiscard]] Result<Duration> ramp(std::optional<Duration> asked, Duration fallback,
+                                      const char* name) const;
+
+  const AxisSettings* settings_;
+  const Capabilities* capabilities_;
+  const Scale* scale_;
+};
+
+/// Duration of a trapezoidal (or triangular) move (manual 7.1). Speeds in pulses per second.
+Duration move_duration(double pulses, double start_speed, double speed, Duration acceleration_time,
+                       Duration deceleration_time);
+
+/// The opposite direction for inverted axes (M18).
+HomingMethod mirrored(HomingMethod method);
+/// What the drive of this axis has to be, mirrored if inverted.
+Result<DriveSetup> drive_setup(const AxisSettings& settings, const DriveDescriptor& descriptor);
+
+}  // namespace axisd

@@ -1,0 +1,82 @@
+#include "devices/axis/position_tracker.hpp"
+
+#include <limits>
+
+#include "devices/units/exact_scale.hpp"
+
+namespace axisd {
+
+struct PositionTracker::Exactly {
+  Exact units;
+};
+
+PositionTracker::PositionTracker(const Scale& scale) : scale_(scale) {}
+PositionTracker::~PositionTracker() = default;
+
+void PositionTracker::update(std::int32_t counter) {
+  if (!known_) {
+    counter_ = counter;
+    known_ = true;
+    return;
+  }
+  // The difference of two readings is small, so it is right even where the 32-bit counter wrapped between
+  // them.
+  const auto step = static_cast<std::int32_t>(
+      static_cast<std::uint32_t>(counter) - static_cast<std::uint32_t>(static_cast<std::uint64_t>(counter_)));
+  counter_ += step;
+}
+
+void PositionTracker::restart(std::int32_t counter) {
+  counter_ = counter;
+  known_ = true;
+  offset_ = 0;
+  trust_ = PositionTrust::unknown;
+  forget_target();
+}
+
+double PositionTracker::position() const { return scale_.to_units(counter_ + offset_); }
+
+std::int64_t PositionTracker::offset_for(double position) const {
+  return scale_.to_pulses(position) - counter_;
+}
+
+void PositionTracker::set_position(double position, PositionTrust trust) {
+  offset_ = offset_for(position);
+  trust_ = trust;
+  commanded_ = std::make_unique<Exactly>(Exact(position));
+}
+
+void PositionTracker::restore(std::int64_t offset) {
+  offset_ = offset;
+  trust_ = PositionTrust::restored;
+  forget_target();
+}
+
+void PositionTracker::rezero(std::int32_t counter_after) {
+  offset_ += counter_ - counter_after;
+  counter_ = counter_after;
+}
+
+void PositionTracker::forget_target() { commanded_.reset(); }
+
+PositionTracker::Target PositionTracker::plan(Exactly target) {
+  planned_ = std::make_unique<Exactly>(std::move(target));
+  constexpr auto limits = std::numeric_limits<std::int64_t>{};
+  const auto pulses =
+      to_pulses(scale_, planned_->units)
+          .value_or((planned_->units > 0) != scale_.settings().invert ? limits.max() : limits.min());
+  std::int64_t counter = 0;
+  if (__builtin_sub_overflow(pulses, offset_, &counter)) counter = pulses;  // far beyond any range either way
+  return {.position = planned_->units.convert_to<double>(), .counter = counter};
+}
+
+PositionTracker::Target PositionTracker::plan_absolute(double position) { return plan({Exact(position)}); }
+
+PositionTracker::Target PositionTracker::plan_relative(double distance) {
+  const auto base = commanded_ ? commanded_->units : to_exact_units(scale_, counter_ + offset_);
+  return plan({base + Exact(distance)});
+}
+
+void PositionTracker::reached_plan() { commanded_ = std::move(planned_); }
+
+}  // namespace axisd
