@@ -1,0 +1,40 @@
+#include "daemon/store/change.hpp"
+
+namespace axisd::store {
+namespace {
+
+struct Apply {
+  StoredState& state;
+  void operator()(const SetOffset& change) const { state.axes[change.axis].offset = change.offset; }
+  void operator()(const ForgetOffset& change) const { state.axes[change.axis].offset.reset(); }
+  void operator()(const SetInhibit& change) const { state.inhibit = change.inhibit; }
+  void operator()(const CountEepromWrites& change) const {
+    state.axes[change.axis].eeprom_writes += change.writes;
+  }
+};
+
+struct ApplyAfterFailure {
+  StoredState& state;
+  void operator()(const SetOffset& change) const { state.axes[change.axis].offset.reset(); }
+  void operator()(const ForgetOffset& change) const { Apply{state}(change); }
+  void operator()(const SetInhibit& change) const {
+    if (change.inhibit.active) Apply{state}(change);
+  }
+  void operator()(const CountEepromWrites& change) const { Apply{state}(change); }
+};
+
+}  // namespace
+
+void apply(StoredState& state, const Change& change) { std::visit(Apply{state}, change); }
+
+void apply_after_failure(StoredState& state, const Change& change) {
+  std::visit(ApplyAfterFailure{state}, change);
+}
+
+void distrust(StoredState& state, WallTime now) {
+  for (auto& [name, axis] : state.axes) axis.offset.reset();
+  if (!state.inhibit.active)
+    state.inhibit = {.active = true, .by = "axisd: the state file was damaged", .since = now};
+}
+
+}  // namespace axisd::store

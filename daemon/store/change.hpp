@@ -1,0 +1,39 @@
+// What a save does to the state: pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+
+#include "devices/persistence.hpp"
+
+namespace axisd::store {
+
+struct SetOffset {
+  std::string axis;
+  OffsetRecord offset;
+};
+struct ForgetOffset {
+  std::string axis;
+};
+struct SetInhibit {
+  InhibitRecord inhibit;
+};
+struct CountEepromWrites {
+  std::string axis;
+  std::uint64_t writes = 0;
+};
+using Change = std::variant<SetOffset, ForgetOffset, SetInhibit, CountEepromWrites>;
+
+/// The change as asked.
+void apply(StoredState& state, const Change& change);
+
+/// What is left of a change that could not be saved: the disk may hold either version, so the next save must
+/// not grant more than both. Offsets are void, an inhibit is latched and never released, counts stay counted.
+void apply_after_failure(StoredState& state, const Change& change);
+
+/// An older state in place of a damaged one: no offset is trusted, and motion is inhibited, because the lost
+/// version may have been.
+void distrust(StoredState& state, WallTime now);
+
+}  // namespace axisd::store

@@ -1,0 +1,148 @@
+#include "daemon/store/state_directory.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+#include <utility>
+
+namespace axisd::store {
+namespace {
+
+constexpr auto newest = "state.v1";
+constexpr auto previous = "state.v1.previous";
+constexpr auto damaged = "state.v1.damaged";
+constexpr auto newest_unfinished = "state.v1.new";
+constexpr auto previous_unfinished = "state.v1.previous.new";
+constexpr std::size_t largest_file = 16U << 20U;  // thousands of axes; anything longer is not ours
+
+std::string text_of(int error) { return std::generic_category().message(error); }
+
+}  // namespace
+
+FileDescriptor::~FileDescriptor() { close(); }
+
+int FileDescriptor::close() {
+  if (fd_ < 0) return 0;
+  return ::close(std::exchange(fd_, -1)) == 0 ? 0 : errno;
+}
+
+std::unexpected<Error> StateDirectory::failed(std::string_view what, std::string_view name, int error) const {
+  return fail(Reason::storage, fmt::format("cannot {} {}: {}", what, (path_ / name).string(), text_of(error)),
+              "check the disk and the directory's permissions");
+}
+
+Result<StateDirectory> StateDirectory::open(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  FileDescriptor directory(error ? -1 : ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (directory.get() < 0) {
+    const int code = error ? error.value() : errno;
+    return fail(Reason::storage,
+                fmt::format("cannot use state directory {}: {}", path.string(), text_of(code)),
+                "create it for the daemon's user, or name another one with --state-directory");
+  }
+  if (flock(directory.get(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK)
+      return fail(Reason::storage, fmt::format("cannot lock {}: {}", path.string(), text_of(errno)),
+                  "put the state directory on a local file system");
+    return fail(Reason::storage, fmt::format("state directory {} is used by another axisd", path.string()),
+                "stop that one, or give this one a --state-directory of its own");
+  }
+  return StateDirectory(path, std::move(directory));
+}
+
+Result<std::optional<std::string>> StateDirectory::read(const char* name) const {
+  const FileDescriptor file(openat(directory_.get(), name, O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0) {
+    if (errno == ENOENT) return std::nullopt;
+    return failed("open", name, errno);
+  }
+  std::string text;
+  std::array<char, 4096> chunk{};
+  while (text.size() <= largest_file) {
+    const auto got = ::read(file.get(), chunk.data(), chunk.size());
+    if (got == 0) break;
+    if (got > 0)
+      text.append(chunk.data(), static_cast<std::size_t>(got));
+    else if (errno != EINTR)
+      return failed("read", name, errno);
+  }
+  return text;
+}
+
+Result<StateDirectory::Loaded> StateDirectory::load() const {
+  const auto text = read(newest);
+  if (!text) return std::unexpected(text.error());
+  const auto before = read(previous);
+  if (!before) return std::unexpected(before.error());
+  if (!*text && !*before) return Loaded{};
+
+  const auto file = (path_ / newest).string();
+  auto current = *text ? decode(**text) : fail(Reason::storage, "missing");
+  if (current) return Loaded{.generation = *std::move(current), .damage = {}};
+  for (const auto& candidate : {*text, *before}) {
+    if (candidate && newer_format(*candidate))
+      return fail(
+          Reason::storage, fmt::format("{} was written by a newer axisd", file),
+          "run that version, or move the state directory's files away (every axis then needs homing)");
+  }
+  auto fallback = *before ? decode(**before) : fail(Reason::storage, "missing");
+  if (!fallback)
+    return fail(Reason::storage,
+                fmt::format("{} is damaged ({}), and so is the generation before it ({})", file,
+                            current.error().message, fallback.error().message),
+                "check the disk; moving the state.v1 files away starts anew: every axis then needs homing, "
+                "and a latched StopAll is forgotten");
+  return Loaded{.generation = *std::move(fallback),
+                .damage = Error{.reason = Reason::storage,
+                                .message = fmt::format("{} is damaged ({}); using the generation before it",
+                                                       file, current.error().message),
+                                .remedy = "home the axes, release the stop, and check the disk"}};
+}
+
+Result<void> StateDirectory::write(const char* name, std::string_view text) const {
+  FileDescriptor file(openat(directory_.get(), name, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
+  if (file.get() < 0) return failed("create", name, errno);
+  while (!text.empty()) {
+    const auto put = ::write(file.get(), text.data(), text.size());
+    if (put >= 0)
+      text.remove_prefix(static_cast<std::size_t>(put));
+    else if (errno != EINTR)
+      return failed("write", name, errno);
+  }
+  if (fsync(file.get()) != 0) return failed("write", name, errno);
+  if (const int error = file.close(); error != 0) return failed("write", name, error);
+  return {};
+}
+
+Result<void> StateDirectory::save(std::string_view text) {
+  if (auto written = write(newest_unfinished, text); !written) return written;
+  // The previous generation becomes a second name of the newest before that is replaced: at no moment is
+  // there no complete `state.v1`, which a plain chain of renames would allow.
+  const int at = directory_.get();
+  if (unlinkat(at, previous_unfinished, 0) != 0 && errno != ENOENT)
+    return failed("remove", previous_unfinished, errno);
+  if (linkat(at, newest, at, previous_unfinished, 0) == 0) {
+    if (renameat(at, previous_unfinished, at, previous) != 0) return failed("replace", previous, errno);
+  } else if (errno != ENOENT) {
+    return failed("keep", previous, errno);
+  }
+  if (renameat(at, newest_unfinished, at, newest) != 0) return failed("replace", newest, errno);
+  if (fsync(at) != 0) return failed("write", ".", errno);
+  return {};
+}
+
+Result<void> StateDirectory::set_aside() {
+  const int at = directory_.get();
+  if (renameat(at, newest, at, damaged) != 0 && errno != ENOENT) return failed("move aside", newest, errno);
+  return {};
+}
+
+}  // namespace axisd::store

@@ -1,0 +1,68 @@
+// The files behind the persistent state.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "buses/error.hpp"
+#include "daemon/store/state_text.hpp"
+
+namespace axisd::store {
+
+/// A file descriptor with an owner.
+class FileDescriptor {
+ public:
+  FileDescriptor() = default;
+  explicit FileDescriptor(int fd) : fd_(fd) {}
+  FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+  ~FileDescriptor();
+  [[nodiscard]] int get() const { return fd_; }
+  /// Closes it now; 0, or the errno: a delayed write error may show only here.
+  int close();
+
+ private:
+  int fd_ = -1;
+};
+
+/// A directory that one process at a time uses. `state.v1` is the newest generation and is never absent once
+/// it was written; `state.v1.previous` is the one before. Thread: one at a time.
+class StateDirectory {
+ public:
+  /// Creates the directory if need be and locks it. Errors: storage (cannot be created, is used by another
+  /// daemon).
+  static Result<StateDirectory> open(const std::filesystem::path& path);
+
+  struct Loaded {
+    std::optional<Generation> generation;  ///< empty: nothing was ever saved here
+    std::optional<Error> damage;           ///< the newest was unusable, and `generation` is the one before
+  };
+  /// Errors: storage (unreadable, of a newer format, or no usable generation left: says what to do).
+  [[nodiscard]] Result<Loaded> load() const;
+
+  /// Returns when `text` is durable as the newest generation. After an error either version may be on the
+  /// disk.
+  Result<void> save(std::string_view text);
+
+  /// Moves a damaged newest file aside (`state.v1.damaged`), so that it does not become the previous
+  /// generation.
+  Result<void> set_aside();
+
+ private:
+  StateDirectory(std::filesystem::path path, FileDescriptor directory)
+      : path_(std::move(path)), directory_(std::move(directory)) {}
+  [[nodiscard]] Result<std::optional<std::string>> read(const char* name) const;
+  [[nodiscard]] Result<void> write(const char* name, std::string_view text) const;
+  [[nodiscard]] std::unexpected<Error> failed(std::string_view what, std::string_view name, int error) const;
+
+  std::filesystem::path path_;
+  FileDescriptor directory_;
+};
+
+}  // namespace axisd::store

@@ -1,0 +1,211 @@
+#include "daemon/store/state_text.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <optional>
+#include <utility>
+
+namespace axisd::store {
+namespace {
+
+constexpr std::string_view header = "axisd-state ";
+constexpr std::string_view version_line = "axisd-state 1\n";
+constexpr std::string_view trailer = "crc32 ";
+constexpr std::size_t trailer_size = trailer.size() + 8 + 1;  // eight hexadecimal digits, end of line
+
+constexpr std::array<std::uint32_t, 256> crc_table = [] {
+  std::array<std::uint32_t, 256> table{};
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    std::uint32_t value = i;
+    for (int bit = 0; bit < 8; ++bit) value = (value >> 1U) ^ ((value & 1U) != 0 ? 0xEDB88320U : 0U);
+    table[i] = value;
+  }
+  return table;
+}();
+
+bool plain(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+         std::string_view("_-.:@/").contains(c);
+}
+
+/// Client identities are free text: whatever could end a word or a line is written as %XX.
+std::string escape(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (plain(c))
+      out += c;
+    else
+      out += fmt::format("%{:02x}", static_cast<unsigned char>(c));
+  }
+  return out;
+}
+
+/// Reads the text from the front; after the first mismatch everything fails.
+class Reader {
+ public:
+  explicit Reader(std::string_view rest) : rest_(rest) {}
+
+  bool literal(std::string_view text) {
+    if (!rest_.starts_with(text)) return false;
+    rest_.remove_prefix(text.size());
+    return true;
+  }
+  template <class Integer>
+  bool number(Integer& value, int base = 10) {
+    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value, base);
+    if (error != std::errc{}) return false;
+    rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
+    return true;
+  }
+  bool flag(bool& value) {
+    unsigned digit = 0;
+    if (!number(digit) || digit > 1) return false;
+    value = digit == 1;
+    return true;
+  }
+  bool word(std::string& value) {
+    value.clear();
+    while (!rest_.empty() && (plain(rest_.front()) || rest_.front() == '%')) {
+      if (!literal("%")) {
+        value += rest_.front();
+        rest_.remove_prefix(1);
+        continue;
+      }
+      unsigned char byte = 0;
+      if (rest_.size() < 2) return false;
+      const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + 2, byte, 16);
+      if (error != std::errc{} || end != rest_.data() + 2) return false;
+      value += static_cast<char>(byte);
+      rest_.remove_prefix(2);
+    }
+    return true;
+  }
+  bool trust(PositionTrust& value) {
+    for (const auto candidate :
+         {PositionTrust::unknown, PositionTrust::set, PositionTrust::homed, PositionTrust::restored}) {
+      value = candidate;
+      if (literal(trust_word(candidate))) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] bool at_end() const { return rest_.empty(); }
+
+  /// The words of the file format; independent of what the API prints.
+  static std::string_view trust_word(PositionTrust trust) {
+    switch (trust) {
+      case PositionTrust::unknown:
+        return "unknown";
+      case PositionTrust::set:
+        return "set";
+      case PositionTrust::homed:
+        return "homed";
+      case PositionTrust::restored:
+        return "restored";
+    }
+    return "unknown";
+  }
+
+ private:
+  std::string_view rest_;
+};
+
+bool read_inhibit(Reader& reader, InhibitRecord& inhibit) {
+  std::int64_t since = 0;
+  const bool ok = reader.literal("inhibit active=") && reader.flag(inhibit.active) &&
+                  reader.literal(" since_ns=") && reader.number(since) && reader.literal(" by=") &&
+                  reader.word(inhibit.by) && reader.literal("\n");
+  inhibit.since = WallTime(std::chrono::nanoseconds(since));
+  return ok;
+}
+
+bool read_offset(Reader& reader, OffsetRecord& offset) {
+  if (!reader.literal(" pulses=") || !reader.number(offset.offset_pulses) || !reader.literal(" trust=") ||
+      !reader.trust(offset.trust) || !reader.literal(" last=") ||
+      !reader.number(offset.last_position_pulses) || !reader.literal(" per_rev=") ||
+      !reader.number(offset.pulses_per_revolution) || !reader.literal(" invert=") ||
+      !reader.flag(offset.invert) || !reader.literal(" canary="))
+    return false;
+  for (std::size_t i = 0; i < offset.canary.size(); ++i) {
+    if ((i > 0 && !reader.literal(".")) || !reader.number(offset.canary[i], 16)) return false;
+  }
+  return reader.literal("\n");
+}
+
+bool read_axis(Reader& reader, std::map<std::string, AxisRecord>& axes) {
+  std::string name;
+  AxisRecord axis;
+  if (!reader.word(name) || !reader.literal(" eeprom_writes=") || !reader.number(axis.eeprom_writes) ||
+      !reader.literal("\n"))
+    return false;
+  if (reader.literal("offset") && !read_offset(reader, axis.offset.emplace())) return false;
+  return axes.emplace(std::move(name), std::move(axis)).second;
+}
+
+std::optional<Generation> read_generation(std::string_view body) {
+  Reader reader(body);
+  Generation generation;
+  auto& state = generation.state;
+  if (!reader.literal(version_line) || !reader.literal("generation ") || !reader.number(generation.number) ||
+      !reader.literal("\nstart_count ") || !reader.number(state.start_count) || !reader.literal("\n") ||
+      !read_inhibit(reader, state.inhibit))
+    return std::nullopt;
+  while (!reader.at_end()) {
+    if (!reader.literal("axis ") || !read_axis(reader, state.axes)) return std::nullopt;
+  }
+  return generation;
+}
+
+std::string checksum_line(std::string_view body) { return fmt::format("{}{:08x}\n", trailer, crc32(body)); }
+
+/// The part that the checksum covers, if the checksum is right.
+std::optional<std::string_view> intact_body(std::string_view text) {
+  if (text.size() < trailer_size) return std::nullopt;
+  const auto body = text.substr(0, text.size() - trailer_size);
+  if (text.substr(body.size()) != checksum_line(body)) return std::nullopt;
+  return body;
+}
+
+}  // namespace
+
+std::uint32_t crc32(std::string_view bytes) {
+  std::uint32_t crc = 0xFFFFFFFFU;
+  for (const char c : bytes) crc = (crc >> 8U) ^ crc_table[(crc ^ static_cast<unsigned char>(c)) & 0xFFU];
+  return ~crc;
+}
+
+std::string encode(const Generation& generation) {
+  const auto& [number, state] = generation;
+  const auto since =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(state.inhibit.since.time_since_epoch());
+  std::string text(version_line);
+  text += fmt::format("generation {}\nstart_count {}\ninhibit active={:d} since_ns={} by={}\n", number,
+                      state.start_count, state.inhibit.active, since.count(), escape(state.inhibit.by));
+  for (const auto& [name, axis] : state.axes) {
+    text += fmt::format("axis {} eeprom_writes={}\n", escape(name), axis.eeprom_writes);
+    if (!axis.offset) continue;
+    const auto& offset = *axis.offset;
+    text += fmt::format("offset pulses={} trust={} last={} per_rev={} invert={:d} canary={:04x}\n",
+                        offset.offset_pulses, Reader::trust_word(offset.trust), offset.last_position_pulses,
+                        offset.pulses_per_revolution, offset.invert, fmt::join(offset.canary, "."));
+  }
+  return text + checksum_line(text);
+}
+
+Result<Generation> decode(std::string_view text) {
+  const auto body = intact_body(text);
+  if (!body) return fail(Reason::storage, fmt::format("checksum or length is wrong ({} bytes)", text.size()));
+  auto generation = read_generation(*body);
+  // Only the canonical form is accepted, so that nothing that was written otherwise is read as something.
+  if (!generation || encode(*generation) != text)
+    return fail(Reason::storage, "intact, but not in the format that this axisd writes");
+  return *std::move(generation);
+}
+
+bool newer_format(std::string_view text) {
+  const auto body = intact_body(text);
+  return body && body->starts_with(header) && !body->starts_with(version_line);
+}
+
+}  // namespace axisd::store

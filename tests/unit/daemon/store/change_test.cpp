@@ -1,0 +1,81 @@
+#include "daemon/store/change.hpp"
+
+#include <gtest/gtest.h>
+
+namespace axisd::store {
+namespace {
+
+const OffsetRecord homed{.offset_pulses = 5,
+                         .trust = PositionTrust::homed,
+                         .canary = {1, 2, 3, 4, 5, 6},
+                         .last_position_pulses = 9,
+                         .pulses_per_revolution = 10000,
+                         .invert = false};
+const InhibitRecord latched{.active = true, .by = "panel", .since = WallTime(std::chrono::seconds(5))};
+const InhibitRecord released{.active = false, .by = "supervisor", .since = WallTime(std::chrono::seconds(6))};
+
+TEST(Change, DoesWhatIsAsked) {
+  StoredState state;
+  apply(state, SetOffset{.axis = "x", .offset = homed});
+  apply(state, CountEepromWrites{.axis = "x", .writes = 2});
+  apply(state, CountEepromWrites{.axis = "x", .writes = 3});
+  apply(state, SetInhibit{latched});
+  EXPECT_EQ(state.axes.at("x").offset, homed);
+  EXPECT_EQ(state.axes.at("x").eeprom_writes, 5U);
+  EXPECT_EQ(state.inhibit, latched);
+  apply(state, SetInhibit{released});
+  apply(state, ForgetOffset{"x"});
+  EXPECT_EQ(state.inhibit, released);
+  EXPECT_EQ(state.axes.at("x").offset, std::nullopt);
+  EXPECT_EQ(state.axes.at("x").eeprom_writes, 5U);
+}
+
+TEST(Change, AFailedOffsetIsVoidAndNotTheOldOne) {
+  StoredState state;
+  apply(state, SetOffset{.axis = "x", .offset = homed});
+  auto other = homed;
+  other.offset_pulses = 6;
+  apply_after_failure(state, SetOffset{.axis = "x", .offset = other});
+  EXPECT_EQ(state.axes.at("x").offset, std::nullopt);
+}
+
+TEST(Change, AFailedForgetStillForgets) {
+  StoredState state;
+  apply(state, SetOffset{.axis = "x", .offset = homed});
+  apply_after_failure(state, ForgetOffset{"x"});
+  EXPECT_EQ(state.axes.at("x").offset, std::nullopt);
+}
+
+TEST(Change, AFailedInhibitLatchesAndAFailedReleaseDoesNotRelease) {
+  StoredState state;
+  apply_after_failure(state, SetInhibit{latched});
+  EXPECT_EQ(state.inhibit, latched);
+  apply_after_failure(state, SetInhibit{released});
+  EXPECT_EQ(state.inhibit, latched);
+}
+
+TEST(Change, AFailedCountIsKept) {
+  StoredState state;
+  apply_after_failure(state, CountEepromWrites{.axis = "x", .writes = 2});
+  EXPECT_EQ(state.axes.at("x").eeprom_writes, 2U);
+}
+
+TEST(Change, AnOlderStateIsNotTrustedAndInhibitsMotion) {
+  StoredState state;
+  state.start_count = 3;
+  apply(state, SetOffset{.axis = "x", .offset = homed});
+  apply(state, CountEepromWrites{.axis = "x", .writes = 2});
+  distrust(state, WallTime(std::chrono::seconds(9)));
+  EXPECT_EQ(state.axes.at("x").offset, std::nullopt);
+  EXPECT_EQ(state.axes.at("x").eeprom_writes, 2U);
+  EXPECT_TRUE(state.inhibit.active);
+  EXPECT_EQ(state.inhibit.since, WallTime(std::chrono::seconds(9)));
+  EXPECT_EQ(state.start_count, 3U);
+
+  state.inhibit = latched;
+  distrust(state, WallTime(std::chrono::seconds(9)));
+  EXPECT_EQ(state.inhibit, latched) << "who latched it must not get lost";
+}
+
+}  // namespace
+}  // namespace axisd::store

@@ -1,0 +1,248 @@
+#include "daemon/store/file_store.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <csignal>
+#include <random>
+
+#include "tests/unit/daemon/store/temporary_directory.hpp"
+
+namespace axisd::store {
+namespace {
+
+using testing::HasSubstr;
+
+OffsetRecord offset(std::int64_t pulses) {
+  return {.offset_pulses = pulses,
+          .trust = PositionTrust::homed,
+          .canary = {5, 100, 100, 300, 0, 1},
+          .last_position_pulses = 10,
+          .pulses_per_revolution = 10000,
+          .invert = false};
+}
+
+class FileStoreTest : public testing::Test {
+ protected:
+  std::unique_ptr<FileStore> open() {
+    auto store = FileStore::open(temporary_.path(), core_.get_executor());
+    if (!store) {
+      ADD_FAILURE() << to_string(store.error());
+      return nullptr;
+    }
+    return *std::move(store);
+  }
+  /// Runs the core until `count` results have arrived.
+  void wait_for(std::size_t count) {
+    while (results_.size() < count) core_.run_one();
+  }
+  Persistence::Callback record() {
+    return [this](Result<void> result) { results_.push_back(std::move(result)); };
+  }
+  void break_disk() { std::filesystem::create_directory(temporary_.path() / "state.v1.new"); }
+  void repair_disk() { std::filesystem::remove(temporary_.path() / "state.v1.new"); }
+
+  TemporaryDirectory temporary_;
+  boost::asio::io_context core_;
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> running_ =
+      boost::asio::make_work_guard(core_);
+  std::vector<Result<void>> results_;
+};
+
+TEST_F(FileStoreTest, SavesAreThereAfterARestart) {
+  const InhibitRecord inhibit{.active = true, .by = "panel", .since = WallTime(std::chrono::seconds(7))};
+  {
+    auto store = open();
+    store->save_offset("x", offset(1), record());
+    store->save_offset("x", offset(2), record());
+    store->save_offset("y", offset(3), record());
+    store->forget_offset("y", record());
+    store->save_inhibit(inhibit, record());
+    store->count_eeprom_writes("y", 4, record());
+    EXPECT_TRUE(results_.empty()) << "a callback never comes from inside the call";
+    wait_for(6);
+    for (const auto& result : results_) EXPECT_TRUE(result);
+    EXPECT_TRUE(store->loaded().axes.empty()) << "loaded() stays what it was";
+  }
+  const auto store = open();
+  EXPECT_FALSE(store->damage());
+  EXPECT_EQ(store->loaded().axes.at("x").offset, offset(2));
+  EXPECT_EQ(store->loaded().axes.at("y"), (AxisRecord{.offset = {}, .eeprom_writes = 4}));
+  EXPECT_EQ(store->loaded().inhibit, inhibit);
+}
+
+TEST_F(FileStoreTest, AReportedSaveIsOnTheDiskAlready) {
+  auto store = open();
+  store->save_offset("x", offset(77), [this](Result<void> result) {
+    results_.push_back(std::move(result));
+    EXPECT_EQ(decode(temporary_.read("state.v1"))->state.axes.at("x").offset, offset(77));
+  });
+  wait_for(1);
+  EXPECT_TRUE(results_.at(0));
+}
+
+TEST_F(FileStoreTest, ClosingSavesWhatIsPending) {
+  open()->save_offset("x", offset(1), {});
+  EXPECT_EQ(open()->loaded().axes.at("x").offset, offset(1));
+}
+
+TEST_F(FileStoreTest, StartsAreCountedStrictly) {
+  for (std::uint64_t start = 1; start < 5; ++start) EXPECT_EQ(open()->loaded().start_count, start);
+  temporary_.write("state.v1", "damaged");
+  EXPECT_EQ(open()->loaded().start_count, 5U);
+  temporary_.write("state.v1", "damaged");
+  EXPECT_EQ(open()->loaded().start_count, 6U) << "a second damage must not repeat a count";
+}
+
+TEST_F(FileStoreTest, DamageCostsTrustAndInhibitsMotion) {
+  {
+    auto store = open();
+    store->save_offset("x", offset(1), {});
+    store->count_eeprom_writes("x", 2, record());
+    wait_for(1);
+    store->save_offset("x", offset(2), record());  // so that the generation before has an offset, too
+    wait_for(2);
+  }
+  temporary_.write("state.v1", temporary_.read("state.v1").substr(1));
+  for (int start = 0; start < 2; ++start) {
+    const auto store = open();
+    if (start == 0) {
+      ASSERT_TRUE(store->damage());
+      EXPECT_THAT(store->damage()->message, HasSubstr("damaged"));
+    } else {
+      EXPECT_FALSE(store->damage()) << "reported once; its consequences are saved";
+    }
+    EXPECT_EQ(store->loaded().axes.at("x"), (AxisRecord{.offset = {}, .eeprom_writes = 2}));
+    EXPECT_TRUE(store->loaded().inhibit.active);
+  }
+}
+
+TEST_F(FileStoreTest, AFailingDiskIsReportedAndGrantsNothing) {
+  const InhibitRecord latched{.active = true, .by = "panel", .since = {}};
+  {
+    auto store = open();
+    store->save_offset("x", offset(1), record());
+    wait_for(1);
+    break_disk();
+    store->save_offset("x", offset(2), record());
+    store->save_inhibit(latched, record());
+    store->count_eeprom_writes("x", 1, record());
+    wait_for(4);
+    for (std::size_t i = 1; i < 4; ++i) {
+      ASSERT_FALSE(results_[i]);
+      EXPECT_EQ(results_[i].error().reason, Reason::storage);
+    }
+    repair_disk();
+    store->count_eeprom_writes("x", 1, record());
+    wait_for(5);
+    EXPECT_TRUE(results_[4]);
+  }
+  const auto store = open();
+  EXPECT_EQ(store->loaded().axes.at("x"), (AxisRecord{.offset = {}, .eeprom_writes = 2}));
+  EXPECT_EQ(store->loaded().inhibit, latched);
+}
+
+TEST_F(FileStoreTest, ClosingRetriesWhatFailed) {
+  {
+    auto store = open();
+    break_disk();
+    store->save_inhibit({.active = true, .by = "panel", .since = {}}, record());
+    wait_for(1);
+    ASSERT_FALSE(results_[0]);
+    repair_disk();
+  }
+  EXPECT_TRUE(open()->loaded().inhibit.active);
+}
+
+TEST_F(FileStoreTest, AnUnchangedStateIsNotWrittenAgain) {
+  auto store = open();
+  store->save_offset("x", offset(1), record());
+  wait_for(1);
+  const auto before = temporary_.read("state.v1");
+  store->save_offset("x", offset(1), record());
+  wait_for(2);
+  EXPECT_TRUE(results_[1]);
+  EXPECT_EQ(temporary_.read("state.v1"), before);
+}
+
+TEST_F(FileStoreTest, ManySavesShareWrites) {
+  auto store = open();
+  const auto before = decode(temporary_.read("state.v1"))->number;
+  constexpr std::size_t saves = 2000;
+  for (std::size_t i = 0; i < saves; ++i)
+    store->save_offset("x", offset(static_cast<std::int64_t>(i)), record());
+  wait_for(saves);
+  const auto generation = decode(temporary_.read("state.v1"));
+  EXPECT_EQ(generation->state.axes.at("x").offset, offset(saves - 1));
+  EXPECT_LT(generation->number - before, saves);
+}
+
+TEST_F(FileStoreTest, OpenFailsClearlyWhereNothingCanBeSaved) {
+  break_disk();
+  const auto store = FileStore::open(temporary_.path(), core_.get_executor());
+  ASSERT_FALSE(store);
+  EXPECT_EQ(store.error().reason, Reason::storage);
+  EXPECT_FALSE(store.error().remedy.empty());
+}
+
+TEST_F(FileStoreTest, ASecondStoreIsRefusedWhileOneIsOpen) {
+  const auto store = open();
+  const auto second = FileStore::open(temporary_.path(), core_.get_executor());
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().message, HasSubstr("another axisd"));
+}
+
+/// Saves rising offsets without end and reports each durable one through `acknowledge`.
+[[noreturn]] void save_until_killed(const std::filesystem::path& directory, int acknowledge) {
+  boost::asio::io_context core;
+  const auto guard = boost::asio::make_work_guard(core);
+  auto store = FileStore::open(directory, core.get_executor());
+  if (!store) _exit(1);
+  std::function<void(std::int64_t)> save = [&](std::int64_t number) {
+    (*store)->save_offset("x", offset(number), [&, number](const Result<void>& result) {
+      if (!result || write(acknowledge, &number, sizeof number) != sizeof number) _exit(2);
+      save(number + 1);
+    });
+  };
+  const auto& loaded = (*store)->loaded().axes;
+  save(loaded.contains("x") ? loaded.at("x").offset->offset_pulses + 1 : 1);
+  core.run();
+  _exit(3);
+}
+
+TEST_F(FileStoreTest, NoAcknowledgedSaveIsLostByAKill) {
+  std::mt19937 random(7);
+  std::int64_t last = 0;
+  for (int round = 0; round < 10; ++round) {
+    int channel[2];
+    ASSERT_EQ(pipe(channel), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      close(channel[0]);
+      save_until_killed(temporary_.path(), channel[1]);
+    }
+    close(channel[1]);
+    const auto wanted = random() % 12;  // killed at another point of its work each time
+    for (std::uint32_t i = 0; i <= wanted; ++i) ASSERT_EQ(read(channel[0], &last, sizeof last), sizeof last);
+    kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status)) << WEXITSTATUS(status);
+    while (read(channel[0], &last, sizeof last) == sizeof last) {  // acknowledged before the kill
+    }
+    close(channel[0]);
+
+    const auto store = open();
+    ASSERT_TRUE(store);
+    EXPECT_FALSE(store->damage());
+    EXPECT_GE(store->loaded().axes.at("x").offset->offset_pulses, last);
+    EXPECT_EQ(store->loaded().start_count, 2U * static_cast<unsigned>(round) + 2U);
+  }
+}
+
+}  // namespace
+}  // namespace axisd::store

@@ -1,0 +1,162 @@
+#include "daemon/store/state_text.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <random>
+
+namespace axisd::store {
+namespace {
+
+using testing::HasSubstr;
+
+Generation example() {
+  Generation generation{.number = 41, .state = {.start_count = 7, .inhibit = {}, .axes = {}}};
+  generation.state.inhibit = {.active = true,
+                              .by = "tls:CN=hmi 1, panel\n\"left\" 100%",
+                              .since = WallTime(std::chrono::nanoseconds(1'700'000'000'123'456'789))};
+  generation.state.axes["feeder"] = {.offset = OffsetRecord{.offset_pulses = -123456789012345,
+                                                            .trust = PositionTrust::homed,
+                                                            .canary = {5, 100, 100, 300, 0, 0xFFFF},
+                                                            .last_position_pulses = 42,
+                                                            .pulses_per_revolution = 10000,
+                                                            .invert = true},
+                                     .eeprom_writes = 3};
+  generation.state.axes["turn-table_2"] = {.offset = {}, .eeprom_writes = 0};
+  return generation;
+}
+
+TEST(StateText, ReadsBackWhatItWrites) {
+  EXPECT_EQ(decode(encode(example())), example());
+  EXPECT_EQ(decode(encode({})), Generation{});
+}
+
+TEST(StateText, FormatIsFixed) {
+  // An installed file must stay readable: whoever changes this needs a new version line and a migration.
+  EXPECT_EQ(
+      encode(example()),
+      "axisd-state 1\n"
+      "generation 41\n"
+      "start_count 7\n"
+      "inhibit active=1 since_ns=1700000000123456789 by=tls:CN%3dhmi%201%2c%20panel%0a%22left%22%20100%25\n"
+      "axis feeder eeprom_writes=3\n"
+      "offset pulses=-123456789012345 trust=homed last=42 per_rev=10000 invert=1 "
+      "canary=0005.0064.0064.012c.0000.ffff\n"
+      "axis turn-table_2 eeprom_writes=0\n"
+      "crc32 " +
+          encode(example()).substr(encode(example()).size() - 9));
+}
+
+TEST(StateText, ChecksumIsIeee802) { EXPECT_EQ(crc32("123456789"), 0xCBF43926U); }
+
+TEST(StateText, KeepsExtremes) {
+  using Limits = std::numeric_limits<std::int64_t>;
+  for (const auto trust :
+       {PositionTrust::unknown, PositionTrust::set, PositionTrust::homed, PositionTrust::restored}) {
+    Generation generation;
+    generation.number = generation.state.start_count = std::numeric_limits<std::uint64_t>::max();
+    generation.state.axes["a"].offset = OffsetRecord{.offset_pulses = Limits::min(),
+                                                     .trust = trust,
+                                                     .canary = {},
+                                                     .last_position_pulses = Limits::max(),
+                                                     .pulses_per_revolution = -1,
+                                                     .invert = false};
+    EXPECT_EQ(decode(encode(generation)), generation);
+  }
+}
+
+TEST(StateText, EveryByteSurvivesInAName) {
+  Generation generation;
+  for (int byte = 0; byte < 256; ++byte) generation.state.inhibit.by += static_cast<char>(byte);
+  EXPECT_EQ(decode(encode(generation)), generation);
+}
+
+TEST(StateText, NoTruncationIsAccepted) {
+  const auto text = encode(example());
+  for (std::size_t length = 0; length < text.size(); ++length) {
+    const auto decoded = decode(text.substr(0, length));
+    ASSERT_FALSE(decoded) << length;
+    EXPECT_EQ(decoded.error().reason, Reason::storage);
+    EXPECT_FALSE(newer_format(text.substr(0, length))) << length;
+  }
+}
+
+TEST(StateText, NoFlippedBitIsAccepted) {
+  const auto text = encode(example());
+  for (std::size_t bit = 0; bit < text.size() * 8; ++bit) {
+    auto flipped = text;
+    flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << (bit % 8)));
+    ASSERT_FALSE(decode(flipped)) << bit;
+    ASSERT_FALSE(newer_format(flipped)) << bit;
+  }
+}
+
+TEST(StateText, NoMixtureOfTwoGenerationsIsAccepted) {
+  // What a torn overwrite would leave: the front of one and the back of the other.
+  auto later = example();
+  later.state.axes["feeder"].offset->offset_pulses += 111;
+  const auto old_text = encode(example());
+  const auto new_text = encode(later);
+  ASSERT_EQ(old_text.size(), new_text.size());
+  for (std::size_t cut = 0; cut <= old_text.size(); ++cut) {
+    const auto mixture = new_text.substr(0, cut) + old_text.substr(cut);
+    if (mixture != old_text && mixture != new_text) {
+      ASSERT_FALSE(decode(mixture)) << cut;
+    }
+  }
+}
+
+std::string with_checksum(std::string body) { return body + fmt::format("crc32 {:08x}\n", crc32(body)); }
+
+std::string replaced(std::string text, std::string_view what, std::string_view by) {
+  text.replace(text.find(what), what.size(), by);
+  return with_checksum(text.substr(0, text.size() - 15));
+}
+
+TEST(StateText, AcceptsOnlyTheCanonicalForm) {
+  const auto text = encode(example());
+  ASSERT_TRUE(decode(replaced(text, "start_count 7", "start_count 8")));
+  for (const auto& [what, by] : std::initializer_list<std::pair<const char*, const char*>>{
+           {"start_count 7", "start_count 07"},
+           {"start_count 7", "start_count -7"},
+           {"start_count 7", "start_count 18446744073709551616"},
+           {"start_count 7", "start_count 7 "},
+           {"start_count 7", "start_count "},
+           {"active=1", "active=2"},
+           {"trust=homed", "trust=trusted"},
+           {"%0a", "%0A"},
+           {"%0a", "%61"},
+           {"%0a", "%zz"},
+           {"ffff", "fffff"},
+           {"0005", "5"},
+           {"turn-table_2", "feeder"},
+           {"turn-table_2", "aaa"},
+           {"turn-table_2 eeprom_writes=0\n", "turn-table_2 eeprom_writes=0\nmore\n"},
+           {"axisd-state 1", "axisd-state 2"},
+           {"\n", "\r\n"}}) {
+    const auto changed = replaced(text, what, by);
+    ASSERT_FALSE(decode(changed)) << by;
+    EXPECT_THAT(decode(changed).error().message, HasSubstr("intact")) << by;
+  }
+}
+
+TEST(StateText, TellsANewerFormatFromDamage) {
+  EXPECT_TRUE(newer_format(with_checksum("axisd-state 2\nwhatever\n")));
+  EXPECT_FALSE(newer_format(encode(example())));
+  EXPECT_FALSE(newer_format(with_checksum("something else\n")));
+}
+
+TEST(StateText, NoiseIsRejected) {
+  std::mt19937 random(20240607);
+  for (int round = 0; round < 2000; ++round) {
+    std::string noise(random() % 300, '\0');
+    for (auto& c : noise) c = static_cast<char>(random());
+    ASSERT_FALSE(decode(noise));
+    ASSERT_FALSE(decode(with_checksum(noise)));
+    ASSERT_FALSE(decode(with_checksum("axisd-state 1\n" + noise)));
+  }
+}
+
+}  // namespace
+}  // namespace axisd::store
