@@ -1,0 +1,19 @@
+// Commands as answers.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "api/server/pending_call.hpp"
+#include "axisd/v1/types.pb.h"
+
+namespace axisd::server {
+
+/// The callback that ends `call` with the command in `to` (part of its response), or with the error's status.
+/// Logs `what` for people. `what` must be a literal.
+[[nodiscard]] Machine::CommandCallback reply_with_command(std::shared_ptr<PendingCall> call, v1::Command* to,
+                                                          std::string client, std::string subject,
+                                                          std::string_view what);
+
+}  // namespace axisd::server

@@ -1,0 +1,72 @@
+#include "api/server/command_service.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <memory>
+#include <utility>
+
+#include "api/server/command_reply.hpp"
+#include "api/server/command_stream.hpp"
+#include "api/server/convert.hpp"
+#include "api/server/peer.hpp"
+#include "api/server/pending_call.hpp"
+#include "api/server/status.hpp"
+#include "api/server/validate.hpp"
+
+namespace axisd::server {
+namespace {
+
+/// A stream that ends before it begins.
+class RefusedStream final : public grpc::ServerWriteReactor<v1::WatchCommandResponse> {
+ public:
+  explicit RefusedStream(const grpc::Status& status) { Finish(status); }
+  void OnDone() override { delete this; }
+};
+
+}  // namespace
+
+grpc::ServerUnaryReactor* CommandServiceImpl::GetCommand(Context* context,
+                                                         const v1::GetCommandRequest* request,
+                                                         v1::GetCommandResponse* response) {
+  if (const auto valid = check_command_id(request->id()); !valid)
+    return answer(context, to_status(valid.error()));
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  auto* command = response->mutable_command();
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.machine.get_command(request->id(), [call, command](Result<Command> result) {
+          call->complete([command, result = std::move(result)]() -> grpc::Status {
+            if (!result) return to_status(result.error());
+            to_proto(*result, *command);
+            return grpc::Status::OK;
+          });
+        });
+      });
+}
+
+grpc::ServerWriteReactor<v1::WatchCommandResponse>* CommandServiceImpl::WatchCommand(
+    Context* context, const v1::WatchCommandRequest* request) {
+  if (const auto valid = check_command_id(request->id()); !valid)
+    return new RefusedStream(to_status(valid.error()));
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::stream);
+  if (!ticket) return new RefusedStream(to_status(ticket.error()));
+  spdlog::debug("{}: watches command {}", client, request->id());
+  auto* stream = CommandStream::start(services_, request->id(), *std::move(ticket));
+  return stream != nullptr ? stream : new RefusedStream(shutting_down());
+}
+
+grpc::ServerUnaryReactor* CommandServiceImpl::CancelCommand(Context* context,
+                                                            const v1::CancelCommandRequest* request,
+                                                            v1::CancelCommandResponse* response) {
+  if (const auto valid = check_command_id(request->id()); !valid)
+    return answer(context, to_status(valid.error()));
+  auto* command = response->mutable_command();
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    services_.machine.cancel_command(
+        request->id(), reply_with_command(call, command, client_of(*context), request->id(), "cancel"));
+  });
+}
+
+}  // namespace axisd::server

@@ -1,0 +1,174 @@
+#include "api/server/convert.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <utility>
+
+namespace axisd::server {
+namespace {
+
+using std::chrono::duration_cast;
+using std::chrono::nanoseconds;
+using std::chrono::seconds;
+
+// The contract reserves 0 for "unspecified", so every enum of ours stands one further there. The unit test
+// compares all names, the assertions below only catch a list that grew on one side.
+template <class Proto, class Domain>
+Proto one_further(Domain value) {
+  return static_cast<Proto>(std::to_underlying(value) + 1);
+}
+static_assert(std::to_underlying(Reason::internal) + 1 == v1::Reason_MAX);
+static_assert(std::to_underlying(Outcome::unknown) + 1 == v1::Outcome_MAX);
+static_assert(std::to_underlying(AxisState::error_stop) + 1 == v1::State_MAX);
+static_assert(std::to_underlying(LinkState::online) + 1 == v1::LinkState_MAX);
+static_assert(std::to_underlying(PositionTrust::restored) + 1 == v1::PositionTrust_MAX);
+static_assert(std::to_underlying(PositionSource::encoder) == v1::PositionSource_MAX);
+static_assert(std::to_underlying(CommandKind::set_position) + 1 == v1::CommandKind_MAX);
+static_assert(std::to_underlying(CommandState::unknown) + 1 == v1::CommandState_MAX);
+
+void to_proto(const TerminalState& from, v1::Terminal& to) {
+  to.set_name(from.name);
+  to.set_function(from.function);
+  to.set_active(from.active);
+}
+
+}  // namespace
+
+v1::Reason to_proto(Reason reason) { return one_further<v1::Reason>(reason); }
+v1::Outcome to_proto(Outcome outcome) { return one_further<v1::Outcome>(outcome); }
+v1::State to_proto(AxisState state) { return one_further<v1::State>(state); }
+v1::LinkState to_proto(LinkState state) { return one_further<v1::LinkState>(state); }
+v1::PositionTrust to_proto(PositionTrust trust) { return one_further<v1::PositionTrust>(trust); }
+v1::PositionSource to_proto(PositionSource source) { return static_cast<v1::PositionSource>(source); }
+v1::CommandKind to_proto(CommandKind kind) { return one_further<v1::CommandKind>(kind); }
+v1::CommandState to_proto(CommandState state) { return one_further<v1::CommandState>(state); }
+
+void to_proto(Duration from, google::protobuf::Duration& to) {
+  const auto whole =
+      duration_cast<seconds>(from);  // towards zero: both fields get the same sign, as required
+  to.set_seconds(whole.count());
+  to.set_nanos(static_cast<std::int32_t>((from - whole).count()));
+}
+
+void to_proto(WallTime from, google::protobuf::Timestamp& to) {
+  const auto whole = std::chrono::floor<seconds>(from);  // nanos count forward, also before 1970
+  to.set_seconds(whole.time_since_epoch().count());
+  to.set_nanos(static_cast<std::int32_t>(duration_cast<nanoseconds>(from - whole).count()));
+}
+
+void to_proto(const Error& from, v1::ErrorDetail& to) {
+  to.set_reason(to_proto(from.reason));
+  to.set_message(from.message);
+  to.set_remedy(from.remedy);
+  to.set_outcome(to_proto(from.outcome));
+  to.set_bus(from.where.bus);
+  if (from.where.node) to.set_node(*from.where.node);
+  if (from.where.object) to.set_object(*from.where.object);
+  if (from.where.native_code) to.set_native_code(*from.where.native_code);
+  if (!from.permitted) return;
+  to.mutable_permitted()->set_minimum(from.permitted->minimum);
+  to.mutable_permitted()->set_maximum(from.permitted->maximum);
+  to.mutable_permitted()->set_unit(from.permitted->unit);
+}
+
+void to_proto(const MotionValues& from, v1::MotionValues& to) {
+  if (from.position) to.set_position(*from.position);
+  if (from.distance) to.set_distance(*from.distance);
+  if (from.velocity) to.set_velocity(*from.velocity);
+  if (from.search_velocity) to.set_search_velocity(*from.search_velocity);
+  if (from.acceleration_time) to_proto(*from.acceleration_time, *to.mutable_acceleration_time());
+  if (from.deceleration_time) to_proto(*from.deceleration_time, *to.mutable_deceleration_time());
+  if (from.hold) to_proto(*from.hold, *to.mutable_hold());
+}
+
+void to_proto(const Command& from, v1::Command& to) {
+  to.set_id(from.id);
+  to.set_axis(from.axis);
+  to.set_kind(to_proto(from.kind));
+  to.set_state(to_proto(from.state));
+  to_proto(from.asked, *to.mutable_asked());
+  to_proto(from.granted, *to.mutable_granted());
+  if (from.cause) to_proto(*from.cause, *to.mutable_cause());
+  to.set_request_id(from.request_id);
+  to.set_client(from.client);
+  to_proto(from.accepted_at, *to.mutable_accepted_at());
+  if (from.started_at) to_proto(*from.started_at, *to.mutable_started_at());
+  if (from.ended_at) to_proto(*from.ended_at, *to.mutable_ended_at());
+}
+
+void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
+  to.set_axis(from.name);
+  to.set_unit(from.unit);
+  to.set_state(to_proto(from.state));
+  to.set_link(to_proto(from.link));
+  if (from.link_error) to_proto(*from.link_error, *to.mutable_link_error());
+  if (from.fault) to_proto(*from.fault, *to.mutable_fault());
+  to.set_enabled(from.enabled);
+  to.set_enabled_by_daemon(from.enabled_by_us);
+  to.set_stop_held(from.stop_held);
+  to.set_inhibited(from.inhibited);
+  to.set_position(from.position);
+  to.set_velocity(from.velocity);
+  if (from.target) to.set_target(*from.target);
+  to.set_moving(from.moving);
+  to.set_positive_direction(from.positive_direction);
+  to.set_in_position(from.in_position);
+  to.set_homed(from.homed);
+  to.set_trust(to_proto(from.trust));
+  to.set_position_source(to_proto(from.position_source));
+  to.set_alarm_code(from.alarm_code);
+  to.set_alarm_name(from.alarm_name);
+  for (const auto& terminal : from.inputs) to_proto(terminal, *to.add_inputs());
+  for (const auto& terminal : from.outputs) to_proto(terminal, *to.add_outputs());
+  // A drive that never answered has no sample: both times stay unset instead of naming 1970 and an absurd
+  // age.
+  if (from.sampled_before != TimePoint{}) {
+    to_proto(from.measured_at, *to.mutable_measured_at());
+    to_proto(std::max(now - from.sampled_before, Duration::zero()), *to.mutable_age());
+  }
+  to.set_simulated(from.simulated);
+  to.set_command_id(from.command_id);
+  to.set_bus(from.bus);
+  to.set_node(from.node);
+  to.set_model(from.model);
+  if (from.identity) to.set_drive_version(from.identity->version);
+  to.set_drive_reboots(static_cast<std::uint32_t>(from.reboots));
+  to.set_revision(from.revision);
+}
+
+void to_proto(const BusStatus& from, v1::Bus& to) {
+  to.set_name(from.name);
+  to.set_port(from.port);
+  to.set_baud(static_cast<std::uint32_t>(from.baud));
+  to.set_open(from.open);
+  if (from.error) to_proto(*from.error, *to.mutable_error());
+  to.set_simulated(from.simulated);
+  to.set_transactions(from.counters.transactions);
+  to.set_timeouts(from.counters.timeouts);
+  to.set_corrupt_replies(from.counters.corrupt);
+  to.set_exceptions(from.counters.exceptions);
+  to.set_foreign_frames(from.counters.foreign_frames);
+  to.set_dropped_expired(from.counters.dropped_expired);
+  to.set_dropped_superseded(from.counters.dropped_superseded);
+  to.set_io_errors(from.counters.io_errors);
+}
+
+std::optional<Duration> from_proto(const google::protobuf::Duration& from) {
+  constexpr std::int64_t longest = std::int64_t{100} * 366 * 24 * 3600;  // far inside 64 bits of nanoseconds
+  const auto whole = from.seconds();
+  const auto nanos = from.nanos();
+  if (whole < -longest || whole > longest || nanos <= -1'000'000'000 || nanos >= 1'000'000'000)
+    return std::nullopt;
+  if ((whole > 0 && nanos < 0) || (whole < 0 && nanos > 0)) return std::nullopt;
+  return seconds(whole) + nanoseconds(nanos);
+}
+
+std::optional<WallTime> from_proto(const google::protobuf::Timestamp& from) {
+  constexpr std::int64_t latest = 7'258'118'400;  // 2200-01-01; WallTime counts nanoseconds and ends in 2262
+  if (from.seconds() < -latest || from.seconds() > latest) return std::nullopt;
+  if (from.nanos() < 0 || from.nanos() >= 1'000'000'000) return std::nullopt;
+  return WallTime(seconds(from.seconds()) + nanoseconds(from.nanos()));
+}
+
+}  // namespace axisd::server

@@ -1,0 +1,30 @@
+// Listening sockets.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "api/server/file_descriptor.hpp"
+#include "buses/error.hpp"
+
+namespace axisd::server {
+
+/// One listening socket. A unix socket's file is removed with it.
+struct ListeningSocket {
+  FileDescriptor fd;
+  int port = 0;           ///< of TCP
+  std::string unix_path;  ///< empty: TCP
+
+  ListeningSocket() = default;
+  ListeningSocket(ListeningSocket&&) = default;
+  ListeningSocket& operator=(ListeningSocket&&) = default;
+  ~ListeningSocket();
+};
+
+/// Listens on "HOST:PORT", "[IPV6]:PORT" or "unix:PATH"; a host name with several addresses gives several
+/// sockets. Port 0 takes a free one. Without `remote_allowed` only loopback addresses and unix sockets are
+/// accepted. Another daemon on the same address is an error, never shared silently. Blocks for name
+/// resolution. Errors: invalid_argument, busy (in use), offline (the system refuses the address).
+[[nodiscard]] Result<std::vector<ListeningSocket>> listen_on(const std::string& address, bool remote_allowed);
+
+}  // namespace axisd::server

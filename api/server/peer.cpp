@@ -1,0 +1,46 @@
+#include "api/server/peer.hpp"
+
+#include <grpc/grpc_security_constants.h>
+
+#include <algorithm>
+#include <string_view>
+
+namespace axisd::server {
+namespace {
+
+constexpr std::size_t longest_identity = 128;
+
+// Identities appear in the log and in Command.client: a certificate must not be able to forge lines there.
+std::string printable(grpc::string_ref text) {
+  std::string result(text.data(), std::min(text.size(), longest_identity));
+  std::ranges::replace_if(result, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return result;
+}
+
+}  // namespace
+
+std::string client_of(const grpc::CallbackServerContext& context) {
+  const auto auth = context.auth_context();
+  if (auth && auth->IsPeerAuthenticated()) {
+    for (const auto* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME}) {
+      const auto values = auth->FindPropertyValues(property);
+      if (!values.empty() && !values.front().empty()) return printable(values.front());
+    }
+    return "unnamed:" + peer_host(context.peer());
+  }
+  return "local:" + peer_host(context.peer());
+}
+
+std::string peer_host(const std::string& peer) {
+  const std::string_view text = peer;
+  const auto scheme = text.find(':');
+  if (scheme == std::string_view::npos || !text.starts_with("ip")) return std::string(text.substr(0, scheme));
+  const auto port = text.rfind(':');
+  auto host =
+      std::string(text.substr(scheme + 1, port > scheme ? port - scheme - 1 : std::string_view::npos));
+  for (const std::string_view bracket : {"%5B", "%5D", "[", "]"})
+    if (const auto at = host.find(bracket); at != std::string::npos) host.erase(at, bracket.size());
+  return host;
+}
+
+}  // namespace axisd::server

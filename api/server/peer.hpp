@@ -1,0 +1,18 @@
+// Who calls.
+#pragma once
+
+#include <grpcpp/server_context.h>
+
+#include <string>
+
+namespace axisd::server {
+
+/// The client's identity: the common name (else the first alternative name) of its verified certificate;
+/// without TLS, "local:" and the host part of its address. Never the port: request ids must stay valid over a
+/// reconnection.
+[[nodiscard]] std::string client_of(const grpc::CallbackServerContext& context);
+
+/// "ipv4:127.0.0.1:50312" to "127.0.0.1", "ipv6:%5B::1%5D:50312" to "::1", "unix:..." to "unix".
+[[nodiscard]] std::string peer_host(const std::string& peer);
+
+}  // namespace axisd::server

@@ -1,0 +1,150 @@
+#include "api/server/server.hpp"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+
+#include "api/server/accept_loop.hpp"
+#include "api/server/axis_service.hpp"
+#include "api/server/bus_service.hpp"
+#include "api/server/command_service.hpp"
+#include "api/server/status.hpp"
+#include "api/server/system_service.hpp"
+#include "api/server/watch_hub.hpp"
+
+namespace axisd::server {
+namespace {
+
+void limit_transport(grpc::ServerBuilder& builder) {
+  builder.SetMaxReceiveMessageSize(256 * 1024);
+  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 8 * 1024);
+  // Far above what Admission lets one client open: its streams must never keep its Stop waiting.
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 2048);
+  // A vanished client is noticed within 3 s instead of minutes.
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 2000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 1000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 1000);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 5000);
+  // Only reflection uses gRPC's synchronous threads, one per open call: a handful is enough.
+  builder.SetResourceQuota(grpc::ResourceQuota("axisd").SetMaxThreads(8));
+  builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
+  builder.SetSyncServerOption(grpc::ServerBuilder::MIN_POLLERS, 1);
+  builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
+}
+
+void enable_plugins() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  });
+}
+
+}  // namespace
+
+struct Server::Parts {
+  Parts(Machine& machine, const ServerOptions& options)
+      : reply(std::make_shared<ReplyThread>()),
+        calls(std::make_shared<OpenCalls>()),
+        admission(options.limits),
+        hub(std::make_shared<WatchHub>(machine, reply, options.stalled_reader_limit)),
+        services{machine, reply, calls, admission, *hub},
+        axis(services),
+        command(services),
+        system(services),
+        bus(services) {}
+
+  std::shared_ptr<ReplyThread> reply;
+  std::shared_ptr<OpenCalls> calls;
+  Admission admission;
+  std::shared_ptr<WatchHub> hub;
+  Services services;
+  AxisServiceImpl axis;
+  CommandServiceImpl command;
+  SystemServiceImpl system;
+  BusServiceImpl bus;
+  std::unique_ptr<AcceptLoop::Acceptor> tcp_acceptor, unix_acceptor;
+  std::unique_ptr<grpc::Server> server;
+  AcceptLoop accept;
+  bool serving = false;
+};
+
+Server::Server(Machine& machine, ServerOptions options)
+    : machine_(machine), options_(std::move(options)), parts_(std::make_unique<Parts>(machine, options_)) {
+  // The machine may publish after this server is gone.
+  machine_.on_published([hub = std::weak_ptr(parts_->hub)] {
+    if (const auto alive = hub.lock()) alive->published();
+  });
+}
+
+Server::~Server() { shutdown(); }
+
+Result<int> Server::start() {
+  std::shared_ptr<grpc::ServerCredentials> tcp_credentials = grpc::InsecureServerCredentials();
+  if (options_.tls) {
+    auto tls = tls_credentials(*options_.tls);
+    if (!tls) return fail(std::move(tls).error());
+    tcp_credentials = *std::move(tls);
+  }
+  std::vector<ListeningSocket> sockets;
+  for (const auto& address : options_.listen) {
+    auto opened = listen_on(address, options_.tls.has_value());
+    if (!opened) return fail(std::move(opened).error());
+    std::ranges::move(*opened, std::back_inserter(sockets));
+  }
+
+  enable_plugins();
+  grpc::ServerBuilder builder;
+  limit_transport(builder);
+  for (grpc::Service* service :
+       std::initializer_list<grpc::Service*>{&parts_->axis, &parts_->command, &parts_->system, &parts_->bus})
+    builder.RegisterService(service);
+  constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
+  parts_->tcp_acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
+  parts_->unix_acceptor =
+      builder.experimental().AddExternalConnectionAcceptor(from_fd, grpc::InsecureServerCredentials());
+  parts_->server = builder.BuildAndStart();
+  if (!parts_->server)
+    return fail(Reason::internal, "gRPC refuses to start", "see the log; GRPC_VERBOSITY=debug tells more");
+  parts_->serving = true;
+  parts_->reply->start([hub = parts_->hub.get()](TimePoint now) { return hub->tick(now); });
+
+  int port = 0;
+  std::vector<AcceptLoop::Entry> entries;
+  for (auto& socket : sockets) {
+    if (port == 0) port = socket.port;
+    auto* acceptor = socket.unix_path.empty() ? parts_->tcp_acceptor.get() : parts_->unix_acceptor.get();
+    entries.push_back({.socket = std::move(socket), .acceptor = acceptor});
+  }
+  if (auto accepting = parts_->accept.start(std::move(entries), options_.connections); !accepting)
+    return fail(std::move(accepting).error());
+  parts_->server->GetHealthCheckService()->SetServingStatus(true);
+  for (const auto& address : options_.listen)
+    spdlog::info("serving on {} ({})", address,
+                 options_.tls && !address.starts_with("unix:") ? "mutual TLS" : "plaintext, local");
+  return port;
+}
+
+void Server::shutdown(Duration deadline) {
+  if (!std::exchange(parts_->serving, false)) return;
+  const auto until =
+      std::chrono::system_clock::now() + std::chrono::duration_cast<std::chrono::microseconds>(deadline);
+  if (auto* health = parts_->server->GetHealthCheckService()) health->Shutdown();
+  parts_->accept.stop();
+  // Open streams would make Shutdown() wait for its whole deadline.
+  parts_->calls->close_all(shutting_down());
+  parts_->server->Shutdown(until);
+  parts_->reply->stop();
+}
+
+std::uint64_t Server::batches_serialised() const { return parts_->hub->batches_serialised(); }
+
+}  // namespace axisd::server

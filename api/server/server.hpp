@@ -1,0 +1,57 @@
+// The gRPC server of a machine.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "api/server/admission.hpp"
+#include "api/server/tls.hpp"
+#include "buses/clock.hpp"
+#include "devices/machine.hpp"
+
+namespace axisd::server {
+
+struct ServerOptions {
+  /// "HOST:PORT", "[IPV6]:PORT" or "unix:PATH".
+  std::vector<std::string> listen{"localhost:7443"};
+  /// Mutual TLS on all TCP addresses. Without it only loopback addresses; unix sockets are always plaintext.
+  std::optional<TlsFiles> tls{};
+  Admission::Limits limits{};
+  int connections = 256;
+  /// A stream whose reader has not read for so long is cancelled.
+  Duration stalled_reader_limit = std::chrono::seconds(2);
+};
+
+/// Serves one machine. start() and shutdown() on one thread, which is not one of gRPC's.
+class Server {
+ public:
+  /// `machine` must outlive shutdown().
+  Server(Machine& machine, ServerOptions options);
+  /// Shuts down.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  /// Begins to serve; returns the TCP port (of the first address; 0: unix sockets only). Once.
+  /// Errors: invalid_argument (address, TLS file), busy (address in use), offline (address refused by the
+  /// system).
+  [[nodiscard]] Result<int> start();
+
+  /// Turns health to NOT_SERVING, ends all streams and waiting calls with UNAVAILABLE, then stops; takes
+  /// `deadline` at most. Commands are not changed by it. Idempotent.
+  void shutdown(Duration deadline = std::chrono::seconds(2));
+
+  /// Batches of axis states serialised since the start. Thread: any.
+  [[nodiscard]] std::uint64_t batches_serialised() const;
+
+ private:
+  struct Parts;
+
+  Machine& machine_;
+  const ServerOptions options_;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace axisd::server

@@ -1,0 +1,87 @@
+#include "api/server/system_service.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "api/server/convert.hpp"
+#include "api/server/peer.hpp"
+#include "api/server/pending_call.hpp"
+#include "api/server/status.hpp"
+#include "api/server/validate.hpp"
+
+namespace axisd::server {
+namespace {
+
+using Results = std::vector<Result<Command>>;
+
+void to_proto(const Results& results, const std::vector<std::string>& axes, v1::StopAllResponse& to) {
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    auto& entry = *to.add_results();
+    if (i < axes.size()) entry.set_axis(axes[i]);  // the machine answers in its axes' order
+    if (results[i]) {
+      entry.set_axis(results[i]->axis);
+      server::to_proto(*results[i], *entry.mutable_command());
+    } else {
+      server::to_proto(results[i].error(), *entry.mutable_error());
+    }
+  }
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1::GetInfoRequest*,
+                                                     v1::GetInfoResponse* response) {
+  const auto info = services_.machine.info();
+  response->set_machine(info.machine);
+  response->set_version(info.version);
+  response->set_instance_id(info.instance_id);
+  response->set_inhibited(info.inhibited);
+  response->set_inhibited_by(info.inhibited_by);
+  return answer(context, grpc::Status::OK);
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::StopAll(Context* context, const v1::StopAllRequest* request,
+                                                     v1::StopAllResponse* response) {
+  const auto client = client_of(*context);
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    auto axes = services_.machine.axis_names();
+    services_.machine.stop_all(client, stop_all_wait(request->wait_until()),
+                               [call, response, client, axes = std::move(axes)](Results results) {
+                                 const auto shared = std::make_shared<const Results>(std::move(results));
+                                 call->complete(
+                                     [response, axes, shared] {
+                                       to_proto(*shared, axes, *response);
+                                       return grpc::Status::OK;
+                                     },
+                                     [client, shared] {
+                                       spdlog::info("{}: stop_all of {} axes, inhibit latched", client,
+                                                    shared->size());
+                                     });
+                               });
+  });
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::ReleaseStopAll(Context* context,
+                                                            const v1::ReleaseStopAllRequest*,
+                                                            v1::ReleaseStopAllResponse*) {
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.machine.release_inhibit(client, [call, client](const Result<void>& result) {
+          const auto error = result ? nullptr : std::make_shared<const Error>(result.error());
+          call->complete([error] { return error ? to_status(*error) : grpc::Status::OK; },
+                         [client, error] {
+                           spdlog::info("{}: release_stop_all {}", client,
+                                        error ? to_string(*error) : "done");
+                         });
+        });
+      });
+}
+
+}  // namespace axisd::server

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "api/server/services.hpp"
+#include "axisd/v1/system_service.grpc.pb.h"
+
+namespace axisd::server {
+
+/// SystemService: the machine as a whole. Thread: gRPC.
+class SystemServiceImpl final : public v1::SystemService::CallbackService {
+ public:
+  explicit SystemServiceImpl(const Services& services) : services_(services) {}
+
+  using Context = grpc::CallbackServerContext;
+  grpc::ServerUnaryReactor* GetInfo(Context* context, const v1::GetInfoRequest* request,
+                                    v1::GetInfoResponse* response) override;
+  grpc::ServerUnaryReactor* StopAll(Context* context, const v1::StopAllRequest* request,
+                                    v1::StopAllResponse* response) override;
+  grpc::ServerUnaryReactor* ReleaseStopAll(Context* context, const v1::ReleaseStopAllRequest* request,
+                                           v1::ReleaseStopAllResponse* response) override;
+
+ private:
+  const Services services_;
+};
+
+}  // namespace axisd::server

@@ -1,0 +1,68 @@
+// One tick for all watchers.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "api/server/watch_stream.hpp"
+#include "axisd/v1/axis_service.pb.h"
+
+namespace axisd::server {
+
+/// Sends every WatchAxes stream its batches. Streams of the same axes and period form a group: each of its
+/// batches is serialised once and shared. Ticks lie on multiples of the period, so that groups wake the
+/// thread together.
+///
+/// Thread: reply, except open() and published().
+class WatchHub {
+ public:
+  WatchHub(Machine& machine, std::shared_ptr<ReplyThread> reply, Duration stalled_reader_limit)
+      : machine_(machine), reply_(std::move(reply)), stalled_reader_limit_(stalled_reader_limit) {}
+
+  /// Begins a stream; its first batch is sent at once. `axes` in the machine's order. nullptr: the server is
+  /// shutting down. Thread: gRPC.
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* open(const Services& services,
+                                                   grpc::CallbackServerContext* context,
+                                                   Admission::Ticket ticket, std::vector<std::string> axes,
+                                                   Duration period);
+
+  /// New snapshots exist: a batch made before is not given to a stream that begins now. Thread: any.
+  void published() { published_.fetch_add(1, std::memory_order_release); }
+
+  /// Sends what is due; returns when it wants to be called again.
+  TimePoint tick(TimePoint now);
+
+  /// Batches serialised since the start. Thread: any.
+  [[nodiscard]] std::uint64_t batches_serialised() const { return batches_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Group {
+    std::vector<std::string> axes;
+    Duration period;
+    TimePoint due;
+    std::vector<std::shared_ptr<WatchStream>> streams;
+    grpc::Slice batch;  ///< the AxisStates of a WatchAxesResponse
+    TimePoint batch_made{};
+    std::uint64_t batch_published = 0;
+  };
+
+  void add(const std::shared_ptr<WatchStream>& stream, std::vector<std::string> axes, Duration period);
+  void run(Group& group, TimePoint now);
+  void pay(const std::shared_ptr<WatchStream>& stream);
+  void refresh(Group& group, TimePoint now);
+  void serialise(Group& group, TimePoint now);
+  void look_for_stalls(TimePoint now);
+
+  Machine& machine_;
+  const std::shared_ptr<ReplyThread> reply_;
+  const Duration stalled_reader_limit_;
+  std::atomic<std::uint64_t> published_{1};
+  std::atomic<std::uint64_t> batches_{0};
+  std::vector<std::unique_ptr<Group>> groups_;
+  TimePoint next_stall_check_{};
+  v1::WatchAxesResponse scratch_;  ///< keeps its memory between batches
+};
+
+}  // namespace axisd::server
