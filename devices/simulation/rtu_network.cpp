@@ -1,0 +1,170 @@
+#include "devices/simulation/rtu_network.hpp"
+
+#include "devices/simulation/crc.hpp"
+
+namespace axisd::simulation {
+
+namespace {
+
+const Fault* find(const std::vector<Fault>& faults, FaultKind kind) {
+  const auto found = std::ranges::find(faults, kind, &Fault::kind);
+  return found == faults.end() ? nullptr : &*found;
+}
+
+/// A reply that nobody asked for: node 247 answers a read with one register.
+std::vector<std::uint8_t> default_foreign_frame() {
+  std::vector<std::uint8_t> frame{0xF7, 0x03, 0x02, 0x12, 0x34};
+  append_frame_crc(frame);
+  return frame;
+}
+
+void append(ReplyPlan& plan, std::span<const std::uint8_t> bytes, TimePoint begin, Duration character,
+            Duration gap) {
+  auto at = begin;
+  for (const auto byte : bytes) {
+    at += character;
+    plan.bytes.push_back(byte);
+    plan.arrivals.push_back(at);
+    at += gap;
+  }
+}
+
+}  // namespace
+
+RtuNetwork::RtuNetwork(RtuNetworkSettings settings) : settings_(settings) {}
+
+SimulatedRtuNode& RtuNetwork::add(std::unique_ptr<SimulatedRtuNode> node) {
+  node->advance(now_);
+  return *nodes_.emplace_back(std::move(node));
+}
+
+SimulatedRtuNode* RtuNetwork::node(std::uint8_t address) const {
+  for (const auto& node : nodes_)
+    if (node->address() == address) return node.get();
+  return nullptr;
+}
+
+Duration RtuNetwork::character_time() const {
+  return Duration(1'000'000'000LL * settings_.bits_per_character / settings_.baud);
+}
+
+Duration RtuNetwork::silence() const {
+  return settings_.baud > 19200 ? Duration(1'750'000) : character_time() * 7 / 2;
+}
+
+void RtuNetwork::pass_time(TimePoint now) {
+  now = std::max(now, now_);
+  std::ranges::sort(returns_, {}, &Return::when);
+  while (!returns_.empty() && returns_.front().when <= now) {
+    const auto [when, node] = returns_.front();
+    returns_.erase(returns_.begin());
+    node->advance(std::max(when, now_));
+    node->set_power(true);
+  }
+  now_ = now;
+  for (const auto& node : nodes_) node->advance(now);
+}
+
+std::optional<std::vector<std::uint8_t>> RtuNetwork::dispatch(std::span<const std::uint8_t> frame) {
+  std::optional<std::vector<std::uint8_t>> reply;
+  for (const auto& node : nodes_) {
+    const auto one = node->on_frame(frame);
+    if (!one) continue;
+    if (!reply) {
+      reply = one;
+      continue;
+    }
+    // Two nodes with one address drive the line at once: a bit is 0 where either of them pulls it there.
+    reply->resize(std::max(reply->size(), one->size()), 0xFF);
+    for (std::size_t i = 0; i < one->size(); ++i) (*reply)[i] &= (*one)[i];
+  }
+  return reply;
+}
+
+void RtuNetwork::reboot(std::span<const std::uint8_t> request, Duration off_time) {
+  for (const auto& node : nodes_) {
+    if (node->address() != request[0]) continue;
+    node->set_power(false);
+    if (off_time > Duration::zero())
+      returns_.push_back({now_ + off_time, node.get()});
+    else
+      node->set_power(true);
+  }
+}
+
+std::optional<ReplyPlan> RtuNetwork::on_request(std::span<const std::uint8_t> frame, TimePoint request_end) {
+  pass_time(request_end);
+  if (!connected_) return std::nullopt;
+  const auto faults = frame_is_sound(frame) ? faults_.strike(frame) : std::vector<Fault>{};
+  if (find(faults, FaultKind::hang_up) != nullptr) {
+    hang_up_ = true;
+    return std::nullopt;
+  }
+  if (const auto* fault = find(faults, FaultKind::reboot_before)) reboot(frame, fault->delay);
+  auto reply = find(faults, FaultKind::drop_request) != nullptr ? std::nullopt : dispatch(frame);
+  if (find(faults, FaultKind::drop_reply) != nullptr) reply.reset();
+  if (const auto* fault = find(faults, FaultKind::reboot_after)) {
+    reboot(frame, fault->delay);
+    reply.reset();
+  }
+  return plan(frame, request_end, faults, std::move(reply));
+}
+
+std::optional<ReplyPlan> RtuNetwork::plan(std::span<const std::uint8_t> request, TimePoint request_end,
+                                          const std::vector<Fault>& faults,
+                                          std::optional<std::vector<std::uint8_t>> reply) {
+  const auto character = character_time();
+  ReplyPlan plan;
+  if (find(faults, FaultKind::echo) != nullptr) append(plan, request, request_end, character, {});
+  auto begin = request_end + turnaround();
+  if (!plan.arrivals.empty()) begin = std::max(begin, plan.arrivals.back() + turnaround());
+  if (const auto* fault = find(faults, FaultKind::foreign_frame)) {
+    append(plan, fault->bytes.empty() ? default_foreign_frame() : fault->bytes, begin, character, {});
+    begin = plan.arrivals.back() + silence();
+  }
+  if (reply && !reply->empty()) {
+    if (const auto* fault = find(faults, FaultKind::delay_reply)) begin += fault->delay;
+    if (find(faults, FaultKind::corrupt_reply) != nullptr) (*reply)[reply->size() / 2] ^= 0x10U;
+    if (find(faults, FaultKind::truncate_reply) != nullptr) reply->pop_back();
+    const auto* drip = find(faults, FaultKind::drip);
+    append(plan, *reply, begin, character, drip == nullptr ? Duration{} : drip->delay);
+  }
+  if (plan.bytes.empty()) return std::nullopt;
+  plan.begin = plan.arrivals.front() - character;
+  plan.end = plan.arrivals.back();
+  return plan;
+}
+
+void RtuNetwork::on_bytes(std::span<const std::uint8_t> bytes, TimePoint begin) {
+  // Whatever was complete before these bytes is a frame of its own, even if nobody called advance()
+  // meanwhile.
+  if (!partial_.empty() && begin >= partial_end_ + silence()) advance(begin);
+  begin = partial_.empty() ? begin : std::max(begin, partial_end_);
+  partial_.insert(partial_.end(), bytes.begin(), bytes.end());
+  partial_end_ = begin + character_time() * static_cast<std::int64_t>(bytes.size());
+}
+
+void RtuNetwork::advance(TimePoint now) {
+  if (!partial_.empty() && now >= partial_end_ + silence()) {
+    // The frame takes effect when the node has recognised its end; the reply counts from its last byte.
+    pass_time(partial_end_ + silence());
+    const auto frame = std::exchange(partial_, {});
+    if (auto reply = on_request(frame, partial_end_)) replies_.push_back(std::move(*reply));
+  }
+  pass_time(now);
+}
+
+TimePoint RtuNetwork::next_event() const {
+  auto next = partial_.empty() ? TimePoint::max() : partial_end_ + silence();
+  for (const auto& one : returns_) next = std::min(next, one.when);
+  return next;
+}
+
+std::optional<ReplyPlan> RtuNetwork::take_reply() {
+  if (replies_.empty()) return std::nullopt;
+  auto reply = std::move(replies_.front());
+  replies_.pop_front();
+  return reply;
+}
+
+}  // namespace axisd::simulation

@@ -1,0 +1,124 @@
+// Homing of the simulated drive, manual 7.5: search, decelerate, leave the switch, approach it slowly.
+#include <cstdlib>
+
+#include "devices/ykd2405pr/simulator.hpp"
+
+namespace axisd::ykd2405pr {
+
+Input SimulatedYkd2405pr::homing_reference() const {
+  const auto mode = memory_.get(reg::homing_mode);
+  return mode == 2 ? Input::positive_limit : mode == 3 ? Input::negative_limit : Input::home;
+}
+
+void SimulatedYkd2405pr::homing_run(int direction, double rpm) {
+  const double time = memory_.get(reg::homing_time);
+  motor_.run(direction, rates(rpm, time, time));
+}
+
+Fail SimulatedYkd2405pr::start_homing() {
+  if (!enabled() || alarm_ != 0) return refusal();
+  if (control_mode_ != 0) return Fail::none;
+  if (motor_.moving()) return behaviour_.start_in_motion_refused ? Fail::access : Fail::none;
+  if (!behaviour_.stop_terminal_only_edge &&
+      (terminals_.active(Input::stop) || terminals_.active(Input::emergency_stop)))
+    return Fail::none;
+  ++starts_;
+  activity_ = Activity::homing;
+  in_position_ = stopping_ = false;
+  if (!behaviour_.homed_stays_during_homing) homed_ = false;
+  homing_direction_ = memory_.get(reg::homing_mode) % 2 == 0 ? 1 : -1;
+  homing_turns_ = 0;
+  if (behaviour_.homing_accepts_active_switch && terminals_.active(homing_reference())) {
+    phase_ = Phase::back_off;
+    homing_run(-homing_direction_, memory_.get(reg::homing_search_speed));
+    return Fail::none;
+  }
+  phase_ = Phase::search;
+  homing_run(homing_direction_, memory_.get(reg::homing_speed));
+  return Fail::none;
+}
+
+void SimulatedYkd2405pr::homing_edge(const InputEdge& edge) {
+  if (activity_ != Activity::homing || edge.function != homing_reference()) return;
+  if (phase_ == Phase::search && edge.rising) {
+    phase_ = Phase::found;
+    motor_.brake();
+  } else if (phase_ == Phase::back_off && !edge.rising) {
+    phase_ = Phase::left;
+    motor_.brake();
+  } else if (phase_ == Phase::approach && edge.rising) {
+    motor_.stop(false);  // slow enough to stop at once, on the pulse
+    homing_reached();
+  }
+}
+
+/// 7.5: "if the limit signal is encountered, the motor will reverse". In modes 2 and 3 the limit ahead is the
+/// goal.
+void SimulatedYkd2405pr::homing_limits() {
+  const int direction = motor_.direction();
+  const auto ahead = direction > 0 ? Input::positive_limit : Input::negative_limit;
+  if (!terminals_.active(ahead) || ahead == homing_reference()) return;
+  if (phase_ == Phase::search) {
+    phase_ = Phase::turn;
+    motor_.brake();
+  } else if (phase_ == Phase::back_off && homing_turns_ > 0 && behaviour_.homing_never_gives_up) {
+    phase_ = Phase::turn;
+    motor_.brake();
+  } else if (phase_ == Phase::back_off || phase_ == Phase::approach) {
+    cut();
+  }
+}
+
+void SimulatedYkd2405pr::homing_stopped() {
+  switch (phase_) {
+    case Phase::turn:
+      if (++homing_turns_ > 1 && !behaviour_.homing_never_gives_up) {
+        finish();
+        break;
+      }
+      if (behaviour_.homing_same_edge && homing_turns_ % 2 == 1) {
+        phase_ =
+            Phase::back_off;  // through the switch, until it has been left on the side where the search began
+        homing_run(-homing_direction_, memory_.get(reg::homing_speed));
+        break;
+      }
+      if (!behaviour_.homing_same_edge) homing_direction_ = -homing_direction_;
+      phase_ = Phase::search;
+      homing_run(homing_direction_, memory_.get(reg::homing_speed));
+      break;
+    case Phase::found:
+      phase_ = Phase::back_off;
+      homing_run(
+          -homing_direction_,
+          memory_.get(behaviour_.back_off_at_homing_speed ? reg::homing_speed : reg::homing_search_speed));
+      break;
+    case Phase::left:
+      phase_ = Phase::approach;
+      homing_run(homing_direction_, memory_.get(reg::homing_search_speed));
+      break;
+    case Phase::compensate:
+      if (!behaviour_.zero_before_compensation) motor_.clear_counter();
+      homed_ = true;
+      finish();
+      break;
+    default:  // stopped on the way: not homed
+      finish();
+      break;
+  }
+}
+
+/// On the switch: the compensation 0x0035 (forwards) and 0x0036 (backwards) follows, then the origin is set.
+void SimulatedYkd2405pr::homing_reached() {
+  phase_ = Phase::compensate;
+  motor_.clear_counter();
+  const auto offset = static_cast<std::int64_t>(memory_.get(reg::homing_positive_offset)) -
+                      static_cast<std::int64_t>(memory_.get(reg::homing_negative_offset));
+  if (offset == 0) {
+    homing_stopped();
+    return;
+  }
+  const double time = memory_.get(reg::homing_time);
+  motor_.move(offset, rates(memory_.get(reg::homing_search_speed), time, time));
+}
+
+}  // namespace axisd::ykd2405pr

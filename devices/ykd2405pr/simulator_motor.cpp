@@ -1,0 +1,81 @@
+#include "devices/ykd2405pr/simulator_motor.hpp"
+
+#include <cmath>
+
+namespace axisd::ykd2405pr {
+
+namespace {
+/// A pulse counts when it is reached, whatever the last bit of the arithmetic says.
+std::int64_t whole_pulses(double distance) { return static_cast<std::int64_t>(std::floor(distance + 1e-4)); }
+}  // namespace
+
+bool Motor::advance(TimePoint now) {
+  now_ = now;
+  if (!moving_) return false;
+  const bool ended = now >= ends();
+  shaft_ = from_ + direction_ * whole_pulses(ended ? profile_.total() : profile_.distance_at(elapsed()));
+  moving_ = !ended;
+  return ended;
+}
+
+void Motor::begin(int direction, const Profile& profile, const Rates& rates) {
+  direction_ = direction;
+  profile_ = profile;
+  rates_ = rates;
+  begin_ = now_;
+  from_ = shaft_;
+  moving_ = true;
+  braking_ = false;
+}
+
+void Motor::move(std::int64_t distance, const Rates& rates) {
+  begin(distance < 0 ? -1 : 1,
+        Profile::move(moving_ ? speed() : rates.start, rates, static_cast<double>(std::llabs(distance))),
+        rates);
+}
+
+void Motor::run(int direction, const Rates& rates) {
+  begin(direction, Profile::run(moving_ ? speed() : rates.start, rates), rates);
+}
+
+void Motor::brake() { brake(rates_.deceleration); }
+
+void Motor::brake(double deceleration) {
+  if (!moving_) return;
+  auto rates = rates_;
+  rates.deceleration = deceleration;
+  begin(direction_, Profile::halt(speed(), rates), rates);
+  braking_ = true;
+}
+
+void Motor::stop(bool slips) {
+  if (!moving_) return;
+  if (slips) {
+    const auto lost = direction_ * whole_pulses(speed() * 0.01);
+    shaft_ += lost;
+    offset_ -= lost;
+  }
+  moving_ = false;
+}
+
+double Motor::speed() const { return moving_ ? profile_.speed_at(elapsed()) : 0; }
+
+double Motor::stopping_distance(const Rates& rates) const {
+  return moving_ ? Profile::stopping_distance(speed(), rates) : 0;
+}
+
+double Motor::elapsed() const { return std::chrono::duration<double>(now_ - begin_).count(); }
+
+TimePoint Motor::after(double seconds) const {
+  if (!(seconds < 1e9)) return TimePoint::max();
+  return begin_ + Duration(static_cast<std::int64_t>(std::ceil(seconds * 1e9)));
+}
+
+TimePoint Motor::ends() const { return moving_ ? after(profile_.duration()) : TimePoint::max(); }
+
+TimePoint Motor::reaches(std::int64_t shaft) const {
+  if (!moving_) return TimePoint::max();
+  return after(profile_.time_at(static_cast<double>((shaft - from_) * direction_)));
+}
+
+}  // namespace axisd::ykd2405pr

@@ -1,0 +1,149 @@
+#include "devices/ykd2405pr/simulator_switches.hpp"
+
+#include <array>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+
+namespace axisd::ykd2405pr {
+
+namespace {
+
+struct Entry {
+  simulation::SwitchSpec spec;
+  bool Behaviour::* member;
+};
+
+// clang-format off
+constexpr Entry entries[] = {
+    {{"start_in_motion", false,
+      "a start while moving takes over from the present speed; off: acknowledged and ignored"},
+     &Behaviour::start_in_motion},
+    {{"start_in_motion_refused", false,
+      "a start while moving is refused with exception 06"},
+     &Behaviour::start_in_motion_refused},
+    {{"start_in_motion_from_target", false,
+      "a relative start that takes over counts from the target before; off: from where it is"},
+     &Behaviour::start_in_motion_from_target},
+    {{"start_refused_when_disabled", false,
+      "a start in alarm or released is refused with exception 06; off: acknowledged and ignored"},
+     &Behaviour::start_refused_when_disabled},
+    {{"reserved_start_refused", false,
+      "0x0027 = 0, 3, 4 is refused with exception 07; off: acknowledged, does nothing"},
+     &Behaviour::reserved_start_refused},
+    {{"reserved_start_moves", false,
+      "0x0027 = 3 starts a position move, as its bit 0 says"},
+     &Behaviour::reserved_start_moves},
+    {{"unsigned_speed", false,
+      "0x000C is the magnitude; off: signed"},
+     &Behaviour::unsigned_speed},
+    {{"model_code_0302", false,
+      "0x0000 reads 0x0302; off: 0x0301"},
+     &Behaviour::model_code_0302},
+    {{"in_position_at_power_up", false,
+      "status bit 0 is 1 after power-up"},
+     &Behaviour::in_position_at_power_up},
+    {{"in_position_after_stop", false,
+      "status bit 0 is 1 whenever a motion ended; off: only after a completed position move"},
+     &Behaviour::in_position_after_stop},
+    {{"enabled_at_power_up", true,
+      "the motor is energised after power-up (the examples of 6.2.5 never enable it); off: released"},
+     &Behaviour::enabled_at_power_up},
+    {{"eeprom_switch_saves_itself", false,
+      "0x0016 = 1 is itself saved; off: it is back at 0 after a power cycle"},
+     &Behaviour::eeprom_switch_saves_itself},
+    {{"pv_speeds_always_saved", false,
+      "PV speeds are saved even if 0x0016 = 1, as 7.4 says"},
+     &Behaviour::pv_speeds_always_saved},
+    {{"position_clear_in_motion", false,
+      "0x002C clears the counter while moving; off: acknowledged and ignored"},
+     &Behaviour::position_clear_in_motion},
+    {{"abrupt_stop_slips", false,
+      "a motor without pulses at speed turns on for 10 ms, which the counter does not see"},
+     &Behaviour::abrupt_stop_slips},
+    {{"free_stop_releases", false,
+      "the free stop at a limit (0x0017 = 0) releases the motor; off: it only stops the pulses"},
+     &Behaviour::free_stop_releases},
+    {{"alarm_releases", false,
+      "an alarm releases the motor; off: it stays locked, as chapter 8 says"},
+     &Behaviour::alarm_releases},
+    {{"stop_ignored_in_homing", false,
+      "0x0028 does nothing while homing (the manual defines it for position and speed mode)"},
+     &Behaviour::stop_ignored_in_homing},
+    {{"stop_ignored_in_pt_pv", false,
+      "0x0028 does nothing in PT and PV mode"},
+     &Behaviour::stop_ignored_in_pt_pv},
+    {{"stop_uses_new_deceleration", false,
+      "a stop uses 0x0022 as it is now; off: as it was before the start (7.6.2)"},
+     &Behaviour::stop_uses_new_deceleration},
+    {{"stop_terminal_only_edge", false,
+      "a held stop terminal does not block starts; off: its level blocks them"},
+     &Behaviour::stop_terminal_only_edge},
+    {{"partial_block_write", false,
+      "a write of several registers keeps those before the bad one; off: none is written"},
+     &Behaviour::partial_block_write},
+    {{"limit_block_writes", false,
+      "writes of more than 16 registers are refused with exception 05"},
+     &Behaviour::limit_block_writes},
+    {{"crc_error_answered", false,
+      "a wrong CRC is answered with exception 01, as the example of 6.2.4; off: silence, as its text"},
+     &Behaviour::crc_error_answered},
+    {{"function_error_code_1", false,
+      "an unknown function is answered with 01, as the text of 6.2.4; off: 02, as its example"},
+     &Behaviour::function_error_code_1},
+    {{"pv_latched", false,
+      "a PV run goes on when its enable input falls, until a stop; off: it ends"},
+     &Behaviour::pv_latched},
+    {{"speed_terminal_is_level", false,
+      "the speed mode input stops the motor when it falls; off: it only starts it"},
+     &Behaviour::speed_terminal_is_level},
+    {{"configuration_makes_edges", false,
+      "assigning or inverting an input that is active acts like an edge; off: it does not"},
+     &Behaviour::configuration_makes_edges},
+    {{"filter_home_and_limits", false,
+      "home and limit inputs must last as long as others before they act; off: they act at once"},
+     &Behaviour::filter_home_and_limits},
+    {{"homed_stays_during_homing", false,
+      "the homing done bit of the last time stays while homing; off: cleared at the start"},
+     &Behaviour::homed_stays_during_homing},
+    {{"homing_accepts_active_switch", false,
+      "homing takes a switch that is active at the start; off: it waits for a rising edge (7.5)"},
+     &Behaviour::homing_accepts_active_switch},
+    {{"homing_same_edge", false,
+      "after a limit, homing passes the home switch and comes back to the same edge; off: it mirrors 7.5"},
+     &Behaviour::homing_same_edge},
+    {{"homing_never_gives_up", false,
+      "homing goes on reversing between both limits; off: it ends undone at the second"},
+     &Behaviour::homing_never_gives_up},
+    {{"zero_before_compensation", false,
+      "the counter is 0 at the switch, before the compensation; off: after it"},
+     &Behaviour::zero_before_compensation},
+    {{"back_off_at_homing_speed", false,
+      "leaving the switch runs at 0x0032; off: at 0x0033 (\"return speed after home is found\")"},
+     &Behaviour::back_off_at_homing_speed},
+};
+// clang-format on
+
+constexpr auto specs = [] {
+  std::array<simulation::SwitchSpec, std::size(entries)> all;
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = entries[i].spec;
+  return all;
+}();
+
+}  // namespace
+
+std::span<const simulation::SwitchSpec> switch_specs() { return specs; }
+
+Behaviour behaviour_from(const simulation::Switches& switches) {
+  Behaviour behaviour{};
+  for (const auto& entry : entries) behaviour.*entry.member = entry.spec.default_value;
+  for (const auto& [name, on] : switches) {
+    const auto* found = std::begin(entries);
+    while (found != std::end(entries) && found->spec.name != name) ++found;
+    if (found == std::end(entries)) throw std::invalid_argument("ykd2405pr has no switch \"" + name + "\"");
+    behaviour.*found->member = on;
+  }
+  return behaviour;
+}
+
+}  // namespace axisd::ykd2405pr

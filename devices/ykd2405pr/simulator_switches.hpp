@@ -1,0 +1,31 @@
+// The points that the manual leaves open, each a named switch (motion-rules.md, facts): tests pass either
+// way.
+#pragma once
+
+#include <span>
+
+#include "devices/simulation/simulator.hpp"
+
+namespace axisd::ykd2405pr {
+
+struct Behaviour {
+  bool start_in_motion, start_in_motion_refused, start_in_motion_from_target;
+  bool start_refused_when_disabled, reserved_start_refused, reserved_start_moves;
+  bool unsigned_speed, model_code_0302;
+  bool in_position_at_power_up, in_position_after_stop;
+  bool enabled_at_power_up, eeprom_switch_saves_itself, pv_speeds_always_saved;
+  bool position_clear_in_motion, abrupt_stop_slips, free_stop_releases, alarm_releases;
+  bool stop_ignored_in_homing, stop_ignored_in_pt_pv, stop_uses_new_deceleration, stop_terminal_only_edge;
+  bool partial_block_write, limit_block_writes, crc_error_answered, function_error_code_1;
+  bool pv_latched, speed_terminal_is_level, configuration_makes_edges, filter_home_and_limits;
+  bool homed_stays_during_homing, homing_accepts_active_switch, homing_same_edge, homing_never_gives_up,
+      zero_before_compensation, back_off_at_homing_speed;
+};
+
+/// Names, defaults and meanings, in the order of the documentation.
+std::span<const simulation::SwitchSpec> switch_specs();
+/// The defaults with `switches` over them. Throws std::invalid_argument for a name that is not in
+/// switch_specs().
+Behaviour behaviour_from(const simulation::Switches& switches);
+
+}  // namespace axisd::ykd2405pr

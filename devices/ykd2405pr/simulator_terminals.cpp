@@ -1,0 +1,143 @@
+#include "devices/ykd2405pr/simulator_terminals.hpp"
+
+#include <algorithm>
+
+namespace axisd::ykd2405pr {
+
+namespace {
+
+using simulation::SwitchKind;
+
+constexpr std::array<TerminalSpec, input_terminals> terminal_names{
+    {{"PU"}, {"DR"}, {"X0"}, {"X1"}, {"X2"}, {"X3"}, {"X4"}, {"X5"}, {"X6"}, {"X7"}}};
+
+Input function_of(std::size_t index, const Memory& memory) {
+  return static_cast<Input>(memory.get(static_cast<std::uint16_t>(reg::first_input_function + index)));
+}
+
+std::optional<SwitchKind> switch_of(Input function) {
+  if (function == Input::home) return SwitchKind::home;
+  if (function == Input::positive_limit) return SwitchKind::positive_limit;
+  if (function == Input::negative_limit) return SwitchKind::negative_limit;
+  return std::nullopt;
+}
+
+}  // namespace
+
+Terminals::Terminals(const Behaviour& behaviour, const simulation::SimulatedNodeSettings& settings)
+    : behaviour_(&behaviour), mechanics_(settings.mechanics) {
+  for (std::size_t i = 0; i < input_terminals; ++i) {
+    const auto wire = settings.wires.find(terminal_names.at(i).name);
+    if (wire == settings.wires.end()) continue;
+    terminals_.at(i).wire = wire->second;
+    wired_.at(static_cast<std::size_t>(wire->second.kind)) = true;
+  }
+}
+
+std::span<const TerminalSpec> Terminals::names() { return terminal_names; }
+
+void Terminals::drive(std::string_view terminal, std::optional<bool> high) {
+  const auto found = std::ranges::find(terminal_names, terminal, &TerminalSpec::name);
+  if (found != terminal_names.end())
+    terminals_.at(static_cast<std::size_t>(found - terminal_names.begin())).driven = high;
+}
+
+bool Terminals::switch_active(SwitchKind kind, std::int64_t shaft) const {
+  const auto& m = mechanics_;
+  if (kind == SwitchKind::home)
+    return m.home_switch_from && m.home_switch_to && shaft >= *m.home_switch_from &&
+           shaft <= *m.home_switch_to;
+  if (kind == SwitchKind::positive_limit) return m.positive_limit_from && shaft >= *m.positive_limit_from;
+  return m.negative_limit_from && shaft <= *m.negative_limit_from;
+}
+
+std::optional<std::int64_t> Terminals::next_switch(std::int64_t shaft, int direction) const {
+  const auto& m = mechanics_;
+  std::optional<std::int64_t> nearest;
+  // `first` is the first position of the other state when going forwards; backwards it is the one before.
+  const auto consider = [&](std::optional<std::int64_t> first, std::int64_t further) {
+    if (!first) return;
+    const auto at = *first + further - (direction > 0 ? 0 : 1);
+    if ((at - shaft) * direction <= 0) return;
+    if (!nearest || (at - *nearest) * direction < 0) nearest = at;
+  };
+  consider(m.home_switch_from, 0);
+  consider(m.home_switch_to, 1);
+  consider(m.positive_limit_from, 0);
+  consider(m.negative_limit_from, 1);
+  return nearest;
+}
+
+bool Terminals::raw(std::size_t index, std::int64_t shaft, const Memory& memory) const {
+  const auto& terminal = terminals_.at(index);
+  const bool inverted = (memory.get(reg::input_levels) >> index & 1U) != 0;
+  if (terminal.driven) return *terminal.driven != inverted;
+  if (terminal.wire)
+    return switch_active(terminal.wire->kind, shaft) != (terminal.wire->normally_closed != inverted);
+  // A switch without a terminal of its own is wired to its function, in the polarity that the drive expects.
+  const auto kind = switch_of(function_of(index, memory));
+  if (kind) return !wired_.at(static_cast<std::size_t>(*kind)) && switch_active(*kind, shaft);
+  return inverted;  // nothing connected: low level
+}
+
+/// 4.3: the pulse at X0..X7 must be longer than 10 ms, the default of the filters 0x0116..0x0119, which are
+/// taken as milliseconds. PU and DR are the high-speed inputs and have none.
+Duration Terminals::filter(std::size_t index, const Memory& memory) const {
+  if (index < 2) return {};
+  if (switch_of(function_of(index, memory)) && !behaviour_->filter_home_and_limits) return {};
+  return std::chrono::milliseconds(memory.get(static_cast<std::uint16_t>(0x0116 + (index - 2) / 2)));
+}
+
+std::array<bool, input_functions> Terminals::evaluate(const Memory& memory) const {
+  std::array<bool, input_functions> functions{};
+  for (std::size_t i = 0; i < input_terminals; ++i)
+    if (terminals_.at(i).active) functions.at(static_cast<std::size_t>(function_of(i, memory))) = true;
+  return functions;
+}
+
+std::vector<InputEdge> Terminals::sample(TimePoint now, std::int64_t shaft, const Memory& memory) {
+  for (std::size_t i = 0; i < input_terminals; ++i) {
+    auto& terminal = terminals_.at(i);
+    const bool level = raw(i, shaft, memory);
+    if (level == terminal.active) {
+      terminal.due = TimePoint::max();
+    } else if (terminal.due == TimePoint::max()) {
+      terminal.due = now + filter(i, memory);
+    }
+    if (terminal.due > now) continue;
+    terminal.active = level;
+    terminal.due = TimePoint::max();
+  }
+  const auto before = functions_;
+  functions_ = evaluate(memory);
+  std::vector<InputEdge> edges;
+  for (std::size_t f = 1; f < input_functions; ++f)
+    if (functions_.at(f) != before.at(f)) edges.push_back({static_cast<Input>(f), functions_.at(f)});
+  return edges;
+}
+
+void Terminals::settle(std::int64_t shaft, const Memory& memory) {
+  for (std::size_t i = 0; i < input_terminals; ++i) {
+    terminals_.at(i).active = raw(i, shaft, memory);
+    terminals_.at(i).due = TimePoint::max();
+  }
+  functions_ = evaluate(memory);
+}
+
+TimePoint Terminals::next_event() const { return std::ranges::min(terminals_, {}, &Terminal::due).due; }
+
+std::uint16_t Terminals::bits() const {
+  unsigned bits = 0;
+  for (std::size_t i = 0; i < input_terminals; ++i) bits |= terminals_.at(i).active ? 1U << i : 0U;
+  return static_cast<std::uint16_t>(bits);
+}
+
+int Terminals::segment() const {
+  int number = 0;
+  for (int pin = 0; pin < 5; ++pin)
+    if (functions_.at(static_cast<std::size_t>(Input::pin0) + static_cast<std::size_t>(pin)))
+      number |= 1 << pin;
+  return number <= 16 ? number : 0;  // 7.3.2 lists 1..16
+}
+
+}  // namespace axisd::ykd2405pr

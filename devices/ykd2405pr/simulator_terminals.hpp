@@ -1,0 +1,96 @@
+// Input terminals of the simulated drive: levels, inversion, filter, functions and their edges
+// (manual 4.3, 6.1).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "devices/simulation/simulated_node.hpp"
+#include "devices/ykd2405pr/simulator_memory.hpp"
+
+namespace axisd::ykd2405pr {
+
+/// Codes of 0x0041..0x004A.
+enum class Input : std::uint8_t {
+  none,
+  home,
+  positive_limit,
+  negative_limit,
+  motor_free,
+  alarm_clear,
+  pv_enable,
+  pv_direction,
+  stop,
+  emergency_stop,
+  position,
+  speed,
+  jog_positive,
+  jog_negative,
+  homing,
+  pt_enable,
+  pin0,
+  pin1,
+  pin2,
+  pin3,
+  pin4
+};
+inline constexpr std::size_t input_functions = 21, input_terminals = 10;
+
+struct InputEdge {
+  Input function;
+  bool rising;
+};
+
+class Terminals {
+ public:
+  Terminals(const Behaviour& behaviour, const simulation::SimulatedNodeSettings& settings);
+
+  static std::span<const TerminalSpec> names();
+  /// Over any switch; nothing gives the terminal back to its switch.
+  void drive(std::string_view terminal, std::optional<bool> high);
+
+  /// Takes the levels at `now` with the shaft at `shaft`; returns the edges of functions that filters let
+  /// through.
+  std::vector<InputEdge> sample(TimePoint now, std::int64_t shaft, const Memory& memory);
+  /// Takes over levels as they are, without edges: at power-up, and after a change of functions or active
+  /// levels.
+  void settle(std::int64_t shaft, const Memory& memory);
+  /// When a filter lets a level through; TimePoint::max() if all are stable.
+  [[nodiscard]] TimePoint next_event() const;
+  /// Next position of the shaft in `direction` at which a switch changes.
+  [[nodiscard]] std::optional<std::int64_t> next_switch(std::int64_t shaft, int direction) const;
+
+  [[nodiscard]] bool active(Input function) const {
+    return functions_.at(static_cast<std::size_t>(function));
+  }
+  /// Bits as in 0x0008.
+  [[nodiscard]] std::uint16_t bits() const;
+  /// 1..16 as PIN0..PIN4 select, 0 for none.
+  [[nodiscard]] int segment() const;
+
+ private:
+  struct Terminal {
+    std::optional<bool> driven;
+    std::optional<simulation::Wire> wire;
+    bool active = false;  ///< after the filter
+
+    TimePoint due = TimePoint::max();  ///< when the other level gets through the filter
+  };
+  [[nodiscard]] bool switch_active(simulation::SwitchKind kind, std::int64_t shaft) const;
+  [[nodiscard]] bool raw(std::size_t index, std::int64_t shaft, const Memory& memory) const;
+  [[nodiscard]] Duration filter(std::size_t index, const Memory& memory) const;
+  [[nodiscard]] std::array<bool, input_functions> evaluate(const Memory& memory) const;
+
+  const Behaviour* behaviour_;
+  simulation::Mechanics mechanics_;
+  std::array<Terminal, input_terminals> terminals_{};
+  std::array<bool, 3> wired_{};  ///< by SwitchKind: has a terminal of its own
+  std::array<bool, input_functions> functions_{};
+};
+
+}  // namespace axisd::ykd2405pr
