@@ -15,22 +15,24 @@ enum class StopKind : std::uint8_t { none, halt, stop, quick_stop };
 
 /// The motion epoch of one axis. Thread: any (atomics only).
 ///
-/// The epoch rises with every stop, halt, disable, lease loss, offline, reboot and reload. A motion frame that was
-/// prepared in an older epoch is never sent.
+/// The epoch rises with every stop, halt, disable, lease loss, offline, reboot and reload. A motion frame
+/// that was prepared in an older epoch is never sent.
 class AxisGate {
  public:
   [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
   /// Makes every motion frame prepared until now unsendable.
   void raise() { epoch_.fetch_add(1, std::memory_order_acq_rel); }
 
-  /// The lane of stops: raises the epoch at once, so that the very next bind already refuses motion, and leaves
-  /// the kind for the core thread, which must be woken by the caller.
+  /// The lane of stops: raises the epoch at once, so that the very next bind already refuses motion, and
+  /// leaves the kind for the core thread, which must be woken by the caller.
   void request_stop(StopKind kind) {
     raise();
     auto pending = pending_stop_.load(std::memory_order_relaxed);
     while (pending < kind && !pending_stop_.compare_exchange_weak(pending, kind, std::memory_order_acq_rel)) {
     }
   }
+  /// A stop was requested that the core has not seen yet: nothing new may be accepted before it.
+  [[nodiscard]] bool stop_pending() const { return pending_stop_.load(std::memory_order_acquire) != StopKind::none; }
   /// Thread: core. The pending request, or `none`.
   StopKind take_stop_request() { return pending_stop_.exchange(StopKind::none, std::memory_order_acq_rel); }
 
@@ -47,8 +49,8 @@ class AxisGate {
 struct MotionGuard {
   std::shared_ptr<const AxisGate> gate;  ///< null: not a motion frame, always sendable
   std::uint64_t epoch = 0;
-  std::uint64_t fencing_token = 0;              ///< 0: given without a lease
-  TimePoint not_after = TimePoint::max();       ///< validity of the request
+  std::uint64_t fencing_token = 0;         ///< 0: given without a lease
+  TimePoint not_after = TimePoint::max();  ///< validity of the request
 };
 
 enum class Verdict : std::uint8_t { send, superseded, expired, lease_lost };

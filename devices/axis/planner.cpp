@@ -105,8 +105,10 @@ Result<void> Planner::check_soft_limits(double target, double from) const {
 
 Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
                            const PositionTracker& tracker) const {
-  if (const auto allowed = check_soft_limits(target.position, tracker.position()); !allowed)
-    return fail(allowed.error());
+  // Without trust the numbers mean nothing; what bounds such moves then is jog_travel, or a waiver in the YAML.
+  if (tracker.trust() != PositionTrust::unknown || !settings_->require_trust)
+    if (const auto allowed = check_soft_limits(target.position, tracker.position()); !allowed)
+      return fail(allowed.error());
   // One move spans at most half the 32-bit counter; the counter itself is re-zeroed before it could overflow.
   constexpr std::int64_t longest = std::int64_t{1} << 30U;
   const auto distance = static_cast<double>(target.counter) - static_cast<double>(tracker.counter());

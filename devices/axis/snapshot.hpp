@@ -1,6 +1,6 @@
 #pragma once
 
-#include <memory>
+#include <boost/smart_ptr/shared_ptr.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -77,6 +77,7 @@ struct AxisSnapshot {
   std::string command_id{};    ///< current command, if any
   std::uint64_t revision = 0;  ///< rises with every publication
 };
-using AxisSnapshotPtr = std::shared_ptr<const AxisSnapshot>;
+/// boost's pointer: libstdc++ 12's atomic shared_ptr is a data race to ThreadSanitizer.
+using AxisSnapshotPtr = boost::shared_ptr<const AxisSnapshot>;
 
 }  // namespace axisd

@@ -1,0 +1,228 @@
+#include "devices/axis/axis.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <boost/smart_ptr/make_shared.hpp>
+#include <cmath>
+
+namespace axisd {
+
+Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescriptor& descriptor,
+           std::unique_ptr<Drive> drive, std::shared_ptr<AxisGate> gate, bool simulated)
+    : env_(std::move(environment)),
+      settings_(std::move(settings)),
+      descriptor_(&descriptor),
+      scale_(settings_.scale),
+      planner_(settings_, descriptor, scale_),
+      tracker_(scale_),
+      drive_(std::move(drive)),
+      gate_(std::move(gate)),
+      simulated_(simulated),
+      sampled_(env_.executor, *env_.clock),
+      wake_(env_.executor, *env_.clock),
+      stopped_(env_.executor, *env_.clock) {
+  publish();
+}
+
+Axis::~Axis() = default;
+
+void Axis::start() { spawn(env_.executor, run(), settings_.name); }
+
+Error Axis::error(Reason reason, std::string message, std::string remedy) const {
+  return {.reason = reason,
+          .message = fmt::format("{}: {}", settings_.name, message),
+          .remedy = std::move(remedy),
+          .where = {.bus = settings_.bus, .node = settings_.node}};
+}
+
+bool Axis::busy() const {
+  return activity_ || stopping_.running || stop_owed_ || terminal_motion_ || (sample_ && sample_->moving);
+}
+
+bool Axis::at_rest() const {
+  return !stopping_.running && !stop_owed_ && !(activity_ && activity_->state != AxisState::standstill) &&
+         !(sample_ && sample_->moving);
+}
+
+bool Axis::input_active(std::string_view function) const {
+  if (!sample_) return false;
+  for (const auto& input : settings_.inputs) {
+    if (input.function != function) continue;
+    const auto terminal = std::ranges::find(descriptor_->inputs, input.terminal, &TerminalSpec::name);
+    const auto bit = static_cast<unsigned>(terminal - descriptor_->inputs.begin());
+    if (terminal != descriptor_->inputs.end() && ((sample_->inputs >> bit) & 1U) != 0) return true;
+  }
+  return false;
+}
+
+bool Axis::limit_active(bool positive) const {
+  return input_active(positive ? "positive_limit" : "negative_limit");
+}
+
+void Axis::on_sample(const DriveSample& sample) {
+  sample_ = sample;
+  tracker_.update(sample.position_pulses);
+  if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
+  if (sample.alarm_code != 0) on_alarm(sample);
+  if (!sample.enabled) on_released(sample);
+  if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = false;
+  if (terminal_motion_ && !sample.moving) {
+    terminal_motion_ = false;
+    tracker_.forget_target();
+  }
+  if (sample.moving && !activity_ && !stopping_.running && link_ == LinkState::online)
+    on_unexplained_motion(sample);
+  publish();
+  sampled_.notify_all();
+}
+
+void Axis::on_alarm(const DriveSample& sample) {
+  if (fault_ && fault_->reason == Reason::alarm && fault_->where.native_code == sample.alarm_code) return;
+  const auto spec = std::ranges::find(descriptor_->alarms, sample.alarm_code, &AlarmSpec::code);
+  const bool known = spec != descriptor_->alarms.end();
+  auto cause =
+      error(Reason::alarm,
+            fmt::format("the drive reports alarm {} ({})", sample.alarm_code, known ? spec->name : "unknown"),
+            known ? std::string(spec->remedy) : "see the drive's manual");
+  cause.where.native_code = sample.alarm_code;
+  lose_trust();
+  enter_error_stop(std::move(cause));
+  // Also for an alarm that clears itself: nothing may go on by itself when it does (M5).
+  begin_stop(StopKind::stop, false, nullptr);
+}
+
+void Axis::on_released(const DriveSample& sample) {
+  if (!descriptor_->capabilities.closed_loop && sample.alarm_code == 0 &&
+      tracker_.trust() != PositionTrust::unknown)
+    lose_trust();  // an open-loop motor without current can be turned by hand
+  if (!enabled_by_us_) return;
+  const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
+  enabled_by_us_ = false;
+  if (releasing || fault_) return;
+  supersede(error(Reason::terminal, "the power stage was released, and not by a command",
+                  "check terminals with the function motor_free and other masters on the bus"));
+}
+
+void Axis::on_unexplained_motion(const DriveSample& sample) {
+  if (terminal_motion_) return;
+  const bool segments = sample.mode == DriveMode::multi_position || sample.mode == DriveMode::multi_velocity;
+  const bool possible = std::ranges::any_of(settings_.inputs, [this](const TerminalSettings& input) {
+    const auto* function = find_function(descriptor_->input_functions, input.function);
+    return function != nullptr && function->starts_motion;
+  });
+  if (segments || possible) {
+    terminal_motion_ = true;
+    return;
+  }
+  spdlog::warn("{}: moving without a command; stopping it", settings_.name);
+  begin_stop(StopKind::stop, false, nullptr);
+}
+
+void Axis::lose_trust() {
+  if (tracker_.trust() == PositionTrust::unknown) return;
+  tracker_.lose_trust();
+  tracker_.forget_target();
+  if (env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
+}
+
+OffsetRecord Axis::offset_record(std::int64_t offset, PositionTrust trust) const {
+  // The record speaks of the 32-bit counter: unwrapping begins anew with each start of the daemon.
+  const auto raw = static_cast<std::int32_t>(tracker_.counter());
+  OffsetRecord record{.offset_pulses = offset + tracker_.counter() - raw,
+                      .trust = trust,
+                      .last_position_pulses = raw,
+                      .pulses_per_revolution = settings_.scale.pulses_per_revolution,
+                      .invert = settings_.scale.invert};
+  if (const auto mark = drive_->continuity_mark()) record.canary = *mark;
+  return record;
+}
+
+void Axis::remember_position() {
+  if (env_.persistence == nullptr || tracker_.trust() == PositionTrust::unknown) return;
+  env_.persistence->save_offset(settings_.name, offset_record(tracker_.offset(), tracker_.trust()), {});
+}
+
+AxisState Axis::state() const {
+  if (fault_) return AxisState::error_stop;
+  if (stopping_.hold || (stopping_.running && stopping_.kind > StopKind::halt)) return AxisState::stopping;
+  if (activity_ && activity_->state != AxisState::standstill) return activity_->state;
+  if (stopping_.running && stopping_.shown != AxisState::standstill) return stopping_.shown;
+  if (terminal_motion_ && sample_)
+    return sample_->mode == DriveMode::multi_velocity ? AxisState::continuous_motion
+                                                      : AxisState::discrete_motion;
+  return sample_ && sample_->enabled ? AxisState::standstill : AxisState::disabled;
+}
+
+namespace {
+
+std::vector<TerminalState> terminal_states(std::span<const TerminalSpec> terminals,
+                                           const std::vector<TerminalSettings>& settings,
+                                           std::uint32_t bits) {
+  std::vector<TerminalState> states;
+  states.reserve(terminals.size());
+  for (std::size_t i = 0; i < terminals.size(); ++i) {
+    const auto configured = std::ranges::find(settings, terminals[i].name, &TerminalSettings::terminal);
+    states.push_back({.name = std::string(terminals[i].name),
+                      .function = configured == settings.end() ? std::string() : configured->function,
+                      .active = ((bits >> i) & 1U) != 0});
+  }
+  return states;
+}
+
+}  // namespace
+
+void Axis::publish() {
+  auto next = boost::make_shared<AxisSnapshot>();
+  next->name = settings_.name;
+  next->bus = settings_.bus;
+  next->node = settings_.node;
+  next->model = settings_.model;
+  next->unit = settings_.scale.unit;
+  next->simulated = simulated_;
+  next->state = state();
+  next->link = link_;
+  next->link_error = link_error_;
+  next->fault = fault_;
+  next->stop_held = stopping_.hold;
+  next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
+  next->enabled_by_us = enabled_by_us_;
+  next->trust = tracker_.trust();
+  next->position_source = descriptor_->capabilities.position_source;
+  next->position = tracker_.position();
+  if (settings_.scale.modulo) {
+    const auto turn = *settings_.scale.modulo;
+    next->position -= std::floor(next->position / turn) * turn;
+  }
+  next->identity = identity_;
+  next->reboots = reboots_;
+  next->revision = ++revision_;
+  next->positive_direction = last_positive_;
+  if (activity_) {
+    next->command_id = activity_->command->value().id;
+    if (activity_->plan.granted.position) next->target = activity_->plan.target;
+  }
+  const auto bits = sample_.value_or(DriveSample{});
+  next->inputs = terminal_states(descriptor_->inputs, settings_.inputs, bits.inputs);
+  next->outputs = terminal_states(descriptor_->outputs, settings_.outputs, bits.outputs);
+  if (sample_) {
+    next->enabled = bits.enabled;
+    // The sign of the speed register is not said; the direction register's is.
+    const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
+    next->velocity = last_positive_ ? speed : -speed;
+    next->moving = bits.moving;
+    next->in_position = bits.in_position;
+    next->homed = bits.homed;
+    next->alarm_code = bits.alarm_code;
+    const auto alarm = std::ranges::find(descriptor_->alarms, bits.alarm_code, &AlarmSpec::code);
+    if (alarm != descriptor_->alarms.end()) next->alarm_name = alarm->name;
+    next->sampled_after = bits.asked_at;
+    next->sampled_before = bits.measured_at;
+    next->measured_at = env_.clock->wall(bits.measured_at);
+  }
+  snapshot_.store(next);
+  if (env_.published) env_.published();
+}
+
+}  // namespace axisd

@@ -1,0 +1,239 @@
+// One axis: the vendor-free motion object (PLCopen Motion Control part 1).
+//
+//                      Enable                      Home            +--------+
+//        Disabled ---------------> Standstill ------------------->| Homing |--+
+//           ^                       |  ^   ^  \                    +--------+  | done
+//           |        Disable        |  |   |   \ MoveAbsolute, MoveRelative    |
+//           +-----------------------+  |   |    +--> DiscreteMotion -----------+--> Standstill
+//                                      |   |  MoveVelocity, Jog
+//                            confirmed |   +-------> ContinuousMotion -- Halt --> Standstill
+//                                      |
+//     any ---- Stop, QuickStop ---> Stopping            any ---- fault ---> ErrorStop ---- Reset --->
+//     Disabled or
+//                                                                                                     Standstill
+//
+// A state is visible as soon as a command is accepted. Beside the state stands the link to the drive
+// (offline, configuring, online). Every change that forbids motion raises the epoch of the gate first; what
+// was prepared before is then never sent, and the sequence that prepared it ends by itself at its next step
+// (superseded, not cancelled).
+#pragma once
+
+#include <boost/smart_ptr/atomic_shared_ptr.hpp>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "buses/gate.hpp"
+#include "buses/modbus_rtu/rtu_bus.hpp"
+#include "buses/signal.hpp"
+#include "buses/task.hpp"
+#include "devices/axis/command_book.hpp"
+#include "devices/axis/planner.hpp"
+#include "devices/axis/position_tracker.hpp"
+#include "devices/axis/settings.hpp"
+#include "devices/axis/snapshot.hpp"
+#include "devices/descriptor.hpp"
+#include "devices/drive.hpp"
+#include "devices/persistence.hpp"
+
+namespace axisd {
+
+/// What an axis shares with the rest of its machine.
+struct AxisEnvironment {
+  Executor executor;
+  Clock* clock = nullptr;
+  modbus_rtu::RtuBus* bus = nullptr;
+  CommandBook* book = nullptr;
+  Persistence* persistence = nullptr;
+  const bool* inhibited = nullptr;  ///< StopAll is latched
+  std::function<void()> published;  ///< after each new snapshot
+};
+
+/// Thread: core, except gate() and snapshot().
+class Axis {
+ public:
+  Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescriptor& descriptor,
+       std::unique_ptr<Drive> drive, std::shared_ptr<AxisGate> gate, bool simulated);
+  ~Axis();
+  Axis(const Axis&) = delete;
+
+  /// Connects to the drive, now and whenever it was lost. Never moves or enables anything (M1).
+  void start();
+
+  /// Accepts or refuses a request. What becomes of an accepted one is in its command.
+  Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
+  Result<CommandPtr> release_stop();
+  /// Halts the axis if `command` is being executed.
+  Result<CommandPtr> cancel(const CommandPtr& command);
+  /// A flag outside changed (inhibit): publish again.
+  void refresh() { publish(); }
+
+  [[nodiscard]] const AxisSettings& settings() const { return settings_; }
+  /// Nothing moves, as far as is known, and no stop is under way.
+  [[nodiscard]] bool at_rest() const;
+  /// Thread: any.
+  [[nodiscard]] const std::shared_ptr<AxisGate>& gate() const { return gate_; }
+  /// Thread: any.
+  [[nodiscard]] AxisSnapshotPtr snapshot() const { return snapshot_.load(); }
+
+ private:
+  /// A command that is being executed.
+  struct Activity {
+    CommandPtr command;
+    AxisState state = AxisState::standstill;
+    std::uint64_t epoch = 0;
+    CommandOptions options;
+    Plan plan{};
+    std::optional<TimePoint> hold_until{};  ///< jog and held velocity: halts at this time
+    bool started = false;                   ///< the drive was seen moving for it
+  };
+  using ActivityPtr = std::shared_ptr<Activity>;
+
+  /// Stops in progress; one sequence serves all that arrive meanwhile.
+  struct Stopping {
+    bool running = false;
+    bool hold = false;                        ///< stay in Stopping until ReleaseStop
+    StopKind kind = StopKind::none;           ///< strongest requested
+    int requests = 0;                         ///< each needs a frame of its own
+    AxisState shown = AxisState::standstill;  ///< while a halt decelerates
+    std::vector<CommandPtr> commands;
+    CommandPtr last;
+  };
+
+  /// Keeps the poll loop off the node: a start is one uninterrupted chain (M6).
+  class Chain {
+   public:
+    explicit Chain(Axis& axis) : axis_(&axis) { ++axis_->chains_; }
+    ~Chain() {
+      --axis_->chains_;
+      axis_->wake_.notify_all();
+    }
+    Chain(const Chain&) = delete;
+
+   private:
+    Axis* axis_;
+  };
+
+  // axis_link.cpp: the way to the drive
+  Task<> run();
+  Task<> connect();
+  Task<Result<void>> try_connect();
+  Task<Result<void>> settle_found_motion();
+  Task<Result<void>> prove_or_configure();
+  Task<> poll();
+  Task<bool> poll_once(int& failures);
+  Task<> wait_for_port();
+  void go_offline(const Error& cause);
+  void on_reboot(const Error& cause);
+
+  // axis.cpp: what the samples mean
+  void on_sample(const DriveSample& sample);
+  void on_alarm(const DriveSample& sample);
+  void on_released(const DriveSample& sample);
+  void on_unexplained_motion(const DriveSample& sample);
+  void publish();
+  [[nodiscard]] AxisState state() const;
+  [[nodiscard]] bool busy() const;
+  [[nodiscard]] bool input_active(std::string_view function) const;
+  [[nodiscard]] bool limit_active(bool positive) const;
+  void lose_trust();
+  void remember_position();
+
+  // axis_requests.cpp: acceptance
+  [[nodiscard]] Result<void> check_common(const CommandOptions& options) const;
+  [[nodiscard]] Result<void> check_online() const;
+  [[nodiscard]] Result<void> check_motion(const CommandOptions& options) const;
+  [[nodiscard]] Result<void> check_direction(bool positive) const;
+  Result<CommandPtr> accept(const EnableRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const DisableRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const HomeRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const MoveAbsoluteRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const MoveRelativeRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const MoveVelocityRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const JogRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const StopRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const ResetRequest& request, const CommandOptions& options);
+  Result<CommandPtr> accept(const SetPositionRequest& request, const CommandOptions& options);
+  [[nodiscard]] Result<Plan> plan_move(const PositionTracker::Target& target, const MotionValues& with) const;
+  Result<Plan> plan_velocity(double velocity, const MotionValues& with, bool jog);
+  ActivityPtr begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan);
+
+  // axis_motion.cpp: sequences
+  [[nodiscard]] bool current(const Activity& activity) const;
+  [[nodiscard]] MotionGuard guard(const Activity& activity) const;
+  Task<bool> reach_standstill(ActivityPtr activity);
+  Task<> run_enable(ActivityPtr activity);
+  Task<> run_disable(ActivityPtr activity);
+  Task<> run_move(ActivityPtr activity);
+  Task<> run_velocity(ActivityPtr activity);
+  Task<> run_reset(ActivityPtr activity);
+  Task<> run_set_position(ActivityPtr activity);
+  Task<Result<void>> make_room(ActivityPtr activity);
+  Task<bool> positioned(ActivityPtr activity);
+  Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
+  Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
+  bool judge_rest(Activity& activity);
+  Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
+  Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
+  [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;
+  void finish(Activity& activity, const std::function<void(CommandRecord&)>& how);
+  void fail_with_stop(Activity& activity, Error cause);
+  void enter_error_stop(Error cause);
+
+  // axis_homing.cpp
+  Task<> run_home(ActivityPtr activity);
+  Task<bool> back_off(ActivityPtr activity);
+  Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
+  [[nodiscard]] std::string_view homing_switch() const;
+
+  // axis_stop.cpp
+  void supersede(const Error& cause);
+  void begin_stop(StopKind kind, bool hold, CommandPtr command);
+  Task<> run_stop();
+  Task<Result<void>> stop_and_confirm();
+  Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
+  [[nodiscard]] Duration deceleration_bound() const;
+  [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
+
+  AxisEnvironment env_;
+  AxisSettings settings_;
+  const DriveDescriptor* descriptor_;
+  Scale scale_;
+  Planner planner_;
+  PositionTracker tracker_;
+  std::unique_ptr<Drive> drive_;
+  std::shared_ptr<AxisGate> gate_;
+  bool simulated_;
+
+  LinkState link_ = LinkState::offline;
+  std::optional<Error> link_error_;
+  std::optional<DriveIdentity> identity_;
+  bool configured_ = false;  ///< in this power cycle of the drive
+  bool restore_tried_ = false;
+  int reboots_ = 0;
+  TimePoint continuity_checked_{};
+
+  std::optional<DriveSample> sample_;
+  Signal sampled_;  ///< a new sample, or the link changed
+  Signal wake_;     ///< the poll loop has something to look at
+  Signal stopped_;  ///< the stop sequence ended
+  int chains_ = 0;
+
+  ActivityPtr activity_;
+  Stopping stopping_;
+  bool stop_owed_ = false;  ///< M4: to a silent node, until standstill is confirmed
+  bool enabled_by_us_ = false;
+  bool terminal_motion_ = false;
+  bool last_positive_ = true;
+  std::optional<Error> fault_;
+  Duration last_deceleration_{
+      milliseconds(2000)};  ///< of the motion in progress; at first the drive's longest
+
+  std::uint64_t revision_ = 0;
+  boost::atomic_shared_ptr<const AxisSnapshot> snapshot_;
+};
+
+}  // namespace axisd

@@ -1,0 +1,142 @@
+// Homing: by the drive itself, watched from here (M21).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+std::string_view Axis::homing_switch() const {
+  switch (settings_.homing->method) {
+    case HomingMethod::home_positive:
+    case HomingMethod::home_negative:
+      return "home";
+    case HomingMethod::positive_limit:
+      return "positive_limit";
+    case HomingMethod::negative_limit:
+      return "negative_limit";
+  }
+  return "home";
+}
+
+Task<> Axis::run_home(ActivityPtr activity) {
+  if (!co_await reach_standstill(activity)) co_return;
+  const auto profile = planner_.homing();
+  if (!profile || !*profile) {
+    finish(*activity, [&](CommandRecord& command) {
+      command.error(profile ? error(Reason::not_supported, "no homing is configured") : profile.error());
+    });
+    co_return;
+  }
+  if (input_active(homing_switch()) && !co_await back_off(activity)) co_return;
+
+  lose_trust();
+  const bool homed_before = sample_->homed;
+  const auto base = tracker_.counter();
+  activity->started = false;
+  Result<void> result;
+  {
+    const Chain chain(*this);
+    result = co_await drive_->start_homing(**profile, guard(*activity));
+  }
+  const auto since = env_.clock->now();
+  if (!co_await started(activity, std::move(result), base, since)) co_return;
+  if (!co_await follow_homing(activity, since, homed_before)) co_return;
+
+  const auto position = settings_.homing->position;
+  // Should the disk fail, the position holds for this run of the daemon; only a restart will not find it.
+  (void)co_await journal_offset(tracker_.offset_for(position), PositionTrust::homed);
+  if (!current(*activity)) co_return;
+  tracker_.set_position(position, PositionTrust::homed);
+  finish(*activity, [](CommandRecord& command) { command.done(); });
+}
+
+/// The drive searches for the rising edge of the switch; on an active switch there is none. A bounded move
+/// against the search direction leaves it.
+Task<bool> Axis::back_off(ActivityPtr activity) {
+  const auto method = settings_.homing->method;
+  const bool search_positive =
+      method == HomingMethod::home_positive || method == HomingMethod::positive_limit;
+  const auto distance = *settings_.homing->backoff * (search_positive ? -1 : 1);
+  const auto velocity = std::max(settings_.homing->search_velocity, planner_.minimum_velocity());
+  auto plan = planner_.profile(velocity, {.acceleration_time = settings_.homing->acceleration_time});
+  if (plan) {
+    const auto target = tracker_.plan_relative(distance);
+    plan->positive = distance > 0;
+    plan->target = target.position;
+    plan->target_counter = target.counter;
+    const auto per_second = static_cast<double>(settings_.scale.pulses_per_revolution) / 60.0;
+    plan->predicted = move_duration(std::abs(static_cast<double>(target.counter - tracker_.counter())),
+                                    plan->start_rpm * per_second, plan->velocity_rpm * per_second,
+                                    plan->acceleration_time, plan->deceleration_time);
+  }
+  if (!plan) {
+    finish(*activity, [&](CommandRecord& command) { command.error(plan.error()); });
+    co_return false;
+  }
+  activity->plan = *plan;
+  if (!co_await positioned(activity)) co_return false;
+  tracker_.forget_target();
+  if (!input_active(homing_switch())) co_return true;
+  finish(*activity, [this](CommandRecord& command) {
+    command.error(error(Reason::limit_switch,
+                        fmt::format("the {} switch is still active after backing off", homing_switch()),
+                        "check the switch, or configure a longer backoff"));
+  });
+  co_return false;
+}
+
+/// True: the drive reports home. The bit alone proves nothing, it may be left from the last time: homing mode
+/// must have been seen, and either the bit's rise, or the counter standing where only a completed homing puts
+/// it.
+Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed_before) {
+  const auto& homing = *settings_.homing;
+  const auto origin = tracker_.counter();
+  const auto latest = since + homing.timeout;
+  const auto start_by = since + milliseconds(500);
+  const auto offset = std::abs(scale_.to_pulses(homing.offset));
+  bool mode_seen = false;
+  bool bit_was_low = !homed_before;
+  for (;;) {
+    co_await sampled_.wait_until(
+        std::max(std::min(latest, mode_seen ? latest : start_by), env_.clock->now() + milliseconds(1)));
+    if (!current(*activity)) co_return false;
+    const auto now = env_.clock->now();
+    if (sample_->asked_at >= since) {
+      const auto& sample = *sample_;
+      if (sample.mode == DriveMode::homing) mode_seen = true;
+      if (!sample.homed) bit_was_low = true;
+      if (mode_seen && !sample.moving && sample.mode == DriveMode::positioning) {
+        const bool rose = sample.homed && bit_was_low;
+        const bool at_zero = sample.homed && std::abs(std::int64_t{sample.position_pulses}) <= offset + 1;
+        if (rose || at_zero) co_return true;
+        fail_with_stop(*activity, error(Reason::not_reached, "homing ended without reaching home",
+                                        "check the switch, limit and stop terminals"));
+        co_return false;
+      }
+      const auto travel = std::abs(scale_.to_units(tracker_.counter()) - scale_.to_units(origin));
+      if (homing.max_travel && travel > *homing.max_travel) {
+        fail_with_stop(*activity, error(Reason::not_reached,
+                                        fmt::format("no switch within max_travel of {} {}; stopped",
+                                                    *homing.max_travel, settings_.scale.unit),
+                                        "check the switch and the homing direction"));
+        co_return false;
+      }
+    }
+    if (!mode_seen && now >= start_by) {
+      fail_with_stop(*activity,
+                     error(Reason::did_not_start, "the drive accepted the homing command but does not home",
+                           "check enable, alarm and terminals"));
+      co_return false;
+    }
+    if (now >= latest) {
+      fail_with_stop(*activity, error(Reason::took_too_long, "no switch was found in time; stopped",
+                                      "check the switch, or raise homing: { timeout: ... }"));
+      co_return false;
+    }
+  }
+}
+
+}  // namespace axisd

@@ -1,0 +1,239 @@
+// The way to the drive: connecting, verifying, polling, and noticing that it is gone or was restarted.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+constexpr auto first_backoff = milliseconds(100);
+constexpr auto longest_backoff = milliseconds(1000);
+constexpr int attempts_before_offline = 3;
+/// The canary is read at least every second (M7), counting the poll that is under way.
+constexpr auto continuity_period = milliseconds(800);
+constexpr auto found_motion_poll = milliseconds(30);
+
+}  // namespace
+
+Task<> Axis::run() {
+  for (;;) {
+    co_await connect();
+    co_await poll();
+  }
+}
+
+Task<> Axis::connect() {
+  Duration backoff = first_backoff;
+  while (link_ != LinkState::online) {
+    co_await wait_for_port();
+    const auto connected = co_await try_connect();
+    if (connected) {
+      link_ = LinkState::online;
+      link_error_.reset();
+      continuity_checked_ = env_.clock->now();
+      spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
+                   identity_ ? identity_->version : "");
+      break;
+    }
+    const bool answers =
+        connected.error().reason != Reason::no_reply && connected.error().reason != Reason::bus_down;
+    link_ = answers ? LinkState::configuring : LinkState::offline;
+    if (!link_error_ || link_error_->reason != connected.error().reason)
+      spdlog::warn("{}: {}", settings_.name, to_string(connected.error()));
+    link_error_ = connected.error();
+    publish();
+    co_await wake_.wait_until(env_.clock->now() + backoff);
+    backoff = std::min<Duration>(backoff * 2, longest_backoff);
+  }
+  publish();
+  sampled_.notify_all();
+}
+
+Task<> Axis::wait_for_port() {
+  while (!env_.bus->port().open) {
+    link_ = LinkState::offline;
+    link_error_ = env_.bus->port().error.value_or(
+        error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists"));
+    publish();
+    co_await env_.bus->port_changed().wait_until(env_.clock->now() + longest_backoff);
+  }
+}
+
+Task<Result<void>> Axis::try_connect() {
+  if (stop_owed_) {
+    // Whatever the drive is doing now, the first frame it gets is a stop (M4).
+    const auto stopped = co_await drive_->stop(StopKind::stop);
+    if (!stopped) co_return stopped;
+  }
+  // While nothing is known about the node, its silence must not cost its neighbours much.
+  auto identity = co_await drive_->identify(TransactionClass::scan);
+  if (!identity) co_return fail(identity.error());
+  if (link_ != LinkState::configuring) {
+    link_ = LinkState::configuring;
+    link_error_.reset();
+    publish();
+  }
+  identity_ = std::move(*identity);
+  const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
+  if (!sample) co_return fail(sample.error());
+  on_sample(*sample);
+  if (const auto settled = co_await settle_found_motion(); !settled) co_return settled;
+  co_return co_await prove_or_configure();
+}
+
+/// M4: a drive found moving without a live command is stopped, unless a terminal started it.
+Task<Result<void>> Axis::settle_found_motion() {
+  const auto by_terminal = [this] { return !stop_owed_ && sample_->mode >= DriveMode::multi_position; };
+  const auto began = env_.clock->now();
+  const auto patience = deceleration_bound() + settings_.stop_margin;
+  auto kind = StopKind::stop;
+  while (sample_->moving && !by_terminal()) {
+    if (!stop_owed_) spdlog::warn("{}: found moving; stopping it", settings_.name);
+    stop_owed_ = true;
+    const auto sent = co_await drive_->stop(kind);
+    if (!sent) co_return sent;
+    co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + found_motion_poll);
+    const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
+    if (!sample) co_return fail(sample.error());
+    on_sample(*sample);
+    if (env_.clock->now() - began > patience) kind = StopKind::quick_stop;
+    if (env_.clock->now() - began > 2 * patience) {
+      if (settings_.stop_escalation_release) co_await drive_->disable();
+      co_return fail(error(Reason::not_confirmed, "found moving, and it does not stop",
+                           "look at the machine; cut its power if it moves"));
+    }
+  }
+  stop_owed_ = false;
+  co_return Result<void>{};
+}
+
+Task<Result<void>> Axis::prove_or_configure() {
+  const AxisRecord* stored = nullptr;
+  if (!configured_ && !restore_tried_ && env_.persistence != nullptr) {
+    const auto& axes = env_.persistence->loaded().axes;
+    const auto found = axes.find(settings_.name);
+    if (found != axes.end() && found->second.offset) stored = &found->second;
+  }
+  bool restorable = false;
+  if (stored != nullptr) {
+    const auto& record = *stored->offset;
+    restorable = record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
+                 record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
+                 record.last_position_pulses == sample_->position_pulses &&
+                 (sample_->enabled || descriptor_->capabilities.closed_loop);
+    if (restorable) drive_->expect_mark(record.canary);
+  }
+  if (configured_ || restorable) {
+    const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
+    if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
+    if (!proof && configured_) on_reboot(proof.error());
+    if (!proof) restorable = false;
+  }
+  if (!configured_) {
+    // A terminal's motion is not disturbed by writing parameters under it.
+    if (sample_->moving)
+      co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
+    const auto configured = co_await drive_->configure();
+    if (!configured) co_return configured;
+    configured_ = true;
+    restore_tried_ = true;
+    if (restorable) {
+      tracker_.restore(stored->offset->offset_pulses);
+      remember_position();
+    }
+  }
+  const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
+  if (!sample) co_return fail(sample.error());
+  on_sample(*sample);
+  co_return Result<void>{};
+}
+
+Task<> Axis::poll() {
+  int failures = 0;
+  while (link_ == LinkState::online) {
+    if (chains_ > 0) {
+      co_await wake_.wait();
+      continue;
+    }
+    const auto began = env_.clock->now();
+    if (!co_await poll_once(failures)) co_return;
+    if (failures > 0) continue;  // the bus's own timeouts pace the repetition
+    co_await wake_.wait_until(began + (busy() ? settings_.poll_moving : settings_.poll_idle));
+  }
+}
+
+/// False: the link is gone.
+Task<bool> Axis::poll_once(int& failures) {
+  Result<void> result;
+  if (env_.clock->now() - continuity_checked_ >= continuity_period) {
+    result = co_await drive_->check_continuity(busy() ? TransactionClass::moving_state
+                                                      : TransactionClass::idle_state);
+    if (result) continuity_checked_ = env_.clock->now();
+    if (!result && result.error().reason == Reason::rebooted) {
+      on_reboot(result.error());
+      co_return false;
+    }
+  }
+  if (result) {
+    const auto sample =
+        co_await drive_->read_state(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
+    if (sample)
+      on_sample(*sample);
+    else
+      result = fail(sample.error());
+  }
+  if (link_ != LinkState::online) co_return false;  // a sequence found the reboot first
+  if (result) {
+    failures = 0;
+    co_return true;
+  }
+  if (result.error().reason == Reason::bus_down || ++failures >= attempts_before_offline) {
+    go_offline(result.error());
+    co_return false;
+  }
+  co_return true;
+}
+
+void Axis::go_offline(const Error& cause) {
+  spdlog::warn("{}: offline: {}", settings_.name, to_string(cause));
+  link_ = LinkState::offline;
+  link_error_ = cause;
+  gate_->raise();
+  env_.bus->purge_superseded();
+  const bool moved = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
+                     terminal_motion_ || (sample_ && sample_->moving);
+  // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
+  if (moved) stop_owed_ = true;
+  if (auto activity = std::exchange(activity_, nullptr)) {
+    auto unknown = error(Reason::offline, "the drive stopped answering while the command was being executed",
+                         "check power and wiring; then reset the axis");
+    unknown.outcome = Outcome::unknown;
+    if (activity->state != AxisState::standstill && !fault_) fault_ = unknown;
+    activity->command->unknown(std::move(unknown));
+  }
+  if (moved) tracker_.forget_target();
+  terminal_motion_ = false;
+  publish();
+  sampled_.notify_all();
+}
+
+void Axis::on_reboot(const Error& cause) {
+  spdlog::warn("{}: {}", settings_.name, to_string(cause));
+  ++reboots_;
+  configured_ = false;
+  enabled_by_us_ = false;
+  link_ = LinkState::configuring;
+  link_error_ = cause;
+  supersede(cause);
+  lose_trust();
+  tracker_.restart(sample_ ? sample_->position_pulses : 0);
+  publish();
+  sampled_.notify_all();
+  wake_.notify_all();
+}
+
+}  // namespace axisd

@@ -1,0 +1,424 @@
+// Sequences. Each reads top to bottom; after every wait it asks whether it is still current, and leaves if
+// not.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// A drive that was told to start is expected to move within this.
+constexpr auto start_window = milliseconds(500);
+/// A sample that was asked for is expected within this, or the link is lost anyway.
+constexpr auto sample_patience = std::chrono::seconds(5);
+/// Beyond the predicted time: the prediction is exact for the profile, the drive's own latency is unknown.
+constexpr auto overrun_margin = std::chrono::seconds(1);
+
+/// Drives hold the position in 32 bit; before half of that is used up the counter is zeroed at standstill.
+constexpr std::int64_t rezero_beyond = std::int64_t{1} << 30U;
+
+}  // namespace
+
+bool Axis::current(const Activity& activity) const {
+  return activity_.get() == &activity && gate_->epoch() == activity.epoch;
+}
+
+MotionGuard Axis::guard(const Activity& activity) const {
+  return {.gate = gate_,
+          .epoch = activity.epoch,
+          .fencing_token = activity.options.lease_token,
+          .not_after = activity.options.not_after};
+}
+
+void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>& how) {
+  if (activity_.get() != &activity) return;
+  const auto keep = std::exchange(activity_, nullptr);
+  how(*keep->command);
+  publish();
+}
+
+void Axis::fail_with_stop(Activity& activity, Error cause) {
+  if (activity_.get() != &activity) return;
+  gate_->raise();
+  env_.bus->purge_superseded();
+  tracker_.forget_target();
+  last_deceleration_ = activity.plan.deceleration_time;
+  stopping_.shown = activity.state;
+  begin_stop(StopKind::stop, false, nullptr);
+  finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+}
+
+void Axis::enter_error_stop(Error cause) {
+  gate_->raise();
+  env_.bus->purge_superseded();
+  if (!fault_ || fault_->reason != cause.reason) {
+    spdlog::error("{}", to_string(cause));
+    fault_ = cause;
+  }
+  if (auto activity = std::exchange(activity_, nullptr)) {
+    last_deceleration_ = activity->plan.deceleration_time;
+    activity->command->error(std::move(cause));
+  }
+  tracker_.forget_target();
+}
+
+/// Waits for a sample whose request went out at `since` or later.
+Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience) {
+  const auto deadline = env_.clock->now() + patience;
+  wake_.notify_all();
+  while (env_.clock->now() < deadline && link_ == LinkState::online) {
+    if (sample_ && sample_->asked_at >= since) co_return *sample_;
+    co_await sampled_.wait_until(deadline);
+  }
+  co_return fail(error(Reason::no_reply, "the drive could not be read back", "check power and wiring"));
+}
+
+/// Lets a halt in progress end. False: no longer current.
+Task<bool> Axis::reach_standstill(ActivityPtr activity) {
+  while (stopping_.running && current(*activity)) co_await stopped_.wait();
+  if (!current(*activity)) co_return false;
+  if (fault_) {
+    finish(*activity, [this](CommandRecord& command) { command.error(*fault_); });
+    co_return false;
+  }
+  co_return true;
+}
+
+Task<> Axis::run_enable(ActivityPtr activity) {
+  Result<void> result;
+  {
+    const Chain chain(*this);
+    result = co_await drive_->enable(guard(*activity));
+  }
+  if (!current(*activity)) co_return;
+  if (!result && result.error().reason == Reason::rebooted) {
+    on_reboot(result.error());
+    co_return;
+  }
+  // Whether an enable without a reply was executed shows in the next samples.
+  const bool uncertain = !result && result.error().outcome == Outcome::unknown;
+  if (!result && !uncertain) {
+    finish(*activity, [&](CommandRecord& command) { command.error(result.error()); });
+    co_return;
+  }
+  activity->command->activate();
+  const auto deadline = env_.clock->now() + std::chrono::seconds(1);
+  const auto before = tracker_.counter();
+  while (env_.clock->now() < deadline) {
+    const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
+    if (!current(*activity)) co_return;
+    if (!sample) break;
+    if (sample->moving || tracker_.counter() != before) {
+      // M1: power never moves. Whatever this is, it ends here.
+      enter_error_stop(error(Reason::terminal, "the drive moved when it was enabled",
+                             "check terminals that start motion; then reset the axis"));
+      begin_stop(StopKind::stop, false, nullptr);
+      publish();
+      co_return;
+    }
+    if (sample->enabled) {
+      enabled_by_us_ = true;
+      finish(*activity, [](CommandRecord& command) { command.done(); });
+      co_return;
+    }
+  }
+  finish(*activity, [&](CommandRecord& command) {
+    command.error(error(Reason::not_confirmed, "the drive does not report its power stage as on",
+                        "check terminals with the function motor_free, and alarms"));
+  });
+}
+
+Task<> Axis::run_disable(ActivityPtr activity) {
+  activity->command->activate();
+  // A fault does not stand in the way of releasing: only the motion has to have ended.
+  while (stopping_.running && current(*activity)) co_await stopped_.wait();
+  if (!current(*activity)) co_return;
+  if (stop_owed_) {
+    finish(*activity, [&](CommandRecord& command) {
+      command.error(error(Reason::not_confirmed, "not released: standstill was not confirmed",
+                          "look at the machine; cut its power if it moves"));
+    });
+    co_return;
+  }
+  const auto result = co_await drive_->disable();
+  if (!current(*activity)) co_return;
+  const auto sample =
+      result ? co_await sample_after(env_.clock->now(), sample_patience) : fail(result.error());
+  if (!current(*activity)) co_return;
+  finish(*activity, [&](CommandRecord& command) {
+    if (sample && !sample->enabled)
+      command.done();
+    else
+      command.error(
+          sample ? error(Reason::not_confirmed, "the drive still reports its power stage as on", "try again")
+                 : sample.error());
+  });
+}
+
+/// Zeroes the drive's counter before a target could leave its 32 bit (M19).
+Task<Result<void>> Axis::make_room(ActivityPtr activity) {
+  if (std::abs(activity->plan.target_counter) < rezero_beyond) co_return Result<void>{};
+  const auto cleared = co_await drive_->clear_position(guard(*activity));
+  if (!cleared) co_return cleared;
+  const auto sample = co_await drive_->read_state(TransactionClass::motion);
+  if (!sample) co_return fail(sample.error());
+  if (sample->position_pulses != 0 || sample->moving)
+    co_return fail(
+        error(Reason::not_confirmed, "the drive's position counter could not be zeroed", "home the axis"));
+  const auto shift = tracker_.counter();
+  tracker_.rezero(0);
+  activity->plan.target_counter -= shift;
+  co_return Result<void>{};
+}
+
+Task<> Axis::run_move(ActivityPtr activity) {
+  if (!co_await positioned(activity)) co_return;
+  tracker_.reached_plan();
+  remember_position();
+  finish(*activity, [](CommandRecord& command) { command.done(); });
+}
+
+/// One positioning motion to the plan's target. False: the activity has ended.
+Task<bool> Axis::positioned(ActivityPtr activity) {
+  if (!co_await reach_standstill(activity)) co_return false;
+  Result<void> result;
+  std::int64_t base = 0;
+  {
+    const Chain chain(*this);
+    result = co_await make_room(activity);
+    if (!current(*activity)) co_return false;
+    base = tracker_.counter();
+    if (result && activity->plan.target_counter == base) {  // nothing to do, and nothing is sent
+      activity->command->activate();
+      co_return true;
+    }
+    if (result) {
+      const MoveProfile profile{.target_pulses = static_cast<std::int32_t>(activity->plan.target_counter),
+                                .velocity_rpm = activity->plan.velocity_rpm,
+                                .start_rpm = activity->plan.start_rpm,
+                                .acceleration_time = activity->plan.acceleration_time,
+                                .deceleration_time = activity->plan.deceleration_time};
+      result = co_await drive_->start_move(profile, guard(*activity));
+    }
+  }
+  const auto since = env_.clock->now();
+  if (!co_await started(activity, std::move(result), base, since)) co_return false;
+  co_return co_await follow(activity, base, since);
+}
+
+Task<> Axis::run_velocity(ActivityPtr activity) {
+  if (!activity->plan.endless) {
+    if (!co_await positioned(activity)) co_return;
+    remember_position();
+    tracker_.forget_target();
+    const bool jog = activity->command->value().kind == CommandKind::jog;
+    auto cause = error(Reason::soft_limit, "reached the software limit", "move the other way");
+    finish(*activity,
+           [&](CommandRecord& command) { jog ? command.done() : command.abort(std::move(cause)); });
+    co_return;
+  }
+  if (!co_await reach_standstill(activity)) co_return;
+  Result<void> result;
+  const auto base = tracker_.counter();
+  {
+    const Chain chain(*this);
+    const VelocityProfile profile{.velocity_rpm = activity->plan.velocity_rpm,
+                                  .start_rpm = activity->plan.start_rpm,
+                                  .acceleration_time = activity->plan.acceleration_time,
+                                  .deceleration_time = activity->plan.deceleration_time};
+    result = co_await drive_->start_velocity(profile, guard(*activity));
+  }
+  const auto since = env_.clock->now();
+  if (!co_await started(activity, std::move(result), base, since)) co_return;
+  co_await follow(activity, base, since);
+}
+
+/// What became of a start. True: it was executed. A trigger without a reply is never sent again: the drive is
+/// read back until it shows what it did (M8).
+Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
+  if (!current(*activity)) co_return false;
+  if (result) {
+    activity->command->activate();
+    publish();
+    co_return true;
+  }
+  auto cause = result.error();
+  if (cause.reason == Reason::rebooted) {
+    on_reboot(cause);
+    co_return false;
+  }
+  if (cause.outcome != Outcome::unknown) {
+    const bool aborted = cause.reason == Reason::expired || cause.reason == Reason::lease_lost;
+    finish(*activity, [&](CommandRecord& command) { aborted ? command.abort(cause) : command.error(cause); });
+    co_return false;
+  }
+  const auto deadline = since + start_window;
+  while (env_.clock->now() < deadline || !sample_ || sample_->asked_at < deadline) {
+    wake_.notify_all();
+    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(50)));
+    if (!current(*activity)) co_return false;  // offline, too: then the command has ended as unknown
+    if (sample_->asked_at >= since &&
+        (sample_->moving || tracker_.counter() != base || sample_->mode != DriveMode::positioning)) {
+      activity->command->activate();
+      publish();
+      co_return true;
+    }
+  }
+  cause.outcome = Outcome::not_executed;
+  cause.message = fmt::format("{}: the start frame got no reply, and the drive did not move: {}",
+                              settings_.name, cause.message);
+  fail_with_stop(*activity, std::move(cause));
+  co_return false;
+}
+
+/// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended
+/// otherwise.
+Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since) {
+  const auto& plan = activity->plan;
+  const auto latest =
+      plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
+  const auto tolerance = std::max<std::int64_t>(
+      0, std::llround(settings_.position_tolerance * std::abs(scale_.pulses_per_unit())));
+  for (;;) {
+    auto deadline = std::min(activity->hold_until.value_or(latest), latest);
+    if (!activity->started) deadline = std::min(deadline, since + start_window);
+    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(1)));
+    if (!current(*activity)) co_return false;
+    const auto now = env_.clock->now();
+    if (activity->hold_until && now >= *activity->hold_until) {
+      const bool jog = activity->command->value().kind == CommandKind::jog;
+      stopping_.shown = activity->state;
+      gate_->raise();
+      last_deceleration_ = plan.deceleration_time;
+      begin_stop(StopKind::halt, false, nullptr);
+      auto cause =
+          error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");
+      finish(*activity,
+             [&](CommandRecord& command) { jog ? command.done() : command.abort(std::move(cause)); });
+      co_return false;
+    }
+    if (sample_ && sample_->asked_at >= since) {
+      const auto& sample = *sample_;
+      if (sample.moving || tracker_.counter() != base) activity->started = true;
+      if (sample.mode != DriveMode::positioning) {
+        fail_with_stop(*activity, error(Reason::terminal, "a terminal of the drive took over the motion",
+                                        "check the terminals"));
+        co_return false;
+      }
+      if (!sample.moving) {
+        if (!plan.endless && std::abs(tracker_.counter() - plan.target_counter) <= tolerance) co_return true;
+        if (activity->started && judge_rest(*activity)) co_return false;
+      }
+    }
+    if (!activity->started && now >= since + start_window) {
+      fail_with_stop(*activity, error(Reason::did_not_start, "the drive accepted the start but does not move",
+                                      "check limit and stop terminals, enable and alarm"));
+      co_return false;
+    }
+    if (now >= latest) {
+      fail_with_stop(*activity,
+                     error(Reason::took_too_long, "the motion takes longer than predicted; stopped",
+                           "check the load, and other masters on the bus"));
+      co_return false;
+    }
+  }
+}
+
+/// The drive rests, but not at the target: says why, and ends the activity.
+bool Axis::judge_rest(Activity& activity) {
+  tracker_.forget_target();
+  const auto positive = activity.plan.positive;
+  if (limit_active(positive)) {
+    lose_trust();  // open loop: the overtravel stop has no ramp (M20)
+    finish(activity, [&](CommandRecord& command) {
+      command.abort(
+          error(Reason::limit_switch,
+                fmt::format("the {} limit switch ended the motion", positive ? "positive" : "negative"),
+                "move away from it; home the axis"));
+    });
+    return true;
+  }
+  const bool terminal = input_active("stop") || input_active("quick_stop");
+  auto cause =
+      terminal
+          ? error(Reason::terminal, "a stop terminal of the drive ended the motion", "check the terminals")
+          : error(
+                Reason::not_reached,
+                fmt::format("the drive came to rest at {:.6g} {}", tracker_.position(), settings_.scale.unit),
+                "check terminals, and other masters on the bus");
+  if (terminal) {
+    finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
+  } else {
+    fail_with_stop(activity, std::move(cause));
+  }
+  return true;
+}
+
+Task<> Axis::run_reset(ActivityPtr activity) {
+  activity->command->activate();
+  if (sample_ && sample_->alarm_code != 0) {
+    const auto cleared = co_await drive_->clear_alarm();
+    if (!current(*activity)) co_return;
+    if (!cleared) {
+      finish(*activity, [&](CommandRecord& command) { command.error(cleared.error()); });
+      co_return;
+    }
+  }
+  // A successful read-back is part of it: after an unknown outcome nothing may start before that.
+  const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
+  if (!current(*activity)) co_return;
+  const bool clean = sample && sample->alarm_code == 0 && !sample->moving;
+  if (clean) fault_.reset();
+  finish(*activity, [&](CommandRecord& command) {
+    if (clean)
+      command.done();
+    else
+      command.error(
+          sample ? error(Reason::alarm, "the drive still reports an alarm or moves", "clear its cause first")
+                 : sample.error());
+  });
+}
+
+Task<Result<void>> Axis::journal_offset(std::int64_t offset, PositionTrust trust) {
+  if (env_.persistence == nullptr) co_return Result<void>{};
+  // Shared: the answer may come after this sequence was left.
+  auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
+  env_.persistence->save_offset(settings_.name, offset_record(offset, trust),
+                                [answer](Result<void> result) { answer->set(std::move(result)); });
+  co_return co_await answer->get();
+}
+
+Task<> Axis::run_set_position(ActivityPtr activity) {
+  activity->command->activate();
+  const auto position = *activity->command->value().asked.position;
+  const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
+  if (!current(*activity)) co_return;
+  if (!sample || sample->moving) {
+    finish(*activity, [&](CommandRecord& command) {
+      command.error(sample ? error(Reason::moving, "the axis moves", "wait for standstill") : sample.error());
+    });
+    co_return;
+  }
+  // Journalled before it is used (M20): a restart must never meet a newer position with an older offset.
+  const auto counter = tracker_.counter();
+  const auto saved = co_await journal_offset(tracker_.offset_for(position), PositionTrust::set);
+  if (!current(*activity)) co_return;
+  if (!saved || counter != tracker_.counter()) {
+    lose_trust();
+    finish(*activity, [&](CommandRecord& command) {
+      command.error(saved ? error(Reason::moving, "the axis moved meanwhile", "repeat it at standstill")
+                          : saved.error());
+    });
+    co_return;
+  }
+  tracker_.set_position(position, PositionTrust::set);
+  finish(*activity, [](CommandRecord& command) { command.done(); });
+}
+
+}  // namespace axisd

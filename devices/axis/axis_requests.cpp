@@ -1,0 +1,323 @@
+// Acceptance: everything that can be decided before the wire is touched.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& options) {
+  auto repeat = env_.book->find_repeat(settings_.name, action, options);
+  if (!repeat || *repeat != nullptr) return repeat;
+  return std::visit([&](const auto& request) { return accept(request, options); }, action);
+}
+
+Result<void> Axis::check_common(const CommandOptions& options) const {
+  if (options.buffer_mode == BufferMode::buffered)
+    return fail(error(Reason::not_supported, "buffered commands are not supported",
+                      "wait for the command to end, or use aborting"));
+  if (options.not_after <= env_.clock->now())
+    return fail(
+        error(Reason::expired, "the request's validity has passed", "repeat it with a later not_after"));
+  if (options.lease_token != gate_->fencing_token())
+    return fail(
+        error(Reason::lease_lost, "the lease token does not fit", "acquire a lease, or leave the token out"));
+  return {};
+}
+
+Result<void> Axis::check_online() const {
+  if (link_ == LinkState::offline)
+    return fail(error(Reason::offline, link_error_ ? "offline: " + to_string(*link_error_) : "offline",
+                      "check power and wiring; it is retried by itself"));
+  if (link_ == LinkState::configuring) {
+    auto cause = error(Reason::configuring, "the drive is being identified and configured", "wait");
+    if (link_error_) {
+      cause = *link_error_;
+      cause.message = fmt::format("{}: not configured: {}", settings_.name, link_error_->message);
+      if (cause.reason != Reason::wrong_model && cause.reason != Reason::misconfigured)
+        cause.reason = Reason::configuring;
+      cause.outcome = Outcome::not_sent;
+    }
+    return fail(std::move(cause));
+  }
+  return {};
+}
+
+Result<void> Axis::check_motion(const CommandOptions& options) const {
+  if (auto common = check_common(options); !common) return common;
+  if (env_.inhibited != nullptr && *env_.inhibited)
+    return fail(
+        error(Reason::inhibited, "StopAll holds the machine", "release it: axisctl release-stop --all"));
+  // A stop that the core has not seen yet comes before everything that is accepted now.
+  if (gate_->stop_pending() || stopping_.hold || (stopping_.running && stopping_.kind > StopKind::halt))
+    return fail(error(Reason::stopping, stopping_.hold ? "a stop is held" : "the axis is stopping",
+                      stopping_.hold ? "release it: axisctl release-stop" : "wait for standstill"));
+  if (fault_) {
+    auto cause = *fault_;
+    cause.message = fmt::format("{}: in ErrorStop: {}", settings_.name, fault_->message);
+    cause.reason = fault_->reason == Reason::alarm ? Reason::alarm : Reason::fault;
+    cause.remedy += cause.remedy.empty() ? "reset the axis" : "; then reset the axis";
+    cause.outcome = Outcome::not_sent;
+    return fail(std::move(cause));
+  }
+  if (auto online = check_online(); !online) return online;
+  if (!sample_ || !sample_->enabled)
+    return fail(error(Reason::disabled, "the power stage is off", "enable the axis first"));
+  if (activity_ && activity_->command->value().kind == CommandKind::disable)
+    return fail(error(Reason::disabled, "the axis is being disabled", "enable it afterwards"));
+  if (terminal_motion_)
+    return fail(error(Reason::terminal, "a terminal of the drive moves it", "wait, or stop it"));
+  return {};
+}
+
+Result<void> Axis::check_direction(bool positive) const {
+  if (!limit_active(positive)) return {};
+  return fail(error(Reason::limit_switch,
+                    fmt::format("the {} limit switch is active", positive ? "positive" : "negative"),
+                    "move away from it"));
+}
+
+/// Enters a command and makes it the one that is executed; whatever was executed before is aborted and
+/// halted.
+Axis::ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, AxisState state,
+                              Plan plan) {
+  auto command = env_.book->open(settings_.name, action, options);
+  const auto replaced = activity_;
+  const bool moving = (replaced && replaced->state != AxisState::standstill) || (sample_ && sample_->moving);
+  if (replaced)
+    supersede(error(Reason::superseded,
+                    fmt::format("replaced by {} {}", to_string(kind_of(action)), command->value().id)));
+  // M9: what a start in motion does is not in the manuals, so the motion is ended first.
+  if (moving && !stopping_.running) begin_stop(StopKind::halt, false, nullptr);
+  command->grant(plan.granted);
+  activity_ = std::make_shared<Activity>(Activity{.command = std::move(command),
+                                                  .state = state,
+                                                  .epoch = gate_->epoch(),
+                                                  .options = options,
+                                                  .plan = std::move(plan)});
+  publish();
+  return activity_;
+}
+
+Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptions& options) {
+  auto allowed = check_motion(options);
+  if (!allowed && allowed.error().reason != Reason::disabled && allowed.error().reason != Reason::inhibited)
+    return fail(allowed.error());
+  if (activity_ && activity_->state != AxisState::standstill)
+    return fail(error(Reason::moving, "the axis moves", "it is enabled already"));
+  if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
+  const auto activity = begin(request, options, AxisState::standstill, {});
+  // Not yet enabled: state() follows the drive's own bit.
+  spawn(env_.executor, run_enable(activity), settings_.name + " enable");
+  return activity->command;
+}
+
+Result<CommandPtr> Axis::accept(const DisableRequest& request, const CommandOptions& options) {
+  if (auto online = check_online(); !online) return fail(online.error());
+  supersede(error(Reason::superseded, "the axis is being disabled"));
+  begin_stop(StopKind::stop, false, nullptr);
+  const auto activity = begin(request, options, AxisState::standstill, {});
+  spawn(env_.executor, run_disable(activity), settings_.name + " disable");
+  return activity->command;
+}
+
+Result<CommandPtr> Axis::accept(const HomeRequest& request, const CommandOptions& options) {
+  if (auto allowed = check_motion(options); !allowed) return fail(allowed.error());
+  if (!settings_.homing)
+    return fail(
+        error(Reason::not_supported, "no homing is configured", "add homing: to the axis in the YAML"));
+  if (input_active(homing_switch()) && !settings_.homing->backoff)
+    return fail(error(Reason::limit_switch, fmt::format("the {} switch is already active", homing_switch()),
+                      "move away from it, or configure homing: { backoff: ... }"));
+  Plan plan;
+  plan.granted.velocity = settings_.homing->velocity;
+  plan.granted.search_velocity = settings_.homing->search_velocity;
+  plan.granted.acceleration_time = settings_.homing->acceleration_time;
+  plan.deceleration_time = settings_.homing->acceleration_time;
+  const auto activity = begin(request, options, AxisState::homing, std::move(plan));
+  spawn(env_.executor, run_home(activity), settings_.name + " home");
+  return activity->command;
+}
+
+Result<Plan> Axis::plan_move(const PositionTracker::Target& target, const MotionValues& with) const {
+  const auto profile = planner_.profile(with.velocity.value_or(planner_.maximum_velocity()), with);
+  if (!profile) return fail(profile.error());
+  auto plan = planner_.move(*profile, target, tracker_);
+  if (!plan) return plan;
+  if (target.counter != tracker_.counter())
+    if (auto direction = check_direction(plan->positive); !direction) return fail(direction.error());
+  return plan;
+}
+
+Result<CommandPtr> Axis::accept(const MoveAbsoluteRequest& request, const CommandOptions& options) {
+  if (auto allowed = check_motion(options); !allowed) return fail(allowed.error());
+  if (!std::isfinite(request.position))
+    return fail(error(Reason::invalid_argument, "the position is not a number", "give a finite position"));
+  if (settings_.require_trust && tracker_.trust() == PositionTrust::unknown)
+    return fail(error(Reason::not_trusted, "the position is unknown", "home the axis, or set its position"));
+  const auto plan = plan_move(tracker_.plan_absolute(request.position), request.with);
+  if (!plan) return fail(plan.error());
+  const auto activity = begin(request, options, AxisState::discrete_motion, *plan);
+  spawn(env_.executor, run_move(activity), settings_.name + " move");
+  return activity->command;
+}
+
+Result<CommandPtr> Axis::accept(const MoveRelativeRequest& request, const CommandOptions& options) {
+  if (auto allowed = check_motion(options); !allowed) return fail(allowed.error());
+  if (!std::isfinite(request.distance))
+    return fail(error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
+  if ((activity_ && activity_->state != AxisState::standstill) || stopping_.running || sample_->moving)
+    return fail(error(Reason::moving, "a relative move needs standstill: its base would be uncertain",
+                      "wait for standstill, or move to an absolute position"));
+  const bool limited = settings_.limits.position_minimum.has_value();
+  if (limited && tracker_.trust() == PositionTrust::unknown &&
+      std::abs(request.distance) > settings_.jog_travel)
+    return fail(
+        Error{.reason = Reason::not_trusted,
+              .message = fmt::format("{}: the position is unknown, so limits cannot be kept", settings_.name),
+              .remedy = "home the axis first; shorter moves are bounded by jog_travel",
+              .where = {.bus = settings_.bus, .node = settings_.node},
+              .permitted = Range{.minimum = -settings_.jog_travel,
+                                 .maximum = settings_.jog_travel,
+                                 .unit = settings_.scale.unit}});
+  const auto target = tracker_.plan_relative(request.distance);
+  auto plan = plan_move(target, request.with);
+  if (!plan) return fail(plan.error());
+  plan->granted.distance = *plan->granted.position - tracker_.position();
+  const auto activity = begin(request, options, AxisState::discrete_motion, *plan);
+  spawn(env_.executor, run_move(activity), settings_.name + " move");
+  return activity->command;
+}
+
+/// M16: nothing on these drives notices a dead daemon or cable, so a motion without end gets one where it
+/// can: the software limit of an axis that knows its position, `jog_travel` for one that does not.
+Result<Plan> Axis::plan_velocity(double velocity, const MotionValues& with, bool jog) {
+  auto profile = planner_.profile(velocity, with);
+  if (!profile) return profile;
+  profile->positive = velocity > 0;
+  profile->granted.velocity = std::copysign(*profile->granted.velocity, velocity);
+  if (auto direction = check_direction(profile->positive); !direction) return fail(direction.error());
+  const auto& limits = settings_.limits;
+  if (!limits.position_minimum) {
+    profile->endless = true;
+    if (profile->positive == settings_.scale.invert) profile->velocity_rpm = -profile->velocity_rpm;
+    return profile;
+  }
+  const auto velocity_granted = profile->granted.velocity;
+  PositionTracker::Target target{};
+  if (tracker_.trust() != PositionTrust::unknown) {
+    target = tracker_.plan_absolute(profile->positive ? *limits.position_maximum : *limits.position_minimum);
+    if ((target.position > tracker_.position()) != profile->positive)
+      return fail(Error{.reason = Reason::soft_limit,
+                        .message = fmt::format("{}: at the software limit already", settings_.name),
+                        .remedy = "move the other way",
+                        .permitted = Range{.minimum = *limits.position_minimum,
+                                           .maximum = *limits.position_maximum,
+                                           .unit = settings_.scale.unit}});
+  } else if (jog && settings_.jog_travel > 0) {
+    target = tracker_.plan_relative(profile->positive ? settings_.jog_travel : -settings_.jog_travel);
+  } else {
+    return fail(error(Reason::not_trusted, "the position is unknown, so limits cannot be kept",
+                      jog ? "configure jog_travel to jog an axis that is not homed" : "home the axis first"));
+  }
+  auto plan = planner_.move(*profile, target, tracker_);
+  if (plan) plan->granted.velocity = velocity_granted;
+  return plan;
+}
+
+Result<CommandPtr> Axis::accept(const MoveVelocityRequest& request, const CommandOptions& options) {
+  if (auto allowed = check_motion(options); !allowed) return fail(allowed.error());
+  auto plan = plan_velocity(request.velocity, request.with, false);
+  if (!plan) return fail(plan.error());
+  plan->granted.hold = request.hold;
+  const auto activity = begin(request, options, AxisState::continuous_motion, *plan);
+  if (request.hold) activity->hold_until = env_.clock->now() + *request.hold;
+  spawn(env_.executor, run_velocity(activity), settings_.name + " velocity");
+  return activity->command;
+}
+
+Result<CommandPtr> Axis::accept(const JogRequest& request, const CommandOptions& options) {
+  if (auto allowed = check_motion(options); !allowed) return fail(allowed.error());
+  // A repeated call with the same velocity extends the motion that it started.
+  if (activity_ && activity_->command->value().kind == CommandKind::jog && current(*activity_) &&
+      activity_->command->value().asked.velocity == request.velocity &&
+      activity_->options.client == options.client) {
+    activity_->hold_until = env_.clock->now() + request.hold;
+    return activity_->command;
+  }
+  auto plan = plan_velocity(request.velocity, request.with, true);
+  if (!plan) return fail(plan.error());
+  plan->granted.hold = request.hold;
+  const auto activity = begin(request, options, AxisState::continuous_motion, *plan);
+  activity->hold_until = env_.clock->now() + request.hold;
+  spawn(env_.executor, run_velocity(activity), settings_.name + " jog");
+  return activity->command;
+}
+
+Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions& options) {
+  gate_->take_stop_request();
+  auto command = env_.book->open(settings_.name, request, options);
+  if (activity_) stopping_.shown = activity_->state;
+  supersede(error(Reason::superseded,
+                  fmt::format("{} {} by {}", to_string(command->value().kind), command->value().id,
+                              options.client.empty() ? "the daemon" : options.client)));
+  begin_stop(request.kind, request.hold, command);
+  publish();
+  return command;
+}
+
+Result<CommandPtr> Axis::accept(const ResetRequest& request, const CommandOptions& options) {
+  if (auto common = check_common(options); !common) return fail(common.error());
+  if (auto online = check_online(); !online) return fail(online.error());
+  if (stopping_.running) return fail(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
+  if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
+  if (sample_ && sample_->alarm_code != 0) {
+    const auto spec = std::ranges::find(descriptor_->alarms, sample_->alarm_code, &AlarmSpec::code);
+    if (spec == descriptor_->alarms.end() || spec->reset != AlarmReset::by_command) {
+      auto cause =
+          error(Reason::alarm, fmt::format("alarm {} is still present", sample_->alarm_code),
+                spec == descriptor_->alarms.end() ? "see the drive's manual" : std::string(spec->remedy));
+      cause.where.native_code = sample_->alarm_code;
+      return fail(std::move(cause));
+    }
+  }
+  const auto activity = begin(request, options, AxisState::standstill, {});
+  spawn(env_.executor, run_reset(activity), settings_.name + " reset");
+  return activity->command;
+}
+
+Result<CommandPtr> Axis::accept(const SetPositionRequest& request, const CommandOptions& options) {
+  auto allowed = check_motion(options);
+  if (!allowed && allowed.error().reason != Reason::disabled && allowed.error().reason != Reason::inhibited)
+    return fail(allowed.error());
+  if (activity_ || stopping_.running || sample_->moving)
+    return fail(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
+  if (!scale_.checked_pulses(request.position))
+    return fail(
+        error(Reason::invalid_argument, "the position is not a usable number", "give a finite position"));
+  const auto activity = begin(request, options, AxisState::standstill, {});
+  spawn(env_.executor, run_set_position(activity), settings_.name + " set position");
+  return activity->command;
+}
+
+Result<CommandPtr> Axis::release_stop() {
+  if (!stopping_.hold)
+    return fail(error(Reason::invalid_argument, "no stop is held", "nothing needs to be released"));
+  stopping_.hold = false;
+  publish();
+  return stopping_.last;
+}
+
+Result<CommandPtr> Axis::cancel(const CommandPtr& command) {
+  if (activity_ && activity_->command == command) {
+    if (activity_->state != AxisState::standstill) stopping_.shown = activity_->state;
+    supersede(error(Reason::cancelled, "cancelled by a client"));
+    begin_stop(StopKind::halt, false, nullptr);
+    publish();
+  }
+  return command;
+}
+
+}  // namespace axisd

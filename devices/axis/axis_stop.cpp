@@ -1,0 +1,139 @@
+// Stopping: one sequence per axis sends, confirms and escalates (M12 to M14).
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+/// Ends what is being executed. Nothing that was prepared for it is sent any more.
+void Axis::supersede(const Error& cause) {
+  gate_->raise();
+  env_.bus->purge_superseded();
+  if (auto activity = std::exchange(activity_, nullptr)) {
+    last_deceleration_ = std::max(activity->plan.deceleration_time, Duration(milliseconds(1)));
+    if (activity->state != AxisState::standstill) tracker_.forget_target();
+    activity->command->abort(cause);
+  }
+}
+
+void Axis::begin_stop(StopKind kind, bool hold, CommandPtr command) {
+  stopping_.kind = std::max(stopping_.kind, kind);
+  stopping_.hold = stopping_.hold || hold;
+  ++stopping_.requests;
+  if (command) {
+    command->activate();
+    stopping_.last = command;
+    stopping_.commands.push_back(std::move(command));
+  }
+  if (!stopping_.running) {
+    stopping_.running = true;
+    spawn(env_.executor, run_stop(), settings_.name + " stop");
+  } else {
+    sampled_.notify_all();  // the running sequence sends this one, too
+  }
+}
+
+/// What a stop may take: the drive keeps the deceleration time that was set before the motion (7.6.2).
+Duration Axis::deceleration_bound() const { return last_deceleration_; }
+
+Task<> Axis::run_stop() {
+  const auto confirmed = co_await stop_and_confirm();
+  const auto kind = stopping_.kind;
+  auto commands = std::exchange(stopping_.commands, {});
+  stopping_.running = false;
+  stopping_.kind = StopKind::none;
+  stopping_.shown = AxisState::standstill;
+  tracker_.forget_target();
+  if (confirmed) {
+    stop_owed_ = false;
+    // Open loop: a stop without a ramp may have lost steps (M12).
+    if (kind == StopKind::quick_stop && !descriptor_->capabilities.closed_loop) lose_trust();
+    remember_position();
+    for (const auto& command : commands) command->done();
+  } else {
+    stop_owed_ = true;
+    if (!fault_) fault_ = confirmed.error();
+    spdlog::error("{}", to_string(confirmed.error()));
+    for (const auto& command : commands) {
+      if (link_ == LinkState::offline)
+        command->unknown(confirmed.error());
+      else
+        command->error(confirmed.error());
+    }
+  }
+  publish();
+  stopped_.notify_all();
+  wake_.notify_all();
+}
+
+Task<Result<void>> Axis::stop_and_confirm() {
+  bool released = false;
+  for (;;) {
+    const auto requests = stopping_.requests;
+    const auto kind = stopping_.kind;
+    const auto sent = co_await drive_->stop(kind);
+    wake_.notify_all();
+    if (!sent && sent.error().reason == Reason::no_reply && link_ != LinkState::offline) continue;
+    if (!sent && sent.error().reason != Reason::refused) {
+      auto cause = error(Reason::not_confirmed, "the stop was not acknowledged: " + to_string(sent.error()),
+                         "look at the machine; a stop is sent as soon as the drive answers");
+      cause.outcome = Outcome::unknown;
+      co_return fail(std::move(cause));
+    }
+    const auto since = env_.clock->now();
+    const auto patience =
+        settings_.stop_margin + (kind == StopKind::quick_stop ? Duration{0} : deceleration_bound());
+    if (co_await standstill_by(since, since + patience, requests)) co_return Result<void>{};
+    if (link_ == LinkState::offline) {
+      auto cause = error(Reason::not_confirmed, "the drive fell silent before its standstill was confirmed",
+                         "look at the machine; a stop is sent as soon as the drive answers");
+      cause.outcome = Outcome::unknown;
+      co_return fail(std::move(cause));
+    }
+    if (requests != stopping_.requests) continue;
+    if (kind != StopKind::quick_stop) {
+      spdlog::warn("{}: standstill not confirmed in time; quick stop", settings_.name);
+      stopping_.kind = StopKind::quick_stop;
+    } else if (settings_.stop_escalation_release && !released) {
+      spdlog::warn("{}: standstill not confirmed after a quick stop; releasing the power stage",
+                   settings_.name);
+      released = true;
+      if (const auto off = co_await drive_->disable(); !off) spdlog::error("{}", to_string(off.error()));
+    } else {
+      co_return fail(error(Reason::not_confirmed, "standstill was not confirmed",
+                           "look at the machine; cut its power "
+                           "if it moves; then reset the axis"));
+    }
+  }
+}
+
+/// Standstill counts once it was measured after `since`. Within homing the motor rests between its phases, so
+/// there it must have rested at one place for a while.
+Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests) {
+  constexpr auto rest = milliseconds(150);
+  std::optional<TimePoint> resting_since;
+  std::int64_t resting_at = 0;
+  while (link_ != LinkState::offline && requests == stopping_.requests) {
+    if (sample_ && sample_->asked_at >= since) {
+      if (sample_->moving) {
+        resting_since.reset();
+      } else if (sample_->mode != DriveMode::homing) {
+        co_return true;
+      } else if (!resting_since || resting_at != tracker_.counter()) {
+        resting_since = sample_->asked_at;
+        resting_at = tracker_.counter();
+      } else if (sample_->asked_at - *resting_since >= rest) {
+        co_return true;
+      }
+    }
+    if (env_.clock->now() >= deadline) co_return false;
+    co_await sampled_.wait_until(deadline);
+  }
+  co_return false;
+}
+
+}  // namespace axisd
