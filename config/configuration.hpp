@@ -17,16 +17,19 @@ struct TlsSettings {
 };
 
 struct ServerSettings {
-  std::string listen = "localhost:7443";  ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
+  std::string listen =
+      "localhost:7443";  ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
   std::optional<TlsSettings> tls;
 };
 
-/// `simulate:` of an axis on a simulated bus: the mechanics around its drive, user units, from the power-up position.
+/// `simulate:` of an axis on a simulated bus: the mechanics around its drive. User units, axis direction, on
+/// the load's own scale: `start_position` is where the load stands on it at power-up (when the drive's
+/// counter is 0).
 struct SimulationSettings {
-  std::optional<double> home_switch;      ///< position of the home switch (active for `home_width` units)
+  std::optional<double> home_switch;  ///< position of the home switch (active for `home_width` units)
   double home_width = 1;
   std::optional<double> positive_limit, negative_limit;
-  double start_position = 0;              ///< where the load stands at power-up
+  double start_position = 0;  ///< where the load stands at power-up
 };
 
 struct AxisEntry {
@@ -36,7 +39,7 @@ struct AxisEntry {
 
 struct Configuration {
   std::string machine;
-  std::string state_directory;  ///< where the daemon keeps its persistent state
+  std::string state_directory = "/var/lib/axisd";  ///< where the daemon keeps its persistent state
   ServerSettings server;
   std::vector<modbus_rtu::LineSettings> buses;
   std::vector<AxisEntry> axes;
@@ -49,7 +52,8 @@ struct Diagnostic {
   std::string message;       ///< with the offending text
   std::string suggestion;    ///< empty if there is none
 };
-std::string to_string(const Diagnostic& diagnostic);  ///< "demo.yaml:12:5: unknown key 'velocty'; did you mean ..."
+std::string to_string(
+    const Diagnostic& diagnostic);  ///< "demo.yaml:12:5: unknown key 'velocty'; did you mean ..."
 
 struct LoadResult {
   std::optional<Configuration> configuration;  ///< set if there is no diagnostic

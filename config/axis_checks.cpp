@@ -1,0 +1,333 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "config/checks.hpp"
+#include "config/quantity.hpp"
+#include "config/text.hpp"
+#include "devices/descriptor.hpp"
+
+namespace axisd::config {
+
+namespace {
+
+/// Relative slack in comparisons of motor speeds: the YAML's decimals pass through divisions.
+constexpr double slack = 1e-9;
+
+class AxisChecks {
+ public:
+  AxisChecks(AxisEntry& entry, Diagnostics& diagnostics, const Places& places)
+      : entry_(entry),
+        axis_(entry.axis),
+        path_(fmt::format("axes.{}.", axis_.name)),
+        diagnostics_(diagnostics),
+        places_(places),
+        model_(usable("model") ? find_drive_model(axis_.model) : nullptr) {}
+
+  void run() {
+    check_node();
+    check_microstep();
+    complete_scale();
+    check_policies();
+    check_poll();
+    check_functions(axis_.inputs, "inputs");
+    check_functions(axis_.outputs, "outputs");
+    check_simulated_switches();
+    if (axis_.scale.modulo && given("limits.position")) {
+      add("scale.modulo", "'modulo' and limits.position exclude each other",
+          "an axis that wraps has no software limits; leave one of them out");
+    }
+    if (model_ != nullptr) {
+      add_default_settings(axis_, *model_);
+      check_times();
+    }
+    if (scale_) check_distances();
+    if (scale_ && model_ != nullptr) check_speeds();
+    if (axis_.homing) check_homing();
+  }
+
+ private:
+  [[nodiscard]] bool given(std::string_view key) const { return places_.given(path_ + std::string(key)); }
+  [[nodiscard]] bool usable(std::string_view key) const { return places_.usable(path_ + std::string(key)); }
+  void add(std::string_view key, std::string message, std::string suggestion) {
+    diagnostics_.add(places_.mark(path_ + std::string(key)), std::move(message), std::move(suggestion));
+  }
+  [[nodiscard]] std::string velocity_text(double value) const {
+    return fmt::format("{} {}/s", format_number(value), axis_.scale.unit);
+  }
+
+  void check_node();
+  void check_microstep();
+  void complete_scale();
+  void check_policies();
+  void check_poll();
+  void check_functions(const std::vector<TerminalSettings>& terminals, std::string_view section);
+  void check_simulated_switches();
+  void check_times();
+  void check_time(std::string_view key, Duration value, int minimum_ms);
+  void check_distances();
+  void check_speeds();
+  void check_speed(std::string_view key, double velocity, double minimum_rpm, double maximum_rpm);
+  void check_homing();
+  [[nodiscard]] bool has_input(std::string_view function) const {
+    return std::ranges::find(axis_.inputs, function, &TerminalSettings::function) != axis_.inputs.end();
+  }
+  /// Says that `key` needs an input terminal; silent if the inputs have errors of their own.
+  void need_input(std::string_view key, std::string_view function, const std::string& message);
+
+  AxisEntry& entry_;
+  AxisSettings& axis_;
+  std::string path_;
+  Diagnostics& diagnostics_;
+  const Places& places_;
+  const DriveDescriptor* model_;  ///< nullptr if it is not known
+  std::optional<Scale> scale_;    ///< once it is known to be right
+};
+
+void AxisChecks::check_node() {
+  if (model_ == nullptr || !usable("node")) return;
+  if (axis_.node >= model_->minimum_node && axis_.node <= model_->maximum_node) return;
+  add("node", fmt::format("model {} cannot have address {}", axis_.model, axis_.node),
+      fmt::format("write a value between {} and {}", model_->minimum_node, model_->maximum_node));
+}
+
+void AxisChecks::check_microstep() {
+  if (model_ == nullptr || !usable("scale.microstep")) return;
+  const auto permitted = model_->capabilities.pulses_per_revolution;
+  const auto wanted = axis_.scale.pulses_per_revolution;
+  if (permitted.empty() || std::ranges::find(permitted, wanted) != permitted.end()) return;
+  const auto nearest = *std::ranges::min_element(
+      permitted, {}, [&](std::int32_t value) { return std::abs(std::int64_t{value} - wanted); });
+  std::vector<std::string> texts;
+  for (const auto value : permitted) texts.push_back(std::to_string(value));
+  const auto list = names_of(texts, [](const std::string& text) -> std::string_view { return text; });
+  add("scale.microstep", fmt::format("model {} cannot be set to {} pulses/rev", axis_.model, wanted),
+      fmt::format("nearest is {} pulses/rev; permitted: {}", nearest, alternatives(list)));
+}
+
+void AxisChecks::complete_scale() {
+  auto& scale = axis_.scale;
+  if (!usable("unit") || !usable("scale.microstep") || !usable("scale.gear") || !usable("scale.travel"))
+    return;
+  if (!given("scale.travel")) {
+    if (scale.unit != "deg" && scale.unit != "rev") {
+      add("scale.travel", fmt::format("missing key 'travel' in {}scale", path_),
+          fmt::format("for example travel: 5 {}/rev", scale.unit));
+      return;
+    }
+    scale.travel_numerator = scale.unit == "deg" ? 360 : 1;
+  }
+  if (Scale::valid(scale)) {
+    scale_.emplace(scale);
+  } else {
+    add("scale", "the scale is too fine or too coarse to be calculated exactly",
+        "use fewer digits in gear and travel");
+  }
+}
+
+void AxisChecks::check_policies() {
+  if (!axis_.vertical || !usable("load")) return;
+  // M2: a policy must not let the load fall.
+  if (axis_.on_lease_loss == LeaseLossPolicy::disable) {
+    add("on_lease_loss", "'on_lease_loss: disable' would release a vertical load", "use halt or stop");
+  }
+  if (axis_.stop_escalation_release) {
+    add("stop_escalation", "'stop_escalation: release' would release a vertical load", "use none");
+  }
+}
+
+void AxisChecks::check_poll() {
+  if (!usable("poll.moving") || !usable("poll.idle") || axis_.poll_idle >= axis_.poll_moving) return;
+  add(given("poll.idle") ? "poll.idle" : "poll.moving",
+      fmt::format("idle axes would be polled more often ({}) than moving ones ({})",
+                  format_duration(axis_.poll_idle), format_duration(axis_.poll_moving)),
+      "make poll.idle at least poll.moving");
+}
+
+void AxisChecks::check_functions(const std::vector<TerminalSettings>& terminals, std::string_view section) {
+  if (model_ == nullptr) return;
+  const auto functions = section == "inputs" ? model_->input_functions : model_->output_functions;
+  std::map<std::string_view, std::string_view> owners;
+  for (const auto& terminal : terminals) {
+    const auto* function = find_function(functions, terminal.function);
+    if (function == nullptr || function->code == 0) continue;  // code 0: no function
+    const auto [owner, is_first] = owners.try_emplace(terminal.function, terminal.terminal);
+    if (is_first) continue;
+    add(fmt::format("{}.{}.function", section, terminal.terminal),
+        fmt::format("function '{}' is assigned to {} already", terminal.function, owner->second),
+        "one terminal per function");
+  }
+}
+
+void AxisChecks::need_input(std::string_view key, std::string_view function, const std::string& message) {
+  if (has_input(function) || model_ == nullptr || !places_.clean(path_ + "inputs")) return;
+  const auto used = [&](const TerminalSpec& t) {
+    return std::ranges::find(axis_.inputs, t.name, &TerminalSettings::terminal) != axis_.inputs.end();
+  };
+  const auto free = std::ranges::find_if_not(model_->inputs, used);
+  add(key, fmt::format("{} needs an input with function '{}'", message, function),
+      free == model_->inputs.end() ? "" : fmt::format("add inputs: {{ {}: {} }}", free->name, function));
+}
+
+void AxisChecks::check_simulated_switches() {
+  const auto& simulation = entry_.simulation;
+  if (given("simulate.home_switch")) need_input("simulate.home_switch", "home", "'home_switch'");
+  if (given("simulate.positive_limit"))
+    need_input("simulate.positive_limit", "positive_limit", "'positive_limit'");
+  if (given("simulate.negative_limit"))
+    need_input("simulate.negative_limit", "negative_limit", "'negative_limit'");
+  if (given("simulate.home_width") && !given("simulate.home_switch")) {
+    add("simulate.home_width", "'home_width' has no effect without home_switch",
+        "add home_switch or leave it out");
+  }
+  if (!places_.clean(path_ + "simulate")) return;
+  const double lowest = simulation.negative_limit.value_or(-std::numeric_limits<double>::infinity());
+  const double highest = simulation.positive_limit.value_or(std::numeric_limits<double>::infinity());
+  if (lowest >= highest) {
+    add("simulate.positive_limit", "the simulated limits are reversed",
+        "make positive_limit larger than negative_limit");
+  } else if (simulation.start_position <= lowest || simulation.start_position >= highest) {
+    add("simulate.start_position", "the load would start on a limit switch",
+        "start between the simulated limits");
+  }
+}
+
+void AxisChecks::check_time(std::string_view key, Duration value, int minimum_ms) {
+  if (!given(key) || !usable(key)) return;
+  const auto maximum_ms = model_->capabilities.maximum_time_ms;
+  if (value < milliseconds(minimum_ms) || value > milliseconds(maximum_ms)) {
+    add(key, fmt::format("{} is out of range: {}", format_duration(value), key),
+        fmt::format("model {} takes {} ms to {} ms", axis_.model, minimum_ms, maximum_ms));
+  } else if (value % milliseconds(1) != Duration::zero()) {
+    add(key, fmt::format("{} is not a whole number of ms: {}", format_duration(value), key),
+        fmt::format("model {} takes whole ms", axis_.model));
+  }
+}
+
+void AxisChecks::check_times() {
+  const auto& capabilities = model_->capabilities;
+  check_time("limits.acceleration_time", axis_.limits.acceleration_time, capabilities.minimum_time_ms);
+  check_time("limits.deceleration_time", axis_.limits.deceleration_time.value_or(Duration::zero()),
+             capabilities.minimum_time_ms);
+  if (axis_.homing) {
+    check_time("homing.acceleration_time", axis_.homing->acceleration_time,
+               capabilities.minimum_homing_time_ms);
+  }
+}
+
+void AxisChecks::check_distances() {
+  // The drives count in signed 32 bit.
+  constexpr std::int64_t largest = std::numeric_limits<std::int32_t>::max();
+  const auto check = [&](std::string_view key, std::optional<double> value) {
+    if (!value || !given(key) || !usable(key)) return;
+    const auto pulses = scale_->checked_pulses(*value);
+    if (pulses && *pulses <= largest && *pulses >= -largest) return;
+    add(key, fmt::format("{} {} is more than the drive can count", format_number(*value), axis_.scale.unit),
+        fmt::format("at most {} {} either way", format_number(std::abs(scale_->to_units(largest))),
+                    axis_.scale.unit));
+  };
+  check("scale.modulo", axis_.scale.modulo);
+  check("limits.position", axis_.limits.position_minimum);
+  check("limits.position", axis_.limits.position_maximum);
+  check("jog_travel", axis_.jog_travel);
+  check("position_tolerance", axis_.position_tolerance);
+  if (axis_.homing) {
+    check("homing.position", axis_.homing->position);
+    check("homing.backoff", axis_.homing->backoff);
+    check("homing.max_travel", axis_.homing->max_travel);
+  }
+  check("simulate.home_switch", entry_.simulation.home_switch);
+  check("simulate.home_width", entry_.simulation.home_width);
+  check("simulate.positive_limit", entry_.simulation.positive_limit);
+  check("simulate.negative_limit", entry_.simulation.negative_limit);
+  check("simulate.start_position", entry_.simulation.start_position);
+}
+
+void AxisChecks::check_speed(std::string_view key, double velocity, double minimum_rpm, double maximum_rpm) {
+  if (!given(key) || !usable(key)) return;
+  const double rpm = std::abs(scale_->velocity_to_rpm(velocity));
+  const bool too_slow = rpm < minimum_rpm * (1 - slack);
+  if (!too_slow && rpm <= maximum_rpm * (1 + slack)) return;
+  const double bound = too_slow ? minimum_rpm : maximum_rpm;
+  const auto direction = too_slow ? "at least" : "at most";
+  add(key,
+      fmt::format("{} {} is {} r/min of the motor; {} {} r/min at {} pulses/rev", key,
+                  velocity_text(velocity), format_number(rpm), direction, bound,
+                  axis_.scale.pulses_per_revolution),
+      fmt::format("write {} {}", direction, velocity_text(std::abs(scale_->velocity_to_units(bound)))));
+}
+
+void AxisChecks::check_speeds() {
+  const auto& capabilities = model_->capabilities;
+  // M11: 200 kHz of pulses; the drives take whole r/min.
+  const auto pulse_limit = 60 * capabilities.maximum_pulse_rate_hz / axis_.scale.pulses_per_revolution;
+  const auto maximum_rpm = static_cast<double>(std::min<std::int64_t>(capabilities.maximum_rpm, pulse_limit));
+  check_speed("limits.velocity", axis_.limits.velocity, capabilities.minimum_rpm, maximum_rpm);
+
+  const int start = axis_.limits.start_speed_rpm;
+  if (!usable("limits.start_speed")) {
+    // reported
+  } else if (start < capabilities.minimum_start_rpm || start > capabilities.maximum_start_rpm) {
+    add("limits.start_speed", fmt::format("'start_speed' {} r/min is out of range", start),
+        fmt::format("model {} takes {} to {} r/min", axis_.model, capabilities.minimum_start_rpm,
+                    capabilities.maximum_start_rpm));
+  } else if (usable("limits.velocity")) {
+    const double highest = std::abs(scale_->velocity_to_rpm(axis_.limits.velocity));
+    if (start > highest * (1 + slack)) {
+      add("limits.start_speed",
+          fmt::format("'start_speed' {} r/min is above limits.velocity ({} r/min)", start,
+                      format_number(highest)),
+          "start slower");
+    }
+  }
+  if (!axis_.homing) return;
+  const auto& homing = *axis_.homing;
+  check_speed("homing.velocity", homing.velocity, capabilities.minimum_homing_rpm,
+              std::min<double>(capabilities.maximum_homing_rpm, maximum_rpm));
+  check_speed("homing.search_velocity", homing.search_velocity, capabilities.minimum_search_rpm,
+              std::min<double>(capabilities.maximum_search_rpm, maximum_rpm));
+  const auto offset = scale_->checked_pulses(homing.offset);
+  const std::int64_t largest = capabilities.maximum_homing_offset_pulses;
+  if (usable("homing.offset") && (!offset || std::abs(*offset) > largest)) {
+    add("homing.offset",
+        fmt::format("'offset' {} {} is out of range", format_number(homing.offset), axis_.scale.unit),
+        fmt::format("model {} takes up to {} {} either way", axis_.model,
+                    format_number(std::abs(scale_->to_units(largest))), axis_.scale.unit));
+  }
+}
+
+void AxisChecks::check_homing() {
+  const auto& homing = *axis_.homing;
+  if (usable("homing.velocity") && usable("limits.velocity") && homing.velocity > axis_.limits.velocity) {
+    add("homing.velocity",
+        fmt::format("homing.velocity {} is above limits.velocity", velocity_text(homing.velocity)),
+        fmt::format("write at most {}", velocity_text(axis_.limits.velocity)));
+  }
+  if (usable("homing.search_velocity") && usable("homing.velocity") &&
+      homing.search_velocity > homing.velocity) {
+    add("homing.search_velocity",
+        fmt::format("homing.search_velocity {} is above homing.velocity",
+                    velocity_text(homing.search_velocity)),
+        fmt::format("write at most {}", velocity_text(homing.velocity)));
+  }
+  if (!usable("homing.method")) return;
+  const auto name = homing_methods()[static_cast<std::size_t>(homing.method)];
+  const bool by_switch =
+      homing.method == HomingMethod::home_positive || homing.method == HomingMethod::home_negative;
+  need_input("homing.method", by_switch ? "home" : name, fmt::format("homing method '{}'", name));
+}
+
+}  // namespace
+
+void complete_axis(AxisEntry& entry, Diagnostics& diagnostics, const Places& places) {
+  AxisChecks(entry, diagnostics, places).run();
+}
+
+}  // namespace axisd::config

@@ -1,0 +1,16 @@
+// What no single key can tell: checks between keys, against the model and against the other axes.
+#pragma once
+
+#include "config/configuration.hpp"
+#include "config/diagnostics.hpp"
+#include "config/reader.hpp"
+
+namespace axisd::config {
+
+/// Server, buses, and how axes share them.
+void check_machine(const Configuration& configuration, Diagnostics& diagnostics, const Places& places);
+
+/// Fills in what follows from other keys (travel, settings of the model), then checks the axis by itself.
+void complete_axis(AxisEntry& entry, Diagnostics& diagnostics, const Places& places);
+
+}  // namespace axisd::config

@@ -1,0 +1,260 @@
+#include <fmt/format.h>
+
+#include <string>
+#include <vector>
+
+#include "config/configuration.hpp"
+#include "config/quantity.hpp"
+#include "config/reader.hpp"
+#include "config/schema.hpp"
+#include "devices/descriptor.hpp"
+
+namespace axisd::config {
+
+namespace {
+
+constexpr std::string_view number = "[+-]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][+-]?[0-9]+)?";
+
+std::string json_string(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
+}
+
+/// Members of a JSON object, in order.
+class Object {
+ public:
+  Object& raw(std::string_view key, const std::string& json) {
+    members_ += fmt::format("{}{}:{}", members_.empty() ? "" : ",", json_string(key), json);
+    return *this;
+  }
+  Object& text(std::string_view key, std::string_view value) { return raw(key, json_string(value)); }
+  [[nodiscard]] std::string json() const { return "{" + members_ + "}"; }
+
+ private:
+  std::string members_;
+};
+
+std::string array(const std::vector<std::string>& items) {
+  return fmt::format("[{}]", fmt::join(items, ","));
+}
+
+std::string strings(std::span<const std::string_view> items) {
+  std::vector<std::string> result;
+  for (const auto item : items) result.push_back(json_string(item));
+  return array(result);
+}
+
+/// What YAML makes of it: numbers and booleans as such, lists as they are written, the rest as text.
+std::string as_written(const KeySpec& spec, std::string_view text) {
+  const bool bare = spec.kind == Kind::integer || spec.kind == Kind::boolean ||
+                    spec.kind == Kind::position_range || (spec.kind == Kind::position && parse_decimal(text));
+  return bare ? std::string(text) : json_string(text);
+}
+
+std::string whole(std::string_view pattern) { return fmt::format("^(?:{})$", pattern); }
+
+void add_bounds(Object& object, const KeySpec& spec) {
+  if (spec.minimum)
+    object.raw(spec.above_minimum ? "exclusiveMinimum" : "minimum", format_number(*spec.minimum));
+  if (spec.maximum) object.raw("maximum", format_number(*spec.maximum));
+}
+
+std::string type_of_position(const KeySpec& spec) {
+  Object bare, with_unit;
+  bare.text("type", "number");
+  add_bounds(bare, spec);
+  with_unit.text("type", "string").text("pattern", whole(fmt::format("{} *([A-Za-z]{{1,16}})?", number)));
+  return array({bare.json(), with_unit.json()});
+}
+
+Object section(std::span<const KeySpec> keys);
+
+Object quantity(std::string_view pattern) {
+  Object result;
+  result.text("type", "string").text("pattern", whole(fmt::format("{} *{}", number, pattern)));
+  return result;
+}
+
+Object named_sections(const KeySpec& spec) {
+  Object names, result;
+  names.text("pattern", whole(name_pattern)).raw("maxLength", std::to_string(longest_name));
+  result.text("type", "object").raw("minProperties", "1").raw("propertyNames", names.json());
+  result.raw("additionalProperties", section(spec.children).json());
+  return result;
+}
+
+std::vector<std::string_view> model_names() {
+  std::vector<std::string_view> names;
+  for (const auto* model : drive_models()) names.push_back(model->model);
+  return names;
+}
+
+Object type_of(const KeySpec& spec) {
+  Object result;
+  switch (spec.kind) {
+    case Kind::section:
+      return section(spec.children);
+    case Kind::named_sections:
+      return named_sections(spec);
+    case Kind::terminals:
+    case Kind::model_settings:
+      return result.text("type", "object");  // refined per model
+    case Kind::text:
+      return result.text("type", "string")
+          .text("pattern", whole(spec.pattern))
+          .raw("maxLength", std::to_string(longest_text_value));
+    case Kind::model:
+      return result.raw("enum", strings(model_names()));
+    case Kind::integer:
+      result.text("type", "integer");
+      break;
+    case Kind::boolean:
+      return result.text("type", "boolean");
+    case Kind::choice:
+      return result.raw("enum", strings(spec.choices));
+    case Kind::duration:
+      return quantity("(us|ms|s|min)");
+    case Kind::motor_speed:
+      return quantity("r */ *min");
+    case Kind::microstep:
+      return quantity("pulses */ *rev");
+    case Kind::ratio:
+      return result.text("type", "string").text("pattern", whole(fmt::format("{0} */ *{0}", number)));
+    case Kind::travel:
+      return quantity(fmt::format("(/ *{} *)?[A-Za-z]{{1,16}} */ *rev", number));
+    case Kind::velocity:
+      return quantity("[A-Za-z]{1,16} */ *s");
+    case Kind::position:
+      return result.raw("anyOf", type_of_position(spec));
+    case Kind::position_range:
+      return result.text("type", "array")
+          .raw("items", Object().raw("anyOf", type_of_position(spec)).json())
+          .raw("minItems", "2")
+          .raw("maxItems", "2");
+  }
+  add_bounds(result, spec);
+  return result;
+}
+
+Object documented(const KeySpec& spec) {
+  auto result = type_of(spec);
+  result.text("description", spec.description);
+  if (!spec.example.empty()) result.raw("examples", array({as_written(spec, spec.example)}));
+  if (!spec.default_value.empty()) result.raw("default", as_written(spec, spec.default_value));
+  return result;
+}
+
+Object closed(const Object& properties) {
+  Object result;
+  result.text("type", "object").raw("additionalProperties", "false").raw("properties", properties.json());
+  return result;
+}
+
+Object section(std::span<const KeySpec> keys) {
+  Object properties;
+  std::vector<std::string_view> required;
+  for (const auto& spec : keys) {
+    properties.raw(spec.key, documented(spec).json());
+    if (spec.required) required.push_back(spec.key);
+  }
+  auto result = closed(properties);
+  if (!required.empty()) result.raw("required", strings(required));
+  if (keys.data() == axis_schema().data()) {  // what the model adds
+    std::vector<std::string> models;
+    for (const auto* model : drive_models())
+      models.push_back(fmt::format("{{\"$ref\":\"#/$defs/{}\"}}", model->model));
+    result.raw("allOf", array(models));
+  }
+  return result;
+}
+
+/// The short form (a function) or the long one ({function, active}).
+std::string terminals(std::span<const TerminalSpec> list, std::span<const TerminalFunctionSpec> functions) {
+  std::vector<std::string_view> names;
+  for (const auto& function : functions) names.push_back(function.name);
+  const auto function = Object().raw("enum", strings(names));
+  Object properties;
+  for (const auto& spec : terminal_schema()) {
+    properties.raw(spec.key, spec.key == "function" ? function.json() : documented(spec).json());
+  }
+  const auto long_form =
+      closed(properties).raw("required", strings(std::vector<std::string_view>{"function"}));
+  Object all;
+  for (const auto& terminal : list) {
+    all.raw(terminal.name, Object().raw("anyOf", array({function.json(), long_form.json()})).json());
+  }
+  return closed(all).json();
+}
+
+std::string if_model(const DriveDescriptor& model) {
+  Object settings;
+  for (const auto& setting : model.settings)
+    settings.raw(setting.key, documented(setting_schema(setting)).json());
+  std::vector<std::string> microsteps;
+  for (const auto value : model.capabilities.pulses_per_revolution) {
+    microsteps.push_back(std::to_string(value));
+  }
+  Object scale, node, then;
+  scale.raw(
+      "microstep",
+      Object().text("pattern", fmt::format("^(?:{}) *pulses */ *rev$", fmt::join(microsteps, "|"))).json());
+  node.raw("minimum", std::to_string(model.minimum_node)).raw("maximum", std::to_string(model.maximum_node));
+  then.raw("node", node.json());
+  then.raw("scale", Object().raw("properties", scale.json()).json());
+  then.raw("inputs", terminals(model.inputs, model.input_functions));
+  then.raw("outputs", terminals(model.outputs, model.output_functions));
+  then.raw("drive", closed(settings).json());
+
+  Object is_model, condition, result;
+  is_model.raw("model", Object().text("const", model.model).json());
+  condition.raw("properties", is_model.json())
+      .raw("required", strings(std::vector<std::string_view>{"model"}));
+  return result.raw("if", condition.json())
+      .raw("then", Object().raw("properties", then.json()).json())
+      .json();
+}
+
+/// Two spaces per level; for people who read it.
+std::string indented(std::string_view json) {
+  std::string result;
+  int depth = 0;
+  bool in_string = false, escaped = false;
+  const auto new_line = [&] { result.append("\n").append(static_cast<std::size_t>(2 * depth), ' '); };
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const char c = json[i];
+    if (in_string) {
+      in_string = escaped || c != '"';
+      escaped = !escaped && c == '\\';
+      result += c;
+      continue;
+    }
+    const bool opens = c == '{' || c == '[', closes = c == '}' || c == ']';
+    const bool was_empty = closes && (json[i - 1] == '{' || json[i - 1] == '[');
+    in_string = c == '"';
+    if (closes) --depth;
+    if (closes && !was_empty) new_line();
+    result += c;
+    if (opens) ++depth;
+    if (c == ':') result += ' ';
+    if (c == ',' || (opens && json[i + 1] != '}' && json[i + 1] != ']')) new_line();
+  }
+  return result;
+}
+
+}  // namespace
+
+std::string json_schema() {
+  Object models;
+  for (const auto* model : drive_models()) models.raw(model->model, if_model(*model));
+  Object head;
+  head.text("$schema", "https://json-schema.org/draft/2020-12/schema").text("title", "axisd configuration");
+  const auto body = section(schema()).raw("$defs", models.json()).json();
+  const auto start = head.json();
+  return indented(start.substr(0, start.size() - 1) + "," + body.substr(1)) + "\n";
+}
+
+}  // namespace axisd::config

@@ -1,0 +1,75 @@
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <exception>
+#include <expected>
+#include <system_error>
+
+#include "config/checks.hpp"
+#include "config/configuration.hpp"
+#include "config/document.hpp"
+#include "config/reader.hpp"
+#include "config/text.hpp"
+
+namespace axisd::config {
+
+namespace {
+
+/// At most one byte more than is accepted: the file may be endless.
+std::expected<std::string, std::error_code> read_file(const std::string& path) {
+  const auto failed = [] { return std::unexpected(std::error_code(errno, std::generic_category())); };
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return failed();
+  std::string text(largest_text + 1, '\0');
+  std::size_t size = 0;
+  while (size < text.size()) {
+    const auto count = ::read(file, text.data() + size, text.size() - size);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      const auto error = failed();
+      ::close(file);
+      return error;
+    }
+    if (count == 0) break;
+    size += static_cast<std::size_t>(count);
+  }
+  ::close(file);
+  text.resize(size);
+  return text;
+}
+
+}  // namespace
+
+LoadResult load_text(std::string_view text, const std::string& file_name) try {
+  Diagnostics diagnostics(file_name);
+  const auto document = parse_document(text);
+  if (!document) {
+    diagnostics.add(document.error().mark, document.error().message, document.error().suggestion);
+    return {{}, diagnostics.sorted()};
+  }
+  Configuration configuration;
+  Places places;
+  Reader(configuration, diagnostics, places).read(**document);
+  for (auto& entry : configuration.axes) complete_axis(entry, diagnostics, places);
+  check_machine(configuration, diagnostics, places);
+  if (!diagnostics.empty()) return {{}, diagnostics.sorted()};
+  return {std::move(configuration), {}};
+} catch (const std::exception& error) {  // out of memory
+  return {{}, {{file_name, 0, 0, fmt::format("cannot be loaded: {}", printable(error.what())), ""}}};
+}
+
+LoadResult load_file(const std::string& path) try {
+  const auto text = read_file(path);
+  if (!text) {
+    return {{},
+            {{path, 0, 0, fmt::format("cannot be read: {}", text.error().message()),
+              "check path and permissions"}}};
+  }
+  return load_text(*text, path);
+} catch (const std::exception& error) {
+  return {{}, {{path, 0, 0, fmt::format("cannot be read: {}", printable(error.what())), ""}}};
+}
+
+}  // namespace axisd::config

@@ -1,0 +1,204 @@
+#include "config/reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "config/text.hpp"
+#include "config/value.hpp"
+
+namespace axisd::config {
+
+namespace {
+
+/// What is known, but not part of this release: says so instead of guessing at a typing error.
+constexpr std::string_view canopen = "canopen";
+
+std::vector<std::string_view> keys_of(std::span<const KeySpec> keys) {
+  return names_of(keys, [](const KeySpec& spec) { return spec.key; });
+}
+
+const KeySpec* find(std::span<const KeySpec> keys, std::string_view key) {
+  const auto spec = std::ranges::find(keys, key, &KeySpec::key);
+  return spec == keys.end() ? nullptr : &*spec;
+}
+
+std::string join(const std::string& path, std::string_view key) {
+  return path.empty() ? std::string(key) : fmt::format("{}.{}", path, key);
+}
+
+/// "limits or homing": the sections beside it that have this key.
+std::string sections_with(std::span<const KeySpec> keys, std::string_view key) {
+  std::vector<std::string_view> sections;
+  for (const auto& spec : keys) {
+    if (spec.kind == Kind::section && find(spec.children, key) != nullptr) sections.push_back(spec.key);
+  }
+  return alternatives(sections);
+}
+
+}  // namespace
+
+bool Places::usable(std::string_view path) const {
+  while (!bad_.contains(path)) {
+    const auto dot = path.rfind('.');
+    if (dot == std::string_view::npos) return true;
+    path = path.substr(0, dot);
+  }
+  return false;
+}
+
+bool Places::clean(std::string_view path) const {
+  const auto inside = std::string(path) + ".";
+  const auto next = bad_.lower_bound(inside);
+  return usable(path) && (next == bad_.end() || !next->starts_with(inside));
+}
+
+Mark Places::mark(std::string_view path) const {
+  for (;;) {
+    if (const auto found = marks_.find(path); found != marks_.end()) return found->second;
+    const auto dot = path.rfind('.');
+    if (dot == std::string_view::npos) return {};
+    path = path.substr(0, dot);
+  }
+}
+
+void Reader::report(const std::string& path, Mark mark, std::string message, std::string suggestion) {
+  places_.mark_bad(path);
+  diagnostics_.add(mark, std::move(message), std::move(suggestion));
+}
+
+void Reader::read(const Node& root) {
+  if (root.kind != Node::Kind::section) {
+    report("", root.mark, fmt::format("the file must be a section of keys, not {}", kind_name(root)),
+           "begin with machine: NAME");
+    return;
+  }
+  read_section(root, root.mark, schema(), "");
+}
+
+void Reader::read_section(const Node& node, Mark where, std::span<const KeySpec> keys,
+                          const std::string& path) {
+  std::set<std::string_view> probably_meant;
+  const auto entries = unique_entries(node);
+  check_keys(entries, keys, path, probably_meant);
+  for (const auto& spec : keys) {  // in the schema's order: some values depend on earlier ones
+    const auto entry =
+        std::ranges::find_if(node.entries, [&](const auto& e) { return e.first->text == spec.key; });
+    if (entry != node.entries.end()) {
+      read_key(spec, *entry->first, *entry->second, join(path, spec.key));
+    } else if (spec.required) {
+      places_.mark_bad(join(path, spec.key));
+      if (probably_meant.contains(spec.key)) continue;  // reported as misspelt
+      diagnostics_.add(where, fmt::format("missing key '{}'{}", spec.key, path.empty() ? "" : " in " + path),
+                       spec.example.empty() ? "" : fmt::format("for example {}: {}", spec.key, spec.example));
+    }
+  }
+}
+
+void Reader::check_keys(std::span<const Entry> entries, std::span<const KeySpec> keys,
+                        const std::string& path, std::set<std::string_view>& probably_meant) {
+  const auto known = keys_of(keys);
+  for (const auto& [key, value] : entries) {
+    if (find(keys, key.text) != nullptr) continue;
+    const auto here = join(path, printable(key.text));
+    if (key.text == canopen && find(keys, "modbus_rtu") != nullptr) {
+      report(here, key.mark, "bus kind 'canopen' is not supported by this release", "supported: modbus_rtu");
+      probably_meant.insert("modbus_rtu");
+      continue;
+    }
+    const auto message = fmt::format("unknown key {}{}", quoted(key.text), path.empty() ? "" : " in " + path);
+    if (const auto sections = sections_with(keys, key.text); !sections.empty()) {
+      report(here, key.mark, message, fmt::format("it belongs under {}", sections));
+    } else {
+      report(here, key.mark, message, suggest(key.text, known));
+      probably_meant.insert(nearest(key.text, known));
+    }
+  }
+}
+
+std::vector<Reader::Entry> Reader::unique_entries(const Node& section) {
+  std::vector<Entry> result;
+  std::map<std::string_view, int> lines;
+  for (const auto& [key, value] : section.entries) {
+    const auto [first, is_first] = lines.try_emplace(key->text, key->mark.line);
+    if (is_first) {
+      result.push_back({*key, *value});
+    } else {
+      diagnostics_.add(key->mark, fmt::format("duplicate key {}", quoted(key->text)),
+                       fmt::format("it stands in line {} already", first->second));
+    }
+  }
+  return result;
+}
+
+bool Reader::check_is_section(const Node& value, std::string_view name, const std::string& path) {
+  if (value.kind == Node::Kind::section) return true;
+  const auto mark = value.kind == Node::Kind::null ? places_.mark(path) : value.mark;
+  report(path, mark, fmt::format("{} must be a section of keys, not {}", quoted(name), kind_name(value)),
+         "indent its keys below it");
+  return false;
+}
+
+void Reader::read_key(const KeySpec& spec, const Node& key, const Node& value, const std::string& path) {
+  const bool one_value = value.kind == Node::Kind::scalar || value.kind == Node::Kind::list;
+  places_.add(path, one_value ? value.mark : key.mark);
+  switch (spec.kind) {
+    case Kind::section:
+      if (!check_is_section(value, spec.key, path)) return;
+      if (spec.apply != nullptr) spec.apply(target_, {});
+      read_section(value, key.mark, spec.children, path);
+      return;
+    case Kind::named_sections:
+      read_named_sections(spec, value, path);
+      return;
+    case Kind::terminals:
+      read_terminals(value, path, spec.key == "inputs");
+      return;
+    case Kind::model_settings:
+      read_model_settings(value, path);
+      return;
+    default:
+      read_value(spec, value, path);
+      return;
+  }
+}
+
+void Reader::read_value(const KeySpec& spec, const Node& value, const std::string& path) {
+  if (value.kind == Node::Kind::null) {
+    report(path, places_.mark(path), fmt::format("'{}' has no value", spec.key),
+           spec.example.empty() ? "" : fmt::format("for example {}: {}", spec.key, spec.example));
+    return;
+  }
+  // An axis's unit is known once it was read; ScaleSettings has a default that nobody wrote.
+  std::string_view unit;
+  if (target_.axis != nullptr && places_.usable(fmt::format("axes.{}.unit", target_.axis->axis.name))) {
+    unit = target_.axis->axis.scale.unit;
+  }
+  const auto parsed = parse_value(spec, value, unit);
+  if (!parsed) {
+    report(path, parsed.error().mark, parsed.error().message, parsed.error().suggestion);
+    return;
+  }
+  spec.apply(target_, *parsed);
+}
+
+void Reader::read_named_sections(const KeySpec& spec, const Node& value, const std::string& path) {
+  if (!check_is_section(value, spec.key, path)) return;
+  if (value.entries.empty()) report(path, places_.mark(path), fmt::format("'{}' is empty", spec.key));
+  for (const auto& [key, section] : unique_entries(value)) {
+    const auto here = join(path, key.text);
+    places_.add(here, key.mark);
+    if (key.text.size() > longest_name || !matches(key.text, name_pattern)) {
+      report(here, key.mark, fmt::format("{} is not a name", quoted(key.text)),
+             "a letter, then letters, digits, - or _; lower case");
+      continue;
+    }
+    if (!check_is_section(section, key.text, here)) continue;
+    spec.apply(target_, Value{.text = key.text});
+    read_section(section, key.mark, spec.children, here);
+    target_.bus = nullptr;
+    target_.axis = nullptr;
+  }
+}
+
+}  // namespace axisd::config

@@ -1,0 +1,161 @@
+#include "config/schema.hpp"
+
+#include <algorithm>
+
+// One entry per key: what it looks like and where its value goes. What depends on other keys is in
+// machine_checks.cpp.
+namespace axisd::config {
+
+namespace {
+
+constexpr std::string_view path_pattern = "/.+";
+constexpr std::string_view path_hint = "write an absolute path, starting with /";
+
+constexpr KeySpec tls_keys[] = {
+    {.key = "certificate",
+     .kind = Kind::text,
+     .required = true,
+     .description = "Certificate of the server, with its chain (PEM file).",
+     .example = "/etc/axisd/tls/server.crt",
+     .pattern = path_pattern,
+     .pattern_hint = path_hint,
+     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->certificate = v.text; }},
+    {.key = "key",
+     .kind = Kind::text,
+     .required = true,
+     .description = "Private key of the server (PEM file).",
+     .example = "/etc/axisd/tls/server.key",
+     .pattern = path_pattern,
+     .pattern_hint = path_hint,
+     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->key = v.text; }},
+    {.key = "client_ca",
+     .kind = Kind::text,
+     .required = true,
+     .description = "Authorities that sign the certificates of permitted clients (PEM file).",
+     .example = "/etc/axisd/tls/clients.crt",
+     .pattern = path_pattern,
+     .pattern_hint = path_hint,
+     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->client_ca = v.text; }},
+};
+
+constexpr KeySpec server_keys[] = {
+    {.key = "listen",
+     .kind = Kind::text,
+     .description =
+         "HOST:PORT or unix:/PATH. Without tls only loopback addresses and unix sockets. Port 0: the system "
+         "chooses.",
+     .example = "127.0.0.1:7444",
+     .default_value = "localhost:7443",
+     .pattern = "unix:/.+|(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9._-]+):[0-9]{1,5}",
+     .pattern_hint = "write HOST:PORT, [IPV6]:PORT or unix:/PATH",
+     .apply = [](Target& t, const Value& v) { t.configuration->server.listen = v.text; }},
+    {.key = "tls",
+     .kind = Kind::section,
+     .description = "Mutual TLS; required where the daemon can be reached from other machines.",
+     .children = tls_keys,
+     .apply = [](Target& t, const Value&) { t.configuration->server.tls.emplace(); }},
+};
+
+constexpr std::string_view formats[] = {"8N1", "8N2", "8E1", "8O1"};
+constexpr modbus_rtu::Format format_values[] = {{modbus_rtu::Parity::none, 1},
+                                                {modbus_rtu::Parity::none, 2},
+                                                {modbus_rtu::Parity::even, 1},
+                                                {modbus_rtu::Parity::odd, 1}};
+
+constexpr KeySpec modbus_rtu_keys[] = {
+    {.key = "port",
+     .kind = Kind::text,
+     .required = true,
+     .description = "Serial device, best by /dev/serial/by-id; or 'sim' for simulated drives.",
+     .example = "/dev/serial/by-id/usb-FTDI_0002",
+     .pattern = "sim|/.+",
+     .pattern_hint = "write an absolute path such as /dev/ttyUSB0, or sim",
+     .apply = [](Target& t, const Value& v) { t.bus->port = v.text; }},
+    {.key = "baud",
+     .kind = Kind::integer,
+     .description = "Bit rate, as set at the drives.",
+     .example = "9600",
+     .default_value = "115200",
+     .minimum = 1200,
+     .maximum = 1'000'000,
+     .apply = [](Target& t, const Value& v) { t.bus->baud = static_cast<int>(v.integer); }},
+    {.key = "format",
+     .kind = Kind::choice,
+     .description = "Data bits, parity and stop bits, as set at the drives.",
+     .example = "8E1",
+     .default_value = "8N1",
+     .choices = formats,
+     .apply = [](Target& t,
+                 const Value& v) { t.bus->format = format_values[choice_index(formats, v.text)]; }},
+    {.key = "turnaround_max",
+     .kind = Kind::duration,
+     .description =
+         "Longest time that a node takes before the first byte of its reply; part of every stop bound.",
+     .example = "30 ms",
+     .default_value = "20 ms",
+     .minimum = 1,
+     .maximum = 1000,
+     .apply = [](Target& t, const Value& v) { t.bus->turnaround_max = v.duration; }},
+};
+
+constexpr KeySpec bus_keys[] = {
+    {.key = "modbus_rtu",
+     .kind = Kind::section,
+     .required = true,
+     .description = "An RS-485 line.",
+     .children = modbus_rtu_keys},
+};
+
+}  // namespace
+
+std::span<const KeySpec> schema() {
+  static const KeySpec top_keys[] = {
+      {.key = "machine",
+       .kind = Kind::text,
+       .required = true,
+       .description = "Name of this machine.",
+       .example = "press-2",
+       .pattern = name_pattern,
+       .pattern_hint = "a letter, then letters, digits, - or _; lower case",
+       .apply = [](Target& t, const Value& v) { t.configuration->machine = v.text; }},
+      {.key = "state_directory",
+       .kind = Kind::text,
+       .description = "Where the daemon keeps what must survive a restart.",
+       .example = "/var/lib/axisd-2",
+       .default_value = "/var/lib/axisd",
+       .pattern = path_pattern,
+       .pattern_hint = path_hint,
+       .apply = [](Target& t, const Value& v) { t.configuration->state_directory = v.text; }},
+      {.key = "server",
+       .kind = Kind::section,
+       .description = "Where the gRPC API is served.",
+       .children = server_keys},
+      {.key = "buses",
+       .kind = Kind::named_sections,
+       .required = true,
+       .description = "The wires, by name.",
+       .children = bus_keys,
+       .apply =
+           [](Target& t, const Value& v) {
+             t.bus = &t.configuration->buses.emplace_back();
+             t.bus->name = v.text;
+           }},
+      {.key = "axes",
+       .kind = Kind::named_sections,
+       .required = true,
+       .description = "The axes, by name.",
+       .children = axis_schema(),
+       .apply =
+           [](Target& t, const Value& v) {
+             t.axis = &t.configuration->axes.emplace_back();
+             t.axis->axis.name = v.text;
+           }},
+  };
+  return top_keys;
+}
+
+std::size_t choice_index(std::span<const std::string_view> choices, std::string_view choice) {
+  return static_cast<std::size_t>(std::ranges::find(choices, choice) - choices.begin());
+}
+
+}  // namespace axisd::config

@@ -1,0 +1,103 @@
+#include "config/text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace axisd::config {
+
+namespace {
+
+constexpr std::size_t longest_shown = 60;
+
+/// Length of the valid UTF-8 sequence at the front, 0 if there is none (also for overlong forms and
+/// surrogates).
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(0);
+  const std::size_t length = lead < 0x80   ? 1
+                             : lead < 0xC2 ? 0
+                             : lead < 0xE0 ? 2
+                             : lead < 0xF0 ? 3
+                             : lead < 0xF5 ? 4
+                                           : 0;
+  if (length == 0 || length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  }
+  if (lead == 0xE0 && byte(1) < 0xA0) return 0;
+  if (lead == 0xED && byte(1) > 0x9F) return 0;
+  if (lead == 0xF0 && byte(1) < 0x90) return 0;
+  if (lead == 0xF4 && byte(1) > 0x8F) return 0;
+  return length;
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const auto replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::string printable(std::string_view text) {
+  std::string result;
+  while (!text.empty()) {
+    if (result.size() >= longest_shown) return result + "...";
+    const auto length = utf8_length(text);
+    // C1 control characters (U+0080..U+009F) drive terminals as well as C0 does.
+    const bool control = length == 1
+                             ? text[0] < 0x20 || text[0] == 0x7F
+                             : length == 2 && text[0] == '\xC2' && static_cast<unsigned char>(text[1]) < 0xA0;
+    result += length == 0 || control ? "?" : text.substr(0, length);
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  return result;
+}
+
+std::string quoted(std::string_view text) { return "'" + printable(text) + "'"; }
+
+std::string alternatives(std::span<const std::string_view> items) {
+  std::string result;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (i > 0) result += i + 1 == items.size() ? " or " : ", ";
+    result += items[i];
+  }
+  return result;
+}
+
+std::string_view nearest(std::string_view text, std::span<const std::string_view> candidates) {
+  if (text.size() > longest_shown) return {};
+  std::string lower(text);
+  std::ranges::transform(lower, lower.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
+  std::ranges::replace(lower, '-', '_');
+  std::string_view best;
+  std::size_t least = std::max<std::size_t>(1, text.size() / 3) + 1;
+  for (const auto candidate : candidates) {
+    const auto distance = std::min(edit_distance(text, candidate), edit_distance(lower, candidate));
+    if (distance < least) {
+      least = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+std::string suggest(std::string_view text, std::span<const std::string_view> candidates) {
+  if (const auto name = nearest(text, candidates); !name.empty())
+    return fmt::format("did you mean '{}'?", name);
+  return candidates.empty() ? "" : "permitted: " + alternatives(candidates);
+}
+
+}  // namespace axisd::config
