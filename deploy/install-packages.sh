@@ -1,0 +1,50 @@
+#!/bin/bash
+# Installs what axisd needs on Debian 12. Quick, and without a network, when everything is there.
+#   deploy/install-packages.sh [build|run|test|all]      (default: all)
+# build: compiler and libraries; run: what built programs need; test: what tests/run.sh needs beside build.
+# Run as root, or as a user who may use sudo.
+set -euo pipefail
+
+build=(
+  ca-certificates ccache clang-19 cmake git libbenchmark-dev libboost1.81-dev libcli11-dev libfmt-dev libgmock-dev
+  libgrpc++-dev libgrpc-dev libgtest-dev libmodbus-dev libprotobuf-dev libspdlog-dev libsystemd-dev libyaml-cpp-dev
+  lld-19 llvm-19 ninja-build pkg-config protobuf-compiler protobuf-compiler-grpc
+)
+run=(libfmt9 libgrpc++1.51 libmodbus5 libprotobuf32 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
+test=(
+  clang-format-19 clang-tidy-19 libclang-rt-19-dev openssl procps python3 python3-grpcio python3-jsonschema
+  python3-protobuf python3-pymodbus python3-serial python3-serial-asyncio python3-yaml systemd
+)
+
+die() { echo "install-packages.sh: $*" >&2; exit 1; }
+
+. /etc/os-release 2>/dev/null || die "cannot read /etc/os-release: is this Debian 12?"
+[ "${ID:-}" = debian ] && [ "${VERSION_ID:-}" = 12 ] ||
+  die "this is ${PRETTY_NAME:-an unknown system}; axisd's packages are named for Debian 12 (bookworm)"
+
+case "${1:-all}" in
+  build) wanted=("${build[@]}") ;;
+  run) wanted=("${run[@]}") ;;
+  test | all) wanted=("${build[@]}" "${run[@]}" "${test[@]}") ;;
+  *) die "unknown set '$1': use build, run, test or all" ;;
+esac
+
+# One query for all: names that dpkg does not know appear only on its standard error and are missing, too.
+installed=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^installed //p') ||
+  true
+mapfile -t missing < <(printf '%s\n' "${wanted[@]}" | grep -vxF -f <(printf '%s\n' "$installed") || true)
+
+# npm fetches buf for the tests. Debian's npm conflicts with Node.js from elsewhere, so any npm will do.
+case "${1:-all}" in test | all) command -v npm >/dev/null || missing+=(nodejs npm) ;; esac
+
+[ "${#missing[@]}" -gt 0 ] || exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || die "missing: ${missing[*]}; run this as root (there is no sudo)"
+  as_root=(sudo)
+fi
+echo "installing: ${missing[*]}"
+"${as_root[@]}" apt-get update -qq || die "apt-get update failed: check the network and /etc/apt/sources.list"
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" \
+  >/dev/null || die "apt-get install failed; missing: ${missing[*]}"
