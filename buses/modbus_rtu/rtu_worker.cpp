@@ -1,0 +1,188 @@
+#include "buses/modbus_rtu/rtu_worker.hpp"
+
+#include <fmt/format.h>
+#include <pthread.h>
+
+#include <algorithm>
+#include <csignal>
+#include <system_error>
+#include <utility>
+
+#include "buses/modbus_rtu/serial_port.hpp"
+#include "buses/modbus_rtu/wire_session.hpp"
+
+namespace axisd::modbus_rtu {
+namespace {
+
+constexpr Duration first_back_off = std::chrono::milliseconds(100);
+constexpr Duration longest_back_off = std::chrono::seconds(1);
+constexpr Duration longest_idle = std::chrono::seconds(1);
+
+/// Signals are the main thread's; those that a thread raises by its own fault must stay deliverable.
+sigset_t all_but_faults() {
+  sigset_t signals;
+  sigfillset(&signals);
+  for (const int fault : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTRAP}) sigdelset(&signals, fault);
+  return signals;
+}
+
+Error lost_error(const LineSettings& line, const std::string& path, int native_error) {
+  Error error{
+      .reason = Reason::bus_down,
+      .message = fmt::format("port {} was lost: {}", path, std::system_category().message(native_error)),
+      .remedy = "check the adapter and its cable; it is opened again by itself"};
+  error.where.bus = line.name;
+  error.where.native_code = static_cast<std::uint32_t>(native_error);
+  return error;
+}
+
+}  // namespace
+
+RtuWorker::RtuWorker(Executor core, LineSettings settings, PortPath port_path)
+    : core_(std::move(core)),
+      settings_(std::move(settings)),
+      port_path_(std::move(port_path)),
+      progress_(monotonic_now().time_since_epoch().count()) {}
+
+RtuWorker::~RtuWorker() {
+  callbacks_->alive = false;
+  slot_.store(nullptr, std::memory_order_release);
+  wakeup_.quit.store(true, std::memory_order_release);
+  wakeup_.notify();
+  if (thread_.joinable()) thread_.join();
+}
+
+void RtuWorker::start(ResultHandler on_result, PortHandler on_port) {
+  callbacks_->on_result = std::move(on_result);
+  callbacks_->on_port = std::move(on_port);
+  // A new thread inherits the mask: blocked here first, no signal can find it unprotected.
+  const auto blocked = all_but_faults();
+  sigset_t before;
+  pthread_sigmask(SIG_BLOCK, &blocked, &before);
+  thread_ = std::thread([this] { run(); });
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+void RtuWorker::arm(const Exchange& exchange) {
+  wakeup_.cut.store(false, std::memory_order_release);  // a cut that came too late is not meant for this one
+  // Sequentially consistent on both sides: either the worker sees the slot, or we see that it sleeps.
+  slot_.store(&exchange);
+  if (idle_.load()) wakeup_.notify();
+}
+
+bool RtuWorker::revoke() { return slot_.exchange(nullptr, std::memory_order_acq_rel) != nullptr; }
+
+void RtuWorker::cut_wait() {
+  if (!wakeup_.cut.exchange(true, std::memory_order_acq_rel)) wakeup_.notify();
+}
+
+TimePoint RtuWorker::last_progress() const {
+  return TimePoint(TimePoint::duration(progress_.load(std::memory_order_relaxed)));
+}
+
+void RtuWorker::touch() {
+  progress_.store(monotonic_now().time_since_epoch().count(), std::memory_order_relaxed);
+}
+
+void RtuWorker::run() {
+  constexpr std::size_t longest_name = 15;
+  pthread_setname_np(pthread_self(), ("rtu:" + settings_.name).substr(0, longest_name).c_str());
+  use_precise_waits();
+  auto back_off = first_back_off;
+  while (!quitting()) {
+    touch();
+    auto port = open_port();
+    if (port) back_off = first_back_off;
+    const auto error = port ? serve(std::move(*port)) : std::move(port.error());
+    if (quitting()) return;
+    report(PortStatus{.open = false, .error = error});
+    wait_closed(back_off, static_cast<int>(error.where.native_code.value_or(0)));
+    back_off = std::min(2 * back_off, longest_back_off);
+  }
+}
+
+Result<SerialPort> RtuWorker::open_port() {
+  if (!port_path_) return SerialPort::open(settings_, settings_.port);
+  auto path = port_path_();
+  if (!path) return fail(std::move(path.error()));
+  return SerialPort::open(settings_, *path);
+}
+
+/// Serves the slot until the port is lost (the error says how) or the worker is to end.
+Error RtuWorker::serve(SerialPort port) {
+  const auto path = port.path();
+  WireSession session(std::move(port), settings_, wakeup_, progress_);
+  int lost = session.find_echo();
+  if (lost == 0) report(PortStatus{.open = true, .error = {}});
+  while (lost == 0 && !quitting()) {
+    touch();
+    lost = session.find_echo();
+    if (lost == 0) lost = session.keep_silence();
+    if (lost != 0) break;
+    // The latest possible moment: until here a stop could take the exchange back.
+    if (const auto* exchange = slot_.exchange(nullptr, std::memory_order_acq_rel)) {
+      bind(session, *exchange, lost);
+    } else {
+      idle(session, lost);
+    }
+  }
+  return lost_error(settings_, path, lost);
+}
+
+void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) {
+  const auto now = monotonic_now();
+  const auto verdict = now > exchange.deadline ? Verdict::expired : may_send(exchange.guard, now);
+  if (verdict != Verdict::send) {
+    report(ExchangeResult{.status = ExchangeStatus::not_sent,
+                          .verdict = verdict,
+                          .request_begin = now,
+                          .request_end = now,
+                          .reply_end = now});
+    return;
+  }
+  const auto result = session.run(exchange);
+  if (result.status == ExchangeStatus::io_error) {
+    lost = result.native_error;
+    // First the port, then the result: the core must not arm the next exchange on it.
+    report(PortStatus{.open = false, .error = lost_error(settings_, session.path(), lost)});
+  }
+  report(result);
+}
+
+void RtuWorker::idle(WireSession& session, int& lost) {
+  idle_.store(true);
+  if (slot_.load() == nullptr && !quitting()) lost = session.idle(longest_idle);
+  idle_.store(false);
+}
+
+/// Passes the time until the next attempt to open; what is armed meanwhile ends unsent.
+void RtuWorker::wait_closed(Duration duration, int native_error) {
+  const auto until = monotonic_now() + duration;
+  while (!quitting() && monotonic_now() < until) {
+    touch();
+    idle_.store(true);
+    if (slot_.exchange(nullptr) != nullptr) {
+      report(ExchangeResult{.status = ExchangeStatus::not_sent, .native_error = native_error});
+    } else {
+      wakeup_.wait(until - monotonic_now());
+    }
+    idle_.store(false);
+  }
+}
+
+void RtuWorker::report(const ExchangeResult& result) {
+  post(core_, [callbacks = callbacks_, result] {
+    if (callbacks->alive) callbacks->on_result(result);
+  });
+}
+
+void RtuWorker::report(const PortStatus& status) {
+  auto text = status.error ? to_string(*status.error) : std::string();
+  if (!status.open && text == reported_error_) return;
+  reported_error_ = std::move(text);
+  post(core_, [callbacks = callbacks_, status] {
+    if (callbacks->alive) callbacks->on_port(status);
+  });
+}
+
+}  // namespace axisd::modbus_rtu

@@ -1,0 +1,265 @@
+#include "buses/modbus_rtu/wire_session.hpp"
+
+#include <poll.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <utility>
+
+namespace axisd::modbus_rtu {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A line that never falls silent (a stuck transmitter, a second master) must not keep a stop from being
+/// tried.
+constexpr Duration babble_limit = milliseconds(250);
+/// Longest single wait, so that the watchdog sees an idle line alive.
+constexpr Duration longest_wait = std::chrono::seconds(1);
+/// Within this an adapter has delivered its own echo: 16 ms latency of an FTDI adapter, hubs and a busy host.
+constexpr Duration echo_latency = milliseconds(100);
+constexpr int echo_attempts = 3;
+/// 248..255 are reserved (Modbus over serial line 2.2): no node answers, so whatever comes back is an echo.
+constexpr std::uint8_t nobody = 248;
+
+Frame make_probe() {
+  Frame probe;
+  probe.append(nobody);
+  probe.append(static_cast<std::uint8_t>(Function::read_holding_registers));
+  probe.append_word(0);
+  probe.append_word(1);
+  probe.append_crc();
+  return probe;
+}
+
+}  // namespace
+
+WireSession::WireSession(SerialPort port, const LineSettings& line, Wakeup& wakeup,
+                         std::atomic<TimePoint::rep>& progress)
+    : port_(std::move(port)),
+      line_(line),
+      wakeup_(wakeup),
+      progress_(progress),
+      last_byte_(monotonic_now()),  // whatever was said before the opening may just have ended
+      request_end_(last_byte_) {}
+
+WireSession::~WireSession() { block_until(request_end_ + wire_time(line_, 1)); }
+
+void WireSession::touch() {
+  progress_.store(monotonic_now().time_since_epoch().count(), std::memory_order_relaxed);
+}
+
+/// Waits for bytes until `until`; with `cut_from` a cut ends the wait from that moment on.
+WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_from) {
+  for (;;) {
+    touch();
+    if (wakeup_.quit.load(std::memory_order_acquire)) return Wait::quit;
+    const bool cut = cut_from != nullptr && wakeup_.cut.load(std::memory_order_acquire);
+    const auto end = cut ? std::min(until, *cut_from) : until;
+    const auto left = end - monotonic_now();
+    const auto timeout = to_timespec(std::min<Duration>(left, longest_wait));
+    std::array<pollfd, 2> watched{{{.fd = port_.descriptor(), .events = POLLIN, .revents = 0},
+                                   {.fd = wakeup_.descriptor(), .events = POLLIN, .revents = 0}}};
+    if (ppoll(watched.data(), watched.size(), &timeout, nullptr) < 0 && errno != EINTR) return Wait::failed;
+    if ((watched[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return Wait::failed;
+    if (watched[0].revents != 0) return Wait::bytes;
+    if (watched[1].revents != 0) {
+      wakeup_.drain();
+    } else if (left <= Duration::zero()) {
+      return end < until ? Wait::cut : Wait::timeout;
+    }
+  }
+}
+
+int WireSession::idle(Duration limit) {
+  touch();
+  const auto timeout = to_timespec(std::min(limit, longest_wait));
+  std::array<pollfd, 2> watched{{{.fd = port_.descriptor(), .events = POLLIN, .revents = 0},
+                                 {.fd = wakeup_.descriptor(), .events = POLLIN, .revents = 0}}};
+  if (ppoll(watched.data(), watched.size(), &timeout, nullptr) < 0) return errno == EINTR ? 0 : errno;
+  if (watched[1].revents != 0) wakeup_.drain();
+  return (watched[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0 ? EIO : 0;
+}
+
+/// Takes the bytes that nobody waits for off the port.
+WireSession::Bytes WireSession::absorb() {
+  std::array<std::uint8_t, Frame::capacity> buffer;
+  Bytes total;
+  for (;;) {
+    const auto got = port_.read_available(buffer);
+    if (!got) return {.count = total.count, .native_error = got.error()};
+    if (*got == 0) return total;
+    const auto now = monotonic_now();
+    if (total.count == 0 && now - last_byte_ >= silence(line_)) ++stray_frames_;
+    last_byte_ = now;
+    total.count += *got;
+    if (total.count > 16 * Frame::capacity)
+      return total;  // more comes than can be read: let the caller decide
+  }
+}
+
+int WireSession::keep_silence() {
+  const auto give_up = monotonic_now() + babble_limit;
+  for (;;) {
+    block_until(last_byte_ + silence(line_));
+    const auto heard = absorb();
+    if (heard.native_error != 0) return heard.native_error;
+    if (heard.count == 0 || monotonic_now() > give_up) return 0;
+  }
+}
+
+WireSession::Bytes WireSession::read_until_full(std::span<std::uint8_t> buffer, TimePoint until) {
+  Bytes total;
+  while (total.count < buffer.size()) {
+    const auto wait = wait_until(until, nullptr);
+    if (wait == Wait::failed) return {.count = total.count, .native_error = EIO};
+    if (wait != Wait::bytes) break;
+    const auto got = port_.read_available(buffer.subspan(total.count));
+    if (!got) return {.count = total.count, .native_error = got.error()};
+    total.count += *got;
+    if (*got > 0) last_byte_ = monotonic_now();
+  }
+  return total;
+}
+
+int WireSession::find_echo() {
+  if (echo_known_) return 0;
+  const auto probe = make_probe();
+  for (int attempt = 0; attempt < echo_attempts && !echo_known_; ++attempt) {
+    if (const int lost = keep_silence(); lost != 0) return lost;
+    if (const int lost = port_.send(probe); lost != 0) return lost;
+    request_end_ = last_byte_ = monotonic_now() + wire_time(line_, probe.size());
+    std::array<std::uint8_t, Frame::capacity> buffer;
+    const auto heard = read_until_full(std::span(buffer).first(probe.size()), request_end_ + echo_latency);
+    if (heard.native_error != 0) return heard.native_error;
+    echo_ = std::ranges::equal(std::span(buffer).first(heard.count), probe.bytes());
+    echo_known_ = echo_ || heard.count == 0;  // other bytes: somebody else was talking, ask again
+  }
+  // An echo that is hidden by noise three times is not taken for one; ordinary reads would still find it.
+  if (echo_)
+    spdlog::info("{}: the adapter on {} hears what it sends; its echo is discarded", line_.name, path());
+  echo_known_ = true;
+  return 0;
+}
+
+void WireSession::end(ExchangeResult& result, ExchangeStatus status, int native_error) {
+  result.status = status;
+  result.native_error = native_error;
+  result.reply_end = monotonic_now();
+}
+
+/// After damage: the sender may not have finished. Its remaining bytes belong to no later request.
+void WireSession::settle(ExchangeResult& result) {
+  const auto give_up = monotonic_now() + babble_limit;
+  while (monotonic_now() < give_up && wait_until(monotonic_now() + silence(line_), nullptr) == Wait::bytes) {
+    std::array<std::uint8_t, Frame::capacity> buffer;
+    const auto got = port_.read_available(buffer);
+    if (!got) return;  // the next use of the port finds it lost
+    if (*got > 0) last_byte_ = monotonic_now();
+    const auto kept = std::min(*got, Frame::capacity - result.reply_frame.size());
+    for (const auto byte : std::span(buffer).first(kept)) result.reply_frame.append(byte);
+  }
+}
+
+/// Takes the adapter's echo of the request off the port. False: the exchange has ended.
+bool WireSession::pass_echo(const Exchange& exchange, ExchangeResult& result) {
+  std::array<std::uint8_t, Frame::capacity> buffer;
+  const auto echo = std::span(buffer).first(exchange.frame.size());
+  const auto heard = read_until_full(echo, std::min(reply_deadline_, request_end_ + echo_latency));
+  if (heard.native_error != 0) {
+    end(result, ExchangeStatus::io_error, heard.native_error);
+    return false;
+  }
+  if (std::ranges::equal(echo.first(heard.count), exchange.frame.bytes())) return true;
+  // Two talked at once, or the adapter was changed: what follows cannot be told apart from the echo.
+  echo_known_ = false;
+  result.reply_frame = Frame(echo.first(heard.count));
+  settle(result);
+  end(result, heard.count == 0 ? ExchangeStatus::timeout : ExchangeStatus::corrupt);
+  return false;
+}
+
+/// A read and its echo differ in shape, so an echo that the probe missed shows itself here as a damaged
+/// reply.
+bool WireSession::is_own_echo(const Exchange& exchange, const Frame& damaged) {
+  const auto request = exchange.frame.bytes();
+  const auto head = damaged.size();
+  if (head >= request.size() || !std::ranges::equal(damaged.bytes(), request.first(head))) return false;
+  std::array<std::uint8_t, Frame::capacity> buffer;
+  const auto tail = std::span(buffer).first(request.size() - head);
+  const auto heard = read_until_full(tail, reply_deadline_);
+  return heard.native_error == 0 && std::ranges::equal(tail.first(heard.count), request.subspan(head));
+}
+
+WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const ExchangeResult& result) {
+  const auto cut_from = result.request_end + exchange.turnaround_max;
+  return wait_until(reply_deadline_, &cut_from);
+}
+
+/// Lets libmodbus read one frame. True: the exchange has ended.
+bool WireSession::take_frame(const Exchange& exchange, ExchangeResult& result) {
+  const auto first_byte = monotonic_now();
+  const auto received = port_.receive(exchange.request.node, reply_deadline_ - first_byte);
+  touch();
+  if (received.kind == Reception::failed) {
+    end(result, ExchangeStatus::io_error, received.native_error);
+    return true;
+  }
+  last_byte_ = monotonic_now();
+  const auto reply = decode(exchange.request, received.bytes.bytes());
+  if (reply.kind == ReplyKind::match || reply.kind == ReplyKind::exception) {
+    result.reply = reply;
+    result.reply_frame = received.bytes;
+    result.reply_begin = first_byte;
+    end(result, ExchangeStatus::replied);
+    return true;
+  }
+  if (received.kind == Reception::frame || received.kind == Reception::filtered) {
+    // libmodbus looks at the node before the CRC: a reply whose first byte was damaged ends here, too.
+    if (reply.kind == ReplyKind::corrupt) damaged_ = true;
+    if (reply.kind == ReplyKind::foreign) ++result.foreign_frames;
+    return false;
+  }
+  if (received.kind == Reception::damaged && is_own_echo(exchange, received.bytes)) {
+    echo_ = true;
+    return false;
+  }
+  result.reply_frame = received.bytes;
+  result.reply_begin = first_byte;
+  settle(result);
+  end(result, ExchangeStatus::corrupt);
+  return true;
+}
+
+ExchangeResult WireSession::run(const Exchange& exchange) {
+  ExchangeResult result{.foreign_frames = std::exchange(stray_frames_, 0)};
+  damaged_ = false;
+  result.request_begin = monotonic_now();
+  if (const int lost = port_.send(exchange.frame); lost != 0) {
+    end(result, ExchangeStatus::io_error, lost);
+    return result;
+  }
+  result.request_end = monotonic_now() + wire_time(line_, exchange.frame.size());
+  request_end_ = last_byte_ = result.request_end;
+  reply_deadline_ = result.request_end + exchange.reply_timeout;
+  if (echo_ && !pass_echo(exchange, result)) return result;
+  for (;;) {
+    const auto wait = wait_for_reply(exchange, result);
+    if (wait == Wait::bytes) {
+      if (take_frame(exchange, result)) return result;
+      continue;
+    }
+    last_byte_ = std::max(last_byte_, request_end_);
+    if (wait == Wait::failed) {
+      end(result, ExchangeStatus::io_error, EIO);
+    } else {
+      const auto silent = wait == Wait::timeout ? ExchangeStatus::timeout : ExchangeStatus::cut;
+      end(result, damaged_ ? ExchangeStatus::corrupt : silent);
+    }
+    return result;
+  }
+}
+
+}  // namespace axisd::modbus_rtu

@@ -1,0 +1,71 @@
+// One open port from its opening to its loss: who may talk when, and what came back.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <span>
+
+#include "buses/modbus_rtu/line.hpp"
+#include "buses/modbus_rtu/serial_port.hpp"
+#include "buses/modbus_rtu/settings.hpp"
+#include "buses/modbus_rtu/wakeup.hpp"
+
+namespace axisd::modbus_rtu {
+
+/// Silences, echoes and exchanges on one open port. Thread: the line's worker.
+///
+///   find_echo -> { keep_silence -> exchange | idle }* -> the port is lost
+///
+/// Functions that return `int` return 0 or the errno with which the port was lost; it is useless afterwards.
+class WireSession {
+ public:
+  /// `progress` is stamped (monotonic, in ticks of TimePoint) at least once per second.
+  WireSession(SerialPort port, const LineSettings& line, Wakeup& wakeup,
+              std::atomic<TimePoint::rep>& progress);
+  WireSession(const WireSession&) = delete;
+  /// Waits until the last request has left: closing or re-opening the port would cut it off.
+  ~WireSession();
+
+  /// Finds out whether the adapter hears what it sends, where that is not known.
+  int find_echo();
+  /// Blocks until the line has been silent for as long as must be before a request.
+  int keep_silence();
+  /// Blocks until the wakeup is notified, bytes that nobody asked for come, or `limit` has passed.
+  int idle(Duration limit);
+  /// Sends `exchange` and waits for its end. Precondition: keep_silence() has just returned.
+  ExchangeResult run(const Exchange& exchange);
+
+  [[nodiscard]] const std::string& path() const { return port_.path(); }
+
+ private:
+  enum class Wait : std::uint8_t { bytes, timeout, cut, quit, failed };
+  struct Bytes {
+    std::size_t count = 0;
+    int native_error = 0;
+  };
+
+  Wait wait_until(TimePoint until, const TimePoint* cut_from);
+  Wait wait_for_reply(const Exchange& exchange, const ExchangeResult& result);
+  bool pass_echo(const Exchange& exchange, ExchangeResult& result);
+  bool take_frame(const Exchange& exchange, ExchangeResult& result);
+  bool is_own_echo(const Exchange& exchange, const Frame& damaged);
+  Bytes read_until_full(std::span<std::uint8_t> buffer, TimePoint until);
+  Bytes absorb();
+  void settle(ExchangeResult& result);
+  void end(ExchangeResult& result, ExchangeStatus status, int native_error = 0);
+  void touch();
+
+  SerialPort port_;
+  const LineSettings& line_;
+  Wakeup& wakeup_;
+  std::atomic<TimePoint::rep>& progress_;
+  TimePoint last_byte_;       ///< end of the last character on the wire, sent or received
+  TimePoint request_end_;     ///< when the last request has left the adapter
+  TimePoint reply_deadline_;  ///< of the exchange under way
+  bool damaged_ = false;      ///< unsound bytes came during the exchange under way
+  bool echo_known_ = false;
+  bool echo_ = false;
+  int stray_frames_ = 0;  ///< bursts that nobody asked for, not yet reported
+};
+
+}  // namespace axisd::modbus_rtu
