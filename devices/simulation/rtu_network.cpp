@@ -94,6 +94,8 @@ void RtuNetwork::reboot(std::span<const std::uint8_t> request, Duration off_time
 
 std::optional<ReplyPlan> RtuNetwork::on_request(std::span<const std::uint8_t> frame, TimePoint request_end) {
   pass_time(request_end);
+  if (observer_)
+    observer_(request_end - character_time() * static_cast<std::int64_t>(frame.size()), true, frame);
   if (!connected_) return std::nullopt;
   const auto faults = frame_is_sound(frame) ? faults_.strike(frame) : std::vector<Fault>{};
   if (find(faults, FaultKind::hang_up) != nullptr) {
@@ -132,6 +134,7 @@ std::optional<ReplyPlan> RtuNetwork::plan(std::span<const std::uint8_t> request,
   if (plan.bytes.empty()) return std::nullopt;
   plan.begin = plan.arrivals.front() - character;
   plan.end = plan.arrivals.back();
+  if (observer_) observer_(plan.begin, false, plan.bytes);
   return plan;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -33,6 +34,11 @@ struct ReplyPlan {
   std::vector<TimePoint> arrivals;  ///< end of each byte
 };
 
+/// A frame seen on the wire. `received`: from the master, also when a fault or a cut cable keeps it from the
+/// drives. `begin`: its first bit. Called by whoever lets time pass; must not block.
+using FrameObserver =
+    std::function<void(TimePoint begin, bool received, std::span<const std::uint8_t> frame)>;
+
 /// Dispatches frames to nodes, applies faults and computes when the reply's bytes are on the wire.
 /// Two uses: on_request() for whoever has whole frames (a virtual wire), on_bytes() + advance() +
 /// take_reply() for whoever has a byte stream (a pty). Times never go backwards. Thread: that of its owner.
@@ -46,6 +52,8 @@ class RtuNetwork {
   [[nodiscard]] SimulatedRtuNode* node(std::uint8_t address) const;
   [[nodiscard]] FaultPlan& faults() { return faults_; }
 
+  void set_observer(FrameObserver observer) { observer_ = std::move(observer); }
+
   /// A whole frame whose last byte ended at `request_end`. Nothing: nobody answers.
   std::optional<ReplyPlan> on_request(std::span<const std::uint8_t> frame, TimePoint request_end);
 
@@ -58,6 +66,8 @@ class RtuNetwork {
   [[nodiscard]] TimePoint next_event() const;
   /// Replies to frames that came through on_bytes(), oldest first.
   std::optional<ReplyPlan> take_reply();
+  /// For owners that took a reply from on_request() and want it in the same row.
+  void add_reply(ReplyPlan reply) { replies_.push_back(std::move(reply)); }
 
   /// Cuts the cable (nothing passes either way while the drives go on) or joins it again.
   void set_connected(bool connected) { connected_ = connected; }
@@ -90,6 +100,7 @@ class RtuNetwork {
   std::vector<std::uint8_t> partial_;
   TimePoint partial_end_{};
   std::deque<ReplyPlan> replies_;
+  FrameObserver observer_;
   TimePoint now_{};
   bool connected_ = true;
   bool hang_up_ = false;

@@ -1,0 +1,123 @@
+#include "devices/simulation/control.hpp"
+
+#include <fmt/format.h>
+
+#include "devices/simulation/text.hpp"
+
+namespace axisd::simulation {
+
+namespace {
+
+using Words = std::span<const std::string_view>;
+
+constexpr std::string_view usage =
+    "power N on|off; input N TERMINAL on|off|auto; alarm N CODE; fault KIND key=value...; fault clear; cut; "
+    "join; "
+    "hangup; replug; shaft N; peek N REGISTER; poke N REGISTER VALUE; eeprom N; help";
+
+std::string power(SimulatedRtuNode& node, Words words) {
+  const auto on = words.size() == 1 ? parse_on_off(words[0]) : std::nullopt;
+  if (!on) return "error use: power N on|off";
+  node.set_power(*on);
+  return "ok";
+}
+
+std::string input(SimulatedRtuNode& node, Words words) {
+  if (words.size() != 2) return "error use: input N TERMINAL on|off|auto";
+  if (!node.has_input(words[0])) return fmt::format("error no input {}", words[0]);
+  const auto level = parse_on_off(words[1]);
+  if (!level && words[1] != "auto") return "error use: input N TERMINAL on|off|auto";
+  node.set_input(words[0], level);
+  return "ok";
+}
+
+std::string alarm(SimulatedRtuNode& node, Words words) {
+  const auto code = words.size() == 1 ? parse_number<int>(words[0]) : std::nullopt;
+  if (!code || *code < 0 || *code > 5) return "error use: alarm N 0..5 (0: the cause is gone)";
+  node.raise_alarm(*code);
+  return "ok";
+}
+
+std::string shaft(SimulatedRtuNode& node, Words words) {
+  if (!words.empty()) return "error use: shaft N";
+  return fmt::format("ok position={} moving={} starts={}", node.shaft_pulses(), node.shaft_moving() ? 1 : 0,
+                     node.starts());
+}
+
+std::string peek(SimulatedRtuNode& node, Words words) {
+  const auto address = words.size() == 1 ? parse_number<std::uint16_t>(words[0]) : std::nullopt;
+  if (!address) return "error use: peek N REGISTER";
+  return fmt::format("ok {}", node.peek(*address));
+}
+
+std::string poke(SimulatedRtuNode& node, Words words) {
+  const auto address = words.size() == 2 ? parse_number<std::uint16_t>(words[0]) : std::nullopt;
+  const auto value = words.size() == 2 ? parse_number<std::uint16_t>(words[1]) : std::nullopt;
+  if (!address || !value) return "error use: poke N REGISTER VALUE";
+  node.poke(*address, *value);
+  return "ok";
+}
+
+std::string eeprom(SimulatedRtuNode& node, Words words) {
+  if (!words.empty()) return "error use: eeprom N";
+  return fmt::format("ok {}", node.eeprom_writes());
+}
+
+struct NodeCommand {
+  std::string_view name;
+  std::string (*run)(SimulatedRtuNode& node, Words words);
+};
+constexpr NodeCommand node_commands[] = {{"power", &power},  {"input", &input}, {"alarm", &alarm},
+                                         {"shaft", &shaft},  {"peek", &peek},   {"poke", &poke},
+                                         {"eeprom", &eeprom}};
+
+std::string fault(PtyLine& line, std::string_view text) {
+  if (text == "clear") {
+    line.with_network([](RtuNetwork& network) { network.faults().clear(); });
+    return "ok";
+  }
+  auto parsed = parse_fault(text);
+  if (!parsed) return fmt::format("error {}; {}", parsed.error().message, parsed.error().remedy);
+  line.with_network([&](RtuNetwork& network) { network.faults().add(std::move(*parsed)); });
+  return "ok";
+}
+
+std::string node_command(PtyLine& line, Words words) {
+  for (const auto& command : node_commands) {
+    if (command.name != words[0]) continue;
+    const auto address = words.size() > 1 ? parse_number<std::uint8_t>(words[1]) : std::nullopt;
+    if (!address) return fmt::format("error {} needs a node", words[0]);
+    return line.with_network([&](RtuNetwork& network) {
+      auto* node = network.node(*address);
+      return node == nullptr ? fmt::format("error no node {}", *address)
+                             : command.run(*node, words.subspan(2));
+    });
+  }
+  return fmt::format("error \"{}\" is no command; use: {}", words[0], usage);
+}
+
+}  // namespace
+
+std::string execute_control(PtyLine& line, std::string_view command) {
+  const auto words = split(command, ' ');
+  if (words.empty()) return fmt::format("error empty; use: {}", usage);
+  if (words[0] == "fault") {
+    const auto rest = command.find("fault") + 5;
+    return fault(line, command.substr(std::min(command.find_first_not_of(' ', rest), command.size())));
+  }
+  if (words.size() > 1) return node_command(line, words);
+  if (words[0] == "help") return fmt::format("ok {}", usage);
+  if (words[0] == "cut" || words[0] == "join") {
+    line.with_network([&](RtuNetwork& network) { network.set_connected(words[0] == "join"); });
+    return "ok";
+  }
+  if (words[0] == "hangup") {
+    line.hang_up();
+    return "ok";
+  }
+  if (words[0] != "replug") return node_command(line, words);
+  const auto plugged = line.replug();
+  return plugged ? "ok " + line.path() : "error " + plugged.error().message;
+}
+
+}  // namespace axisd::simulation

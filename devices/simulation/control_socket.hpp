@@ -1,0 +1,46 @@
+// A unix socket that takes lines of text and answers each with a line.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "buses/error.hpp"
+
+namespace axisd::simulation {
+
+/// Serves any number of clients on a thread of its own until destroyed; then the socket is removed.
+class ControlSocket {
+ public:
+  /// One command to its reply, without line ends. Thread: the socket's.
+  using Handler = std::function<std::string(std::string_view)>;
+
+  /// Replaces a socket left behind at `path`. Errors: the path cannot be bound.
+  static Result<std::unique_ptr<ControlSocket>> open(std::string path, Handler handler);
+  ~ControlSocket();
+  ControlSocket(const ControlSocket&) = delete;
+  ControlSocket& operator=(const ControlSocket&) = delete;
+
+ private:
+  struct Client {
+    int socket = -1;
+    std::string input;
+  };
+  ControlSocket(std::string path, Handler handler);
+  Result<void> listen();
+  void run();
+  bool serve(Client& client);
+
+  std::string path_;
+  Handler handler_;
+  int listener_ = -1, wake_fd_ = -1;
+  std::vector<Client> clients_;  ///< thread: the socket's
+  std::atomic<bool> stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace axisd::simulation

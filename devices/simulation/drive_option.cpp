@@ -1,0 +1,109 @@
+#include "devices/simulation/drive_option.hpp"
+
+#include <fmt/format.h>
+
+#include "devices/simulation/text.hpp"
+
+namespace axisd::simulation {
+
+namespace {
+
+bool parse_range(std::string_view value, Mechanics& mechanics) {
+  const auto colon = value.find(':');
+  if (colon == std::string_view::npos) return false;
+  const auto from = parse_number<std::int64_t>(value.substr(0, colon));
+  const auto to = parse_number<std::int64_t>(value.substr(colon + 1));
+  if (!from || !to || *from > *to) return false;
+  mechanics.home_switch_from = from;
+  mechanics.home_switch_to = to;
+  return true;
+}
+
+bool parse_position(std::string_view value, std::optional<std::int64_t>& into) {
+  into = parse_number<std::int64_t>(value);
+  return into.has_value();
+}
+
+bool parse_switch(std::string_view name, std::string_view value, Switches& switches) {
+  const auto on = parse_on_off(value);
+  if (on) switches[std::string(name)] = *on;
+  return on.has_value();
+}
+
+bool parse_eeprom(std::string_view address, std::string_view value, SimulatedNodeSettings& settings) {
+  const auto at = parse_number<std::uint16_t>(address);
+  const auto number = parse_number<std::int32_t>(value);
+  if (!at || !number || *number < -32768 || *number > 65535) return false;
+  settings.eeprom[*at] = static_cast<std::uint16_t>(*number);
+  return true;
+}
+
+bool parse_wire(std::string_view terminal, std::string_view value, SimulatedNodeSettings& settings) {
+  Wire wire;
+  if (value.ends_with(":nc")) {
+    wire.normally_closed = true;
+    value.remove_suffix(3);
+  }
+  if (value == "home")
+    wire.kind = SwitchKind::home;
+  else if (value == "positive_limit")
+    wire.kind = SwitchKind::positive_limit;
+  else if (value == "negative_limit")
+    wire.kind = SwitchKind::negative_limit;
+  else
+    return false;
+  settings.wires[std::string(terminal)] = wire;
+  return true;
+}
+
+bool parse_part(std::string_view key, std::string_view value, DriveOption& option) {
+  auto& settings = option.settings;
+  const auto named = [&](std::string_view prefix) {
+    return key.starts_with(prefix) && key.size() > prefix.size();
+  };
+  if (named("switch.")) return parse_switch(key.substr(7), value, settings.switches);
+  if (named("eeprom.")) return parse_eeprom(key.substr(7), value, settings);
+  if (named("wire.")) return parse_wire(key.substr(5), value, settings);
+  if (key == "home") return parse_range(value, settings.mechanics);
+  if (key == "positive_limit") return parse_position(value, settings.mechanics.positive_limit_from);
+  if (key == "negative_limit") return parse_position(value, settings.mechanics.negative_limit_from);
+  if (key == "model") {
+    option.model = value;
+    return !value.empty();
+  }
+  if (key == "node") {
+    const auto node = parse_number<std::uint8_t>(value);
+    if (node) settings.address = *node;
+    return node.has_value();
+  }
+  if (key == "powered") {
+    const auto on = parse_on_off(value);
+    if (on) settings.powered = *on;
+    return on.has_value();
+  }
+  if (key != "boot_ms") return false;
+  const auto milliseconds = parse_number<std::uint16_t>(value);
+  if (milliseconds) settings.boot_time = std::chrono::milliseconds(*milliseconds);
+  return milliseconds.has_value();
+}
+
+}  // namespace
+
+Result<DriveOption> parse_drive(std::string_view text) {
+  DriveOption option;
+  option.settings.address = 0;
+  for (const auto part : split(text, ',')) {
+    const auto [key, value] = key_value(part);
+    if (!parse_part(key, value, option))
+      return fail(Reason::invalid_argument, fmt::format("\"{}\" is not understood", part),
+                  "use node=, model=, home=FROM:TO, positive_limit=, negative_limit=, switch.NAME=on|off, "
+                  "eeprom.REGISTER=VALUE, wire.TERMINAL=home|positive_limit|negative_limit[:nc], boot_ms=, "
+                  "powered=on|off");
+  }
+  if (option.model.empty() || option.settings.address == 0)
+    return fail(Reason::invalid_argument, fmt::format("\"{}\" names no drive", text),
+                "give node= and model=");
+  return option;
+}
+
+}  // namespace axisd::simulation

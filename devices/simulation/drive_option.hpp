@@ -1,0 +1,22 @@
+// One simulated drive as text, for the command line.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "buses/error.hpp"
+#include "devices/simulation/simulated_node.hpp"
+
+namespace axisd::simulation {
+
+struct DriveOption {
+  std::string model;
+  SimulatedNodeSettings settings;
+};
+
+/// "node=1,model=ykd2405pr,home=5000:6000,positive_limit=90000,negative_limit=-2000,switch.start_in_motion=on,
+/// eeprom.0x0011=13,wire.X0=home,wire.X1=positive_limit:nc,boot_ms=300,powered=off". node and model are
+/// needed. Errors name the part that is wrong. Models, switches and terminals are checked by make_node().
+Result<DriveOption> parse_drive(std::string_view text);
+
+}  // namespace axisd::simulation
