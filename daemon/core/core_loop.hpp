@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <functional>
+#include <mutex>
+#include <vector>
+
+#include "buses/asio_clock.hpp"
+#include "buses/clock.hpp"
+#include "buses/gate.hpp"
+#include "buses/task.hpp"
+
+namespace axisd::core {
+
+/// Stops overtake everything that waits for the core thread: the lane is emptied before each handler. Asking
+/// for a stop makes the axis's prepared motion unsendable at once, from the asking thread. Thread: any.
+class StopLane {
+ public:
+  explicit StopLane(Executor core) : core_(std::move(core)) {}
+  void request(AxisGate& gate, StopKind kind, std::function<void()> serve);
+  /// Thread: core.
+  void drain();
+
+ private:
+  Executor core_;
+  std::atomic<bool> waiting_{false};
+  std::mutex mutex_;
+  std::vector<std::function<void()>> requests_;
+};
+
+/// The core thread's loop.
+class CoreLoop {
+ public:
+  CoreLoop();
+  [[nodiscard]] Executor executor() { return io_.get_executor(); }
+  [[nodiscard]] Clock& clock() { return clock_; }
+  [[nodiscard]] StopLane& lane() { return lane_; }
+
+  /// Runs handlers until stop(). Thread: becomes the core thread.
+  void run();
+  /// Thread: any.
+  void stop();
+  /// When the loop last came round. Thread: any.
+  [[nodiscard]] TimePoint last_progress() const { return last_progress_.load(std::memory_order_relaxed); }
+  /// Longest single handler since the last call. Thread: any.
+  [[nodiscard]] Duration take_longest_handler() {
+    return Duration(longest_.exchange(0, std::memory_order_relaxed));
+  }
+
+ private:
+  boost::asio::io_context io_{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
+  AsioClock clock_;
+  StopLane lane_;
+  std::atomic<TimePoint> last_progress_{};
+  std::atomic<Duration::rep> longest_{0};
+};
+
+}  // namespace axisd::core

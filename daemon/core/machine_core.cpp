@@ -1,0 +1,149 @@
+#include "daemon/core/machine_core.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace axisd::core {
+
+namespace {
+
+modbus_rtu::RtuBus* bus_named(const std::vector<std::unique_ptr<modbus_rtu::RtuBus>>& buses,
+                              const std::string& name) {
+  const auto found =
+      std::ranges::find_if(buses, [&](const auto& bus) { return bus->settings().name == name; });
+  return found == buses.end() ? nullptr : found->get();
+}
+
+}  // namespace
+
+MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
+    : parts_(std::move(parts)), book_(*parts_.clock, parts_.instance_id) {
+  if (parts_.persistence != nullptr) {
+    inhibited_ = parts_.persistence->loaded().inhibit.active;
+    inhibited_by_ = parts_.persistence->loaded().inhibit.by;
+  }
+  for (const auto& line : configuration.buses)
+    buses_.push_back(
+        std::make_unique<modbus_rtu::RtuBus>(parts_.executor, *parts_.clock, line, parts_.make_line(line)));
+  for (const auto& entry : configuration.axes) {
+    const auto& settings = entry.axis;
+    auto* bus = bus_named(buses_, settings.bus);
+    const auto* descriptor = find_drive_model(settings.model);
+    auto setup =
+        descriptor == nullptr ? fail(Reason::internal, "unknown model") : drive_setup(settings, *descriptor);
+    // The loader has refused all of this with its position in the file.
+    if (bus == nullptr || !setup)
+      throw std::invalid_argument(
+          fmt::format("axis {}: {}", settings.name, setup ? "unknown bus" : setup.error().message));
+    auto drive = descriptor->make({.executor = parts_.executor,
+                                   .clock = parts_.clock,
+                                   .rtu = bus,
+                                   .node = settings.node,
+                                   .setup = std::move(*setup)});
+    axes_.push_back(std::make_unique<Axis>(AxisEnvironment{.executor = parts_.executor,
+                                                           .clock = parts_.clock,
+                                                           .bus = bus,
+                                                           .book = &book_,
+                                                           .persistence = parts_.persistence,
+                                                           .inhibited = &inhibited_,
+                                                           .published = parts_.published},
+                                           settings, *descriptor, std::move(drive),
+                                           std::make_shared<AxisGate>(), bus->settings().simulated()));
+    by_name_.emplace(settings.name, axes_.back().get());
+  }
+}
+
+MachineCore::~MachineCore() = default;
+
+void MachineCore::start() {
+  for (const auto& bus : buses_) bus->start(parts_.observer);
+  for (const auto& axis : axes_) axis->start();
+}
+
+Axis* MachineCore::find(std::string_view axis) const {
+  const auto found = by_name_.find(axis);
+  return found == by_name_.end() ? nullptr : found->second;
+}
+
+Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& action,
+                                       const CommandOptions& options) {
+  auto* found = find(axis);
+  if (found == nullptr)
+    return fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis), "list them: axisctl list");
+  auto command = found->submit(action, options);
+  if (!command)
+    spdlog::info("{} {}: refused: {}", axis, to_string(kind_of(action)), to_string(command.error()));
+  return command;
+}
+
+std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client) {
+  inhibited_ = true;
+  inhibited_by_ = client;
+  spdlog::warn("StopAll by {}: motion is inhibited until it is released", client);
+  if (parts_.persistence != nullptr)
+    parts_.persistence->save_inhibit(
+        {.active = true, .by = client, .since = parts_.clock->wall(parts_.clock->now())},
+        [](const Result<void>& saved) {
+          if (!saved) spdlog::error("the inhibit would not survive a restart: {}", to_string(saved.error()));
+        });
+  // The line serves stops in the order in which they are queued.
+  const auto rank = [](const Axis& axis) {
+    if (axis.snapshot()->link == LinkState::offline) return 2;
+    return axis.at_rest() ? 1 : 0;
+  };
+  std::vector<std::pair<int, std::size_t>> order;
+  for (std::size_t i = 0; i < axes_.size(); ++i) order.emplace_back(rank(*axes_[i]), i);
+  std::ranges::sort(order);
+  std::vector<Result<CommandPtr>> results(axes_.size(), fail(Reason::internal, "not stopped"));
+  for (const auto& [urgency, i] : order)
+    results[i] = axes_[i]->submit(StopRequest{.kind = StopKind::stop}, {.client = client});
+  return results;
+}
+
+void MachineCore::release_inhibit(const std::string& client, std::function<void(Result<void>)> done) {
+  auto release = [this, client, done = std::move(done)](const Result<void>& saved) {
+    if (saved) {
+      inhibited_ = false;
+      inhibited_by_.clear();
+      spdlog::warn("StopAll released by {}", client);
+      for (const auto& axis : axes_) axis->refresh();
+    }
+    done(saved);
+  };
+  if (parts_.persistence == nullptr) return release({});
+  parts_.persistence->save_inhibit(
+      {.active = false, .by = client, .since = parts_.clock->wall(parts_.clock->now())}, std::move(release));
+}
+
+void MachineCore::stop_moving_axes() {
+  for (const auto& axis : axes_)
+    if (!axis->at_rest()) (void)axis->submit(StopRequest{.kind = StopKind::stop}, {.client = "shutdown"});
+}
+
+bool MachineCore::at_rest() const {
+  return std::ranges::all_of(axes_, [](const auto& axis) { return axis->at_rest(); });
+}
+
+std::vector<BusStatus> MachineCore::bus_status() const {
+  std::vector<BusStatus> all;
+  for (const auto& bus : buses_)
+    all.push_back({.name = bus->settings().name,
+                   .port = bus->settings().port,
+                   .baud = bus->settings().baud,
+                   .open = bus->port().open,
+                   .simulated = bus->settings().simulated(),
+                   .error = bus->port().error,
+                   .counters = bus->counters()});
+  return all;
+}
+
+bool MachineCore::buses_reported() const {
+  return std::ranges::all_of(
+      buses_, [](const auto& bus) { return bus->port().open || bus->port().error.has_value(); });
+}
+
+}  // namespace axisd::core

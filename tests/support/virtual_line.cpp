@@ -1,0 +1,118 @@
+#include "tests/support/virtual_line.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <utility>
+
+namespace axisd::test {
+
+using namespace modbus_rtu;
+
+VirtualLine::VirtualLine(VirtualWorld& world, LineSettings settings)
+    : world_(&world),
+      settings_(std::move(settings)),
+      network_({.baud = settings_.baud, .bits_per_character = settings_.format.bits_per_character()}) {}
+
+void VirtualLine::start(ResultHandler on_result, PortHandler on_port) {
+  on_result_ = std::move(on_result);
+  on_port_ = std::move(on_port);
+  set_open(open_);
+}
+
+void VirtualLine::set_open(bool open) {
+  open_ = open;
+  if (!on_port_) return;
+  post(world_->executor(), [this, open] {
+    PortStatus status{.open = open};
+    if (!open) status.error = Error{.reason = Reason::bus_down, .message = "unplugged"};
+    on_port_(status);
+    if (open) return;
+    if (std::exchange(armed_, nullptr) != nullptr) end(ExchangeStatus::not_sent);
+    if (under_way_ != nullptr) end(ExchangeStatus::io_error);
+  });
+}
+
+void VirtualLine::arm(const Exchange& exchange) {
+  armed_ = &exchange;
+  timer_ =
+      world_->clock().call_at(std::max(world_->now(), quiet_since_ + silence(settings_)), [this] { bind(); });
+}
+
+bool VirtualLine::revoke() {
+  if (armed_ == nullptr) return false;
+  armed_ = nullptr;
+  timer_.reset();
+  return true;
+}
+
+void VirtualLine::bind() {
+  const auto now = world_->now();
+  const auto& exchange = *std::exchange(armed_, nullptr);
+  result_ = {};
+  result_.request_begin = result_.request_end = now;
+  if (exchange.deadline < now) return end(ExchangeStatus::not_sent, Verdict::expired);
+  if (const auto verdict = may_send(exchange.guard, now); verdict != Verdict::send)
+    return end(ExchangeStatus::not_sent, verdict);
+  under_way_ = &exchange;
+  result_.request_end = now + wire_time(settings_, exchange.frame.size());
+  const auto bytes = exchange.frame.bytes();
+  wire_.push_back({.begin = now, .request = {bytes.begin(), bytes.end()}, .status = ExchangeStatus::timeout});
+  timer_ = world_->clock().call_at(result_.request_end, [this] { request_sent(); });
+}
+
+void VirtualLine::request_sent() {
+  const auto& exchange = *under_way_;
+  const auto latest = result_.request_end + exchange.reply_timeout;
+  network_.advance(world_->now());
+  const auto reply = network_.on_request(exchange.frame.bytes(), result_.request_end);
+  if (!reply || reply->end > latest) {
+    timer_ = world_->clock().call_at(latest, [this, late = reply ? reply->end : TimePoint{}] {
+      end(ExchangeStatus::timeout);
+      quiet_since_ = std::max(quiet_since_, late);
+    });
+    return;
+  }
+  reply_bytes_ = reply->bytes;
+  reply_coming_ = true;
+  result_.reply_begin = reply->begin;
+  timer_ = world_->clock().call_at(reply->end, [this] {
+    // The reply proper comes last; an echo or a foreign frame may stand before it.
+    const std::span<const std::uint8_t> all = reply_bytes_;
+    Reply best;
+    for (std::size_t skip = 0;
+         skip < all.size() && best.kind != ReplyKind::match && best.kind != ReplyKind::exception; ++skip)
+      if (auto decoded = decode(under_way_->request, all.subspan(skip)); decoded.kind != ReplyKind::corrupt)
+        best = std::move(decoded);
+    result_.reply = std::move(best);
+    const auto kind = result_.reply.kind;
+    end(kind == ReplyKind::match || kind == ReplyKind::exception ? ExchangeStatus::replied
+        : kind == ReplyKind::foreign                             ? ExchangeStatus::timeout
+                                                                 : ExchangeStatus::corrupt);
+  });
+}
+
+void VirtualLine::cut_wait() {
+  if (under_way_ == nullptr || reply_coming_ || world_->now() < result_.request_end) return;
+  const auto when = std::max(world_->now(), result_.request_end + under_way_->turnaround_max);
+  cut_timer_ = world_->clock().call_at(when, [this] {
+    if (under_way_ != nullptr && !reply_coming_) end(ExchangeStatus::cut);
+  });
+}
+
+void VirtualLine::end(ExchangeStatus status, Verdict verdict) {
+  timer_.reset();
+  cut_timer_.reset();
+  result_.status = status;
+  result_.verdict = verdict;
+  result_.reply_end = world_->now();
+  if (status == ExchangeStatus::io_error) result_.native_error = EIO;
+  if (under_way_ != nullptr) {
+    wire_.back().status = status;
+    quiet_since_ = world_->now();
+  }
+  under_way_ = nullptr;
+  reply_coming_ = false;
+  post(world_->executor(), [this, result = result_] { on_result_(result); });
+}
+
+}  // namespace axisd::test
