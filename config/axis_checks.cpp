@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,6 +58,7 @@ class AxisChecks {
   [[nodiscard]] bool given(std::string_view key) const { return places_.given(path_ + std::string(key)); }
   [[nodiscard]] bool usable(std::string_view key) const { return places_.usable(path_ + std::string(key)); }
   void add(std::string_view key, std::string message, std::string suggestion) {
+    if (!reported_.emplace(key).second) return;  // the first finding of a key mostly causes the others
     diagnostics_.add(places_.mark(path_ + std::string(key)), std::move(message), std::move(suggestion));
   }
   [[nodiscard]] std::string velocity_text(double value) const {
@@ -89,6 +91,7 @@ class AxisChecks {
   const Places& places_;
   const DriveDescriptor* model_;  ///< nullptr if it is not known
   std::optional<Scale> scale_;    ///< once it is known to be right
+  std::set<std::string, std::less<>> reported_;
 };
 
 void AxisChecks::check_node() {
@@ -278,7 +281,7 @@ void AxisChecks::check_speeds() {
     add("limits.start_speed", fmt::format("'start_speed' {} r/min is out of range", start),
         fmt::format("model {} takes {} to {} r/min", axis_.model, capabilities.minimum_start_rpm,
                     capabilities.maximum_start_rpm));
-  } else if (usable("limits.velocity")) {
+  } else if (usable("limits.velocity") && !reported_.contains("limits.velocity")) {
     const double highest = std::abs(scale_->velocity_to_rpm(axis_.limits.velocity));
     if (start > highest * (1 + slack)) {
       add("limits.start_speed",

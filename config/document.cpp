@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "config/text.hpp"
@@ -119,6 +120,20 @@ std::expected<NodePtr, SyntaxError> failed(Mark mark, std::string message, std::
   return std::unexpected(SyntaxError{mark, std::move(message), std::move(suggestion)});
 }
 
+/// yaml-cpp has several messages for it, none of which says so. `line` is 0-based.
+std::optional<Mark> tab_in_indentation(std::string_view text, int line) {
+  std::size_t start = 0;
+  for (int i = 0; i < line; ++i) {
+    const auto end = text.find('\n', start);
+    if (end == std::string_view::npos) return std::nullopt;
+    start = end + 1;
+  }
+  const auto indentation = text.substr(start, text.find_first_not_of(" \t", start) - start);
+  const auto tab = indentation.find('\t');
+  if (tab == std::string_view::npos) return std::nullopt;
+  return Mark{line + 1, static_cast<int>(tab) + 1};
+}
+
 }  // namespace
 
 const Node* Node::find(std::string_view key) const {
@@ -152,10 +167,11 @@ std::expected<NodePtr, SyntaxError> parse_document(std::string_view text) try {
 } catch (const SyntaxError& error) {
   return std::unexpected(error);
 } catch (const YAML::Exception& error) {
-  const bool tab = error.msg.find("tab") != std::string::npos;
-  return failed(
-      to_mark(error.mark), fmt::format("not valid YAML: {}", printable(error.msg)),
-      tab ? "indent with spaces" : "check indentation, brackets and quotes here and in the line above");
+  if (const auto tab = tab_in_indentation(text, error.mark.line)) {
+    return failed(*tab, "not valid YAML: a tab in the indentation", "indent with spaces");
+  }
+  return failed(to_mark(error.mark), fmt::format("not valid YAML: {}", printable(error.msg)),
+                "check indentation, brackets and quotes here and in the line above");
 } catch (const std::exception& error) {
   return failed({}, fmt::format("not valid YAML: {}", printable(error.what())));
 }

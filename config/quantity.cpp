@@ -62,7 +62,7 @@ std::unexpected<QuantityError> not_a_number(std::string_view text) {
 }
 
 std::unexpected<QuantityError> too_long(std::string_view text) {
-  return wrong(fmt::format("{} has too many digits", quoted(text)), "use at most 18 digits");
+  return wrong(fmt::format("{} does not fit into 18 digits", quoted(text)), "round it");
 }
 
 Decimal reduced(std::int64_t numerator, std::int64_t denominator, double value) {

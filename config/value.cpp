@@ -19,8 +19,8 @@ using Parsed = std::expected<Value, ValueError>;
 std::unexpected<ValueError> wrong(const Node& node, std::string message, std::string suggestion = {}) {
   return std::unexpected(ValueError{node.mark, std::move(message), std::move(suggestion)});
 }
-std::unexpected<ValueError> wrong(const Node& node, QuantityError error) {
-  return wrong(node, std::move(error.message), std::move(error.suggestion));
+std::unexpected<ValueError> wrong(const KeySpec& spec, const Node& node, QuantityError error) {
+  return wrong(node, fmt::format("'{}': {}", spec.key, error.message), std::move(error.suggestion));
 }
 
 /// "between 1 and 127", "above 0": as far as the key has bounds.
@@ -76,7 +76,7 @@ Parsed parse_integer(const KeySpec& spec, const Node& node) {
                  fmt::format("write it in decimal and without quotes, such as {}", spec.example));
   }
   const auto number = parse_decimal(node.text);
-  if (!number) return wrong(node, number.error());
+  if (!number) return wrong(spec, node, number.error());
   if (auto ok = check_bounds(spec, node, number->value, ""); !ok) return std::unexpected(ok.error());
   return Value{.integer = number->numerator};
 }
@@ -90,7 +90,7 @@ Parsed parse_boolean(const KeySpec& spec, const Node& node) {
 
 Parsed parse_duration_value(const KeySpec& spec, const Node& node) {
   const auto duration = parse_duration(node.text);
-  if (!duration) return wrong(node, duration.error());
+  if (!duration) return wrong(spec, node, duration.error());
   const double ms = std::chrono::duration<double, std::milli>(*duration).count();
   if (auto ok = check_bounds(spec, node, ms, "ms"); !ok) return std::unexpected(ok.error());
   return Value{.duration = *duration};
@@ -99,7 +99,7 @@ Parsed parse_duration_value(const KeySpec& spec, const Node& node) {
 /// "5 r/min", "10000 pulses/rev": whole numbers above 0.
 Parsed parse_whole(const KeySpec& spec, const Node& node, std::string_view unit) {
   const auto number = parse_in_unit(node.text, unit);
-  if (!number) return wrong(node, number.error());
+  if (!number) return wrong(spec, node, number.error());
   if (number->denominator != 1 || number->numerator <= 0 || number->numerator > 1'000'000'000) {
     return wrong(node,
                  fmt::format("'{}' must be a whole number above 0, not {}", spec.key, quoted(node.text)),
@@ -108,15 +108,15 @@ Parsed parse_whole(const KeySpec& spec, const Node& node, std::string_view unit)
   return Value{.integer = number->numerator};
 }
 
-Parsed parse_fraction(const Node& node, const QuantityResult<Decimal>& fraction) {
-  if (!fraction) return wrong(node, fraction.error());
+Parsed parse_fraction(const KeySpec& spec, const Node& node, const QuantityResult<Decimal>& fraction) {
+  if (!fraction) return wrong(spec, node, fraction.error());
   return Value{.numerator = fraction->numerator, .denominator = fraction->denominator};
 }
 
-Parsed parse_travel(const Node& node, std::string_view unit) {
+Parsed parse_travel(const KeySpec& spec, const Node& node, std::string_view unit) {
   if (unit.empty())
     return Value{.numerator = 1, .denominator = 1};  // not to be judged; the unit was reported
-  return parse_fraction(node, parse_ratio_in_unit(node.text, fmt::format("{}/rev", unit)));
+  return parse_fraction(spec, node, parse_ratio_in_unit(node.text, fmt::format("{}/rev", unit)));
 }
 
 /// With whatever unit: the axis's own is not known.
@@ -132,7 +132,7 @@ Parsed parse_in_axis_unit(const KeySpec& spec, const Node& node, std::string_vie
   const auto number =
       unit.empty() ? parse_number_of_quantity(node.text)
                    : parse_in_unit(node.text, wanted, velocity ? UnitRule::required : UnitRule::optional);
-  if (!number) return wrong(node, number.error());
+  if (!number) return wrong(spec, node, number.error());
   if (velocity && number->value <= 0) {
     return wrong(node, fmt::format("'{}' must be above 0, not {}", spec.key, quoted(node.text)));
   }
@@ -215,9 +215,9 @@ std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& no
     case Kind::microstep:
       return parse_whole(spec, node, "pulses/rev");
     case Kind::ratio:
-      return parse_fraction(node, parse_ratio(node.text));
+      return parse_fraction(spec, node, parse_ratio(node.text));
     case Kind::travel:
-      return parse_travel(node, unit);
+      return parse_travel(spec, node, unit);
     case Kind::position:
     case Kind::velocity:
       return parse_in_axis_unit(spec, node, unit);

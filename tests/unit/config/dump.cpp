@@ -1,0 +1,133 @@
+#include "tests/unit/config/dump.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <string_view>
+#include <type_traits>
+#include <variant>
+
+namespace axisd::config {
+
+namespace {
+
+class Dump {
+ public:
+  template <class T>
+  void field(std::string_view name, const T& value) {
+    text_ += fmt::format("{}{} = {}\n", prefix_, name, to_text(value));
+  }
+  void enter(std::string_view name) { prefix_ = fmt::format("{}.", name); }
+  [[nodiscard]] std::string text() const { return text_; }
+
+ private:
+  template <class T>
+  static std::string to_text(const T& value) {
+    if constexpr (std::is_enum_v<T>) {
+      return std::to_string(static_cast<int>(value));
+    } else if constexpr (std::is_same_v<T, Duration>) {
+      return fmt::format("{} ns", value.count());
+    } else {
+      return fmt::format("{}", value);
+    }
+  }
+  template <class T>
+  static std::string to_text(const std::optional<T>& value) {
+    return value ? to_text(*value) : "none";
+  }
+  static std::string to_text(const SettingValue& value) {
+    return fmt::format("{}:{}", value.index(),
+                       std::visit([](const auto& v) { return fmt::format("{}", v); }, value));
+  }
+
+  std::string prefix_, text_;
+};
+
+void dump_terminals(Dump& dump, std::string_view section, const std::vector<TerminalSettings>& terminals) {
+  for (const auto& t : terminals) {
+    dump.field(fmt::format("{}.{}", section, t.terminal), fmt::format("{} low={}", t.function, t.active_low));
+  }
+}
+
+void dump_homing(Dump& dump, const HomingSettings& homing) {
+  dump.field("homing.method", homing.method);
+  dump.field("homing.velocity", homing.velocity);
+  dump.field("homing.search_velocity", homing.search_velocity);
+  dump.field("homing.acceleration_time", homing.acceleration_time);
+  dump.field("homing.position", homing.position);
+  dump.field("homing.offset", homing.offset);
+  dump.field("homing.backoff", homing.backoff);
+  dump.field("homing.max_travel", homing.max_travel);
+  dump.field("homing.timeout", homing.timeout);
+}
+
+void dump_scale_and_limits(Dump& dump, const AxisSettings& axis) {
+  dump.field("pulses_per_revolution", axis.scale.pulses_per_revolution);
+  dump.field("gear_motor", axis.scale.gear_motor);
+  dump.field("gear_output", axis.scale.gear_output);
+  dump.field("travel_numerator", axis.scale.travel_numerator);
+  dump.field("travel_denominator", axis.scale.travel_denominator);
+  dump.field("invert", axis.scale.invert);
+  dump.field("modulo", axis.scale.modulo);
+  dump.field("unit", axis.scale.unit);
+  dump.field("position_minimum", axis.limits.position_minimum);
+  dump.field("position_maximum", axis.limits.position_maximum);
+  dump.field("velocity", axis.limits.velocity);
+  dump.field("acceleration_time", axis.limits.acceleration_time);
+  dump.field("deceleration_time", axis.limits.deceleration_time);
+  dump.field("start_speed_rpm", axis.limits.start_speed_rpm);
+}
+
+void dump_axis(Dump& dump, const AxisSettings& axis) {
+  dump.enter(fmt::format("axes.{}", axis.name));
+  dump.field("bus", axis.bus);
+  dump.field("node", axis.node);
+  dump.field("model", axis.model);
+  dump_scale_and_limits(dump, axis);
+  if (axis.homing) dump_homing(dump, *axis.homing);
+  dump_terminals(dump, "inputs", axis.inputs);
+  dump_terminals(dump, "outputs", axis.outputs);
+  dump.field("on_lease_loss", axis.on_lease_loss);
+  dump.field("vertical", axis.vertical);
+  dump.field("stop_escalation_release", axis.stop_escalation_release);
+  dump.field("require_trust", axis.require_trust);
+  dump.field("jog_travel", axis.jog_travel);
+  dump.field("position_tolerance", axis.position_tolerance);
+  dump.field("poll_moving", axis.poll_moving);
+  dump.field("poll_idle", axis.poll_idle);
+  dump.field("reboot_guard", axis.reboot_guard);
+  dump.field("stop_margin", axis.stop_margin);
+  dump.field("persist", axis.persist);
+  for (const auto& [key, value] : axis.model_settings) dump.field("drive." + key, value);
+}
+
+}  // namespace
+
+std::string dump(const Configuration& configuration) {
+  Dump dump;
+  dump.field("machine", configuration.machine);
+  dump.field("state_directory", configuration.state_directory);
+  dump.field("listen", configuration.server.listen);
+  if (const auto& tls = configuration.server.tls) {
+    dump.field("tls", fmt::format("{} {} {}", tls->certificate, tls->key, tls->client_ca));
+  }
+  for (const auto& bus : configuration.buses) {
+    dump.enter(fmt::format("buses.{}", bus.name));
+    dump.field("port", bus.port);
+    dump.field("baud", bus.baud);
+    dump.field("parity", bus.format.parity);
+    dump.field("stop_bits", bus.format.stop_bits);
+    dump.field("turnaround_max", bus.turnaround_max);
+  }
+  for (const auto& [axis, simulation] : configuration.axes) {
+    dump_axis(dump, axis);
+    dump.field("home_switch", simulation.home_switch);
+    dump.field("home_width", simulation.home_width);
+    dump.field("positive_limit", simulation.positive_limit);
+    dump.field("negative_limit", simulation.negative_limit);
+    dump.field("start_position", simulation.start_position);
+  }
+  return dump.text();
+}
+
+}  // namespace axisd::config

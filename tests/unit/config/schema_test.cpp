@@ -1,0 +1,239 @@
+// Walks the schema: every key is documented, has an effect, and its default is the one that the structs have.
+#include "config/schema.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "config/document.hpp"
+#include "config/reader.hpp"
+#include "config/value.hpp"
+#include "devices/descriptor.hpp"
+#include "tests/unit/config/dump.hpp"
+#include "tests/unit/config/support.hpp"
+
+namespace axisd::config {
+namespace {
+
+/// A document as text again, with some values replaced and some keys left out, by path.
+class Emitter {
+ public:
+  Emitter& replace(const std::string& path, std::string_view text) {
+    replaced_[path] = text;
+    return *this;
+  }
+  Emitter& erase(const std::string& path) {
+    erased_.insert(path);
+    return *this;
+  }
+  [[nodiscard]] std::string text(const Node& node, const std::string& path = "") const {
+    if (const auto found = replaced_.find(path); found != replaced_.end()) return found->second;
+    switch (node.kind) {
+      case Node::Kind::null:
+        return "~";
+      case Node::Kind::scalar:
+        return node.plain ? node.text : fmt::format("'{}'", node.text);
+      case Node::Kind::list:
+        return list(node, path);
+      case Node::Kind::section:
+        return section(node, path);
+    }
+    return "";
+  }
+
+ private:
+  [[nodiscard]] std::string list(const Node& node, const std::string& path) const {
+    std::string result;
+    for (const auto& item : node.items) result += (result.empty() ? "" : ", ") + text(*item, path + "[]");
+    return "[" + result + "]";
+  }
+  [[nodiscard]] std::string section(const Node& node, const std::string& path) const {
+    std::string result;
+    for (const auto& [key, value] : node.entries) {
+      const auto here = path.empty() ? key->text : path + "." + key->text;
+      if (erased_.contains(here)) continue;
+      result += fmt::format("{}{}: {}", result.empty() ? "" : ",\n", key->text, text(*value, here));
+    }
+    return "{ " + result + " }";
+  }
+  std::map<std::string, std::string> replaced_;
+  std::set<std::string> erased_;
+};
+
+struct Leaf {
+  std::string path;  ///< with * for names
+  const KeySpec* spec;
+};
+
+void collect(std::span<const KeySpec> keys, const std::string& path, std::vector<Leaf>& leaves) {
+  for (const auto& spec : keys) {
+    const auto here = path.empty() ? std::string(spec.key) : fmt::format("{}.{}", path, spec.key);
+    if (spec.kind == Kind::section) collect(spec.children, here, leaves);
+    if (spec.kind == Kind::named_sections) collect(spec.children, here + ".*", leaves);
+    if (spec.children.empty()) leaves.push_back({here, &spec});
+  }
+}
+
+std::vector<Leaf> leaves() {
+  std::vector<Leaf> result;
+  collect(schema(), "", result);
+  return result;
+}
+
+const Node* find(const Node& root, std::string_view path) {
+  const Node* node = &root;
+  while (node != nullptr && !path.empty()) {
+    const auto dot = std::min(path.find('.'), path.size());
+    node = node->find(path.substr(0, dot));
+    path.remove_prefix(std::min(dot + 1, path.size()));
+  }
+  return node;
+}
+
+class Schema : public ::testing::Test {
+ protected:
+  Schema() : root_(*parse_document(read_text(source_path("config/examples/reference.yaml")))) {}
+
+  /// The first path in the reference that the pattern stands for; empty if it lacks the key.
+  [[nodiscard]] std::string in_reference(const std::string& pattern) const {
+    const auto star = pattern.find('*');
+    if (star == std::string::npos) return find(*root_, pattern) == nullptr ? "" : pattern;
+    for (const auto& [name, section] : find(*root_, pattern.substr(0, star - 1))->entries) {
+      const auto path = pattern.substr(0, star) + name->text + pattern.substr(star + 1);
+      if (find(*root_, path) != nullptr) return path;
+    }
+    return "";
+  }
+  [[nodiscard]] std::string loaded(const Emitter& emitter) const {
+    const auto result = load_text(emitter.text(*root_), "changed.yaml");
+    EXPECT_TRUE(result.configuration) << findings(result) << emitter.text(*root_);
+    return result.configuration ? dump(*result.configuration) : "";
+  }
+
+  NodePtr root_;
+};
+
+TEST_F(Schema, IsDocumented) {
+  for (const auto& [path, spec] : leaves()) {
+    EXPECT_FALSE(spec->description.empty()) << path;
+    const bool of_model = spec->kind == Kind::terminals || spec->kind == Kind::model_settings;
+    EXPECT_EQ(spec->example.empty(), of_model) << path;
+    EXPECT_EQ(spec->apply == nullptr, of_model) << path;
+    if (spec->kind == Kind::text) EXPECT_FALSE(spec->pattern.empty() || spec->pattern_hint.empty()) << path;
+    if (spec->required) EXPECT_TRUE(spec->default_value.empty()) << path;
+  }
+}
+
+TEST_F(Schema, ReferenceShowsEveryKey) {
+  for (const auto& [path, spec] : leaves()) EXPECT_NE(in_reference(path), "") << path;
+}
+
+TEST_F(Schema, EveryKeyHasAnEffect) {
+  const auto before = loaded(Emitter());
+  for (const auto& [pattern, spec] : leaves()) {
+    if (spec->example.empty()) continue;  // of the model: below
+    const auto path = in_reference(pattern);
+    if (spec->kind == Kind::model) {
+      const auto refused = load_text(Emitter().replace(path, "none").text(*root_), "changed.yaml");
+      EXPECT_FALSE(refused.configuration) << path;
+    } else if (spec->key == "unit") {
+      auto text = Emitter().text(*root_);
+      for (auto at = text.find("mm"); at != std::string::npos; at = text.find("mm", at))
+        text.replace(at, 2, "cm");
+      const auto result = load_text(text, "changed.yaml");
+      ASSERT_TRUE(result.configuration) << findings(result);
+      EXPECT_TRUE(dump(*result.configuration) != before) << path;
+    } else {
+      EXPECT_TRUE(loaded(Emitter().replace(path, spec->example)) != before) << path << ": " << spec->example;
+    }
+  }
+}
+
+TEST_F(Schema, DefaultsAreThoseOfTheStructs) {
+  int checked = 0;
+  for (const auto& [pattern, spec] : leaves()) {
+    if (spec->default_value.empty()) continue;
+    const auto path = in_reference(pattern);
+    auto written = Emitter().replace(path, spec->default_value), left_out = Emitter().erase(path);
+    if (spec->key == "listen") {  // the default is for loopback, the reference is not: both are fine with tls
+      written.erase("server.tls");
+      left_out.erase("server.tls");
+    }
+    EXPECT_EQ(loaded(written), loaded(left_out)) << path << ": " << spec->default_value;
+    ++checked;
+  }
+  EXPECT_GT(checked, 20);
+}
+
+TEST_F(Schema, MisspeltKeysAreSuggested) {
+  for (const auto& [pattern, spec] : leaves()) {
+    const auto path = in_reference(pattern);
+    const std::string key(spec->key);
+    auto text = Emitter().replace(path, "@@").text(*root_);
+    const auto at = text.find(key + ": @@");
+    ASSERT_NE(at, std::string::npos) << path;
+    text.replace(at, key.size() + 4, key + "x: 1");
+    const auto result = load_text(text, "changed.yaml");
+    EXPECT_NE(findings(result).find(fmt::format("unknown key '{0}x'", key)), std::string::npos)
+        << findings(result);
+    EXPECT_NE(findings(result).find(fmt::format("did you mean '{}'?", key)), std::string::npos)
+        << findings(result);
+  }
+}
+
+TEST_F(Schema, EverySettingOfEveryModelHasAnEffect) {
+  for (const auto* model : drive_models()) {
+    for (const auto& setting : model->settings) {
+      std::vector<std::string> values(setting.choices.begin(), setting.choices.end());
+      if (setting.kind == "boolean") values = {"true", "false"};
+      if (setting.kind == "integer")
+        values = {std::to_string(setting.minimum), std::to_string(setting.maximum)};
+      std::set<std::string> dumps;
+      for (const auto& value : values) {
+        const auto drive = fmt::format("{{ {}: {} }}", setting.key, value);
+        dumps.insert(
+            loaded(Emitter().replace("axes.feeder.model", model->model).replace("axes.feeder.drive", drive)));
+      }
+      EXPECT_EQ(dumps.size(), values.size()) << setting.key;
+      EXPECT_GE(values.size(), 2U) << setting.key;
+      if (!setting.default_value.empty()) {
+        const auto drive = fmt::format("{{ {}: {} }}", setting.key, setting.default_value);
+        EXPECT_EQ(loaded(Emitter().replace("axes.feeder.drive", drive)),
+                  loaded(Emitter().erase("axes.feeder.drive")))
+            << setting.key;
+      }
+    }
+  }
+}
+
+TEST_F(Schema, EveryTerminalTakesEveryFunction) {
+  for (const auto* model : drive_models()) {
+    std::set<std::string> dumps;
+    std::size_t expected = 0;
+    const auto try_all = [&](std::string_view section, const auto& terminals, const auto& functions) {
+      for (const auto& terminal : terminals) {
+        for (const auto& function : functions) {
+          for (const auto level : {"low", "high"}) {
+            const auto text =
+                fmt::format("{{ {}: {{ function: {}, active: {} }} }}", terminal.name, function.name, level);
+            dumps.insert(loaded(Emitter()
+                                    .erase("axes.feeder.homing")
+                                    .replace("axes.feeder.model", model->model)
+                                    .replace(fmt::format("axes.feeder.{}", section), text)));
+            ++expected;
+          }
+        }
+      }
+    };
+    try_all("inputs", model->inputs, model->input_functions);
+    try_all("outputs", model->outputs, model->output_functions);
+    EXPECT_EQ(dumps.size(), expected) << model->model;
+  }
+}
+
+}  // namespace
+}  // namespace axisd::config
