@@ -78,10 +78,7 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   FileDescriptor connection(accept4(entry.socket.fd.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   if (connection.get() < 0) {
     const auto code = errno;
-    if (code == EMFILE || code == ENFILE) {
-      turn_away(entry);
-      return true;
-    }
+    if (code == EMFILE || code == ENFILE) return turn_away(entry);
     return code != ENOBUFS && code != ENOMEM;  // the rest concerns one connection that is gone already
   }
   if (connection.get() >= first_refused_descriptor_) {
@@ -101,14 +98,18 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   return true;
 }
 
-void AcceptLoop::turn_away(const Entry& entry) {
+bool AcceptLoop::turn_away(const Entry& entry) {
   reserve_.reset();
-  FileDescriptor(accept4(entry.socket.fd.get(), nullptr, nullptr, SOCK_CLOEXEC)).reset();
+  FileDescriptor surplus(accept4(entry.socket.fd.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  const bool closed = surplus.get() >= 0;
+  surplus.reset();
   reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  if (!closed) return false;  // somebody else took the reserve meanwhile
   const auto count = ++refused_;
   if (std::has_single_bit(count))
     spdlog::error("out of file descriptors: {} connections turned away since start; raise LimitNOFILE",
                   count);
+  return true;
 }
 
 }  // namespace axisd::server

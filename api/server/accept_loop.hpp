@@ -39,7 +39,7 @@ class AcceptLoop {
   void run();
   /// False: nothing could be accepted, and trying again at once would spin.
   bool accept_one(const Entry& entry);
-  void turn_away(const Entry& entry);
+  bool turn_away(const Entry& entry);
 
   std::vector<Entry> entries_;
   int first_refused_descriptor_ = 0;

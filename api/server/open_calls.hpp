@@ -3,9 +3,14 @@
 
 #include <grpcpp/support/status.h>
 
+#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "buses/clock.hpp"
 
 namespace axisd::server {
 
@@ -29,21 +34,25 @@ class OpenCalls {
   void remove(const OpenCall* call) {
     const std::lock_guard lock(mutex_);
     calls_.erase(call);
+    if (closed_ && calls_.empty()) empty_.notify_all();
   }
-  /// Closes all calls and refuses further ones.
-  void close_all(const grpc::Status& status) {
-    std::unordered_map<const OpenCall*, std::weak_ptr<OpenCall>> calls;
-    {
-      const std::lock_guard lock(mutex_);
-      closed_ = true;
-      calls.swap(calls_);
-    }
-    for (const auto& [key, weak] : calls)
-      if (const auto call = weak.lock()) call->close(status);
+  /// Closes all calls, refuses further ones, and waits until all have ended or `until` has come.
+  void close_all(const grpc::Status& status, TimePoint until) {
+    std::vector<std::shared_ptr<OpenCall>> calls;
+    std::unique_lock lock(mutex_);
+    closed_ = true;
+    for (const auto& [key, weak] : calls_)
+      if (auto call = weak.lock()) calls.push_back(std::move(call));
+    lock.unlock();
+    for (const auto& call : calls) call->close(status);
+    calls.clear();
+    lock.lock();
+    empty_.wait_until(lock, until, [this] { return calls_.empty(); });
   }
 
  private:
   std::mutex mutex_;
+  std::condition_variable empty_;
   bool closed_ = false;
   std::unordered_map<const OpenCall*, std::weak_ptr<OpenCall>> calls_;
 };

@@ -135,13 +135,12 @@ Result<int> Server::start() {
 
 void Server::shutdown(Duration deadline) {
   if (!std::exchange(parts_->serving, false)) return;
-  const auto until =
-      std::chrono::system_clock::now() + std::chrono::duration_cast<std::chrono::microseconds>(deadline);
   if (auto* health = parts_->server->GetHealthCheckService()) health->Shutdown();
   parts_->accept.stop();
-  // Open streams would make Shutdown() wait for its whole deadline.
-  parts_->calls->close_all(shutting_down());
-  parts_->server->Shutdown(until);
+  parts_->calls->close_all(shutting_down(), monotonic_now() + deadline);
+  // What is left are watchers of gRPC's own health and reflection services, which never end by themselves:
+  // with the whole deadline, Shutdown() would wait for all of it.
+  parts_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(50));
   parts_->reply->stop();
 }
 

@@ -1,0 +1,293 @@
+// Unary calls through a real connection.
+#include <gmock/gmock.h>
+#include <grpcpp/generic/generic_stub.h>
+
+#include <thread>
+
+#include "axisd/v1/bus_service.grpc.pb.h"
+#include "axisd/v1/command_service.grpc.pb.h"
+#include "axisd/v1/system_service.grpc.pb.h"
+#include "tests/unit/api/serving.hpp"
+
+namespace axisd::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using Stub = v1::AxisService::Stub;
+
+class Calls : public Serving {
+ protected:
+  /// Calls one motion RPC; returns the status and keeps the command.
+  template <class Request, class Response>
+  grpc::Status call(
+      grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+      const std::function<void(Request&)>& fill = [](Request&) {},
+      std::chrono::milliseconds timeout = patience) {
+    Request request;
+    request.set_axis("feeder");
+    request.mutable_options()->set_request_id("r-1");
+    fill(request);
+    Response response;
+    Call context(timeout);
+    const auto status = (axes_.get()->*method)(&context, request, &response);
+    command_ = response.command();
+    return status;
+  }
+  v1::Command command_;
+};
+
+TEST_F(Calls, EveryMotionReachesTheMachineAndReturnsItsCommand) {
+  serve();
+  EXPECT_TRUE(call(&Stub::Enable).ok());
+  EXPECT_EQ(command_.kind(), v1::COMMAND_KIND_ENABLE);
+  EXPECT_EQ(command_.id(), "c-1");
+  EXPECT_EQ(command_.client(), "local:unix");
+  EXPECT_TRUE(call(&Stub::Disable).ok());
+  EXPECT_EQ(command_.kind(), v1::COMMAND_KIND_DISABLE);
+  EXPECT_TRUE(call(&Stub::Home).ok());
+  EXPECT_TRUE(call<v1::MoveAbsoluteRequest>(&Stub::MoveAbsolute, [](auto& r) { r.set_position(1); }).ok());
+  EXPECT_TRUE(call<v1::MoveRelativeRequest>(&Stub::MoveRelative, [](auto& r) { r.set_distance(-2); }).ok());
+  EXPECT_TRUE(call<v1::MoveVelocityRequest>(&Stub::MoveVelocity, [](auto& r) { r.set_velocity(3); }).ok());
+  EXPECT_TRUE(call<v1::JogRequest>(&Stub::Jog, [](auto& r) { r.set_velocity(4); }).ok());
+  EXPECT_TRUE(call(&Stub::Halt).ok());
+  EXPECT_TRUE(call<v1::StopRequest>(&Stub::Stop, [](auto& r) { r.set_hold(true); }).ok());
+  EXPECT_TRUE(call(&Stub::QuickStop).ok());
+  EXPECT_TRUE(call(&Stub::Reset).ok());
+  EXPECT_TRUE(call<v1::SetPositionRequest>(&Stub::SetPosition, [](auto& r) { r.set_position(5); }).ok());
+  EXPECT_EQ(command_.kind(), v1::COMMAND_KIND_SET_POSITION);
+
+  const auto seen = machine_.submitted();
+  ASSERT_EQ(seen.size(), 12U);
+  EXPECT_EQ(std::get<MoveAbsoluteRequest>(seen[3].action).position, 1);
+  EXPECT_EQ(std::get<MoveRelativeRequest>(seen[4].action).distance, -2);
+  EXPECT_EQ(std::get<MoveVelocityRequest>(seen[5].action).velocity, 3);
+  EXPECT_EQ(std::get<JogRequest>(seen[6].action).velocity, 4);
+  EXPECT_EQ(std::get<StopRequest>(seen[7].action).kind, StopKind::halt);
+  EXPECT_EQ(std::get<StopRequest>(seen[8].action).kind, StopKind::stop);
+  EXPECT_TRUE(std::get<StopRequest>(seen[8].action).hold);
+  EXPECT_EQ(std::get<StopRequest>(seen[9].action).kind, StopKind::quick_stop);
+  EXPECT_EQ(std::get<SetPositionRequest>(seen[11].action).position, 5);
+
+  Call context;
+  v1::ReleaseStopRequest release;
+  release.set_axis("feeder");
+  v1::ReleaseStopResponse released;
+  EXPECT_TRUE(axes_->ReleaseStop(&context, release, &released).ok());
+  EXPECT_THAT(machine_.log(), ElementsAre("release_stop feeder"));
+}
+
+TEST_F(Calls, WaitUntilIsPassedOn) {
+  serve();
+  EXPECT_TRUE(call<v1::HomeRequest>(&Stub::Home, [](auto& r) {
+                r.mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE);
+              }).ok());
+  EXPECT_TRUE(call<v1::HomeRequest>(&Stub::Home, [](auto& r) {
+                r.mutable_options()->set_wait_until(v1::WAIT_UNTIL_STARTED);
+              }).ok());
+  EXPECT_EQ(machine_.submitted()[0].until, WaitUntil::done);
+  EXPECT_EQ(machine_.submitted()[1].until, WaitUntil::started);
+}
+
+TEST_F(Calls, RefusalsCarryTypedDetails) {
+  serve();
+  machine_.refuse_with(Error{.reason = Reason::soft_limit,
+                             .message = "target 500 is beyond the limit",
+                             .remedy = "stay inside",
+                             .permitted = Range{0, 400, "mm"}});
+  auto status = call<v1::MoveAbsoluteRequest>(&Stub::MoveAbsolute, [](auto& r) { r.set_position(500); });
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::OUT_OF_RANGE);
+  EXPECT_EQ(detail_of(status).reason(), v1::REASON_SOFT_LIMIT);
+  EXPECT_EQ(detail_of(status).permitted().maximum(), 400);
+  EXPECT_THAT(status.error_message(), HasSubstr("stay inside"));
+
+  status = call(&Stub::MoveAbsolute);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(detail_of(status).message(), HasSubstr("position"));
+  status = call<v1::HomeRequest>(&Stub::Home, [](auto& r) { r.mutable_options()->clear_request_id(); });
+  EXPECT_EQ(detail_of(status).reason(), v1::REASON_INVALID_ARGUMENT);
+  status = call<v1::StopRequest>(&Stub::Stop, [](auto& r) { r.set_axis("nobody"); });
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(detail_of(status).reason(), v1::REASON_UNKNOWN_AXIS);
+  EXPECT_EQ(machine_.submitted().size(), 1U);
+}
+
+TEST_F(Calls, StopsNeedNoRequestId) {
+  serve();
+  for (const auto method : {&Stub::Stop})
+    EXPECT_TRUE(call<v1::StopRequest>(method, [](auto& r) { r.clear_options(); }).ok());
+  EXPECT_TRUE(call<v1::HaltRequest>(&Stub::Halt, [](auto& r) { r.clear_options(); }).ok());
+  EXPECT_TRUE(call<v1::QuickStopRequest>(&Stub::QuickStop, [](auto& r) { r.clear_options(); }).ok());
+  EXPECT_TRUE(call<v1::DisableRequest>(&Stub::Disable, [](auto& r) { r.clear_options(); }).ok());
+}
+
+TEST_F(Calls, ReadingNeverWaitsForTheCore) {
+  serve();
+  machine_.hold();
+  Call context, list;
+  v1::GetAxisRequest request;
+  request.set_axis("turntable");
+  v1::GetAxisResponse response;
+  EXPECT_TRUE(axes_->GetAxis(&context, request, &response).ok());
+  EXPECT_EQ(response.state().axis(), "turntable");
+  v1::ListAxesResponse axes;
+  EXPECT_TRUE(axes_->ListAxes(&list, {}, &axes).ok());
+  EXPECT_EQ(axes.axes_size(), 2);
+  Call unknown;
+  request.set_axis("nobody");
+  EXPECT_EQ(axes_->GetAxis(&unknown, request, &response).error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
+TEST_F(Calls, ExpiredCallLeavesItsCommandAloneAndItsLateCallbackIsHarmless) {
+  serve();
+  machine_.hold();
+  const auto status = call<v1::HomeRequest>(
+      &Stub::Home, [](auto& r) { r.mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE); }, 50ms);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  ASSERT_TRUE(eventually([this] { return machine_.held() == 1; }));
+  machine_.let_go();
+  EXPECT_TRUE(call(&Stub::Reset).ok());
+  EXPECT_THAT(machine_.log(), ElementsAre());  // nothing was cancelled
+}
+
+TEST_F(Calls, CallbackAfterTheServersEndIsHarmless) {
+  serve();
+  machine_.hold();
+  EXPECT_EQ(call<v1::HomeRequest>(
+                &Stub::Home, [](auto&) {}, 50ms)
+                .error_code(),
+            grpc::StatusCode::DEADLINE_EXCEEDED);
+  ASSERT_TRUE(eventually([this] { return machine_.held() == 1; }));
+  server_.reset();
+  machine_.let_go();
+  machine_.publish({.name = "feeder"});  // the notification outlives the server, too
+}
+
+TEST_F(Calls, CallsInProgressAreBoundedPerClientButStopsAreNot) {
+  serve({.limits = {.calls = 1, .streams = 64}});
+  machine_.hold();
+  std::thread first([this] {
+    Call context;
+    v1::HomeRequest request;
+    request.set_axis("feeder");
+    request.mutable_options()->set_request_id("r-1");
+    v1::HomeResponse response;
+    EXPECT_TRUE(axes_->Home(&context, request, &response).ok());
+  });
+  ASSERT_TRUE(eventually([this] { return machine_.held() == 1; }));
+  const auto status = call(&Stub::Reset);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(detail_of(status).reason(), v1::REASON_BUSY);
+  std::thread stop([this] {
+    Call context;
+    v1::StopRequest request;
+    request.set_axis("feeder");
+    v1::StopResponse response;
+    EXPECT_TRUE(axes_->Stop(&context, request, &response).ok());
+  });
+  EXPECT_TRUE(eventually([this] { return machine_.held() == 2; }));
+  machine_.let_go();
+  first.join();
+  stop.join();
+  EXPECT_TRUE(call(&Stub::Reset).ok());
+}
+
+TEST_F(Calls, SystemAndBuses) {
+  serve();
+  const auto system = v1::SystemService::NewStub(channel_);
+  Call c1, c2, c3, c4;
+  v1::GetInfoResponse info;
+  EXPECT_TRUE(system->GetInfo(&c1, {}, &info).ok());
+  EXPECT_EQ(info.machine() + info.version() + info.instance_id() + info.inhibited_by(), "press-10.1i-1hmi");
+  EXPECT_TRUE(info.inhibited());
+  v1::StopAllRequest all;
+  all.set_wait_until(v1::WAIT_UNTIL_DONE);
+  v1::StopAllResponse stopped;
+  EXPECT_TRUE(system->StopAll(&c2, all, &stopped).ok());
+  ASSERT_EQ(stopped.results_size(), 2);
+  EXPECT_EQ(stopped.results(0).command().kind(), v1::COMMAND_KIND_STOP);
+  EXPECT_EQ(stopped.results(1).axis(), "turntable");
+  EXPECT_EQ(stopped.results(1).error().reason(), v1::REASON_NOT_CONFIRMED);
+  v1::ReleaseStopAllResponse released;
+  EXPECT_TRUE(system->ReleaseStopAll(&c3, {}, &released).ok());
+  EXPECT_THAT(machine_.log(), ElementsAre("stop_all local:unix done", "release_inhibit local:unix"));
+  v1::ListBusesResponse buses;
+  EXPECT_TRUE(v1::BusService::NewStub(channel_)->ListBuses(&c4, {}, &buses).ok());
+  ASSERT_EQ(buses.buses_size(), 1);
+  EXPECT_EQ(buses.buses(0).timeouts(), 7U);
+}
+
+TEST_F(Calls, CommandsAsResources) {
+  serve();
+  const auto commands = v1::CommandService::NewStub(channel_);
+  Call c1, c2, c3, c4;
+  v1::GetCommandRequest get;
+  v1::GetCommandResponse got;
+  EXPECT_EQ(commands->GetCommand(&c1, get, &got).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  get.set_id("c-1");
+  EXPECT_TRUE(commands->GetCommand(&c2, get, &got).ok());
+  EXPECT_EQ(got.command().id(), "c-1");
+  v1::CancelCommandRequest cancel;
+  cancel.set_id("c-1");
+  v1::CancelCommandResponse cancelled;
+  EXPECT_TRUE(commands->CancelCommand(&c3, cancel, &cancelled).ok());
+  EXPECT_THAT(machine_.log(), ElementsAre("get_command c-1", "cancel_command c-1"));
+  machine_.refuse_with(Error{.reason = Reason::unknown_command});
+  const auto status = commands->GetCommand(&c4, get, &got);
+  EXPECT_EQ(detail_of(status).reason(), v1::REASON_UNKNOWN_COMMAND);
+}
+
+/// Calls by path, for services whose proto files are not part of the contract.
+std::string generic_call(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
+                         const std::string& request) {
+  grpc::GenericStub stub(channel);
+  grpc::CompletionQueue queue;
+  Call context;
+  const auto call = stub.PrepareCall(&context, path, &queue);
+  void* tag = nullptr;
+  bool ok = false;
+  const auto step = [&] { return queue.Next(&tag, &ok) && ok; };
+  const grpc::Slice slice(request);
+  grpc::ByteBuffer out(&slice, 1), in;
+  call->StartCall(nullptr);
+  EXPECT_TRUE(step());
+  call->Write(out, nullptr);
+  EXPECT_TRUE(step());
+  call->Read(&in, nullptr);
+  EXPECT_TRUE(step());
+  call->WritesDone(nullptr);
+  step();
+  grpc::Status status;
+  call->Finish(&status, nullptr);
+  step();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  std::vector<grpc::Slice> slices;
+  std::string text;
+  if (in.Dump(&slices).ok())
+    for (const auto& part : slices) text.append(reinterpret_cast<const char*>(part.begin()), part.size());
+  return text;
+}
+
+TEST_F(Calls, HealthAndReflectionAreServed) {
+  serve();
+  EXPECT_EQ(generic_call(channel_, "/grpc.health.v1.Health/Check", ""), "\x08\x01");  // SERVING
+  const auto services =
+      generic_call(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+                   std::string("\x3a\x00", 2));  // list_services: ""
+  for (const auto* name : {"AxisService", "CommandService", "SystemService", "BusService"})
+    EXPECT_THAT(services, HasSubstr(std::string("axisd.v1.") + name));
+}
+
+TEST_F(Calls, OversizedRequestsAreRefusedAndTheConnectionLives) {
+  serve();
+  Call context;
+  v1::GetAxisRequest request;
+  request.set_axis(std::string(300 * 1024, 'a'));
+  v1::GetAxisResponse response;
+  EXPECT_EQ(axes_->GetAxis(&context, request, &response).error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(call(&Stub::Stop).ok());
+}
+
+}  // namespace
+}  // namespace axisd::testing

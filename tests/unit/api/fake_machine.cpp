@@ -1,0 +1,209 @@
+#include "tests/unit/api/fake_machine.hpp"
+
+#include <algorithm>
+#include <boost/smart_ptr/make_shared.hpp>
+#include <utility>
+
+namespace axisd::testing {
+
+using namespace std::chrono_literals;
+
+FakeMachine::FakeMachine() {
+  for (const auto* name : {"feeder", "turntable"})
+    publish({.name = name, .bus = "line-a", .node = 1, .model = "ykd2405pr", .unit = "mm"});
+  core_ = std::thread([this] {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      wake_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
+      if (stopping_) return;
+      auto jobs = std::exchange(jobs_, {});
+      lock.unlock();
+      for (auto& job : jobs) job();
+      jobs.clear();
+      lock.lock();
+    }
+  });
+}
+
+FakeMachine::~FakeMachine() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_one();
+  core_.join();
+}
+
+void FakeMachine::post(Job job) {
+  {
+    const std::lock_guard lock(mutex_);
+    (holding_ ? held_ : jobs_).push_back(std::move(job));
+  }
+  wake_.notify_one();
+}
+
+void FakeMachine::publish(AxisSnapshot snapshot) {
+  std::function<void()> notify;
+  {
+    const std::lock_guard lock(mutex_);
+    auto name = snapshot.name;
+    snapshots_[std::move(name)] = boost::make_shared<const AxisSnapshot>(std::move(snapshot));
+    notify = notify_;
+  }
+  notify();
+}
+
+void FakeMachine::refuse_with(std::optional<Error> error) {
+  const std::lock_guard lock(mutex_);
+  refusal_ = std::move(error);
+}
+
+void FakeMachine::hold() {
+  const std::lock_guard lock(mutex_);
+  holding_ = true;
+}
+
+void FakeMachine::let_go() {
+  {
+    const std::lock_guard lock(mutex_);
+    holding_ = false;
+    std::ranges::move(std::exchange(held_, {}), std::back_inserter(jobs_));
+  }
+  wake_.notify_one();
+}
+
+void FakeMachine::change(const Command& command) {
+  post([this, command] {
+    std::vector<std::shared_ptr<CommandCallback>> watchers;
+    {
+      const std::lock_guard lock(mutex_);
+      for (const auto& watcher : watchers_)
+        if (auto alive = watcher.lock()) watchers.push_back(std::move(alive));
+    }
+    for (const auto& watcher : watchers) (*watcher)(command);
+  });
+}
+
+std::vector<FakeMachine::Submitted> FakeMachine::submitted() const {
+  const std::lock_guard lock(mutex_);
+  return submitted_;
+}
+
+std::vector<std::string> FakeMachine::log() const {
+  const std::lock_guard lock(mutex_);
+  return log_;
+}
+
+std::size_t FakeMachine::held() const {
+  const std::lock_guard lock(mutex_);
+  return held_.size();
+}
+
+std::size_t FakeMachine::watchers() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(
+      std::ranges::count_if(watchers_, [](const auto& w) { return !w.expired(); }));
+}
+
+std::vector<std::string> FakeMachine::axis_names() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> names;
+  for (const auto& [name, snapshot] : snapshots_) names.push_back(name);
+  return names;
+}
+
+AxisSnapshotPtr FakeMachine::snapshot(std::string_view axis) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = snapshots_.find(axis);
+  return found == snapshots_.end() ? nullptr : found->second;
+}
+
+MachineInfo FakeMachine::info() const {
+  return {
+      .machine = "press-1", .version = "0.1", .instance_id = "i-1", .inhibited = true, .inhibited_by = "hmi"};
+}
+
+Result<Command> FakeMachine::result_of(std::string axis, CommandKind kind) {
+  const std::lock_guard lock(mutex_);
+  if (refusal_) return fail(*refusal_);
+  return Command{.id = "c-1", .axis = std::move(axis), .kind = kind, .state = CommandState::active};
+}
+
+void FakeMachine::answer(const CommandCallback& callback, Result<Command> result) {
+  post([callback, result = std::move(result)] { callback(result); });
+}
+
+void FakeMachine::note(std::string line) {
+  const std::lock_guard lock(mutex_);
+  log_.push_back(std::move(line));
+}
+
+void FakeMachine::submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
+                         CommandCallback callback) {
+  auto result = result_of(axis, kind_of(action));
+  if (result) result->client = options.client;
+  {
+    const std::lock_guard lock(mutex_);
+    submitted_.push_back({std::move(axis), std::move(action), std::move(options), until});
+  }
+  answer(callback, std::move(result));
+}
+
+void FakeMachine::release_stop(std::string axis, CommandCallback callback) {
+  note("release_stop " + axis);
+  answer(callback, result_of(std::move(axis), CommandKind::stop));
+}
+
+void FakeMachine::stop_all(std::string client, WaitUntil until,
+                           std::function<void(std::vector<Result<Command>>)> callback) {
+  note("stop_all " + client + (until == WaitUntil::done ? " done" : " accepted"));
+  std::vector<Result<Command>> results{result_of("feeder", CommandKind::stop),
+                                       fail(Reason::not_confirmed, "still moving")};
+  post([callback = std::move(callback), results = std::move(results)] { callback(results); });
+}
+
+void FakeMachine::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {
+  note("release_inhibit " + client);
+  post([callback = std::move(callback)] { callback({}); });
+}
+
+void FakeMachine::get_command(std::string id, CommandCallback callback) {
+  note("get_command " + id);
+  answer(callback, result_of("feeder", CommandKind::home));
+}
+
+std::shared_ptr<void> FakeMachine::watch_command(std::string id, CommandCallback callback) {
+  note("watch_command " + id);
+  auto watcher = std::make_shared<CommandCallback>(std::move(callback));
+  answer(
+      [weak = std::weak_ptr(watcher)](Result<Command> result) {
+        if (const auto alive = weak.lock()) (*alive)(std::move(result));
+      },
+      result_of("feeder", CommandKind::home));
+  const std::lock_guard lock(mutex_);
+  watchers_.push_back(watcher);
+  return watcher;
+}
+
+void FakeMachine::cancel_command(std::string id, CommandCallback callback) {
+  note("cancel_command " + id);
+  answer(callback, result_of("feeder", CommandKind::home));
+}
+
+void FakeMachine::buses(std::function<void(std::vector<BusStatus>)> callback) {
+  BusStatus status{
+      .name = "line-a", .port = "sim", .baud = 115200, .open = true, .simulated = true, .error = {}};
+  status.counters.timeouts = 7;
+  post([callback = std::move(callback), status] { callback({status}); });
+}
+
+void FakeMachine::on_published(std::function<void()> notify) {
+  const std::lock_guard lock(mutex_);
+  notify_ = std::move(notify);
+}
+
+WallTime FakeMachine::wall(TimePoint t) const {
+  return WallTime(1'700'000'000s) + std::chrono::duration_cast<WallTime::duration>(t.time_since_epoch());
+}
+
+}  // namespace axisd::testing

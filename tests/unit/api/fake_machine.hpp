@@ -1,0 +1,86 @@
+// A machine that does what the test says, with a core thread of its own.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "devices/machine.hpp"
+
+namespace axisd::testing {
+
+class FakeMachine final : public Machine {
+ public:
+  struct Submitted {
+    std::string axis;
+    Action action;
+    CommandOptions options;
+    WaitUntil until;
+  };
+
+  FakeMachine();
+  ~FakeMachine() override;
+
+  // What the test controls. Thread: any.
+  void publish(AxisSnapshot snapshot);
+  /// All further calls are answered with this error; nullopt: with a command.
+  void refuse_with(std::optional<Error> error);
+  /// Keeps callbacks back until let_go().
+  void hold();
+  void let_go();
+  /// A change of command "c-1" for those who watch it.
+  void change(const Command& command);
+  void set_now(TimePoint now) { now_ = now; }
+
+  [[nodiscard]] std::vector<Submitted> submitted() const;
+  [[nodiscard]] std::vector<std::string> log()
+      const;  ///< other calls: "release_stop feeder", "stop_all local:unix" ...
+  [[nodiscard]] std::size_t held() const;
+  [[nodiscard]] std::size_t watchers() const;
+
+  [[nodiscard]] std::vector<std::string> axis_names() const override;
+  [[nodiscard]] AxisSnapshotPtr snapshot(std::string_view axis) const override;
+  [[nodiscard]] MachineInfo info() const override;
+  void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
+              CommandCallback callback) override;
+  void release_stop(std::string axis, CommandCallback callback) override;
+  void stop_all(std::string client, WaitUntil until,
+                std::function<void(std::vector<Result<Command>>)> callback) override;
+  void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
+  void get_command(std::string id, CommandCallback callback) override;
+  std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
+  void cancel_command(std::string id, CommandCallback callback) override;
+  void buses(std::function<void(std::vector<BusStatus>)> callback) override;
+  void on_published(std::function<void()> notify) override;
+  [[nodiscard]] WallTime wall(TimePoint t) const override;
+  [[nodiscard]] TimePoint now() const override { return now_; }
+
+ private:
+  using Job = std::function<void()>;
+  void post(Job job);
+  void answer(const CommandCallback& callback, Result<Command> result);
+  [[nodiscard]] Result<Command> result_of(std::string axis, CommandKind kind);
+  void note(std::string line);
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::vector<Job> jobs_, held_;
+  bool holding_ = false, stopping_ = false;
+  std::map<std::string, AxisSnapshotPtr, std::less<>> snapshots_;
+  std::optional<Error> refusal_;
+  std::vector<Submitted> submitted_;
+  std::vector<std::string> log_;
+  std::vector<std::weak_ptr<CommandCallback>> watchers_;
+  std::function<void()> notify_ = [] {};
+  std::atomic<TimePoint> now_{TimePoint(std::chrono::hours(1))};
+  std::thread core_;
+};
+
+}  // namespace axisd::testing

@@ -1,0 +1,225 @@
+// Addresses, the accept loop and TLS.
+#include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
+#include "api/server/file_descriptor.hpp"
+#include "tests/unit/api/serving.hpp"
+
+namespace axisd::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using server::FileDescriptor;
+using server::Server;
+using server::ServerOptions;
+using ::testing::HasSubstr;
+
+std::string contents(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The status of one Stop, and the identity that the server saw.
+std::pair<grpc::Status, std::string> stop(const std::shared_ptr<grpc::Channel>& channel) {
+  Call context;
+  v1::StopRequest request;
+  request.set_axis("feeder");
+  v1::StopResponse response;
+  auto status = v1::AxisService::NewStub(channel)->Stop(&context, request, &response);
+  return {status, response.command().client()};
+}
+
+class Transport : public ::testing::Test {
+ protected:
+  Result<int> start(ServerOptions options) {
+    server_ = std::make_unique<Server>(machine_, std::move(options));
+    return server_->start();
+  }
+  Reason refused(ServerOptions options) {
+    const auto result = start(std::move(options));
+    EXPECT_FALSE(result);
+    message_ = result ? "" : to_string(result.error());
+    return result ? Reason::internal : result.error().reason;
+  }
+  FakeMachine machine_;
+  TemporaryDirectory directory_;
+  std::unique_ptr<Server> server_;
+  std::string message_;
+};
+
+TEST_F(Transport, TcpOnLoopback) {
+  const auto port = start({.listen = {"127.0.0.1:0"}});
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto [status, client] = stop(connect("127.0.0.1:" + std::to_string(*port)));
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(client, "local:127.0.0.1");
+}
+
+TEST_F(Transport, SecondDaemonOnTheSameAddressFails) {
+  const auto path = "unix:" + (directory_ / "axisd.sock");
+  const auto port = start({.listen = {"127.0.0.1:0", path}});
+  ASSERT_TRUE(port);
+  const auto running = std::move(server_);
+  EXPECT_EQ(refused({.listen = {"127.0.0.1:" + std::to_string(*port)}}), Reason::busy);
+  EXPECT_THAT(message_, HasSubstr("another program listens there"));
+  EXPECT_EQ(refused({.listen = {path}}), Reason::busy);
+  EXPECT_TRUE(stop(connect(path)).first.ok());
+}
+
+TEST_F(Transport, UnixSocketLeftBehindIsReplaced) {
+  const auto file = directory_ / "axisd.sock";
+  {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    file.copy(address.sun_path, sizeof address.sun_path - 1);
+    const FileDescriptor dead(socket(AF_UNIX, SOCK_STREAM, 0));
+    ASSERT_EQ(bind(dead.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  }
+  ASSERT_TRUE(std::filesystem::exists(file));
+  ASSERT_TRUE(start({.listen = {"unix:" + file}}));
+  EXPECT_TRUE(stop(connect("unix:" + file)).first.ok());
+  server_.reset();
+  EXPECT_FALSE(std::filesystem::exists(file));
+}
+
+TEST_F(Transport, PlaintextStaysOnTheHostAndAddressesAreChecked) {
+  EXPECT_EQ(refused({.listen = {"0.0.0.0:0"}}), Reason::invalid_argument);
+  EXPECT_THAT(message_, HasSubstr("plaintext"));
+  EXPECT_EQ(refused({.listen = {"[::]:0"}}), Reason::invalid_argument);
+  for (const auto* wrong :
+       {"7443", ":7443", "localhost:", "localhost:http", "localhost:70000", "::1:7443", "unix:"})
+    EXPECT_EQ(refused({.listen = {wrong}}), Reason::invalid_argument) << wrong;
+}
+
+TEST_F(Transport, SurvivesRunningOutOfDescriptors) {
+  const auto port = start({.listen = {"127.0.0.1:0"}});
+  ASSERT_TRUE(port);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(*port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::vector<FileDescriptor> clients;
+  for (int i = 0; i < 8; ++i) clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+
+  const int lowest_free = dup(0);
+  close(lowest_free);
+  rlimit before{};
+  getrlimit(RLIMIT_NOFILE, &before);
+  auto none_left = before;
+  none_left.rlim_cur = static_cast<rlim_t>(lowest_free);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none_left), 0);
+  int turned_away = 0;
+  for (const auto& client : clients) {
+    EXPECT_EQ(connect(client.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    char byte = 0;
+    if (recv(client.get(), &byte, 1, 0) <= 0) ++turned_away;
+  }
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_EQ(turned_away, 8);
+  clients.clear();
+  EXPECT_TRUE(stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok());
+}
+
+TEST_F(Transport, ConnectionsAreBounded) {
+  const auto port = start({.listen = {"127.0.0.1:0"}, .connections = 8});
+  ASSERT_TRUE(port);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(*port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::vector<FileDescriptor> clients;
+  // Surplus connections are closed without a word; gRPC greets the others with its settings.
+  bool turned_away = false;
+  for (int i = 0; i < 200 && !turned_away; ++i) {
+    auto& client = clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    ASSERT_EQ(connect(client.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    char byte = 0;
+    turned_away = recv(client.get(), &byte, 1, 0) <= 0;
+  }
+  EXPECT_TRUE(turned_away);
+  clients.clear();
+  EXPECT_TRUE(eventually([&] { return stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok(); }));
+}
+
+/// Certificates made by the openssl command.
+class Tls : public Transport {
+ protected:
+  static void run(const std::string& command) {
+    ASSERT_EQ(std::system((command + " 2>/dev/null").c_str()), 0) << command;
+  }
+  void make_ca(const std::string& name) {
+    run("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=" +
+        name + " -keyout " + (directory_ / (name + ".key")) + " -out " + (directory_ / (name + ".crt")));
+  }
+  void make_pair(const std::string& name, const std::string& ca) {
+    const auto base = directory_ / name;
+    std::ofstream(base + ".ext") << "subjectAltName=DNS:localhost,IP:127.0.0.1\n";
+    run("openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=" + name +
+        " -keyout " + base + ".key -out " + base + ".csr");
+    run("openssl x509 -req -days 2 -in " + base + ".csr -CA " + (directory_ / (ca + ".crt")) + " -CAkey " +
+        (directory_ / (ca + ".key")) + " -CAcreateserial -extfile " + base + ".ext -out " + base + ".crt");
+  }
+  ServerOptions options() {
+    return {.listen = {"127.0.0.1:0"},
+            .tls = server::TlsFiles{.certificate = directory_ / "server.crt",
+                                    .key = directory_ / "server.key",
+                                    .client_ca = directory_ / "ca.crt"}};
+  }
+  std::shared_ptr<grpc::ChannelCredentials> client(const std::string& name) {
+    grpc::SslCredentialsOptions ssl;
+    ssl.pem_root_certs = contents(directory_ / "ca.crt");
+    if (!name.empty()) {
+      ssl.pem_private_key = contents(directory_ / (name + ".key"));
+      ssl.pem_cert_chain = contents(directory_ / (name + ".crt"));
+    }
+    return grpc::SslCredentials(ssl);
+  }
+};
+
+TEST_F(Tls, OnlyVerifiedClientsAreServedByTheirName) {
+  make_ca("ca");
+  make_ca("stranger-ca");
+  make_pair("server", "ca");
+  make_pair("hmi-1", "ca");
+  make_pair("intruder", "stranger-ca");
+  const auto port = start(options());
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto target = "127.0.0.1:" + std::to_string(*port);
+  const auto [status, name] = stop(connect(target, client("hmi-1")));
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(name, "hmi-1");
+  EXPECT_FALSE(stop(connect(target, client("intruder"))).first.ok());
+  EXPECT_FALSE(stop(connect(target, client(""))).first.ok());
+  EXPECT_FALSE(stop(connect(target)).first.ok());
+  EXPECT_EQ(machine_.submitted().size(), 1U);
+}
+
+TEST_F(Tls, UnusableFilesAreNamedAtTheStart) {
+  make_ca("ca");
+  make_pair("server", "ca");
+  make_pair("other", "ca");
+  const auto refused_file = [&](auto change, const std::string& file) {
+    auto wrong = options();
+    change(*wrong.tls);
+    EXPECT_EQ(refused(wrong), Reason::invalid_argument);
+    EXPECT_THAT(message_, HasSubstr(directory_ / file));
+  };
+  std::ofstream(directory_ / "garbage")
+      << "-----BEGIN CERTIFICATE-----\nnonsense\n-----END CERTIFICATE-----\n";
+  refused_file([&](auto& tls) { tls.key = directory_ / "other.key"; }, "other.key");
+  EXPECT_THAT(message_, HasSubstr("does not belong to the certificate"));
+  refused_file([&](auto& tls) { tls.key = directory_ / "missing"; }, "missing");
+  refused_file([&](auto& tls) { tls.key = directory_ / "garbage"; }, "garbage");
+  refused_file([&](auto& tls) { tls.certificate = directory_ / "garbage"; }, "garbage");
+  refused_file([&](auto& tls) { tls.client_ca = directory_ / "server.key"; }, "server.key");
+}
+
+}  // namespace
+}  // namespace axisd::testing
