@@ -98,7 +98,8 @@ class Bench {
   }
   void assign(std::string_view terminal, Input function) {
     const int index = terminal == "PU" ? 0 : terminal == "DR" ? 1 : terminal[1] - '0' + 2;
-    ASSERT_EQ(0, write(static_cast<std::uint16_t>(reg::first_input_function + index), static_cast<int>(function)));
+    ASSERT_EQ(
+        0, write(static_cast<std::uint16_t>(reg::first_input_function + index), static_cast<int>(function)));
   }
   void pulse(std::string_view terminal) {
     drive_->set_input(terminal, true);

@@ -17,36 +17,37 @@ TEST_P(GoldenFrames, AreAnsweredAsPrinted) {
   EXPECT_EQ(GetParam().reply, bench.send(GetParam().request)) << GetParam().section;
 }
 
-// Misprints, with the reading of facts/manual-conflicts: the reply to function 02 prints its CRC as "61 C1" (C1 61
-// fits); the CRC error prints a reply although its text says silence.
+// Misprints, with the reading of facts/manual-conflicts: the reply to function 02 prints its CRC as "61 C1"
+// (C1 61 fits); the CRC error prints a reply although its text says silence.
 INSTANTIATE_TEST_SUITE_P(
     Manual, GoldenFrames,
-    ::testing::Values(
-        Golden{"4.3 X0", "01 06 00 43 00 01 B9 DE", "01 06 00 43 00 01 B9 DE"},
-        Golden{"4.3 X1", "01 06 00 44 00 02 48 1E", "01 06 00 44 00 02 48 1E"},
-        Golden{"4.3 X2", "01 06 00 45 00 03 D8 1E", "01 06 00 45 00 03 D8 1E"},
-        Golden{"6.2.1 speed", "01 03 00 23 00 01 75 C0", "01 03 02 00 3C B8 55"},
-        Golden{"6.2.1 block", "01 03 00 20 00 04 45 C3", "01 03 08 00 05 00 64 00 64 00 3C F0 D1"},
-        Golden{"6.2.2 speed", "01 06 00 23 00 3C 78 11", "01 06 00 23 00 3C 78 11"},
-        Golden{"6.2.2 time", "01 06 00 21 01 F4 D9 D7", "01 06 00 21 01 F4 D9 D7"},
-        Golden{"6.2.3", "01 10 00 24 00 02 04 00 00 13 88 FD 12", "01 10 00 24 00 02 01 C3"},
-        Golden{"6.2.4 CRC", "01 03 00 20 00 01 85 C1", "silence"},
-        Golden{"6.2.4 function", "01 02 00 00 00 04 79 C9", "01 82 02 C1 61"},
-        Golden{"6.2.4 hole", "01 03 00 19 00 01 55 CD", "01 83 03 01 31"},
-        Golden{"6.2.4 count", "01 03 00 20 00 20 45 D8", "01 83 05 81 33"},
-        Golden{"6.2.4 access", "01 03 00 27 00 01 34 01", "01 83 06 C1 32"},
-        Golden{"6.2.4 value", "01 06 00 26 00 08 69 C7", "01 86 07 03 A2"},
-        Golden{"6.2.5 current", "01 06 00 10 00 06 08 0D", "01 06 00 10 00 06 08 0D"},
-        Golden{"6.2.5 microstep", "01 06 00 11 00 08 D8 09", "01 06 00 11 00 08 D8 09"},
-        Golden{"6.2.5 block", "01 10 00 20 00 06 0C 00 0A 00 64 00 64 01 F4 00 00 03 E8 3D 69",
-               "01 10 00 20 00 06 41 C1"},
-        Golden{"6.2.5 speed mode", "01 10 00 20 00 04 08 00 0A 00 64 00 64 01 F4 AD C5", "01 10 00 20 00 04 C0 00"},
-        Golden{"7.6.1 relative", "01 06 00 27 00 01 F8 01", "01 06 00 27 00 01 F8 01"},
-        Golden{"7.6.1 absolute", "01 06 00 27 00 05 F9 C2", "01 06 00 27 00 05 F9 C2"},
-        Golden{"7.6.1 speed", "01 06 00 27 00 02 B8 00", "01 06 00 27 00 02 B8 00"},
-        Golden{"7.6.2 normal", "01 06 00 28 00 00 09 C2", "01 06 00 28 00 00 09 C2"},
-        Golden{"7.6.2 emergency", "01 06 00 28 00 01 C8 02", "01 06 00 28 00 01 C8 02"},
-        Golden{"7.6.3", "01 06 00 30 00 01 48 05", "01 06 00 30 00 01 48 05"}));
+    ::testing::Values(Golden{"4.3 X0", "01 06 00 43 00 01 B9 DE", "01 06 00 43 00 01 B9 DE"},
+                      Golden{"4.3 X1", "01 06 00 44 00 02 48 1E", "01 06 00 44 00 02 48 1E"},
+                      Golden{"4.3 X2", "01 06 00 45 00 03 D8 1E", "01 06 00 45 00 03 D8 1E"},
+                      Golden{"6.2.1 speed", "01 03 00 23 00 01 75 C0", "01 03 02 00 3C B8 55"},
+                      Golden{"6.2.1 block", "01 03 00 20 00 04 45 C3",
+                             "01 03 08 00 05 00 64 00 64 00 3C F0 D1"},
+                      Golden{"6.2.2 speed", "01 06 00 23 00 3C 78 11", "01 06 00 23 00 3C 78 11"},
+                      Golden{"6.2.2 time", "01 06 00 21 01 F4 D9 D7", "01 06 00 21 01 F4 D9 D7"},
+                      Golden{"6.2.3", "01 10 00 24 00 02 04 00 00 13 88 FD 12", "01 10 00 24 00 02 01 C3"},
+                      Golden{"6.2.4 CRC", "01 03 00 20 00 01 85 C1", "silence"},
+                      Golden{"6.2.4 function", "01 02 00 00 00 04 79 C9", "01 82 02 C1 61"},
+                      Golden{"6.2.4 hole", "01 03 00 19 00 01 55 CD", "01 83 03 01 31"},
+                      Golden{"6.2.4 count", "01 03 00 20 00 20 45 D8", "01 83 05 81 33"},
+                      Golden{"6.2.4 access", "01 03 00 27 00 01 34 01", "01 83 06 C1 32"},
+                      Golden{"6.2.4 value", "01 06 00 26 00 08 69 C7", "01 86 07 03 A2"},
+                      Golden{"6.2.5 current", "01 06 00 10 00 06 08 0D", "01 06 00 10 00 06 08 0D"},
+                      Golden{"6.2.5 microstep", "01 06 00 11 00 08 D8 09", "01 06 00 11 00 08 D8 09"},
+                      Golden{"6.2.5 block", "01 10 00 20 00 06 0C 00 0A 00 64 00 64 01 F4 00 00 03 E8 3D 69",
+                             "01 10 00 20 00 06 41 C1"},
+                      Golden{"6.2.5 speed mode", "01 10 00 20 00 04 08 00 0A 00 64 00 64 01 F4 AD C5",
+                             "01 10 00 20 00 04 C0 00"},
+                      Golden{"7.6.1 relative", "01 06 00 27 00 01 F8 01", "01 06 00 27 00 01 F8 01"},
+                      Golden{"7.6.1 absolute", "01 06 00 27 00 05 F9 C2", "01 06 00 27 00 05 F9 C2"},
+                      Golden{"7.6.1 speed", "01 06 00 27 00 02 B8 00", "01 06 00 27 00 02 B8 00"},
+                      Golden{"7.6.2 normal", "01 06 00 28 00 00 09 C2", "01 06 00 28 00 00 09 C2"},
+                      Golden{"7.6.2 emergency", "01 06 00 28 00 01 C8 02", "01 06 00 28 00 01 C8 02"},
+                      Golden{"7.6.3", "01 06 00 30 00 01 48 05", "01 06 00 30 00 01 48 05"}));
 
 TEST(SimulatorProtocol, AnswersTheBlockOfCurrentAndMicrostepAsPrinted) {
   Bench bench;
