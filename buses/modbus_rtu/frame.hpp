@@ -11,8 +11,11 @@
 
 namespace axisd::modbus_rtu {
 
-enum class Function : std::uint8_t { read_holding_registers = 0x03, write_single_register = 0x06,
-                                     write_multiple_registers = 0x10 };
+enum class Function : std::uint8_t {
+  read_holding_registers = 0x03,
+  write_single_register = 0x06,
+  write_multiple_registers = 0x10
+};
 
 /// A complete frame with its CRC.
 class Frame {
@@ -47,8 +50,8 @@ struct Request {
   std::vector<std::uint16_t> values{};  ///< written registers
 };
 
-/// Encodes; refuses node 0 (broadcast is never used), counts of 0, more than 125 read or 123 written registers and
-/// addresses that would wrap.
+/// Encodes; refuses node 0 (broadcast is never used) and 248..255 (reserved), other functions, counts of 0,
+/// more than 125 read or 123 written registers and addresses that would wrap.
 Result<Frame> encode(const Request& request);
 /// Size of the normal reply to `request` in bytes.
 std::size_t reply_size(const Request& request);

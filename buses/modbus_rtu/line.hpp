@@ -14,7 +14,7 @@ namespace axisd::modbus_rtu {
 /// One exchange as the line sees it. The core owns it and leaves it alone while it is armed or under way.
 struct Exchange {
   Request request;
-  Frame frame;            ///< encoded request with CRC
+  Frame frame;  ///< encoded request with CRC
   MotionGuard guard;
   TimePoint deadline = TimePoint::max();
   Duration reply_timeout{};   ///< from the last byte of the request to the last byte of the reply
@@ -22,21 +22,22 @@ struct Exchange {
 };
 
 enum class ExchangeStatus : std::uint8_t {
-  replied,      ///< `reply` answers the request (a match or an exception)
-  timeout,      ///< sent completely; no valid reply within the timeout
-  cut,          ///< like timeout, but the wait was cut short by cut_wait() past turnaround_max
-  corrupt,      ///< sent completely; only damaged bytes came back
-  not_sent,     ///< refused at the bind: `verdict` says why; no byte went out
-  io_error,     ///< the port failed; `native_error` is errno. Some bytes may have gone out.
+  replied,   ///< `reply` answers the request (a match or an exception)
+  timeout,   ///< sent completely; no valid reply within the timeout
+  cut,       ///< like timeout, but the wait was cut short by cut_wait() past turnaround_max
+  corrupt,   ///< sent completely; only damaged bytes came back
+  not_sent,  ///< no byte went out: refused at the bind (`verdict` says why), or `send`: the port was lost
+             ///< before
+  io_error,  ///< the port failed; `native_error` is errno. Some bytes may have gone out.
 };
 
 struct ExchangeResult {
   ExchangeStatus status = ExchangeStatus::io_error;
   Verdict verdict = Verdict::send;
   Reply reply{};
-  Frame reply_frame{};      ///< raw bytes, for traces
+  Frame reply_frame{};  ///< raw bytes, for traces
   int native_error = 0;
-  int foreign_frames = 0;   ///< discarded while waiting
+  int foreign_frames = 0;     ///< discarded while waiting
   TimePoint request_begin{};  ///< first byte out (at the bind)
   TimePoint request_end{};    ///< last byte out (computed from the baud rate)
   TimePoint reply_begin{};    ///< first byte in; unset without a reply
@@ -49,8 +50,8 @@ struct PortStatus {
   std::optional<Error> error;  ///< why it is not open
 };
 
-/// Carries one exchange at a time, with the mandatory silence before each. All calls from the core thread; both
-/// callbacks arrive on the core thread.
+/// Carries one exchange at a time, with the mandatory silence before each. All calls from the core thread;
+/// both callbacks arrive on the core thread.
 class Line {
  public:
   using ResultHandler = std::function<void(const ExchangeResult&)>;
@@ -59,9 +60,9 @@ class Line {
 
   /// Sets the callbacks and starts opening the port (again and again, with back-off).
   virtual void start(ResultHandler on_result, PortHandler on_port) = 0;
-  /// Puts `exchange` into the one-place slot. It is bound, and its guard checked, when the silence has passed.
-  /// Precondition: the port is open, the slot is empty and nothing is under way. Ends with exactly one on_result,
-  /// unless revoke() succeeds.
+  /// Puts `exchange` into the one-place slot. It is bound, and its guard checked, when the silence has
+  /// passed. Precondition: the port is open, the slot is empty and nothing is under way. Ends with exactly
+  /// one on_result, unless revoke() succeeds.
   virtual void arm(const Exchange& exchange) = 0;
   /// Takes the armed exchange back. False: it was already bound, its result will come.
   virtual bool revoke() = 0;

@@ -14,16 +14,19 @@ enum class Parity : std::uint8_t { none, even, odd };
 struct Format {
   Parity parity = Parity::none;
   int stop_bits = 1;
-  [[nodiscard]] int bits_per_character() const { return 1 + 8 + (parity == Parity::none ? 0 : 1) + stop_bits; }
+  [[nodiscard]] int bits_per_character() const {
+    return 1 + 8 + (parity == Parity::none ? 0 : 1) + stop_bits;
+  }
 };
 
 /// One RS-485 line as the YAML describes it.
 struct LineSettings {
-  std::string name;                 ///< bus name
-  std::string port;                 ///< device path, or "sim"
-  int baud = 115200;                ///< bit/s; any rate the adapter can do
+  std::string name;   ///< bus name
+  std::string port;   ///< device path, or "sim"
+  int baud = 115200;  ///< bit/s; any rate the adapter can do
   Format format{};
-  Duration turnaround_max = std::chrono::milliseconds(20);  ///< longest time a node takes before its first byte
+  Duration turnaround_max =
+      std::chrono::milliseconds(20);  ///< longest time a node takes before its first byte
   [[nodiscard]] bool simulated() const { return port == "sim"; }
 };
 

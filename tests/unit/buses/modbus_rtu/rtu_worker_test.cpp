@@ -103,6 +103,15 @@ TEST(RtuWorker, LateReplyDoesNotAnswerTheNextRequest) {
   EXPECT_EQ(result.foreign_frames, 1);
 }
 
+TEST(RtuWorker, AsksForAnEchoOncePerOpening) {
+  const ScriptedNode node(answering());
+  WorkerBench bench(line_at(fast, node.path()));
+  bench.start_and_open();
+  EXPECT_EQ(bench.run(read_of(0x0020, 1)).status, ExchangeStatus::replied);
+  EXPECT_EQ(bench.run(read_of(0x0020, 1)).status, ExchangeStatus::replied);
+  EXPECT_EQ(node.probes(), 1);
+}
+
 TEST(RtuWorker, EchoAloneIsNoReply) {
   const ScriptedNode node(silent(), /*echo=*/true);
   WorkerBench bench(line_at(fast, node.path()));
@@ -139,10 +148,12 @@ TEST(RtuWorker, EchoThatTheProbeMissedIsLearntFromARead) {
   for (int round = 0; round < 2; ++round)
     EXPECT_EQ(bench.run(read_of(0x0020, 2)).reply.registers, (std::vector<std::uint16_t>{0x20, 0x21}));
   EXPECT_EQ(bench.run(write_of(0x0027, 1)).reply.kind, ReplyKind::match);
+  EXPECT_EQ(node.probes(), 1);
   // The adapter stops echoing: one exchange is lost, then a new probe has found out.
   echoing = false;
   EXPECT_EQ(bench.run(read_of(0x0020, 2, milliseconds(300))).status, ExchangeStatus::corrupt);
   EXPECT_EQ(bench.run(read_of(0x0020, 2)).status, ExchangeStatus::replied);
+  EXPECT_EQ(node.probes(), 2);
 }
 
 TEST(RtuWorker, DamagedRepliesAreCorruptAndHarmNoLaterOne) {

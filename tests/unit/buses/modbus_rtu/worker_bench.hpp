@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <functional>
@@ -85,6 +86,8 @@ class ScriptedNode {
     const std::scoped_lock lock(mutex_);
     return seen_;
   }
+  /// Thread: any. How many echo probes came.
+  [[nodiscard]] int probes() const { return probes_; }
 
  private:
   void run() {
@@ -109,7 +112,10 @@ class ScriptedNode {
   static std::size_t request_size(const Bytes& start) { return start[1] == 0x10 ? 9U + start[6] : 8U; }
   void on_request(const Bytes& request) {
     if (echo_) say(request);
-    if (request[0] == nobody) return;
+    if (request[0] == nobody) {
+      ++probes_;
+      return;
+    }
     {
       const std::scoped_lock lock(mutex_);
       seen_.push_back(to_hex(request));
@@ -123,6 +129,7 @@ class ScriptedNode {
   std::string path_;
   mutable std::mutex mutex_;
   std::vector<std::string> seen_;
+  std::atomic<int> probes_ = 0;
   std::thread thread_;
 };
 
