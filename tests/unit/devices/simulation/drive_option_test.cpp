@@ -1,0 +1,42 @@
+#include "devices/simulation/drive_option.hpp"
+
+#include <gtest/gtest.h>
+
+namespace axisd::simulation {
+namespace {
+
+TEST(DriveOption, ReadsEveryPart) {
+  const auto option = parse_drive(
+      "node=3,model=ykd2405pr,home=-50:600,positive_limit=90000,negative_limit=-2000,switch.start_in_motion="
+      "on,"
+      "switch.unsigned_speed=off,eeprom.0x0011=13,wire.X1=positive_limit:nc,boot_ms=250,powered=off");
+  ASSERT_TRUE(option);
+  EXPECT_EQ("ykd2405pr", option->model);
+  const auto& settings = option->settings;
+  EXPECT_EQ(3, settings.address);
+  EXPECT_EQ(-50, settings.mechanics.home_switch_from);
+  EXPECT_EQ(600, settings.mechanics.home_switch_to);
+  EXPECT_EQ(90000, settings.mechanics.positive_limit_from);
+  EXPECT_EQ(-2000, settings.mechanics.negative_limit_from);
+  EXPECT_EQ((Switches{{"start_in_motion", true}, {"unsigned_speed", false}}), settings.switches);
+  EXPECT_EQ(13, settings.eeprom.at(0x11));
+  EXPECT_EQ(SwitchKind::positive_limit, settings.wires.at("X1").kind);
+  EXPECT_TRUE(settings.wires.at("X1").normally_closed);
+  EXPECT_EQ(std::chrono::milliseconds(250), settings.boot_time);
+  EXPECT_FALSE(settings.powered);
+}
+
+TEST(DriveOption, NamesThePartThatIsWrong) {
+  for (const std::string wrong :
+       {"node=0x1FF", "home=5", "home=6:5", "positive_limit=far", "switch.a=maybe", "eeprom.1=x",
+        "eeprom.1=70000", "wire.X0=somewhere", "boot_ms=-1", "powered=1", "color=red", "model="}) {
+    const auto option = parse_drive("node=1,model=ykd2405pr," + wrong);
+    ASSERT_FALSE(option) << wrong;
+    EXPECT_NE(std::string::npos, option.error().message.find(wrong));
+  }
+  EXPECT_FALSE(parse_drive("node=1"));
+  EXPECT_FALSE(parse_drive("model=ykd2405pr"));
+}
+
+}  // namespace
+}  // namespace axisd::simulation
