@@ -7,13 +7,13 @@ set -euo pipefail
 
 build=(
   ca-certificates ccache clang-19 cmake git libbenchmark-dev libboost1.81-dev libcli11-dev libfmt-dev libgmock-dev
-  libgrpc++-dev libgrpc-dev libgtest-dev libmodbus-dev libprotobuf-dev libspdlog-dev libsystemd-dev libyaml-cpp-dev
-  lld-19 llvm-19 ninja-build pkg-config protobuf-compiler protobuf-compiler-grpc
+  libgrpc++-dev libgrpc-dev libgtest-dev libmodbus-dev libprotobuf-dev libspdlog-dev libssl-dev libsystemd-dev
+  libyaml-cpp-dev lld-19 llvm-19 ninja-build pkg-config protobuf-compiler protobuf-compiler-grpc
 )
 run=(libfmt9 libgrpc++1.51 libmodbus5 libprotobuf32 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
 test=(
   clang-format-19 clang-tidy-19 libclang-rt-19-dev openssl procps python3 python3-grpcio python3-jsonschema
-  python3-protobuf python3-pymodbus python3-serial python3-serial-asyncio python3-yaml systemd
+  python3-protobuf python3-pymodbus python3-serial python3-serial-asyncio python3-yaml shellcheck systemd
 )
 
 die() { echo "install-packages.sh: $*" >&2; exit 1; }

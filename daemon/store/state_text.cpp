@@ -74,9 +74,9 @@ class Reader {
         continue;
       }
       unsigned char byte = 0;
-      if (rest_.size() < 2) return false;
-      const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + 2, byte, 16);
-      if (error != std::errc{} || end != rest_.data() + 2) return false;
+      const auto digits = rest_.substr(0, 2);
+      const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
+      if (error != std::errc{} || end != digits.data() + 2) return false;
       value += static_cast<char>(byte);
       rest_.remove_prefix(2);
     }
@@ -140,7 +140,7 @@ bool read_axis(Reader& reader, std::map<std::string, AxisRecord>& axes) {
       !reader.literal("\n"))
     return false;
   if (reader.literal("offset") && !read_offset(reader, axis.offset.emplace())) return false;
-  return axes.emplace(std::move(name), std::move(axis)).second;
+  return axes.emplace(std::move(name), axis).second;
 }
 
 std::optional<Generation> read_generation(std::string_view body) {

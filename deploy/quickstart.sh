@@ -1,0 +1,130 @@
+#!/bin/bash
+# From a fresh clone to moving axes: installs what is missing, builds, starts axisd with three simulated drives
+# (config/examples/demo.yaml) and moves them with axisctl. No hardware, nothing outside build/ and a temporary
+# directory is written (packages apart).
+#   deploy/quickstart.sh          keeps the axes moving and shows them until Ctrl-C
+#   deploy/quickstart.sh --once   shows each thing once and ends: status 0, no process left
+set -euo pipefail
+cd "$(dirname "$(readlink -f "$0")")/.."
+
+case "${1:-}" in
+  '' | --once) once=${1:-} ;;
+  *) echo "usage: deploy/quickstart.sh [--once]" >&2; exit 2 ;;
+esac
+
+scratch=$(mktemp -d "${TMPDIR:-/tmp}/axisd-quickstart.XXXXXX")
+daemon='' mover='' watcher='' viewer=''
+
+say() { printf '\n== %s\n' "$*"; }
+die() { echo "quickstart.sh: $*" >&2; exit 1; }
+
+end_group() {  # a background job with everything that it started
+  [ -n "$1" ] || return 0
+  kill -TERM -- "-$1" 2>/dev/null || true
+  for _ in $(seq 50); do kill -0 -- "-$1" 2>/dev/null || break; sleep 0.1; done
+  kill -KILL -- "-$1" 2>/dev/null || true
+  wait "$1" 2>/dev/null || true
+}
+clean_up() {
+  local status=$?
+  trap '' INT TERM
+  end_group "$mover"
+  end_group "$watcher"
+  end_group "$viewer"
+  end_group "$daemon"
+  if [ "$status" -ne 0 ] && [ -s "$scratch/axisd.log" ]; then
+    echo "-- the last lines of axisd's log:" >&2
+    tail -n 30 "$scratch/axisd.log" >&2
+  fi
+  rm -rf "$scratch"
+  exit "$status"
+}
+trap clean_up EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+say "Packages and build"
+deploy/install-packages.sh build
+deploy/install-packages.sh run
+if ! { cmake --preset release && cmake --build --preset release --target axisd axisctl axisd-sim; } \
+    >"$scratch/build.log" 2>&1; then
+  tail -n 60 "$scratch/build.log" >&2
+  die "the build failed"
+fi
+bin=$PWD/build/release
+axisd=$bin/daemon/axisd axisctl=$bin/api/axisctl/axisctl
+"$axisctl" check config/examples/demo.yaml >/dev/null || die "config/examples/demo.yaml does not pass axisctl check"
+
+taken() { (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null || (exec 3<>"/dev/tcp/::1/$1") 2>/dev/null; }
+port=7443
+while taken "$port"; do port=$((20000 + RANDOM % 10000)); done
+export AXISD_SERVER=localhost:$port
+
+say "axisd with three simulated drives on $AXISD_SERVER"
+set -m  # jobs of their own process groups: Ctrl-C ends the demonstration in order, and nothing is left behind
+"$axisd" --config config/examples/demo.yaml --state-directory "$scratch/state" --listen "$AXISD_SERVER" \
+  >"$scratch/axisd.log" 2>&1 &
+daemon=$!
+
+# Repeats a command until it succeeds, while axisd lives; its own complaint is shown when it never does.
+eventually() {
+  for _ in $(seq 100); do
+    "$@" >"$scratch/last" 2>&1 && return 0
+    kill -0 "$daemon" 2>/dev/null || die "axisd ended by itself"
+    sleep 0.1
+  done
+  cat "$scratch/last" >&2
+  die "did not succeed within its time: $*"
+}
+step() {  # shows a command as it would be typed, and runs it
+  echo "\$ $*"
+  "$axisctl" "${@:2}" || die "failed: $*"
+}
+eventually "$axisctl" list
+for axis in feeder lifter turntable; do
+  eventually "$axisctl" enable "$axis" --wait  # refused until the drive's identity and configuration are verified
+done
+step axisctl list
+
+say "Homing and moving, as axisctl watch sees it"
+"$axisctl" watch --period 500ms >"$scratch/watch" 2>&1 &
+watcher=$!
+(tail -n +1 -f --pid="$watcher" "$scratch/watch" | sed -u 's/^/    /') &
+viewer=$!
+step axisctl home feeder --wait
+step axisctl home lifter --wait
+step axisctl home turntable --wait
+step axisctl move feeder 120mm --velocity 50mm/s --wait
+step axisctl move lifter 100mm --velocity 100mm/s --wait
+step axisctl move turntable 90deg --relative --velocity 90deg/s --wait
+[ -s "$scratch/watch" ] || die "axisctl watch showed nothing"
+end_group "$watcher"
+watcher=''
+wait "$viewer" || true
+viewer=''
+
+if [ -z "$once" ]; then
+  say "To and fro until Ctrl-C"
+  {
+    while "$axisctl" move feeder 20mm --velocity 80mm/s --wait && "$axisctl" move lifter 200mm --wait &&
+        "$axisctl" move feeder 300mm --velocity 80mm/s --wait && "$axisctl" move lifter 20mm --wait; do
+      "$axisctl" move turntable 30deg --relative --wait || break
+    done
+  } >"$scratch/mover.log" 2>&1 &
+  mover=$!
+  trap 'interrupted=1' INT
+  interrupted=''
+  "$axisctl" watch || [ -n "$interrupted" ] || { cat "$scratch/mover.log" >&2; die "axisctl watch ended"; }
+  trap 'exit 130' INT
+  end_group "$mover"
+  mover=''
+fi
+
+say "Stopping and switching off"
+step axisctl stop --all
+step axisctl release-stop --all
+for axis in feeder lifter turntable; do step axisctl disable "$axis" --wait; done
+kill -TERM "$daemon"
+wait "$daemon" || die "axisd ended with status $?"
+daemon=''
+say "Done. Next: axisctl --help, config/examples/reference.yaml, README.md"

@@ -1,0 +1,133 @@
+"""Who may include whom: fails on a forbidden include.
+
+The folders stand on each other: buses < devices < config, api < daemon. Third-party libraries are confined to the
+folder that wraps them. Time is asked for and waited for in one place. A drive family's simulator shares nothing with
+its driver but the register table, so that one's mistake is not the other's.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+import tree
+
+# Folder -> what it may include, as prefixes. The longest matching folder decides. `axisd/v1/` is generated from proto.
+OURS = {
+    "buses": ["buses/"],
+    "devices": ["buses/", "devices/"],
+    "config": ["buses/", "devices/", "config/"],
+    "api/server": ["buses/", "devices/", "api/server/", "axisd/v1/"],
+    "api/cell": ["buses/", "devices/", "api/cell/", "axisd/v1/"],
+    "api/axisctl": ["api/axisctl/", "config/", "axisd/v1/"],
+    "daemon/store": ["buses/", "devices/", "daemon/store/"],
+    "daemon/core": ["buses/", "devices/", "config/", "daemon/core/", "daemon/store/"],
+    "daemon/sim": ["buses/", "devices/", "config/", "daemon/sim/"],
+    "daemon": ["buses/", "devices/", "config/", "api/server/", "api/cell/", "daemon/", "axisd/v1/"],
+}
+
+# Third party -> the folders that may include it. "daemon/*" means the folder itself, not those below.
+THIRD_PARTY = {
+    "modbus": ["buses/modbus_rtu"],
+    "linux/can": ["buses/can"],
+    "boost/asio": ["buses", "daemon"],
+    "yaml-cpp": ["config"],
+    "grpc": ["api/server", "api/cell", "api/axisctl", "daemon/*"],
+    "grpcpp": ["api/server", "api/cell", "api/axisctl", "daemon/*"],
+    "google": ["api/server", "api/cell", "api/axisctl", "daemon/*"],
+    "openssl": ["api/server", "api/axisctl"],
+    "CLI": ["api/axisctl", "daemon/sim", "daemon/*"],
+    "systemd": ["daemon"],
+}
+
+TIME = re.compile(r"steady_timer|high_resolution_timer|steady_clock::now|high_resolution_clock|\bsleep_for\s*\("
+                  r"|this_thread::sleep|\b(u|nano|clock_nano)?sleep\s*\(")
+TIME_ALLOWED = re.compile(r"buses/(asio_)?clock\.[ch]pp$")
+
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
+COMMENT_OR_STRING = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
+LAYERS = ("buses", "devices", "config", "api", "daemon")
+SHARED_BY_FAMILY = re.compile(r"(registers|parameters)[^/]*\.hpp$")
+
+
+def within(path, folder):
+    if folder.endswith("/*"):
+        return path.parent.as_posix() == folder[:-2]
+    return folder in [parent.as_posix() for parent in path.parents]
+
+
+def owner(path, table):
+    """The entry of the deepest folder of `table` that holds `path`."""
+    return next((table[parent.as_posix()] for parent in path.parents if parent.as_posix() in table), None)
+
+
+def families(paths):
+    """Folders under devices/ with a descriptor: one drive family each."""
+    return {path.parent.as_posix() for path in paths
+            if path.name == "descriptor.cpp" and path.parent.parent.as_posix() == "devices"}
+
+
+def family_finding(path, included, family_folders):
+    """Why `path` must not include `included`, as far as drive families are concerned."""
+    own = path.parent.as_posix() if path.parent.as_posix() in family_folders else None
+    target = included.rsplit("/", 1)[0]
+    if target in family_folders and target != own:
+        return "a drive family is reached through its descriptor only"
+    simulates = path.name.startswith("simulat")
+    if path.parts[0] == "devices" and own != "devices/simulation" and included.startswith("devices/simulation/"):
+        if not simulates and path.parts[1] != "simulation":
+            return "only simulators use devices/simulation"
+    if target != own or own is None:
+        return None
+    included_simulates = included.rsplit("/", 1)[1].startswith("simulat")
+    if simulates != included_simulates and not SHARED_BY_FAMILY.search(included):
+        return "simulator and driver share the register table only"
+    return None
+
+
+def include_findings(path, text, family_folders):
+    allowed = owner(path, OURS)
+    for match in INCLUDE.finditer(text):
+        included = match[2]
+        line = text.count("\n", 0, match.start()) + 1
+        at = f"{path}:{line}: includes {included}"
+        if match[1] == '"' or included.startswith(("axisd/v1/", *(f"{layer}/" for layer in LAYERS))):
+            if allowed is None:
+                yield f"{at}: this folder has no include rule; add one to tests/checks/layering.py"
+            elif not any(included.startswith(prefix) for prefix in allowed):
+                yield f"{at}: may include only {', '.join(allowed)}"
+            elif (why := family_finding(path, included, family_folders)) is not None:
+                yield f"{at}: {why}"
+        for library, folders in THIRD_PARTY.items():
+            # "linux/can" also covers linux/can/raw.h and linux/can.h
+            if re.match(rf"{library}([/.]|$)", included) and not any(within(path, folder) for folder in folders):
+                yield f"{at}: {library} belongs to {', '.join(folders)}"
+
+
+def time_findings(path, text):
+    if TIME_ALLOWED.search(path.as_posix()):
+        return
+    code = COMMENT_OR_STRING.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+    for match in TIME.finditer(code):
+        line = code.count("\n", 0, match.start()) + 1
+        yield f"{path}:{line}: {match[0]}: time goes through buses/clock.hpp"
+
+
+def findings(root):
+    paths = tree.files(root)
+    family_folders = families(paths)
+    found = []
+    for path in paths:
+        if path.suffix not in tree.CODE or len(path.parts) < 2:
+            continue
+        layer = path.parts[0] in LAYERS
+        if not layer and path.parts[:2] != ("tests", "unit"):
+            continue
+        text = tree.text(root, path) or ""
+        if layer:
+            found += include_findings(path, text, family_folders)
+        found += time_findings(path, text)
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(tree.report(findings(Path(sys.argv[1])), "layering"))

@@ -1,0 +1,26 @@
+#!/bin/bash
+# Stages an installation of BUILD and checks what systemd will read: the unit (syntax, programs, exposure) and the user.
+#   tests/checks/service.sh BUILD
+set -euo pipefail
+build=$(readlink -f "${1:?"usage: tests/checks/service.sh BUILD"}")
+command -v systemd-analyze >/dev/null ||
+  { echo "service.sh: no systemd-analyze: install the package systemd (deploy/install-packages.sh test)" >&2; exit 1; }
+
+stage=$(mktemp -d "${TMPDIR:-/tmp}/axisd-service.XXXXXX")
+trap 'rm -rf "$stage"' EXIT
+DESTDIR=$stage cmake --install "$build" --prefix /usr >/dev/null
+for program in axisd axisctl axisd-sim; do
+  [ -x "$stage/usr/bin/$program" ] || { echo "service.sh: $program is not installed" >&2; exit 1; }
+done
+
+# The unit names /usr/bin; this computer has the programs elsewhere.
+mkdir "$stage/unit"
+sed "s#/usr/bin/axisd#$stage/usr/bin/axisd#" "$stage/usr/lib/systemd/system/axisd.service" >"$stage/unit/axisd.service"
+complaints=$(systemd-analyze verify --man=no "$stage/unit/axisd.service" 2>&1) || { echo "$complaints"; exit 1; }
+if grep -F axisd.service <<<"$complaints"; then exit 1; fi
+
+# 10 is without any protection; beyond 2.0 somebody has opened something.
+systemd-analyze security --offline=true --threshold=20 "$stage/unit/axisd.service" >"$stage/exposure" ||
+  { cat "$stage/exposure"; exit 1; }
+tail -n 1 "$stage/exposure"
+systemd-sysusers --dry-run "$stage/usr/lib/sysusers.d/axisd.conf"
