@@ -147,6 +147,19 @@ TEST_F(Streams, SlowReaderIsOwedOneBatchAndDelaysNobody) {
   EXPECT_EQ(watch->batch.tick(), old + 1);
 }
 
+TEST_F(Streams, OwnStreamsNeverLockOutAStop) {
+  serve();
+  std::vector<std::unique_ptr<Watch>> watches;
+  for (int i = 0; i < 64; ++i) {
+    watches.push_back(std::make_unique<Watch>(*axes_, 60s));
+    ASSERT_TRUE(watches.back()->read()) << i;
+  }
+  Watch beyond(*axes_, 60s);
+  EXPECT_FALSE(beyond.read());
+  EXPECT_EQ(detail_of(beyond.reader->Finish()).reason(), v1::REASON_BUSY);
+  stop_axis();  // on the same connection
+}
+
 TEST_F(Streams, ReaderThatNeverReadsIsCancelled) {
   serve({.limits = {.calls = 8, .streams = 1}, .stalled_reader_limit = 500ms});
   publish_large(1);
