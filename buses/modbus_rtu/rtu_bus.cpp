@@ -159,7 +159,15 @@ void RtuBus::note_late_read(const Request& request, const ExchangeResult& result
   }
 }
 
+void RtuBus::close() {
+  closed_ = true;
+  on_port({.open = false, .error = Error{.reason = Reason::cancelled, .message = "the bus is being closed"}});
+  if (current_ && line_->revoke())
+    end(std::exchange(current_, nullptr), {.status = ExchangeStatus::not_sent});
+}
+
 void RtuBus::on_port(const PortStatus& status) {
+  if (closed_ && status.open) return;
   port_ = status;
   if (port_.error) port_.error->where.bus = settings_.name;
   late_reads_.clear();

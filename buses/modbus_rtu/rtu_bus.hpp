@@ -49,6 +49,10 @@ class RtuBus {
   /// stop before its frame is queued.
   void purge_superseded();
 
+  /// Ends everything that waits; what is under way is still awaited. Nothing is accepted any more.
+  void close();
+  [[nodiscard]] bool idle() const { return current_ == nullptr && queue_.size() == 0; }
+
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
   [[nodiscard]] const PortStatus& port() const { return port_; }
   /// Fires when the port opens or is lost.
@@ -87,6 +91,7 @@ class RtuBus {
   std::map<std::uint8_t, LateRead> late_reads_;
   Clock::Timer expiry_;
   BusCounters counters_;
+  bool closed_ = false;
   ExchangeObserver observer_;
 };
 

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <boost/smart_ptr/make_shared.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -23,8 +24,8 @@ modbus_rtu::RtuBus* bus_named(const std::vector<std::unique_ptr<modbus_rtu::RtuB
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
     : parts_(std::move(parts)), book_(*parts_.clock, parts_.instance_id) {
   if (parts_.persistence != nullptr) {
-    inhibited_ = parts_.persistence->loaded().inhibit.active;
-    inhibited_by_ = parts_.persistence->loaded().inhibit.by;
+    const auto& inhibit = parts_.persistence->loaded().inhibit;
+    set_inhibit(inhibit.active, inhibit.by);
   }
   for (const auto& line : configuration.buses)
     buses_.push_back(
@@ -59,6 +60,11 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
 
 MachineCore::~MachineCore() = default;
 
+void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
+  inhibited_ = inhibited;
+  inhibited_by_.store(inhibited ? boost::make_shared<const std::string>(by) : nullptr);
+}
+
 void MachineCore::start() {
   for (const auto& bus : buses_) bus->start(parts_.observer);
   for (const auto& axis : axes_) axis->start();
@@ -81,8 +87,7 @@ Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& ac
 }
 
 std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client) {
-  inhibited_ = true;
-  inhibited_by_ = client;
+  set_inhibit(true, client);
   spdlog::warn("StopAll by {}: motion is inhibited until it is released", client);
   if (parts_.persistence != nullptr)
     parts_.persistence->save_inhibit(
@@ -107,8 +112,7 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client)
 void MachineCore::release_inhibit(const std::string& client, std::function<void(Result<void>)> done) {
   auto release = [this, client, done = std::move(done)](const Result<void>& saved) {
     if (saved) {
-      inhibited_ = false;
-      inhibited_by_.clear();
+      set_inhibit(false, client);
       spdlog::warn("StopAll released by {}", client);
       for (const auto& axis : axes_) axis->refresh();
     }
@@ -126,6 +130,16 @@ void MachineCore::stop_moving_axes() {
 
 bool MachineCore::at_rest() const {
   return std::ranges::all_of(axes_, [](const auto& axis) { return axis->at_rest(); });
+}
+
+void MachineCore::close() {
+  for (const auto& axis : axes_) axis->close();
+  for (const auto& bus : buses_) bus->close();
+}
+
+bool MachineCore::closed() const {
+  return std::ranges::all_of(axes_, [](const auto& axis) { return axis->closed(); }) &&
+         std::ranges::all_of(buses_, [](const auto& bus) { return bus->idle(); });
 }
 
 std::vector<BusStatus> MachineCore::bus_status() const {

@@ -47,20 +47,25 @@ class MachineCore {
   std::vector<Result<CommandPtr>> stop_all(const std::string& client);
   /// Ends the inhibit once that is durable.
   void release_inhibit(const std::string& client, std::function<void(Result<void>)> done);
-  [[nodiscard]] bool inhibited() const { return inhibited_; }
-  [[nodiscard]] const std::string& inhibited_by() const { return inhibited_by_; }
+  /// Who latched the inhibit, or nullptr. Thread: any.
+  [[nodiscard]] boost::shared_ptr<const std::string> inhibited_by() const { return inhibited_by_.load(); }
   /// Halts what moves, for the end of the daemon.
   void stop_moving_axes();
   [[nodiscard]] bool at_rest() const;
   [[nodiscard]] std::vector<BusStatus> bus_status() const;
+  /// Ends all sequences; then closed() comes true and the machine can be destroyed. Moves nothing.
+  void close();
+  [[nodiscard]] bool closed() const;
   /// Every bus is open, or it is known why not.
   [[nodiscard]] bool buses_reported() const;
 
  private:
+  void set_inhibit(bool inhibited, const std::string& by);
+
   MachineParts parts_;
   CommandBook book_;
   bool inhibited_ = false;
-  std::string inhibited_by_;
+  boost::atomic_shared_ptr<const std::string> inhibited_by_;
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> buses_;
   std::vector<std::unique_ptr<Axis>> axes_;
   std::map<std::string, Axis*, std::less<>> by_name_;

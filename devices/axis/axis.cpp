@@ -28,7 +28,24 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
 
 Axis::~Axis() = default;
 
-void Axis::start() { spawn(env_.executor, run(), settings_.name); }
+void Axis::start() { launch(run(), "link"); }
+
+void Axis::launch(Task<> sequence, const char* name) {
+  ++sequences_;
+  auto counted = [](Task<> inner, int& count) -> Task<> {
+    co_await std::move(inner);
+    --count;
+  };
+  spawn(env_.executor, counted(std::move(sequence), sequences_), fmt::format("{} {}", settings_.name, name));
+}
+
+void Axis::close() {
+  closing_ = true;
+  link_ = LinkState::offline;
+  supersede(error(Reason::cancelled, "the daemon ends"));
+  publish();
+  for (auto* signal : {&sampled_, &wake_, &stopped_}) signal->notify_all();
+}
 
 Error Axis::error(Reason reason, std::string message, std::string remedy) const {
   return {.reason = reason,

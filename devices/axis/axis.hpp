@@ -63,6 +63,10 @@ class Axis {
   /// Connects to the drive, now and whenever it was lost. Never moves or enables anything (M1).
   void start();
 
+  /// Ends all sequences; they run out on the core thread until closed(). The drive is left as it is.
+  void close();
+  [[nodiscard]] bool closed() const { return closing_ && sequences_ == 0; }
+
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
   Result<CommandPtr> release_stop();
@@ -116,6 +120,9 @@ class Axis {
    private:
     Axis* axis_;
   };
+
+  /// Runs a sequence and counts it while it lives.
+  void launch(Task<> sequence, const char* name);
 
   // axis_link.cpp: the way to the drive
   Task<> run();
@@ -221,6 +228,8 @@ class Axis {
   Signal wake_;     ///< the poll loop has something to look at
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
+  int sequences_ = 0;  ///< coroutines that still run
+  bool closing_ = false;
 
   ActivityPtr activity_;
   Stopping stopping_;

@@ -93,7 +93,8 @@ Task<bool> Axis::back_off(ActivityPtr activity) {
 /// it.
 Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed_before) {
   const auto& homing = *settings_.homing;
-  const auto origin = tracker_.counter();
+  auto origin = tracker_.counter();
+  auto previous = origin;
   const auto latest = since + homing.timeout;
   const auto start_by = since + milliseconds(500);
   const auto offset = std::abs(scale_.to_pulses(homing.offset));
@@ -116,6 +117,11 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
                                         "check the switch, limit and stop terminals"));
         co_return false;
       }
+      // The drive zeroes its counter at home: a step that no motor makes between two samples is no travel.
+      const auto step = tracker_.counter() - previous;
+      previous = tracker_.counter();
+      if (std::abs(step) > settings_.scale.pulses_per_revolution * planner_.maximum_rpm() / 60)
+        origin += step;
       const auto travel = std::abs(scale_.to_units(tracker_.counter()) - scale_.to_units(origin));
       if (homing.max_travel && travel > *homing.max_travel) {
         fail_with_stop(*activity, error(Reason::not_reached,

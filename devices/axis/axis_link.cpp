@@ -20,7 +20,7 @@ constexpr auto found_motion_poll = milliseconds(30);
 }  // namespace
 
 Task<> Axis::run() {
-  for (;;) {
+  while (!closing_) {
     co_await connect();
     co_await poll();
   }
@@ -28,9 +28,11 @@ Task<> Axis::run() {
 
 Task<> Axis::connect() {
   Duration backoff = first_backoff;
-  while (link_ != LinkState::online) {
+  while (!closing_ && link_ != LinkState::online) {
     co_await wait_for_port();
+    if (closing_) co_return;
     const auto connected = co_await try_connect();
+    if (closing_) co_return;
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
@@ -54,7 +56,7 @@ Task<> Axis::connect() {
 }
 
 Task<> Axis::wait_for_port() {
-  while (!env_.bus->port().open) {
+  while (!closing_ && !env_.bus->port().open) {
     link_ = LinkState::offline;
     link_error_ = env_.bus->port().error.value_or(
         error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists"));
@@ -91,7 +93,7 @@ Task<Result<void>> Axis::settle_found_motion() {
   const auto began = env_.clock->now();
   const auto patience = deceleration_bound() + settings_.stop_margin;
   auto kind = StopKind::stop;
-  while (sample_->moving && !by_terminal()) {
+  while (sample_->moving && !by_terminal() && !closing_) {
     if (!stop_owed_) spdlog::warn("{}: found moving; stopping it", settings_.name);
     stop_owed_ = true;
     const auto sent = co_await drive_->stop(kind);

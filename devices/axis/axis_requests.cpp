@@ -9,6 +9,13 @@
 namespace axisd {
 
 Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& options) {
+  // Stops and disables are never deduplicated: each one is executed.
+  if (std::holds_alternative<StopRequest>(action) || std::holds_alternative<DisableRequest>(action)) {
+    gate_->take_stop_request();
+    auto always = options;
+    always.request_id.clear();
+    return std::visit([&](const auto& request) { return accept(request, always); }, action);
+  }
   auto repeat = env_.book->find_repeat(settings_.name, action, options);
   if (!repeat || *repeat != nullptr) return repeat;
   return std::visit([&](const auto& request) { return accept(request, options); }, action);
@@ -110,7 +117,7 @@ Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptio
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
   const auto activity = begin(request, options, AxisState::standstill, {});
   // Not yet enabled: state() follows the drive's own bit.
-  spawn(env_.executor, run_enable(activity), settings_.name + " enable");
+  launch(run_enable(activity), "enable");
   return activity->command;
 }
 
@@ -119,7 +126,7 @@ Result<CommandPtr> Axis::accept(const DisableRequest& request, const CommandOpti
   supersede(error(Reason::superseded, "the axis is being disabled"));
   begin_stop(StopKind::stop, false, nullptr);
   const auto activity = begin(request, options, AxisState::standstill, {});
-  spawn(env_.executor, run_disable(activity), settings_.name + " disable");
+  launch(run_disable(activity), "disable");
   return activity->command;
 }
 
@@ -137,7 +144,7 @@ Result<CommandPtr> Axis::accept(const HomeRequest& request, const CommandOptions
   plan.granted.acceleration_time = settings_.homing->acceleration_time;
   plan.deceleration_time = settings_.homing->acceleration_time;
   const auto activity = begin(request, options, AxisState::homing, std::move(plan));
-  spawn(env_.executor, run_home(activity), settings_.name + " home");
+  launch(run_home(activity), "home");
   return activity->command;
 }
 
@@ -157,10 +164,14 @@ Result<CommandPtr> Axis::accept(const MoveAbsoluteRequest& request, const Comman
     return fail(error(Reason::invalid_argument, "the position is not a number", "give a finite position"));
   if (settings_.require_trust && tracker_.trust() == PositionTrust::unknown)
     return fail(error(Reason::not_trusted, "the position is unknown", "home the axis, or set its position"));
-  const auto plan = plan_move(tracker_.plan_absolute(request.position), request.with);
+  auto position = request.position;
+  // A rotary axis goes the shorter way round.
+  if (settings_.scale.modulo)
+    position = tracker_.position() + std::remainder(position - tracker_.position(), *settings_.scale.modulo);
+  const auto plan = plan_move(tracker_.plan_absolute(position), request.with);
   if (!plan) return fail(plan.error());
   const auto activity = begin(request, options, AxisState::discrete_motion, *plan);
-  spawn(env_.executor, run_move(activity), settings_.name + " move");
+  launch(run_move(activity), "move");
   return activity->command;
 }
 
@@ -187,7 +198,7 @@ Result<CommandPtr> Axis::accept(const MoveRelativeRequest& request, const Comman
   if (!plan) return fail(plan.error());
   plan->granted.distance = *plan->granted.position - tracker_.position();
   const auto activity = begin(request, options, AxisState::discrete_motion, *plan);
-  spawn(env_.executor, run_move(activity), settings_.name + " move");
+  launch(run_move(activity), "move");
   return activity->command;
 }
 
@@ -234,7 +245,7 @@ Result<CommandPtr> Axis::accept(const MoveVelocityRequest& request, const Comman
   plan->granted.hold = request.hold;
   const auto activity = begin(request, options, AxisState::continuous_motion, *plan);
   if (request.hold) activity->hold_until = env_.clock->now() + *request.hold;
-  spawn(env_.executor, run_velocity(activity), settings_.name + " velocity");
+  launch(run_velocity(activity), "velocity");
   return activity->command;
 }
 
@@ -252,12 +263,11 @@ Result<CommandPtr> Axis::accept(const JogRequest& request, const CommandOptions&
   plan->granted.hold = request.hold;
   const auto activity = begin(request, options, AxisState::continuous_motion, *plan);
   activity->hold_until = env_.clock->now() + request.hold;
-  spawn(env_.executor, run_velocity(activity), settings_.name + " jog");
+  launch(run_velocity(activity), "jog");
   return activity->command;
 }
 
 Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions& options) {
-  gate_->take_stop_request();
   auto command = env_.book->open(settings_.name, request, options);
   if (activity_) stopping_.shown = activity_->state;
   supersede(error(Reason::superseded,
@@ -284,7 +294,7 @@ Result<CommandPtr> Axis::accept(const ResetRequest& request, const CommandOption
     }
   }
   const auto activity = begin(request, options, AxisState::standstill, {});
-  spawn(env_.executor, run_reset(activity), settings_.name + " reset");
+  launch(run_reset(activity), "reset");
   return activity->command;
 }
 
@@ -298,7 +308,7 @@ Result<CommandPtr> Axis::accept(const SetPositionRequest& request, const Command
     return fail(
         error(Reason::invalid_argument, "the position is not a usable number", "give a finite position"));
   const auto activity = begin(request, options, AxisState::standstill, {});
-  spawn(env_.executor, run_set_position(activity), settings_.name + " set position");
+  launch(run_set_position(activity), "set position");
   return activity->command;
 }
 

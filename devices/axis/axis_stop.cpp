@@ -31,7 +31,7 @@ void Axis::begin_stop(StopKind kind, bool hold, CommandPtr command) {
   }
   if (!stopping_.running) {
     stopping_.running = true;
-    spawn(env_.executor, run_stop(), settings_.name + " stop");
+    launch(run_stop(), "stop");
   } else {
     sampled_.notify_all();  // the running sequence sends this one, too
   }

@@ -105,7 +105,8 @@ Result<void> Planner::check_soft_limits(double target, double from) const {
 
 Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
                            const PositionTracker& tracker) const {
-  // Without trust the numbers mean nothing; what bounds such moves then is jog_travel, or a waiver in the YAML.
+  // Without trust the numbers mean nothing; what bounds such moves then is jog_travel, or a waiver in the
+  // YAML.
   if (tracker.trust() != PositionTrust::unknown || !settings_->require_trust)
     if (const auto allowed = check_soft_limits(target.position, tracker.position()); !allowed)
       return fail(allowed.error());

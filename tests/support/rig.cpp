@@ -73,6 +73,12 @@ Rig::Rig(RigOptions options) : invert_(options.invert) {
     EXPECT_TRUE(run_until([this] { return state()->link == LinkState::online; }, std::chrono::seconds(5)));
 }
 
+Rig::~Rig() {
+  machine->close();
+  EXPECT_TRUE(run_until([this] { return machine->closed(); }, std::chrono::seconds(60)))
+      << "sequences left over";
+}
+
 Result<CommandPtr> Rig::try_submit(const Action& action, CommandOptions options) {
   return machine->submit("feeder", action, options);
 }

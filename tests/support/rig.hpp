@@ -30,6 +30,7 @@ struct RigOptions {
 class Rig {
  public:
   explicit Rig(RigOptions options = {});
+  ~Rig();
 
   VirtualWorld world;
   config::Configuration configuration;

@@ -1,0 +1,159 @@
+#include "daemon/core/machine_service.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+namespace axisd::core {
+
+namespace {
+
+bool reached(const Command& command, WaitUntil until) {
+  if (ended(command.state) || until == WaitUntil::accepted) return true;
+  return until == WaitUntil::started && command.state == CommandState::active;
+}
+
+std::unexpected<Error> closing() {
+  return fail(Reason::cancelled, "the daemon is shutting down", "repeat the request when it is back");
+}
+
+std::unexpected<Error> unknown_command(const std::string& id) {
+  return fail(Reason::unknown_command, fmt::format("there is no command '{}' (any more)", id),
+              "commands are remembered for 30 minutes, and not over a restart");
+}
+
+}  // namespace
+
+MachineService::MachineService(CoreLoop& loop, MachineCore& machine, std::string name,
+                               std::string instance_id)
+    : loop_(&loop), machine_(&machine), name_(std::move(name)), instance_id_(std::move(instance_id)) {
+  for (const auto& axis : machine.axes()) {
+    names_.push_back(axis->settings().name);
+    axes_.emplace(axis->settings().name, axis.get());
+  }
+}
+
+std::vector<std::string> MachineService::axis_names() const { return names_; }
+
+AxisSnapshotPtr MachineService::snapshot(std::string_view axis) const {
+  const auto found = axes_.find(axis);
+  return found == axes_.end() ? nullptr : found->second->snapshot();
+}
+
+MachineInfo MachineService::info() const {
+  MachineInfo info{.machine = name_, .version = AXISD_VERSION, .instance_id = instance_id_};
+  if (const auto by = machine_->inhibited_by()) {
+    info.inhibited = true;
+    info.inhibited_by = *by;
+  }
+  return info;
+}
+
+/// Calls back once, when the command has come as far as the caller wants to wait.
+void MachineService::answer(const Result<CommandPtr>& command, WaitUntil until, CommandCallback callback) {
+  if (!command) return callback(fail(command.error()));
+  if (reached((*command)->value(), until)) return callback((*command)->value());
+  auto pending = std::make_shared<CommandCallback>(std::move(callback));
+  (*command)->observe(pending, [until, keep = pending](const Command& now) {
+    if (*keep && reached(now, until)) std::exchange(*keep, nullptr)(now);
+  });
+}
+
+void MachineService::submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
+                            CommandCallback callback) {
+  const auto found = axes_.find(axis);
+  const auto* stop = std::get_if<StopRequest>(&action);
+  const bool disable = std::holds_alternative<DisableRequest>(action);
+  const auto stop_kind = stop != nullptr ? stop->kind : StopKind::stop;
+  auto serve = [this, axis, action = std::move(action), options = std::move(options), until,
+                callback = std::move(callback)]() mutable {
+    const bool is_stop =
+        std::holds_alternative<StopRequest>(action) || std::holds_alternative<DisableRequest>(action);
+    if (closing_ && !is_stop) return callback(closing());
+    answer(machine_->submit(axis, action, options), until, std::move(callback));
+  };
+  if (found != axes_.end() && (stop != nullptr || disable))
+    loop_->lane().request(*found->second->gate(), stop_kind, std::move(serve));
+  else
+    post(loop_->executor(), std::move(serve));
+}
+
+void MachineService::release_stop(std::string axis, CommandCallback callback) {
+  post(loop_->executor(), [this, axis = std::move(axis), callback = std::move(callback)]() mutable {
+    auto* found = machine_->find(axis);
+    if (found == nullptr)
+      return callback(fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis)));
+    answer(found->release_stop(), WaitUntil::accepted, std::move(callback));
+  });
+}
+
+void MachineService::stop_all(std::string client, WaitUntil until,
+                              std::function<void(std::vector<Result<Command>>)> callback) {
+  struct Gathering {
+    std::vector<Result<Command>> results;
+    std::size_t missing = 0;
+  };
+  auto serve = [this, client = std::move(client), until, callback = std::move(callback)] {
+    const auto commands = machine_->stop_all(client);
+    auto gathering = std::make_shared<Gathering>();
+    gathering->results.assign(commands.size(), fail(Reason::internal, "no answer"));
+    gathering->missing = commands.size();
+    if (commands.empty()) return callback({});
+    for (std::size_t i = 0; i < commands.size(); ++i)
+      answer(commands[i], until, [gathering, i, callback](Result<Command> result) {
+        gathering->results[i] = std::move(result);
+        if (--gathering->missing == 0) callback(std::move(gathering->results));
+      });
+  };
+  if (axes_.empty()) return post(loop_->executor(), std::move(serve));
+  // Every gate is raised here and now; one visit of the core serves all.
+  auto last = std::prev(axes_.end());
+  for (auto axis = axes_.begin(); axis != last; ++axis) axis->second->gate()->request_stop(StopKind::stop);
+  loop_->lane().request(*last->second->gate(), StopKind::stop, std::move(serve));
+}
+
+void MachineService::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {
+  post(loop_->executor(), [this, client = std::move(client), callback = std::move(callback)]() mutable {
+    machine_->release_inhibit(client, std::move(callback));
+  });
+}
+
+void MachineService::get_command(std::string id, CommandCallback callback) {
+  post(loop_->executor(), [this, id = std::move(id), callback = std::move(callback)] {
+    const auto command = machine_->book().find(id);
+    command ? callback(command->value()) : callback(unknown_command(id));
+  });
+}
+
+std::shared_ptr<void> MachineService::watch_command(std::string id, CommandCallback callback) {
+  auto token = std::make_shared<int>(0);
+  post(loop_->executor(),
+       [this, id = std::move(id), callback = std::move(callback), alive = std::weak_ptr<void>(token)] {
+         const auto command = machine_->book().find(id);
+         if (!command) return callback(unknown_command(id));
+         callback(command->value());
+         command->observe(alive, callback);
+       });
+  return token;
+}
+
+void MachineService::cancel_command(std::string id, CommandCallback callback) {
+  post(loop_->executor(), [this, id = std::move(id), callback = std::move(callback)]() mutable {
+    const auto command = machine_->book().find(id);
+    if (!command) return callback(unknown_command(id));
+    answer(machine_->find(command->value().axis)->cancel(command), WaitUntil::accepted, std::move(callback));
+  });
+}
+
+void MachineService::buses(std::function<void(std::vector<BusStatus>)> callback) {
+  post(loop_->executor(), [this, callback = std::move(callback)] { callback(machine_->bus_status()); });
+}
+
+void MachineService::on_published(std::function<void()> notify) { notify_ = std::move(notify); }
+
+void MachineService::published() const {
+  if (notify_) notify_();
+}
+
+}  // namespace axisd::core

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/core/core_loop.hpp"
+#include "daemon/core/machine_core.hpp"
+#include "devices/machine.hpp"
+
+namespace axisd::core {
+
+/// The machine as the API sees it: hands requests to the core thread, stops through the lane. Thread: any,
+/// from construction (before the core runs) to destruction (after it ended).
+class MachineService final : public Machine {
+ public:
+  MachineService(CoreLoop& loop, MachineCore& machine, std::string name, std::string instance_id);
+
+  [[nodiscard]] std::vector<std::string> axis_names() const override;
+  [[nodiscard]] AxisSnapshotPtr snapshot(std::string_view axis) const override;
+  [[nodiscard]] MachineInfo info() const override;
+  void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
+              CommandCallback callback) override;
+  void release_stop(std::string axis, CommandCallback callback) override;
+  void stop_all(std::string client, WaitUntil until,
+                std::function<void(std::vector<Result<Command>>)> callback) override;
+  void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
+  void get_command(std::string id, CommandCallback callback) override;
+  std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
+  void cancel_command(std::string id, CommandCallback callback) override;
+  void buses(std::function<void(std::vector<BusStatus>)> callback) override;
+  void on_published(std::function<void()> notify) override;
+  [[nodiscard]] WallTime wall(TimePoint t) const override { return loop_->clock().wall(t); }
+  [[nodiscard]] TimePoint now() const override { return loop_->clock().now(); }
+
+  /// From now on everything but stops is refused: the daemon is going down.
+  void close() { closing_ = true; }
+  /// Called by the core after each publication.
+  void published() const;
+
+ private:
+  struct Latch;
+  void answer(const Result<CommandPtr>& command, WaitUntil until, CommandCallback callback);
+
+  CoreLoop* loop_;
+  MachineCore* machine_;
+  std::string name_;
+  std::string instance_id_;
+  std::atomic<bool> closing_{false};
+  std::vector<std::string> names_;
+  std::map<std::string, Axis*, std::less<>>
+      axes_;  ///< never changes; only gate() and snapshot() are used here
+  std::function<void()> notify_;
+};
+
+}  // namespace axisd::core

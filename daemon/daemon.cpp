@@ -1,0 +1,252 @@
+// The composition root: the whole program from top to bottom, torn down in reverse.
+#include "daemon/daemon.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <iostream>
+#include <random>
+#include <thread>
+
+#include "api/server/server.hpp"
+#include "buses/modbus_rtu/rtu_worker.hpp"
+#include "daemon/core/core_loop.hpp"
+#include "daemon/core/machine_core.hpp"
+#include "daemon/core/machine_service.hpp"
+#include "daemon/core/quiesce.hpp"
+#include "daemon/logging.hpp"
+#include "daemon/simulated_lines.hpp"
+#include "daemon/store/file_store.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// Longest that the end of the daemon waits for moving axes.
+constexpr auto stop_patience = std::chrono::seconds(10);
+constexpr auto close_patience = std::chrono::seconds(3);
+/// The loops come round at least every second; this is a stall.
+constexpr auto stalled_after = std::chrono::seconds(3);
+constexpr auto quiesce_limit = std::chrono::seconds(4);
+
+/// Copy of the last configuration that was served, for --quiesce when the file itself was broken meanwhile.
+std::filesystem::path last_good(const std::string& state_directory) {
+  return std::filesystem::path(state_directory) / "last-good.yaml";
+}
+
+sigset_t ending_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, number);
+  return set;
+}
+
+/// Starts of the daemon are counted durably, so ids never repeat; the random part tells two state directories
+/// apart.
+std::string make_instance_id(std::uint64_t start_count) {
+  return fmt::format("{:x}{:04x}", start_count, std::random_device{}() & 0xFFFFU);
+}
+
+/// Runs `function` on the core thread and waits for its result.
+template <class Function>
+auto ask_core(core::CoreLoop& loop, Function function) {
+  std::promise<decltype(function())> promise;
+  auto future = promise.get_future();
+  post(loop.executor(), [&] { promise.set_value(function()); });
+  return future.get();
+}
+
+template <class Condition>
+bool wait_until(Condition condition, Duration limit) {
+  const auto end = monotonic_now() + limit;
+  while (!condition()) {
+    if (monotonic_now() >= end) return false;
+    block_until(monotonic_now() + milliseconds(10));
+  }
+  return true;
+}
+
+std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> line_maker(
+    core::CoreLoop& loop, const SimulatedLines& simulated) {
+  return [&loop, &simulated](const modbus_rtu::LineSettings& settings) -> std::unique_ptr<modbus_rtu::Line> {
+    modbus_rtu::RtuWorker::PortPath path;
+    if (settings.simulated())
+      path = [&simulated, name = settings.name]() -> Result<std::string> { return simulated.path(name); };
+    return std::make_unique<modbus_rtu::RtuWorker>(loop.executor(), settings, std::move(path));
+  };
+}
+
+/// Tells systemd that core and workers make progress, until a signal asks for the end.
+void supervise(core::CoreLoop& loop, const core::MachineCore& machine) {
+  const auto signals = ending_signals();
+  std::uint64_t interval_us = 0;
+  const bool watched = sd_watchdog_enabled(0, &interval_us) > 0;
+  for (;;) {
+    const timespec period{.tv_sec = watched && interval_us < 4'000'000 ? 0 : 1,
+                          .tv_nsec = watched ? 300'000'000 : 0};
+    const int number = sigtimedwait(&signals, nullptr, &period);
+    if (number == SIGHUP) spdlog::warn("SIGHUP: reloading is not supported; restart the service");
+    if (number == SIGTERM || number == SIGINT) return;
+    const auto oldest = monotonic_now() - stalled_after;
+    bool alive = loop.last_progress() > oldest;
+    for (const auto& bus : machine.buses()) alive = alive && bus->last_progress() > oldest;
+    if (alive)
+      sd_notify(0, "WATCHDOG=1");
+    else
+      spdlog::critical("core or a bus worker makes no progress");
+  }
+}
+
+/// Stops what moves; true: everything rests.
+bool stop_axes(core::CoreLoop& loop, core::MachineCore& machine) {
+  ask_core(loop, [&] {
+    machine.stop_moving_axes();
+    return true;
+  });
+  return wait_until([&] { return ask_core(loop, [&] { return machine.at_rest(); }); }, stop_patience);
+}
+
+server::ServerOptions server_options(const config::ServerSettings& settings) {
+  server::ServerOptions options{.listen = {settings.listen}};
+  if (settings.tls)
+    options.tls = server::TlsFiles{.certificate = settings.tls->certificate,
+                                   .key = settings.tls->key,
+                                   .client_ca = settings.tls->client_ca};
+  return options;
+}
+
+int give_up(const Error& error) {
+  spdlog::critical("{}", to_string(error));
+  end_logging();
+  return 1;
+}
+
+}  // namespace
+
+int run_daemon(const Options& options, config::Configuration configuration) {
+  const auto signals = ending_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  start_logging(options.log_level);
+
+  core::CoreLoop loop;
+  auto store = store::FileStore::open(configuration.state_directory, loop.executor());
+  if (!store) return give_up(store.error());
+  if ((*store)->damage()) spdlog::error("{}", to_string(*(*store)->damage()));
+  auto simulated = SimulatedLines::open(configuration);
+  if (!simulated) return give_up(simulated.error());
+  modbus_rtu::ExchangeObserver wire_log;
+  if (!options.wire_log.empty()) {
+    auto opened = open_wire_log(options.wire_log);
+    if (!opened) return give_up(opened.error());
+    wire_log = std::move(*opened);
+  }
+
+  const auto instance_id = make_instance_id((*store)->loaded().start_count);
+  core::MachineService* published_to = nullptr;
+  core::MachineCore machine({.executor = loop.executor(),
+                             .clock = &loop.clock(),
+                             .persistence = store->get(),
+                             .instance_id = instance_id,
+                             .make_line = line_maker(loop, **simulated),
+                             .observer = std::move(wire_log),
+                             .published =
+                                 [&published_to] {
+                                   if (published_to != nullptr) published_to->published();
+                                 }},
+                            configuration);
+  core::MachineService service(loop, machine, configuration.machine, instance_id);
+  published_to = &service;
+  server::Server server(service, server_options(configuration.server));
+  machine.start();
+  std::thread core_thread([&loop] {
+    pthread_setname_np(pthread_self(), "axisd-core");
+    loop.run();
+  });
+
+  int status = 1;
+  if (const auto port = server.start(); !port) {
+    spdlog::critical("{}", to_string(port.error()));
+  } else {
+    wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },
+               std::chrono::seconds(1));
+    std::error_code ignored;  // the copy is a convenience of --quiesce
+    std::filesystem::copy_file(options.config, last_good(configuration.state_directory),
+                               std::filesystem::copy_options::overwrite_existing, ignored);
+    spdlog::info("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration.machine,
+                 *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
+                 configuration.axes.size());
+    sd_notify(0, "READY=1");
+    supervise(loop, machine);
+    sd_notify(0, "STOPPING=1");
+    service.close();
+    const bool rests = stop_axes(loop, machine);
+    if (!rests) spdlog::error("not every axis has confirmed its standstill; run axisd --quiesce");
+    status = rests ? 0 : 1;
+  }
+
+  server.shutdown();
+  ask_core(loop, [&] {
+    machine.close();
+    return true;
+  });
+  if (!wait_until([&] { return ask_core(loop, [&] { return machine.closed(); }); }, close_patience)) {
+    spdlog::critical("sequences did not end; leaving at once");
+    end_logging();
+    std::_Exit(1);
+  }
+  loop.stop();
+  core_thread.join();
+  published_to = nullptr;
+  end_logging();
+  return status;
+}
+
+int run_quiesce(const Options& options) {
+  auto loaded = config::load_file(*options.quiesce);
+  if (!loaded.configuration) {
+    for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
+    const auto directory =
+        options.state_directory.empty() ? config::Configuration{}.state_directory : options.state_directory;
+    std::cerr << "axisd: using the last configuration that was served: " << last_good(directory).string()
+              << '\n';
+    loaded = config::load_file(last_good(directory).string());
+  }
+  if (!loaded.configuration) {
+    std::cerr << "axisd: no usable configuration: nothing was stopped\n";
+    return 2;
+  }
+  spdlog::set_level(spdlog::level::off);
+  const auto& configuration = *loaded.configuration;
+  auto simulated = SimulatedLines::open(configuration);
+  if (!simulated) {
+    std::cerr << "axisd: " << to_string(simulated.error()) << '\n';
+    return 1;
+  }
+  std::vector<core::QuiesceReport> reports;
+  {
+    core::CoreLoop loop;
+    auto all = [](core::CoreLoop& core, const config::Configuration& machine, const SimulatedLines& lines,
+                  std::vector<core::QuiesceReport>& out) -> Task<> {
+      out = co_await core::quiesce(core.executor(), core.clock(), machine, line_maker(core, lines),
+                                   quiesce_limit);
+      core.stop();
+    };
+    spawn(loop.executor(), all(loop, configuration, **simulated, reports), "quiesce");
+    loop.run();
+  }
+  bool confirmed = true;
+  for (const auto& report : reports) {
+    std::cout << report.axis << ": " << report.detail << '\n';
+    confirmed = confirmed && report.confirmed;
+  }
+  return confirmed ? 0 : 1;
+}
+
+}  // namespace axisd

@@ -1,0 +1,26 @@
+#include <iostream>
+
+#include "config/configuration.hpp"
+#include "daemon/daemon.hpp"
+#include "daemon/options.hpp"
+
+int main(int argc, char** argv) {
+  const auto options = axisd::parse_options(argc, argv);
+  if (options.schema) {
+    std::cout << axisd::config::json_schema() << '\n';
+    return 0;
+  }
+  if (options.quiesce) return axisd::run_quiesce(options);
+  auto loaded = axisd::config::load_file(options.config);
+  for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
+  if (!loaded.configuration) return 2;
+  auto& configuration = *loaded.configuration;
+  if (!options.state_directory.empty()) configuration.state_directory = options.state_directory;
+  if (!options.listen.empty()) configuration.server.listen = options.listen;
+  if (options.check) {
+    std::cout << options.config << ": ok (" << configuration.axes.size() << " axes on "
+              << configuration.buses.size() << " buses)\n";
+    return 0;
+  }
+  return axisd::run_daemon(options, std::move(configuration));
+}

@@ -1,0 +1,35 @@
+#include "daemon/options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <iostream>
+
+namespace axisd {
+
+Options parse_options(int argc, char** argv) {
+  Options options;
+  CLI::App app("axisd: owns a machine's drive buses and serves their axes over gRPC.", "axisd");
+  app.footer("Exit status: 0 ended in order; 1 failed while running; 2 bad command line or configuration.");
+  app.set_version_flag("--version", std::string("axisd ") + AXISD_VERSION);
+  app.add_option("--config", options.config, "configuration file")->capture_default_str();
+  app.add_flag("--check", options.check, "check the configuration, print every error, and exit");
+  app.add_flag("--schema", options.schema, "print the JSON Schema of the configuration, and exit");
+  app.add_option("--quiesce", options.quiesce, "stop every drive of this configuration, report, and exit");
+  app.add_option("--state-directory", options.state_directory,
+                 "overrides state_directory of the configuration");
+  app.add_option("--listen", options.listen, "overrides server: { listen } of the configuration");
+  app.add_option("--wire-log", options.wire_log, "append every frame with its time to this file");
+  app.add_option("--log-level", options.log_level, "trace, debug, info, warn, error")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) std::exit(app.exit(error));
+    std::cerr << "axisd: " << error.what() << "; see axisd --help\n";
+    std::exit(2);
+  }
+  return options;
+}
+
+}  // namespace axisd

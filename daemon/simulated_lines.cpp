@@ -1,0 +1,57 @@
+#include "daemon/simulated_lines.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/simulation/simulator.hpp"
+#include "devices/units/scale.hpp"
+
+namespace axisd {
+
+simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry) {
+  const Scale scale(entry.axis.scale);
+  const auto& simulate = entry.simulation;
+  const auto pulses = [&](double units) { return scale.to_pulses(units - simulate.start_position); };
+  simulation::SimulatedNodeSettings node{.address = entry.axis.node};
+  auto& mechanics = node.mechanics;
+  if (simulate.home_switch) {
+    const auto edges =
+        std::minmax(pulses(*simulate.home_switch), pulses(*simulate.home_switch + simulate.home_width));
+    mechanics.home_switch_from = edges.first;
+    mechanics.home_switch_to = edges.second;
+  }
+  if (simulate.positive_limit) mechanics.positive_limit_from = pulses(*simulate.positive_limit);
+  if (simulate.negative_limit) mechanics.negative_limit_from = pulses(*simulate.negative_limit);
+  if (entry.axis.scale.invert) std::swap(mechanics.positive_limit_from, mechanics.negative_limit_from);
+  return node;
+}
+
+Result<std::unique_ptr<SimulatedLines>> SimulatedLines::open(const config::Configuration& configuration) {
+  auto lines = std::make_unique<SimulatedLines>();
+  for (const auto& bus : configuration.buses) {
+    if (!bus.simulated()) continue;
+    std::vector<std::unique_ptr<simulation::SimulatedRtuNode>> nodes;
+    for (const auto& entry : configuration.axes) {
+      if (entry.axis.bus != bus.name) continue;
+      const auto* simulator = simulation::find_simulator(entry.axis.model);
+      if (simulator == nullptr)
+        return fail(Reason::not_supported, fmt::format("there is no simulated {}", entry.axis.model));
+      nodes.push_back(simulator->make(simulated_node(entry)));
+    }
+    auto line = simulation::PtyLine::open(
+        {.network = {.baud = bus.baud, .bits_per_character = bus.format.bits_per_character()}},
+        std::move(nodes));
+    if (!line) return fail(line.error());
+    lines->lines_.emplace(bus.name, std::move(*line));
+  }
+  return lines;
+}
+
+std::string SimulatedLines::path(const std::string& bus) const {
+  const auto found = lines_.find(bus);
+  return found == lines_.end() ? std::string() : found->second->path();
+}
+
+}  // namespace axisd
