@@ -1,0 +1,82 @@
+#include "api/axisctl/client.hpp"
+
+#include <fmt/format.h>
+#include <grpc/support/log.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+
+#include <array>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+namespace axisd::axisctl {
+namespace {
+
+std::string read_pem(const std::string& path, std::string_view option) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file || text.empty())
+    throw Failure(ExitCode::usage, fmt::format("{}: cannot read '{}'; it must be a PEM file", option, path));
+  return text;
+}
+
+std::shared_ptr<grpc::ChannelCredentials> credentials(const Connection& connection) {
+  if (connection.tls_certificate.empty() != connection.tls_key.empty())
+    throw Failure(ExitCode::usage, "--tls-cert and --tls-key belong together");
+  if (connection.tls_ca.empty()) {
+    if (!connection.tls_certificate.empty())
+      throw Failure(ExitCode::usage,
+                    "--tls-cert needs --tls-ca, the certificate that the daemon's is checked with");
+    return grpc::InsecureChannelCredentials();
+  }
+  grpc::SslCredentialsOptions options;
+  options.pem_root_certs = read_pem(connection.tls_ca, "--tls-ca");
+  if (!connection.tls_certificate.empty()) {
+    options.pem_cert_chain = read_pem(connection.tls_certificate, "--tls-cert");
+    options.pem_private_key = read_pem(connection.tls_key, "--tls-key");
+  }
+  return grpc::SslCredentials(options);
+}
+
+grpc::ChannelArguments arguments() {
+  grpc::ChannelArguments arguments;
+  // The daemon permits one ping per second; faster ones are answered with GOAWAY.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 2000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 1000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  // A machine is on the local network; an http_proxy of the environment must not redirect its commands.
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // A call that failed is reported, never sent again behind the user's back.
+  arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
+  // Without this, two channel objects of one process share one connection.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  return arguments;
+}
+
+}  // namespace
+
+Client::Client(Connection connection) : connection_(std::move(connection)) {
+  // Errors are one line on standard error; gRPC's own log would add to it. GRPC_VERBOSITY brings it back.
+  if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
+  const auto trusted = credentials(connection_);
+  channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
+  stop_channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
+}
+
+Failure Client::failure(const grpc::Status& status, std::string_view subject) const {
+  return failure_of(status, subject, connection_.server, !connection_.tls_ca.empty());
+}
+
+std::string random_uuid() {
+  std::random_device source;
+  std::array<std::uint32_t, 4> words{source(), source(), source(), source()};
+  words[1] = (words[1] & 0xFFFF0FFFU) | 0x4000U;      // version 4
+  words[2] = (words[2] & 0x3FFFFFFFU) | 0x80000000U;  // variant of RFC 4122
+  return fmt::format("{:08x}-{:04x}-{:04x}-{:04x}-{:04x}{:08x}", words[0], words[1] >> 16U,
+                     words[1] & 0xFFFFU, words[2] >> 16U, words[2] & 0xFFFFU, words[3]);
+}
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,70 @@
+// The connection to a daemon.
+#pragma once
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "api/axisctl/error.hpp"
+
+namespace axisd::axisctl {
+
+struct Connection {
+  std::string server = "localhost:7443";  ///< HOST:PORT or unix:PATH
+  std::string tls_ca;                     ///< PEM file; TLS is used if it is set
+  std::string tls_certificate, tls_key;   ///< PEM files of the client, both or none
+  std::chrono::nanoseconds timeout = std::chrono::seconds(10);
+};
+
+/// Stops travel on a connection of their own, so that nothing this program has open or queued can delay one.
+enum class Lane : std::uint8_t { ordinary, stop };
+
+/// Connects on first use. Thread: any.
+class Client {
+ public:
+  /// Reads the certificates. Throws Failure (usage) if they cannot be read.
+  explicit Client(Connection connection);
+
+  /// One call, with the time limit of --timeout. `subject` leads the text of errors. Throws Failure.
+  template <class Response, class Stub, class Request>
+  Response call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                const Request& request, std::string_view subject, Lane lane = Lane::ordinary) const {
+    return call_within(connection_.timeout, method, request, subject, lane);
+  }
+
+  /// The same with another time limit; zero or less: none.
+  template <class Response, class Stub, class Request>
+  Response call_within(std::chrono::nanoseconds limit,
+                       grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                       const Request& request, std::string_view subject, Lane lane = Lane::ordinary) const {
+    grpc::ClientContext context;
+    if (limit.count() > 0)
+      context.set_deadline(std::chrono::system_clock::now() +
+                           std::chrono::duration_cast<std::chrono::system_clock::duration>(limit));
+    Stub stub(channel(lane));
+    Response response;
+    if (const auto status = (stub.*method)(&context, request, &response); !status.ok())
+      throw failure(status, subject);
+    return response;
+  }
+
+  /// For streams: they have no time limit; keep-alive notices a daemon that is gone.
+  [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel(Lane lane = Lane::ordinary) const {
+    return lane == Lane::stop ? stop_channel_ : channel_;
+  }
+  [[nodiscard]] Failure failure(const grpc::Status& status, std::string_view subject) const;
+
+ private:
+  Connection connection_;
+  std::shared_ptr<grpc::Channel> channel_, stop_channel_;
+};
+
+/// A random UUID (version 4): the request_id of one invocation.
+std::string random_uuid();
+
+}  // namespace axisd::axisctl

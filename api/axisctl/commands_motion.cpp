@@ -1,0 +1,165 @@
+// enable, disable, home, move, velocity, reset, set-position.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "api/axisctl/duration.hpp"
+#include "api/axisctl/invocation.hpp"
+#include "api/axisctl/motion_arguments.hpp"
+#include "api/axisctl/progress.hpp"
+#include "api/axisctl/quantity.hpp"
+#include "axisd/v1/axis_service.grpc.pb.h"
+
+namespace axisd::axisctl {
+namespace {
+
+using Stub = v1::AxisService::Stub;
+using Arguments = std::shared_ptr<MotionArguments>;
+
+void finish(Invocation& invocation, const MotionArguments& arguments,
+            const std::vector<v1::Command>& commands, const v1::AxisState& before) {
+  invocation.status = report(
+      invocation, commands, arguments.wait,
+      {.unit = before.unit(), .start = before.position(), .halt_on_interrupt = arguments.halt_on_interrupt});
+}
+
+/// Fills what all requests with a velocity profile share.
+void set_ramps(auto& request, const MotionArguments& arguments) {
+  if (!arguments.acceleration_time.empty())
+    set(*request.mutable_acceleration_time(),
+        parse_duration(arguments.acceleration_time, "--acceleration-time"));
+  if (!arguments.deceleration_time.empty())
+    set(*request.mutable_deceleration_time(),
+        parse_duration(arguments.deceleration_time, "--deceleration-time"));
+}
+
+void set_profile(auto& request, const MotionArguments& arguments, const std::string& unit) {
+  if (!arguments.velocity.empty())
+    request.set_velocity(parse_value(arguments.velocity, unit + "/s", "--velocity"));
+  set_ramps(request, arguments);
+}
+
+void move(Invocation& invocation, const MotionArguments& arguments, bool relative) {
+  const auto before = invocation.state(arguments.axis());
+  const double value = parse_value(arguments.value, before.unit(), relative ? "distance" : "position");
+  const auto request_move = [&](auto request, auto method, auto&& set_value) {
+    request.set_axis(arguments.axis());
+    set_value(request);
+    set_profile(request, arguments, before.unit());
+    *request.mutable_options() = command_options(arguments);
+    finish(invocation, arguments, {send(invocation, method, request)}, before);
+  };
+  if (relative)
+    request_move(v1::MoveRelativeRequest(), &Stub::MoveRelative, [&](auto& r) { r.set_distance(value); });
+  else
+    request_move(v1::MoveAbsoluteRequest(), &Stub::MoveAbsolute, [&](auto& r) { r.set_position(value); });
+}
+
+void velocity(Invocation& invocation, const MotionArguments& arguments) {
+  const auto before = invocation.state(arguments.axis());
+  v1::MoveVelocityRequest request;
+  request.set_axis(arguments.axis());
+  request.set_velocity(parse_value(arguments.value, before.unit() + "/s", "velocity"));
+  if (!arguments.hold.empty()) set(*request.mutable_hold(), parse_duration(arguments.hold, "--hold"));
+  set_ramps(request, arguments);
+  *request.mutable_options() = command_options(arguments);
+  finish(invocation, arguments, {send(invocation, &Stub::MoveVelocity, request)}, before);
+}
+
+void set_position(Invocation& invocation, const MotionArguments& arguments) {
+  const auto before = invocation.state(arguments.axis());
+  v1::SetPositionRequest request;
+  request.set_axis(arguments.axis());
+  request.set_position(parse_value(arguments.value, before.unit(), "position"));
+  *request.mutable_options() = command_options(arguments);
+  finish(invocation, arguments, {send(invocation, &Stub::SetPosition, request)}, before);
+}
+
+/// Commands that need nothing but the axis: all are sent before the first is followed.
+template <class Request, class Response>
+void simple(Invocation& invocation, const MotionArguments& arguments,
+            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  std::vector<v1::Command> commands;
+  v1::AxisState before;
+  for (const auto& axis : arguments.axes) {
+    before = invocation.state(axis);
+    Request request;
+    request.set_axis(axis);
+    *request.mutable_options() = command_options(arguments);
+    commands.push_back(send(invocation, method, request));
+  }
+  finish(invocation, arguments, commands, before);
+}
+
+CLI::App* add(CLI::App& app, const std::string& name, const std::string& help, const Arguments& arguments) {
+  auto* command = app.add_subcommand(name, help);
+  add_options(*command, *arguments);
+  add_wait(*command, *arguments);
+  return command;
+}
+
+void add_halt_on_interrupt(CLI::App& command, MotionArguments& arguments) {
+  command.add_flag("--halt-on-interrupt", arguments.halt_on_interrupt,
+                   "With --wait: Ctrl-C halts the axis (without it the command goes on)");
+  command.add_flag("--buffered", arguments.buffered,
+                   "Start when the present command is done instead of ending it");
+}
+
+template <class Request, class Response>
+void add_simple(CLI::App& app, Invocation& invocation, const std::string& name, const std::string& help,
+                grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  const auto arguments = std::make_shared<MotionArguments>();
+  auto* command = add(app, name, help, arguments);
+  add_several_axes(*command, *arguments);
+  command->get_option("AXIS")->required();
+  if (name == "home") add_halt_on_interrupt(*command, *arguments);
+  command->callback([&invocation, arguments, method] { simple(invocation, *arguments, method); });
+}
+
+void add_move(CLI::App& app, Invocation& invocation) {
+  const auto arguments = std::make_shared<MotionArguments>();
+  const auto relative = std::make_shared<bool>(false);
+  auto* command =
+      add(app, "move", "Move to a position, or by a distance: axisctl move feeder 120mm --wait", arguments);
+  add_axis(*command, *arguments);
+  command
+      ->add_option("VALUE", arguments->value,
+                   "Position or distance, with or without the axis's unit: 120mm, -10")
+      ->required();
+  command->add_flag("--relative", *relative, "VALUE is a distance from the last commanded target");
+  command->add_option("--velocity", arguments->velocity, "Per second: 50mm/s (default: the axis's limit)")
+      ->type_name("VALUE");
+  add_ramps(*command, *arguments);
+  add_halt_on_interrupt(*command, *arguments);
+  command->callback([&invocation, arguments, relative] { move(invocation, *arguments, *relative); });
+}
+
+void add_velocity(CLI::App& app, Invocation& invocation) {
+  const auto arguments = std::make_shared<MotionArguments>();
+  auto* command = add(app, "velocity", "Move at a velocity, endlessly or towards the soft limit", arguments);
+  add_axis(*command, *arguments);
+  command->add_option("VALUE", arguments->value, "Signed, per second: 20mm/s, -20")->required();
+  command->add_option("--hold", arguments->hold, "Halt unless the call is repeated within this time: 500ms")
+      ->type_name("TIME");
+  add_ramps(*command, *arguments);
+  add_halt_on_interrupt(*command, *arguments);
+  command->callback([&invocation, arguments] { velocity(invocation, *arguments); });
+}
+
+}  // namespace
+
+void add_motion_commands(CLI::App& app, Invocation& invocation) {
+  add_simple(app, invocation, "enable", "Switch the power stage on; never moves", &Stub::Enable);
+  add_simple(app, invocation, "disable", "Stop, wait for standstill, switch the power stage off",
+             &Stub::Disable);
+  add_simple(app, invocation, "home", "Search the home position as configured", &Stub::Home);
+  add_move(app, invocation);
+  add_velocity(app, invocation);
+  add_simple(app, invocation, "reset", "Leave ErrorStop if the cause is gone; never moves", &Stub::Reset);
+  const auto arguments = std::make_shared<MotionArguments>();
+  auto* command = add(app, "set-position", "Declare the present position; at standstill only", arguments);
+  add_axis(*command, *arguments);
+  command->add_option("VALUE", arguments->value, "What the present position shall be: 0, 12.5mm")->required();
+  command->callback([&invocation, arguments] { set_position(invocation, *arguments); });
+}
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,66 @@
+// check, schema, completion: nothing here talks to a daemon.
+#include <fmt/format.h>
+#include <google/protobuf/struct.pb.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "api/axisctl/completion.hpp"
+#include "api/axisctl/format.hpp"
+#include "api/axisctl/invocation.hpp"
+#include "api/axisctl/terminal.hpp"
+#include "config/configuration.hpp"
+
+namespace axisd::axisctl {
+namespace {
+
+google::protobuf::Struct as_message(const config::LoadResult& result) {
+  google::protobuf::Struct message;
+  (*message.mutable_fields())["valid"].set_bool_value(result.configuration.has_value());
+  auto& list = *(*message.mutable_fields())["diagnostics"].mutable_list_value();
+  for (const auto& diagnostic : result.diagnostics) {
+    auto& fields = *list.add_values()->mutable_struct_value()->mutable_fields();
+    fields["file"].set_string_value(diagnostic.file);
+    fields["line"].set_number_value(diagnostic.line);
+    fields["column"].set_number_value(diagnostic.column);
+    fields["message"].set_string_value(diagnostic.message);
+    fields["suggestion"].set_string_value(diagnostic.suggestion);
+  }
+  return message;
+}
+
+void check(Invocation& invocation, const std::string& path) {
+  const auto result = config::load_file(path);
+  if (!result.configuration) invocation.status = ExitCode::usage;
+  if (invocation.json) return print_line(json(as_message(result)));
+  for (const auto& diagnostic : result.diagnostics) fmt::print(stderr, "{}\n", config::to_string(diagnostic));
+  if (result.configuration)
+    print_line(fmt::format("{}: ok, machine '{}', axes: {}, buses: {}", path, result.configuration->machine,
+                           result.configuration->axes.size(), result.configuration->buses.size()));
+  else
+    fmt::print(stderr, "axisctl: {}: {} error{}\n", path, result.diagnostics.size(),
+               result.diagnostics.size() == 1 ? "" : "s");
+}
+
+}  // namespace
+
+void add_offline_commands(CLI::App& app, Invocation& invocation) {
+  auto* check_command =
+      app.add_subcommand("check", "Check a configuration file without a daemon; status 2 on errors");
+  const auto path = std::make_shared<std::string>();
+  check_command->add_option("FILE", *path, "The YAML file")->required();
+  check_command->callback([&invocation, path] { check(invocation, *path); });
+
+  app.add_subcommand("schema", "JSON Schema of the configuration file, for editors")->callback([] {
+    print_line(config::json_schema());
+  });
+
+  auto* completion =
+      app.add_subcommand("completion", "Completion script: eval \"$(axisctl completion bash)\"");
+  const auto shell = std::make_shared<std::string>();
+  completion->add_option("SHELL", *shell, "bash")->required()->check(CLI::IsMember({"bash"}));
+  completion->callback([&app] { print(bash_completion(app)); });
+}
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,83 @@
+#include "api/axisctl/error.hpp"
+
+#include <fmt/format.h>
+
+#include "api/axisctl/format.hpp"
+
+namespace axisd::axisctl {
+namespace {
+
+constexpr std::string_view detail_type = "axisd.v1.ErrorDetail";
+
+/// gRPC's text for a failed connection is a list of wrapped errors, the last one being the reason.
+std::string_view innermost(std::string_view text) {
+  constexpr std::string_view mark = "last error: ";
+  if (const auto at = text.rfind(mark); at != text.npos) text.remove_prefix(at + mark.size());
+  for (const std::string_view noise : {"UNKNOWN: ", "UNAVAILABLE: ", "INTERNAL: "})
+    if (text.starts_with(noise)) text.remove_prefix(noise.size());
+  return text;
+}
+
+Failure unreachable(const grpc::Status& status, std::string_view server, bool tls) {
+  const std::string message = status.error_message();
+  const std::string_view reason = innermost(message);
+  const bool refused = reason.contains("refused") || reason.contains("No such file");
+  const std::string_view remedy =
+      refused ? "is the daemon running there? --server HOST:PORT or AXISD_SERVER names another one"
+      : tls   ? "check the certificates (--tls-ca, --tls-cert, --tls-key) and the address"
+              : "check the address (--server); a daemon with TLS needs --tls-ca, --tls-cert and --tls-key";
+  return {ExitCode::unreachable, fmt::format("cannot reach axisd at {}: {}; {}", server, reason, remedy)};
+}
+
+}  // namespace
+
+std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status) {
+  v1::StatusDetails details;
+  if (status.error_details().empty() || !details.ParseFromString(status.error_details())) return std::nullopt;
+  for (const auto& packed : details.details()) {
+    const std::string_view type = packed.type_url();
+    if (type.substr(type.rfind('/') + 1) != detail_type) continue;
+    if (v1::ErrorDetail detail; detail.ParseFromString(packed.value())) return detail;
+  }
+  return std::nullopt;
+}
+
+std::string describe(const v1::ErrorDetail& detail) {
+  std::string text;
+  if (!detail.bus().empty()) text = detail.bus();
+  if (detail.has_node()) text += fmt::format("{}node {}", text.empty() ? "" : " ", detail.node());
+  if (detail.has_object())
+    text += fmt::format("{}0x{:04X}", text.empty() ? "object " : " object ", detail.object());
+  if (!text.empty()) text += ": ";
+  text +=
+      detail.message().empty() ? lower_word(v1::Reason_Name(detail.reason()), "REASON_") : detail.message();
+  if (detail.has_permitted() && !detail.message().contains("permitted"))
+    text += fmt::format(" (permitted {} to {}{}{})", number(detail.permitted().minimum()),
+                        number(detail.permitted().maximum()), detail.permitted().unit().empty() ? "" : " ",
+                        detail.permitted().unit());
+  if (!detail.remedy().empty()) text += "; " + detail.remedy();
+  return text;
+}
+
+Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls) {
+  const std::string lead = subject.empty() ? "" : fmt::format("{}: ", subject);
+  if (const auto detail = detail_of(status)) {
+    const std::string text = describe(*detail);
+    return {ExitCode::refused, text.starts_with(lead) ? text : lead + text};
+  }
+  if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return unreachable(status, server, tls);
+  if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
+    return {
+        ExitCode::unreachable,
+        fmt::format("{}no answer from axisd at {} in time; --timeout sets how long to wait", lead, server)};
+  if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED)
+    return {ExitCode::refused, fmt::format("{}the daemon at {} does not offer this function: {}; compare the "
+                                           "versions of both (axisctl info, axisctl --version)",
+                                           lead, server, status.error_message())};
+  const std::string text = status.error_message().empty()
+                               ? fmt::format("the call failed with gRPC status {}", int{status.error_code()})
+                               : status.error_message();
+  return {ExitCode::refused, lead + text};
+}
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,46 @@
+// How axisctl ends: exit codes, and one line of text for everything that can go wrong.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "axisd/v1/error.pb.h"
+
+namespace axisd::axisctl {
+
+/// Documented in --help; scripts depend on the numbers.
+enum class ExitCode : int {
+  ok = 0,
+  ended_otherwise = 1,  ///< a motion ended, but not Done
+  usage = 2,            ///< bad arguments or a bad configuration file
+  unreachable = 3,      ///< the daemon did not answer
+  refused = 4,          ///< the daemon answered with an error
+  interrupted = 130,    ///< Ctrl-C while waiting, as shells number SIGINT
+};
+
+/// Ends the program with a line "axisctl: TEXT" on standard error. Thrown, because every command ends at its
+/// first failure and CLI11 reports by exception as well.
+class Failure : public std::runtime_error {
+ public:
+  Failure(ExitCode code, const std::string& text) : std::runtime_error(text), code_(code) {}
+  [[nodiscard]] ExitCode code() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+/// The typed detail of the grpc-status-details-bin trailer, if the daemon sent one.
+std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status);
+
+/// One line: address, message, permitted range, remedy.
+std::string describe(const v1::ErrorDetail& detail);
+
+/// What to tell about a call that failed. `subject` (an axis, a command id or empty) leads the line; `server`
+/// names the endpoint for a daemon that cannot be reached; `tls` says whether the connection was encrypted.
+Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls);
+
+}  // namespace axisd::axisctl

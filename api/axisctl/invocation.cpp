@@ -1,0 +1,117 @@
+#include "api/axisctl/invocation.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <utility>
+#include <vector>
+
+#include "api/axisctl/quantity.hpp"
+#include "axisd/v1/axis_service.grpc.pb.h"
+
+namespace axisd::axisctl {
+namespace {
+
+constexpr const char* footer = R"(
+Values carry the axis's unit or none: 120mm, -10, 50mm/s. Times carry theirs: 150ms, 2s.
+A command that was accepted goes on when axisctl ends, also by Ctrl-C or --timeout; only jog ends with it.
+
+Exit status:
+  0    ok; with --wait: the motion is Done
+  1    the motion ended otherwise (Aborted, Error, Unknown)
+  2    bad arguments or a bad configuration file
+  3    the daemon cannot be reached or did not answer in time
+  4    the daemon refused
+  130  interrupted while waiting
+
+Environment: AXISD_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, NO_COLOR.)";
+
+void add_global_options(CLI::App& app, Invocation& invocation) {
+  app.add_option("--server", invocation.connection.server, "The daemon: HOST:PORT or unix:PATH")
+      ->envname("AXISD_SERVER")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  app.add_option("--tls-ca", invocation.connection.tls_ca,
+                 "Use TLS; the daemon's certificate is checked with this one")
+      ->envname("AXISD_TLS_CA")
+      ->type_name("FILE");
+  app.add_option("--tls-cert", invocation.connection.tls_certificate, "Certificate of this client")
+      ->envname("AXISD_TLS_CERT")
+      ->type_name("FILE");
+  app.add_option("--tls-key", invocation.connection.tls_key, "Its private key")
+      ->envname("AXISD_TLS_KEY")
+      ->type_name("FILE");
+  app.add_option("--timeout", invocation.timeout, "How long the daemon may take to answer")
+      ->type_name("TIME")
+      ->capture_default_str();
+  app.add_flag("--json", invocation.json, "Print JSON with the names of the proto, one object per line");
+}
+
+/// The arguments, last first as CLI11 wants them. "-.5" becomes "-0.5": CLI11 takes a dash and a digit for a
+/// value, a dash and a point for an option.
+std::vector<std::string> reversed_arguments(int argc, const char* const* argv) {
+  std::vector<std::string> words;
+  for (int i = argc - 1; i > 0; --i) {
+    std::string word = argv[i];
+    if (word.size() > 2 && word.starts_with("-.") && word[2] >= '0' && word[2] <= '9') word.insert(1, "0");
+    words.push_back(std::move(word));
+  }
+  return words;
+}
+
+int usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
+  std::string help = "axisctl";
+  for (const auto* command = &app; !command->get_subcommands().empty();) {
+    command = command->get_subcommands().front();
+    help += " " + command->get_name();
+  }
+  fmt::print(stderr, "axisctl: {}; see '{} --help'\n", error.what(), help);
+  return std::to_underlying(ExitCode::usage);
+}
+
+}  // namespace
+
+Client& Invocation::client() {
+  if (!client_) {
+    connection.timeout = parse_duration(timeout, "--timeout");
+    client_ = std::make_unique<Client>(connection);
+  }
+  return *client_;
+}
+
+v1::AxisState Invocation::state(const std::string& axis) {
+  v1::GetAxisRequest request;
+  request.set_axis(axis);
+  return client().call(&v1::AxisService::Stub::GetAxis, request, axis).state();
+}
+
+int run(int argc, const char* const* argv) {
+  Invocation invocation;
+  CLI::App app("Commands the axes of a machine through axisd.", "axisctl");
+  app.set_version_flag("--version", std::string("axisctl " AXISD_VERSION));
+  app.footer(footer);
+  app.fallthrough();  // --json and the like may stand behind the subcommand, too
+  app.require_subcommand(1);
+  add_global_options(app, invocation);
+  add_state_commands(app, invocation);
+  add_motion_commands(app, invocation);
+  add_jog_command(app, invocation);
+  add_stop_commands(app, invocation);
+  add_command_commands(app, invocation);
+  add_system_commands(app, invocation);
+  add_offline_commands(app, invocation);
+  try {
+    app.parse(reversed_arguments(argc, argv));
+  } catch (const CLI::ParseError& error) {
+    return usage_error(app, error);
+  } catch (const Failure& failure) {
+    fmt::print(stderr, "axisctl: {}\n", failure.what());
+    return std::to_underlying(failure.code());
+  }
+  return std::to_underlying(invocation.status);
+}
+
+}  // namespace axisd::axisctl

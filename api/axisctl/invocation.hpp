@@ -1,0 +1,45 @@
+// What all subcommands share: the options before them, the connection, the exit status.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "api/axisctl/client.hpp"
+#include "api/axisctl/error.hpp"
+#include "axisd/v1/types.pb.h"
+
+namespace CLI {
+class App;
+}
+
+namespace axisd::axisctl {
+
+struct Invocation {
+  Connection connection;
+  std::string timeout = "10s";  ///< as given, parsed on first use
+  bool json = false;
+  ExitCode status = ExitCode::ok;
+
+  /// The client, made at first use: offline commands need none.
+  Client& client();
+  /// The axis's state as the daemon last saw it. Throws Failure.
+  v1::AxisState state(const std::string& axis);
+
+ private:
+  std::unique_ptr<Client> client_;
+};
+
+// Each adds its subcommands to `app`; their callbacks run on `invocation`, which outlives the app.
+void add_state_commands(CLI::App& app, Invocation& invocation);  ///< list, state, watch
+void add_motion_commands(CLI::App& app,
+                         Invocation& invocation);             ///< enable, disable, home, move, velocity, ...
+void add_jog_command(CLI::App& app, Invocation& invocation);  ///< jog
+void add_stop_commands(CLI::App& app, Invocation& invocation);     ///< halt, stop, quick-stop, release-stop
+void add_command_commands(CLI::App& app, Invocation& invocation);  ///< command get|watch|cancel
+void add_system_commands(CLI::App& app, Invocation& invocation);   ///< buses, info
+void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, schema, completion
+
+/// The whole program. Prints errors; returns the exit status.
+int run(int argc, const char* const* argv);
+
+}  // namespace axisd::axisctl

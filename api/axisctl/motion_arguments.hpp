@@ -1,0 +1,47 @@
+// Options that motion subcommands have in common.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "api/axisctl/invocation.hpp"
+
+namespace axisd::axisctl {
+
+struct MotionArguments {
+  std::vector<std::string> axes;
+  std::string value, velocity, acceleration_time, deceleration_time, hold, valid_for, request_id;
+  std::uint64_t lease_token = 0;
+  bool wait = false, buffered = false, halt_on_interrupt = false;
+
+  [[nodiscard]] const std::string& axis() const { return axes.front(); }
+};
+
+void add_axis(CLI::App& command, MotionArguments& arguments);          ///< exactly one
+void add_several_axes(CLI::App& command, MotionArguments& arguments);  ///< one or more
+void add_ramps(CLI::App& command, MotionArguments& arguments);         ///< the two ramp times
+void add_options(CLI::App& command, MotionArguments& arguments);       ///< request id, lease, validity
+void add_wait(CLI::App& command, MotionArguments& arguments);
+
+/// What the wire wants of them. Without --request-id each axis gets a fresh one, stored back into
+/// `arguments`. Throws Failure (usage).
+v1::CommandOptions command_options(const MotionArguments& arguments);
+
+/// Sends one motion call. A failure that leaves open whether the call arrived names the request id to repeat
+/// it with.
+template <class Response, class Stub, class Request>
+v1::Command send(Invocation& invocation,
+                 grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                 const Request& request, Lane lane = Lane::ordinary) {
+  try {
+    return invocation.client().call(method, request, request.axis(), lane).command();
+  } catch (const Failure& failure) {
+    if (failure.code() != ExitCode::unreachable) throw;
+    throw Failure(failure.code(), std::string(failure.what()) +
+                                      "; if the command may have arrived, repeat it with " + "--request-id " +
+                                      request.options().request_id());
+  }
+}
+
+}  // namespace axisd::axisctl

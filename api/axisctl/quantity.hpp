@@ -1,0 +1,18 @@
+// Arguments with units: "120mm", "-10", "50 mm/s", "150ms". Pure.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+
+namespace axisd::axisctl {
+
+/// A value in `unit`; the text may carry the unit or leave it out. `what` names the argument in errors.
+/// Throws Failure (usage) for anything else, NaN and infinity included.
+double parse_value(std::string_view text, std::string_view unit, std::string_view what);
+
+/// A time with its unit, "150ms", "2s": a bare number would be ambiguous. Not negative. Throws Failure
+/// (usage). (usage).
+std::chrono::nanoseconds parse_duration(std::string_view text, std::string_view what);
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,142 @@
+#include "api/axisctl/state_view.hpp"
+
+#include <fmt/format.h>
+
+#include "api/axisctl/error.hpp"
+#include "api/axisctl/format.hpp"
+
+namespace axisd::axisctl {
+namespace {
+
+Colour state_colour(const v1::AxisState& state) {
+  if (state.link() == v1::LINK_STATE_OFFLINE || state.state() == v1::STATE_ERROR_STOP) return Colour::red;
+  switch (state.state()) {
+    case v1::STATE_HOMING:
+    case v1::STATE_DISCRETE_MOTION:
+    case v1::STATE_CONTINUOUS_MOTION:
+    case v1::STATE_SYNCHRONIZED_MOTION:
+      return Colour::green;
+    case v1::STATE_STOPPING:
+      return Colour::yellow;
+    case v1::STATE_DISABLED:
+      return Colour::dim;
+    default:
+      return Colour::none;
+  }
+}
+
+void append(std::string& text, std::string_view more) {
+  if (!text.empty()) text += ", ";
+  text += more;
+}
+
+std::string trust(const v1::AxisState& state) {
+  return lower_word(v1::PositionTrust_Name(state.trust()), "POSITION_TRUST_");
+}
+
+std::string link(const v1::AxisState& state) {
+  return lower_word(v1::LinkState_Name(state.link()), "LINK_STATE_");
+}
+
+std::string terminals(const google::protobuf::RepeatedPtrField<v1::Terminal>& all) {
+  std::string text;
+  for (const auto& terminal : all)
+    append(text, fmt::format("{}{}{}={}", terminal.name(), terminal.function().empty() ? "" : " ",
+                             terminal.function(), terminal.active() ? "on" : "off"));
+  return text;
+}
+
+/// "name:   value" lines, aligned; empty values are left out.
+class Details {
+ public:
+  void add(std::string_view name, const std::string& value) {
+    if (!value.empty()) text_ += fmt::format("{:<12}{}\n", fmt::format("{}:", name), value);
+  }
+  [[nodiscard]] std::string text() && { return std::move(text_); }
+
+ private:
+  std::string text_;
+};
+
+std::string power(const v1::AxisState& state) {
+  if (!state.enabled()) return "off";
+  return state.enabled_by_daemon() ? "on" : "on, found so: nobody enabled it through this daemon";
+}
+
+}  // namespace
+
+std::string remarks(const v1::AxisState& state) {
+  std::string text;
+  if (state.simulated()) append(text, "simulated");
+  if (state.inhibited()) append(text, "all stopped");
+  if (state.stop_held()) append(text, "stop held");
+  if (state.alarm_code() != 0)
+    append(text, fmt::format("alarm {} {}", state.alarm_code(), state.alarm_name()));
+  if (state.enabled() && !state.enabled_by_daemon()) append(text, "not enabled by us");
+  if (state.has_fault() && state.alarm_code() == 0) append(text, state.fault().message());
+  if (state.has_link_error()) append(text, state.link_error().message());
+  return text;
+}
+
+Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes) {
+  Table table(
+      {"AXIS", "STATE", "POSITION", "", "VELOCITY", "", "TRUST", "LINK", "MODEL", "BUS", "NODE", "REMARKS"},
+      {2, 4, 10});
+  for (const auto& state : axes)
+    table.add({state.axis(),
+               {state_text(state), state_colour(state)},
+               number(state.position()),
+               state.unit(),
+               number(state.velocity()),
+               state.unit() + "/s",
+               trust(state),
+               link(state),
+               state.model(),
+               state.bus(),
+               std::to_string(state.node()),
+               {remarks(state), state.has_fault() || state.has_link_error() ? Colour::red : Colour::none}});
+  return table;
+}
+
+std::string state_details(const v1::AxisState& state, bool colour) {
+  Details details;
+  details.add("axis", state.axis() + (state.simulated() ? " (simulated)" : ""));
+  details.add("state", coloured(state_text(state), state_colour(state), colour) +
+                           (state.in_position() ? ", in position" : "") +
+                           (state.stop_held() ? ", stop held" : "") +
+                           (state.inhibited() ? ", all axes stopped: release-stop --all" : ""));
+  if (state.has_fault()) details.add("fault", coloured(describe(state.fault()), Colour::red, colour));
+  if (state.alarm_code() != 0)
+    details.add("alarm", fmt::format("{} {}", state.alarm_code(), state.alarm_name()));
+  details.add("power", power(state));
+  details.add("position",
+              fmt::format("{} ({}{})", with_unit(state.position(), state.unit()), trust(state),
+                          state.position_source() == v1::POSITION_SOURCE_COMMANDED ? ", counted pulses"
+                          : state.position_source() == v1::POSITION_SOURCE_ENCODER ? ", encoder"
+                                                                                   : ""));
+  if (state.has_target()) details.add("target", with_unit(state.target(), state.unit()));
+  details.add("velocity", with_unit(state.velocity(), state.unit() + "/s"));
+  details.add("command", state.command_id());
+  details.add("inputs", terminals(state.inputs()));
+  details.add("outputs", terminals(state.outputs()));
+  details.add("drive",
+              fmt::format("{}{}{} on {} node {}", state.model(), state.drive_version().empty() ? "" : " ",
+                          state.drive_version(), state.bus(), state.node()));
+  details.add("link", link(state));
+  if (state.has_link_error())
+    details.add("link error", coloured(describe(state.link_error()), Colour::red, colour));
+  if (state.has_age()) details.add("measured", duration_text(seconds(state.age())) + " ago");
+  if (state.drive_reboots() > 0) details.add("reboots", std::to_string(state.drive_reboots()));
+  return std::move(details).text();
+}
+
+std::string tick_line(const v1::WatchAxesResponse& batch) {
+  std::string text = std::to_string(batch.tick());
+  for (const auto& state : batch.axes())
+    text += fmt::format("  {} {} {} {}", state.axis(), state_text(state),
+                        with_unit(state.position(), state.unit()),
+                        with_unit(state.velocity(), state.unit() + "/s"));
+  return text;
+}
+
+}  // namespace axisd::axisctl

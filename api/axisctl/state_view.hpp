@@ -1,0 +1,23 @@
+// Axis states as tables and text. Pure.
+#pragma once
+
+#include <google/protobuf/repeated_ptr_field.h>
+
+#include <string>
+
+#include "api/axisctl/table.hpp"
+#include "axisd/v1/axis_service.pb.h"
+#include "axisd/v1/types.pb.h"
+
+namespace axisd::axisctl {
+
+/// One row per axis.
+Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes);
+/// Everything known about one axis, a line per item, ending in a line end.
+std::string state_details(const v1::AxisState& state, bool colour);
+/// A whole batch in one line: "12  feeder Standstill 0 mm 0 mm/s  turntable Offline 10 deg 0 deg/s".
+std::string tick_line(const v1::WatchAxesResponse& batch);
+/// What a person should know beside the state: "simulated, alarm 3 overcurrent, all stopped".
+std::string remarks(const v1::AxisState& state);
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,289 @@
+"""What the daemon tells, as plain immutable values. Positions in the axis's unit, velocities per second, times in
+seconds. Each value keeps the message that it came from as `raw`."""
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import enum
+from typing import Any
+
+from google.protobuf.duration_pb2 import Duration
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from .v1 import axis_service_pb2, bus_service_pb2, error_pb2, system_service_pb2, types_pb2
+
+
+class State(enum.Enum):
+    """PLCopen states of an axis. Whether the drive can be reached is Link."""
+    UNSPECIFIED = "Unspecified"
+    DISABLED = "Disabled"
+    STANDSTILL = "Standstill"
+    HOMING = "Homing"
+    DISCRETE_MOTION = "DiscreteMotion"
+    CONTINUOUS_MOTION = "ContinuousMotion"
+    SYNCHRONIZED_MOTION = "SynchronizedMotion"
+    STOPPING = "Stopping"
+    ERROR_STOP = "ErrorStop"
+
+
+class Link(enum.Enum):
+    UNSPECIFIED = "Unspecified"
+    OFFLINE = "Offline"
+    CONFIGURING = "Configuring"
+    ONLINE = "Online"
+
+
+class Trust(enum.Enum):
+    """How far the position can be believed."""
+    UNSPECIFIED = "Unspecified"
+    UNKNOWN = "Unknown"
+    SET = "Set"
+    HOMED = "Homed"
+    RESTORED = "Restored"
+
+
+class CommandState(enum.Enum):
+    UNSPECIFIED = "Unspecified"
+    ACCEPTED = "Accepted"
+    ACTIVE = "Active"
+    DONE = "Done"
+    ABORTED = "Aborted"
+    ERROR = "Error"
+    UNKNOWN = "Unknown"
+
+    @property
+    def ended(self) -> bool:
+        return self in (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR, CommandState.UNKNOWN)
+
+
+def _member(kind: Any, descriptor: Any, prefix: str, number: int) -> Any:
+    """The enum member for a number; a newer daemon's unknown numbers are UNSPECIFIED."""
+    value = descriptor.values_by_number.get(number)
+    name = value.name.removeprefix(prefix) if value is not None else "UNSPECIFIED"
+    return kind[name] if name in kind.__members__ else kind["UNSPECIFIED"]
+
+
+def seconds(duration: Duration) -> float:
+    return duration.seconds + duration.nanos * 1e-9
+
+
+def _optional(message: Any, field: str) -> Any:
+    return getattr(message, field) if message.HasField(field) else None
+
+
+def _optional_seconds(message: Any, field: str) -> float | None:
+    return seconds(getattr(message, field)) if message.HasField(field) else None
+
+
+def _optional_time(message: Any, field: str) -> datetime.datetime | None:
+    if not message.HasField(field):
+        return None
+    stamp: Timestamp = getattr(message, field)
+    return stamp.ToDatetime(tzinfo=datetime.timezone.utc)
+
+
+@dataclasses.dataclass(frozen=True)
+class PermittedRange:
+    minimum: float
+    maximum: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.minimum:g} to {self.maximum:g} {self.unit}".rstrip()
+
+
+@dataclasses.dataclass(frozen=True)
+class ErrorDetail:
+    """What happened, where, and what to do. `reason` is lower case: "soft_limit", "disabled" ..."""
+    reason: str
+    message: str
+    remedy: str
+    outcome: str
+    bus: str
+    node: int | None
+    object: int | None
+    native_code: int | None
+    permitted: PermittedRange | None
+    raw: error_pb2.ErrorDetail = dataclasses.field(repr=False, compare=False)
+
+    @classmethod
+    def of(cls, raw: error_pb2.ErrorDetail) -> ErrorDetail:
+        reason = error_pb2.Reason.DESCRIPTOR.values_by_number.get(raw.reason)
+        outcome = error_pb2.Outcome.DESCRIPTOR.values_by_number.get(raw.outcome)
+        permitted = raw.permitted
+        return cls(
+            reason.name.removeprefix("REASON_").lower() if reason else str(raw.reason), raw.message, raw.remedy,
+            outcome.name.removeprefix("OUTCOME_").lower() if outcome else str(raw.outcome), raw.bus,
+            _optional(raw, "node"), _optional(raw, "object"), _optional(raw, "native_code"),
+            PermittedRange(permitted.minimum, permitted.maximum, permitted.unit) if raw.HasField("permitted") else None,
+            raw)
+
+    def __str__(self) -> str:
+        text = self.message or self.reason.replace("_", " ")
+        if self.permitted is not None and "permitted" not in text:
+            text += f" (permitted {self.permitted})"
+        return f"{text}; {self.remedy}" if self.remedy else text
+
+
+def _optional_error(message: Any, field: str) -> ErrorDetail | None:
+    return ErrorDetail.of(getattr(message, field)) if message.HasField(field) else None
+
+
+@dataclasses.dataclass(frozen=True)
+class Terminal:
+    """A digital input or output; `active` has the configured active level applied."""
+    name: str
+    function: str
+    active: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class AxisState:
+    """Everything known about an axis at one moment; see proto/axisd/v1/types.proto for each field."""
+    axis: str
+    unit: str
+    state: State
+    link: Link
+    link_error: ErrorDetail | None
+    fault: ErrorDetail | None
+    enabled: bool
+    enabled_by_daemon: bool
+    stop_held: bool
+    inhibited: bool
+    position: float
+    velocity: float
+    target: float | None
+    moving: bool
+    in_position: bool
+    trust: Trust
+    alarm_code: int
+    alarm_name: str
+    inputs: tuple[Terminal, ...]
+    outputs: tuple[Terminal, ...]
+    measured_at: datetime.datetime | None
+    age: float | None
+    simulated: bool
+    command_id: str
+    model: str
+    bus: str
+    node: int
+    raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
+
+    @classmethod
+    def of(cls, raw: types_pb2.AxisState) -> AxisState:
+        return cls(
+            axis=raw.axis, unit=raw.unit, state=_member(State, types_pb2.State.DESCRIPTOR, "STATE_", raw.state),
+            link=_member(Link, types_pb2.LinkState.DESCRIPTOR, "LINK_STATE_", raw.link),
+            link_error=_optional_error(raw, "link_error"), fault=_optional_error(raw, "fault"), enabled=raw.enabled,
+            enabled_by_daemon=raw.enabled_by_daemon, stop_held=raw.stop_held, inhibited=raw.inhibited,
+            position=raw.position, velocity=raw.velocity, target=_optional(raw, "target"), moving=raw.moving,
+            in_position=raw.in_position,
+            trust=_member(Trust, types_pb2.PositionTrust.DESCRIPTOR, "POSITION_TRUST_", raw.trust),
+            alarm_code=raw.alarm_code, alarm_name=raw.alarm_name,
+            inputs=tuple(Terminal(t.name, t.function, t.active) for t in raw.inputs),
+            outputs=tuple(Terminal(t.name, t.function, t.active) for t in raw.outputs),
+            measured_at=_optional_time(raw, "measured_at"), age=_optional_seconds(raw, "age"),
+            simulated=raw.simulated, command_id=raw.command_id, model=raw.model, bus=raw.bus, node=raw.node, raw=raw)
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionValues:
+    """Values of a motion; None where one does not apply."""
+    position: float | None
+    distance: float | None
+    velocity: float | None
+    search_velocity: float | None
+    acceleration_time: float | None
+    deceleration_time: float | None
+    hold: float | None
+
+    @classmethod
+    def of(cls, raw: types_pb2.MotionValues) -> MotionValues:
+        return cls(_optional(raw, "position"), _optional(raw, "distance"), _optional(raw, "velocity"),
+                   _optional(raw, "search_velocity"), _optional_seconds(raw, "acceleration_time"),
+                   _optional_seconds(raw, "deceleration_time"), _optional_seconds(raw, "hold"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """One accepted motion request. `granted` is what the drive's resolution made of `asked`."""
+    id: str
+    axis: str
+    kind: str
+    state: CommandState
+    asked: MotionValues
+    granted: MotionValues
+    cause: ErrorDetail | None
+    request_id: str
+    accepted_at: datetime.datetime | None
+    started_at: datetime.datetime | None
+    ended_at: datetime.datetime | None
+    raw: types_pb2.Command = dataclasses.field(repr=False, compare=False)
+
+    @classmethod
+    def of(cls, raw: types_pb2.Command) -> Command:
+        kind = types_pb2.CommandKind.DESCRIPTOR.values_by_number.get(raw.kind)
+        return cls(
+            raw.id, raw.axis, kind.name.removeprefix("COMMAND_KIND_").lower() if kind else str(raw.kind),
+            _member(CommandState, types_pb2.CommandState.DESCRIPTOR, "COMMAND_STATE_", raw.state),
+            MotionValues.of(raw.asked), MotionValues.of(raw.granted), _optional_error(raw, "cause"), raw.request_id,
+            _optional_time(raw, "accepted_at"), _optional_time(raw, "started_at"), _optional_time(raw, "ended_at"),
+            raw)
+
+
+@dataclasses.dataclass(frozen=True)
+class Tick:
+    """One batch of a watch. `dropped` counts the ticks that this reader was too slow for."""
+    instance_id: str
+    tick: int
+    dropped: int
+    axes: dict[str, AxisState]
+
+    @classmethod
+    def of(cls, raw: axis_service_pb2.WatchAxesResponse) -> Tick:
+        return cls(raw.instance_id, raw.tick, raw.dropped, {state.axis: AxisState.of(state) for state in raw.axes})
+
+
+@dataclasses.dataclass(frozen=True)
+class Info:
+    machine: str
+    version: str
+    instance_id: str
+    inhibited: bool
+    inhibited_by: str
+
+    @classmethod
+    def of(cls, raw: system_service_pb2.GetInfoResponse) -> Info:
+        return cls(raw.machine, raw.version, raw.instance_id, raw.inhibited, raw.inhibited_by)
+
+
+@dataclasses.dataclass(frozen=True)
+class StopResult:
+    """What a stop of all axes did to one of them: a command or an error."""
+    axis: str
+    command: Command | None
+    error: ErrorDetail | None
+
+    @classmethod
+    def of(cls, raw: system_service_pb2.StopResult) -> StopResult:
+        return cls(raw.axis, Command.of(raw.command) if raw.HasField("command") else None,
+                   _optional_error(raw, "error"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Bus:
+    """One line and its counters (all counters are in `raw`)."""
+    name: str
+    port: str
+    baud: int
+    open: bool
+    error: ErrorDetail | None
+    simulated: bool
+    transactions: int
+    timeouts: int
+    raw: bus_service_pb2.Bus = dataclasses.field(repr=False, compare=False)
+
+    @classmethod
+    def of(cls, raw: bus_service_pb2.Bus) -> Bus:
+        return cls(raw.name, raw.port, raw.baud, raw.open, _optional_error(raw, "error"), raw.simulated,
+                   raw.transactions, raw.timeouts, raw)

@@ -1,0 +1,458 @@
+"""A daemon for tests of clients: speaks axisd.v1 and moves imaginary axes in real time, without axisd.
+
+Axes: `feeder` (mm, soft limits 0 to 400, simulated), `turntable` (deg), `ghost` (offline), `sticky` (each move ends
+in Error not_reached). Velocities are granted in steps of 3 units per second, as whole r/min would do.
+"""
+import asyncio
+import contextlib
+import pathlib
+import sys
+import threading
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
+from client import package  # noqa: E402
+
+package.load()
+import grpc  # noqa: E402
+import grpc.aio  # noqa: E402
+from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes_rpc,  # noqa: E402
+                      bus_service_pb2 as bus_pb, bus_service_pb2_grpc as bus_rpc,
+                      command_service_pb2 as command_pb, command_service_pb2_grpc as command_rpc,
+                      error_pb2, system_service_pb2 as system_pb, system_service_pb2_grpc as system_rpc, types_pb2)
+
+ENDS = (types_pb2.COMMAND_STATE_DONE, types_pb2.COMMAND_STATE_ABORTED, types_pb2.COMMAND_STATE_ERROR,
+        types_pb2.COMMAND_STATE_UNKNOWN)
+STEP = 0.01  # s between positions of a moving axis
+GRANTED_STEP = 3.0
+
+
+async def refuse(context, code, detail, text=None):
+    """Ends the call with the typed detail in the standard trailer."""
+    packed = error_pb2.StatusDetails.Packed(type_url="type.googleapis.com/axisd.v1.ErrorDetail",
+                                            value=detail.SerializeToString())
+    details = error_pb2.StatusDetails(code=code.value[0], message=detail.message, details=[packed])
+    await context.abort(code, text or detail.message, (("grpc-status-details-bin", details.SerializeToString()),))
+
+
+class FakeAxis:
+    def __init__(self, machine, name, unit, node, limits=None):
+        self.machine, self.name, self.limits = machine, name, limits
+        self.task = None
+        self.current = None
+        self.state = types_pb2.AxisState(
+            axis=name, unit=unit, state=types_pb2.STATE_DISABLED, link=types_pb2.LINK_STATE_ONLINE,
+            trust=types_pb2.POSITION_TRUST_UNKNOWN, position_source=types_pb2.POSITION_SOURCE_COMMANDED,
+            simulated=True, bus="line-a", node=node, model="ykd2405pr", drive_version="1.0",
+            inputs=[types_pb2.Terminal(name="X0", function="home", active=False)],
+            outputs=[types_pb2.Terminal(name="Y0", function="alarm", active=False)])
+        if name == "ghost":
+            self.state.link = types_pb2.LINK_STATE_OFFLINE
+            self.state.link_error.CopyFrom(offline_detail())
+
+    def snapshot(self):
+        state = types_pb2.AxisState()
+        state.CopyFrom(self.state)
+        state.measured_at.GetCurrentTime()
+        state.age.FromMilliseconds(5)
+        state.inhibited = self.machine.inhibited
+        return state
+
+    def end(self, state, cause=None):
+        """Ends the current command, and with it the motion."""
+        if self.task is not None and self.task is not asyncio.current_task():
+            self.task.cancel()
+        self.task = None
+        if self.current is not None and self.current.state not in ENDS:
+            self.machine.change(self.current, state, cause)
+        self.current = None
+        self.state.velocity = 0
+        self.state.moving = False
+
+    def begin(self, command, work):
+        self.end(types_pb2.COMMAND_STATE_ABORTED, error_pb2.ErrorDetail(
+            reason=error_pb2.REASON_SUPERSEDED, message="a newer command took its place"))
+        self.current = command
+        self.state.command_id = command.id
+        self.task = asyncio.create_task(work)
+
+    async def travel(self, command, target, velocity, state):
+        self.machine.change(command, types_pb2.COMMAND_STATE_ACTIVE)
+        self.state.state = state
+        self.state.moving = True
+        start, distance = self.state.position, target - self.state.position
+        self.state.velocity = velocity if distance >= 0 else -velocity
+        duration = abs(distance) / velocity
+        begun = time.monotonic()
+        while (passed := time.monotonic() - begun) < duration:
+            self.state.position = start + distance * passed / duration
+            await asyncio.sleep(STEP)
+        self.state.position = target
+        self.state.state = types_pb2.STATE_STANDSTILL
+        if self.name == "sticky":
+            self.end(types_pb2.COMMAND_STATE_ERROR, error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_NOT_REACHED, message="the drive stopped 2 mm before the target",
+                remedy="look for an obstacle, then reset"))
+            self.state.state = types_pb2.STATE_ERROR_STOP
+        else:
+            self.end(types_pb2.COMMAND_STATE_DONE)
+
+    async def run(self, command, velocity, hold):
+        self.machine.change(command, types_pb2.COMMAND_STATE_ACTIVE)
+        self.state.state = types_pb2.STATE_CONTINUOUS_MOTION
+        self.state.moving, self.state.velocity = True, velocity
+        self.hold_until = time.monotonic() + hold if hold else None
+        while self.hold_until is None or time.monotonic() < self.hold_until:
+            self.state.position += velocity * STEP
+            await asyncio.sleep(STEP)
+        self.state.state = types_pb2.STATE_STANDSTILL
+        self.end(types_pb2.COMMAND_STATE_DONE)
+
+
+def offline_detail():
+    return error_pb2.ErrorDetail(reason=error_pb2.REASON_OFFLINE, message="the drive does not answer",
+                                 remedy="check power and wiring; it is retried by itself", bus="line-a", node=9,
+                                 outcome=error_pb2.OUTCOME_NOT_SENT)
+
+
+class FakeMachine(axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer,
+                  system_rpc.SystemServiceServicer):
+    """All services. `calls` records (method, request, peer) of every call, for assertions."""
+
+    def __init__(self):
+        self.inhibited = False
+        self.calls = []
+        self.commands = {}
+        self.by_request = {}
+        self.changed = asyncio.Condition()
+        self.axes = {axis.name: axis for axis in (
+            FakeAxis(self, "feeder", "mm", 1, (0.0, 400.0)), FakeAxis(self, "turntable", "deg", 2),
+            FakeAxis(self, "ghost", "mm", 9), FakeAxis(self, "sticky", "mm", 3))}
+        for name in ("feeder", "sticky"):
+            self.axes[name].state.state = types_pb2.STATE_STANDSTILL
+            self.axes[name].state.enabled = self.axes[name].state.enabled_by_daemon = True
+            self.axes[name].state.trust = types_pb2.POSITION_TRUST_HOMED
+
+    # Bookkeeping
+
+    def change(self, command, state, cause=None):
+        command.state = state
+        if cause is not None:
+            command.cause.CopyFrom(cause)
+        if state == types_pb2.COMMAND_STATE_ACTIVE:
+            command.started_at.GetCurrentTime()
+        if state in ENDS:
+            command.ended_at.GetCurrentTime()
+
+        async def notify():
+            async with self.changed:
+                self.changed.notify_all()
+        self.notifying = asyncio.ensure_future(notify())
+
+    def note(self, method, request, context):
+        self.calls.append((method, request, context.peer()))
+
+    async def find(self, name, context):
+        axis = self.axes.get(name)
+        if axis is None:
+            await refuse(context, grpc.StatusCode.NOT_FOUND, error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_UNKNOWN_AXIS, message=f"no axis '{name}'",
+                remedy="axisctl list shows all: " + ", ".join(self.axes)))
+        return axis
+
+    async def ready(self, request, context, powered=True):
+        axis = await self.find(request.axis, context)
+        if axis.name == "ghost":
+            await refuse(context, grpc.StatusCode.UNAVAILABLE, offline_detail())
+        if self.inhibited and powered:
+            await refuse(context, grpc.StatusCode.FAILED_PRECONDITION, error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_INHIBITED, message="all axes are stopped", remedy="release the stop first"))
+        if powered and not axis.state.enabled:
+            await refuse(context, grpc.StatusCode.FAILED_PRECONDITION, error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_DISABLED, message="the power stage is off", remedy="enable the axis"))
+        return axis
+
+    def command(self, axis, kind, request, **asked):
+        command = types_pb2.Command(id=f"c-{len(self.commands) + 1}", axis=axis.name, kind=kind,
+                                    state=types_pb2.COMMAND_STATE_ACCEPTED, client="test",
+                                    request_id=request.options.request_id)
+        for name, value in asked.items():
+            setattr(command.asked, name, value)
+        for name in ("acceleration_time", "deceleration_time", "hold"):
+            if name in request.DESCRIPTOR.fields_by_name and name != "hold" and request.HasField(name):
+                getattr(command.asked, name).CopyFrom(getattr(request, name))
+        command.granted.CopyFrom(command.asked)
+        if command.asked.HasField("velocity"):
+            command.granted.velocity = int(command.asked.velocity / GRANTED_STEP) * GRANTED_STEP
+        command.accepted_at.GetCurrentTime()
+        self.commands[command.id] = command
+        self.by_request[command.request_id] = command
+        return command
+
+    async def wait(self, command, until):
+        while until == types_pb2.WAIT_UNTIL_DONE and command.state not in ENDS:
+            async with self.changed:
+                with contextlib.suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(self.changed.wait(), 0.05)
+        return command
+
+    async def at_once(self, kind, request, context, response, apply, powered=False):
+        """A command that needs no time."""
+        axis = await self.ready(request, context, powered)
+        command = self.command(axis, kind, request)
+        axis.begin(command, asyncio.sleep(0))
+        apply(axis)
+        axis.end(types_pb2.COMMAND_STATE_DONE)
+        return response(command=command)
+
+    # AxisService
+
+    async def ListAxes(self, request, context):
+        self.note("ListAxes", request, context)
+        return axes_pb.ListAxesResponse(axes=[axis.snapshot() for axis in self.axes.values()])
+
+    async def GetAxis(self, request, context):
+        self.note("GetAxis", request, context)
+        return axes_pb.GetAxisResponse(state=(await self.find(request.axis, context)).snapshot())
+
+    async def WatchAxes(self, request, context):
+        self.note("WatchAxes", request, context)
+        axes = [await self.find(name, context) for name in request.axes or self.axes]
+        tick = 0
+        while True:
+            tick += 1
+            yield axes_pb.WatchAxesResponse(instance_id="fake", tick=tick, axes=[axis.snapshot() for axis in axes])
+            await asyncio.sleep(request.period.ToTimedelta().total_seconds() or 0.1)
+
+    async def Enable(self, request, context):
+        self.note("Enable", request, context)
+
+        def apply(axis):
+            axis.state.enabled = axis.state.enabled_by_daemon = True
+            axis.state.state = types_pb2.STATE_STANDSTILL
+        return await self.at_once(types_pb2.COMMAND_KIND_ENABLE, request, context, axes_pb.EnableResponse, apply)
+
+    async def Disable(self, request, context):
+        self.note("Disable", request, context)
+
+        def apply(axis):
+            axis.state.enabled = axis.state.enabled_by_daemon = False
+            axis.state.state = types_pb2.STATE_DISABLED
+        return await self.at_once(types_pb2.COMMAND_KIND_DISABLE, request, context, axes_pb.DisableResponse, apply)
+
+    async def Reset(self, request, context):
+        self.note("Reset", request, context)
+
+        def apply(axis):
+            axis.state.state = types_pb2.STATE_STANDSTILL
+        return await self.at_once(types_pb2.COMMAND_KIND_RESET, request, context, axes_pb.ResetResponse, apply)
+
+    async def SetPosition(self, request, context):
+        self.note("SetPosition", request, context)
+
+        def apply(axis):
+            axis.state.position = request.position
+            axis.state.trust = types_pb2.POSITION_TRUST_SET
+        return await self.at_once(types_pb2.COMMAND_KIND_SET_POSITION, request, context,
+                                  axes_pb.SetPositionResponse, apply)
+
+    async def Home(self, request, context):
+        self.note("Home", request, context)
+        axis = await self.ready(request, context)
+        command = self.command(axis, types_pb2.COMMAND_KIND_HOME, request)
+        axis.state.trust = types_pb2.POSITION_TRUST_HOMED
+        axis.begin(command, axis.travel(command, 0.0, 1000.0, types_pb2.STATE_HOMING))
+        return axes_pb.HomeResponse(command=await self.wait(command, request.options.wait_until))
+
+    async def go(self, kind, request, context, target, **asked):
+        axis = await self.ready(request, context)
+        if request.options.request_id in self.by_request:
+            return await self.wait(self.by_request[request.options.request_id], request.options.wait_until)
+        target += axis.state.position if kind == types_pb2.COMMAND_KIND_MOVE_RELATIVE else 0
+        if axis.limits and not axis.limits[0] <= target <= axis.limits[1]:
+            await refuse(context, grpc.StatusCode.OUT_OF_RANGE, error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_SOFT_LIMIT, message=f"position {target:g} mm is beyond the soft limit",
+                remedy="choose a target inside", permitted=error_pb2.PermittedRange(
+                    minimum=axis.limits[0], maximum=axis.limits[1], unit="mm")))
+        velocity = request.velocity if request.HasField("velocity") else 600.0
+        command = self.command(axis, kind, request, velocity=velocity, **asked)
+        axis.begin(command, axis.travel(command, target, command.granted.velocity,
+                                        types_pb2.STATE_DISCRETE_MOTION))
+        return await self.wait(command, request.options.wait_until)
+
+    async def MoveAbsolute(self, request, context):
+        self.note("MoveAbsolute", request, context)
+        return axes_pb.MoveAbsoluteResponse(command=await self.go(
+            types_pb2.COMMAND_KIND_MOVE_ABSOLUTE, request, context, request.position, position=request.position))
+
+    async def MoveRelative(self, request, context):
+        self.note("MoveRelative", request, context)
+        return axes_pb.MoveRelativeResponse(command=await self.go(
+            types_pb2.COMMAND_KIND_MOVE_RELATIVE, request, context, request.distance, distance=request.distance))
+
+    async def MoveVelocity(self, request, context):
+        self.note("MoveVelocity", request, context)
+        axis = await self.ready(request, context)
+        command = self.command(axis, types_pb2.COMMAND_KIND_MOVE_VELOCITY, request, velocity=request.velocity)
+        axis.begin(command, axis.run(command, request.velocity, request.hold.ToTimedelta().total_seconds()))
+        return axes_pb.MoveVelocityResponse(command=await self.wait(command, request.options.wait_until))
+
+    async def Jog(self, request, context):
+        self.note("Jog", request, context)
+        axis = await self.ready(request, context)
+        hold = request.hold.ToTimedelta().total_seconds() or 0.3
+        if axis.current is not None and axis.current.kind == types_pb2.COMMAND_KIND_JOG:
+            axis.hold_until = time.monotonic() + hold
+            return axes_pb.JogResponse(command=axis.current)
+        command = self.command(axis, types_pb2.COMMAND_KIND_JOG, request, velocity=request.velocity)
+        axis.begin(command, axis.run(command, request.velocity, hold))
+        return axes_pb.JogResponse(command=command)
+
+    async def halting(self, method, kind, request, context, response):
+        self.note(method, request, context)
+        axis = await self.ready(request, context, powered=False)
+        axis.end(types_pb2.COMMAND_STATE_ABORTED, error_pb2.ErrorDetail(
+            reason=error_pb2.REASON_SUPERSEDED, message=f"a {method} took its place"))
+        command = self.command(axis, kind, request)
+        held = bool(getattr(request, "hold", False))
+        axis.state.stop_held = held
+        if axis.state.enabled:
+            axis.state.state = types_pb2.STATE_STOPPING if held else types_pb2.STATE_STANDSTILL
+        self.change(command, types_pb2.COMMAND_STATE_DONE)
+        return response(command=command)
+
+    async def Halt(self, request, context):
+        return await self.halting("Halt", types_pb2.COMMAND_KIND_HALT, request, context, axes_pb.HaltResponse)
+
+    async def Stop(self, request, context):
+        return await self.halting("Stop", types_pb2.COMMAND_KIND_STOP, request, context, axes_pb.StopResponse)
+
+    async def QuickStop(self, request, context):
+        return await self.halting("QuickStop", types_pb2.COMMAND_KIND_QUICK_STOP, request, context,
+                                  axes_pb.QuickStopResponse)
+
+    async def ReleaseStop(self, request, context):
+        self.note("ReleaseStop", request, context)
+        axis = await self.ready(request, context, powered=False)
+        axis.state.stop_held = False
+        axis.state.state = types_pb2.STATE_STANDSTILL
+        return axes_pb.ReleaseStopResponse(command=types_pb2.Command(
+            id="c-0", axis=axis.name, kind=types_pb2.COMMAND_KIND_STOP, state=types_pb2.COMMAND_STATE_DONE))
+
+    # CommandService
+
+    async def known(self, request, context):
+        command = self.commands.get(request.id)
+        if command is None:
+            await refuse(context, grpc.StatusCode.NOT_FOUND, error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_UNKNOWN_COMMAND, message=f"no command '{request.id}'"))
+        return command
+
+    async def GetCommand(self, request, context):
+        self.note("GetCommand", request, context)
+        return command_pb.GetCommandResponse(command=await self.known(request, context))
+
+    async def WatchCommand(self, request, context):
+        self.note("WatchCommand", request, context)
+        command = await self.known(request, context)
+        shown = None
+        while shown not in ENDS:
+            if command.state != shown:
+                shown = command.state
+                yield command_pb.WatchCommandResponse(command=command)
+                continue
+            await asyncio.sleep(STEP)
+
+    async def CancelCommand(self, request, context):
+        self.note("CancelCommand", request, context)
+        command = await self.known(request, context)
+        axis = self.axes[command.axis]
+        if axis.current is command:
+            axis.end(types_pb2.COMMAND_STATE_ABORTED, error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_CANCELLED, message="cancelled by a client"))
+            axis.state.state = types_pb2.STATE_STANDSTILL
+        return command_pb.CancelCommandResponse(command=command)
+
+    # BusService, SystemService
+
+    async def ListBuses(self, request, context):
+        self.note("ListBuses", request, context)
+        return bus_pb.ListBusesResponse(buses=[
+            bus_pb.Bus(name="line-a", port="sim", baud=115200, open=True, simulated=True, transactions=1234),
+            bus_pb.Bus(name="line-b", port="/dev/ttyUSB7", baud=9600, error=error_pb2.ErrorDetail(
+                reason=error_pb2.REASON_BUS_DOWN, message="/dev/ttyUSB7: No such file or directory",
+                remedy="check the adapter"))])
+
+    async def GetInfo(self, request, context):
+        self.note("GetInfo", request, context)
+        return system_pb.GetInfoResponse(machine="press-1", version="0.1.0", instance_id="fake",
+                                         inhibited=self.inhibited, inhibited_by="test" if self.inhibited else "")
+
+    async def StopAll(self, request, context):
+        self.note("StopAll", request, context)
+        self.inhibited = True
+        results = []
+        for axis in self.axes.values():
+            if axis.name == "ghost":
+                results.append(system_pb.StopResult(axis=axis.name, error=offline_detail()))
+                continue
+            axis.end(types_pb2.COMMAND_STATE_ABORTED)
+            command = types_pb2.Command(id=f"s-{axis.name}", axis=axis.name, kind=types_pb2.COMMAND_KIND_STOP,
+                                        state=types_pb2.COMMAND_STATE_DONE)
+            results.append(system_pb.StopResult(axis=axis.name, command=command))
+        return system_pb.StopAllResponse(results=results)
+
+    async def ReleaseStopAll(self, request, context):
+        self.note("ReleaseStopAll", request, context)
+        self.inhibited = False
+        return system_pb.ReleaseStopAllResponse()
+
+
+async def serve(machine, addresses):
+    """Starts a server; returns it and the port of the first address (0 for a socket's path)."""
+    server = grpc.aio.server(options=(("grpc.http2.min_recv_ping_interval_without_data_ms", 900),
+                                      ("grpc.http2.max_ping_strikes", 0)))
+    for add in (axes_rpc.add_AxisServiceServicer_to_server, command_rpc.add_CommandServiceServicer_to_server,
+                bus_rpc.add_BusServiceServicer_to_server, system_rpc.add_SystemServiceServicer_to_server):
+        add(machine, server)
+    ports = [server.add_insecure_port(address) for address in addresses]
+    await server.start()
+    return server, ports[0]
+
+
+class ThreadedServer:
+    """The fake daemon on a thread of its own, on a free TCP port and optionally on a socket."""
+
+    def __init__(self, socket_path=None):
+        self._socket_path = socket_path
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
+
+    def __enter__(self):
+        self._thread.start()
+        if not self._ready.wait(60):
+            raise RuntimeError("the fake server did not start")
+        return self
+
+    def __exit__(self, *_):
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._end.set)
+            self._thread.join(30)
+
+    async def _main(self):
+        self._loop = asyncio.get_running_loop()
+        self._end = asyncio.Event()
+        self.machine = FakeMachine()
+        addresses = ["127.0.0.1:0"] + ([f"unix:{self._socket_path}"] if self._socket_path else [])
+        server, port = await serve(self.machine, addresses)
+        self.address = f"127.0.0.1:{port}"
+        self._ready.set()
+        await self._end.wait()
+        await server.stop(0)
+
+    def calls(self, method):
+        """Requests of one method so far."""
+        return [request for name, request, _ in self.machine.calls if name == method]
+
+    def peers(self, method):
+        return [peer for name, _, peer in self.machine.calls if name == method]

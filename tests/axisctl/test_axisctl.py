@@ -1,0 +1,341 @@
+"""The real axisctl against the fake daemon: every subcommand, its output and its exit status."""
+import pathlib
+import signal
+import socket
+import subprocess
+import tempfile
+import unittest
+
+import fake_server
+from support import AXISCTL, LIMIT, AxisctlTest, environment
+
+
+class Reading(AxisctlTest):
+    def test_list_is_an_aligned_table_that_shows_simulated(self):
+        lines = self.ok("list").splitlines()
+        self.assertRegex(lines[0], r"^AXIS +STATE +POSITION")
+        self.assertEqual(len(lines), 5)
+        self.assertRegex(lines[1], r"^feeder +Standstill +0 +mm +0 +mm/s +homed +online +ykd2405pr +line-a +1 +simulated")
+        self.assertEqual(lines[1].index("Standstill"), lines[0].index("STATE"))
+        self.assertRegex(lines[3], r"^ghost +Offline .*the drive does not answer")
+        self.assertNotIn("\x1b", "".join(lines))
+
+    def test_list_as_json_keeps_the_names_of_the_proto(self):
+        (response,) = self.json("list")
+        feeder = response["axes"][0]
+        self.assertEqual((feeder["axis"], feeder["state"], feeder["stop_held"]), ("feeder", "STATE_STANDSTILL", False))
+
+    def test_list_names_are_for_completion(self):
+        self.assertEqual(self.ok("list", "--names").split(), ["feeder", "turntable", "ghost", "sticky"])
+
+    def test_state(self):
+        text = self.ok("state", "feeder")
+        self.assertRegex(text, r"axis: +feeder \(simulated\)")
+        self.assertRegex(text, r"position: +0 mm \(homed, counted pulses\)")
+        self.assertRegex(text, r"inputs: +X0 home=off")
+        self.assertRegex(self.ok("state", "ghost"), r"link error: +line-a node 9: the drive does not answer; check")
+        self.assertEqual(self.json("state", "turntable")[0]["unit"], "deg")
+
+    def test_unknown_axis(self):
+        self.assertEqual(self.fails(4, "state", "fedeer"),
+                         "axisctl: fedeer: no axis 'fedeer'; axisctl list shows all: feeder, turntable, ghost, sticky")
+
+    def test_watch_prints_a_line_per_tick_off_a_terminal(self):
+        lines = self.ok("watch", "--period", "10ms", "--count", "3", "feeder", "turntable").splitlines()
+        self.assertEqual([line.split()[0] for line in lines], ["1", "2", "3"])
+        self.assertIn("feeder Standstill 0 mm 0 mm/s  turntable Disabled 0 deg 0 deg/s", lines[0])
+        self.assertEqual(self.server.calls("WatchAxes")[0].period.nanos, 10_000_000)
+        self.assertEqual(len(self.json("watch", "--period", "10ms", "--count", "2")), 2)
+
+    def test_watch_redraws_in_place_on_a_terminal_and_ends_with_ctrl_c(self):
+        status, shown = self.on_terminal("watch", "--period", "20ms", interrupt_at=r"\x1b\[5A.*\x1b\[5A")
+        self.assertEqual(status, 0, shown)
+        self.assertIn("\x1b[?25h", shown)  # the cursor is back
+
+    def test_watch_of_an_unknown_axis_is_refused(self):
+        self.assertIn("no axis 'nobody'", self.fails(4, "watch", "nobody"))
+
+    def test_buses(self):
+        text = self.ok("buses")
+        self.assertRegex(text, r"line-a +sim +115200 +1234 .*open, simulated")
+        self.assertIn("closed: /dev/ttyUSB7: No such file or directory; check the adapter", text)
+        self.assertEqual(self.json("buses")[0]["buses"][0]["transactions"], "1234")
+
+    def test_info(self):
+        self.assertRegex(self.ok("info"), r"machine: +press-1\n(.*\n)*motion: +permitted")
+        self.assertEqual(self.json("info")[0]["instance_id"], "fake")
+
+
+class Motion(AxisctlTest):
+    def test_move_prints_id_state_and_what_was_granted_differently(self):
+        text = self.ok("move", "feeder", "120mm", "--velocity", "50mm/s", "--acceleration-time", "150ms",
+                       "--deceleration-time", "0.2s")
+        self.assertRegex(text, r"^c-1  feeder  MoveAbsolute  (Accepted|Active)  "
+                               r"granted velocity 48 mm/s \(asked 50 mm/s\)\n$")
+        (request,) = self.server.calls("MoveAbsolute")
+        self.assertEqual((request.position, request.velocity), (120, 50))
+        self.assertEqual((request.acceleration_time.nanos, request.deceleration_time.nanos),
+                         (150_000_000, 200_000_000))
+        self.assertRegex(request.options.request_id, r"^[0-9a-f]{8}-[0-9a-f]{4}-4[0-9a-f]{3}-[89ab][0-9a-f]{3}-")
+
+    def test_negative_values(self):
+        self.ok("set-position", "feeder", "50")
+        self.ok("move", "feeder", "--relative", "-10mm", "--wait")
+        self.ok("move", "feeder", "-.5", "--relative", "--wait")
+        self.assertEqual([r.distance for r in self.server.calls("MoveRelative")], [-10, -0.5])
+        self.ok("velocity", "feeder", "-20mm/s", "--hold", "50ms")
+        self.assertEqual(self.server.calls("MoveVelocity")[0].velocity, -20)
+
+    def test_wait_ends_with_the_result(self):
+        lines = self.ok("move", "feeder", "30", "--wait").splitlines()
+        self.assertEqual(len(lines), 2)
+        self.assertRegex(lines[1], r"^c-1  feeder  MoveAbsolute  Done after \d+(\.\d+)? m?s$")
+        (command,) = self.json("move", "feeder", "0", "--wait")
+        self.assertEqual(command["state"], "COMMAND_STATE_DONE")
+
+    def test_wait_shows_progress_on_a_terminal(self):
+        status, shown = self.on_terminal("move", "feeder", "300", "--velocity", "300", "--wait")
+        self.assertEqual(status, 0, shown)
+        self.assertRegex(shown, r"feeder  \d+(\.\d+)? mm  300 mm/s  \[#+ *\]  \d+ %  \d\.\d s")
+        self.assertRegex(shown.splitlines()[-1], r"Done after")
+
+    def test_a_motion_that_ends_otherwise_has_status_1(self):
+        done = self.run_axisctl("move", "sticky", "10", "--wait")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("Error after", done.stdout)
+        self.assertIn("the drive stopped 2 mm before the target; look for an obstacle, then reset", done.stdout)
+        self.assertRegex(self.ok("list"), r"sticky +ErrorStop")
+        self.ok("reset", "sticky", "--wait")
+        self.assertRegex(self.ok("list"), r"sticky +Standstill")
+
+    def test_refusals_are_one_line_with_range_and_remedy(self):
+        self.assertEqual(self.fails(4, "move", "feeder", "500"),
+                         "axisctl: feeder: position 500 mm is beyond the soft limit (permitted 0 to 400 mm); "
+                         "choose a target inside")
+        self.assertEqual(self.fails(4, "move", "ghost", "1"),
+                         "axisctl: ghost: line-a node 9: the drive does not answer; check power and wiring; it is "
+                         "retried by itself")
+        self.assertEqual(self.fails(4, "home", "turntable"),
+                         "axisctl: turntable: the power stage is off; enable the axis")
+
+    def test_units_must_be_those_of_the_axis(self):
+        self.assertIn("mm", self.fails(2, "move", "feeder", "10deg"))
+        self.assertIn("mm/s", self.fails(2, "move", "feeder", "10", "--velocity", "5mm"))
+        self.assertIn("--acceleration-time", self.fails(2, "move", "feeder", "10", "--acceleration-time", "150"))
+        self.assertIn("position", self.fails(2, "move", "feeder", "nan"))
+        self.assertEqual(self.server.calls("MoveAbsolute"), [])
+
+    def test_request_id_repeats_without_moving_twice(self):
+        first = self.json("move", "feeder", "--relative", "5", "--wait", "--request-id", "abc")
+        second = self.json("move", "feeder", "--relative", "5", "--wait", "--request-id", "abc")
+        self.assertEqual(first[0]["id"], second[0]["id"])
+
+    def test_options_reach_the_daemon(self):
+        self.ok("move", "feeder", "1", "--buffered", "--valid-for", "5s", "--lease-token", "7")
+        options = self.server.calls("MoveAbsolute")[0].options
+        self.assertEqual((options.buffer_mode, options.lease_token, options.HasField("not_after")), (2, 7, True))
+
+    def test_power_home_reset_set_position(self):
+        self.assertRegex(self.ok("enable", "turntable"), r"^c-1  turntable  Enable  Done")
+        self.assertRegex(self.ok("home", "turntable", "feeder", "--wait"), r"(?s)turntable  Home  Done.*feeder  Home  Done")
+        self.assertRegex(self.ok("set-position", "turntable", "-90deg"), r"SetPosition  Done")
+        self.assertEqual(self.json("state", "turntable")[0]["position"], -90)
+        self.assertRegex(self.ok("disable", "turntable"), r"Disable  Done")
+
+    def test_ctrl_c_while_waiting_leaves_the_command_alone(self):
+        status, shown = self.on_terminal("move", "feeder", "390", "--velocity", "9", "--wait", interrupt_at=r" %")
+        self.assertEqual(status, 130, shown)
+        self.assertIn("command c-1 goes on; 'axisctl halt feeder' ends it", shown)
+        self.assertEqual(self.server.calls("Halt"), [])
+
+    def test_halt_on_interrupt_halts_on_a_connection_of_its_own(self):
+        status, shown = self.on_terminal("move", "feeder", "390", "--velocity", "9", "--wait", "--halt-on-interrupt",
+                                         interrupt_at=r" %")
+        self.assertEqual(status, 130, shown)
+        self.assertNotEqual(self.server.peers("Halt"), self.server.peers("MoveAbsolute"))
+
+    def test_velocity_runs_out_with_its_hold(self):
+        self.assertIn("MoveVelocity  Done", self.ok("velocity", "feeder", "30", "--hold", "100ms", "--wait"))
+
+
+class Jogging(AxisctlTest):
+    def test_jog_renews_and_halts_when_its_time_is_over(self):
+        text = self.ok("jog", "feeder", "30mm/s", "--hold", "300ms", "--for", "1s")
+        self.assertRegex(text, r"(?s)feeder  Jog  .*feeder  Halt  Done")
+        calls = self.server.calls("Jog")
+        self.assertGreaterEqual(len(calls), 3)
+        self.assertEqual(len({call.options.request_id for call in calls}), len(calls))
+        self.assertEqual(calls[0].hold.nanos, 300_000_000)
+        self.assertNotEqual(self.server.peers("Halt")[0], self.server.peers("Jog")[0])
+
+    def test_ctrl_c_halts(self):
+        status, shown = self.on_terminal("jog", "feeder", "-30", "--hold", "2s", interrupt_at=r"Jog")
+        self.assertEqual(status, 0, shown)
+        self.assertEqual(len(self.server.calls("Halt")), 1)
+
+    def test_a_jog_that_a_stop_ended_is_not_started_again(self):
+        jog = subprocess.Popen([AXISCTL, "--server", self.server.address, "jog", "feeder", "3", "--hold", "600ms"],
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment())
+        self.addCleanup(jog.kill)
+        self.wait_for_call("Jog")
+        self.ok("stop", "feeder")
+        text, _ = jog.communicate(timeout=LIMIT)
+        self.assertEqual(jog.returncode, 1, text)
+        self.assertIn("Jog  Aborted", text)
+        self.assertFalse(self.json("state", "feeder")[0]["moving"])
+
+    def test_hold_has_a_range(self):
+        self.assertIn("permitted 30ms to 2s", self.fails(2, "jog", "feeder", "1", "--hold", "3s"))
+
+
+class Stopping(AxisctlTest):
+    def test_stops_ask_nothing_before(self):
+        for words, method in ((["halt"], "Halt"), (["stop"], "Stop"), (["quick-stop"], "QuickStop")):
+            self.assertRegex(self.ok(*words, "feeder"), rf"feeder  {method}  Done")
+        self.assertEqual([name for name, _, _ in self.server.machine.calls], ["Halt", "Stop", "QuickStop"])
+
+    def test_hold_and_release(self):
+        self.ok("stop", "feeder", "--hold")
+        self.assertTrue(self.server.calls("Stop")[0].hold)
+        self.assertIn("stop held", self.ok("state", "feeder"))
+        self.ok("release-stop", "feeder")
+        self.assertNotIn("stop held", self.ok("state", "feeder"))
+
+    def test_one_refused_stop_does_not_keep_the_others(self):
+        done = self.run_axisctl("stop", "ghost", "feeder")
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("axisctl: ghost: ", done.stderr)
+        self.assertIn("feeder  Stop  Done", done.stdout)
+
+    def test_stop_all_reports_each_axis_and_holds_until_released(self):
+        done = self.run_axisctl("stop", "--all", "--wait")
+        self.assertEqual(done.returncode, 1)  # ghost cannot be confirmed
+        self.assertIn("ghost: line-a node 9: the drive does not answer", done.stdout)
+        self.assertIn("feeder  Stop  Done", done.stdout)
+        self.assertIn("release-stop --all", self.ok("info"))
+        self.assertIn("all axes are stopped", self.fails(4, "move", "feeder", "1"))
+        self.assertIn("released", self.ok("release-stop", "--all"))
+        self.ok("move", "feeder", "1", "--wait")
+
+    def test_axes_or_all(self):
+        self.assertIn("name an axis, or use --all", self.fails(2, "stop"))
+        self.assertIn("not both", self.fails(2, "stop", "feeder", "--all"))
+
+
+class Commands(AxisctlTest):
+    def test_get_watch_cancel(self):
+        self.ok("move", "feeder", "390", "--velocity", "9")
+        self.assertRegex(self.ok("command", "get", "c-1"), r"^c-1  feeder  MoveAbsolute  Active")
+        self.assertRegex(self.ok("command", "cancel", "c-1"), r"Aborted after .*: cancelled by a client")
+        watched = self.run_axisctl("command", "watch", "c-1")
+        self.assertEqual(watched.returncode, 1)
+        self.assertIn("Aborted", watched.stdout)
+        self.ok("move", "feeder", "10", "--velocity", "60")
+        self.assertEqual(self.json("command", "watch", "c-2")[-1]["state"], "COMMAND_STATE_DONE")
+
+    def test_unknown(self):
+        self.assertEqual(self.fails(4, "command", "get", "c-9"), "axisctl: c-9: no command 'c-9'")
+        self.assertIn("no command", self.fails(4, "command", "watch", "c-9"))
+
+
+class Connecting(AxisctlTest):
+    def test_unix_socket_and_environment(self):
+        with tempfile.TemporaryDirectory() as directory:
+            path = pathlib.Path(directory) / "s"
+            with fake_server.ThreadedServer(path):
+                done = subprocess.run([AXISCTL, "list", "--names"], capture_output=True, text=True, timeout=LIMIT,
+                                      env=environment() | {"AXISD_SERVER": f"unix:{path}"}, check=False)
+        self.assertEqual((done.returncode, done.stdout.split()[0]), (0, "feeder"), done.stderr)
+
+    def test_a_proxy_of_the_environment_is_ignored(self):
+        done = self.run_axisctl("list", env={"http_proxy": "http://127.0.0.1:9", "grpc_proxy": "http://127.0.0.1:9"})
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_unreachable(self):
+        with socket.socket() as taken:  # bound, not listening: nobody else can get this port meanwhile
+            taken.bind(("127.0.0.1", 0))
+            address = f"127.0.0.1:{taken.getsockname()[1]}"
+            self.assertRegex(self.fails(3, "list", server=address),
+                             rf"cannot reach axisd at {address}: .*refused; is the daemon running")
+            self.assertIn(f"cannot reach axisd at {address}", self.fails(3, "stop", "--all", server=address))
+        self.assertIn("cannot reach axisd at unix:/nonexistent/s", self.fails(3, "list", server="unix:/nonexistent/s"))
+
+    def test_a_silent_daemon_ends_with_the_time_limit(self):
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            self.fails(3, "--timeout", "300ms", "list", server=f"127.0.0.1:{silent.getsockname()[1]}")
+
+    def test_a_daemon_that_goes_away_while_waiting(self):
+        move = subprocess.Popen([AXISCTL, "--server", self.server.address, "move", "feeder", "390", "--velocity", "9",
+                                 "--wait"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                env=environment())
+        self.addCleanup(move.kill)
+        self.wait_for_call("WatchCommand")
+        self.server.__exit__()
+        _, error = move.communicate(timeout=LIMIT)
+        self.assertEqual(move.returncode, 3, error)
+        self.assertIn(f"cannot reach axisd at {self.server.address}", error)
+        self.assertIn("command c-1 may go on", error)
+
+    def test_certificates(self):
+        self.assertIn("cannot read '/nonexistent'", self.fails(2, "--tls-ca", "/nonexistent", "list"))
+        self.assertIn("belong together", self.fails(2, "--tls-cert", "/nonexistent", "list"))
+
+
+class Offline(AxisctlTest):
+    def setUp(self):
+        """No daemon needed."""
+        self.server = type("Nobody", (), {"address": "unix:/nonexistent/s"})
+
+    def test_check_prints_every_diagnostic(self):
+        with tempfile.TemporaryDirectory() as directory:
+            path = pathlib.Path(directory) / "bad.yaml"
+            path.write_text("machine: demo\nbusses: {}\naxes: 7\n")
+            done = self.run_axisctl("check", str(path))
+            self.assertEqual(done.returncode, 2)
+            self.assertGreaterEqual(len(done.stderr.splitlines()), 3)
+            for line in done.stderr.splitlines()[:-1]:
+                self.assertRegex(line, rf"^{path}:\d+:\d+: ")
+            self.assertRegex(done.stderr.splitlines()[-1], r"^axisctl: .*: \d+ errors?$")
+            listed = self.run_axisctl("--json", "check", str(path))
+            self.assertEqual(listed.returncode, 2)
+            self.assertIn('"valid":false', listed.stdout)
+
+    def test_schema(self):
+        self.assertTrue(self.ok("schema").startswith("{"))
+
+    def test_usage(self):
+        for words in ([], ["move"], ["move", "feeder"], ["fly"], ["move", "feeder", "1", "--velcity", "2"],
+                      ["completion", "fish"], ["command"]):
+            self.assertRegex(self.fails(2, *words), r"see 'axisctl.* --help'$")
+        self.assertIn("--timeout", self.fails(2, "--timeout", "5", "list"))
+
+    def test_help_documents_exit_status(self):
+        self.assertIn("the daemon cannot be reached", self.ok("--help"))
+        self.assertIn("--acceleration-time", self.ok("move", "--help"))
+        self.assertRegex(self.ok("--version"), r"^axisctl \d")
+
+
+class Completion(AxisctlTest):
+    def complete(self, *words):
+        script = ('eval "$("$AXISCTL" completion bash)"; COMP_WORDS=("$AXISCTL" "$@"); COMP_CWORD=$#; _axisctl; '
+                  'printf "%s\\n" "${COMPREPLY[@]}"')
+        done = subprocess.run(["bash", "-c", script, "bash", *words], capture_output=True, text=True, timeout=LIMIT,
+                              env=environment() | {"AXISCTL": AXISCTL, "AXISD_SERVER": self.server.address},
+                              check=False)
+        self.assertEqual(done.stderr, "")
+        return done.stdout.split()
+
+    def test_subcommands_options_axes(self):
+        self.assertEqual(self.complete("sto"), ["stop"])
+        self.assertEqual(sorted(self.complete("command", "")), ["cancel", "get", "watch"])
+        self.assertIn("--relative", self.complete("move", "feeder", "--re"))
+        self.assertIn("--json", self.complete("list", "--j"))
+        self.assertEqual(self.complete("move", "fe"), ["feeder"])
+        self.assertEqual(self.complete("stop", "feeder", "t"), ["turntable"])
+        self.assertEqual(self.complete("--timeout", "2s", "state", "gh"), ["ghost"])
+        self.assertEqual(self.complete("move", "feeder", ""), [])
+
+
+if __name__ == "__main__":
+    signal.alarm(600)  # a hang names itself instead of blocking a test run
+    unittest.main()

@@ -1,0 +1,216 @@
+"""The Python package against the fake daemon."""
+import asyncio
+import datetime
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import fake_server  # builds the package and puts it on the path
+import axisd
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+class ClientTest(unittest.IsolatedAsyncioTestCase):
+    async def asyncSetUp(self):
+        self.fake = fake_server.FakeMachine()
+        server, port = await fake_server.serve(self.fake, ["127.0.0.1:0"])
+        self.addAsyncCleanup(server.stop, 0)
+        self.server = server
+        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
+        self.feeder = self.machine.axis("feeder")
+
+    def calls(self, method):
+        return [request for name, request, _ in self.fake.calls if name == method]
+
+    def peers(self, method):
+        return {peer for name, _, peer in self.fake.calls if name == method}
+
+
+class Motion(ClientTest):
+    async def test_power_home_move_until_done(self):
+        await self.feeder.enable()
+        await self.feeder.home()
+        result = await self.feeder.move(30, velocity=200, acceleration_time=0.15,
+                                        deceleration_time=datetime.timedelta(milliseconds=200))
+        self.assertIs(result.state, axisd.CommandState.DONE)
+        self.assertEqual((result.kind, result.asked.velocity, result.granted.velocity), ("move_absolute", 200, 198))
+        state = await self.feeder.state()
+        self.assertEqual((state.position, state.state, state.trust), (30, axisd.State.STANDSTILL, axisd.Trust.HOMED))
+        (request,) = self.calls("MoveAbsolute")
+        self.assertEqual((request.acceleration_time.nanos, request.deceleration_time.nanos),
+                         (150_000_000, 200_000_000))
+
+    async def test_zero_is_a_value(self):
+        await self.feeder.set_position(5)
+        await self.feeder.move(0)
+        self.assertTrue(self.calls("MoveAbsolute")[0].HasField("position"))
+        self.assertFalse(self.calls("MoveAbsolute")[0].HasField("velocity"))
+
+    async def test_move_relative(self):
+        await self.feeder.set_position(100)
+        await self.feeder.move_relative(-10)
+        self.assertEqual((await self.feeder.state()).position, 90)
+
+    async def test_without_waiting(self):
+        command = await self.feeder.move(60, velocity=300, wait=False)
+        self.assertFalse(command.state.ended)
+        self.assertIs((await self.machine.wait(command)).state, axisd.CommandState.DONE)
+        self.assertIs((await self.machine.command(command.id)).state, axisd.CommandState.DONE)
+
+    async def test_a_motion_that_ends_otherwise_raises(self):
+        with self.assertRaises(axisd.MotionError) as raised:
+            await self.machine.axis("sticky").move(5)
+        self.assertEqual(raised.exception.reason, "not_reached")
+        self.assertIs(raised.exception.command.state, axisd.CommandState.ERROR)
+        self.assertEqual(str(raised.exception), "sticky: move_absolute Error: the drive stopped 2 mm before the "
+                                                "target; look for an obstacle, then reset")
+        await self.machine.axis("sticky").reset()
+
+    async def test_a_halt_ends_a_waiting_move(self):
+        moving = asyncio.create_task(self.feeder.move(390, velocity=9))
+        while not self.calls("MoveAbsolute"):
+            await asyncio.sleep(0.01)
+        await self.feeder.halt()
+        with self.assertRaises(axisd.MotionError) as raised:
+            await moving
+        self.assertEqual(raised.exception.reason, "superseded")
+        self.assertNotEqual(self.peers("Halt"), self.peers("MoveAbsolute"))
+
+    async def test_cancelling_the_call_leaves_the_motion_alone(self):
+        with self.assertRaises(TimeoutError):
+            await asyncio.wait_for(self.feeder.move(390, velocity=9), 0.2)
+        self.assertTrue((await self.feeder.state()).moving)
+
+    async def test_a_repeated_request_id_attaches(self):
+        first = await self.feeder.move_relative(5, request_id="abc")
+        second = await self.feeder.move_relative(5, request_id="abc")
+        self.assertEqual(first.id, second.id)
+
+    async def test_velocity_with_hold_and_cancel(self):
+        command = await self.feeder.velocity(-30, hold=0.1)
+        self.assertIs((await self.machine.wait(command)).state, axisd.CommandState.DONE)
+        command = await self.feeder.velocity(3)
+        self.assertIs((await self.machine.cancel(command.id)).state, axisd.CommandState.ABORTED)
+
+    async def test_stop_held_and_quick_stop(self):
+        await self.feeder.stop(hold=True)
+        self.assertTrue((await self.feeder.state()).stop_held)
+        await self.feeder.release_stop()
+        self.assertFalse((await self.feeder.state()).stop_held)
+        self.assertEqual((await self.feeder.quick_stop()).kind, "quick_stop")
+        await self.feeder.disable()
+        self.assertIs((await self.feeder.state()).state, axisd.State.DISABLED)
+
+
+class Jogging(ClientTest):
+    async def test_renews_inside_the_block_and_halts_after(self):
+        async with self.feeder.jog(30, hold=0.15) as jog:
+            await asyncio.sleep(0.6)  # longer than the hold: only renewals keep it moving
+            self.assertIs((await self.machine.command(jog.command.id)).state, axisd.CommandState.ACTIVE)
+        self.assertFalse((await self.feeder.state()).moving)
+        calls = self.calls("Jog")
+        self.assertGreater(len(calls), 2)
+        self.assertEqual(len({call.options.request_id for call in calls}), len(calls))
+        self.assertEqual(len(self.calls("Halt")), 1)
+
+    async def test_halts_when_the_block_raises(self):
+        with self.assertRaises(ZeroDivisionError):
+            async with self.feeder.jog(30):
+                raise ZeroDivisionError
+        self.assertEqual(len(self.calls("Halt")), 1)
+
+    async def test_a_stop_ends_it_and_it_is_not_started_again(self):
+        with self.assertRaises(axisd.MotionError):
+            async with self.feeder.jog(3, hold=0.3):
+                await self.feeder.stop()
+                jogs = len(self.calls("Jog"))
+                await asyncio.sleep(0.5)
+        self.assertEqual(len(self.calls("Jog")), jogs)
+        self.assertFalse((await self.feeder.state()).moving)
+
+
+class WholeMachine(ClientTest):
+    async def test_axes_buses_info(self):
+        axes = await self.machine.axes()
+        self.assertEqual(list(axes), ["feeder", "turntable", "ghost", "sticky"])
+        self.assertTrue(axes["feeder"].simulated)
+        self.assertEqual((axes["ghost"].link, axes["ghost"].link_error.node), (axisd.Link.OFFLINE, 9))
+        self.assertEqual([bus.open for bus in await self.machine.buses()], [True, False])
+        self.assertEqual((await self.machine.info()).machine, "press-1")
+
+    async def test_watch(self):
+        ticks = []
+        async for tick in self.machine.watch(["feeder"], period=0.01):
+            ticks.append(tick)
+            if len(ticks) == 3:
+                break
+        self.assertEqual([tick.tick for tick in ticks], [1, 2, 3])
+        async for state in self.feeder.watch(0.01):
+            self.assertEqual(state.axis, "feeder")
+            break
+
+    async def test_stop_all_and_release(self):
+        results = {result.axis: result for result in await self.machine.stop_all()}
+        self.assertIs(results["feeder"].command.state, axisd.CommandState.DONE)
+        self.assertEqual(results["ghost"].error.reason, "offline")
+        with self.assertRaises(axisd.RefusedError) as raised:
+            await self.feeder.move(1)
+        self.assertEqual(raised.exception.reason, "inhibited")
+        await self.machine.release_stop_all()
+        await self.feeder.move(1)
+
+
+class Errors(ClientTest):
+    async def test_refusal_carries_the_detail(self):
+        with self.assertRaises(axisd.RefusedError) as raised:
+            await self.feeder.move(500)
+        error = raised.exception
+        self.assertEqual((error.reason, error.message, error.remedy),
+                         ("soft_limit", "position 500 mm is beyond the soft limit", "choose a target inside"))
+        self.assertEqual((error.detail.permitted.minimum, error.detail.permitted.maximum), (0, 400))
+        self.assertEqual(str(error), "feeder: position 500 mm is beyond the soft limit (permitted 0 to 400 mm); "
+                                     "choose a target inside")
+
+    async def test_offline_is_a_refusal_and_no_daemon_is_unreachable(self):
+        with self.assertRaises(axisd.RefusedError) as raised:
+            await self.machine.axis("ghost").enable()
+        self.assertEqual(raised.exception.reason, "offline")
+        await self.server.stop(0)
+        with self.assertRaises(axisd.UnreachableError) as raised:
+            await self.feeder.move(1, request_id="abc")
+        self.assertEqual(raised.exception.request_id, "abc")
+
+    async def test_watch_translates_errors(self):
+        with self.assertRaisesRegex(axisd.RefusedError, "no axis 'nobody'"):
+            async for _ in self.machine.axis("nobody").watch():
+                self.fail("no state expected")
+
+    def test_certificates_belong_together(self):
+        with self.assertRaises(ValueError):
+            axisd.connect("localhost:1", tls_key="key.pem")
+
+
+class Packaging(unittest.TestCase):
+    def test_builds_without_network_and_imports(self):
+        with tempfile.TemporaryDirectory() as directory:
+            # From a copy: setuptools writes beside its sources, and parallel tests share the tree.
+            for name in ("api/python", "proto"):
+                subprocess.run(["cp", "-r", "--parents", name, directory], cwd=ROOT, check=True)
+            built = pathlib.Path(directory) / "built"
+            subprocess.run([sys.executable, "setup.py", "-q", "build_py", "--build-lib", str(built)], check=True,
+                           cwd=pathlib.Path(directory) / "api" / "python")
+            self.assertTrue((built / "axisd" / "py.typed").exists())
+            done = subprocess.run([sys.executable, "-c", "import axisd; print(axisd.connect('x:1').server)"],
+                                  env=os.environ | {"PYTHONPATH": str(built)}, capture_output=True, text=True,
+                                  check=True)
+            self.assertEqual(done.stdout.strip(), "x:1")
+
+
+if __name__ == "__main__":
+    signal.alarm(600)  # a hang names itself instead of blocking a test run
+    unittest.main()

@@ -1,0 +1,14 @@
+# axisctl and the Python client need gRPC on both sides.
+if(AXISD_GRPC)
+  file(GLOB sources CONFIGURE_DEPENDS unit/axisctl/*.cpp)
+  axisd_test(test_axisctl SOURCES ${sources} LINK axisctl_commands)
+
+  # Debian's interpreter: python3-grpcio is a package of that one only.
+  find_program(AXISD_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
+  add_test(NAME axisctl.against_fake_daemon
+           COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl.py)
+  add_test(NAME python_client.against_fake_daemon
+           COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_python_client.py)
+  set_tests_properties(axisctl.against_fake_daemon python_client.against_fake_daemon PROPERTIES
+                       ENVIRONMENT "AXISCTL=$<TARGET_FILE:axisctl>" TIMEOUT 600)
+endif()

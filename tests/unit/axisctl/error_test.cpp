@@ -1,0 +1,87 @@
+#include "api/axisctl/error.hpp"
+
+#include <gmock/gmock.h>
+
+namespace axisd::axisctl {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+v1::ErrorDetail soft_limit() {
+  v1::ErrorDetail detail;
+  detail.set_reason(v1::REASON_SOFT_LIMIT);
+  detail.set_message("position 500 mm is beyond the soft limit");
+  detail.set_remedy("choose a target inside");
+  detail.mutable_permitted()->set_maximum(400);
+  detail.mutable_permitted()->set_unit("mm");
+  return detail;
+}
+
+grpc::Status status_with(const v1::ErrorDetail& detail, grpc::StatusCode code, const std::string& type) {
+  v1::StatusDetails details;
+  auto& packed = *details.add_details();
+  packed.set_type_url(type);
+  packed.set_value(detail.SerializeAsString());
+  return {code, "text", details.SerializeAsString()};
+}
+
+TEST(ErrorText, DetailIsOneLineWithRangeAndRemedy) {
+  EXPECT_EQ(describe(soft_limit()),
+            "position 500 mm is beyond the soft limit (permitted 0 to 400 mm); choose a target inside");
+  auto told = soft_limit();
+  told.set_message("500 mm is not permitted");
+  EXPECT_THAT(describe(told), Not(HasSubstr("(permitted")));
+}
+
+TEST(ErrorText, AddressLeads) {
+  v1::ErrorDetail detail;
+  detail.set_reason(v1::REASON_REFUSED);
+  detail.set_bus("line-a");
+  detail.set_node(3);
+  detail.set_object(0x27);
+  EXPECT_EQ(describe(detail), "line-a node 3 object 0x0027: refused");
+}
+
+TEST(ErrorText, DetailComesFromTheTrailer) {
+  const auto status =
+      status_with(soft_limit(), grpc::StatusCode::OUT_OF_RANGE, "type.googleapis.com/axisd.v1.ErrorDetail");
+  const auto failure = failure_of(status, "feeder", "localhost:7443", false);
+  EXPECT_EQ(failure.code(), ExitCode::refused);
+  EXPECT_STREQ(
+      failure.what(),
+      "feeder: position 500 mm is beyond the soft limit (permitted 0 to 400 mm); choose a target inside");
+}
+
+TEST(ErrorText, ForeignOrBrokenDetailsFallBackToTheMessage) {
+  const auto foreign =
+      status_with(soft_limit(), grpc::StatusCode::INTERNAL, "type.googleapis.com/google.rpc.DebugInfo");
+  EXPECT_FALSE(detail_of(foreign));
+  EXPECT_STREQ(failure_of(foreign, "feeder", "x", false).what(), "feeder: text");
+  EXPECT_FALSE(detail_of(grpc::Status(grpc::StatusCode::INTERNAL, "text", "\xff\xff")));
+}
+
+TEST(ErrorText, AnOfflineDriveIsARefusalAndASilentDaemonIsNot) {
+  v1::ErrorDetail offline;
+  offline.set_reason(v1::REASON_OFFLINE);
+  const auto by_daemon = status_with(offline, grpc::StatusCode::UNAVAILABLE, "x/axisd.v1.ErrorDetail");
+  EXPECT_EQ(failure_of(by_daemon, "feeder", "x", false).code(), ExitCode::refused);
+
+  const grpc::Status refused(
+      grpc::StatusCode::UNAVAILABLE,
+      "failed to connect to all addresses; last error: UNKNOWN: ipv4:127.0.0.1:1: Failed to "
+      "connect to remote host: Connection refused");
+  const auto failure = failure_of(refused, "", "localhost:1", false);
+  EXPECT_EQ(failure.code(), ExitCode::unreachable);
+  EXPECT_STREQ(
+      failure.what(),
+      "cannot reach axisd at localhost:1: ipv4:127.0.0.1:1: Failed to connect to remote host: Connection "
+      "refused; is the daemon running there? --server HOST:PORT or AXISD_SERVER names another one");
+  EXPECT_EQ(failure_of({grpc::StatusCode::DEADLINE_EXCEEDED, "Deadline Exceeded"}, "", "x", false).code(),
+            ExitCode::unreachable);
+  EXPECT_EQ(failure_of({grpc::StatusCode::PERMISSION_DENIED, "no"}, "", "x", false).code(),
+            ExitCode::refused);
+}
+
+}  // namespace
+}  // namespace axisd::axisctl
