@@ -254,7 +254,7 @@ std::string json_schema() {
   head.text("$schema", "https://json-schema.org/draft/2020-12/schema").text("title", "axisd configuration");
   const auto body = section(schema()).raw("$defs", models.json()).json();
   const auto start = head.json();
-  return indented(start.substr(0, start.size() - 1) + "," + body.substr(1)) + "\n";
+  return indented(start.substr(0, start.size() - 1) + "," + body.substr(1));
 }
 
 }  // namespace axisd::config

@@ -11,15 +11,16 @@ struct ScaleSettings {
   std::int64_t pulses_per_revolution = 0;  ///< microstep setting of the drive (motor revolution)
   std::int64_t gear_motor = 1;             ///< gear: motor revolutions ...
   std::int64_t gear_output = 1;            ///< ... per output revolutions
-  /// Travel in user units per output revolution, as a decimal that was written in the YAML: numerator / denominator.
+  /// Travel in user units per output revolution, as a decimal that was written in the YAML: numerator /
+  /// denominator.
   std::int64_t travel_numerator = 1, travel_denominator = 1;
-  bool invert = false;                     ///< positive axis direction = negative drive direction (M18)
-  std::optional<double> modulo;            ///< rotary axes: user units per turn (360)
-  std::string unit = "rev";                ///< mm, deg, rev ...
+  bool invert = false;           ///< positive axis direction = negative drive direction (M18)
+  std::optional<double> modulo;  ///< rotary axes: user units per turn (360)
+  std::string unit = "rev";      ///< mm, deg, rev ...
 };
 
-/// Conversions in the axis's own direction; invert is applied here and nowhere else. Pure, never undefined: what does
-/// not fit saturates. Sums of distances belong into exact_scale.hpp.
+/// Conversions in the axis's own direction; invert is applied here and nowhere else. Pure, never undefined:
+/// what does not fit saturates. Sums of distances belong into exact_scale.hpp.
 class Scale {
  public:
   /// Precondition: valid(settings); else throws std::invalid_argument.
@@ -35,8 +36,8 @@ class Scale {
   [[nodiscard]] std::int64_t denominator() const { return denominator_; }
   /// Position in user units of a (drive direction) pulse count.
   [[nodiscard]] double to_units(std::int64_t pulses) const;
-  /// Nearest pulse count; exact ratio, rounded once, half away from zero. Saturates at the ends of the type; NaN
-  /// gives 0: use checked_pulses() to refuse both.
+  /// Nearest pulse count; exact ratio, rounded once, half away from zero. Saturates at the ends of the type;
+  /// NaN gives 0: use checked_pulses() to refuse both.
   [[nodiscard]] std::int64_t to_pulses(double units) const;
   /// As to_pulses(), but nullopt for NaN, infinity and whatever does not fit.
   [[nodiscard]] std::optional<std::int64_t> checked_pulses(double units) const;
