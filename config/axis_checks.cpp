@@ -138,9 +138,6 @@ void AxisChecks::complete_scale() {
 void AxisChecks::check_policies() {
   if (!axis_.vertical || !usable("load")) return;
   // M2: a policy must not let the load fall.
-  if (axis_.on_lease_loss == LeaseLossPolicy::disable) {
-    add("on_lease_loss", "'on_lease_loss: disable' would release a vertical load", "use halt or stop");
-  }
   if (axis_.stop_escalation_release) {
     add("stop_escalation", "'stop_escalation: release' would release a vertical load", "use none");
   }

@@ -205,7 +205,6 @@ constexpr KeySpec simulate_keys[] = {
      .apply = [](Target& t, const Value& v) { t.axis->simulation.start_position = v.number; }},
 };
 
-constexpr std::string_view lease_policies[] = {"halt", "stop", "disable", "finish"};
 constexpr std::string_view loads[] = {"normal", "vertical"};
 constexpr std::string_view escalations[] = {"none", "release"};
 
@@ -259,16 +258,6 @@ constexpr KeySpec axis_keys[] = {
      .kind = Kind::terminals,
      .description = "Functions of input terminals, in axis direction."},
     {.key = "outputs", .kind = Kind::terminals, .description = "Functions of output terminals."},
-    {.key = "on_lease_loss",
-     .kind = Kind::choice,
-     .description = "What happens to a motion whose client lost its lease.",
-     .example = "stop",
-     .default_value = "halt",
-     .choices = lease_policies,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.on_lease_loss = static_cast<LeaseLossPolicy>(choice_index(lease_policies, v.text));
-         }},
     {.key = "load",
      .kind = Kind::choice,
      .description = "vertical: the power stage is never released by a policy.",

@@ -13,6 +13,7 @@ namespace {
 
 /// What is known, but not part of this release: says so instead of guessing at a typing error.
 constexpr std::string_view canopen = "canopen";
+constexpr std::string_view on_lease_loss = "on_lease_loss";
 
 std::vector<std::string_view> keys_of(std::span<const KeySpec> keys) {
   return names_of(keys, [](const KeySpec& spec) { return spec.key; });
@@ -104,6 +105,12 @@ void Reader::check_keys(std::span<const Entry> entries, std::span<const KeySpec>
     if (key.text == canopen && find(keys, "modbus_rtu") != nullptr) {
       report(here, key.mark, "bus kind 'canopen' is not supported by this release", "supported: modbus_rtu");
       probably_meant.insert("modbus_rtu");
+      continue;
+    }
+    if (key.text == on_lease_loss && find(keys, "homing") != nullptr) {
+      // A machine builder who reads it in the file would rely on it.
+      report(here, key.mark, "'on_lease_loss' is not supported by this release, which has no leases",
+             "leave it out; jog and velocity with hold halt when they are not renewed");
       continue;
     }
     const auto message = fmt::format("unknown key {}{}", quoted(key.text), path.empty() ? "" : " in " + path);

@@ -55,6 +55,10 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                                            settings, *descriptor, std::move(drive),
                                            std::make_shared<AxisGate>(), bus->settings().simulated()));
     by_name_.emplace(settings.name, axes_.back().get());
+    const bool brake =
+        std::ranges::any_of(settings.outputs, [](const auto& o) { return o.function == "brake"; });
+    if (settings.vertical && !brake)
+      spdlog::warn("{}: load: vertical, but no output has the function brake", settings.name);  // M2
   }
 }
 

@@ -45,8 +45,6 @@ struct HomingSettings {
   Duration timeout = std::chrono::seconds(60);
 };
 
-enum class LeaseLossPolicy : std::uint8_t { halt, stop, disable, finish };
-
 /// Value of a model-specific setting, after the descriptor's schema was applied.
 using SettingValue = std::variant<bool, std::int64_t, double, std::string>;
 
@@ -59,7 +57,6 @@ struct AxisSettings {
   LimitSettings limits{};
   std::optional<HomingSettings> homing{};
   std::vector<TerminalSettings> inputs{}, outputs{};
-  LeaseLossPolicy on_lease_loss = LeaseLossPolicy::halt;
   bool vertical = false;                 ///< `load: vertical` (M2)
   bool stop_escalation_release = false;  ///< `stop_escalation: release` (M13)
   bool require_trust = true;             ///< absolute moves need a trusted position

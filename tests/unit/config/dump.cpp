@@ -87,7 +87,6 @@ void dump_axis(Dump& dump, const AxisSettings& axis) {
   if (axis.homing) dump_homing(dump, *axis.homing);
   dump_terminals(dump, "inputs", axis.inputs);
   dump_terminals(dump, "outputs", axis.outputs);
-  dump.field("on_lease_loss", axis.on_lease_loss);
   dump.field("vertical", axis.vertical);
   dump.field("stop_escalation_release", axis.stop_escalation_release);
   dump.field("require_trust", axis.require_trust);
