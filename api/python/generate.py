@@ -21,6 +21,7 @@ def generate(directory: pathlib.Path) -> None:
     protos = sorted(str(path.relative_to(PROTO)) for path in PROTO.glob("axisd/v1/*.proto"))
     if not protos:
         raise SystemExit(f"no .proto files below {PROTO}: build inside the repository")
+    directory = directory.resolve()  # protoc runs elsewhere
     directory.mkdir(parents=True, exist_ok=True)
     subprocess.run(
         [program("protoc"), f"-I{PROTO}", f"--python_out={directory}", f"--pyi_out={directory}",

@@ -201,9 +201,11 @@ class Packaging(unittest.TestCase):
             # From a copy: setuptools writes beside its sources, and parallel tests share the tree.
             for name in ("api/python", "proto"):
                 subprocess.run(["cp", "-r", "--parents", name, directory], cwd=ROOT, check=True)
-            built = pathlib.Path(directory) / "built"
-            subprocess.run([sys.executable, "setup.py", "-q", "build_py", "--build-lib", str(built)], check=True,
-                           cwd=pathlib.Path(directory) / "api" / "python")
+            source = pathlib.Path(directory) / "api" / "python"
+            # --build-lib relative, as pip has it
+            subprocess.run([sys.executable, "setup.py", "-q", "build_py", "--build-lib", "built"], check=True,
+                           cwd=source, stderr=subprocess.DEVNULL)
+            built = source / "built"
             self.assertTrue((built / "axisd" / "py.typed").exists())
             done = subprocess.run([sys.executable, "-c", "import axisd; print(axisd.connect('x:1').server)"],
                                   env=os.environ | {"PYTHONPATH": str(built)}, capture_output=True, text=True,
