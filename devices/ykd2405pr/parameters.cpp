@@ -1,7 +1,8 @@
 // The register table of the YKD2405PR, manual 6.1, with these corrections (its other chapters contradict it):
-// 0x0027 is write-only (6.2.4); 0x0028..0x002C print the same "-" as default and are commands, so they are as well;
-// 0x0030 is printed RO but 7.6.3 writes it; 0x0001 prints "V1.0", which its sister models give as 0x0100;
-// 0x0024/0x0025 are the halves of one signed 32-bit number, so any word is allowed (their own example: 0x86A0).
+// 0x0027 is write-only (6.2.4); 0x0028..0x002C print the same "-" as default and are commands: write-only as
+// well; 0x0030 is printed RO but 7.6.3 writes it; 0x0001 prints "V1.0", which its sister models give as
+// 0x0100; 0x0024/0x0025 are the halves of one signed 32-bit number: any word is allowed (their own example:
+// 0x86A0).
 #include "devices/ykd2405pr/registers.hpp"
 
 namespace axisd::ykd2405pr {
