@@ -14,7 +14,7 @@ struct DriveOption {
   SimulatedNodeSettings settings;
 };
 
-/// "node=1,model=ykd2405pr,home=5000:6000,positive_limit=90000,negative_limit=-2000,switch.start_in_motion=on,
+/// "node=1,model=ykd2405pr,home=5000:6000,positive_limit=90000,negative_limit=-2000,switch.unsigned_speed=on,
 /// eeprom.0x0011=13,wire.X0=home,wire.X1=positive_limit:nc,boot_ms=300,powered=off". node and model are
 /// needed. Errors name the part that is wrong. Models, switches and terminals are checked by make_node().
 Result<DriveOption> parse_drive(std::string_view text);
