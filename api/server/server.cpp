@@ -126,7 +126,11 @@ Result<int> Server::start() {
   }
   if (auto accepting = parts_->accept.start(std::move(entries), options_.connections); !accepting)
     return fail(std::move(accepting).error());
-  parts_->server->GetHealthCheckService()->SetServingStatus(true);
+  auto* health = parts_->server->GetHealthCheckService();
+  health->SetServingStatus(true);
+  for (const auto* name : {v1::AxisService::service_full_name(), v1::CommandService::service_full_name(),
+                           v1::SystemService::service_full_name(), v1::BusService::service_full_name()})
+    health->SetServingStatus(name, true);
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,
                  options_.tls && !address.starts_with("unix:") ? "mutual TLS" : "plaintext, local");

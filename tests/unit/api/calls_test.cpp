@@ -272,6 +272,10 @@ std::string generic_call(const std::shared_ptr<grpc::Channel>& channel, const st
 TEST_F(Calls, HealthAndReflectionAreServed) {
   serve();
   EXPECT_EQ(generic_call(channel_, "/grpc.health.v1.Health/Check", ""), "\x08\x01");  // SERVING
+  EXPECT_EQ(generic_call(channel_, "/grpc.health.v1.Health/Check",
+                         "\x0a\x14"
+                         "axisd.v1.AxisService"),
+            "\x08\x01");
   const auto services =
       generic_call(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                    std::string("\x3a\x00", 2));  // list_services: ""
