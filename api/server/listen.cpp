@@ -138,6 +138,7 @@ Result<std::vector<ListeningSocket>> listen_unix(const std::string& name, const 
   const auto* address = reinterpret_cast<const sockaddr*>(&target);
   // A file that a killed daemon left behind is replaced; one that somebody answers on is in use.
   const FileDescriptor probe(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  if (probe.get() < 0) return system_error(name, "open a socket");
   if (connect(probe.get(), address, sizeof target) == 0) {
     errno = EADDRINUSE;
     return system_error(name, "bind");
