@@ -66,9 +66,10 @@ void stop_all(Invocation& invocation, bool wait) {
     const bool failed = result.has_error() || outcome(result.command()) != ExitCode::ok;
     if (failed) invocation.status = ExitCode::ended_otherwise;
     if (invocation.json) continue;
-    print_line(result.has_error() ? coloured(fmt::format("{}: {}", result.axis(), describe(result.error())),
-                                             Colour::red, use_colour())
-                                  : command_line(result.command(), ""));
+    print_line(result.has_error()
+                   ? coloured(fmt::format("{}: {}", result.axis(), describe(result.error(), result.axis())),
+                              Colour::red, use_colour())
+                   : command_line(result.command(), ""));
   }
   if (!invocation.json) print_line("all motion is refused until 'axisctl release-stop --all'");
 }

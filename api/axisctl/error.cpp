@@ -42,16 +42,18 @@ std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status) {
   return std::nullopt;
 }
 
-std::string describe(const v1::ErrorDetail& detail) {
+std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
+  std::string message = detail.message();
+  if (const std::string lead = fmt::format("{}: ", subject); message.starts_with(lead))
+    message.erase(0, lead.size());
   std::string text;
   if (!detail.bus().empty()) text = detail.bus();
   if (detail.has_node()) text += fmt::format("{}node {}", text.empty() ? "" : " ", detail.node());
   if (detail.has_object())
     text += fmt::format("{}0x{:04X}", text.empty() ? "object " : " object ", detail.object());
   if (!text.empty()) text += ": ";
-  text +=
-      detail.message().empty() ? lower_word(v1::Reason_Name(detail.reason()), "REASON_") : detail.message();
-  if (detail.has_permitted() && !detail.message().contains("permitted"))
+  text += message.empty() ? lower_word(v1::Reason_Name(detail.reason()), "REASON_") : message;
+  if (detail.has_permitted() && !message.contains("permitted"))
     text += fmt::format(" (permitted {} to {}{}{})", number(detail.permitted().minimum()),
                         number(detail.permitted().maximum()), detail.permitted().unit().empty() ? "" : " ",
                         detail.permitted().unit());
@@ -61,10 +63,7 @@ std::string describe(const v1::ErrorDetail& detail) {
 
 Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls) {
   const std::string lead = subject.empty() ? "" : fmt::format("{}: ", subject);
-  if (const auto detail = detail_of(status)) {
-    const std::string text = describe(*detail);
-    return {ExitCode::refused, text.starts_with(lead) ? text : lead + text};
-  }
+  if (const auto detail = detail_of(status)) return {ExitCode::refused, lead + describe(*detail, subject)};
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return unreachable(status, server, tls);
   if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
     return {

@@ -36,8 +36,9 @@ class Failure : public std::runtime_error {
 /// The typed detail of the grpc-status-details-bin trailer, if the daemon sent one.
 std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status);
 
-/// One line: address, message, permitted range, remedy.
-std::string describe(const v1::ErrorDetail& detail);
+/// One line: address, message, permitted range, remedy. A message that begins with `subject` loses that: the
+/// caller names it already.
+std::string describe(const v1::ErrorDetail& detail, std::string_view subject = {});
 
 /// What to tell about a call that failed. `subject` (an axis, a command id or empty) leads the line; `server`
 /// names the endpoint for a daemon that cannot be reached; `tls` says whether the connection was encrypted.

@@ -126,7 +126,7 @@ std::string command_line(const v1::Command& command, std::string_view unit) {
                                  command_state(command));
   if (command.has_ended_at() && command.has_accepted_at())
     text += fmt::format(" after {}", duration_text(seconds(command.ended_at() - command.accepted_at())));
-  if (command.has_cause()) text += ": " + describe(command.cause());
+  if (command.has_cause()) text += ": " + describe(command.cause(), command.axis());
   if (const std::string granted = granted_text(command, unit); !granted.empty()) text += "  " + granted;
   return text;
 }

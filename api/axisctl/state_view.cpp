@@ -105,7 +105,8 @@ std::string state_details(const v1::AxisState& state, bool colour) {
                            (state.in_position() ? ", in position" : "") +
                            (state.stop_held() ? ", stop held" : "") +
                            (state.inhibited() ? ", all axes stopped: release-stop --all" : ""));
-  if (state.has_fault()) details.add("fault", coloured(describe(state.fault()), Colour::red, colour));
+  if (state.has_fault())
+    details.add("fault", coloured(describe(state.fault(), state.axis()), Colour::red, colour));
   if (state.alarm_code() != 0)
     details.add("alarm", fmt::format("{} {}", state.alarm_code(), state.alarm_name()));
   details.add("power", power(state));
@@ -124,7 +125,7 @@ std::string state_details(const v1::AxisState& state, bool colour) {
                           state.drive_version(), state.bus(), state.node()));
   details.add("link", link(state));
   if (state.has_link_error())
-    details.add("link error", coloured(describe(state.link_error()), Colour::red, colour));
+    details.add("link error", coloured(describe(state.link_error(), state.axis()), Colour::red, colour));
   if (state.has_age()) details.add("measured", duration_text(seconds(state.age())) + " ago");
   if (state.drive_reboots() > 0) details.add("reboots", std::to_string(state.drive_reboots()));
   return std::move(details).text();

@@ -49,7 +49,8 @@ class MotionError(AxisdError):
     """A motion was accepted and ended Aborted, Error or Unknown. `command` is how it ended."""
 
     def __init__(self, command: Command) -> None:
-        cause = f": {command.cause}" if command.cause else ""
+        # The daemon's text may name the axis as well; once is enough.
+        cause = ": " + str(command.cause).removeprefix(f"{command.axis}: ") if command.cause else ""
         super().__init__(f"{command.axis}: {command.kind} {command.state.value}{cause}")
         self.command = command
 
@@ -79,4 +80,5 @@ def translate(error: grpc.aio.AioRpcError, subject: str, server: str, request_id
     lead = f"{subject}: " if subject else ""
     if detail is None and error.code() in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED):
         return UnreachableError(f"{lead}no answer from axisd at {server}: {error.details()}", request_id)
-    return RefusedError(f"{lead}{detail or error.details()}", error.code(), detail)
+    text = str(detail or error.details()).removeprefix(lead)  # the daemon's text may name the axis as well
+    return RefusedError(lead + text, error.code(), detail)

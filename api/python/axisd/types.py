@@ -64,7 +64,7 @@ def _member(kind: Any, descriptor: Any, prefix: str, number: int) -> Any:
 
 
 def seconds(duration: Duration) -> float:
-    return duration.seconds + duration.nanos * 1e-9
+    return (duration.seconds * 1_000_000_000 + duration.nanos) / 1e9
 
 
 def _optional(message: Any, field: str) -> Any:

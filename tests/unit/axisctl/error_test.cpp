@@ -34,6 +34,15 @@ TEST(ErrorText, DetailIsOneLineWithRangeAndRemedy) {
   EXPECT_THAT(describe(told), Not(HasSubstr("(permitted")));
 }
 
+TEST(ErrorText, TheSubjectIsNamedOnce) {
+  auto detail = soft_limit();
+  detail.set_message("feeder: too far");
+  detail.clear_permitted();
+  detail.set_bus("line-a");
+  EXPECT_EQ(describe(detail, "feeder"), "line-a: too far; choose a target inside");
+  EXPECT_EQ(describe(detail), "line-a: feeder: too far; choose a target inside");
+}
+
 TEST(ErrorText, AddressLeads) {
   v1::ErrorDetail detail;
   detail.set_reason(v1::REASON_REFUSED);
