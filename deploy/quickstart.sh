@@ -61,10 +61,13 @@ while taken "$port"; do port=$((20000 + RANDOM % 10000)); done
 export AXISD_SERVER=localhost:$port
 
 say "axisd with three simulated drives on $AXISD_SERVER"
-set -m  # jobs of their own process groups: Ctrl-C ends the demonstration in order, and nothing is left behind
+# Background jobs get process groups of their own (set -m): Ctrl-C ends the demonstration in order, and end_group
+# leaves nothing behind.
+set -m
 "$axisd" --config config/examples/demo.yaml --state-directory "$scratch/state" --listen "$AXISD_SERVER" \
   >"$scratch/axisd.log" 2>&1 &
 daemon=$!
+set +m
 
 # Repeats a command until it succeeds, while axisd lives; its own complaint is shown when it never does.
 eventually() {
@@ -87,10 +90,12 @@ done
 step axisctl list
 
 say "Homing and moving, as axisctl watch sees it"
+set -m
 "$axisctl" watch --period 500ms >"$scratch/watch" 2>&1 &
 watcher=$!
 (tail -n +1 -f --pid="$watcher" "$scratch/watch" | sed -u 's/^/    /') &
 viewer=$!
+set +m
 step axisctl home feeder --wait
 step axisctl home lifter --wait
 step axisctl home turntable --wait
@@ -105,6 +110,7 @@ viewer=''
 
 if [ -z "$once" ]; then
   say "To and fro until Ctrl-C"
+  set -m
   {
     while "$axisctl" move feeder 20mm --velocity 80mm/s --wait && "$axisctl" move lifter 200mm --wait &&
         "$axisctl" move feeder 300mm --velocity 80mm/s --wait && "$axisctl" move lifter 20mm --wait; do
@@ -112,10 +118,13 @@ if [ -z "$once" ]; then
     done
   } >"$scratch/mover.log" 2>&1 &
   mover=$!
-  trap 'interrupted=1' INT
+  set +m
   interrupted=''
-  "$axisctl" watch || [ -n "$interrupted" ] || { cat "$scratch/mover.log" >&2; die "axisctl watch ended"; }
+  trap 'interrupted=1' INT
+  "$axisctl" watch || true
   trap 'exit 130' INT
+  [ -n "$interrupted" ] || { cat "$scratch/mover.log" >&2; die "axisctl watch ended by itself"; }
+  kill -0 "$mover" 2>/dev/null || { cat "$scratch/mover.log" >&2; die "the axes stopped moving to and fro"; }
   end_group "$mover"
   mover=''
 fi
