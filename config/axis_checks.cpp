@@ -238,6 +238,10 @@ void AxisChecks::check_distances() {
   check("limits.position", axis_.limits.position_maximum);
   check("jog_travel", axis_.jog_travel);
   check("position_tolerance", axis_.position_tolerance);
+  // It bounds what an axis with limits may do while its position is unknown.
+  if (given("jog_travel") && usable("limits") && !given("limits.position"))
+    add("jog_travel", "'jog_travel' has no effect without limits: { position: ... }",
+        "leave it out, or add the limits");
   if (axis_.homing) {
     check("homing.position", axis_.homing->position);
     check("homing.backoff", axis_.homing->backoff);

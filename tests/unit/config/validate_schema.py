@@ -10,6 +10,7 @@ import yaml
 LOADER_ONLY = {
     "function_twice",
     "homing_without_switch",
+    "jog_travel",
     "limits_beyond_counter",
     "listen_port",
     "merge_key",
