@@ -52,13 +52,21 @@ simulation::SimulatedNodeSettings drive_of(const RigOptions& options) {
 
 }  // namespace
 
-Rig::Rig(RigOptions options) : invert_(options.invert) {
+Rig::Rig(RigOptions options) : store(world.executor()), options_(std::move(options)) {
   configuration.machine = "test";
   configuration.buses.push_back({.name = "line-a", .port = "sim"});
-  configuration.axes.push_back({.axis = feeder(options)});
+  configuration.axes.push_back({.axis = feeder(options_)});
+  drive = simulation::find_simulator("ykd2405pr")->make(drive_of(options_));
+  drive->advance(world.now());
+  if (options_.before_start) options_.before_start(*drive, world);
+  start_daemon(options_.connect);
+}
+
+void Rig::start_daemon(bool connect) {
+  store.restart();
   auto parts = core::MachineParts{.executor = world.executor(),
                                   .clock = &world.clock(),
-                                  .persistence = options.persistence,
+                                  .persistence = options_.persistence ? &store : nullptr,
                                   .instance_id = "t",
                                   .make_line = [this](const modbus_rtu::LineSettings& settings) {
                                     auto made = std::make_unique<VirtualLine>(world, settings);
@@ -66,17 +74,33 @@ Rig::Rig(RigOptions options) : invert_(options.invert) {
                                     return made;
                                   }};
   machine = std::make_unique<core::MachineCore>(std::move(parts), configuration);
-  drive = &line->network().add(simulation::find_simulator("ykd2405pr")->make(drive_of(options)));
   line->network().advance(world.now());
+  line->network().add(std::make_unique<BorrowedNode>(*drive));
   machine->start();
-  if (options.connect)
-    EXPECT_TRUE(run_until([this] { return state()->link == LinkState::online; }, std::chrono::seconds(5)));
+  if (connect) reconnect(std::chrono::seconds(5));
 }
 
-Rig::~Rig() {
+void Rig::stop_daemon() {
   machine->close();
   EXPECT_TRUE(run_until([this] { return machine->closed(); }, std::chrono::seconds(60)))
       << "sequences left over";
+  run(std::chrono::milliseconds(100));  // what the line still had to deliver
+  machine.reset();
+  line = nullptr;
+}
+
+Rig::~Rig() {
+  if (machine) stop_daemon();
+}
+
+void Rig::idle(Duration duration) {
+  run(duration);
+  drive->advance(world.now());
+}
+
+void Rig::reconnect(Duration limit) {
+  EXPECT_TRUE(run_until([this] { return state()->link == LinkState::online; }, limit))
+      << "not online: " << (state()->link_error ? to_string(*state()->link_error) : "");
 }
 
 Result<CommandPtr> Rig::try_submit(const Action& action, CommandOptions options) {
@@ -112,8 +136,58 @@ int Rig::writes_of(std::uint16_t address) const {
   }));
 }
 
+int Rig::first_write(std::uint16_t address) const {
+  const auto& wire = line->wire();
+  const auto found = std::ranges::find_if(
+      wire, [&](const WireEntry& entry) { return entry.is_write() && entry.address() == address; });
+  return found == wire.end() ? -1 : static_cast<int>(found - wire.begin());
+}
+
 double Rig::load_mm() const {
-  return static_cast<double>(drive->shaft_pulses()) / pulses_per_mm * (invert_ ? -1 : 1);
+  return static_cast<double>(drive->shaft_pulses()) / pulses_per_mm * (options_.invert ? -1 : 1);
+}
+
+void write_register(simulation::SimulatedRtuNode& drive, std::uint16_t address, std::uint16_t value) {
+  modbus_rtu::Request request{
+      .node = drive.address(), .function = modbus_rtu::Function::write_single_register, .address = address};
+  request.values.push_back(value);
+  drive.on_frame(modbus_rtu::encode(request)->bytes());
+}
+
+void Rig::write_behind(std::uint16_t address, std::uint16_t value) {
+  drive->advance(world.now());
+  write_register(*drive, address, value);
+}
+
+void Rig::cycle_power(Duration off) {
+  drive->advance(world.now());
+  drive->set_power(false);
+  run(off);
+  drive->advance(world.now());
+  drive->set_power(true);
+}
+
+std::string describe(const Command& command) {
+  return std::string(to_string(command.state)) + (command.cause ? ": " + to_string(*command.cause) : "");
+}
+
+void both_directions(const RigOptions& base, const std::function<void(const RigOptions&)>& test) {
+  for (const bool invert : {false, true}) {
+    SCOPED_TRACE(invert ? "inverted" : "plain");
+    auto options = base;
+    options.invert = invert;
+    test(options);
+  }
+}
+
+void for_each_switch(const RigOptions& base, const std::function<void(const RigOptions&)>& test) {
+  both_directions(base, test);
+  for (const auto& spec : simulation::find_simulator("ykd2405pr")->switches) {
+    SCOPED_TRACE(std::string(spec.name) + (spec.default_value ? " off" : " on"));
+    auto options = base;
+    options.switches[std::string(spec.name)] = !spec.default_value;
+    both_directions(options, test);
+  }
 }
 
 }  // namespace axisd::test

@@ -3,12 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/core/machine_core.hpp"
 #include "devices/simulation/simulator.hpp"
+#include "tests/support/borrowed_node.hpp"
+#include "tests/support/fake_persistence.hpp"
 #include "tests/support/virtual_line.hpp"
 #include "tests/support/virtual_world.hpp"
 
@@ -20,8 +24,10 @@ struct RigOptions {
   std::function<void(AxisSettings&)> adjust{};
   std::function<void(simulation::SimulatedNodeSettings&)> adjust_drive{};
   bool limits = true;
-  bool connect = true;  ///< wait until the axis is online
-  Persistence* persistence = nullptr;
+  bool connect = true;       ///< wait until the axis is online
+  bool persistence = false;  ///< keep state between restarts in Rig::store
+  /// Called between the drive's power-up and the start of the daemon.
+  std::function<void(simulation::SimulatedRtuNode&, VirtualWorld&)> before_start{};
 };
 
 /// The axis "feeder": 1000 pulses/rev, 10 mm/rev (100 pulses per mm), 0..400 mm, 100 mm/s; home switch at -50
@@ -33,14 +39,26 @@ class Rig {
   ~Rig();
 
   VirtualWorld world;
+  FakePersistence store;
   config::Configuration configuration;
+  std::unique_ptr<simulation::SimulatedRtuNode> drive;
   VirtualLine* line = nullptr;
   std::unique_ptr<core::MachineCore> machine;
-  simulation::SimulatedRtuNode* drive = nullptr;
+
+  /// Ends the daemon; the drive goes on.
+  void stop_daemon();
+  /// Starts the daemon (again). The wire log is that of the newest daemon.
+  void start_daemon(bool connect = true);
+  /// Lets the drive alone pass time while there is no daemon.
+  void idle(Duration duration);
 
   [[nodiscard]] Axis& axis() { return *machine->find("feeder"); }
   [[nodiscard]] AxisSnapshotPtr state() { return axis().snapshot(); }
   void run(Duration duration) { world.run_for(duration); }
+  /// Runs until the axis is online; fails the test after `limit`.
+  void reconnect(Duration limit = std::chrono::seconds(10));
+  simulation::FaultPlan& faults() { return line->network().faults(); }
+  void fault(simulation::Fault fault) { faults().add(std::move(fault)); }
   bool run_until(const std::function<bool()>& done, Duration limit) { return world.run_until(done, limit); }
 
   /// Submits and fails the test if it is refused.
@@ -55,11 +73,29 @@ class Rig {
   /// Requests on the wire that write `address`, since the last forget_wire().
   [[nodiscard]] int writes_of(std::uint16_t address) const;
   [[nodiscard]] int triggers() const { return writes_of(0x0027) + writes_of(0x0030); }
+  /// Index of the first write of `address` on the wire, or -1.
+  [[nodiscard]] int first_write(std::uint16_t address) const;
+  /// Lets something else write a register of the drive, off the wire: another master, an earlier daemon.
+  void write_behind(std::uint16_t address, std::uint16_t value);
+  /// Switches the drive off for a while; returns when it is on again (and boots).
+  void cycle_power(Duration off = std::chrono::milliseconds(1));
   /// Position of the load in axis direction, mm from where it powered up: what really happened.
   [[nodiscard]] double load_mm() const;
 
  private:
-  bool invert_;
+  RigOptions options_;
 };
+
+/// Writes one register as a frame of the wire would.
+void write_register(simulation::SimulatedRtuNode& drive, std::uint16_t address, std::uint16_t value);
+
+/// "error: line-a node 1 ...": state and cause, for failure messages.
+std::string describe(const Command& command);
+
+/// Runs `test` with the drive's open points as they are by default, and with each of them the other way; each
+/// with the axis plain and inverted. The options are copied from `base`.
+void for_each_switch(const RigOptions& base, const std::function<void(const RigOptions&)>& test);
+/// Runs `test` with the axis plain and inverted.
+void both_directions(const RigOptions& base, const std::function<void(const RigOptions&)>& test);
 
 }  // namespace axisd::test

@@ -56,39 +56,57 @@ void VirtualLine::bind() {
   under_way_ = &exchange;
   result_.request_end = now + wire_time(settings_, exchange.frame.size());
   const auto bytes = exchange.frame.bytes();
-  wire_.push_back({.begin = now, .request = {bytes.begin(), bytes.end()}, .status = ExchangeStatus::timeout});
+  wire_.push_back({.begin = now,
+                   .end = result_.request_end,
+                   .request = {bytes.begin(), bytes.end()},
+                   .status = ExchangeStatus::timeout});
+  if (on_bind_) on_bind_(wire_.back());
   timer_ = world_->clock().call_at(result_.request_end, [this] { request_sent(); });
 }
 
 void VirtualLine::request_sent() {
   const auto& exchange = *under_way_;
-  const auto latest = result_.request_end + exchange.reply_timeout;
   network_.advance(world_->now());
-  const auto reply = network_.on_request(exchange.frame.bytes(), result_.request_end);
-  if (!reply || reply->end > latest) {
-    timer_ = world_->clock().call_at(latest, [this, late = reply ? reply->end : TimePoint{}] {
-      end(ExchangeStatus::timeout);
-      quiet_since_ = std::max(quiet_since_, late);
-    });
+  auto reply = network_.on_request(exchange.frame.bytes(), result_.request_end);
+  if (network_.take_hang_up()) return set_open(false);
+  const auto latest = result_.request_end + exchange.reply_timeout;
+  timer_ = world_->clock().call_at(latest, [this] { end(ExchangeStatus::timeout); });
+  if (!reply) return;
+  if (reply->end <= latest) {
+    reply_coming_ = true;
+    result_.reply_begin = reply->begin;
+  }
+  const auto id = ++last_arrival_;
+  arrivals_[id] = world_->clock().call_at(reply->end, [this, id, bytes = std::move(reply->bytes)]() mutable {
+    // The timer lives as long as its callback runs.
+    const auto timer = std::move(arrivals_.extract(id).mapped());
+    hear(std::move(bytes));
+  });
+}
+
+void VirtualLine::hear(std::vector<std::uint8_t> bytes) {
+  quiet_since_ = std::max(quiet_since_, world_->now());
+  if (armed_ != nullptr) {  // the silence begins anew
+    timer_ = world_->clock().call_at(quiet_since_ + silence(settings_), [this] { bind(); });
     return;
   }
-  reply_bytes_ = reply->bytes;
-  reply_coming_ = true;
-  result_.reply_begin = reply->begin;
-  timer_ = world_->clock().call_at(reply->end, [this] {
-    // The reply proper comes last; an echo or a foreign frame may stand before it.
-    const std::span<const std::uint8_t> all = reply_bytes_;
-    Reply best;
-    for (std::size_t skip = 0;
-         skip < all.size() && best.kind != ReplyKind::match && best.kind != ReplyKind::exception; ++skip)
-      if (auto decoded = decode(under_way_->request, all.subspan(skip)); decoded.kind != ReplyKind::corrupt)
-        best = std::move(decoded);
-    result_.reply = std::move(best);
-    const auto kind = result_.reply.kind;
-    end(kind == ReplyKind::match || kind == ReplyKind::exception ? ExchangeStatus::replied
-        : kind == ReplyKind::foreign                             ? ExchangeStatus::timeout
-                                                                 : ExchangeStatus::corrupt);
-  });
+  // Bytes that arrive while the request is being sent are lost with it.
+  if (under_way_ == nullptr || world_->now() < result_.request_end) return;
+  // The reply proper comes last; an echo or a foreign frame may stand before it.
+  const std::span<const std::uint8_t> all = bytes;
+  Reply best;
+  for (std::size_t skip = 0;
+       skip < all.size() && best.kind != ReplyKind::match && best.kind != ReplyKind::exception; ++skip)
+    if (auto decoded = decode(under_way_->request, all.subspan(skip)); decoded.kind != ReplyKind::corrupt)
+      best = std::move(decoded);
+  if (best.kind == ReplyKind::foreign) {
+    ++result_.foreign_frames;
+    reply_coming_ = false;
+    return;
+  }
+  const bool answered = best.kind == ReplyKind::match || best.kind == ReplyKind::exception;
+  result_.reply = std::move(best);
+  end(answered ? ExchangeStatus::replied : ExchangeStatus::corrupt);
 }
 
 void VirtualLine::cut_wait() {
@@ -107,7 +125,10 @@ void VirtualLine::end(ExchangeStatus status, Verdict verdict) {
   result_.reply_end = world_->now();
   if (status == ExchangeStatus::io_error) result_.native_error = EIO;
   if (under_way_ != nullptr) {
-    wire_.back().status = status;
+    if (!wire_.empty()) {
+      wire_.back().status = status;
+      wire_.back().end = world_->now();
+    }
     quiet_since_ = world_->now();
   }
   under_way_ = nullptr;

@@ -1,6 +1,10 @@
 // An RS-485 line in virtual time: the slot and the silences of the real worker, simulated drives behind them.
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "buses/modbus_rtu/line.hpp"
@@ -12,6 +16,7 @@ namespace axisd::test {
 
 struct WireEntry {
   TimePoint begin;  ///< first byte of the request
+  TimePoint end{};  ///< last byte on the wire because of it, or the end of the wait
   std::vector<std::uint8_t> request;
   modbus_rtu::ExchangeStatus status;
   [[nodiscard]] std::uint8_t node() const { return request.at(0); }
@@ -19,12 +24,22 @@ struct WireEntry {
   [[nodiscard]] std::uint16_t address() const {
     return static_cast<std::uint16_t>(request.at(2) << 8U | request.at(3));
   }
+  [[nodiscard]] bool is_write() const { return function() != 0x03; }
   /// Value of a write of one register.
   [[nodiscard]] std::uint16_t value() const {
     return static_cast<std::uint16_t>(request.at(4) << 8U | request.at(5));
   }
+  /// Of a write of several registers.
+  [[nodiscard]] std::vector<std::uint16_t> block() const {
+    std::vector<std::uint16_t> values;
+    for (std::size_t i = 7; i + 3 < request.size(); i += 2)
+      values.push_back(static_cast<std::uint16_t>(request[i] << 8U | request[i + 1]));
+    return values;
+  }
 };
 
+/// A reply that comes after its wait has ended is still heard: by the exchange that is waiting then, as on a
+/// real line.
 class VirtualLine final : public modbus_rtu::Line {
  public:
   VirtualLine(VirtualWorld& world, modbus_rtu::LineSettings settings);
@@ -33,6 +48,8 @@ class VirtualLine final : public modbus_rtu::Line {
   /// Every request that went over the wire.
   [[nodiscard]] const std::vector<WireEntry>& wire() const { return wire_; }
   void forget_wire() { wire_.clear(); }
+  /// Called at the bind of each frame, before its first byte.
+  void set_on_bind(std::function<void(const WireEntry&)> on_bind) { on_bind_ = std::move(on_bind); }
   /// Plugs the adapter in or out.
   void set_open(bool open);
 
@@ -45,6 +62,7 @@ class VirtualLine final : public modbus_rtu::Line {
  private:
   void bind();
   void request_sent();
+  void hear(std::vector<std::uint8_t> bytes);
   void end(modbus_rtu::ExchangeStatus status, Verdict verdict = Verdict::send);
 
   VirtualWorld* world_;
@@ -56,10 +74,12 @@ class VirtualLine final : public modbus_rtu::Line {
   const modbus_rtu::Exchange* armed_ = nullptr;
   const modbus_rtu::Exchange* under_way_ = nullptr;
   modbus_rtu::ExchangeResult result_;
-  std::vector<std::uint8_t> reply_bytes_;
   bool reply_coming_ = false;
   TimePoint quiet_since_{};
   Clock::Timer timer_, cut_timer_;
+  std::map<std::uint64_t, Clock::Timer> arrivals_;
+  std::uint64_t last_arrival_ = 0;
+  std::function<void(const WireEntry&)> on_bind_;
   std::vector<WireEntry> wire_;
 };
 

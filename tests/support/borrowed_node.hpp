@@ -1,0 +1,38 @@
+// A simulated drive on a line that may end before the drive does.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "devices/simulation/simulated_node.hpp"
+
+namespace axisd::test {
+
+class BorrowedNode final : public simulation::SimulatedRtuNode {
+ public:
+  explicit BorrowedNode(simulation::SimulatedRtuNode& node) : node_(&node) {}
+  [[nodiscard]] std::uint8_t address() const override { return node_->address(); }
+  void advance(TimePoint now) override { node_->advance(now); }
+  std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) override {
+    return node_->on_frame(frame);
+  }
+  void set_power(bool on) override { node_->set_power(on); }
+  void set_input(std::string_view terminal, std::optional<bool> active) override {
+    node_->set_input(terminal, active);
+  }
+  [[nodiscard]] bool has_input(std::string_view terminal) const override {
+    return node_->has_input(terminal);
+  }
+  void raise_alarm(int code) override { node_->raise_alarm(code); }
+  [[nodiscard]] std::int64_t shaft_pulses() const override { return node_->shaft_pulses(); }
+  [[nodiscard]] bool shaft_moving() const override { return node_->shaft_moving(); }
+  [[nodiscard]] int starts() const override { return node_->starts(); }
+  [[nodiscard]] std::uint16_t peek(std::uint16_t address) const override { return node_->peek(address); }
+  void poke(std::uint16_t address, std::uint16_t value) override { node_->poke(address, value); }
+  [[nodiscard]] std::uint64_t eeprom_writes() const override { return node_->eeprom_writes(); }
+
+ private:
+  simulation::SimulatedRtuNode* node_;
+};
+
+}  // namespace axisd::test

@@ -1,0 +1,50 @@
+// What must survive a restart, in memory; can be slow, and can fail as a full disk does.
+#pragma once
+
+#include <utility>
+
+#include "devices/persistence.hpp"
+#include "tests/support/virtual_world.hpp"
+
+namespace axisd::test {
+
+class FakePersistence final : public Persistence {
+ public:
+  explicit FakePersistence(Executor executor) : executor_(std::move(executor)) {}
+
+  bool failing = false;  ///< saves fail with Error `storage`
+  StoredState saved;     ///< what the file holds now
+  /// What the next daemon finds when it starts.
+  void restart() { loaded_ = saved; }
+
+  [[nodiscard]] const StoredState& loaded() const override { return loaded_; }
+  void save_offset(std::string axis, OffsetRecord offset, Callback done) override {
+    if (!failing) saved.axes[axis].offset = offset;
+    answer(std::move(done));
+  }
+  void forget_offset(std::string axis, Callback done) override {
+    if (!failing) saved.axes[axis].offset.reset();
+    answer(std::move(done));
+  }
+  void save_inhibit(InhibitRecord inhibit, Callback done) override {
+    if (!failing) saved.inhibit = std::move(inhibit);
+    answer(std::move(done));
+  }
+  void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) override {
+    if (!failing) saved.axes[axis].eeprom_writes += writes;
+    answer(std::move(done));
+  }
+
+ private:
+  void answer(Callback done) {
+    if (!done) return;
+    Result<void> result;
+    if (failing) result = fail(Reason::storage, "the disk is full", "free some space");
+    post(executor_, [done = std::move(done), result] { done(result); });
+  }
+
+  Executor executor_;
+  StoredState loaded_;
+};
+
+}  // namespace axisd::test
