@@ -75,6 +75,12 @@ void add_choice(const DriveSetup& setup, const char* key, std::span<const std::s
 
 }  // namespace
 
+bool starts_motion(std::uint16_t function_code) {
+  const auto functions = descriptor().input_functions;
+  const auto found = std::ranges::find(functions, function_code, &TerminalFunctionSpec::code);
+  return found != functions.end() && found->starts_motion;
+}
+
 Result<std::vector<RegisterSetting>> required_registers(const DriveSetup& setup) {
   const auto& model = descriptor();
   const auto inputs = assign(setup.inputs, model.inputs, model.input_functions);

@@ -64,8 +64,8 @@ class Ykd2405prDrive final : public Drive {
   };
 
   Task<Result<Registers>> read_configuration() const;
-  Task<Result<void>> write_configuration(const std::vector<RegisterSetting>& required,
-                                         const Registers& present);
+  Task<Result<void>> write_configuration(const std::vector<RegisterSetting>& required, Registers present);
+  Task<Result<void>> neutralise_inputs(const std::vector<RegisterSetting>& required, Registers& present);
   Task<Result<void>> write_setting(const RegisterSetting& setting);
   Task<Result<void>> set_canary();
   Task<Result<Answer>> read_canary(TransactionOptions options);
@@ -164,10 +164,34 @@ Task<Result<void>> Ykd2405prDrive::configure() {
 }
 
 Task<Result<void>> Ykd2405prDrive::write_configuration(const std::vector<RegisterSetting>& required,
-                                                       const Registers& present) {
+                                                       Registers present) {
+  bool neutral = false;
   for (const auto& setting : required) {
+    // Before anything else about inputs, but after the EEPROM switch (M3).
+    if (setting.address >= reg::input_levels && !std::exchange(neutral, true))
+      if (const auto done = co_await neutralise_inputs(required, present); !done) co_return done;
     if (present.at(setting.address) == setting.value) continue;  // spares the EEPROM
     if (const auto written = co_await write_setting(setting); !written) co_return written;
+  }
+  co_return Result<void>{};
+}
+
+/// Takes functions that can start motion off inputs that get another function or level: the new level could
+/// act like an edge of the old function.
+Task<Result<void>> Ykd2405prDrive::neutralise_inputs(const std::vector<RegisterSetting>& required,
+                                                     Registers& present) {
+  const auto wanted = [&](std::uint16_t address) {
+    return std::ranges::find(required, address, &RegisterSetting::address)->value;
+  };
+  const unsigned turned = present.at(reg::input_levels) ^ wanted(reg::input_levels);
+  for (std::uint16_t i = 0; i < input_count; ++i) {
+    const auto address = static_cast<std::uint16_t>(reg::first_input_function + i);
+    auto& function = present.at(address);
+    const bool changes = function != wanted(address) || ((turned >> i) & 1U) != 0;
+    if (!changes || !starts_motion(function)) continue;
+    const auto written = co_await write_setting({.address = address, .value = 0});
+    if (!written) co_return written;
+    function = 0;
   }
   co_return Result<void>{};
 }
@@ -252,7 +276,8 @@ Task<Result<void>> Ykd2405prDrive::disable() {
 }
 
 Task<Result<void>> Ykd2405prDrive::start_move(MoveProfile profile, MotionGuard guard) {
-  // 7.6.1: bit 0 position mode, bit 2 absolute. An absolute start that arrives twice goes nowhere the second time.
+  // 7.6.1: bit 0 position mode, bit 2 absolute. An absolute start that arrives twice goes nowhere the second
+  // time.
   co_return co_await start(encode(profile), std::nullopt, {reg::start, 5}, std::move(guard));
 }
 
