@@ -150,8 +150,11 @@ class Axis {
   void remember_position();
 
   // axis_requests.cpp: acceptance
+  void renew_hold(const CommandPtr& command);
   [[nodiscard]] Result<void> check_common(const CommandOptions& options) const;
   [[nodiscard]] Result<void> check_online() const;
+  /// Holds for everything but stops; StopAll does not forbid what moves nothing.
+  [[nodiscard]] Result<void> check_ready(const CommandOptions& options) const;
   [[nodiscard]] Result<void> check_motion(const CommandOptions& options) const;
   [[nodiscard]] Result<void> check_direction(bool positive) const;
   Result<CommandPtr> accept(const EnableRequest& request, const CommandOptions& options);

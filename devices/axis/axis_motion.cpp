@@ -57,7 +57,7 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
 void Axis::enter_error_stop(Error cause) {
   gate_->raise();
   env_.bus->purge_superseded();
-  if (!fault_ || fault_->reason != cause.reason) {
+  if (!fault_ || fault_->reason != cause.reason || fault_->where.native_code != cause.where.native_code) {
     spdlog::error("{}", to_string(cause));
     fault_ = cause;
   }
@@ -72,7 +72,7 @@ void Axis::enter_error_stop(Error cause) {
 Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience) {
   const auto deadline = env_.clock->now() + patience;
   wake_.notify_all();
-  while (env_.clock->now() < deadline && link_ == LinkState::online) {
+  while (env_.clock->now() < deadline && link_ != LinkState::offline) {
     if (sample_ && sample_->asked_at >= since) co_return *sample_;
     co_await sampled_.wait_until(deadline);
   }

@@ -17,8 +17,15 @@ Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& opti
     return std::visit([&](const auto& request) { return accept(request, always); }, action);
   }
   auto repeat = env_.book->find_repeat(settings_.name, action, options);
+  if (repeat && *repeat != nullptr) renew_hold(*repeat);
   if (!repeat || *repeat != nullptr) return repeat;
   return std::visit([&](const auto& request) { return accept(request, options); }, action);
+}
+
+/// A repeated jog (or held velocity) extends the motion that it started, and never starts one that has ended.
+void Axis::renew_hold(const CommandPtr& command) {
+  if (!activity_ || activity_->command != command || !activity_->hold_until || !current(*activity_)) return;
+  activity_->hold_until = env_.clock->now() + command->value().asked.hold.value_or(Duration{0});
 }
 
 Result<void> Axis::check_common(const CommandOptions& options) const {
@@ -52,11 +59,8 @@ Result<void> Axis::check_online() const {
   return {};
 }
 
-Result<void> Axis::check_motion(const CommandOptions& options) const {
+Result<void> Axis::check_ready(const CommandOptions& options) const {
   if (auto common = check_common(options); !common) return common;
-  if (env_.inhibited != nullptr && *env_.inhibited)
-    return fail(
-        error(Reason::inhibited, "StopAll holds the machine", "release it: axisctl release-stop --all"));
   // A stop that the core has not seen yet comes before everything that is accepted now.
   if (gate_->stop_pending() || stopping_.hold || (stopping_.running && stopping_.kind > StopKind::halt))
     return fail(error(Reason::stopping, stopping_.hold ? "a stop is held" : "the axis is stopping",
@@ -69,7 +73,14 @@ Result<void> Axis::check_motion(const CommandOptions& options) const {
     cause.outcome = Outcome::not_sent;
     return fail(std::move(cause));
   }
-  if (auto online = check_online(); !online) return online;
+  return check_online();
+}
+
+Result<void> Axis::check_motion(const CommandOptions& options) const {
+  if (env_.inhibited != nullptr && *env_.inhibited)
+    return fail(
+        error(Reason::inhibited, "StopAll holds the machine", "release it: axisctl release-stop --all"));
+  if (auto ready = check_ready(options); !ready) return ready;
   if (!sample_ || !sample_->enabled)
     return fail(error(Reason::disabled, "the power stage is off", "enable the axis first"));
   if (activity_ && activity_->command->value().kind == CommandKind::disable)
@@ -109,9 +120,7 @@ Axis::ActivityPtr Axis::begin(const Action& action, const CommandOptions& option
 }
 
 Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptions& options) {
-  auto allowed = check_motion(options);
-  if (!allowed && allowed.error().reason != Reason::disabled && allowed.error().reason != Reason::inhibited)
-    return fail(allowed.error());
+  if (auto allowed = check_ready(options); !allowed) return fail(allowed.error());
   if (activity_ && activity_->state != AxisState::standstill)
     return fail(error(Reason::moving, "the axis moves", "it is enabled already"));
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
@@ -122,7 +131,8 @@ Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptio
 }
 
 Result<CommandPtr> Axis::accept(const DisableRequest& request, const CommandOptions& options) {
-  if (auto online = check_online(); !online) return fail(online.error());
+  // Also while the drive is not configured: some of its configuration is only written while it is released.
+  if (link_ == LinkState::offline) return fail(check_online().error());
   supersede(error(Reason::superseded, "the axis is being disabled"));
   begin_stop(StopKind::stop, false, nullptr);
   const auto activity = begin(request, options, AxisState::standstill, {});
@@ -299,9 +309,7 @@ Result<CommandPtr> Axis::accept(const ResetRequest& request, const CommandOption
 }
 
 Result<CommandPtr> Axis::accept(const SetPositionRequest& request, const CommandOptions& options) {
-  auto allowed = check_motion(options);
-  if (!allowed && allowed.error().reason != Reason::disabled && allowed.error().reason != Reason::inhibited)
-    return fail(allowed.error());
+  if (auto allowed = check_ready(options); !allowed) return fail(allowed.error());
   if (activity_ || stopping_.running || sample_->moving)
     return fail(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
   if (!scale_.checked_pulses(request.position))
