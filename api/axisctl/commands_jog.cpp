@@ -26,8 +26,8 @@ struct JogArguments : MotionArguments {
   std::string lasts;  ///< --for
 };
 
-/// The jog request of these arguments; each call gets a request id of its own, since a repeated id would only
-/// attach to the earlier call instead of extending the hold.
+/// The jog request of these arguments. Repeating it extends the hold; it never starts a jog anew that has
+/// ended.
 v1::JogRequest jog_request(const JogArguments& arguments, const std::string& unit,
                            std::chrono::nanoseconds hold) {
   v1::JogRequest request;
@@ -51,12 +51,6 @@ v1::Command halt(Invocation& invocation, const std::string& axis) {
   return invocation.client().call(&Stub::Halt, request, axis, Lane::stop).command();
 }
 
-v1::Command present(Invocation& invocation, const std::string& id, std::chrono::nanoseconds limit) {
-  v1::GetCommandRequest request;
-  request.set_id(id);
-  return invocation.client().call_within(limit, &v1::CommandService::Stub::GetCommand, request, id).command();
-}
-
 /// Renews until Ctrl-C, the end of --for or the end of the motion. Returns the command as last seen.
 v1::Command renew(Invocation& invocation, const JogArguments& arguments, const Interrupt& interrupt,
                   v1::JogRequest request, v1::Command command, std::chrono::nanoseconds hold) {
@@ -68,17 +62,10 @@ v1::Command renew(Invocation& invocation, const JogArguments& arguments, const I
     left -= pause;
     if (interrupt.wait_for(std::chrono::ceil<milliseconds>(pause))) break;
     if (!endless && left.count() <= 0) break;
+    const auto id = request.options().request_id();
     *request.mutable_options() = command_options(arguments);
-    // A jog that a stop has ended must not be started anew by its own renewal.
-    command = present(invocation, command.id(), hold);
-    if (ended(command)) break;
-    const auto renewed =
-        invocation.client().call_within(hold, &Stub::Jog, request, arguments.axis()).command();
-    if (renewed.id() != command.id()) {
-      halt(invocation, arguments.axis());
-      return present(invocation, command.id(), hold);
-    }
-    command = renewed;
+    request.mutable_options()->set_request_id(id);
+    command = invocation.client().call_within(hold, &Stub::Jog, request, arguments.axis()).command();
   }
   return command;
 }

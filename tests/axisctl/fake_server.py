@@ -203,11 +203,14 @@ class FakeMachine(axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServic
 
     async def Jog(self, request, context):
         self.note("Jog", request, context)
-        axis = await self.ready(request, context)
         hold = request.hold.ToTimedelta().total_seconds() or 0.3
-        if axis.current is not None and axis.current.kind == types_pb2.COMMAND_KIND_JOG:
-            axis.hold_until = time.monotonic() + hold
-            return axes_pb.JogResponse(command=axis.current)
+        repeated = self.by_request.get(request.options.request_id)
+        if repeated is not None:
+            axis = self.axes[request.axis]
+            if axis.current is not None and axis.current.id == repeated.id:
+                axis.hold_until = time.monotonic() + hold
+            return axes_pb.JogResponse(command=self.commands[repeated.id])
+        axis = await self.ready(request, context)
         command = self.command(axis, types_pb2.COMMAND_KIND_JOG, request, velocity=request.velocity)
         axis.begin(command, axis.run(command, request.velocity, hold))
         return axes_pb.JogResponse(command=command)

@@ -301,6 +301,7 @@ class Jog:
         self._arguments = {"axis": axis.name, "velocity": velocity, "hold": _duration(hold),
                            "acceleration_time": _duration(acceleration_time),
                            "deceleration_time": _duration(deceleration_time)}
+        self._request_id = str(uuid.uuid4())
         self._renewal: asyncio.Task[None] | None = None
         self.command: Command | None = None
 
@@ -327,22 +328,14 @@ class Jog:
             raise failure
 
     async def _call(self) -> Command:
-        # A fresh id each time: a repeated one would attach to the earlier call instead of extending the hold.
-        request = axis_service_pb2.JogRequest(**self._arguments, options=_options(None, wait=False))
+        # The same id each time: a repeat extends the hold, and never starts a jog anew that has ended.
+        request = axis_service_pb2.JogRequest(**self._arguments, options=_options(self._request_id, wait=False))
         return await self._axis._command(self._axis._machine._axes.Jog, request, wait=False)
 
     async def _renew(self) -> None:
         # Three renewals per hold: two may be late or lost before the axis halts.
         while True:
             await asyncio.sleep(self._hold / 3)
-            assert self.command is not None
-            # A jog that a stop has ended must not be started anew by its own renewal.
-            self.command = _done(await self._axis._machine.command(self.command.id))
+            self.command = _done(await self._call())
             if self.command.state.ended:
                 return
-            renewed = await self._call()
-            if renewed.id != self.command.id:
-                await self._axis.halt()
-                self.command = _done(await self._axis._machine.command(self.command.id))
-                return
-            self.command = renewed
