@@ -65,7 +65,8 @@ class Clock {
 
 /// For threads of their own (bus workers, simulated lines): the same time base as the real clock.
 TimePoint monotonic_now();
-/// Blocks the calling thread until `when` with the best precision that the kernel gives (absolute, 1 ns slack).
+/// Blocks the calling thread until `when` with the best precision that the kernel gives (absolute, 1 ns
+/// slack).
 void block_until(TimePoint when);
 /// Sets the calling thread's timer slack to 1 ns, so that its waits end on time.
 void use_precise_waits();

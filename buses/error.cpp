@@ -8,15 +8,42 @@
 namespace axisd {
 
 std::string_view to_string(Reason reason) {
-  static constexpr auto names = std::to_array<std::string_view>(
-      {"invalid_argument", "out_of_range",  "unknown_axis", "unknown_command", "not_supported",
-       "offline",          "configuring",   "wrong_model",  "misconfigured",   "disabled",
-       "fault",            "stopping",      "moving",       "inhibited",       "not_trusted",
-       "soft_limit",       "limit_switch",  "terminal",     "alarm",           "did_not_start",
-       "not_reached",      "took_too_long", "not_confirmed", "rebooted",       "superseded",
-       "expired",          "lease_lost",    "lease_required", "request_id_conflict", "busy",
-       "refused",          "no_reply",      "bus_down",     "storage",         "cancelled",
-       "internal"});
+  static constexpr auto names = std::to_array<std::string_view>({"invalid_argument",
+                                                                 "out_of_range",
+                                                                 "unknown_axis",
+                                                                 "unknown_command",
+                                                                 "not_supported",
+                                                                 "offline",
+                                                                 "configuring",
+                                                                 "wrong_model",
+                                                                 "misconfigured",
+                                                                 "disabled",
+                                                                 "fault",
+                                                                 "stopping",
+                                                                 "moving",
+                                                                 "inhibited",
+                                                                 "not_trusted",
+                                                                 "soft_limit",
+                                                                 "limit_switch",
+                                                                 "terminal",
+                                                                 "alarm",
+                                                                 "did_not_start",
+                                                                 "not_reached",
+                                                                 "took_too_long",
+                                                                 "not_confirmed",
+                                                                 "rebooted",
+                                                                 "superseded",
+                                                                 "expired",
+                                                                 "lease_lost",
+                                                                 "lease_required",
+                                                                 "request_id_conflict",
+                                                                 "busy",
+                                                                 "refused",
+                                                                 "no_reply",
+                                                                 "bus_down",
+                                                                 "storage",
+                                                                 "cancelled",
+                                                                 "internal"});
   static_assert(names.size() == std::to_underlying(Reason::internal) + 1U);
   return names.at(std::to_underlying(reason));
 }

@@ -9,45 +9,45 @@
 
 namespace axisd {
 
-/// Why something failed. Each reason fixes the caller's policy; api/server/status.cpp maps it to a gRPC status,
-/// proto/axisd/v1/error.proto documents it for clients. The list never grows with a drive model.
+/// Why something failed. Each reason fixes the caller's policy; api/server/status.cpp maps it to a gRPC
+/// status, proto/axisd/v1/error.proto documents it for clients. The list never grows with a drive model.
 enum class Reason : std::uint8_t {
-  invalid_argument,    ///< The request is malformed. Fix it; repeating it is pointless.
-  out_of_range,        ///< A value the drive or the limits forbid; `permitted` holds the range.
-  unknown_axis,        ///< No axis of that name in the configuration.
-  unknown_command,     ///< No command with that id (any more).
-  not_supported,       ///< The model or this build lacks the function (a capability, not a fault).
-  offline,             ///< The node or its port does not answer. Check power and wiring; it is retried by itself.
-  configuring,         ///< Identity and configuration are not yet verified in this power cycle. Wait.
-  wrong_model,         ///< Another model answers at this address than the configuration names.
-  misconfigured,       ///< The drive refused or lost a configured value.
-  disabled,            ///< The power stage is off. Enable the axis first.
-  fault,               ///< The axis is in ErrorStop. Clear the cause, then Reset.
-  stopping,            ///< A stop is being executed or held. Wait, or ReleaseStop.
-  moving,              ///< Not possible while the axis moves.
-  inhibited,           ///< StopAll holds the machine. Release it explicitly.
-  not_trusted,         ///< The position is unknown. Home the axis or set its position.
-  soft_limit,          ///< The target lies beyond a software limit; `permitted` holds the range.
-  limit_switch,        ///< A limit terminal ended or forbids the motion.
-  terminal,            ///< A terminal of the drive started, changed or ended the motion.
-  alarm,               ///< The drive reports an alarm; `native_code` is its code.
-  did_not_start,       ///< The drive accepted a start but never moved.
-  not_reached,         ///< The drive stopped, but not at the target.
-  took_too_long,       ///< The motion ran longer than predicted and was stopped.
-  not_confirmed,       ///< A stop was sent, but standstill was not confirmed.
-  rebooted,            ///< The drive lost its memory (power cycle). Nothing resumes by itself.
-  superseded,          ///< A newer command, stop or loss of link took its place. Nothing was sent after that.
-  expired,             ///< `not_after` or a deadline passed before the frame could be sent.
-  lease_lost,          ///< The lease that the command was given under is gone.
-  lease_required,      ///< The axis is leased (or must be) and the token does not fit.
-  request_id_conflict, ///< The request_id was used before for other content.
-  busy,                ///< Too many requests in progress. Retry later.
-  refused,             ///< The drive answered with an exception or abort; `native_code` is its code.
-  no_reply,            ///< A frame was sent and no valid reply came. Whether it was executed is unknown.
-  bus_down,            ///< The port cannot be opened or was lost.
-  storage,             ///< The state directory cannot be written.
-  cancelled,           ///< Ended by CancelCommand or by the daemon's shutdown.
-  internal,            ///< A bug of axisd.
+  invalid_argument,  ///< The request is malformed. Fix it; repeating it is pointless.
+  out_of_range,      ///< A value the drive or the limits forbid; `permitted` holds the range.
+  unknown_axis,      ///< No axis of that name in the configuration.
+  unknown_command,   ///< No command with that id (any more).
+  not_supported,     ///< The model or this build lacks the function (a capability, not a fault).
+  offline,         ///< The node or its port does not answer. Check power and wiring; it is retried by itself.
+  configuring,     ///< Identity and configuration are not yet verified in this power cycle. Wait.
+  wrong_model,     ///< Another model answers at this address than the configuration names.
+  misconfigured,   ///< The drive refused or lost a configured value.
+  disabled,        ///< The power stage is off. Enable the axis first.
+  fault,           ///< The axis is in ErrorStop. Clear the cause, then Reset.
+  stopping,        ///< A stop is being executed or held. Wait, or ReleaseStop.
+  moving,          ///< Not possible while the axis moves.
+  inhibited,       ///< StopAll holds the machine. Release it explicitly.
+  not_trusted,     ///< The position is unknown. Home the axis or set its position.
+  soft_limit,      ///< The target lies beyond a software limit; `permitted` holds the range.
+  limit_switch,    ///< A limit terminal ended or forbids the motion.
+  terminal,        ///< A terminal of the drive started, changed or ended the motion.
+  alarm,           ///< The drive reports an alarm; `native_code` is its code.
+  did_not_start,   ///< The drive accepted a start but never moved.
+  not_reached,     ///< The drive stopped, but not at the target.
+  took_too_long,   ///< The motion ran longer than predicted and was stopped.
+  not_confirmed,   ///< A stop was sent, but standstill was not confirmed.
+  rebooted,        ///< The drive lost its memory (power cycle). Nothing resumes by itself.
+  superseded,      ///< A newer command, stop or loss of link took its place. Nothing was sent after that.
+  expired,         ///< `not_after` or a deadline passed before the frame could be sent.
+  lease_lost,      ///< The lease that the command was given under is gone.
+  lease_required,  ///< The axis is leased (or must be) and the token does not fit.
+  request_id_conflict,  ///< The request_id was used before for other content.
+  busy,                 ///< Too many requests in progress. Retry later.
+  refused,              ///< The drive answered with an exception or abort; `native_code` is its code.
+  no_reply,             ///< A frame was sent and no valid reply came. Whether it was executed is unknown.
+  bus_down,             ///< The port cannot be opened or was lost.
+  storage,              ///< The state directory cannot be written.
+  cancelled,            ///< Ended by CancelCommand or by the daemon's shutdown.
+  internal,             ///< A bug of axisd.
 };
 
 std::string_view to_string(Reason reason);
@@ -62,9 +62,9 @@ enum class Outcome : std::uint8_t {
 
 /// Where an error happened; unset parts do not apply.
 struct Address {
-  std::string bus;                       ///< name of the bus in the YAML
-  std::optional<std::uint8_t> node;      ///< Modbus unit or CANopen node-ID
-  std::optional<std::uint32_t> object;   ///< Modbus register, or CANopen index << 8 | sub-index
+  std::string bus;                           ///< name of the bus in the YAML
+  std::optional<std::uint8_t> node;          ///< Modbus unit or CANopen node-ID
+  std::optional<std::uint32_t> object;       ///< Modbus register, or CANopen index << 8 | sub-index
   std::optional<std::uint32_t> native_code;  ///< drive alarm, Modbus exception, SDO abort, errno
 };
 
