@@ -84,10 +84,7 @@ Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& ac
   auto* found = find(axis);
   if (found == nullptr)
     return fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis), "list them: axisctl list");
-  auto command = found->submit(action, options);
-  if (!command)
-    spdlog::info("{} {}: refused: {}", axis, to_string(kind_of(action)), to_string(command.error()));
-  return command;
+  return found->submit(action, options);
 }
 
 std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client) {

@@ -227,7 +227,7 @@ void Axis::publish() {
     next->enabled = bits.enabled;
     // The sign of the speed register is not said; the direction register's is.
     const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
-    next->velocity = last_positive_ ? speed : -speed;
+    next->velocity = last_positive_ || speed == 0 ? speed : -speed;
     next->moving = bits.moving;
     next->in_position = bits.in_position;
     next->homed = bits.homed;
