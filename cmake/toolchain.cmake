@@ -10,7 +10,8 @@ endif()
 add_compile_options(-Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wno-missing-designated-field-initializers
                     -ffile-prefix-map=${CMAKE_SOURCE_DIR}/= -fdebug-compilation-dir=.)
 if(CMAKE_BUILD_TYPE STREQUAL "Debug")
-  add_compile_options(-O1 -g1)
+  # Unoptimised: coroutines and gRPC compile 2.5 times as fast, and virtual time makes the tests quick anyway.
+  add_compile_options(-O0 -g1)
   add_compile_definitions(_GLIBCXX_ASSERTIONS)
 endif()
 add_compile_definitions(AXISD_VERSION="${PROJECT_VERSION}" SPDLOG_FMT_EXTERNAL BOOST_ASIO_NO_DEPRECATED)
