@@ -185,6 +185,8 @@ class Axis {
   Task<bool> positioned(ActivityPtr activity);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
+  Task<bool> is_no_reboot(ActivityPtr activity);
+  [[nodiscard]] std::int64_t target_tolerance() const;
   bool judge_rest(Activity& activity);
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
   Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);

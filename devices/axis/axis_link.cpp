@@ -13,8 +13,9 @@ namespace {
 constexpr auto first_backoff = milliseconds(100);
 constexpr auto longest_backoff = milliseconds(1000);
 constexpr int attempts_before_offline = 3;
-/// The canary is read at least every second (M7), counting the poll that is under way.
+/// The canary is read at least every second (M7), whatever the polling period; the rest is for the wire.
 constexpr auto continuity_period = milliseconds(800);
+constexpr auto continuity_latest = milliseconds(950);
 constexpr auto found_motion_poll = milliseconds(30);
 
 }  // namespace
@@ -164,7 +165,8 @@ Task<> Axis::poll() {
     const auto began = env_.clock->now();
     if (!co_await poll_once(failures)) co_return;
     if (failures > 0) continue;  // the bus's own timeouts pace the repetition
-    co_await wake_.wait_until(began + (busy() ? settings_.poll_moving : settings_.poll_idle));
+    co_await wake_.wait_until(std::min(began + (busy() ? settings_.poll_moving : settings_.poll_idle),
+                                       continuity_checked_ + continuity_latest));
   }
 }
 

@@ -209,7 +209,34 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   }
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return false;
-  co_return co_await follow(activity, base, since);
+  if (!co_await follow(activity, base, since)) co_return false;
+  co_return co_await is_no_reboot(activity);
+}
+
+/// A drive that was restarted on the way shows the counter 0: only where that is the target, too, it has to
+/// prove that it is the same one.
+Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
+  if (std::abs(activity->plan.target_counter) > target_tolerance()) co_return true;
+  Result<void> proof;
+  do {
+    proof = co_await drive_->check_continuity(TransactionClass::moving_state);
+    if (!current(*activity)) co_return false;  // offline, too
+  } while (!proof && proof.error().reason == Reason::no_reply);
+  if (proof) {
+    continuity_checked_ = env_.clock->now();
+    co_return true;
+  }
+  if (proof.error().reason == Reason::rebooted) {
+    on_reboot(proof.error());
+  } else {
+    finish(*activity, [&](CommandRecord& command) { command.error(proof.error()); });
+  }
+  co_return false;
+}
+
+std::int64_t Axis::target_tolerance() const {
+  return std::max<std::int64_t>(
+      0, std::llround(settings_.position_tolerance * std::abs(scale_.pulses_per_unit())));
 }
 
 Task<> Axis::run_velocity(ActivityPtr activity) {
@@ -283,8 +310,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
   const auto& plan = activity->plan;
   const auto latest =
       plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
-  const auto tolerance = std::max<std::int64_t>(
-      0, std::llround(settings_.position_tolerance * std::abs(scale_.pulses_per_unit())));
+  const auto tolerance = target_tolerance();
   for (;;) {
     auto deadline = std::min(activity->hold_until.value_or(latest), latest);
     if (!activity->started) deadline = std::min(deadline, since + start_window);

@@ -56,10 +56,12 @@ Result<Plan> Planner::profile(double velocity, const MotionValues& asked) const 
   const auto speed = std::abs(velocity);
   const auto unit = settings_->scale.unit + "/s";
   // A little beyond the limit is the limit, written with fewer digits.
-  if (!std::isfinite(velocity) || speed > maximum_velocity() * (1 + 1e-9) ||
+  // The direction of a move is that of its target: a sign of its velocity would be dropped silently.
+  const bool negative_in_move = asked.velocity && *asked.velocity < 0;
+  if (!std::isfinite(velocity) || negative_in_move || speed > maximum_velocity() * (1 + 1e-9) ||
       speed < minimum_velocity() * (1 - 1e-9))
-    return out_of_range(fmt::format("velocity {} {}", speed, unit), minimum_velocity(), maximum_velocity(),
-                        unit);
+    return out_of_range(fmt::format("velocity {} {}", negative_in_move ? velocity : speed, unit),
+                        minimum_velocity(), maximum_velocity(), unit);
   const auto& limits = settings_->limits;
   const auto acceleration = ramp(asked.acceleration_time, limits.acceleration_time, "acceleration time");
   if (!acceleration) return fail(acceleration.error());
