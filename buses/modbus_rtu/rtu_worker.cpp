@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <pthread.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <csignal>
@@ -179,6 +180,10 @@ void RtuWorker::report(const ExchangeResult& result) {
 void RtuWorker::report(const PortStatus& status) {
   auto text = status.error ? to_string(*status.error) : std::string();
   if (!status.open && text == reported_error_) return;
+  if (status.open)
+    spdlog::info("{}: port {} is open", settings_.name, settings_.port);
+  else
+    spdlog::warn("{}", text);
   reported_error_ = std::move(text);
   post(core_, [callbacks = callbacks_, status] {
     if (callbacks->alive) callbacks->on_port(status);
