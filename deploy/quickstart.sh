@@ -43,7 +43,7 @@ trap clean_up EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-say "Packages and build"
+say "Packages and build (some minutes the first time)"
 deploy/install-packages.sh build
 deploy/install-packages.sh run
 if ! { cmake --preset release && cmake --build --preset release --target axisd axisctl axisd-sim; } \
