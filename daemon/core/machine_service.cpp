@@ -50,13 +50,15 @@ MachineInfo MachineService::info() const {
   return info;
 }
 
-/// Calls back once, when the command has come as far as the caller wants to wait.
+/// Calls back once, when the command has come as far as the caller wants to wait. A change is told from a
+/// handler of its own, so that whoever hears of it finds the axis's state published.
 void MachineService::answer(const Result<CommandPtr>& command, WaitUntil until, CommandCallback callback) {
   if (!command) return callback(fail(command.error()));
   if (reached((*command)->value(), until)) return callback((*command)->value());
   auto pending = std::make_shared<CommandCallback>(std::move(callback));
-  (*command)->observe(pending, [until, keep = pending](const Command& now) {
-    if (*keep && reached(now, until)) std::exchange(*keep, nullptr)(now);
+  (*command)->observe(pending, [executor = loop_->executor(), until, keep = pending](const Command& now) {
+    if (!*keep || !reached(now, until)) return;
+    post(executor, [tell = std::exchange(*keep, nullptr), now] { tell(now); });
   });
 }
 
@@ -133,7 +135,11 @@ std::shared_ptr<void> MachineService::watch_command(std::string id, CommandCallb
          const auto command = machine_->book().find(id);
          if (!command) return callback(unknown_command(id));
          callback(command->value());
-         command->observe(alive, callback);
+         command->observe(alive, [executor = loop_->executor(), alive, callback](const Command& now) {
+           post(executor, [alive, callback, now] {
+             if (alive.lock()) callback(now);
+           });
+         });
        });
   return token;
 }
