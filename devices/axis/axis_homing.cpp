@@ -101,8 +101,7 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
   bool mode_seen = false;
   bool bit_was_low = !homed_before;
   for (;;) {
-    co_await sampled_.wait_until(
-        std::max(std::min(latest, mode_seen ? latest : start_by), env_.clock->now() + milliseconds(1)));
+    co_await sampled_.wait_until(std::max(latest, env_.clock->now() + milliseconds(1)));
     if (!current(*activity)) co_return false;
     const auto now = env_.clock->now();
     if (sample_->asked_at >= since) {
@@ -131,7 +130,8 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
         co_return false;
       }
     }
-    if (!mode_seen && now >= start_by) {
+    // Only who was asked after the window has not started: a silent drive may well run.
+    if (!mode_seen && sample_->asked_at >= start_by) {
       fail_with_stop(*activity,
                      error(Reason::did_not_start, "the drive accepted the homing command but does not home",
                            "check enable, alarm and terminals"));
