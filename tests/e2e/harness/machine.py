@@ -1,0 +1,169 @@
+"""A machine of its own for each scenario: simulated lines, the daemon, a client, everything in a directory."""
+import os
+import pathlib
+import shutil
+import tempfile
+
+from .client import Client
+from .notify import NotifySocket
+from .programs import AXISCTL, AXISD, Program, run
+from .simulator import Simulator
+from .wire import WireLog
+
+
+class Axis:
+    """An axis of the configuration, and the drive that is simulated for it. `keys` are YAML keys with their
+    text, `simulated` what axisd-sim --drive takes. Drives power up released here, unless that says otherwise."""
+
+    def __init__(self, node=1, bus="line", simulated="", **keys):
+        self.node, self.bus, self.simulated, self.keys = node, bus, simulated, keys
+
+    def yaml(self):
+        return "".join(f"    {key}: {value}\n" for key, value in
+                       {"bus": self.bus, "node": self.node, "model": "ykd2405pr", **self.keys}.items())
+
+    def option(self):
+        words = f"node={self.node},model=ykd2405pr,switch.enabled_at_power_up=off"
+        return words + (f",{self.simulated}" if self.simulated else "")
+
+
+def feeder(node=1, bus="line", simulated="", **keys):
+    """A spindle, 2000 pulses/mm, with soft limits; its home edge lies 10 mm below where it stands at first."""
+    keys = {"unit": "mm", "scale": "{ microstep: 10000 pulses/rev, travel: 5 mm/rev }",
+            "limits": "{ position: [0, 400], velocity: 100 mm/s, acceleration_time: 150 ms }",
+            "homing": "{ method: home_negative, velocity: 20 mm/s, search_velocity: 2 mm/s, backoff: 5 mm, "
+                      "max_travel: 450 mm, timeout: 60 s }",
+            "inputs": "{ X0: home, X1: positive_limit, X2: negative_limit }", "jog_travel": "20 mm"} | keys
+    return Axis(node, bus, simulated or "home=-28000:-20000,positive_limit=900000,negative_limit=-60000", **keys)
+
+
+def spinner(node=1, bus="line", simulated="", **keys):
+    """An endless axis, 1000 pulses/rev."""
+    keys = {"unit": "rev", "scale": "{ microstep: 1000 pulses/rev }",
+            "limits": "{ velocity: 10 rev/s, acceleration_time: 150 ms }"} | keys
+    return Axis(node, bus, simulated, **keys)
+
+
+class Machine:
+    """Not started by itself: start_lines() and start_daemon(), or start()."""
+
+    def __init__(self, axes, baud=115200, serial_format="8N1", server=None):
+        self.axes = axes
+        self.baud, self.serial_format = baud, serial_format
+        self.directory = tempfile.mkdtemp(prefix="axe2e-")
+        self.socket = os.path.join(self.directory, "axisd.sock")
+        self.server = server or f"{{ listen: \"unix:{self.socket}\" }}"
+        self.state_directory = os.path.join(self.directory, "state")
+        self.config = os.path.join(self.directory, "axisd.yaml")
+        self.wire = WireLog(os.path.join(self.directory, "wire.log"))
+        self.notify = NotifySocket(self.directory)
+        self.lines = {}
+        self.daemons = []
+        self._clients = []
+        self.write_config()
+
+    def path(self, name):
+        return os.path.join(self.directory, name)
+
+    def buses(self):
+        return sorted({axis.bus for axis in self.axes.values()})
+
+    def write_config(self):
+        text = f"machine: e2e\nstate_directory: {self.state_directory}\nserver: {self.server}\nbuses:\n"
+        for bus in self.buses():
+            text += (f"  {bus}:\n    modbus_rtu: {{ port: {self.path(bus)}, baud: {self.baud}, "
+                     f"format: {self.serial_format}, turnaround_max: 250 ms }}\n")
+        text += "axes:\n"
+        for name, axis in self.axes.items():
+            text += f"  {name}:\n{axis.yaml()}"
+        pathlib.Path(self.config).write_text(text)
+
+    def start_line(self, bus):
+        drives = [axis.option() for axis in self.axes.values() if axis.bus == bus]
+        self.lines[bus] = Simulator(bus, self.directory, drives,
+                                    ["--baud", str(self.baud), "--format", self.serial_format])
+        return self.lines[bus]
+
+    def start_lines(self):
+        for bus in self.buses():
+            self.start_line(bus)
+
+    def start_daemon(self, environment=None, wait=True, options=()):
+        """Starts axisd; returns once it reports READY."""
+        self.notify.forget()
+        daemon = Program(f"axisd-{len(self.daemons)}",
+                         [AXISD, "--config", self.config, "--wire-log", str(self.wire.path), *options], self.directory,
+                         {"NOTIFY_SOCKET": self.notify.path} | (environment or {}))
+        self.daemons.append(daemon)
+        for client in self._clients:
+            client.close()
+            client.connect()
+        if wait:
+            self.notify.wait_for("READY=1", daemon)
+        return daemon
+
+    def start(self):
+        """Everything, until each axis is online."""
+        self.start_lines()
+        self.start_daemon()
+        for axis in self.axes:
+            self.client.wait_online(axis)
+        return self
+
+    @property
+    def daemon(self):
+        return self.daemons[-1]
+
+    @property
+    def sim(self):
+        """The only line."""
+        (line,) = self.lines.values()
+        return line
+
+    def connect(self):
+        """A client with a connection of its own."""
+        client = Client(f"unix:{self.socket}")
+        self._clients.append(client)
+        return client
+
+    @property
+    def client(self):
+        return self._clients[0] if self._clients else self.connect()
+
+    def axisctl(self, *words):
+        """Runs axisctl to its end."""
+        return run([AXISCTL, "--server", f"unix:{self.socket}", *words], limit=120)
+
+    def quiesce(self):
+        return run([AXISD, "--quiesce", self.config], limit=60)
+
+    def logs(self):
+        """Everything that was written, the long logs by their ends."""
+        text = f"\n===== axisd.yaml\n{pathlib.Path(self.config).read_text()}"
+        for file in sorted(pathlib.Path(self.directory).iterdir()):
+            if file.suffix in (".stderr", ".stdout", ".log"):
+                lines = file.read_text(errors="replace").splitlines()
+                text += f"\n===== {file.name} ({len(lines)} lines)\n" + "\n".join(lines[-60:])
+        return text
+
+    def close(self):
+        """Ends all programs, the daemon first; the directory is left to remove()."""
+        for client in self._clients:
+            client.close()
+        findings = []
+        for part in [*self.daemons, *self.lines.values()]:
+            try:
+                if isinstance(part, Program):
+                    part.terminate()
+                    part.check_memory()
+                else:
+                    part.close()
+            except Exception as error:  # each of the others must end, too
+                findings.append(f"{part.name}: {error}")
+                getattr(part, "program", part).kill()
+        self.notify.close()
+        if findings:
+            raise AssertionError("\n".join(findings))
+
+    def remove(self):
+        shutil.rmtree(self.directory, ignore_errors=True)

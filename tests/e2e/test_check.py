@@ -1,0 +1,69 @@
+"""The binaries' behaviour towards configurations: what they print, where, and how they end."""
+import json
+import pathlib
+import unittest
+
+from harness import AXISCTL, AXISD, ROOT, Scenario, feeder, run
+
+BROKEN = sorted((ROOT / "tests" / "broken").glob("*.yaml"))
+EXAMPLES = sorted((ROOT / "config" / "examples").glob("*.yaml"))
+
+
+class Check(Scenario):
+    def test_broken_files(self):
+        self.assertGreater(len(BROKEN), 40)
+        for path in BROKEN:
+            with self.subTest(path=path.name):
+                done = run([AXISD, "--check", "--config", str(path)])
+                self.assertEqual((done.returncode, done.stdout), (2, ""), done)
+                expected = path.with_suffix(".expected").read_text().splitlines()
+                # The file's name is printed as it was given.
+                self.assertEqual([line.replace(str(path), path.name) for line in done.stderr.splitlines()], expected)
+
+    def test_a_broken_file_is_not_served(self):
+        done = run([AXISD, "--config", str(BROKEN[0])])
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn(str(BROKEN[0]), done.stderr)
+
+    def test_examples(self):
+        self.assertTrue(EXAMPLES)
+        for path in EXAMPLES:
+            with self.subTest(path=path.name):
+                done = run([AXISD, "--check", "--config", str(path)])
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                self.assertRegex(done.stdout, r"\A" + str(path) + r": ok \(\d+ axes on \d+ buses\)\n\Z")
+
+    def test_axisctl_agrees(self):
+        for path in (BROKEN[0], BROKEN[-1], EXAMPLES[0]):
+            daemon = run([AXISD, "--check", "--config", str(path)])
+            done = run([AXISCTL, "check", str(path)])
+            self.assertEqual(done.returncode, daemon.returncode, done)
+            for line in daemon.stderr.splitlines():
+                self.assertIn(line, done.stderr + done.stdout)
+
+    def test_no_such_file(self):
+        done = run([AXISD, "--check", "--config", "/nonexistent/axisd.yaml"])
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertRegex(done.stderr, r"\A/nonexistent/axisd.yaml[^\n]*\n\Z")
+
+    def test_command_line(self):
+        wrong = run([AXISD, "--nonsense"])
+        self.assertEqual((wrong.returncode, wrong.stdout), (2, ""))
+        self.assertRegex(wrong.stderr, r"\Aaxisd: .*--nonsense[^\n]*\n\Z")
+        self.assertEqual(run([AXISD, "--help"]).returncode, 0)
+        version = run([AXISD, "--version"])
+        self.assertEqual((version.returncode, version.stderr), (0, ""))
+        self.assertRegex(version.stdout, r"\Aaxisd \d+\.\d+\.\d+\n\Z")
+        json.loads(run([AXISD, "--schema"]).stdout)
+
+    def test_state_directory_that_cannot_be_written(self):
+        machine = self.machine({"feeder": feeder()})
+        blocker = pathlib.Path(machine.path("file"))
+        blocker.write_text("")
+        done = run([AXISD, "--config", machine.config, "--state-directory", str(blocker / "state")])
+        self.assertEqual(done.returncode, 1, done)
+        self.assertIn(str(blocker), done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

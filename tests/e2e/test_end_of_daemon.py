@@ -1,0 +1,135 @@
+"""SIGTERM and SIGKILL in mid-move, --quiesce, and the systemd protocol."""
+import signal
+import socket
+import time
+import unittest
+
+from harness import AXISD, START, STOP, Scenario, feeder, pb, run, spinner
+
+
+class Terminated(Scenario):
+    def test_in_mid_move(self):
+        machine = self.ready_feeder()
+        self.move_under_way(machine)
+        at = time.monotonic_ns()
+        self.assertEqual(machine.daemon.terminate(), 0)
+        self.assertFalse(machine.sim.shaft().moving)
+        self.assertLess(machine.sim.shaft().position, 590000)
+        self.assertEqual([frame.values for frame in machine.wire.writes(STOP, since=at)], [[0]])
+        self.assertEqual(machine.sim.peek(0x0007) >> 4 & 1, 0, "the power stage is left on")
+        # The next start finds it at rest and moves nothing.
+        machine.start_daemon()
+        state = machine.client.wait_online("feeder")
+        self.assert_state(state, "STANDSTILL")
+        self.assertEqual((state.enabled, state.enabled_by_daemon), (True, False))
+        self.assertEqual(machine.wire.writes(START, since=at), [])
+        # Its continuity is proven, so the position still counts.
+        self.assertEqual(state.trust, pb.POSITION_TRUST_RESTORED)
+        self.assertAlmostEqual(state.position, machine.sim.shaft().position / 2000)
+
+    def test_interrupt_in_velocity(self):
+        machine = self.ready_spinner()
+        machine.client.motion("MoveVelocity", "spinner", velocity=5.0)
+        machine.sim.wait_moving()
+        machine.daemon.process.send_signal(signal.SIGINT)
+        self.assertEqual(machine.daemon.wait(), 0)
+        self.assertFalse(machine.sim.shaft().moving)
+
+
+class Killed(Scenario):
+    def test_velocity_then_quiesce(self):
+        axes = {"spinner": spinner(1), "idle": feeder(2), "other": spinner(3, bus="second")}
+        machine = self.machine(axes).start()
+        for axis in ("spinner", "other"):
+            machine.client.to_done("Enable", axis)
+            machine.client.motion("MoveVelocity", axis, velocity=5.0, wait=pb.WAIT_UNTIL_STARTED)
+        machine.lines["line"].wait_moving(1)
+        machine.lines["second"].wait_moving(3)
+        machine.daemon.kill()
+        self.assertTrue(machine.lines["line"].shaft(1).moving)
+        done = machine.quiesce()
+        self.assertEqual((done.returncode, done.stderr), (0, ""), done)
+        self.assertEqual(sorted(done.stdout.splitlines()),
+                         ["idle: standstill confirmed", "other: standstill confirmed", "spinner: standstill confirmed"])
+        for line, node in (("line", 1), ("line", 2), ("second", 3)):
+            self.assertFalse(machine.lines[line].shaft(node).moving)
+
+    def test_restart_stops_what_moves(self):
+        machine = self.ready_spinner()
+        machine.client.motion("MoveVelocity", "spinner", velocity=5.0, wait=pb.WAIT_UNTIL_STARTED)
+        machine.sim.wait_moving()
+        machine.daemon.kill()
+        restarted = time.monotonic_ns()
+        machine.start_daemon()
+        machine.client.wait_online("spinner")
+        self.assertFalse(machine.sim.shaft().moving)
+        writes = machine.wire.writes(node=1, since=restarted)
+        self.assertTrue(writes[0].writes(STOP, 0), [str(frame) for frame in writes[:5]])
+        self.assertEqual(machine.wire.writes(START, since=restarted), [])
+
+    def test_quiesce_says_what_it_could_not_do(self):
+        machine = self.machine({"dead": feeder(1), "spinner": spinner(2)})
+        machine.start_lines()
+        machine.sim.control("power 1 off")
+        done = machine.quiesce()
+        self.assertEqual(done.returncode, 1)
+        dead, alive = sorted(done.stdout.splitlines())
+        self.assertEqual(alive, "spinner: standstill confirmed")
+        self.assertRegex(dead, r"\Adead: (?!standstill).+")
+
+    def test_quiesce_without_a_port(self):
+        machine = self.machine({"feeder": feeder()})
+        done = machine.quiesce()
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stdout, r"\Afeeder: .*" + machine.path("line"))
+
+    def test_quiesce_with_a_broken_file(self):
+        machine = self.ready_spinner()
+        machine.client.motion("MoveVelocity", "spinner", velocity=5.0, wait=pb.WAIT_UNTIL_STARTED)
+        machine.sim.wait_moving()
+        machine.daemon.kill()
+        with open(machine.config, "a") as file:
+            file.write("nonsense: 1\n")
+        done = run([AXISD, "--quiesce", machine.config, "--state-directory", machine.state_directory])
+        self.assertEqual((done.returncode, done.stdout), (0, "spinner: standstill confirmed\n"), done)
+        self.assertIn("nonsense", done.stderr)
+        self.assertIn("last-good.yaml", done.stderr)
+        self.assertFalse(machine.sim.shaft().moving)
+
+
+class Systemd(Scenario):
+    def test_protocol(self):
+        machine = self.machine({"feeder": feeder()})
+        machine.start_lines()
+        daemon = machine.start_daemon({"WATCHDOG_USEC": "1000000"}, wait=False)
+        machine.notify.wait_for("READY=1", daemon)
+        # The port is served at that moment: no retry here.
+        with socket.socket(socket.AF_UNIX) as probe:
+            probe.connect(machine.socket)
+        self.assertEqual(machine.client.info().machine, "e2e")
+        for _ in range(3):
+            machine.notify.forget()
+            machine.notify.wait_for("WATCHDOG=1", daemon)
+        self.assertNotIn("STOPPING=1", machine.notify.received())
+        daemon.process.send_signal(signal.SIGHUP)  # neither ends nor reloads it
+        machine.notify.forget()
+        machine.notify.wait_for("WATCHDOG=1", daemon)
+        self.assertIn("SIGHUP", daemon.log())
+        machine.client.wait_online("feeder")
+        machine.notify.forget()
+        self.assertEqual(daemon.terminate(), 0)
+        self.assertIn("STOPPING=1", machine.notify.received())
+        self.assertNotIn("READY=1", machine.notify.received())
+
+    def test_no_ready_without_the_port(self):
+        machine = self.machine({"feeder": feeder()}).start()
+        second = self.machine({"feeder": feeder()}, server=f'{{ listen: "unix:{machine.socket}" }}')
+        daemon = second.start_daemon(wait=False)
+        self.assertEqual(daemon.wait(), 1)
+        self.assertNotIn("READY=1", second.notify.received())
+        self.assertIn(machine.socket, daemon.log())
+        self.assertEqual(machine.client.info().machine, "e2e")
+
+
+if __name__ == "__main__":
+    unittest.main()
