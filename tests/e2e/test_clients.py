@@ -53,6 +53,17 @@ class Killed(Scenario):
         self.assertEqual(len(machine.wire.writes(START)), 1)
 
 
+class Idle(Scenario):
+    def test_its_stop_gets_through(self):
+        """gRPC looks at a connection without calls every 5 s only, so it answers the daemon's pings that late."""
+        machine = self.ready_spinner()
+        machine.client.motion("MoveVelocity", "spinner", velocity=1.0)
+        quiet = time.monotonic_ns()
+        wait_for(lambda: machine.wire.requests(since=quiet + 6_000_000_000), "6 s without a call")
+        self.assert_command(machine.client.motion("Stop", "spinner", wait=DONE), "DONE")
+        self.assertFalse(machine.sim.shaft().moving)
+
+
 class Commands(Scenario):
     def test_request_id(self):
         machine = self.ready_feeder()

@@ -2,7 +2,7 @@
 import time
 import unittest
 
-from harness import DONE, START, STOP, Scenario, axis_pb, error_pb, pb
+from harness import DONE, START, STOP, Scenario, axis_pb, error_pb, feeder, pb
 
 
 def monotonic(timestamp):
@@ -56,6 +56,29 @@ class Stop(Scenario):
         self.assert_command(machine.client.get_command(move), "ABORTED")
         self.assertIn(machine.client.get_command(halt).state, (pb.COMMAND_STATE_DONE, pb.COMMAND_STATE_ABORTED))
         self.assertEqual(machine.sim.shaft().position, 2000)
+
+    def stop_in_homing(self, switch):
+        machine = self.machine({"feeder": feeder(simulated=f"home=-2000000:-1900000,{switch}")}).start()
+        machine.client.to_done("Enable", "feeder")
+        home = machine.client.motion("Home", "feeder")
+        machine.client.wait_state("feeder", lambda s: s.moving and s.state == pb.STATE_HOMING, "homing")
+        stop = machine.client.motion("Stop", "feeder", wait=DONE)
+        self.assert_command(machine.client.get_command(home), "ABORTED")
+        self.assertEqual(machine.client.state("feeder").trust, pb.POSITION_TRUST_UNKNOWN)
+        return machine, stop
+
+    def test_in_homing(self):
+        machine, stop = self.stop_in_homing("switch.stop_ignored_in_homing=off")
+        self.assert_command(stop, "DONE")
+        self.assertFalse(machine.sim.shaft().moving)
+
+    def test_in_homing_of_a_drive_that_does_not_listen(self):
+        """The manual defines 0x0028 for position and speed mode only: then it is escalated, and said."""
+        machine, stop = self.stop_in_homing("switch.stop_ignored_in_homing=on")
+        self.assert_command(stop, "ERROR")
+        self.assertEqual(stop.cause.reason, error_pb.REASON_NOT_CONFIRMED, stop)
+        self.assert_state(machine.client.state("feeder"), "ERROR_STOP")
+        self.assertEqual([frame.values for frame in machine.wire.writes(STOP)][:2], [[0], [1]])
 
     def test_held_stop(self):
         machine = self.ready_feeder()
