@@ -79,11 +79,15 @@ bool Axis::limit_active(bool positive) const {
 }
 
 void Axis::on_sample(const DriveSample& sample) {
+  const auto before = sample_;
   sample_ = sample;
-  tracker_.update(sample.position_pulses);
+  if (!rezeroing_) tracker_.update(sample.position_pulses);
   if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
   if (sample.alarm_code != 0) on_alarm(sample);
-  if (!sample.enabled) on_released(sample);
+  if (before && before->moving && !sample.moving && before->mode != DriveMode::homing &&
+      sample.mode != DriveMode::homing && limit_active(last_positive_))
+    lose_trust();  // open loop: the overtravel stop has no ramp (M20)
+  if (!sample.enabled) on_released(sample, before && before->enabled);
   if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = false;
   if (terminal_motion_ && !sample.moving) {
     terminal_motion_ = false;
@@ -110,14 +114,19 @@ void Axis::on_alarm(const DriveSample& sample) {
   begin_stop(StopKind::stop, false, nullptr);
 }
 
-void Axis::on_released(const DriveSample& sample) {
+void Axis::on_released(const DriveSample& sample, bool enabled_before) {
   if (!descriptor_->capabilities.closed_loop && sample.alarm_code == 0 &&
       tracker_.trust() != PositionTrust::unknown)
     lose_trust();  // an open-loop motor without current can be turned by hand
-  if (!enabled_by_us_) return;
+  if (!enabled_by_us_ && !enabled_before) return;
   const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
   enabled_by_us_ = false;
   if (releasing || fault_) return;
+  if (activity_ && activity_->state != AxisState::standstill && limit_active(last_positive_)) {
+    supersede(error(Reason::limit_switch, "a limit switch ended the motion, and the drive released the motor",
+                    "move away from it by hand; home the axis"));
+    return;
+  }
   supersede(error(Reason::terminal, "the power stage was released, and not by a command",
                   "check terminals with the function motor_free and other masters on the bus"));
 }

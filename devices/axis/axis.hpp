@@ -139,7 +139,7 @@ class Axis {
   // axis.cpp: what the samples mean
   void on_sample(const DriveSample& sample);
   void on_alarm(const DriveSample& sample);
-  void on_released(const DriveSample& sample);
+  void on_released(const DriveSample& sample, bool enabled_before);
   void on_unexplained_motion(const DriveSample& sample);
   void publish();
   [[nodiscard]] AxisState state() const;
@@ -169,6 +169,7 @@ class Axis {
   Result<CommandPtr> accept(const SetPositionRequest& request, const CommandOptions& options);
   [[nodiscard]] Result<Plan> plan_move(const PositionTracker::Target& target, const MotionValues& with) const;
   Result<Plan> plan_velocity(double velocity, const MotionValues& with, bool jog);
+  bool renewed(const Action& action, const CommandOptions& options, Duration hold);
   ActivityPtr begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan);
 
   // axis_motion.cpp: sequences
@@ -241,6 +242,7 @@ class Axis {
   bool stop_owed_ = false;  ///< M4: to a silent node, until standstill is confirmed
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
+  bool rezeroing_ = false;  ///< the drive's counter is being zeroed
   bool last_positive_ = true;
   std::optional<Error> fault_;
   Duration last_deceleration_{

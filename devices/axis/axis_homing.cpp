@@ -67,10 +67,7 @@ Task<bool> Axis::back_off(ActivityPtr activity) {
     plan->positive = distance > 0;
     plan->target = target.position;
     plan->target_counter = target.counter;
-    const auto per_second = static_cast<double>(settings_.scale.pulses_per_revolution) / 60.0;
-    plan->predicted = move_duration(std::abs(static_cast<double>(target.counter - tracker_.counter())),
-                                    plan->start_rpm * per_second, plan->velocity_rpm * per_second,
-                                    plan->acceleration_time, plan->deceleration_time);
+    plan->exact_target = target.exact;
   }
   if (!plan) {
     finish(*activity, [&](CommandRecord& command) { command.error(plan.error()); });
@@ -95,9 +92,14 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
   const auto& homing = *settings_.homing;
   auto origin = tracker_.counter();
   auto previous = origin;
+  auto previous_asked = sample_->asked_at;
+  const auto fastest =  // pulses per second
+      std::max(std::abs(scale_.velocity_to_rpm(homing.velocity)),
+               std::abs(scale_.velocity_to_rpm(homing.search_velocity))) /
+      60 * static_cast<double>(settings_.scale.pulses_per_revolution);
   const auto latest = since + homing.timeout;
   const auto start_by = since + milliseconds(500);
-  const auto offset = std::abs(scale_.to_pulses(homing.offset));
+  const auto offset = scale_.to_pulses(homing.offset);
   bool mode_seen = false;
   bool bit_was_low = !homed_before;
   for (;;) {
@@ -110,17 +112,21 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
       if (!sample.homed) bit_was_low = true;
       if (mode_seen && !sample.moving && sample.mode == DriveMode::positioning) {
         const bool rose = sample.homed && bit_was_low;
-        const bool at_zero = sample.homed && std::abs(std::int64_t{sample.position_pulses}) <= offset + 1;
-        if (rose || at_zero) co_return true;
+        // Which of the two it is after a compensation is not said (7.5).
+        const auto counter = std::int64_t{sample.position_pulses};
+        const bool at_home = std::abs(counter) <= 1 || std::abs(counter - offset) <= 1;
+        if (rose || (sample.homed && at_home)) co_return true;
         fail_with_stop(*activity, error(Reason::not_reached, "homing ended without reaching home",
                                         "check the switch, limit and stop terminals"));
         co_return false;
       }
-      // The drive zeroes its counter at home: a step that no motor makes between two samples is no travel.
+      // The drive zeroes its counter at home: a step that the motor cannot make between two samples is no
+      // travel.
       const auto step = tracker_.counter() - previous;
       previous = tracker_.counter();
-      if (std::abs(step) > settings_.scale.pulses_per_revolution * planner_.maximum_rpm() / 60)
-        origin += step;
+      const auto seconds = std::chrono::duration<double>(sample.measured_at - previous_asked).count();
+      previous_asked = sample.asked_at;
+      if (std::abs(static_cast<double>(step)) > 1 + (1.1 * fastest * seconds)) origin += step;
       const auto travel = std::abs(scale_.to_units(tracker_.counter()) - scale_.to_units(origin));
       if (homing.max_travel && travel > *homing.max_travel) {
         fail_with_stop(*activity, error(Reason::not_reached,

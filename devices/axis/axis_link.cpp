@@ -99,6 +99,7 @@ Task<Result<void>> Axis::settle_found_motion() {
     stop_owed_ = true;
     const auto sent = co_await drive_->stop(kind);
     if (!sent) co_return sent;
+    if (kind == StopKind::quick_stop && !descriptor_->capabilities.closed_loop) lose_trust();
     co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + found_motion_poll);
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
     if (!sample) co_return fail(sample.error());
@@ -130,10 +131,16 @@ Task<Result<void>> Axis::prove_or_configure() {
                  (sample_->enabled || descriptor_->capabilities.closed_loop);
     if (restorable) drive_->expect_mark(record.canary);
   }
+  const auto void_record = [this] {  // what it says may come true again by chance, but never by right
+    restore_tried_ = true;
+    env_.persistence->forget_offset(settings_.name, {});
+  };
+  if (stored != nullptr && !restorable) void_record();
   if (configured_ || restorable) {
     const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     if (!proof && configured_) on_reboot(proof.error());
+    if (!proof && restorable) void_record();
     if (!proof) restorable = false;
   }
   if (!configured_) {
@@ -217,6 +224,7 @@ void Axis::go_offline(const Error& cause) {
                          "check power and wiring; then reset the axis");
     unknown.outcome = Outcome::unknown;
     if (activity->state != AxisState::standstill && !fault_) fault_ = unknown;
+    last_deceleration_ = std::max(activity->plan.deceleration_time, Duration(milliseconds(1)));
     activity->command->unknown(std::move(unknown));
   }
   if (moved) tracker_.forget_target();

@@ -30,10 +30,11 @@ bool Axis::current(const Activity& activity) const {
 }
 
 MotionGuard Axis::guard(const Activity& activity) const {
+  // What nobody holds any more does not start, either.
   return {.gate = gate_,
           .epoch = activity.epoch,
           .fencing_token = activity.options.lease_token,
-          .not_after = activity.options.not_after};
+          .not_after = std::min(activity.options.not_after, activity.hold_until.value_or(TimePoint::max()))};
 }
 
 void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>& how) {
@@ -164,22 +165,32 @@ Task<> Axis::run_disable(ActivityPtr activity) {
 /// Zeroes the drive's counter before a target could leave its 32 bit (M19).
 Task<Result<void>> Axis::make_room(ActivityPtr activity) {
   if (std::abs(activity->plan.target_counter) < rezero_beyond) co_return Result<void>{};
-  const auto cleared = co_await drive_->clear_position(guard(*activity));
-  if (!cleared) co_return cleared;
+  // A sample that was asked for meanwhile may show either counter: none is taken for a motion.
+  rezeroing_ = true;
+  auto cleared = co_await drive_->clear_position(guard(*activity));
+  // Without a reply it may have been cleared: the counter tells, and clearing it twice changes nothing.
+  if (!cleared && cleared.error().outcome != Outcome::unknown) {
+    rezeroing_ = false;
+    co_return cleared;
+  }
   const auto sample = co_await drive_->read_state(TransactionClass::motion);
-  if (!sample) co_return fail(sample.error());
-  if (sample->position_pulses != 0 || sample->moving)
-    co_return fail(
-        error(Reason::not_confirmed, "the drive's position counter could not be zeroed", "home the axis"));
+  rezeroing_ = false;
   const auto shift = tracker_.counter();
-  tracker_.rezero(0);
-  activity->plan.target_counter -= shift;
-  co_return Result<void>{};
+  if (sample && sample->position_pulses == 0 && !sample->moving) {
+    tracker_.rezero(0);
+    activity->plan.target_counter -= shift;
+    co_return Result<void>{};
+  }
+  if (!sample || sample->position_pulses != static_cast<std::int32_t>(shift)) lose_trust();
+  auto cause =
+      error(Reason::not_confirmed, "the drive's position counter could not be zeroed", "repeat the move");
+  cause.outcome = Outcome::not_executed;
+  co_return fail(std::move(cause));
 }
 
 Task<> Axis::run_move(ActivityPtr activity) {
   if (!co_await positioned(activity)) co_return;
-  tracker_.reached_plan();
+  tracker_.reached(activity->plan.exact_target);
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
@@ -187,6 +198,13 @@ Task<> Axis::run_move(ActivityPtr activity) {
 /// One positioning motion to the plan's target. False: the activity has ended.
 Task<bool> Axis::positioned(ActivityPtr activity) {
   if (!co_await reach_standstill(activity)) co_return false;
+  if (activity->plan.trusted && tracker_.trust() == PositionTrust::unknown) {
+    finish(*activity, [this](CommandRecord& command) {
+      command.error(error(Reason::not_trusted, "the position was lost before the move could start",
+                          "home the axis, or set its position"));
+    });
+    co_return false;
+  }
   Result<void> result;
   std::int64_t base = 0;
   {
@@ -199,6 +217,10 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
       co_return true;
     }
     if (result) {
+      // From where it really starts: a motion before it may have ended anywhere.
+      const auto distance = activity->plan.target_counter - base;
+      activity->plan.positive = (distance >= 0) != settings_.scale.invert;
+      activity->plan.predicted = planner_.duration(activity->plan, distance);
       const MoveProfile profile{.target_pulses = static_cast<std::int32_t>(activity->plan.target_counter),
                                 .velocity_rpm = activity->plan.velocity_rpm,
                                 .start_rpm = activity->plan.start_rpm,
@@ -371,6 +393,9 @@ bool Axis::judge_rest(Activity& activity) {
     return true;
   }
   const bool terminal = input_active("stop") || input_active("quick_stop");
+  // Without a ramp an open loop may have lost steps (M20). A short pulse at a terminal, or another master,
+  // leaves nothing by which to tell the kind of stop.
+  if (!descriptor_->capabilities.closed_loop && !input_active("stop")) lose_trust();
   auto cause =
       terminal
           ? error(Reason::terminal, "a stop terminal of the drive ended the motion", "check the terminals")

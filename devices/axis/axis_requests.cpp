@@ -11,7 +11,7 @@ namespace axisd {
 Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& options) {
   // Stops and disables are never deduplicated: each one is executed.
   if (std::holds_alternative<StopRequest>(action) || std::holds_alternative<DisableRequest>(action)) {
-    gate_->take_stop_request();
+    gate_->stop_served();
     auto always = options;
     always.request_id.clear();
     return std::visit([&](const auto& request) { return accept(request, always); }, action);
@@ -178,8 +178,9 @@ Result<CommandPtr> Axis::accept(const MoveAbsoluteRequest& request, const Comman
   // A rotary axis goes the shorter way round.
   if (settings_.scale.modulo)
     position = tracker_.position() + std::remainder(position - tracker_.position(), *settings_.scale.modulo);
-  const auto plan = plan_move(tracker_.plan_absolute(position), request.with);
+  auto plan = plan_move(tracker_.plan_absolute(position), request.with);
   if (!plan) return fail(plan.error());
+  plan->trusted = settings_.require_trust;
   const auto activity = begin(request, options, AxisState::discrete_motion, *plan);
   launch(run_move(activity), "move");
   return activity->command;
@@ -245,11 +246,32 @@ Result<Plan> Axis::plan_velocity(double velocity, const MotionValues& with, bool
   }
   auto plan = planner_.move(*profile, target, tracker_);
   if (plan) plan->granted.velocity = velocity_granted;
+  if (plan) plan->trusted = tracker_.trust() != PositionTrust::unknown;
   return plan;
+}
+
+/// A repeated call with the same velocity extends the held motion that it started.
+bool Axis::renewed(const Action& action, const CommandOptions& options, Duration hold) {
+  if (!activity_ || !activity_->hold_until || !current(*activity_)) return false;
+  const auto& known = activity_->command->value();
+  const auto velocity = std::visit(
+      [](const auto& request) -> std::optional<double> {
+        if constexpr (requires { request.velocity; }) return request.velocity;
+        return std::nullopt;
+      },
+      action);
+  if (known.kind != kind_of(action) || known.asked.velocity != velocity ||
+      activity_->options.client != options.client)
+    return false;
+  activity_->hold_until = env_.clock->now() + hold;
+  // Should this very call be repeated later, it belongs to this command, too, and starts nothing.
+  env_.book->attach(activity_->command, settings_.name, action, options);
+  return true;
 }
 
 Result<CommandPtr> Axis::accept(const MoveVelocityRequest& request, const CommandOptions& options) {
   if (auto allowed = check_motion(options); !allowed) return fail(allowed.error());
+  if (request.hold && renewed(request, options, *request.hold)) return activity_->command;
   auto plan = plan_velocity(request.velocity, request.with, false);
   if (!plan) return fail(plan.error());
   plan->granted.hold = request.hold;
@@ -261,13 +283,7 @@ Result<CommandPtr> Axis::accept(const MoveVelocityRequest& request, const Comman
 
 Result<CommandPtr> Axis::accept(const JogRequest& request, const CommandOptions& options) {
   if (auto allowed = check_motion(options); !allowed) return fail(allowed.error());
-  // A repeated call with the same velocity extends the motion that it started.
-  if (activity_ && activity_->command->value().kind == CommandKind::jog && current(*activity_) &&
-      activity_->command->value().asked.velocity == request.velocity &&
-      activity_->options.client == options.client) {
-    activity_->hold_until = env_.clock->now() + request.hold;
-    return activity_->command;
-  }
+  if (renewed(request, options, request.hold)) return activity_->command;
   auto plan = plan_velocity(request.velocity, request.with, true);
   if (!plan) return fail(plan.error());
   plan->granted.hold = request.hold;
@@ -283,6 +299,8 @@ Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions
   supersede(error(Reason::superseded,
                   fmt::format("{} {} by {}", to_string(command->value().kind), command->value().id,
                               options.client.empty() ? "the daemon" : options.client)));
+  // The drive keeps the deceleration that was set before the motion: the answer says which (M12).
+  if (request.kind != StopKind::quick_stop) command->grant({.deceleration_time = deceleration_bound()});
   begin_stop(request.kind, request.hold, command);
   publish();
   return command;

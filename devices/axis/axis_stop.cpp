@@ -9,6 +9,13 @@
 
 namespace axisd {
 
+namespace {
+
+/// A stop without a reply is repeated at once, this often before the motor's state decides.
+constexpr int stop_attempts = 3;
+
+}  // namespace
+
 /// Ends what is being executed. Nothing that was prepared for it is sent any more.
 void Axis::supersede(const Error& cause) {
   gate_->raise();
@@ -72,13 +79,17 @@ Task<> Axis::run_stop() {
 
 Task<Result<void>> Axis::stop_and_confirm() {
   bool released = false;
+  int silent = 0;  // replies in a row that did not come
   for (;;) {
     const auto requests = stopping_.requests;
     const auto kind = stopping_.kind;
     const auto sent = co_await drive_->stop(kind);
     wake_.notify_all();
-    if (!sent && sent.error().reason == Reason::no_reply && link_ != LinkState::offline) continue;
-    if (!sent && sent.error().reason != Reason::refused) {
+    const bool no_reply = !sent && sent.error().reason == Reason::no_reply;
+    if (no_reply && link_ != LinkState::offline && ++silent < stop_attempts) continue;
+    silent = 0;
+    // Replies may be lost where the stop itself is not: what counts is the motor, so go on and look at it.
+    if (!sent && sent.error().reason != Reason::refused && (!no_reply || link_ == LinkState::offline)) {
       auto cause = error(Reason::not_confirmed, "the stop was not acknowledged: " + to_string(sent.error()),
                          "look at the machine; a stop is sent as soon as the drive answers");
       cause.outcome = Outcome::unknown;

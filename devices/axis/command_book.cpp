@@ -144,6 +144,17 @@ CommandPtr CommandBook::open(const std::string& axis, const Action& action, cons
   return entry->command;
 }
 
+void CommandBook::attach(const CommandPtr& command, const std::string& axis, const Action& action,
+                         const CommandOptions& options) {
+  if (options.request_id.empty()) return;
+  auto entry = std::make_shared<Entry>(Entry{.command = command,
+                                             .digest = digest(axis, action),
+                                             .request_key = options.client + "\n" + options.request_id,
+                                             .entered = clock_->now()});
+  by_request_.insert_or_assign(entry->request_key, entry);
+  order_.push_back(entry);
+}
+
 CommandPtr CommandBook::find(const std::string& id) const {
   const auto found = by_id_.find(id);
   return found == by_id_.end() ? nullptr : found->second->command;

@@ -55,6 +55,10 @@ class CommandBook {
   /// Enters an accepted command.
   CommandPtr open(const std::string& axis, const Action& action, const CommandOptions& options);
 
+  /// Another request that was taken into a command: repeats of it get that command.
+  void attach(const CommandPtr& command, const std::string& axis, const Action& action,
+              const CommandOptions& options);
+
   /// nullptr: unknown.
   [[nodiscard]] CommandPtr find(const std::string& id) const;
 

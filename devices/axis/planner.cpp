@@ -122,13 +122,16 @@ Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
   }
   plan.target = target.position;
   plan.target_counter = target.counter;
+  plan.exact_target = target.exact;
   plan.positive = (distance >= 0) != settings_->scale.invert;
   plan.granted.position = scale_->to_units(target.counter + tracker.offset());
-  const auto per_second = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
-  plan.predicted =
-      move_duration(std::abs(distance), plan.start_rpm * per_second, plan.velocity_rpm * per_second,
-                    plan.acceleration_time, plan.deceleration_time);
   return plan;
+}
+
+Duration Planner::duration(const Plan& plan, std::int64_t pulses) const {
+  const auto per_second = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
+  return move_duration(std::abs(static_cast<double>(pulses)), plan.start_rpm * per_second,
+                       plan.velocity_rpm * per_second, plan.acceleration_time, plan.deceleration_time);
 }
 
 Result<std::optional<HomingProfile>> Planner::homing() const {

@@ -19,9 +19,11 @@ struct Plan {
   Duration acceleration_time{}, deceleration_time{};
   std::int64_t target_counter = 0;  ///< unwrapped; positioning only
   double target = 0;                ///< user units
-  bool positive = true;             ///< axis direction
-  bool endless = false;             ///< drive speed mode
-  Duration predicted{};             ///< from start to standstill; 0 if endless
+  std::shared_ptr<const PositionTracker::Exactly> exact_target{};
+  bool trusted = false;  ///< the target means a place only while the position is trusted
+  bool positive = true;  ///< axis direction
+  bool endless = false;  ///< drive speed mode
+  Duration predicted{};  ///< from start to standstill; 0 if endless
 };
 
 class Planner {
@@ -34,6 +36,8 @@ class Planner {
   /// Completes a profile for a move to `target`. Errors: out_of_range, soft_limit.
   [[nodiscard]] Result<Plan> move(Plan plan, const PositionTracker::Target& target,
                                   const PositionTracker& tracker) const;
+  /// How long a profile takes over `pulses`.
+  [[nodiscard]] Duration duration(const Plan& plan, std::int64_t pulses) const;
   [[nodiscard]] Result<void> check_soft_limits(double target, double from) const;
 
   [[nodiscard]] double maximum_velocity() const;  ///< of limits and drive, user units per second

@@ -43,7 +43,7 @@ std::int64_t PositionTracker::offset_for(double position) const {
 void PositionTracker::set_position(double position, PositionTrust trust) {
   offset_ = offset_for(position);
   trust_ = trust;
-  commanded_ = std::make_unique<Exactly>(Exact(position));
+  commanded_ = std::make_shared<const Exactly>(Exact(position));
 }
 
 void PositionTracker::restore(std::int64_t offset) {
@@ -59,24 +59,27 @@ void PositionTracker::rezero(std::int32_t counter_after) {
 
 void PositionTracker::forget_target() { commanded_.reset(); }
 
-PositionTracker::Target PositionTracker::plan(Exactly target) {
-  planned_ = std::make_unique<Exactly>(std::move(target));
+PositionTracker::Target PositionTracker::plan(Exactly target) const {
   constexpr auto limits = std::numeric_limits<std::int64_t>{};
   const auto pulses =
-      to_pulses(scale_, planned_->units)
-          .value_or((planned_->units > 0) != scale_.settings().invert ? limits.max() : limits.min());
+      to_pulses(scale_, target.units)
+          .value_or((target.units > 0) != scale_.settings().invert ? limits.max() : limits.min());
   std::int64_t counter = 0;
   if (__builtin_sub_overflow(pulses, offset_, &counter)) counter = pulses;  // far beyond any range either way
-  return {.position = planned_->units.convert_to<double>(), .counter = counter};
+  return {.position = target.units.convert_to<double>(),
+          .counter = counter,
+          .exact = std::make_shared<const Exactly>(std::move(target))};
 }
 
-PositionTracker::Target PositionTracker::plan_absolute(double position) { return plan({Exact(position)}); }
+PositionTracker::Target PositionTracker::plan_absolute(double position) const {
+  return plan({Exact(position)});
+}
 
-PositionTracker::Target PositionTracker::plan_relative(double distance) {
+PositionTracker::Target PositionTracker::plan_relative(double distance) const {
   const auto base = commanded_ ? commanded_->units : to_exact_units(scale_, counter_ + offset_);
   return plan({base + Exact(distance)});
 }
 
-void PositionTracker::reached_plan() { commanded_ = std::move(planned_); }
+void PositionTracker::reached(std::shared_ptr<const Exactly> target) { commanded_ = std::move(target); }
 
 }  // namespace axisd

@@ -38,29 +38,30 @@ class PositionTracker {
   /// The drive's counter was cleared at standstill: the position stays what it was.
   void rezero(std::int32_t counter_after);
 
+  struct Exactly;
   struct Target {
     double position;       ///< user units, for people
     std::int64_t counter;  ///< unwrapped drive counter
+    std::shared_ptr<const Exactly> exact;
   };
-  /// Plans a move; the newest plan counts. The base of a relative move is the last commanded target at
+  /// Plans a move. The base of a relative move is the last commanded target at
   /// standstill, or the present position after anything that ended elsewhere. Precondition: finite numbers.
-  Target plan_absolute(double position);
-  Target plan_relative(double distance);
-  /// The planned target was reached and is the base of the next relative move.
-  void reached_plan();
+  [[nodiscard]] Target plan_absolute(double position) const;
+  [[nodiscard]] Target plan_relative(double distance) const;
+  /// That target was reached and is the base of the next relative move.
+  void reached(std::shared_ptr<const Exactly> target);
   /// The axis came to rest elsewhere.
   void forget_target();
 
  private:
-  struct Exactly;
-  Target plan(Exactly target);
+  [[nodiscard]] Target plan(Exactly target) const;
 
   Scale scale_;
   std::int64_t counter_ = 0;
   bool known_ = false;
   std::int64_t offset_ = 0;
   PositionTrust trust_ = PositionTrust::unknown;
-  std::unique_ptr<Exactly> commanded_, planned_;  ///< exact user units
+  std::shared_ptr<const Exactly> commanded_;  ///< exact user units
 };
 
 }  // namespace axisd

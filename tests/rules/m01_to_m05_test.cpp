@@ -208,14 +208,14 @@ TEST(M03, StartFunctionsOnlyWhileReleasedAndInactive) {
   EXPECT_EQ(rig.state()->link, LinkState::configuring);
   EXPECT_EQ(rig.writes_of(0x0047), 0);
   EXPECT_EQ(rig.try_submit(EnableRequest{}).error().reason, Reason::misconfigured);
-  rig.drive->set_input("X4", true);
+  rig.set_input("X4", true);
   // The way out is the one that the error names: release the drive, then open the input.
   const auto disabled = rig.complete(DisableRequest{});
   EXPECT_EQ(disabled.state, CommandState::done) << describe(disabled);
   rig.run(3s);
   EXPECT_EQ(rig.state()->link, LinkState::configuring);
   EXPECT_EQ(rig.writes_of(0x0047), 0);
-  rig.drive->set_input("X4", false);
+  rig.set_input("X4", false);
   rig.reconnect();
   EXPECT_EQ(rig.drive->peek(0x0047), 12);
   EXPECT_EQ(rig.drive->starts(), 0);

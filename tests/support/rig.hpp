@@ -77,6 +77,10 @@ class Rig {
   [[nodiscard]] int first_write(std::uint16_t address) const;
   /// Lets something else write a register of the drive, off the wire: another master, an earlier daemon.
   void write_behind(std::uint16_t address, std::uint16_t value);
+  void set_input(std::string_view terminal, bool high) {
+    drive->advance(world.now());
+    drive->set_input(terminal, high);
+  }
   /// Switches the drive off for a while; returns when it is on again (and boots).
   void cycle_power(Duration off = std::chrono::milliseconds(1));
   /// Position of the load in axis direction, mm from where it powered up: what really happened.
