@@ -96,10 +96,10 @@ void supervise(core::CoreLoop& loop, const core::MachineCore& machine) {
     const auto oldest = monotonic_now() - stalled_after;
     bool alive = loop.last_progress() > oldest;
     for (const auto& bus : machine.buses()) alive = alive && bus->last_progress() > oldest;
-    if (alive)
-      sd_notify(0, "WATCHDOG=1");
-    else
+    if (!alive)
       spdlog::critical("core or a bus worker makes no progress");
+    else if (watched)  // nobody may read what nobody asked for, and a full socket blocks
+      sd_notify(0, "WATCHDOG=1");
   }
 }
 
