@@ -4,7 +4,7 @@ import socket
 import time
 import unittest
 
-from harness import AXISD, START, STOP, Scenario, feeder, pb, run, spinner
+from harness import AXISD, START, STOP, Scenario, feeder, pb, run, spinner, wait_for
 
 
 class Terminated(Scenario):
@@ -114,11 +114,11 @@ class Systemd(Scenario):
         daemon.process.send_signal(signal.SIGHUP)  # neither ends nor reloads it
         machine.notify.forget()
         machine.notify.wait_for("WATCHDOG=1", daemon)
-        self.assertIn("SIGHUP", daemon.log())
+        wait_for(lambda: "SIGHUP" in daemon.log(), "the signal is logged")
         machine.client.wait_online("feeder")
         machine.notify.forget()
         self.assertEqual(daemon.terminate(), 0)
-        self.assertIn("STOPPING=1", machine.notify.received())
+        machine.notify.wait_for("STOPPING=1", daemon)
         self.assertNotIn("READY=1", machine.notify.received())
 
     def test_no_ready_without_the_port(self):

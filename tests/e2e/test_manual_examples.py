@@ -1,7 +1,7 @@
 """The two application examples of the YKD2405PR's manual (6.2.5), through the API."""
 import unittest
 
-from harness import BLOCK, START, Scenario, spinner
+from harness import BLOCK, START, STARTED, Scenario, spinner
 
 #: Current 2.3 A, lock current half, 1000 pulses/rev, initial speed 10 r/min, times 100 ms, 500 r/min.
 EXAMPLE = {"limits": "{ velocity: 10 rev/s, acceleration_time: 100 ms, start_speed: 10 r/min }",
@@ -49,7 +49,7 @@ class Examples(Scenario):
 
     def test_speed_mode(self):
         machine = self.example()
-        machine.client.motion("MoveVelocity", "motor", velocity=VELOCITY, wait=2)
+        machine.client.motion("MoveVelocity", "motor", velocity=VELOCITY, wait=STARTED)
         machine.client.wait_state("motor", lambda s: abs(s.velocity - VELOCITY) < 0.01, "500 r/min")
         registers, start = self.registers_at_start(machine)
         self.assertEqual([registers[a] for a in (0x10, 0x11, 0x12)], [6, 8, 0])
@@ -59,7 +59,7 @@ class Examples(Scenario):
 
     def test_speed_mode_backwards(self):
         machine = self.example()
-        machine.client.motion("MoveVelocity", "motor", velocity=-VELOCITY, wait=2)
+        machine.client.motion("MoveVelocity", "motor", velocity=-VELOCITY, wait=STARTED)
         machine.client.wait_state("motor", lambda s: abs(s.velocity + VELOCITY) < 0.01, "-500 r/min")
         registers, _ = self.registers_at_start(machine)
         # The manual's own bytes say +500 for "backwards"; the table says that the sign gives the direction.

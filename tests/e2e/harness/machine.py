@@ -11,6 +11,11 @@ from .simulator import Simulator
 from .wire import WireLog
 
 
+#: On a busy computer the kernel's worker hands over the bytes of pseudo terminals late, by up to a second (observed). A
+#: simulated drive boots for 300 ms.
+PATIENT = {"reboot_guard": "250 ms", "stop_margin": "2 s"}
+
+
 class Axis:
     """An axis of the configuration, and the drive that is simulated for it. `keys` are YAML keys with their
     text, `simulated` what axisd-sim --drive takes. Drives power up released here, unless that says otherwise."""
@@ -20,7 +25,7 @@ class Axis:
 
     def yaml(self):
         return "".join(f"    {key}: {value}\n" for key, value in
-                       {"bus": self.bus, "node": self.node, "model": "ykd2405pr", **self.keys}.items())
+                       {"bus": self.bus, "node": self.node, "model": "ykd2405pr", **PATIENT, **self.keys}.items())
 
     def option(self):
         words = f"node={self.node},model=ykd2405pr,switch.enabled_at_power_up=off"
@@ -50,7 +55,9 @@ class Machine:
     def __init__(self, axes, baud=115200, serial_format="8N1", server=None):
         self.axes = axes
         self.baud, self.serial_format = baud, serial_format
-        self.directory = tempfile.mkdtemp(prefix="axe2e-")
+        # In memory where possible, so that a busy disk does not hold up simulators, which log.
+        memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+        self.directory = tempfile.mkdtemp(prefix="axe2e-", dir=memory)
         self.socket = os.path.join(self.directory, "axisd.sock")
         self.server = server or f"{{ listen: \"unix:{self.socket}\" }}"
         self.state_directory = os.path.join(self.directory, "state")
@@ -72,7 +79,7 @@ class Machine:
         text = f"machine: e2e\nstate_directory: {self.state_directory}\nserver: {self.server}\nbuses:\n"
         for bus in self.buses():
             text += (f"  {bus}:\n    modbus_rtu: {{ port: {self.path(bus)}, baud: {self.baud}, "
-                     f"format: {self.serial_format}, turnaround_max: 250 ms }}\n")
+                     f"format: {self.serial_format}, turnaround_max: 1 s }}\n")
         text += "axes:\n"
         for name, axis in self.axes.items():
             text += f"  {name}:\n{axis.yaml()}"

@@ -1,28 +1,34 @@
 """The other end of the systemd protocol (sd_notify)."""
 import os
-import select
 import socket
+import threading
 
 from .programs import wait_for
 
 
 class NotifySocket:
-    """Collects the messages of a service."""
+    """Collects the messages of a service, at once: a full socket would hold the service up."""
 
     def __init__(self, directory):
         self.path = os.path.join(directory, "notify")
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.bind(self.path)
         self._received = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        while True:
+            message = self._socket.recv(4096)
+            if not message:
+                return
+            self._received += message.decode().splitlines()
 
     def received(self):
         """All messages so far."""
-        while select.select([self._socket], [], [], 0)[0]:
-            self._received += self._socket.recv(4096).decode().splitlines()
-        return self._received
+        return list(self._received)
 
     def forget(self):
-        self.received()
         self._received = []
 
     def wait_for(self, message, while_running):
@@ -37,4 +43,7 @@ class NotifySocket:
         wait_for(seen, f"{message} of {while_running.name}")
 
     def close(self):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+            end.sendto(b"", self.path)
+        self._reader.join()
         self._socket.close()
