@@ -20,21 +20,25 @@ enum class StopKind : std::uint8_t { none, halt, stop, quick_stop };
 class AxisGate {
  public:
   [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
-  /// Makes every motion frame prepared until now unsendable.
-  void raise() { epoch_.fetch_add(1, std::memory_order_acq_rel); }
+  /// Makes every motion frame prepared until now unsendable. The new epoch.
+  std::uint64_t raise() { return epoch_.fetch_add(1, std::memory_order_acq_rel) + 1; }
 
-  /// The lane of stops: raises the epoch at once, so that the very next bind already refuses motion, and
-  /// leaves the kind for the core thread, which must be woken by the caller.
-  void request_stop(StopKind kind) {
+  /// The lane of stops: raises the epoch at once, so that the very next bind already refuses motion. The
+  /// caller must wake the core thread, which serves the stop. First the count, then the epoch: whoever still
+  /// saw no pending stop has read an epoch that this makes old.
+  void request_stop() {
+    pending_stops_.fetch_add(1, std::memory_order_acq_rel);
     raise();
-    auto pending = pending_stop_.load(std::memory_order_relaxed);
-    while (pending < kind && !pending_stop_.compare_exchange_weak(pending, kind, std::memory_order_acq_rel)) {
+  }
+  /// Stops were requested that the core has not served yet: nothing new may be accepted before them.
+  [[nodiscard]] bool stop_pending() const { return pending_stops_.load(std::memory_order_acquire) > 0; }
+  /// Thread: core. One stop is being served (also one that came without request_stop()).
+  void stop_served() {
+    auto pending = pending_stops_.load(std::memory_order_acquire);
+    while (pending > 0 &&
+           !pending_stops_.compare_exchange_weak(pending, pending - 1, std::memory_order_acq_rel)) {
     }
   }
-  /// A stop was requested that the core has not seen yet: nothing new may be accepted before it.
-  [[nodiscard]] bool stop_pending() const { return pending_stop_.load(std::memory_order_acquire) != StopKind::none; }
-  /// Thread: core. The pending request, or `none`.
-  StopKind take_stop_request() { return pending_stop_.exchange(StopKind::none, std::memory_order_acq_rel); }
 
   [[nodiscard]] std::uint64_t fencing_token() const { return fencing_token_.load(std::memory_order_acquire); }
   void set_fencing_token(std::uint64_t token) { fencing_token_.store(token, std::memory_order_release); }
@@ -42,7 +46,7 @@ class AxisGate {
  private:
   std::atomic<std::uint64_t> epoch_{1};
   std::atomic<std::uint64_t> fencing_token_{0};
-  std::atomic<StopKind> pending_stop_{StopKind::none};
+  std::atomic<int> pending_stops_{0};
 };
 
 /// What a motion frame carries to its bind.

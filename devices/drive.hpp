@@ -24,7 +24,7 @@ enum class PositionSource : std::uint8_t { unspecified, commanded, encoder };
 
 /// One coherent reading of a drive. Pulses and directions are the drive's.
 struct DriveSample {
-  TimePoint asked_at;   ///< first byte of the request: everything below is at least this fresh
+  TimePoint asked_at;     ///< first byte of the request: everything below is at least this fresh
   TimePoint measured_at;  ///< last byte of the reply
   DriveMode mode = DriveMode::positioning;
   bool moving = false;
@@ -35,7 +35,7 @@ struct DriveSample {
   std::int32_t position_pulses = 0;
   std::int32_t velocity_rpm = 0;  ///< signed as the drive reports it
   bool negative_direction = false;
-  std::uint32_t inputs = 0;   ///< bit per terminal, in the descriptor's order; 1 active
+  std::uint32_t inputs = 0;  ///< bit per terminal, in the descriptor's order; 1 active
   std::uint32_t outputs = 0;
 };
 
@@ -76,12 +76,12 @@ struct DriveSetup {
   std::map<std::string, SettingValue> model_settings;
 };
 
-/// Contents of drive memory that no power-up leaves behind: finding them proves that the drive kept its memory, and
-/// with it its position and configuration (M6, M7, M20).
+/// Contents of drive memory that no power-up leaves behind: finding them proves that the drive kept its
+/// memory, and with it its position and configuration (M6, M7, M20).
 using ContinuityMark = std::array<std::uint16_t, 6>;
 
-/// One drive. All sequences are coroutines of the core thread. Errors carry bus, node, register and native code;
-/// `outcome` says what is known about the execution. Thread: core.
+/// One drive. All sequences are coroutines of the core thread. Errors carry bus, node, register and native
+/// code; `outcome` says what is known about the execution. Thread: core.
 class Drive {
  public:
   virtual ~Drive() = default;
@@ -89,9 +89,10 @@ class Drive {
   /// Reads and verifies the identity. Errors: wrong_model, no_reply, bus_down, refused.
   virtual Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) = 0;
 
-  /// Brings the drive's configuration to `setup`: compares, writes what differs, verifies all of it, and marks this
-  /// power cycle with a canary (M3, M6). Never touches the power stage or starts anything. Functions that can start
-  /// motion are written only while the drive is released. Errors: misconfigured, refused, no_reply, moving, ...
+  /// Brings the drive's configuration to `setup`: compares, writes what differs, verifies all of it, and
+  /// marks this power cycle with a canary (M3, M6). Never touches the power stage or starts anything.
+  /// Functions that can start motion are written only while the drive is released. Errors: misconfigured,
+  /// refused, no_reply, moving, ...
   virtual Task<Result<void>> configure() = 0;
 
   /// One block read of the whole state.
@@ -100,16 +101,19 @@ class Drive {
   /// Reads the canary (M7). Error `rebooted` if the drive lost its memory since configure().
   virtual Task<Result<void>> check_continuity(TransactionClass transaction_class) = 0;
 
-  /// What the drive's memory holds now, if that is known; and, after a restart of the daemon, what it should hold.
+  /// What the drive's memory holds now, if that is known; and, after a restart of the daemon, what it should
+  /// hold.
   [[nodiscard]] virtual std::optional<ContinuityMark> continuity_mark() const = 0;
   virtual void expect_mark(const ContinuityMark& mark) = 0;
 
   /// Power stage. enable() includes a canary check. Errors as above.
   virtual Task<Result<void>> enable(MotionGuard guard) = 0;
-  virtual Task<Result<void>> disable() = 0;
+  /// An empty guard for the escalation of a stop: that one is always sent.
+  virtual Task<Result<void>> disable(MotionGuard guard) = 0;
 
-  /// Canary, fresh block, trigger (M6): returns once the trigger was acknowledged. `rebooted`: nothing was sent.
-  /// outcome `unknown`: the trigger was sent without a reply; the caller must read back before anything else (M8).
+  /// Canary, fresh block, trigger (M6): returns once the trigger was acknowledged. `rebooted`: nothing was
+  /// sent. outcome `unknown`: the trigger was sent without a reply; the caller must read back before anything
+  /// else (M8).
   virtual Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) = 0;
   virtual Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) = 0;
   virtual Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) = 0;

@@ -50,9 +50,9 @@ void RtuBus::start(ExchangeObserver observer) {
 
 Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {
   if (options.transaction_class != TransactionClass::stop && needs_resync(request)) {
-    // Another length than the late reply's: that one is then discarded as foreign, not taken for this answer.
+    // Another length than any late reply's: those are then discarded as foreign, not taken for this answer.
     auto resync = request;
-    resync.count = static_cast<std::uint16_t>(request.count - 1);
+    while (resync.count > 1 && needs_resync(resync)) --resync.count;
     auto answered = co_await exchange(std::move(resync), options);
     if (!answered) co_return answered;
   }
@@ -62,7 +62,7 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
 bool RtuBus::needs_resync(const Request& request) const {
   const auto late = late_reads_.find(request.node);
   return late != late_reads_.end() && request.function == Function::read_holding_registers &&
-         request.count > 1 && late->second.count == request.count;
+         request.count > 1 && late->second.contains(request.count);
 }
 
 Task<Result<Answer>> RtuBus::exchange(Request request, TransactionOptions options) {
@@ -95,12 +95,17 @@ Task<Result<Answer>> RtuBus::exchange(Request request, TransactionOptions option
 
 void RtuBus::purge_superseded() { pump(); }
 
+void RtuBus::hasten(std::uint8_t node, TransactionClass to) { queue_.hasten(node, to); }
+
 /// Brings line and queue in step: the most urgent sendable transaction belongs into the slot.
 void RtuBus::pump() {
   const auto now = clock_->now();
   if (current_) {
     const auto top = queue_.top_class();
-    const bool overtaken = top && *top < current_->transaction_class;
+    // State reads do not overtake each other in the slot: a reservation would be taken back each time.
+    const bool urgent =
+        top == TransactionClass::stop || (top == TransactionClass::motion && !current_->reserved);
+    const bool overtaken = urgent && *top < current_->transaction_class;
     const bool dead = may_send(current_->exchange.guard, now) != Verdict::send;
     if ((overtaken || dead) && line_->revoke()) {
       auto revoked = std::exchange(current_, nullptr);
@@ -146,13 +151,13 @@ void RtuBus::on_result(const ExchangeResult& result) {
 void RtuBus::note_late_read(const Request& request, const ExchangeResult& result) {
   switch (result.status) {
     case ExchangeStatus::replied:
-      late_reads_.erase(request.node);
+      late_reads_.erase(request.node);  // replies come in order: nothing older can follow
       break;
     case ExchangeStatus::timeout:
     case ExchangeStatus::cut:
     case ExchangeStatus::corrupt:
       if (request.function == Function::read_holding_registers)
-        late_reads_.insert_or_assign(request.node, LateRead{request.address, request.count});
+        late_reads_[request.node].insert(request.count);
       break;
     default:
       break;

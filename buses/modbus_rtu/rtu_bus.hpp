@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,8 @@ class RtuBus {
   /// Moves queued frames whose gate was raised out of the way and takes an armed one back. Called for each
   /// stop before its frame is queued.
   void purge_superseded();
+  /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
+  void hasten(std::uint8_t node, TransactionClass to);
 
   /// Ends everything that waits; what is under way is still awaited. Nothing is accepted any more.
   void close();
@@ -61,13 +64,6 @@ class RtuBus {
   [[nodiscard]] TimePoint last_progress() const { return line_->last_progress(); }
 
  private:
-  /// A read that timed out: its reply may still come, and an FC03 reply does not say which registers it
-  /// carries.
-  struct LateRead {
-    std::uint16_t address;
-    std::uint16_t count;
-  };
-
   Task<Result<Answer>> exchange(Request request, TransactionOptions options);
   [[nodiscard]] bool needs_resync(const Request& request) const;
   void pump();
@@ -88,7 +84,9 @@ class RtuBus {
   Signal port_changed_;
   TransactionQueue queue_;
   TransactionPtr current_;  ///< armed or under way
-  std::map<std::uint8_t, LateRead> late_reads_;
+  /// Lengths of reads that timed out, by node: their replies may still come, and an FC03 reply does not say
+  /// which registers it carries.
+  std::map<std::uint8_t, std::set<std::uint16_t>> late_reads_;
   Clock::Timer expiry_;
   BusCounters counters_;
   bool closed_ = false;

@@ -52,27 +52,45 @@ void TransactionQueue::insert(TransactionPtr transaction) {
 }
 
 TransactionPtr TransactionQueue::pop() {
-  Lane* first = nullptr;
-  Lane* second = nullptr;  // highest waiting class below the first
-  for (auto& candidate : lanes_) {
-    if (candidate.empty()) continue;
-    if (first == nullptr) {
-      first = &candidate;
-    } else {
-      second = &candidate;
-      break;
-    }
-  }
-  if (first == nullptr) return nullptr;
-  auto* chosen = first;
-  const bool stop_waits = first == &lane(TransactionClass::stop);
-  if (second != nullptr && !stop_waits && ++popped_since_reservation_ >= reservation_) {
+  const auto first = std::ranges::find_if(lanes_, [](const Lane& lane) { return !lane.empty(); });
+  if (first == lanes_.end()) return nullptr;
+  auto* chosen = &*first;
+  const bool stop_waits = first == lanes_.begin();
+  auto* lower = stop_waits ? nullptr : next_below(static_cast<std::size_t>(first - lanes_.begin()));
+  const bool reserved = lower != nullptr && ++popped_since_reservation_ >= reservation_;
+  if (reserved) {
     popped_since_reservation_ = 0;
-    chosen = second;
+    last_reserved_ = static_cast<std::size_t>(lower - lanes_.data());
+    chosen = lower;
   }
   auto transaction = std::move(chosen->front());
   chosen->pop_front();
+  transaction->reserved = reserved;
   return transaction;
+}
+
+/// The waiting class below `top` whose turn it is: the first one after the last that had a reservation.
+TransactionQueue::Lane* TransactionQueue::next_below(std::size_t top) {
+  const auto below = lanes_.size() - top - 1;
+  const auto start = last_reserved_ > top ? last_reserved_ - top : 0;
+  for (std::size_t step = 0; step < below; ++step) {
+    auto& candidate = lanes_.at(top + 1 + (start + step) % below);
+    if (!candidate.empty()) return &candidate;
+  }
+  return nullptr;
+}
+
+void TransactionQueue::hasten(std::uint8_t node, TransactionClass to) {
+  for (auto index = static_cast<std::size_t>(to) + 1; index < lanes_.size(); ++index) {
+    std::vector<TransactionPtr> hastened;
+    for (auto& transaction : lanes_.at(index))
+      if (transaction->exchange.request.node == node) hastened.push_back(std::move(transaction));
+    std::erase(lanes_.at(index), nullptr);
+    for (auto& transaction : hastened) {
+      transaction->transaction_class = to;
+      insert(std::move(transaction));
+    }
+  }
 }
 
 std::optional<TransactionClass> TransactionQueue::top_class() const {

@@ -18,14 +18,15 @@ struct Transaction {
   Exchange exchange;
   TransactionClass transaction_class = TransactionClass::parameters;
   std::uint64_t sequence = 0;  ///< order of arrival; set by the queue
+  bool reserved = false;       ///< it was given out by the reservation: only a stop may take its place
   /// Called exactly once each. Several: identical reads that were merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
 };
 using TransactionPtr = std::unique_ptr<Transaction>;
 
-/// Order of one bus: strict classes, earliest deadline within a class, then order of arrival. So that the
-/// lowest classes are never starved, every `reservation`-th pop takes the head of the highest waiting class
-/// *below* the one that would be next (never instead of a stop). Pure: no I/O, no clock of its own.
+/// Order of one bus: strict classes, earliest deadline within a class, then order of arrival. So that no
+/// class is ever starved, every `reservation`-th pop takes the head of a class *below* the one that would be
+/// next, the lower ones in turn (never instead of a stop). Pure: no I/O, no clock of its own.
 class TransactionQueue {
  public:
   explicit TransactionQueue(int reservation = 8) : reservation_(reservation) {}
@@ -38,6 +39,8 @@ class TransactionQueue {
   TransactionPtr pop();
   /// Class of the next one by strict order.
   [[nodiscard]] std::optional<TransactionClass> top_class() const;
+  /// What waits for `node` in a lower class than `to` becomes that urgent.
+  void hasten(std::uint8_t node, TransactionClass to);
   /// Takes out all whose deadline has passed, or whose guard forbids sending.
   std::vector<TransactionPtr> take_unsendable(TimePoint now);
   std::vector<TransactionPtr> take_all();
@@ -52,10 +55,12 @@ class TransactionQueue {
   }
   bool merge(Transaction& transaction);
   void insert(TransactionPtr transaction);
+  Lane* next_below(std::size_t top);
 
   std::array<Lane, transaction_class_count> lanes_;
   int reservation_;
   int popped_since_reservation_ = 0;
+  std::size_t last_reserved_ = 0;  ///< class that had the last reservation
   std::uint64_t last_sequence_ = 0;
 };
 

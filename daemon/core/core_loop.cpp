@@ -5,8 +5,8 @@
 
 namespace axisd::core {
 
-void StopLane::request(AxisGate& gate, StopKind kind, std::function<void()> serve) {
-  gate.request_stop(kind);
+void StopLane::request(AxisGate& gate, std::function<void()> serve) {
+  gate.request_stop();
   {
     const std::lock_guard lock(mutex_);
     requests_.push_back(std::move(serve));

@@ -19,7 +19,7 @@ namespace axisd::core {
 class StopLane {
  public:
   explicit StopLane(Executor core) : core_(std::move(core)) {}
-  void request(AxisGate& gate, StopKind kind, std::function<void()> serve);
+  void request(AxisGate& gate, std::function<void()> serve);
   /// Thread: core.
   void drain();
 

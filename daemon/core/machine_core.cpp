@@ -88,6 +88,7 @@ Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& ac
 }
 
 std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client) {
+  ++latches_;
   set_inhibit(true, client);
   spdlog::warn("StopAll by {}: motion is inhibited until it is released", client);
   if (parts_.persistence != nullptr)
@@ -111,7 +112,11 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client)
 }
 
 void MachineCore::release_inhibit(const std::string& client, std::function<void(Result<void>)> done) {
-  auto release = [this, client, done = std::move(done)](const Result<void>& saved) {
+  auto release = [this, client, latch = latches_, done = std::move(done)](const Result<void>& saved) {
+    // A StopAll that came while this was being saved is nobody's to release but by a release of its own.
+    if (latch != latches_)
+      return done(fail(Reason::inhibited, fmt::format("StopAll was called again by {}", *inhibited_by()),
+                       "release it again if that is right"));
     if (saved) {
       set_inhibit(false, client);
       spdlog::warn("StopAll released by {}", client);

@@ -65,6 +65,7 @@ class MachineCore {
   MachineParts parts_;
   CommandBook book_;
   bool inhibited_ = false;
+  int latches_ = 0;  ///< StopAlls so far
   boost::atomic_shared_ptr<const std::string> inhibited_by_;
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> buses_;
   std::vector<std::unique_ptr<Axis>> axes_;

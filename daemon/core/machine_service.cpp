@@ -67,7 +67,6 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
   const auto found = axes_.find(axis);
   const auto* stop = std::get_if<StopRequest>(&action);
   const bool disable = std::holds_alternative<DisableRequest>(action);
-  const auto stop_kind = stop != nullptr ? stop->kind : StopKind::stop;
   auto serve = [this, axis, action = std::move(action), options = std::move(options), until,
                 callback = std::move(callback)]() mutable {
     const bool is_stop =
@@ -76,7 +75,7 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
     answer(machine_->submit(axis, action, options), until, std::move(callback));
   };
   if (found != axes_.end() && (stop != nullptr || disable))
-    loop_->lane().request(*found->second->gate(), stop_kind, std::move(serve));
+    loop_->lane().request(*found->second->gate(), std::move(serve));
   else
     post(loop_->executor(), std::move(serve));
 }
@@ -111,8 +110,8 @@ void MachineService::stop_all(std::string client, WaitUntil until,
   if (axes_.empty()) return post(loop_->executor(), std::move(serve));
   // Every gate is raised here and now; one visit of the core serves all.
   auto last = std::prev(axes_.end());
-  for (auto axis = axes_.begin(); axis != last; ++axis) axis->second->gate()->request_stop(StopKind::stop);
-  loop_->lane().request(*last->second->gate(), StopKind::stop, std::move(serve));
+  for (auto axis = axes_.begin(); axis != last; ++axis) axis->second->gate()->request_stop();
+  loop_->lane().request(*last->second->gate(), std::move(serve));
 }
 
 void MachineService::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {

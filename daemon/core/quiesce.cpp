@@ -20,9 +20,29 @@ struct Times {
   TimePoint end;
 };
 
+/// Within homing the motor rests between its phases: there it must have rested at one place for a while.
+class Rest {
+ public:
+  bool confirms(const DriveSample& sample) {
+    if (sample.moving) {
+      since_.reset();
+      return false;
+    }
+    if (sample.mode != DriveMode::homing) return true;
+    if (!since_ || position_ != sample.position_pulses) since_ = sample.asked_at;
+    position_ = sample.position_pulses;
+    return sample.asked_at - *since_ >= milliseconds(150);
+  }
+
+ private:
+  std::optional<TimePoint> since_;
+  std::int32_t position_ = 0;
+};
+
 Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, Drive& drive,
                              modbus_rtu::RtuBus& bus, Times times) {
   QuiesceReport report{.axis = std::move(axis)};
+  Rest rest;
   report.detail = "the port did not open";
   while (clock.now() < times.end) {
     if (!bus.port().open) {
@@ -35,7 +55,7 @@ Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, 
     const auto acked = clock.now();
     if (sent) {
       const auto state = co_await drive.read_state(TransactionClass::moving_state);
-      if (state && state->asked_at >= acked && !state->moving) {
+      if (state && state->asked_at >= acked && rest.confirms(*state)) {
         report.confirmed = true;
         report.detail = "standstill confirmed";
         co_return report;

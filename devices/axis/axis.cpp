@@ -83,6 +83,10 @@ void Axis::on_sample(const DriveSample& sample) {
   sample_ = sample;
   if (!rezeroing_) tracker_.update(sample.position_pulses);
   if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
+  // Open loop: the overtravel stop at a limit has no ramp (M20). Homing runs onto limits by design.
+  const bool homing = activity_ && activity_->state == AxisState::homing;
+  if (sample.moving && !homing && !descriptor_->capabilities.closed_loop && limit_active(last_positive_))
+    lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && before->moving && !sample.moving && before->mode != DriveMode::homing &&
       sample.mode != DriveMode::homing && limit_active(last_positive_))
@@ -138,7 +142,8 @@ void Axis::on_unexplained_motion(const DriveSample& sample) {
     const auto* function = find_function(descriptor_->input_functions, input.function);
     return function != nullptr && function->starts_motion;
   });
-  if (segments || possible) {
+  // A motor that was told to stop, and has not confirmed it, is never a terminal's.
+  if (!stop_owed_ && !fault_ && (segments || possible)) {
     terminal_motion_ = true;
     return;
   }

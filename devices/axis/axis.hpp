@@ -93,6 +93,7 @@ class Axis {
     Plan plan{};
     std::optional<TimePoint> hold_until{};  ///< jog and held velocity: halts at this time
     bool started = false;                   ///< the drive was seen moving for it
+    bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
   };
   using ActivityPtr = std::shared_ptr<Activity>;
 
@@ -127,7 +128,7 @@ class Axis {
   // axis_link.cpp: the way to the drive
   Task<> run();
   Task<> connect();
-  Task<Result<void>> try_connect();
+  Task<Result<void>> try_connect(TransactionClass contact);
   Task<Result<void>> settle_found_motion();
   Task<Result<void>> prove_or_configure();
   Task<> poll();
@@ -208,6 +209,8 @@ class Axis {
   Task<> run_stop();
   Task<Result<void>> stop_and_confirm();
   Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
+  Task<bool> standstill_unpolled(TimePoint deadline);
+  void keep_deceleration(const Activity& activity);
   [[nodiscard]] Duration deceleration_bound() const;
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
 
@@ -234,7 +237,8 @@ class Axis {
   Signal wake_;     ///< the poll loop has something to look at
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
-  int sequences_ = 0;  ///< coroutines that still run
+  int sequences_ = 0;               ///< coroutines that still run
+  std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
   bool closing_ = false;
 
   ActivityPtr activity_;

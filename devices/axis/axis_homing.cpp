@@ -47,8 +47,14 @@ Task<> Axis::run_home(ActivityPtr activity) {
 
   const auto position = settings_.homing->position;
   // Should the disk fail, the position holds for this run of the daemon; only a restart will not find it.
+  const auto counter = tracker_.counter();
   (void)co_await journal_offset(tracker_.offset_for(position), PositionTrust::homed);
   if (!current(*activity)) co_return;
+  if (counter != tracker_.counter()) {
+    fail_with_stop(*activity, error(Reason::moving, "the axis moved after it had reached home",
+                                    "check terminals, and other masters on the bus; home again"));
+    co_return;
+  }
   tracker_.set_position(position, PositionTrust::homed);
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
@@ -115,7 +121,8 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
         // Which of the two it is after a compensation is not said (7.5).
         const auto counter = std::int64_t{sample.position_pulses};
         const bool at_home = std::abs(counter) <= 1 || std::abs(counter - offset) <= 1;
-        if (rose || (sample.homed && at_home)) co_return true;
+        const bool held_up = input_active("stop") || input_active("quick_stop");
+        if (rose || (sample.homed && at_home && !held_up)) co_return true;
         fail_with_stop(*activity, error(Reason::not_reached, "homing ended without reaching home",
                                         "check the switch, limit and stop terminals"));
         co_return false;

@@ -32,7 +32,10 @@ Task<> Axis::connect() {
   while (!closing_ && link_ != LinkState::online) {
     co_await wait_for_port();
     if (closing_) co_return;
-    const auto connected = co_await try_connect();
+    // The first contact is as urgent as any state; repeated silence must not cost the neighbours much.
+    const bool first = backoff == first_backoff;
+    const auto connected =
+        co_await try_connect(first ? TransactionClass::idle_state : TransactionClass::scan);
     if (closing_) co_return;
     if (connected) {
       link_ = LinkState::online;
@@ -66,14 +69,13 @@ Task<> Axis::wait_for_port() {
   }
 }
 
-Task<Result<void>> Axis::try_connect() {
+Task<Result<void>> Axis::try_connect(TransactionClass contact) {
   if (stop_owed_) {
     // Whatever the drive is doing now, the first frame it gets is a stop (M4).
     const auto stopped = co_await drive_->stop(StopKind::stop);
     if (!stopped) co_return stopped;
   }
-  // While nothing is known about the node, its silence must not cost its neighbours much.
-  auto identity = co_await drive_->identify(TransactionClass::scan);
+  auto identity = co_await drive_->identify(contact);
   if (!identity) co_return fail(identity.error());
   if (link_ != LinkState::configuring) {
     link_ = LinkState::configuring;
@@ -106,7 +108,7 @@ Task<Result<void>> Axis::settle_found_motion() {
     on_sample(*sample);
     if (env_.clock->now() - began > patience) kind = StopKind::quick_stop;
     if (env_.clock->now() - began > 2 * patience) {
-      if (settings_.stop_escalation_release) co_await drive_->disable();
+      if (settings_.stop_escalation_release) co_await drive_->disable({});
       co_return fail(error(Reason::not_confirmed, "found moving, and it does not stop",
                            "look at the machine; cut its power if it moves"));
     }
@@ -224,7 +226,7 @@ void Axis::go_offline(const Error& cause) {
                          "check power and wiring; then reset the axis");
     unknown.outcome = Outcome::unknown;
     if (activity->state != AxisState::standstill && !fault_) fault_ = unknown;
-    last_deceleration_ = std::max(activity->plan.deceleration_time, Duration(milliseconds(1)));
+    keep_deceleration(*activity);
     activity->command->unknown(std::move(unknown));
   }
   if (moved) tracker_.forget_target();

@@ -49,7 +49,7 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
   gate_->raise();
   env_.bus->purge_superseded();
   tracker_.forget_target();
-  last_deceleration_ = activity.plan.deceleration_time;
+  keep_deceleration(activity);
   stopping_.shown = activity.state;
   begin_stop(StopKind::stop, false, nullptr);
   finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
@@ -63,7 +63,7 @@ void Axis::enter_error_stop(Error cause) {
     fault_ = cause;
   }
   if (auto activity = std::exchange(activity_, nullptr)) {
-    last_deceleration_ = activity->plan.deceleration_time;
+    keep_deceleration(*activity);
     activity->command->error(std::move(cause));
   }
   tracker_.forget_target();
@@ -88,6 +88,7 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
     finish(*activity, [this](CommandRecord& command) { command.error(*fault_); });
     co_return false;
   }
+  activity->may_run = true;
   co_return true;
 }
 
@@ -147,7 +148,7 @@ Task<> Axis::run_disable(ActivityPtr activity) {
     });
     co_return;
   }
-  const auto result = co_await drive_->disable();
+  const auto result = co_await drive_->disable(guard(*activity));
   if (!current(*activity)) co_return;
   const auto sample =
       result ? co_await sample_after(env_.clock->now(), sample_patience) : fail(result.error());
@@ -335,14 +336,14 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
   const auto tolerance = target_tolerance();
   for (;;) {
     const auto deadline = std::min(activity->hold_until.value_or(latest), latest);
-    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(1)));
+    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(20)));
     if (!current(*activity)) co_return false;
     const auto now = env_.clock->now();
     if (activity->hold_until && now >= *activity->hold_until) {
       const bool jog = activity->command->value().kind == CommandKind::jog;
       stopping_.shown = activity->state;
       gate_->raise();
-      last_deceleration_ = plan.deceleration_time;
+      keep_deceleration(*activity);
       begin_stop(StopKind::halt, false, nullptr);
       auto cause =
           error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");
@@ -359,7 +360,9 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
         co_return false;
       }
       if (!sample.moving) {
-        if (!plan.endless && std::abs(tracker_.counter() - plan.target_counter) <= tolerance) co_return true;
+        // Before it moved it may rest within the tolerance, too.
+        const bool there = !plan.endless && std::abs(tracker_.counter() - plan.target_counter) <= tolerance;
+        if (there && activity->started) co_return true;
         if (activity->started && judge_rest(*activity)) co_return false;
       }
     }
@@ -369,7 +372,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
                                       "check limit and stop terminals, enable and alarm"));
       co_return false;
     }
-    if (now >= latest) {
+    if (sample_ && sample_->asked_at >= latest) {
       fail_with_stop(*activity,
                      error(Reason::took_too_long, "the motion takes longer than predicted; stopped",
                            "check the load, and other masters on the bus"));

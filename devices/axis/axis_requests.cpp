@@ -9,6 +9,7 @@
 namespace axisd {
 
 Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& options) {
+  accept_epoch_ = gate_->epoch();
   // Stops and disables are never deduplicated: each one is executed.
   if (std::holds_alternative<StopRequest>(action) || std::holds_alternative<DisableRequest>(action)) {
     gate_->stop_served();
@@ -112,7 +113,7 @@ Axis::ActivityPtr Axis::begin(const Action& action, const CommandOptions& option
   command->grant(plan.granted);
   activity_ = std::make_shared<Activity>(Activity{.command = std::move(command),
                                                   .state = state,
-                                                  .epoch = gate_->epoch(),
+                                                  .epoch = accept_epoch_,
                                                   .options = options,
                                                   .plan = std::move(plan)});
   publish();

@@ -19,9 +19,10 @@ constexpr int stop_attempts = 3;
 /// Ends what is being executed. Nothing that was prepared for it is sent any more.
 void Axis::supersede(const Error& cause) {
   gate_->raise();
+  ++accept_epoch_;
   env_.bus->purge_superseded();
   if (auto activity = std::exchange(activity_, nullptr)) {
-    last_deceleration_ = std::max(activity->plan.deceleration_time, Duration(milliseconds(1)));
+    keep_deceleration(*activity);
     if (activity->state != AxisState::standstill) tracker_.forget_target();
     activity->command->abort(cause);
   }
@@ -36,12 +37,18 @@ void Axis::begin_stop(StopKind kind, bool hold, CommandPtr command) {
     stopping_.last = command;
     stopping_.commands.push_back(std::move(command));
   }
+  env_.bus->hasten(settings_.node, TransactionClass::moving_state);
   if (!stopping_.running) {
     stopping_.running = true;
     launch(run_stop(), "stop");
   } else {
     sampled_.notify_all();  // the running sequence sends this one, too
   }
+}
+
+/// A command that never started leaves the ramps of the motion before it in force.
+void Axis::keep_deceleration(const Activity& activity) {
+  if (activity.may_run) last_deceleration_ = activity.plan.deceleration_time;
 }
 
 /// What a stop may take: the drive keeps the deceleration time that was set before the motion (7.6.2).
@@ -98,7 +105,10 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto since = env_.clock->now();
     const auto patience =
         settings_.stop_margin + (kind == StopKind::quick_stop ? Duration{0} : deceleration_bound());
-    if (co_await standstill_by(since, since + patience, requests)) co_return Result<void>{};
+    const bool polled = link_ != LinkState::offline;
+    const bool rests = polled ? co_await standstill_by(since, since + patience, requests)
+                              : sent && co_await standstill_unpolled(since + patience);
+    if (rests) co_return Result<void>{};
     if (link_ == LinkState::offline) {
       auto cause = error(Reason::not_confirmed, "the drive fell silent before its standstill was confirmed",
                          "look at the machine; a stop is sent as soon as the drive answers");
@@ -113,7 +123,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
       spdlog::warn("{}: standstill not confirmed after a quick stop; releasing the power stage",
                    settings_.name);
       released = true;
-      if (const auto off = co_await drive_->disable(); !off) spdlog::error("{}", to_string(off.error()));
+      if (const auto off = co_await drive_->disable({}); !off) spdlog::error("{}", to_string(off.error()));
     } else {
       co_return fail(error(Reason::not_confirmed, "standstill was not confirmed",
                            "look at the machine; cut its power "
@@ -123,7 +133,8 @@ Task<Result<void>> Axis::stop_and_confirm() {
 }
 
 /// Standstill counts once it was measured after `since`. Within homing the motor rests between its phases, so
-/// there it must have rested at one place for a while.
+/// there it must have rested at one place for a while. Not in time is only what a sample from after
+/// `deadline` shows moving: on a slow line the sample may come late, and a silent node goes offline.
 Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests) {
   constexpr auto rest = milliseconds(150);
   std::optional<TimePoint> resting_since;
@@ -140,11 +151,23 @@ Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests
       } else if (sample_->asked_at - *resting_since >= rest) {
         co_return true;
       }
+      if (sample_->asked_at >= deadline + (resting_since ? rest : Duration{0})) co_return false;
     }
-    if (env_.clock->now() >= deadline) co_return false;
-    co_await sampled_.wait_until(deadline);
+    co_await sampled_.wait();
   }
   co_return false;
+}
+
+/// The same for a node that nobody polls, because it is not (or not yet) online.
+Task<bool> Axis::standstill_unpolled(TimePoint deadline) {
+  constexpr auto pause = milliseconds(30);
+  for (;;) {
+    const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
+    if (!sample) co_return false;
+    if (!sample->moving && sample->mode != DriveMode::homing) co_return true;
+    if (sample->asked_at >= deadline) co_return false;
+    co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + pause);
+  }
 }
 
 }  // namespace axisd

@@ -48,7 +48,7 @@ class Ykd2405prDrive final : public Drive {
   }
   void expect_mark(const ContinuityMark& mark) override { expected_ = {mark}; }
   Task<Result<void>> enable(MotionGuard guard) override;
-  Task<Result<void>> disable() override;
+  Task<Result<void>> disable(MotionGuard guard) override;
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
@@ -218,7 +218,10 @@ Task<Result<void>> Ykd2405prDrive::set_canary() {
   if (!found) co_return failed(found.error());
   std::ranges::copy(found->registers, found_at_connect_.begin());
   // Pulses 0: should a terminal start a relative move, it goes nowhere.
-  constexpr MotionBlock neutral = {5, 100, 100, 60, 0, 0};
+  // The deceleration time differs a little each time: a record of an earlier power cycle then never fits this
+  // one.
+  const auto moment = clock_->now().time_since_epoch() / std::chrono::milliseconds(1);
+  const MotionBlock neutral = {5, 100, static_cast<std::uint16_t>(101 + moment % 61), 60, 0, 0};
   co_return co_await write_canary(distinct(neutral), in(TransactionClass::parameters));
 }
 
@@ -269,8 +272,9 @@ Task<Result<void>> Ykd2405prDrive::enable(MotionGuard guard) {
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::disable() {
-  const auto written = co_await node_.write_patiently(reg::enable, 0, in(TransactionClass::stop));
+Task<Result<void>> Ykd2405prDrive::disable(MotionGuard guard) {
+  const auto written = co_await node_.write_patiently(
+      reg::enable, 0, {.transaction_class = TransactionClass::stop, .guard = std::move(guard)});
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }

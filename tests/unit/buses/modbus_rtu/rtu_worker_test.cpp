@@ -244,7 +244,7 @@ TEST(RtuWorker, StopDuringTheSilenceStillSupersedes) {
   exchange.guard = {.gate = gate, .epoch = gate->epoch()};
   bench.on_open = [&] {
     bench.worker->arm(exchange);
-    gate->request_stop(StopKind::stop);
+    gate->request_stop();
   };
   bench.start();
   const auto result = bench.next_result();

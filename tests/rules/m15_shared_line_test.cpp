@@ -1,0 +1,161 @@
+// M15 and the scheduling that it rests on: many axes on one line, none of them starved.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// `count` axes on one line, endless, 1000 pulses/rev.
+class Line {
+ public:
+  Line(int count, int baud) {
+    configuration_.machine = "line";
+    configuration_.buses.push_back({.name = "line-a", .port = "sim", .baud = baud});
+    for (int i = 1; i <= count; ++i) {
+      AxisSettings axis{.name = "a" + std::to_string(i),
+                        .bus = "line-a",
+                        .node = static_cast<std::uint8_t>(i),
+                        .model = "ykd2405pr"};
+      axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
+      axis.limits.velocity = 100;
+      configuration_.axes.push_back({.axis = axis});
+    }
+    machine_ = std::make_unique<core::MachineCore>(
+        core::MachineParts{.executor = world.executor(),
+                           .clock = &world.clock(),
+                           .instance_id = "t",
+                           .make_line =
+                               [this](const modbus_rtu::LineSettings& settings) {
+                                 auto made = std::make_unique<VirtualLine>(world, settings);
+                                 line = made.get();
+                                 return made;
+                               }},
+        configuration_);
+    for (int i = 1; i <= count; ++i)
+      line->network().add(
+          simulation::find_simulator("ykd2405pr")->make({.address = static_cast<std::uint8_t>(i)}));
+    line->network().advance(world.now());
+    machine_->start();
+  }
+  ~Line() {
+    machine_->close();
+    EXPECT_TRUE(world.run_until([this] { return machine_->closed(); }, 60s));
+  }
+  [[nodiscard]] bool all(const std::function<bool(const AxisSnapshot&)>& condition) const {
+    for (const auto& axis : machine_->axes())
+      if (!condition(*axis->snapshot())) return false;
+    return true;
+  }
+  core::MachineCore& machine() { return *machine_; }
+  CommandPtr submit(int axis, const Action& action) {
+    auto command = machine_->submit("a" + std::to_string(axis), action, {});
+    EXPECT_TRUE(command) << (command ? "" : to_string(command.error()));
+    return command.value_or(nullptr);
+  }
+
+  VirtualWorld world;
+  VirtualLine* line = nullptr;
+
+ private:
+  config::Configuration configuration_;
+  std::unique_ptr<core::MachineCore> machine_;
+};
+
+TEST(M15, EveryAxisConnectsOnASlowLine) {
+  Line line(16, 9600);
+  EXPECT_TRUE(line.world.run_until(
+      [&] { return line.all([](const AxisSnapshot& a) { return a.link == LinkState::online; }); }, 60s));
+}
+
+TEST(M15, MovingAxesLeaveTheOthersTheirShare) {
+  Line line(8, 115200);
+  const auto online = [&] {
+    return line.all([](const AxisSnapshot& a) { return a.link == LinkState::online; });
+  };
+  ASSERT_TRUE(line.world.run_until(online, 10s));
+  for (int i = 1; i <= 3; ++i) {
+    const auto enabled = line.submit(i, EnableRequest{});
+    ASSERT_TRUE(line.world.run_until([&] { return enabled->has_ended(); }, 5s));
+    line.submit(i, MoveVelocityRequest{.velocity = 20});
+  }
+  line.world.run_for(1s);
+  line.line->forget_wire();
+  line.world.run_for(5s);
+  std::map<int, int> requests;
+  for (const auto& entry : line.line->wire()) ++requests[entry.node()];
+  for (int i = 4; i <= 8; ++i) EXPECT_GE(requests[i], 5) << "node " << i;
+  EXPECT_TRUE(online());
+}
+
+TEST(M15, StopAllOnASlowLineConfirmsWithoutEscalating) {
+  Line line(16, 9600);
+  ASSERT_TRUE(line.world.run_until(
+      [&] { return line.all([](const AxisSnapshot& a) { return a.link == LinkState::online; }); }, 60s));
+  for (int i = 1; i <= 16; ++i) {
+    const auto enabled = line.submit(i, EnableRequest{});
+    ASSERT_TRUE(line.world.run_until([&] { return enabled->has_ended(); }, 10s));
+    line.submit(i, MoveVelocityRequest{.velocity = 20});
+  }
+  line.world.run_for(5s);
+  line.line->forget_wire();
+  const auto stops = line.machine().stop_all("test");
+  ASSERT_TRUE(line.world.run_until(
+      [&] {
+        for (const auto& stop : stops)
+          if (!(*stop)->has_ended()) return false;
+        return true;
+      },
+      30s));
+  for (const auto& stop : stops)
+    EXPECT_EQ((*stop)->value().state, CommandState::done)
+        << ((*stop)->value().cause ? to_string(*(*stop)->value().cause) : "");
+  for (const auto& entry : line.line->wire())
+    if (entry.function() == 0x06 && entry.address() == 0x0028) EXPECT_EQ(entry.value(), 0) << "a quick stop";
+  for (int node = 1; node <= 16; ++node)
+    EXPECT_FALSE(line.line->network().node(static_cast<std::uint8_t>(node))->shaft_moving());
+}
+
+TEST(M14, AnOlderReleaseDoesNotLiftANewerStopAll) {
+  Rig rig({.persistence = true});
+  rig.machine->stop_all("a");
+  std::optional<Result<void>> released;
+  rig.machine->release_inhibit("a", [&](Result<void> result) { released = std::move(result); });
+  rig.machine->stop_all("b");  // while the release is being saved
+  rig.run(1s);
+  ASSERT_TRUE(released);
+  EXPECT_FALSE(*released);
+  EXPECT_NE(rig.machine->inhibited_by(), nullptr);
+}
+
+TEST(M12, AStopDuringADecelerationKeepsItsRamp) {
+  Rig rig;
+  rig.ready();
+  rig.submit(MoveAbsoluteRequest{.position = 400, .with = {.velocity = 100, .deceleration_time = 2000ms}});
+  rig.run(1s);
+  rig.line->forget_wire();
+  rig.submit(DisableRequest{});
+  rig.run(50ms);
+  const auto stop = rig.submit(StopRequest{});
+  ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 10s));
+  EXPECT_EQ(stop->value().state, CommandState::done);
+  for (const auto& entry : rig.line->wire())
+    if (entry.function() == 0x06 && entry.address() == 0x0028) EXPECT_EQ(entry.value(), 0) << "a quick stop";
+  EXPECT_NE(rig.state()->trust, PositionTrust::unknown);
+}
+
+TEST(M10, AMoveShorterThanTheToleranceIsDoneOnlyOnceItMoved) {
+  Rig rig({.adjust = [](AxisSettings& axis) { axis.position_tolerance = 0.1; }});
+  rig.ready();
+  const auto moved = rig.complete(MoveRelativeRequest{.distance = 0.05, .with = {.velocity = 1}});
+  EXPECT_EQ(moved.state, CommandState::done) << (moved.cause ? to_string(*moved.cause) : "");
+  EXPECT_DOUBLE_EQ(rig.load_mm(), 0.05);
+}
+
+}  // namespace
+}  // namespace axisd::test
