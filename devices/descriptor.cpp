@@ -8,7 +8,8 @@ const DriveDescriptor* find_drive_model(std::string_view model) {
   return nullptr;
 }
 
-const TerminalFunctionSpec* find_function(std::span<const TerminalFunctionSpec> functions, std::string_view name) {
+const TerminalFunctionSpec* find_function(std::span<const TerminalFunctionSpec> functions,
+                                          std::string_view name) {
   for (const auto& function : functions)
     if (function.name == name) return &function;
   return nullptr;

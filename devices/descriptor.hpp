@@ -1,4 +1,5 @@
-// What a model folder exports: data that the loader, the schema, the documentation, `check` and `budget` walk.
+// What a model folder exports: data that the loader, the schema, the documentation, `check` and `budget`
+// walk.
 #pragma once
 
 #include <cstdint>
@@ -25,12 +26,13 @@ struct TerminalSpec {
   std::string_view name;  ///< "X0"; its index in the list is its bit in DriveSample
 };
 
-/// A function that a terminal can have. `mirror` names the function that an inverted axis needs instead (M18).
+/// A function that a terminal can have. `mirror` names the function that an inverted axis needs instead
+/// (M18).
 struct TerminalFunctionSpec {
   std::string_view name;  ///< "positive_limit"
   std::uint16_t code;
-  std::string_view mirror;      ///< empty: direction does not matter
-  bool starts_motion = false;   ///< M3: written only while released and the input is inactive
+  std::string_view mirror;     ///< empty: direction does not matter
+  bool starts_motion = false;  ///< M3: written only while released and the input is inactive
 };
 
 enum class Access : std::uint8_t { ro, rw, rw_saved, wo };
@@ -49,7 +51,7 @@ struct ParameterSpec {
 enum class AlarmReset : std::uint8_t { power_cycle, by_itself, by_command };
 struct AlarmSpec {
   std::uint16_t code;
-  std::string_view name;    ///< "overcurrent"
+  std::string_view name;  ///< "overcurrent"
   AlarmReset reset;
   std::string_view remedy;  ///< what to do
 };
@@ -57,10 +59,10 @@ struct AlarmSpec {
 /// A key that this model adds to the YAML's `drive:` section.
 struct SettingSpec {
   std::string_view key;
-  std::string_view kind;  ///< "enum", "integer", "boolean"
+  std::string_view kind;                      ///< "enum", "integer", "boolean"
   std::span<const std::string_view> choices;  ///< of an enum
   std::int64_t minimum = 0, maximum = 0;
-  std::string_view default_value;             ///< empty: the drive's value is left alone
+  std::string_view default_value;  ///< empty: the drive's value is left alone
   std::string_view description;
 };
 
@@ -68,7 +70,7 @@ struct SettingSpec {
 struct Capabilities {
   std::span<const std::int32_t> pulses_per_revolution;  ///< permitted microstep settings
   int minimum_rpm = 1, maximum_rpm = 3000;
-  std::int64_t maximum_pulse_rate_hz = 200'000;         ///< M11
+  std::int64_t maximum_pulse_rate_hz = 200'000;  ///< M11
   int minimum_start_rpm = 2, maximum_start_rpm = 300;
   int minimum_time_ms = 0, maximum_time_ms = 2000;
   int minimum_homing_rpm = 5, maximum_homing_rpm = 3000, minimum_search_rpm = 5, maximum_search_rpm = 300;
@@ -108,6 +110,7 @@ std::span<const DriveDescriptor* const> drive_models();
 /// nullptr if there is none of that name.
 const DriveDescriptor* find_drive_model(std::string_view model);
 /// nullptr if the model has no such function.
-const TerminalFunctionSpec* find_function(std::span<const TerminalFunctionSpec> functions, std::string_view name);
+const TerminalFunctionSpec* find_function(std::span<const TerminalFunctionSpec> functions,
+                                          std::string_view name);
 
 }  // namespace axisd

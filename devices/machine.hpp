@@ -1,4 +1,5 @@
-// What the API sees of a machine. Implemented by the daemon's composition; every call is safe from any thread.
+// What the API sees of a machine. Implemented by the daemon's composition; every call is safe from any
+// thread.
 #pragma once
 
 #include <chrono>
@@ -27,7 +28,7 @@ struct BusStatus {
 };
 
 struct MachineInfo {
-  std::string machine;      ///< name from the YAML
+  std::string machine;  ///< name from the YAML
   std::string version;
   std::string instance_id;  ///< new with every start
   bool inhibited = false;   ///< StopAll is latched
@@ -45,11 +46,12 @@ class Machine {
   [[nodiscard]] virtual AxisSnapshotPtr snapshot(std::string_view axis) const = 0;
   [[nodiscard]] virtual MachineInfo info() const = 0;
 
-  /// Validates and starts a command; calls back exactly once: with an error if it was not accepted, else when it
-  /// reached `until` or ended. Ending the call early never changes the command. Stops take their own lane.
+  /// Validates and starts a command; calls back exactly once: with an error if it was not accepted, else when
+  /// it reached `until` or ended. Ending the call early never changes the command. Stops take their own lane.
   virtual void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
                       CommandCallback callback) = 0;
-  /// Extends the hold of the axis's current jog or held velocity command (by repeating it); part of submit(Jog).
+  /// Extends the hold of the axis's current jog or held velocity command (by repeating it); part of
+  /// submit(Jog).
 
   /// Ends Stopping with hold (MC_Stop with Execute going false).
   virtual void release_stop(std::string axis, CommandCallback callback) = 0;
@@ -60,7 +62,8 @@ class Machine {
 
   /// A known command; calls back at once. Errors: unknown_command.
   virtual void get_command(std::string id, CommandCallback callback) = 0;
-  /// Calls back at each change of the command until it has ended (the last call) or the returned token is dropped.
+  /// Calls back at each change of the command until it has ended (the last call) or the returned token is
+  /// dropped.
   virtual std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) = 0;
   virtual void cancel_command(std::string id, CommandCallback callback) = 0;
 
