@@ -232,7 +232,8 @@ Result<Plan> Axis::plan_velocity(double velocity, const MotionValues& with, bool
   PositionTracker::Target target{};
   if (tracker_.trust() != PositionTrust::unknown) {
     target = tracker_.plan_absolute(profile->positive ? *limits.position_maximum : *limits.position_minimum);
-    if ((target.position > tracker_.position()) != profile->positive)
+    const auto way = target.position - tracker_.position();
+    if (profile->positive ? way <= 0 : way >= 0)
       return fail(Error{.reason = Reason::soft_limit,
                         .message = fmt::format("{}: at the software limit already", settings_.name),
                         .remedy = "move the other way",
@@ -331,6 +332,10 @@ Result<CommandPtr> Axis::accept(const SetPositionRequest& request, const Command
   if (auto allowed = check_ready(options); !allowed) return fail(allowed.error());
   if (activity_ || stopping_.running || sample_->moving)
     return fail(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
+  // A released open-loop motor can be turned by hand: its position would be lost again at once (M20).
+  if (!sample_->enabled && !descriptor_->capabilities.closed_loop)
+    return fail(error(Reason::disabled, "the power stage is off, so the position would not hold",
+                      "enable the axis first"));
   if (!scale_.checked_pulses(request.position))
     return fail(
         error(Reason::invalid_argument, "the position is not a usable number", "give a finite position"));
