@@ -177,12 +177,8 @@ class Axis {
   [[nodiscard]] bool current(const Activity& activity) const;
   [[nodiscard]] MotionGuard guard(const Activity& activity) const;
   Task<bool> reach_standstill(ActivityPtr activity);
-  Task<> run_enable(ActivityPtr activity);
-  Task<> run_disable(ActivityPtr activity);
   Task<> run_move(ActivityPtr activity);
   Task<> run_velocity(ActivityPtr activity);
-  Task<> run_reset(ActivityPtr activity);
-  Task<> run_set_position(ActivityPtr activity);
   Task<Result<void>> make_room(ActivityPtr activity);
   Task<bool> positioned(ActivityPtr activity);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
@@ -196,6 +192,12 @@ class Axis {
   void finish(Activity& activity, const std::function<void(CommandRecord&)>& how);
   void fail_with_stop(Activity& activity, Error cause);
   void enter_error_stop(Error cause);
+
+  // axis_power.cpp: sequences that move nothing
+  Task<> run_enable(ActivityPtr activity);
+  Task<> run_disable(ActivityPtr activity);
+  Task<> run_reset(ActivityPtr activity);
+  Task<> run_set_position(ActivityPtr activity);
 
   // axis_homing.cpp
   Task<> run_home(ActivityPtr activity);

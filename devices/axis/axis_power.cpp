@@ -1,0 +1,150 @@
+// Sequences that move nothing: power, reset, and what the position means.
+#include <fmt/format.h>
+
+#include <memory>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// A sample that was asked for is expected within this, or the link is lost anyway.
+constexpr auto sample_patience = std::chrono::seconds(5);
+
+}  // namespace
+
+Task<> Axis::run_enable(ActivityPtr activity) {
+  Result<void> result;
+  {
+    const Chain chain(*this);
+    result = co_await drive_->enable(guard(*activity));
+  }
+  if (!current(*activity)) co_return;
+  if (!result && result.error().reason == Reason::rebooted) {
+    on_reboot(result.error());
+    co_return;
+  }
+  // Whether an enable without a reply was executed shows in the next samples.
+  const bool uncertain = !result && result.error().outcome == Outcome::unknown;
+  if (!result && !uncertain) {
+    finish(*activity, [&](CommandRecord& command) { command.error(result.error()); });
+    co_return;
+  }
+  activity->command->activate();
+  const auto deadline = env_.clock->now() + std::chrono::seconds(1);
+  const auto before = tracker_.counter();
+  while (env_.clock->now() < deadline) {
+    const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
+    if (!current(*activity)) co_return;
+    if (!sample) break;
+    if (sample->moving || tracker_.counter() != before) {
+      // M1: power never moves. Whatever this is, it ends here.
+      enter_error_stop(error(Reason::terminal, "the drive moved when it was enabled",
+                             "check terminals that start motion; then reset the axis"));
+      begin_stop(StopKind::stop, false, nullptr);
+      publish();
+      co_return;
+    }
+    if (sample->enabled) {
+      enabled_by_us_ = true;
+      finish(*activity, [](CommandRecord& command) { command.done(); });
+      co_return;
+    }
+  }
+  finish(*activity, [&](CommandRecord& command) {
+    command.error(error(Reason::not_confirmed, "the drive does not report its power stage as on",
+                        "check terminals with the function motor_free, and alarms"));
+  });
+}
+
+Task<> Axis::run_disable(ActivityPtr activity) {
+  activity->command->activate();
+  // A fault does not stand in the way of releasing: only the motion has to have ended.
+  while (stopping_.running && current(*activity)) co_await stopped_.wait();
+  if (!current(*activity)) co_return;
+  if (stop_owed_) {
+    finish(*activity, [&](CommandRecord& command) {
+      command.error(error(Reason::not_confirmed, "not released: standstill was not confirmed",
+                          "look at the machine; cut its power if it moves"));
+    });
+    co_return;
+  }
+  const auto result = co_await drive_->disable(guard(*activity));
+  if (!current(*activity)) co_return;
+  const auto sample =
+      result ? co_await sample_after(env_.clock->now(), sample_patience) : fail(result.error());
+  if (!current(*activity)) co_return;
+  finish(*activity, [&](CommandRecord& command) {
+    if (sample && !sample->enabled)
+      command.done();
+    else
+      command.error(
+          sample ? error(Reason::not_confirmed, "the drive still reports its power stage as on", "try again")
+                 : sample.error());
+  });
+}
+
+Task<> Axis::run_reset(ActivityPtr activity) {
+  activity->command->activate();
+  if (sample_ && sample_->alarm_code != 0) {
+    const auto cleared = co_await drive_->clear_alarm();
+    if (!current(*activity)) co_return;
+    if (!cleared) {
+      finish(*activity, [&](CommandRecord& command) { command.error(cleared.error()); });
+      co_return;
+    }
+  }
+  // A successful read-back is part of it: after an unknown outcome nothing may start before that.
+  const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
+  if (!current(*activity)) co_return;
+  const bool clean = sample && sample->alarm_code == 0 && !sample->moving;
+  if (clean) fault_.reset();
+  finish(*activity, [&](CommandRecord& command) {
+    if (clean)
+      command.done();
+    else
+      command.error(
+          sample ? error(Reason::alarm, "the drive still reports an alarm or moves", "clear its cause first")
+                 : sample.error());
+  });
+}
+
+Task<Result<void>> Axis::journal_offset(std::int64_t offset, PositionTrust trust) {
+  if (env_.persistence == nullptr) co_return Result<void>{};
+  // Shared: the answer may come after this sequence was left.
+  auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
+  env_.persistence->save_offset(settings_.name, offset_record(offset, trust),
+                                [answer](Result<void> result) { answer->set(std::move(result)); });
+  co_return co_await answer->get();
+}
+
+Task<> Axis::run_set_position(ActivityPtr activity) {
+  activity->command->activate();
+  const auto position = *activity->command->value().asked.position;
+  const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
+  if (!current(*activity)) co_return;
+  if (!sample || sample->moving) {
+    finish(*activity, [&](CommandRecord& command) {
+      command.error(sample ? error(Reason::moving, "the axis moves", "wait for standstill") : sample.error());
+    });
+    co_return;
+  }
+  // Journalled before it is used (M20): a restart must never meet a newer position with an older offset.
+  const auto counter = tracker_.counter();
+  const auto saved = co_await journal_offset(tracker_.offset_for(position), PositionTrust::set);
+  if (!current(*activity)) co_return;
+  if (!saved || counter != tracker_.counter()) {
+    lose_trust();
+    finish(*activity, [&](CommandRecord& command) {
+      command.error(saved ? error(Reason::moving, "the axis moved meanwhile", "repeat it at standstill")
+                          : saved.error());
+    });
+    co_return;
+  }
+  tracker_.set_position(position, PositionTrust::set);
+  finish(*activity, [](CommandRecord& command) { command.done(); });
+}
+
+}  // namespace axisd
