@@ -60,7 +60,9 @@ void add_offline_commands(CLI::App& app, Invocation& invocation) {
       app.add_subcommand("completion", "Completion script: eval \"$(axisctl completion bash)\"");
   const auto shell = std::make_shared<std::string>();
   completion->add_option("SHELL", *shell, "bash")->required()->check(CLI::IsMember({"bash"}));
-  completion->callback([&app] { print(bash_completion(app)); });
+  completion->callback([&app, shell] {
+    if (*shell == "bash") print(bash_completion(app));
+  });
 }
 
 }  // namespace axisd::axisctl
