@@ -48,24 +48,13 @@ void RtuBus::start(ExchangeObserver observer) {
                [this](const PortStatus& status) { on_port(status); });
 }
 
-Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {
-  if (options.transaction_class != TransactionClass::stop && needs_resync(request)) {
-    // Another length than any late reply's: those are then discarded as foreign, not taken for this answer.
-    auto resync = request;
-    while (resync.count > 1 && needs_resync(resync)) --resync.count;
-    auto answered = co_await exchange(std::move(resync), options);
-    if (!answered) co_return answered;
-  }
-  co_return co_await exchange(std::move(request), std::move(options));
-}
-
 bool RtuBus::needs_resync(const Request& request) const {
   const auto late = late_reads_.find(request.node);
   return late != late_reads_.end() && request.function == Function::read_holding_registers &&
          request.count > 1 && late->second.contains(request.count);
 }
 
-Task<Result<Answer>> RtuBus::exchange(Request request, TransactionOptions options) {
+Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {
   auto frame = encode(request);
   if (!frame) co_return fail(frame.error());
   if (!port_.open) {
@@ -125,7 +114,28 @@ void RtuBus::pump() {
 
 void RtuBus::arm_next() {
   current_ = queue_.pop();
-  if (current_) line_->arm(current_->exchange);
+  if (!current_) return;
+  if (current_->transaction_class != TransactionClass::stop && needs_resync(current_->exchange.request))
+    current_ = resync_before(std::move(current_));
+  line_->arm(current_->exchange);
+}
+
+/// Another length than any late reply's: those are then discarded as foreign, not taken for this answer.
+/// Decided here and not when the read is queued: what it waits for may time out meanwhile.
+TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
+  auto resync = std::make_unique<Transaction>();
+  resync->transaction_class = waiting->transaction_class;
+  resync->reserved = waiting->reserved;
+  resync->exchange = waiting->exchange;
+  auto& request = resync->exchange.request;
+  while (request.count > 1 && needs_resync(request)) --request.count;
+  resync->exchange.frame = *encode(request);
+  auto held = std::make_shared<TransactionPtr>(std::move(waiting));
+  resync->on_end.emplace_back([this, held](const Transaction&, const ExchangeResult& result) {
+    if (result.status == ExchangeStatus::replied) return queue_.put_back(std::move(*held));
+    for (const auto& tell : (*held)->on_end) tell(**held, result);
+  });
+  return resync;
 }
 
 void RtuBus::reap(TimePoint now) {

@@ -64,10 +64,10 @@ class RtuBus {
   [[nodiscard]] TimePoint last_progress() const { return line_->last_progress(); }
 
  private:
-  Task<Result<Answer>> exchange(Request request, TransactionOptions options);
   [[nodiscard]] bool needs_resync(const Request& request) const;
   void pump();
   void arm_next();
+  TransactionPtr resync_before(TransactionPtr waiting);
   void on_result(const ExchangeResult& result);
   void on_port(const PortStatus& status);
   void reap(TimePoint now);

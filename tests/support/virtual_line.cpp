@@ -69,6 +69,12 @@ void VirtualLine::request_sent() {
   network_.advance(world_->now());
   auto reply = network_.on_request(exchange.frame.bytes(), result_.request_end);
   if (network_.take_hang_up()) return set_open(false);
+  if (reply) {
+    // A node, and the adapter too, delivers in order: nothing overtakes a reply that is late.
+    const auto shift = std::max(Duration{}, last_reply_end_ + silence(settings_) - reply->begin);
+    reply->begin += shift;
+    last_reply_end_ = reply->end += shift;
+  }
   const auto latest = result_.request_end + exchange.reply_timeout;
   timer_ = world_->clock().call_at(latest, [this] { end(ExchangeStatus::timeout); });
   if (!reply) return;

@@ -76,6 +76,7 @@ class VirtualLine final : public modbus_rtu::Line {
   modbus_rtu::ExchangeResult result_;
   bool reply_coming_ = false;
   TimePoint quiet_since_{};
+  TimePoint last_reply_end_{};
   Clock::Timer timer_, cut_timer_;
   std::map<std::uint64_t, Clock::Timer> arrivals_;
   std::uint64_t last_arrival_ = 0;

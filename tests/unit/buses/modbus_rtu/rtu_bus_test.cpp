@@ -1,0 +1,145 @@
+#include "buses/modbus_rtu/rtu_bus.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "devices/simulation/simulator.hpp"
+#include "tests/support/virtual_line.hpp"
+
+namespace axisd::modbus_rtu {
+namespace {
+
+using namespace std::chrono_literals;
+using simulation::FaultKind;
+
+struct BusRig {
+  test::VirtualWorld world;
+  test::VirtualLine* line = nullptr;
+  std::unique_ptr<RtuBus> bus;
+  std::map<std::string, Result<Answer>> results;
+
+  BusRig() {
+    auto made = std::make_unique<test::VirtualLine>(world, LineSettings{.name = "a", .port = "sim"});
+    line = made.get();
+    for (const std::uint8_t node : {1, 2})
+      line->network().add(simulation::find_simulator("ykd2405pr")->make({.address = node}));
+    bus = std::make_unique<RtuBus>(world.executor(), world.clock(), LineSettings{.name = "a", .port = "sim"},
+                                   std::move(made));
+    bus->start();
+    world.run_for(10ms);
+  }
+  ~BusRig() { world.run_for(2s); }
+
+  void transact(std::string name, Request request, TransactionOptions options = {}) {
+    auto one = [](BusRig& rig, std::string key, Request r, TransactionOptions o) -> Task<> {
+      auto result = co_await rig.bus->transact(std::move(r), std::move(o));
+      rig.results.insert_or_assign(std::move(key), std::move(result));
+    };
+    spawn(world.executor(), one(*this, std::move(name), std::move(request), std::move(options)), "test");
+  }
+  void read(std::string name, std::uint16_t address, std::uint16_t count, std::uint8_t node = 1) {
+    transact(
+        std::move(name),
+        {.node = node, .function = Function::read_holding_registers, .address = address, .count = count});
+  }
+};
+
+/// An FC03 reply does not say which registers it carries: a late one must never answer another read.
+TEST(RtuBus, ALateReplyNeverAnswersAnotherRead) {
+  for (const bool queued_before : {false, true}) {
+    for (int delay = 25; delay < 60; ++delay) {
+      for (const int late : {1, 2}) {
+        BusRig rig;
+        rig.line->network().node(1)->poke(0x0020, 111);
+        rig.line->network().node(1)->poke(0x0032, 222);
+        rig.line->network().faults().add({.kind = FaultKind::delay_reply,
+                                          .node = 1,
+                                          .function = 3,
+                                          .count = late,
+                                          .delay = std::chrono::milliseconds(delay)});
+        rig.read("late", 0x0020, 4);
+        if (!queued_before) rig.world.run_for(38ms);
+        rig.read("next", 0x0032, 4);
+        rig.world.run_for(500ms);
+        ASSERT_EQ(rig.results.size(), 2U);
+        const auto& next = rig.results.at("next");
+        if (next) EXPECT_EQ(next->registers.at(0), 222) << delay;
+        if (rig.results.at("late")) EXPECT_EQ(rig.results.at("late")->registers.at(0), 111);
+      }
+    }
+  }
+}
+
+TEST(RtuBus, OneSilentNodeDoesNotDisturbItsNeighbour) {
+  BusRig rig;
+  rig.line->network().node(1)->set_power(false);
+  rig.read("silent", 0x0003, 10, 1);
+  rig.read("other", 0x0003, 10, 2);
+  rig.world.run_for(1s);
+  EXPECT_EQ(rig.results.at("silent").error().reason, Reason::no_reply);
+  EXPECT_EQ(rig.results.at("silent").error().outcome, Outcome::unknown);
+  EXPECT_TRUE(rig.results.at("other"));
+  EXPECT_EQ(rig.bus->counters().timeouts, 1U);
+}
+
+TEST(RtuBus, AStopOvertakesWhatIsArmedAndCutsAnotherNodesSilence) {
+  BusRig rig;
+  rig.line->network().node(1)->set_power(false);
+  for (std::uint16_t i = 0; i < 5; ++i)
+    rig.read("r" + std::to_string(i), static_cast<std::uint16_t>(0x0020 + i), 1, 1);
+  rig.world.run_for(5ms);
+  Request stop{.node = 2, .function = Function::write_single_register, .address = 0x0028};
+  stop.values.push_back(0);
+  const auto asked = rig.world.now();
+  rig.transact("stop", stop, {.transaction_class = TransactionClass::stop});
+  rig.world.run_for(1s);
+  EXPECT_TRUE(rig.results.at("stop"));
+  ASSERT_GE(rig.line->wire().size(), 2U);
+  EXPECT_EQ(rig.line->wire()[1].address(), 0x0028);
+  EXPECT_LE(rig.line->wire()[1].begin - asked, 25ms);  // turnaround_max and the silence
+}
+
+TEST(RtuBus, ARaisedGateIsNeverSent) {
+  for (int offset = 0; offset < 40; ++offset) {
+    BusRig rig;
+    const auto gate = std::make_shared<AxisGate>();
+    rig.read("busy", 0x0003, 10);
+    Request trigger{.node = 1, .function = Function::write_single_register, .address = 0x0027};
+    trigger.values.push_back(5);
+    rig.transact(
+        "trigger", trigger,
+        {.transaction_class = TransactionClass::motion, .guard = {.gate = gate, .epoch = gate->epoch()}});
+    rig.world.run_for(std::chrono::microseconds(offset * 400));
+    const bool was_sent = std::ranges::any_of(
+        rig.line->wire(), [](const test::WireEntry& entry) { return entry.address() == 0x0027; });
+    gate->raise();
+    rig.bus->purge_superseded();
+    rig.world.run_for(1s);
+    EXPECT_EQ(rig.results.at("trigger").has_value(), was_sent);
+    if (!was_sent) EXPECT_EQ(rig.results.at("trigger").error().reason, Reason::superseded);
+  }
+}
+
+TEST(RtuBus, ExpiredAndLostPortsAreSaid) {
+  BusRig rig;
+  rig.read("first", 0x0003, 10);
+  rig.transact("late",
+               {.node = 1, .function = Function::read_holding_registers, .address = 0x0010, .count = 1},
+               {.deadline = rig.world.now() + 1ms});
+  rig.world.run_for(100ms);
+  EXPECT_EQ(rig.results.at("late").error().reason, Reason::expired);
+  EXPECT_EQ(rig.results.at("late").error().outcome, Outcome::not_sent);
+  rig.read("under way", 0x0003, 10);
+  rig.read("waiting", 0x0010, 2);
+  rig.world.run_for(3ms);
+  rig.line->set_open(false);
+  rig.world.run_for(100ms);
+  EXPECT_EQ(rig.results.at("under way").error().outcome, Outcome::unknown);
+  EXPECT_EQ(rig.results.at("waiting").error().outcome, Outcome::not_sent);
+  EXPECT_EQ(rig.results.at("waiting").error().reason, Reason::bus_down);
+  EXPECT_TRUE(rig.bus->idle());
+}
+
+}  // namespace
+}  // namespace axisd::modbus_rtu

@@ -1,0 +1,124 @@
+#include "buses/modbus_rtu/transaction_queue.hpp"
+
+#include <gtest/gtest.h>
+
+namespace axisd::modbus_rtu {
+namespace {
+
+using namespace std::chrono_literals;
+using Class = TransactionClass;
+
+TransactionPtr read_of(std::uint16_t address, Class transaction_class, TimePoint deadline = TimePoint::max(),
+                       std::uint8_t node = 1) {
+  auto transaction = std::make_unique<Transaction>();
+  transaction->transaction_class = transaction_class;
+  transaction->exchange.request = {
+      .node = node, .function = Function::read_holding_registers, .address = address, .count = 2};
+  transaction->exchange.frame = *encode(transaction->exchange.request);
+  transaction->exchange.deadline = deadline;
+  return transaction;
+}
+
+std::vector<std::uint16_t> drain(TransactionQueue& queue) {
+  std::vector<std::uint16_t> order;
+  while (auto transaction = queue.pop()) order.push_back(transaction->exchange.request.address);
+  return order;
+}
+
+TEST(TransactionQueue, ClassesInStrictOrder) {
+  TransactionQueue queue(100);
+  std::uint16_t address = 10;
+  for (const auto c :
+       {Class::scan, Class::parameters, Class::idle_state, Class::moving_state, Class::motion, Class::stop})
+    queue.push(read_of(address--, c));
+  EXPECT_EQ(queue.top_class(), Class::stop);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{5, 6, 7, 8, 9, 10}));
+  EXPECT_EQ(queue.top_class(), std::nullopt);
+}
+
+TEST(TransactionQueue, EarliestDeadlineThenArrival) {
+  TransactionQueue queue;
+  const TimePoint now{};
+  queue.push(read_of(1, Class::parameters));
+  queue.push(read_of(2, Class::parameters, now + 2s));
+  queue.push(read_of(3, Class::parameters, now + 1s));
+  queue.push(read_of(4, Class::parameters, now + 1s));
+  EXPECT_EQ(queue.next_deadline(), now + 1s);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{3, 4, 2, 1}));
+}
+
+TEST(TransactionQueue, EqualReadsMergeAndBothAreTold) {
+  TransactionQueue queue;
+  int told = 0;
+  auto low = read_of(1, Class::parameters, TimePoint{} + 1s);
+  auto high = read_of(1, Class::moving_state, TimePoint{} + 2s);
+  for (auto* each : {&low, &high}) (*each)->on_end.emplace_back([&](const auto&, const auto&) { ++told; });
+  queue.push(std::move(low));
+  queue.push(std::move(high));
+  queue.push(read_of(1, Class::parameters, TimePoint::max(), 2));  // another node
+  ASSERT_EQ(queue.size(), 2U);
+  const auto merged = queue.pop();
+  EXPECT_EQ(merged->transaction_class, Class::moving_state);
+  EXPECT_EQ(merged->exchange.deadline, TimePoint{} + 2s);
+  for (const auto& tell : merged->on_end) tell(*merged, {});
+  EXPECT_EQ(told, 2);
+}
+
+TEST(TransactionQueue, WritesAndGuardedReadsNeverMerge) {
+  TransactionQueue queue;
+  for (int i = 0; i < 2; ++i) {
+    auto write = read_of(1, Class::motion);
+    write->exchange.request.function = Function::write_single_register;
+    queue.push(std::move(write));
+    auto guarded = read_of(2, Class::motion);
+    guarded->exchange.guard.gate = std::make_shared<AxisGate>();
+    queue.push(std::move(guarded));
+  }
+  EXPECT_EQ(queue.size(), 4U);
+}
+
+TEST(TransactionQueue, EveryEighthComesFromBelowButNeverBeforeAStop) {
+  TransactionQueue queue(8);
+  queue.push(read_of(100, Class::scan));
+  queue.push(read_of(101, Class::parameters));
+  int until_lower = 0;
+  for (std::uint16_t i = 0; i < 16; ++i) queue.push(read_of(i, Class::moving_state));
+  while (queue.pop()->exchange.request.address < 100) ++until_lower;
+  EXPECT_EQ(until_lower, 7);
+  int until_next = 0;
+  while (queue.pop()->exchange.request.address < 100) ++until_next;
+  EXPECT_EQ(until_next, 7) << "the lower classes take turns";
+
+  TransactionQueue stops(2);
+  stops.push(read_of(100, Class::scan));
+  for (std::uint16_t i = 0; i < 10; ++i) stops.push(read_of(i, Class::stop));
+  for (int i = 0; i < 10; ++i) EXPECT_LT(stops.pop()->exchange.request.address, 100);
+}
+
+TEST(TransactionQueue, TakesOutWhatMayNotBeSent) {
+  TransactionQueue queue;
+  const TimePoint now{10s};
+  queue.push(read_of(1, Class::parameters, now - 1ns));
+  queue.push(read_of(2, Class::parameters, now));
+  const auto gate = std::make_shared<AxisGate>();
+  auto motion = read_of(3, Class::motion);
+  motion->exchange.guard = {.gate = gate, .epoch = gate->epoch()};
+  queue.push(std::move(motion));
+  EXPECT_EQ(queue.take_unsendable(now).size(), 1U);
+  gate->raise();
+  const auto taken = queue.take_unsendable(now);
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0]->exchange.request.address, 3);
+  EXPECT_EQ(drain(queue), std::vector<std::uint16_t>{2});
+}
+
+TEST(TransactionQueue, PutBackKeepsItsPlace) {
+  TransactionQueue queue;
+  queue.push(read_of(1, Class::parameters));
+  queue.push(read_of(2, Class::parameters));
+  queue.put_back(queue.pop());
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{1, 2}));
+}
+
+}  // namespace
+}  // namespace axisd::modbus_rtu
