@@ -20,7 +20,7 @@ class CommandRecord {
 
   [[nodiscard]] const Command& value() const { return command_; }
   [[nodiscard]] bool has_ended() const { return ended(command_.state); }
-  void grant(MotionValues granted) { command_.granted = std::move(granted); }
+  void grant(const MotionValues& granted) { command_.granted = granted; }
   void activate();
   void done() { end(CommandState::done, std::nullopt); }
   void abort(Error cause) { end(CommandState::aborted, std::move(cause)); }
