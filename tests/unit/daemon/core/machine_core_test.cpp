@@ -1,0 +1,144 @@
+#include "daemon/core/machine_core.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "devices/simulation/simulator.hpp"
+#include "tests/support/fake_persistence.hpp"
+#include "tests/support/virtual_line.hpp"
+
+namespace axisd::core {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Three axes on one line; the drive of the last one has no power.
+class ThreeAxes : public testing::Test {
+ protected:
+  ThreeAxes() : store_(world_.executor()) {
+    configuration_.machine = "three";
+    configuration_.buses.push_back({.name = "line-a", .port = "sim"});
+    for (const std::uint8_t node : {1, 2, 3}) {
+      AxisSettings axis{
+          .name = "a" + std::to_string(node), .bus = "line-a", .node = node, .model = "ykd2405pr"};
+      axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
+      axis.limits.velocity = 100;
+      configuration_.axes.push_back({.axis = axis});
+    }
+  }
+  ~ThreeAxes() override {
+    if (!machine_) return;
+    machine_->close();
+    EXPECT_TRUE(world_.run_until([this] { return machine_->closed(); }, 60s));
+  }
+  void start() {
+    machine_ = std::make_unique<MachineCore>(
+        MachineParts{.executor = world_.executor(),
+                     .clock = &world_.clock(),
+                     .persistence = &store_,
+                     .instance_id = "t",
+                     .make_line =
+                         [this](const modbus_rtu::LineSettings& settings) {
+                           auto made = std::make_unique<test::VirtualLine>(world_, settings);
+                           line_ = made.get();
+                           return made;
+                         }},
+        configuration_);
+    for (const std::uint8_t node : {1, 2, 3})
+      line_->network().add(
+          simulation::find_simulator("ykd2405pr")->make({.address = node, .powered = node != 3}));
+    line_->network().advance(world_.now());
+    machine_->start();
+    world_.run_for(2s);
+  }
+
+  test::VirtualWorld world_;
+  test::FakePersistence store_;
+  config::Configuration configuration_;
+  test::VirtualLine* line_ = nullptr;
+  std::unique_ptr<MachineCore> machine_;
+};
+
+TEST_F(ThreeAxes, OneDeadDriveDoesNotDelayTheOthers) {
+  start();
+  EXPECT_EQ(machine_->find("a1")->snapshot()->link, LinkState::online);
+  EXPECT_EQ(machine_->find("a2")->snapshot()->link, LinkState::online);
+  EXPECT_EQ(machine_->find("a3")->snapshot()->link, LinkState::offline);
+  EXPECT_TRUE(machine_->at_rest());
+  EXPECT_TRUE(machine_->buses_reported());
+  line_->network().node(3)->set_power(true);
+  world_.run_for(3s);
+  EXPECT_EQ(machine_->find("a3")->snapshot()->link, LinkState::online);
+}
+
+TEST_F(ThreeAxes, UnknownAxes) {
+  start();
+  EXPECT_EQ(machine_->find("a4"), nullptr);
+  EXPECT_EQ(machine_->submit("a4", StopRequest{}, {}).error().reason, Reason::unknown_axis);
+}
+
+TEST_F(ThreeAxes, StopAllStopsMovingAxesFirstAndSilentOnesLast) {
+  start();
+  const auto run = machine_->submit("a2", MoveVelocityRequest{.velocity = 50}, {});
+  ASSERT_TRUE(run);
+  world_.run_for(500ms);
+  line_->forget_wire();
+  const auto stops = machine_->stop_all("operator");
+  ASSERT_EQ(stops.size(), 3U);
+  world_.run_for(3s);
+  std::vector<int> nodes;
+  for (const auto& entry : line_->wire())
+    if (entry.is_write() && entry.address() == 0x0028) nodes.push_back(entry.node());
+  ASSERT_GE(nodes.size(), 3U);
+  EXPECT_EQ(nodes[0], 2);
+  EXPECT_EQ(nodes[1], 1);
+  EXPECT_EQ(nodes[2], 3);
+  EXPECT_EQ((*stops[0])->value().state, CommandState::done);
+  EXPECT_EQ((*stops[1])->value().state, CommandState::done);
+  EXPECT_EQ((*stops[2])->value().state, CommandState::unknown) << "nobody answered";
+  EXPECT_EQ(*machine_->inhibited_by(), "operator");
+  EXPECT_TRUE(store_.saved.inhibit.active);
+}
+
+TEST_F(ThreeAxes, AFullDiskDoesNotDelayStopAll) {
+  start();
+  ASSERT_TRUE(machine_->submit("a1", MoveVelocityRequest{.velocity = 50}, {}));
+  world_.run_for(500ms);
+  store_.failing = true;
+  machine_->stop_all("operator");
+  EXPECT_NE(machine_->inhibited_by(), nullptr);
+  world_.run_for(1s);
+  EXPECT_FALSE(line_->network().node(1)->shaft_moving());
+}
+
+TEST_F(ThreeAxes, TheEndOfTheDaemonStopsWhatMovesOnly) {
+  start();
+  ASSERT_TRUE(machine_->submit("a1", MoveVelocityRequest{.velocity = 50}, {}));
+  world_.run_for(500ms);
+  EXPECT_FALSE(machine_->at_rest());
+  line_->forget_wire();
+  machine_->stop_moving_axes();
+  EXPECT_TRUE(world_.run_until([this] { return machine_->at_rest(); }, 3s));
+  EXPECT_FALSE(line_->network().node(1)->shaft_moving());
+  for (const auto& entry : line_->wire())
+    if (entry.is_write()) EXPECT_EQ(entry.node(), 1);
+}
+
+TEST_F(ThreeAxes, ALatchedInhibitIsFoundAtTheStart) {
+  store_.saved.inhibit = {.active = true, .by = "last week"};
+  store_.restart();
+  start();
+  EXPECT_EQ(machine_->submit("a1", MoveRelativeRequest{.distance = 1}, {}).error().reason, Reason::inhibited);
+  EXPECT_EQ(*machine_->inhibited_by(), "last week");
+}
+
+TEST_F(ThreeAxes, AConfigurationThatTheLoaderWouldRefuseIsNotBuilt) {
+  configuration_.axes[1].axis.scale.pulses_per_revolution = 1000;
+  configuration_.axes[1].axis.bus = "line-b";
+  EXPECT_THROW(start(), std::invalid_argument);
+  machine_.reset();
+}
+
+}  // namespace
+}  // namespace axisd::core
