@@ -92,7 +92,7 @@ TEST(M19, EndlessAxesRezeroAtStandstill) {
                                                {FaultKind::drop_request},
                                                {FaultKind::drop_reply},
                                                {FaultKind::corrupt_reply}}) {
-    for (int offset = 0; offset < 3; ++offset) {
+    for (int offset = 0; offset < 2; ++offset) {
       both_directions(rotary(), [&](const RigOptions& options) {
         Rig rig(options);
         rig.ready();
@@ -116,7 +116,7 @@ TEST(M19, EndlessAxesRezeroAtStandstill) {
         if (rig.state()->trust != PositionTrust::unknown)
           EXPECT_NEAR(std::remainder(rig.state()->position - truth, 360), 0, 1e-3) << "trusted and wrong";
       });
-      if (fault && offset > 0) break;
+      if (fault) break;
     }
   }
 }
