@@ -1,8 +1,8 @@
 // What the YKD2405PR is, as data (manual V1.3; sections as noted).
 #include "devices/descriptor.hpp"
 
-#include "devices/ykd2405pr/drive.hpp"
-#include "devices/ykd2405pr/registers.hpp"
+#include "devices/yako_rtu/drive.hpp"
+#include "devices/ykd2405pr/parameters.hpp"
 #include "devices/ykd2405pr/settings.hpp"
 
 namespace axisd::ykd2405pr {
@@ -108,7 +108,7 @@ const DriveDescriptor models[] = {{
                      .position_source = PositionSource::commanded,
                      .closed_loop = false,
                      .communication_watchdog = false},
-    .make = &make_drive,
+    .make = &yako_rtu::make_drive,
 }};
 
 }  // namespace

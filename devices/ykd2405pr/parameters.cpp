@@ -3,7 +3,7 @@
 // well; 0x0030 is printed RO but 7.6.3 writes it; 0x0001 prints "V1.0", which its sister models give as
 // 0x0100; 0x0024/0x0025 are the halves of one signed 32-bit number: any word is allowed (their own example:
 // 0x86A0).
-#include "devices/ykd2405pr/registers.hpp"
+#include "devices/ykd2405pr/parameters.hpp"
 
 namespace axisd::ykd2405pr {
 

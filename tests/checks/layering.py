@@ -61,12 +61,19 @@ def owner(path, table):
 
 
 def families(paths):
-    """Folders under devices/ with a descriptor: one drive family each."""
+    """Folders under devices/ with a descriptor: one drive model each."""
     return {path.parent.as_posix() for path in paths
             if path.name == "descriptor.cpp" and path.parent.parent.as_posix() == "devices"}
 
 
-def family_finding(path, included, family_folders):
+def with_simulators(paths):
+    """Folders under devices/ in which drivers and simulators live side by side."""
+    return {path.parent.as_posix() for path in paths
+            if path.name.startswith("simulat") and path.parent.parent.as_posix() == "devices"
+            and path.parent.name != "simulation"}
+
+
+def family_finding(path, included, family_folders, mixed_folders):
     """Why `path` must not include `included`, as far as drive families are concerned."""
     own = path.parent.as_posix() if path.parent.as_posix() in family_folders else None
     target = included.rsplit("/", 1)[0]
@@ -76,7 +83,7 @@ def family_finding(path, included, family_folders):
     if path.parts[0] == "devices" and own != "devices/simulation" and included.startswith("devices/simulation/"):
         if not simulates and path.parts[1] != "simulation":
             return "only simulators use devices/simulation"
-    if target != own or own is None:
+    if target not in mixed_folders or path.parts[0] != "devices":
         return None
     included_simulates = included.rsplit("/", 1)[1].startswith("simulat")
     if simulates != included_simulates and not SHARED_BY_FAMILY.search(included):
@@ -84,7 +91,7 @@ def family_finding(path, included, family_folders):
     return None
 
 
-def include_findings(path, text, family_folders):
+def include_findings(path, text, family_folders, mixed_folders):
     allowed = owner(path, OURS)
     for match in INCLUDE.finditer(text):
         included = match[2]
@@ -95,7 +102,7 @@ def include_findings(path, text, family_folders):
                 yield f"{at}: this folder has no include rule; add one to tests/checks/layering.py"
             elif not any(included.startswith(prefix) for prefix in allowed):
                 yield f"{at}: may include only {', '.join(allowed)}"
-            elif (why := family_finding(path, included, family_folders)) is not None:
+            elif (why := family_finding(path, included, family_folders, mixed_folders)) is not None:
                 yield f"{at}: {why}"
         for library, folders in THIRD_PARTY.items():
             # "linux/can" also covers linux/can/raw.h and linux/can.h
@@ -115,6 +122,7 @@ def time_findings(path, text):
 def findings(root):
     paths = tree.files(root)
     family_folders = families(paths)
+    mixed_folders = with_simulators(paths)
     found = []
     for path in paths:
         if path.suffix not in tree.CODE or len(path.parts) < 2:
@@ -124,7 +132,7 @@ def findings(root):
             continue
         text = tree.text(root, path) or ""
         if layer:
-            found += include_findings(path, text, family_folders)
+            found += include_findings(path, text, family_folders, mixed_folders)
         found += time_findings(path, text)
     return found
 

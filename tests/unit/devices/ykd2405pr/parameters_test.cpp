@@ -1,12 +1,16 @@
+#include "devices/ykd2405pr/parameters.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 #include <string>
 
-#include "devices/ykd2405pr/registers.hpp"
+#include "devices/yako_rtu/registers.hpp"
 
 namespace axisd::ykd2405pr {
+
+namespace reg = yako_rtu::reg;
 namespace {
 
 const ParameterSpec* find(std::uint32_t address) {

@@ -6,7 +6,7 @@
 
 #include "devices/simulation/simulator.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 struct Behaviour {
   bool start_in_motion, start_in_motion_refused, start_in_motion_from_target;
@@ -28,4 +28,4 @@ std::span<const simulation::SwitchSpec> switch_specs();
 /// switch_specs().
 Behaviour behaviour_from(const simulation::Switches& switches);
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,4 +1,4 @@
-#include "devices/ykd2405pr/drive.hpp"
+#include "devices/yako_rtu/drive.hpp"
 
 #include <fmt/format.h>
 
@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "buses/modbus_rtu/node.hpp"
-#include "devices/ykd2405pr/codec.hpp"
-#include "devices/ykd2405pr/configuration.hpp"
-#include "devices/ykd2405pr/registers.hpp"
+#include "devices/yako_rtu/codec.hpp"
+#include "devices/yako_rtu/configuration.hpp"
+#include "devices/yako_rtu/registers.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 
@@ -34,9 +34,9 @@ Error explained(Error error) {
 /// The canary: registers 0x0020..0x0025 live in RAM. Whatever stands there after a power-up is never what
 /// this class last wrote, so one read of the block proves that the drive has not been restarted since (M6,
 /// M7).
-class Ykd2405prDrive final : public Drive {
+class YakoRtuDrive final : public Drive {
  public:
-  explicit Ykd2405prDrive(DriveContext context)
+  explicit YakoRtuDrive(DriveContext context)
       : clock_(context.clock), node_(*context.rtu, context.node), setup_(std::move(context.setup)) {}
 
   Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) override;
@@ -88,8 +88,8 @@ class Ykd2405prDrive final : public Drive {
   MotionBlock found_at_connect_ = factory_block;  ///< possibly what a power-up leaves (saved by 0x002B = 2)
 };
 
-Error Ykd2405prDrive::error_at(Reason reason, std::uint16_t address, std::string message,
-                               std::string remedy) const {
+Error YakoRtuDrive::error_at(Reason reason, std::uint16_t address, std::string message,
+                             std::string remedy) const {
   return {.reason = reason,
           .message = std::move(message),
           .remedy = std::move(remedy),
@@ -97,7 +97,7 @@ Error Ykd2405prDrive::error_at(Reason reason, std::uint16_t address, std::string
           .where = {.bus = node_.bus().settings().name, .node = node_.address(), .object = address}};
 }
 
-Task<Result<DriveIdentity>> Ykd2405prDrive::identify(TransactionClass transaction_class) {
+Task<Result<DriveIdentity>> YakoRtuDrive::identify(TransactionClass transaction_class) {
   const auto answer = co_await node_.read(reg::model, 2, in(transaction_class));
   if (!answer) co_return failed(answer.error());
   const auto code = answer->registers[0];
@@ -118,7 +118,7 @@ Task<Result<DriveIdentity>> Ykd2405prDrive::identify(TransactionClass transactio
                           .version = fmt::format("V{}.{}", version >> 8U, (version >> 4U) & 0xFU)};
 }
 
-Task<Result<DriveSample>> Ykd2405prDrive::read_state(TransactionClass transaction_class) {
+Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class) {
   const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
   if (!answer) co_return failed(answer.error());
   auto sample = decode_state(answer->registers);
@@ -127,7 +127,7 @@ Task<Result<DriveSample>> Ykd2405prDrive::read_state(TransactionClass transactio
   co_return sample;
 }
 
-Task<Result<Ykd2405prDrive::Registers>> Ykd2405prDrive::read_configuration() const {
+Task<Result<YakoRtuDrive::Registers>> YakoRtuDrive::read_configuration() const {
   struct Block {
     std::uint16_t address, count;
   };
@@ -144,7 +144,7 @@ Task<Result<Ykd2405prDrive::Registers>> Ykd2405prDrive::read_configuration() con
   co_return registers;
 }
 
-Task<Result<void>> Ykd2405prDrive::configure() {
+Task<Result<void>> YakoRtuDrive::configure() {
   expected_.clear();
   const auto required = required_registers(setup_);
   if (!required) co_return failed(required.error());
@@ -163,8 +163,8 @@ Task<Result<void>> Ykd2405prDrive::configure() {
   co_return co_await set_canary();
 }
 
-Task<Result<void>> Ykd2405prDrive::write_configuration(const std::vector<RegisterSetting>& required,
-                                                       Registers present) {
+Task<Result<void>> YakoRtuDrive::write_configuration(const std::vector<RegisterSetting>& required,
+                                                     Registers present) {
   bool neutral = false;
   for (const auto& setting : required) {
     // Before anything else about inputs, but after the EEPROM switch (M3).
@@ -178,8 +178,8 @@ Task<Result<void>> Ykd2405prDrive::write_configuration(const std::vector<Registe
 
 /// Takes functions that can start motion off inputs that get another function or level: the new level could
 /// act like an edge of the old function.
-Task<Result<void>> Ykd2405prDrive::neutralise_inputs(const std::vector<RegisterSetting>& required,
-                                                     Registers& present) {
+Task<Result<void>> YakoRtuDrive::neutralise_inputs(const std::vector<RegisterSetting>& required,
+                                                   Registers& present) {
   const auto wanted = [&](std::uint16_t address) {
     return std::ranges::find(required, address, &RegisterSetting::address)->value;
   };
@@ -196,7 +196,7 @@ Task<Result<void>> Ykd2405prDrive::neutralise_inputs(const std::vector<RegisterS
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::write_setting(const RegisterSetting& setting) {
+Task<Result<void>> YakoRtuDrive::write_setting(const RegisterSetting& setting) {
   if (setting.starts_motion) {
     const auto state = co_await read_state(TransactionClass::parameters);
     if (!state) co_return fail(state.error());
@@ -213,7 +213,7 @@ Task<Result<void>> Ykd2405prDrive::write_setting(const RegisterSetting& setting)
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::set_canary() {
+Task<Result<void>> YakoRtuDrive::set_canary() {
   const auto found = co_await node_.read_patiently(reg::start_speed, 6, in(TransactionClass::parameters));
   if (!found) co_return failed(found.error());
   std::ranges::copy(found->registers, found_at_connect_.begin());
@@ -225,13 +225,13 @@ Task<Result<void>> Ykd2405prDrive::set_canary() {
   co_return co_await write_canary(distinct(neutral), in(TransactionClass::parameters));
 }
 
-MotionBlock Ykd2405prDrive::distinct(MotionBlock block) const {
+MotionBlock YakoRtuDrive::distinct(MotionBlock block) const {
   while (block == factory_block || block == found_at_connect_)
     block[1] = block[1] < 2000 ? block[1] + 1 : block[1] - 2;
   return block;
 }
 
-Task<Result<void>> Ykd2405prDrive::write_canary(MotionBlock block, TransactionOptions options) {
+Task<Result<void>> YakoRtuDrive::write_canary(MotionBlock block, TransactionOptions options) {
   const auto written = co_await node_.write_block(reg::start_speed, block, std::move(options));
   if (written) {
     expected_ = {block};
@@ -242,7 +242,7 @@ Task<Result<void>> Ykd2405prDrive::write_canary(MotionBlock block, TransactionOp
   co_return failed(written.error());
 }
 
-Task<Result<Answer>> Ykd2405prDrive::read_canary(TransactionOptions options) {
+Task<Result<Answer>> YakoRtuDrive::read_canary(TransactionOptions options) {
   auto answer = co_await node_.read(reg::start_speed, 6, std::move(options));
   if (!answer) co_return failed(answer.error());
   MotionBlock block{};
@@ -257,13 +257,13 @@ Task<Result<Answer>> Ykd2405prDrive::read_canary(TransactionOptions options) {
   co_return answer;
 }
 
-Task<Result<void>> Ykd2405prDrive::check_continuity(TransactionClass transaction_class) {
+Task<Result<void>> YakoRtuDrive::check_continuity(TransactionClass transaction_class) {
   const auto answer = co_await read_canary(in(transaction_class));
   if (!answer) co_return fail(answer.error());
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::enable(MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::enable(MotionGuard guard) {
   const auto canary = co_await read_canary({.transaction_class = TransactionClass::motion, .guard = guard});
   if (!canary) co_return fail(canary.error());
   const auto written =
@@ -272,24 +272,24 @@ Task<Result<void>> Ykd2405prDrive::enable(MotionGuard guard) {
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::disable(MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::disable(MotionGuard guard) {
   const auto written = co_await node_.write_patiently(
       reg::enable, 0, {.transaction_class = TransactionClass::stop, .guard = std::move(guard)});
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::start_move(MoveProfile profile, MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::start_move(MoveProfile profile, MotionGuard guard) {
   // 7.6.1: bit 0 position mode, bit 2 absolute. An absolute start that arrives twice goes nowhere the second
   // time.
   co_return co_await start(encode(profile), std::nullopt, {reg::start, 5}, std::move(guard));
 }
 
-Task<Result<void>> Ykd2405prDrive::start_velocity(VelocityProfile profile, MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::start_velocity(VelocityProfile profile, MotionGuard guard) {
   co_return co_await start(encode(profile), std::nullopt, {reg::start, 2}, std::move(guard));
 }
 
-Task<Result<void>> Ykd2405prDrive::start_homing(HomingProfile profile, MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::start_homing(HomingProfile profile, MotionGuard guard) {
   // Homing uses its own block; the motion block is only the canary, and keeps what it holds.
   if (expected_.empty())
     co_return fail(
@@ -297,8 +297,8 @@ Task<Result<void>> Ykd2405prDrive::start_homing(HomingProfile profile, MotionGua
   co_return co_await start(expected_.back(), encode(profile), {reg::homing_start, 1}, std::move(guard));
 }
 
-Task<Result<void>> Ykd2405prDrive::start(MotionBlock block, std::optional<HomingBlock> homing,
-                                         Trigger trigger, MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::start(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
+                                       MotionGuard guard) {
   Result<void> result;
   for (int attempt = 0; attempt < chain_attempts; ++attempt) {
     result = co_await start_once(block, homing, trigger, guard);
@@ -315,8 +315,8 @@ Task<Result<void>> Ykd2405prDrive::start(MotionBlock block, std::optional<Homing
   co_return result;
 }
 
-Task<Result<void>> Ykd2405prDrive::start_once(MotionBlock block, std::optional<HomingBlock> homing,
-                                              Trigger trigger, MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<HomingBlock> homing,
+                                            Trigger trigger, MotionGuard guard) {
   const TransactionOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
   const auto canary = co_await read_canary(motion);
   if (!canary) co_return fail(canary.error());
@@ -337,20 +337,20 @@ Task<Result<void>> Ykd2405prDrive::start_once(MotionBlock block, std::optional<H
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::stop(StopKind kind) {
+Task<Result<void>> YakoRtuDrive::stop(StopKind kind) {
   const std::uint16_t value = kind == StopKind::quick_stop ? 1 : 0;  // 7.6.2: zero is a command
   const auto written = co_await node_.write(reg::stop, value, in(TransactionClass::stop));
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::clear_alarm() {
+Task<Result<void>> YakoRtuDrive::clear_alarm() {
   const auto written = co_await node_.write_patiently(reg::alarm_clear, 1, in(TransactionClass::parameters));
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }
 
-Task<Result<void>> Ykd2405prDrive::clear_position(MotionGuard guard) {
+Task<Result<void>> YakoRtuDrive::clear_position(MotionGuard guard) {
   const auto written = co_await node_.write(
       reg::position_clear, 1, {.transaction_class = TransactionClass::motion, .guard = std::move(guard)});
   if (!written) co_return failed(written.error());
@@ -360,7 +360,7 @@ Task<Result<void>> Ykd2405prDrive::clear_position(MotionGuard guard) {
 }  // namespace
 
 std::unique_ptr<Drive> make_drive(DriveContext context) {
-  return std::make_unique<Ykd2405prDrive>(std::move(context));
+  return std::make_unique<YakoRtuDrive>(std::move(context));
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,8 +1,8 @@
 // Frames of the simulated drive, manual 6.2.
 #include "devices/simulation/crc.hpp"
-#include "devices/ykd2405pr/simulator.hpp"
+#include "devices/yako_rtu/simulator.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 
@@ -26,7 +26,7 @@ bool has_right_size(std::span<const std::uint8_t> frame) {
 
 }  // namespace
 
-std::optional<std::vector<std::uint8_t>> SimulatedYkd2405pr::on_frame(std::span<const std::uint8_t> frame) {
+std::optional<std::vector<std::uint8_t>> SimulatedDrive::on_frame(std::span<const std::uint8_t> frame) {
   if (!ready() || frame.size() < 4 || frame[0] != node_ || node_ == 0) return std::nullopt;
   const auto function = frame[1];
   std::vector<std::uint8_t> reply{node_, function};
@@ -51,7 +51,7 @@ std::optional<std::vector<std::uint8_t>> SimulatedYkd2405pr::on_frame(std::span<
   return reply;
 }
 
-Fail SimulatedYkd2405pr::read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) const {
+Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) const {
   const auto first = word(frame, 2), count = word(frame, 4);
   const auto fail = Memory::check_read(first, count);
   if (fail != Fail::none) return fail;
@@ -60,7 +60,7 @@ Fail SimulatedYkd2405pr::read(std::span<const std::uint8_t> frame, std::vector<s
   return Fail::none;
 }
 
-Fail SimulatedYkd2405pr::write_one(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) {
+Fail SimulatedDrive::write_one(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) {
   const auto address = word(frame, 2), value = word(frame, 4);
   auto fail = Memory::check_write(address, value);
   if (fail == Fail::none) fail = execute(address, value);
@@ -69,7 +69,7 @@ Fail SimulatedYkd2405pr::write_one(std::span<const std::uint8_t> frame, std::vec
   return fail;
 }
 
-Fail SimulatedYkd2405pr::write_many(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) {
+Fail SimulatedDrive::write_many(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) {
   const auto first = word(frame, 2), count = word(frame, 4);
   if (behaviour_.limit_block_writes && count > 16) return Fail::count;
   const auto value = [&](unsigned i) { return word(frame, 7 + std::size_t{2} * i); };
@@ -89,7 +89,7 @@ Fail SimulatedYkd2405pr::write_many(std::span<const std::uint8_t> frame, std::ve
   return fail;
 }
 
-Fail SimulatedYkd2405pr::execute(std::uint16_t address, std::uint16_t value) {
+Fail SimulatedDrive::execute(std::uint16_t address, std::uint16_t value) {
   switch (address) {
     case reg::start:
       return start(value);
@@ -121,4 +121,4 @@ Fail SimulatedYkd2405pr::execute(std::uint16_t address, std::uint16_t value) {
   return Fail::none;
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,12 +1,12 @@
-#include "devices/ykd2405pr/configuration.hpp"
+#include "devices/yako_rtu/configuration.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "devices/ykd2405pr/registers.hpp"
+#include "devices/yako_rtu/registers.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 namespace {
 
 std::ptrdiff_t place(const std::vector<RegisterSetting>& all, std::uint16_t address) {
@@ -83,4 +83,4 @@ TEST(Configuration, FunctionsThatCanStartMotion) {
 }
 
 }  // namespace
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

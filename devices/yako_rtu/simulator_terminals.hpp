@@ -11,9 +11,9 @@
 
 #include "buses/clock.hpp"
 #include "devices/simulation/simulated_node.hpp"
-#include "devices/ykd2405pr/simulator_memory.hpp"
+#include "devices/yako_rtu/simulator_memory.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 /// Codes of 0x0041..0x004A.
 enum class Input : std::uint8_t {
@@ -93,4 +93,4 @@ class Terminals {
   std::array<bool, input_functions> functions_{};
 };
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

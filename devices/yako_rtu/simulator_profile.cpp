@@ -1,10 +1,10 @@
-#include "devices/ykd2405pr/simulator_profile.hpp"
+#include "devices/yako_rtu/simulator_profile.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 
@@ -111,4 +111,4 @@ double Profile::time_at(double distance) const {
   return duration_;
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

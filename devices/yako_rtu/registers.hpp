@@ -1,13 +1,10 @@
-// Register addresses of the YKD2405PR (manual 6.1). The only thing that driver and simulator share, with the
-// parameter table beside it.
+// Register addresses that the family's manuals have in common (6.1), and those of single models by their
+// names. The only thing that driver and simulator share, with the parameter tables.
 #pragma once
 
 #include <cstdint>
-#include <span>
 
-#include "devices/descriptor.hpp"
-
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace reg {
 inline constexpr std::uint16_t model = 0x0000, version = 0x0001, node = 0x0002, mode = 0x0003,
@@ -31,7 +28,4 @@ inline constexpr std::uint16_t segment_pulses_high = 0x0090, segment_pulses_low 
                                performance = 0x0110, last = 0x0119;
 }  // namespace reg
 
-/// The whole catalogue of manual 6.1, in order of address: 148 registers.
-std::span<const ParameterSpec> parameters();
-
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,7 +1,7 @@
 // Homing, 7.5: four modes, limits, compensation, starts on a switch, and the switches about them.
-#include "tests/unit/devices/ykd2405pr/simulator_fixture.hpp"
+#include "tests/unit/devices/yako_rtu/simulator_fixture.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 namespace {
 
 simulation::SimulatedNodeSettings machine() {
@@ -227,4 +227,4 @@ TEST(SimulatorHoming, ByTerminal) {
 }
 
 }  // namespace
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,15 +1,15 @@
-#include "devices/ykd2405pr/configuration.hpp"
+#include "devices/yako_rtu/configuration.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "devices/descriptor.hpp"
-#include "devices/ykd2405pr/codec.hpp"
-#include "devices/ykd2405pr/registers.hpp"
+#include "devices/yako_rtu/codec.hpp"
+#include "devices/yako_rtu/registers.hpp"
 #include "devices/ykd2405pr/settings.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 
@@ -87,8 +87,8 @@ Result<std::vector<RegisterSetting>> required_registers(const DriveSetup& setup)
   if (!inputs) return fail(inputs.error());
   const auto outputs = assign(setup.outputs, model.outputs, model.output_functions);
   if (!outputs) return fail(outputs.error());
-  const auto microstep = std::ranges::find(microstep_codes, setup.pulses_per_revolution);
-  if (microstep == microstep_codes.end())
+  const auto microstep = std::ranges::find(ykd2405pr::microstep_codes, setup.pulses_per_revolution);
+  if (microstep == ykd2405pr::microstep_codes.end())
     return fail(Reason::misconfigured, fmt::format("the drive has no microstep setting of {} pulses/rev",
                                                    setup.pulses_per_revolution));
 
@@ -98,12 +98,12 @@ Result<std::vector<RegisterSetting>> required_registers(const DriveSetup& setup)
   if (!setup.outputs.empty()) all.push_back({.address = reg::output_levels, .value = outputs->levels});
   add_inputs(*inputs, true, all);
   all.push_back({.address = reg::control_mode, .value = 0});
-  all.push_back(
-      {.address = reg::microstep, .value = static_cast<std::uint16_t>(microstep - microstep_codes.begin())});
+  all.push_back({.address = reg::microstep,
+                 .value = static_cast<std::uint16_t>(microstep - ykd2405pr::microstep_codes.begin())});
   static constexpr std::string_view halves[] = {"half", "full"};
   static constexpr std::string_view overtravels[] = {"free", "quick_stop", "ignore"};
   add_choice(setup, "overtravel_stop", overtravels, reg::overtravel_stop, all);
-  add_choice(setup, "current", current_choices, reg::current, all);
+  add_choice(setup, "current", ykd2405pr::current_choices, reg::current, all);
   add_choice(setup, "lock_current", halves, reg::lock_current, all);
   if (setup.homing) {
     const auto block = encode(*setup.homing);
@@ -118,4 +118,4 @@ Result<std::vector<RegisterSetting>> required_registers(const DriveSetup& setup)
   return all;
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

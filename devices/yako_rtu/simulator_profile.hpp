@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 /// Speeds in pulses/s, accelerations in pulses/s^2. The sign of a motion is kept elsewhere.
 struct Rates {
@@ -50,4 +50,4 @@ class Profile {
   double duration_ = 0, total_ = 0;
 };
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

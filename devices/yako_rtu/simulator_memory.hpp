@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <map>
 
-#include "devices/ykd2405pr/registers.hpp"
-#include "devices/ykd2405pr/simulator_switches.hpp"
+#include "devices/yako_rtu/registers.hpp"
+#include "devices/yako_rtu/simulator_switches.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 /// The vendor's exception codes (table at the end of 6.2.4), not those of the Modbus standard.
 enum class Fail : std::uint8_t {
@@ -59,4 +59,4 @@ class Memory {
   std::uint64_t writes_ = 0;
 };
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,9 +1,9 @@
-#include "devices/ykd2405pr/codec.hpp"
+#include "devices/yako_rtu/codec.hpp"
 
 #include <algorithm>
 #include <utility>
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 
@@ -69,4 +69,4 @@ const char* exception_text(std::uint32_t code) {
   return texts.at(code < texts.size() ? code : 0);
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

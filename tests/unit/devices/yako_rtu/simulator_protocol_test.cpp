@@ -1,7 +1,7 @@
 // The frames that the manual prints, from the slave's side, and the exceptions of 6.2.4.
-#include "tests/unit/devices/ykd2405pr/simulator_fixture.hpp"
+#include "tests/unit/devices/yako_rtu/simulator_fixture.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 namespace {
 
 struct Golden {
@@ -137,4 +137,4 @@ TEST(SimulatorSwitches, AreDocumentedUniqueAndUnknownOnesRefused) {
 }
 
 }  // namespace
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,7 +1,7 @@
 // Terminals: filter, levels, functions, limits (6.1), PT and PV (7.3, 7.4), outputs.
-#include "tests/unit/devices/ykd2405pr/simulator_fixture.hpp"
+#include "tests/unit/devices/yako_rtu/simulator_fixture.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 namespace {
 
 constexpr int x(int number) { return 1 << (number + 2); }
@@ -286,4 +286,4 @@ TEST(SimulatorOutputs, HaveTheFunctionsAndLevelsOfTheTable) {
 }
 
 }  // namespace
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -4,8 +4,8 @@
 
 #include "devices/descriptor.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 std::unique_ptr<Drive> make_drive(DriveContext context);
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

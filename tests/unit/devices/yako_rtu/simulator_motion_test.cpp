@@ -1,8 +1,8 @@
 // Motion profiles (7.1, 7.2), starts and stops (7.6), directions, counter, 200 kHz, and the switches about
 // them.
-#include "tests/unit/devices/ykd2405pr/simulator_fixture.hpp"
+#include "tests/unit/devices/yako_rtu/simulator_fixture.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 namespace {
 
 /// Time until the drive stands still, in steps of 1 ms.
@@ -314,4 +314,4 @@ TEST(SimulatorMotion, LivesThroughAHundredThousandSteps) {
 }
 
 }  // namespace
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -7,7 +7,7 @@
 #include "buses/error.hpp"
 #include "devices/drive.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 struct RegisterSetting {
   std::uint16_t address;
@@ -25,4 +25,4 @@ bool starts_motion(std::uint16_t function_code);
 /// move the axis behind its owner's back. Outputs that it does not name are left alone: one may hold a brake.
 Result<std::vector<RegisterSetting>> required_registers(const DriveSetup& setup);
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

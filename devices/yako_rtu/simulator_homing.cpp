@@ -1,21 +1,21 @@
 // Homing of the simulated drive, manual 7.5: search, decelerate, leave the switch, approach it slowly.
 #include <cstdlib>
 
-#include "devices/ykd2405pr/simulator.hpp"
+#include "devices/yako_rtu/simulator.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
-Input SimulatedYkd2405pr::homing_reference() const {
+Input SimulatedDrive::homing_reference() const {
   const auto mode = memory_.get(reg::homing_mode);
   return mode == 2 ? Input::positive_limit : mode == 3 ? Input::negative_limit : Input::home;
 }
 
-void SimulatedYkd2405pr::homing_run(int direction, double rpm) {
+void SimulatedDrive::homing_run(int direction, double rpm) {
   const double time = memory_.get(reg::homing_time);
   motor_.run(direction, rates(rpm, time, time));
 }
 
-Fail SimulatedYkd2405pr::start_homing() {
+Fail SimulatedDrive::start_homing() {
   if (!enabled() || alarm_ != 0) return refusal();
   if (control_mode_ != 0) return Fail::none;
   if (motor_.moving()) return behaviour_.start_in_motion_refused ? Fail::access : Fail::none;
@@ -38,7 +38,7 @@ Fail SimulatedYkd2405pr::start_homing() {
   return Fail::none;
 }
 
-void SimulatedYkd2405pr::homing_edge(const InputEdge& edge) {
+void SimulatedDrive::homing_edge(const InputEdge& edge) {
   if (activity_ != Activity::homing || edge.function != homing_reference()) return;
   if (phase_ == Phase::search && edge.rising) {
     phase_ = Phase::found;
@@ -54,7 +54,7 @@ void SimulatedYkd2405pr::homing_edge(const InputEdge& edge) {
 
 /// 7.5: "if the limit signal is encountered, the motor will reverse". In modes 2 and 3 the limit ahead is the
 /// goal.
-void SimulatedYkd2405pr::homing_limits() {
+void SimulatedDrive::homing_limits() {
   const int direction = motor_.direction();
   const auto ahead = direction > 0 ? Input::positive_limit : Input::negative_limit;
   if (!terminals_.active(ahead) || ahead == homing_reference()) return;
@@ -69,7 +69,7 @@ void SimulatedYkd2405pr::homing_limits() {
   }
 }
 
-void SimulatedYkd2405pr::homing_stopped() {
+void SimulatedDrive::homing_stopped() {
   switch (phase_) {
     case Phase::turn:
       if (++homing_turns_ > 1 && !behaviour_.homing_never_gives_up) {
@@ -108,7 +108,7 @@ void SimulatedYkd2405pr::homing_stopped() {
 }
 
 /// On the switch: the compensation 0x0035 (forwards) and 0x0036 (backwards) follows, then the origin is set.
-void SimulatedYkd2405pr::homing_reached() {
+void SimulatedDrive::homing_reached() {
   phase_ = Phase::compensate;
   motor_.clear_counter();
   const auto offset = static_cast<std::int64_t>(memory_.get(reg::homing_positive_offset)) -
@@ -121,4 +121,4 @@ void SimulatedYkd2405pr::homing_reached() {
   motor_.move(offset, rates(memory_.get(reg::homing_search_speed), time, time));
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

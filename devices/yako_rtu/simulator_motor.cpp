@@ -1,8 +1,8 @@
-#include "devices/ykd2405pr/simulator_motor.hpp"
+#include "devices/yako_rtu/simulator_motor.hpp"
 
 #include <cmath>
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 /// A pulse counts when it is reached, whatever the last bit of the arithmetic says.
@@ -78,4 +78,4 @@ TimePoint Motor::reaches(std::int64_t shaft) const {
   return after(profile_.time_at(static_cast<double>((shaft - from_) * direction_)));
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,11 +1,11 @@
-#include "devices/ykd2405pr/simulator_switches.hpp"
+#include "devices/yako_rtu/simulator_switches.hpp"
 
 #include <array>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 
@@ -146,4 +146,4 @@ Behaviour behaviour_from(const simulation::Switches& switches) {
   return behaviour;
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,8 +1,8 @@
-#include "devices/ykd2405pr/simulator_terminals.hpp"
+#include "devices/yako_rtu/simulator_terminals.hpp"
 
 #include <algorithm>
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 namespace {
 
@@ -140,4 +140,4 @@ int Terminals::segment() const {
   return number <= 16 ? number : 0;  // 7.3.2 lists 1..16
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

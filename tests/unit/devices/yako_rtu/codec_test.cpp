@@ -1,10 +1,10 @@
-#include "devices/ykd2405pr/codec.hpp"
+#include "devices/yako_rtu/codec.hpp"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 namespace {
 
 using namespace std::chrono_literals;
@@ -86,4 +86,4 @@ TEST(Codec, HomingOffsetsHaveARegisterForEachDirection) {
 }
 
 }  // namespace
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

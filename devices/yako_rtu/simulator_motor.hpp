@@ -4,9 +4,9 @@
 #include <cstdint>
 
 #include "buses/clock.hpp"
-#include "devices/ykd2405pr/simulator_profile.hpp"
+#include "devices/yako_rtu/simulator_profile.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 /// Positions in pulses. `shaft` is where the machine really is, `counter` what the drive believes.
 class Motor {
@@ -52,4 +52,4 @@ class Motor {
   std::int64_t shaft_ = 0, from_ = 0, offset_ = 0;
 };
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

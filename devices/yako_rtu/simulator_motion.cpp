@@ -3,18 +3,18 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "devices/ykd2405pr/simulator.hpp"
+#include "devices/yako_rtu/simulator.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
-Rates SimulatedYkd2405pr::rates(double rpm, double acceleration_ms, double deceleration_ms) const {
+Rates SimulatedDrive::rates(double rpm, double acceleration_ms, double deceleration_ms) const {
   const double pulses = memory_.pulses_per_revolution();
   const double fastest = std::min(3000.0, 12e6 / pulses);  // 0x0023: 200 kHz of pulses
   return rates_from(memory_.get(reg::start_speed), std::min(rpm, fastest), acceleration_ms, deceleration_ms,
                     pulses);
 }
 
-SimulatedYkd2405pr::Plan SimulatedYkd2405pr::position_plan(bool absolute) const {
+SimulatedDrive::Plan SimulatedDrive::position_plan(bool absolute) const {
   const std::int64_t value = memory_.get_long(reg::pulses_high, reg::pulses_low);
   const bool from_target =
       behaviour_.start_in_motion_from_target && motor_.moving() && activity_ == Activity::position;
@@ -29,7 +29,7 @@ SimulatedYkd2405pr::Plan SimulatedYkd2405pr::position_plan(bool absolute) const 
                          memory_.get(reg::acceleration_time), memory_.get(reg::deceleration_time))};
 }
 
-SimulatedYkd2405pr::Plan SimulatedYkd2405pr::endless_plan(Activity activity, int direction) const {
+SimulatedDrive::Plan SimulatedDrive::endless_plan(Activity activity, int direction) const {
   auto plan = position_plan(false);
   plan.activity = activity;
   plan.target.reset();
@@ -38,7 +38,7 @@ SimulatedYkd2405pr::Plan SimulatedYkd2405pr::endless_plan(Activity activity, int
 }
 
 /// 7.6.1; only 1, 2, 5 and 6 say what to do (bit 2 has no meaning in speed mode).
-Fail SimulatedYkd2405pr::start(std::uint16_t command) {
+Fail SimulatedDrive::start(std::uint16_t command) {
   const auto kind = command & 3U;
   if (kind == 0 || kind == 3) {
     if (behaviour_.reserved_start_refused) return Fail::value;
@@ -50,11 +50,11 @@ Fail SimulatedYkd2405pr::start(std::uint16_t command) {
 }
 
 /// What a start in alarm or released gets.
-Fail SimulatedYkd2405pr::refusal() const {
+Fail SimulatedDrive::refusal() const {
   return behaviour_.start_refused_when_disabled ? Fail::access : Fail::none;
 }
 
-Fail SimulatedYkd2405pr::begin(const Plan& plan) {
+Fail SimulatedDrive::begin(const Plan& plan) {
   if (!enabled() || alarm_ != 0) return refusal();
   if (control_mode_ != 0) return Fail::none;
   if (!behaviour_.stop_terminal_only_edge &&
@@ -72,7 +72,7 @@ Fail SimulatedYkd2405pr::begin(const Plan& plan) {
   return Fail::none;
 }
 
-void SimulatedYkd2405pr::launch(const Plan& plan) {
+void SimulatedDrive::launch(const Plan& plan) {
   activity_ = plan.activity;
   in_position_ = stopping_ = false;
   pending_.reset();
@@ -91,13 +91,13 @@ void SimulatedYkd2405pr::launch(const Plan& plan) {
   }
 }
 
-void SimulatedYkd2405pr::stop_command(bool emergency) {
+void SimulatedDrive::stop_command(bool emergency) {
   if (activity_ == Activity::homing && behaviour_.stop_ignored_in_homing) return;
   if ((activity_ == Activity::pt || activity_ == Activity::pv) && behaviour_.stop_ignored_in_pt_pv) return;
   stop_motion(emergency);
 }
 
-void SimulatedYkd2405pr::stop_motion(bool emergency) {
+void SimulatedDrive::stop_motion(bool emergency) {
   pending_.reset();
   multi_speed_on_ = false;
   segment_due_ = TimePoint::max();
@@ -115,7 +115,7 @@ void SimulatedYkd2405pr::stop_motion(bool emergency) {
 }
 
 /// No more pulses, and nothing goes on afterwards.
-void SimulatedYkd2405pr::cut() {
+void SimulatedDrive::cut() {
   pending_.reset();
   multi_speed_on_ = false;
   segment_due_ = TimePoint::max();
@@ -126,7 +126,7 @@ void SimulatedYkd2405pr::cut() {
   on_stopped();
 }
 
-void SimulatedYkd2405pr::on_stopped() {
+void SimulatedDrive::on_stopped() {
   if (pending_) {
     const auto plan = *pending_;
     // The braking may have carried it past the target.
@@ -143,21 +143,21 @@ void SimulatedYkd2405pr::on_stopped() {
   finish();
 }
 
-void SimulatedYkd2405pr::finish() {
+void SimulatedDrive::finish() {
   activity_ = Activity::none;
   stopping_ = false;
   if (behaviour_.in_position_after_stop) in_position_ = true;
 }
 
-bool SimulatedYkd2405pr::limit_active(int direction) const {
+bool SimulatedDrive::limit_active(int direction) const {
   return terminals_.active(direction > 0 ? Input::positive_limit : Input::negative_limit);
 }
 
-bool SimulatedYkd2405pr::blocked(int direction) const {
+bool SimulatedDrive::blocked(int direction) const {
   return memory_.get(reg::overtravel_stop) != 2 && limit_active(direction);
 }
 
-void SimulatedYkd2405pr::enforce_limits() {
+void SimulatedDrive::enforce_limits() {
   if (!motor_.moving()) return;
   if (activity_ == Activity::homing && phase_ != Phase::compensate) {
     homing_limits();
@@ -168,7 +168,7 @@ void SimulatedYkd2405pr::enforce_limits() {
   if (memory_.get(reg::overtravel_stop) == 0 && behaviour_.free_stop_releases) enabled_ = false;
 }
 
-void SimulatedYkd2405pr::on_edge(const InputEdge& edge) {
+void SimulatedDrive::on_edge(const InputEdge& edge) {
   const auto jog = [&](int direction) {
     if (edge.rising)
       begin(endless_plan(Activity::jog, direction));
@@ -226,13 +226,13 @@ void SimulatedYkd2405pr::on_edge(const InputEdge& edge) {
 }
 
 /// 7.3.2: the PINs must be valid 5 ms before and after the PT edge.
-void SimulatedYkd2405pr::select_segment() {
+void SimulatedDrive::select_segment() {
   segment_ = terminals_.segment();
   if (segment_ != 0 && now_ >= pins_changed_ + std::chrono::milliseconds(5))
     segment_due_ = now_ + std::chrono::milliseconds(5);
 }
 
-void SimulatedYkd2405pr::start_segment() {
+void SimulatedDrive::start_segment() {
   segment_due_ = TimePoint::max();
   const auto at = [&](std::uint16_t first) { return static_cast<std::uint16_t>(first + segment_ - 1); };
   const std::int64_t value = memory_.get_long(at(reg::segment_pulses_high), at(reg::segment_pulses_low));
@@ -247,7 +247,7 @@ void SimulatedYkd2405pr::start_segment() {
 
 /// 7.4: the speed follows the selection, with the time of the newly selected segment; without one the motor
 /// brakes.
-void SimulatedYkd2405pr::update_multi_speed() {
+void SimulatedDrive::update_multi_speed() {
   const int segment = multi_speed_on_ ? terminals_.segment() : 0;
   const auto at = [&](std::uint16_t first) { return static_cast<std::uint16_t>(first + segment - 1); };
   const int magnitude = segment == 0 ? 0 : memory_.get(at(reg::segment_pv_speed));
@@ -278,4 +278,4 @@ void SimulatedYkd2405pr::update_multi_speed() {
   motor_.run(direction, next);
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,15 +1,17 @@
-#include "devices/ykd2405pr/simulator_memory.hpp"
+#include "devices/yako_rtu/simulator_memory.hpp"
 
 #include <algorithm>
 
-namespace axisd::ykd2405pr {
+#include "devices/ykd2405pr/parameters.hpp"
+
+namespace axisd::yako_rtu {
 
 namespace {
 
 const ParameterSpec* find_register(std::uint32_t address) {
   static const auto by_address = [] {
     std::array<const ParameterSpec*, reg::last + 1> all{};
-    for (const auto& parameter : parameters()) all.at(parameter.address) = &parameter;
+    for (const auto& parameter : ykd2405pr::parameters()) all.at(parameter.address) = &parameter;
     return all;
   }();
   return address < by_address.size() ? by_address[address] : nullptr;
@@ -22,7 +24,7 @@ Fail missing(std::uint32_t address) { return address > reg::last ? Fail::beyond 
 
 Memory::Memory(const Behaviour& behaviour, const std::map<std::uint16_t, std::uint16_t>& eeprom)
     : behaviour_(&behaviour) {
-  for (const auto& parameter : parameters())
+  for (const auto& parameter : ykd2405pr::parameters())
     eeprom_.at(parameter.address) = static_cast<std::uint16_t>(parameter.default_value.value_or(0));
   for (const auto& [address, value] : eeprom) eeprom_.at(address) = value;
   power_up();
@@ -77,7 +79,7 @@ void Memory::write(std::uint16_t address, std::uint16_t value) {
 }
 
 void Memory::restore_factory() {
-  for (const auto& parameter : parameters()) {
+  for (const auto& parameter : ykd2405pr::parameters()) {
     if (parameter.access != Access::rw && parameter.access != Access::rw_saved) continue;
     eeprom_.at(parameter.address) = static_cast<std::uint16_t>(parameter.default_value.value_or(0));
     ++writes_;
@@ -86,11 +88,11 @@ void Memory::restore_factory() {
 }
 
 void Memory::save_all() {
-  for (const auto& parameter : parameters()) {
+  for (const auto& parameter : ykd2405pr::parameters()) {
     if (parameter.access != Access::rw && parameter.access != Access::rw_saved) continue;
     eeprom_.at(parameter.address) = ram_.at(parameter.address);
     ++writes_;
   }
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

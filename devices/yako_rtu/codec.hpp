@@ -7,7 +7,7 @@
 
 #include "devices/drive.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 /// Registers 0x0003..0x000C in one read.
 inline constexpr std::uint16_t state_count = 10;
@@ -27,4 +27,4 @@ HomingBlock encode(const HomingProfile& profile);
 /// The vendor's exception codes (6.2.4), which are not those of the Modbus standard.
 const char* exception_text(std::uint32_t code);
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

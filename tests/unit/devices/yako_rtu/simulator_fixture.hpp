@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "devices/simulation/crc.hpp"
-#include "devices/ykd2405pr/simulator.hpp"
+#include "devices/yako_rtu/simulator.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 
 using namespace std::chrono_literals;
 using Bytes = std::vector<std::uint8_t>;
@@ -45,11 +45,11 @@ inline std::string hex_of(const std::optional<Bytes>& bytes) {
 class Bench {
  public:
   explicit Bench(simulation::SimulatedNodeSettings settings = {})
-      : drive_(std::make_unique<SimulatedYkd2405pr>(std::move(settings))) {
+      : drive_(std::make_unique<SimulatedDrive>(std::move(settings))) {
     drive_->advance(now_);
   }
 
-  SimulatedYkd2405pr& drive() { return *drive_; }
+  SimulatedDrive& drive() { return *drive_; }
   void wait(Duration duration) {
     now_ += duration;
     drive_->advance(now_);
@@ -122,7 +122,7 @@ class Bench {
   }
 
   TimePoint now_{1s};
-  std::unique_ptr<SimulatedYkd2405pr> drive_;
+  std::unique_ptr<SimulatedDrive> drive_;
 };
 
 inline simulation::SimulatedNodeSettings with_switch(std::string name, bool on = true) {
@@ -131,4 +131,4 @@ inline simulation::SimulatedNodeSettings with_switch(std::string name, bool on =
   return settings;
 }
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

@@ -1,7 +1,7 @@
 // Power cycle, EEPROM rules (6.1), alarms and their reset rules (chapter 8).
-#include "tests/unit/devices/ykd2405pr/simulator_fixture.hpp"
+#include "tests/unit/devices/yako_rtu/simulator_fixture.hpp"
 
-namespace axisd::ykd2405pr {
+namespace axisd::yako_rtu {
 namespace {
 
 TEST(SimulatorPower, APowerCycleLosesRamPositionAndHoming) {
@@ -101,7 +101,7 @@ TEST(SimulatorEeprom, SaveAllKeepsTheMotionParametersToo) {
 TEST(SimulatorEeprom, FactoryResetRestoresRamAndEeprom) {
   simulation::SimulatedNodeSettings settings;
   settings.address = 40;
-  SimulatedYkd2405pr drive{settings};
+  SimulatedDrive drive{settings};
   EXPECT_EQ(40, drive.address());
   drive.advance(TimePoint{1s});
   Bytes frame{40, 6, 0, 0x2B, 0, 1};
@@ -164,4 +164,4 @@ TEST(SimulatorAlarms, LockTheMotorUnlessTheSwitchReleasesIt) {
 }
 
 }  // namespace
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu

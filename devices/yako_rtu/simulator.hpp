@@ -11,20 +11,18 @@
 
 #include "devices/simulation/simulated_node.hpp"
 #include "devices/simulation/simulator.hpp"
-#include "devices/ykd2405pr/simulator_memory.hpp"
-#include "devices/ykd2405pr/simulator_motor.hpp"
-#include "devices/ykd2405pr/simulator_switches.hpp"
-#include "devices/ykd2405pr/simulator_terminals.hpp"
+#include "devices/yako_rtu/simulator_memory.hpp"
+#include "devices/yako_rtu/simulator_motor.hpp"
+#include "devices/yako_rtu/simulator_switches.hpp"
+#include "devices/yako_rtu/simulator_terminals.hpp"
 
-namespace axisd::ykd2405pr {
-
-std::span<const simulation::Simulator> simulators();
+namespace axisd::yako_rtu {
 
 /// Pure, in the time given to advance(); events within it happen at their exact times. Address up to 31 is
 /// set by the DIP switches, above by 0x0013. Throws std::invalid_argument for an unknown switch.
-class SimulatedYkd2405pr final : public simulation::SimulatedRtuNode {
+class SimulatedDrive final : public simulation::SimulatedRtuNode {
  public:
-  explicit SimulatedYkd2405pr(simulation::SimulatedNodeSettings settings);
+  explicit SimulatedDrive(simulation::SimulatedNodeSettings settings);
 
   [[nodiscard]] std::uint8_t address() const override { return node_; }
   void advance(TimePoint now) override;
@@ -129,4 +127,4 @@ class SimulatedYkd2405pr final : public simulation::SimulatedRtuNode {
   int homing_turns_ = 0;
 };
 
-}  // namespace axisd::ykd2405pr
+}  // namespace axisd::yako_rtu
