@@ -45,6 +45,9 @@ struct ParameterSpec {
   std::optional<std::int32_t> default_value;
   std::string_view unit;
   std::string_view description;
+  /// Of a trigger register (wo) the RPC that does what it does, "AxisService.Stop": such a register is never
+  /// written as a parameter. Empty for all others.
+  std::string_view instead = {};
 };
 
 /// How an alarm goes away.

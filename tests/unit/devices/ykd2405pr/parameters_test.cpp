@@ -55,6 +55,12 @@ TEST(Parameters, CorrectTheMisprintsOfTheManual) {
   EXPECT_EQ("segment_16_pv_speed", find(0xEF)->name);
 }
 
+TEST(Parameters, PointFromEveryTriggerRegisterToTheRpcThatDoesIt) {
+  for (const auto& one : parameters()) EXPECT_EQ(one.access == Access::wo, !one.instead.empty()) << one.name;
+  EXPECT_EQ("AxisService.Stop", find(reg::stop)->instead);
+  EXPECT_EQ("AxisService.Home", find(0x30)->instead);
+}
+
 TEST(Parameters, HaveDefaultsWithinTheirRangeExceptTheSegmentTimes) {
   for (const auto& one : parameters()) {
     const bool segment_time = one.address >= reg::segment_time && one.address < reg::segment_time + 16;
