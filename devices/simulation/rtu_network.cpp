@@ -33,8 +33,22 @@ void append(ReplyPlan& plan, std::span<const std::uint8_t> bytes, TimePoint begi
 
 RtuNetwork::RtuNetwork(RtuNetworkSettings settings) : settings_(settings) {}
 
+void RtuNetwork::set_serial(const Serial& serial) {
+  if (!serial_)
+    for (const auto& node : nodes_) node->join(serial);
+  serial_ = serial;
+  settings_.baud = serial.baud;
+  settings_.bits_per_character = serial.format.bits_per_character();
+}
+
+bool RtuNetwork::hears(const SimulatedRtuNode& node) const {
+  const auto own = serial_ ? node.serial() : std::nullopt;
+  return !own || own->fits(*serial_);
+}
+
 SimulatedRtuNode& RtuNetwork::add(std::unique_ptr<SimulatedRtuNode> node) {
   node->advance(now_);
+  if (serial_) node->join(*serial_);
   return *nodes_.emplace_back(std::move(node));
 }
 
@@ -68,6 +82,7 @@ void RtuNetwork::pass_time(TimePoint now) {
 std::optional<std::vector<std::uint8_t>> RtuNetwork::dispatch(std::span<const std::uint8_t> frame) {
   std::optional<std::vector<std::uint8_t>> reply;
   for (const auto& node : nodes_) {
+    if (!hears(*node)) continue;
     const auto one = node->on_frame(frame);
     if (!one) continue;
     if (!reply) {

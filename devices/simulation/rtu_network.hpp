@@ -46,6 +46,11 @@ class RtuNetwork {
  public:
   explicit RtuNetwork(RtuNetworkSettings settings = {});
 
+  /// What the master has set its side to, from now on: times follow it, and nodes with other settings hear
+  /// garbage. Before the first call every node hears the line.
+  void set_serial(const Serial& serial);
+  [[nodiscard]] const std::optional<Serial>& serial() const { return serial_; }
+
   SimulatedRtuNode& add(std::unique_ptr<SimulatedRtuNode> node);
   [[nodiscard]] std::span<const std::unique_ptr<SimulatedRtuNode>> nodes() const { return nodes_; }
   /// nullptr if nobody has this address now.
@@ -90,10 +95,12 @@ class RtuNetwork {
   std::optional<ReplyPlan> plan(std::span<const std::uint8_t> request, TimePoint request_end,
                                 const std::vector<Fault>& faults,
                                 std::optional<std::vector<std::uint8_t>> reply);
+  [[nodiscard]] bool hears(const SimulatedRtuNode& node) const;
   void reboot(std::span<const std::uint8_t> request, Duration off_time);
   void pass_time(TimePoint now);
 
   RtuNetworkSettings settings_;
+  std::optional<Serial> serial_;
   std::vector<std::unique_ptr<SimulatedRtuNode>> nodes_;
   FaultPlan faults_;
   std::vector<Return> returns_;  ///< supplies that come back

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "buses/clock.hpp"
+#include "buses/modbus_rtu/settings.hpp"
 
 namespace axisd::simulation {
 
@@ -18,11 +19,28 @@ namespace axisd::simulation {
 /// Each simulator documents which names it understands and their default. Set before the first frame.
 using Switches = std::map<std::string, bool, std::less<>>;
 
+/// Serial settings of one side of a line. What is sent with other settings than the receiver's is garbage to
+/// it.
+struct Serial {
+  int baud = 115200;  ///< bit/s
+  modbus_rtu::Format format{};
+  bool parity_hidden = false;  ///< nobody can tell its parity (a pty drops it): any parity fits
+  [[nodiscard]] bool fits(const Serial& other) const {
+    return baud == other.baud && format.stop_bits == other.format.stop_bits &&
+           (parity_hidden || other.parity_hidden || format.parity == other.format.parity);
+  }
+};
+
 /// One node on an RS-485 line. Not thread-safe: owned by its line.
 class SimulatedRtuNode {
  public:
   virtual ~SimulatedRtuNode() = default;
   [[nodiscard]] virtual std::uint8_t address() const = 0;
+  /// What it listens with since its last power-up; nothing: with whatever the line has.
+  [[nodiscard]] virtual std::optional<Serial> serial() const { return std::nullopt; }
+  /// It is put on a line with these settings: what its own settings leave open becomes like them, as if
+  /// somebody had set its switches and registers for this line.
+  virtual void join(const Serial& /*line*/) {}
   /// Lets time pass until `now` (motor, timers, alarms). Calls never go backwards.
   virtual void advance(TimePoint now) = 0;
   /// A complete frame on the wire, for any node, ending at the time of the last advance(). The reply, or
@@ -38,6 +56,10 @@ class SimulatedRtuNode {
   [[nodiscard]] virtual bool has_input(std::string_view) const { return true; }
   /// Raises alarm `code` (0: the cause goes away).
   virtual void raise_alarm(int code) = 0;
+  /// Alarm codes that the model has.
+  [[nodiscard]] virtual std::span<const int> alarms() const { return {}; }
+  /// Holds the shaft (a collision), or lets it go.
+  virtual void block_shaft(bool /*blocked*/) {}
   /// Position of the virtual machine in pulses, independent of the drive's counter: where the load really is.
   [[nodiscard]] virtual std::int64_t shaft_pulses() const = 0;
   [[nodiscard]] virtual bool shaft_moving() const = 0;
@@ -67,7 +89,14 @@ struct Wire {
 };
 
 struct SimulatedNodeSettings {
+  /// Within the range of the address switches they are set to it, else they are all off and the custom
+  /// address (0x0013) holds it.
   std::uint8_t address = 1;
+  /// The address switches, if they are to stand elsewhere: 0 is all off, so that 0x0013 counts alone.
+  std::optional<std::uint8_t> dip_address{};
+  /// The baud rate switches: bit/s, or 0 for "custom" (0x0014 counts). Nothing: as the line that the node
+  /// joins, and so are 0x0014 and 0x0015 unless `eeprom` holds them.
+  std::optional<int> dip_baud{};
   Mechanics mechanics{};
   Switches switches{};
   bool powered = true;
