@@ -1,0 +1,64 @@
+// What happened on a machine, in order: kept for a while, so that a client that was away can catch up.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "buses/error.hpp"
+#include "devices/axis/snapshot.hpp"
+
+namespace axisd {
+
+/// A terminal changed between two samples (M29). Pulses shorter than the refresh period are not seen.
+struct TerminalEdge {
+  std::string terminal;  ///< "X0", "Y1"
+  std::string function;  ///< as configured; empty without one
+  bool active = false;   ///< after the edge
+  WallTime after{};      ///< it was still the other way then (the request of the previous sample)
+  WallTime before{};     ///< it was seen then
+};
+
+struct StateChange {
+  AxisState from = AxisState::disabled, to = AxisState::disabled;
+  MotionCause cause = MotionCause::none;  ///< of a motion that begins
+};
+
+struct LinkChange {
+  LinkState to = LinkState::offline;
+  std::string detail;  ///< why it is not online
+};
+
+/// The drive no longer holds what the configuration says; or holds it again (`text` empty).
+struct ConfigurationDrift {
+  std::string text;
+};
+
+using EventContent = std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift>;
+
+struct Event {
+  std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon
+  WallTime at{};
+  std::string axis;
+  EventContent content;
+};
+
+/// Thread: any.
+class EventSource {
+ public:
+  struct Batch {
+    std::vector<Event> events;  ///< oldest first
+    std::uint64_t lost = 0;     ///< events after the cursor that are no longer kept
+    std::uint64_t newest = 0;   ///< sequence of the newest event of all
+  };
+  virtual ~EventSource() = default;
+  /// Events with a sequence above `cursor`, at most `most`.
+  [[nodiscard]] virtual Batch events_after(std::uint64_t cursor, std::size_t most) const = 0;
+  /// Called on the core thread after each event; must only hand over. Set once before serving.
+  virtual void on_event(std::function<void()> notify) = 0;
+};
+
+}  // namespace axisd
