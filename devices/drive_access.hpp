@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,8 @@ struct DriveInfo {
   std::optional<DriveIdentity> identity;  ///< nothing before the drive was reached
   std::uint64_t eeprom_writes = 0;        ///< registers saved, since the axis is known on this computer
   bool persist = false;                   ///< anything of the configuration is saved in the drive
+  /// By address: the key of the configuration that decides a parameter ("inputs.X0"). The others are free.
+  std::map<std::uint32_t, std::string> configured_by{};
 };
 
 /// A new address or new serial settings for one drive. They count from its next power-up.
