@@ -25,7 +25,11 @@ void StopLane::drain() {
   for (const auto& serve : requests) serve();
 }
 
-CoreLoop::CoreLoop() : work_(boost::asio::make_work_guard(io_)), clock_(io_), lane_(io_.get_executor()) {}
+CoreLoop::CoreLoop()
+    : work_(boost::asio::make_work_guard(io_)), clock_(&own_clock_.emplace(io_)), lane_(io_.get_executor()) {}
+
+CoreLoop::CoreLoop(Clock& clock)
+    : work_(boost::asio::make_work_guard(io_)), clock_(&clock), lane_(io_.get_executor()) {}
 
 void CoreLoop::run() {
   last_progress_ = monotonic_now();
@@ -44,6 +48,11 @@ void CoreLoop::run() {
       if (took > longest_.load(std::memory_order_relaxed)) longest_.store(took, std::memory_order_relaxed);
     }
   }
+}
+
+bool CoreLoop::step(bool wait) {
+  lane_.drain();
+  return (wait ? io_.run_one() : io_.poll_one()) > 0;
 }
 
 void CoreLoop::stop() { io_.stop(); }

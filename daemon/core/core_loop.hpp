@@ -5,6 +5,7 @@
 #include <boost/asio/io_context.hpp>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "buses/asio_clock.hpp"
@@ -34,12 +35,17 @@ class StopLane {
 class CoreLoop {
  public:
   CoreLoop();
+  /// With a time of its own, which must outlive the loop; whoever lets it pass calls step() instead of run().
+  explicit CoreLoop(Clock& clock);
   [[nodiscard]] Executor executor() { return io_.get_executor(); }
-  [[nodiscard]] Clock& clock() { return clock_; }
+  [[nodiscard]] Clock& clock() { return *clock_; }
   [[nodiscard]] StopLane& lane() { return lane_; }
 
   /// Runs handlers until stop(). Thread: becomes the core thread.
   void run();
+  /// Serves stops that wait and one handler that is ready; with `wait` one that is yet to come. False: there
+  /// was none, or stop() was called. Thread: becomes the core thread.
+  bool step(bool wait = false);
   /// Thread: any.
   void stop();
   /// When the loop last came round. Thread: any.
@@ -52,7 +58,8 @@ class CoreLoop {
  private:
   boost::asio::io_context io_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
-  AsioClock clock_;
+  std::optional<AsioClock> own_clock_;
+  Clock* clock_;
   StopLane lane_;
   std::atomic<TimePoint> last_progress_{};
   std::atomic<Duration::rep> longest_{0};

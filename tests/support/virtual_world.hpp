@@ -1,17 +1,19 @@
 // A core thread without a thread: handlers and timers run in virtual time, as fast as the machine can.
 #pragma once
 
-#include <boost/asio/io_context.hpp>
+#include <atomic>
 #include <functional>
 
 #include "buses/clock.hpp"
 #include "buses/task.hpp"
+#include "daemon/core/core_loop.hpp"
 
 namespace axisd::test {
 
 class VirtualClock final : public Clock {
  public:
-  [[nodiscard]] TimePoint now() const override { return now_; }
+  /// Thread: any, as of the real clock.
+  [[nodiscard]] TimePoint now() const override { return now_.load(std::memory_order_relaxed); }
   [[nodiscard]] WallTime wall(TimePoint t) const override {
     return WallTime(std::chrono::duration_cast<WallTime::duration>(t.time_since_epoch()));
   }
@@ -23,12 +25,13 @@ class VirtualClock final : public Clock {
 
  private:
   void schedule(TimePoint) override {}
-  TimePoint now_ = TimePoint(std::chrono::hours(1));
+  std::atomic<TimePoint> now_{TimePoint(std::chrono::hours(1))};
 };
 
 class VirtualWorld {
  public:
-  [[nodiscard]] Executor executor() { return io_.get_executor(); }
+  [[nodiscard]] core::CoreLoop& loop() { return loop_; }
+  [[nodiscard]] Executor executor() { return loop_.executor(); }
   [[nodiscard]] VirtualClock& clock() { return clock_; }
   [[nodiscard]] TimePoint now() const { return clock_.now(); }
 
@@ -41,9 +44,8 @@ class VirtualWorld {
   bool run_until(const std::function<bool()>& done, Duration limit) {
     const auto end = clock_.now() + limit;
     for (;;) {
-      while (io_.poll_one() > 0)
+      while (loop_.step())
         if (done()) return true;
-      io_.restart();
       if (done()) return true;
       const auto next = clock_.next();
       if (next > end) break;
@@ -54,8 +56,8 @@ class VirtualWorld {
   }
 
  private:
-  boost::asio::io_context io_;
   VirtualClock clock_;
+  core::CoreLoop loop_{clock_};
 };
 
 }  // namespace axisd::test
