@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "devices/nearest.hpp"
+
 namespace axisd::config {
 
 /// Valid UTF-8 without control characters, shortened to about 60 characters.
@@ -15,8 +17,7 @@ std::string printable(std::string_view text);
 std::string quoted(std::string_view text);
 /// "a, b or c".
 std::string alternatives(std::span<const std::string_view> items);
-/// The candidate with the least edit distance, if it is near enough to be a typing error; else empty.
-std::string_view nearest(std::string_view text, std::span<const std::string_view> candidates);
+using axisd::nearest;
 /// "did you mean 'velocity'?", or "permitted: a, b or c" if nothing is near.
 std::string suggest(std::string_view text, std::span<const std::string_view> candidates);
 
