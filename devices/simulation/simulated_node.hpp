@@ -60,6 +60,8 @@ class SimulatedRtuNode {
   [[nodiscard]] virtual std::span<const int> alarms() const { return {}; }
   /// Holds the shaft (a collision), or lets it go.
   virtual void block_shaft(bool /*blocked*/) {}
+  /// The load turns the shaft by so many pulses. False: it does not give way (energised or blocked).
+  virtual bool push_shaft(std::int64_t /*pulses*/) { return false; }
   /// Position of the virtual machine in pulses, independent of the drive's counter: where the load really is.
   [[nodiscard]] virtual std::int64_t shaft_pulses() const = 0;
   [[nodiscard]] virtual bool shaft_moving() const = 0;

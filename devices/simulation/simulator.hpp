@@ -23,6 +23,9 @@ struct Simulator {
   std::unique_ptr<SimulatedRtuNode> (*make)(SimulatedNodeSettings settings) = nullptr;
   std::span<const SwitchSpec> switches{};
   std::span<const TerminalSpec> inputs{};
+  std::uint8_t maximum_node = 127;
+  std::uint8_t maximum_dip_address = 31;  ///< of the address switches
+  std::span<const int> dip_bauds{};       ///< bit/s that the baud rate switches can be set to
 };
 
 /// All simulated models, generated from the folders.

@@ -2,27 +2,52 @@
 #include "devices/yako_rtu/simulator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
+#include <utility>
 
 namespace axisd::yako_rtu {
 
 namespace {
 
-simulation::SimulatedNodeSettings with_defaults(simulation::SimulatedNodeSettings settings,
+using simulation::Serial;
+
+/// Its 4.4: the switches hold the address, or are all off, and 0x0013 counts.
+std::uint8_t dip_address(const SimulatedModel& model, const simulation::SimulatedNodeSettings& settings) {
+  return settings.dip_address.value_or(settings.address <= model.maximum_dip_address ? settings.address : 0);
+}
+
+simulation::SimulatedNodeSettings with_defaults(const SimulatedModel& model,
+                                                simulation::SimulatedNodeSettings settings,
                                                 const Behaviour& behaviour) {
-  if (behaviour.model_code_0302) settings.eeprom.try_emplace(reg::model, 0x0302);
-  if (settings.address > 31) settings.eeprom.try_emplace(reg::custom_node, settings.address);
+  if (behaviour.other_model_code) settings.eeprom.try_emplace(reg::model, model.other_model_code);
+  settings.dip_address = dip_address(model, settings);
+  if (settings.dip_address == 0) settings.eeprom.try_emplace(reg::custom_node, settings.address);
   return settings;
 }
 
+// Codes of 0x0015 (6.1).
+constexpr std::array<modbus_rtu::Format, 4> formats{{{.parity = modbus_rtu::Parity::none, .stop_bits = 1},
+                                                     {.parity = modbus_rtu::Parity::none, .stop_bits = 2},
+                                                     {.parity = modbus_rtu::Parity::even, .stop_bits = 1},
+                                                     {.parity = modbus_rtu::Parity::odd, .stop_bits = 1}}};
+
 }  // namespace
 
-SimulatedDrive::SimulatedDrive(simulation::SimulatedNodeSettings settings)
-    : behaviour_(behaviour_from(settings.switches)),
-      settings_(with_defaults(std::move(settings), behaviour_)),
-      memory_(behaviour_, settings_.eeprom),
-      terminals_(behaviour_, settings_) {
-  node_ = settings_.address;
+std::unique_ptr<simulation::SimulatedRtuNode> make_simulated_drive(
+    const SimulatedModel& model, simulation::SimulatedNodeSettings settings) {
+  return std::make_unique<SimulatedDrive>(model, std::move(settings));
+}
+
+SimulatedDrive::SimulatedDrive(const SimulatedModel& model, simulation::SimulatedNodeSettings settings)
+    : model_(&model),
+      behaviour_(behaviour_from(model, settings.switches)),
+      settings_(with_defaults(model, std::move(settings), behaviour_)),
+      memory_(model, behaviour_, settings_.eeprom),
+      terminals_(model, behaviour_, settings_),
+      node_(settings_.address),
+      dip_baud_(settings_.dip_baud) {
   if (!settings_.powered) return;
   power_up();
   boot_end_.reset();
@@ -33,10 +58,16 @@ void SimulatedDrive::power_up() {
   boot_end_ = now_ + settings_.boot_time;
   memory_.power_up();
   motor_.power_up();
-  // 4.4: the DIP switches give 1..31; all off, 0x0013 counts, and only its values above 31 are defined.
   const auto custom = memory_.get(reg::custom_node);
-  node_ = settings_.address <= 31 ? settings_.address : static_cast<std::uint8_t>(custom > 31 ? custom : 0);
-  control_mode_ = memory_.get(reg::control_mode);
+  const bool defined = custom >= model_->first_custom_address && custom <= model_->last_custom_address;
+  const std::uint8_t fallback =
+      behaviour_.undefined_address_is_1 ? std::uint8_t{1} : model_->undefined_custom_address;
+  node_ = *settings_.dip_address != 0 ? *settings_.dip_address
+          : defined                   ? static_cast<std::uint8_t>(custom)
+                                      : fallback;
+  set_serial();
+  control_mode_ = model_->pulse_input ? memory_.get(reg::control_mode) : std::uint16_t{0};
+  open_loop_ = memory_.get(reg::loop_mode) == 1;
   enabled_ = behaviour_.enabled_at_power_up;
   in_position_ = behaviour_.in_position_at_power_up;
   homed_ = false;
@@ -45,6 +76,31 @@ void SimulatedDrive::power_up() {
   multi_speed_on_ = stopping_ = false;
   segment_due_ = TimePoint::max();
   terminals_.settle(motor_.shaft(), memory_);
+}
+
+/// 6.1: 0x0014 and 0x0015 count from the next power-up; 4.4: the switches before 0x0014.
+void SimulatedDrive::set_serial() {
+  if (!dip_baud_) return;
+  const auto custom = model_->custom_bauds.at(memory_.get(reg::custom_baud) & 3U);
+  serial_ = Serial{.baud = *dip_baud_ != 0 ? *dip_baud_ : custom,
+                   .format = formats.at(memory_.get(reg::serial_format) & 3U)};
+}
+
+void SimulatedDrive::join(const Serial& line) {
+  if (settings_.dip_baud) return;
+  dip_baud_ = std::ranges::find(model_->dip_bauds, line.baud) != model_->dip_bauds.end() ? line.baud : 0;
+  const auto preset = [&](std::uint16_t address, auto index) {
+    if (index < 4 && !settings_.eeprom.contains(address))
+      memory_.preset(address, static_cast<std::uint16_t>(index));
+  };
+  if (*dip_baud_ == 0)
+    preset(reg::custom_baud,
+           std::ranges::find(model_->custom_bauds, line.baud) - model_->custom_bauds.begin());
+  preset(reg::serial_format, std::ranges::find_if(formats, [&](const modbus_rtu::Format& one) {
+                               return one.parity == line.format.parity &&
+                                      one.stop_bits == line.format.stop_bits;
+                             }) - formats.begin());
+  set_serial();
 }
 
 void SimulatedDrive::set_power(bool on) {
@@ -71,13 +127,14 @@ TimePoint SimulatedDrive::next_event() const {
   if (motor_.moving()) {
     const auto change = terminals_.next_switch(motor_.shaft(), motor_.direction());
     if (change) next = std::min(next, motor_.reaches(*change));
+    if (in_control()) next = std::min(next, motor_.lags(deviation_limit()));
   }
   return next;
 }
 
 void SimulatedDrive::step(TimePoint now) {
   now_ = now;
-  const bool ended = motor_.advance(now);
+  const bool ended = motor_.advance(now, in_control());
   if (boot_end_ && now >= *boot_end_) {
     boot_end_.reset();
     terminals_.settle(motor_.shaft(), memory_);
@@ -85,6 +142,7 @@ void SimulatedDrive::step(TimePoint now) {
   if (!ready()) return;
   for (const auto& edge : terminals_.sample(now, motor_.shaft(), memory_)) on_edge(edge);
   if (motor_.moving() && !enabled()) cut();
+  if (in_control() && std::llabs(motor_.lag()) >= deviation_limit()) show_alarm(5);
   enforce_limits();
   if (ended && !motor_.moving()) on_stopped();
   if (segment_due_ <= now) start_segment();
@@ -97,7 +155,7 @@ void SimulatedDrive::set_input(std::string_view terminal, std::optional<bool> ac
 }
 
 bool SimulatedDrive::has_input(std::string_view terminal) const {
-  return std::ranges::find(Terminals::names(), terminal, &TerminalSpec::name) != Terminals::names().end();
+  return std::ranges::find(model_->inputs, terminal, &TerminalSpec::name) != model_->inputs.end();
 }
 
 void SimulatedDrive::raise_alarm(int code) {
@@ -107,10 +165,36 @@ void SimulatedDrive::raise_alarm(int code) {
     return;
   }
   cause_ = code == 2 || code == 3 ? code : 0;
-  if (!powered_) return;
+  if (powered_) show_alarm(code);
+}
+
+void SimulatedDrive::show_alarm(int code) {
+  if (alarm_ == 1 || alarm_ == 5) return;  // chapter 8: stays until the next power-up
   alarm_ = code;
   cut();
   if (behaviour_.alarm_releases) enabled_ = false;
+}
+
+void SimulatedDrive::block_shaft(bool blocked) {
+  motor_.block(blocked);
+  step(now_);
+}
+
+bool SimulatedDrive::push_shaft(std::int64_t pulses) {
+  if (motor_.blocked() || (ready() && enabled())) return false;
+  motor_.push(pulses, ready() && closed_loop() && !behaviour_.released_position_frozen);
+  step(now_);
+  return true;
+}
+
+/// In pulses. 0x0116 gives no unit: taken as counts of the encoder, so that its default is one revolution.
+std::int64_t SimulatedDrive::deviation_limit() const {
+  const std::int64_t counts = memory_.get(reg::encoder_resolution) == 1 ? 10000 : 4000;
+  return memory_.get(reg::deviation_threshold) * std::int64_t{memory_.pulses_per_revolution()} / counts + 1;
+}
+
+std::int32_t SimulatedDrive::position() const {
+  return closed_loop() && !behaviour_.position_is_commanded ? motor_.encoder() : motor_.counter();
 }
 
 void SimulatedDrive::clear_alarm() {
@@ -129,22 +213,25 @@ std::uint16_t SimulatedDrive::status() const {
 }
 
 bool SimulatedDrive::output_active(int index) const {
-  switch (memory_.get(static_cast<std::uint16_t>(reg::first_output_function + index))) {
-    case 1:
+  const auto code = memory_.get(static_cast<std::uint16_t>(reg::first_output_function + index));
+  // The range of the registers goes on beyond the functions that the table lists.
+  switch (code < model_->output_functions.size() ? model_->output_functions[code] : Output::none) {
+    case Output::alarm:
       return alarm_ != 0;
-    case 2:
+    case Output::brake:
       return enabled();  // what the brake does is not said: here active lets the motor turn
-    case 3:
+    case Output::moving:
       return motor_.moving();
-    case 4:
+    case Output::homed:
       return homed_;
-    case 5:
+    case Output::in_position:
       return in_position_;
-    case 6:
+    case Output::pt_mode:
       return activity_ == Activity::pt;
-    default:
-      return false;
+    case Output::none:
+      break;
   }
+  return false;
 }
 
 bool SimulatedDrive::output_level(int index) const {
@@ -152,7 +239,7 @@ bool SimulatedDrive::output_level(int index) const {
 }
 
 std::uint16_t SimulatedDrive::peek(std::uint16_t address) const {
-  const auto counter = static_cast<std::uint32_t>(motor_.counter());
+  const auto counter = static_cast<std::uint32_t>(position());
   switch (address) {
     case reg::node:
       return node_;
@@ -173,7 +260,7 @@ std::uint16_t SimulatedDrive::peek(std::uint16_t address) const {
       return terminals_.bits();
     case reg::outputs: {
       unsigned bits = 0;
-      for (int i = 0; i < 4; ++i) bits |= output_active(i) ? 1U << i : 0U;
+      for (int i = 0; i < model_->outputs; ++i) bits |= output_active(i) ? 1U << i : 0U;
       return static_cast<std::uint16_t>(bits);
     }
     case reg::position_high:
@@ -185,13 +272,14 @@ std::uint16_t SimulatedDrive::peek(std::uint16_t address) const {
       return static_cast<std::uint16_t>(behaviour_.unsigned_speed ? rpm : rpm * motor_.direction());
     }
     default:
-      return address <= reg::last ? memory_.get(address) : 0;
+      return address <= model_->last ? memory_.get(address) : 0;
   }
 }
 
 void SimulatedDrive::poke(std::uint16_t address, std::uint16_t value) {
-  if (address > reg::last) return;
+  if (address > model_->last) return;
   memory_.poke(address, value);
+  if (address == reg::loop_mode && !behaviour_.loop_mode_from_power_up) open_loop_ = value == 1;
   configuration_changed();
 }
 

@@ -1,4 +1,5 @@
-// The YKD2405PR as its manual describes it, at register level; nothing here knows the driver.
+// A drive of the family as the manual of its model describes it, at register level; nothing here knows the
+// driver.
 #pragma once
 
 #include <cstdint>
@@ -18,26 +19,31 @@
 
 namespace axisd::yako_rtu {
 
-/// Pure, in the time given to advance(); events within it happen at their exact times. Address up to 31 is
-/// set by the DIP switches, above by 0x0013. Throws std::invalid_argument for an unknown switch.
+/// Pure, in the time given to advance(); events within it happen at their exact times. `model` must outlive
+/// it. Throws std::invalid_argument for a switch that the model does not have.
 class SimulatedDrive final : public simulation::SimulatedRtuNode {
  public:
-  explicit SimulatedDrive(simulation::SimulatedNodeSettings settings);
+  SimulatedDrive(const SimulatedModel& model, simulation::SimulatedNodeSettings settings);
 
   [[nodiscard]] std::uint8_t address() const override { return node_; }
+  [[nodiscard]] std::optional<simulation::Serial> serial() const override { return serial_; }
+  void join(const simulation::Serial& line) override;
   void advance(TimePoint now) override;
   std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) override;
   void set_power(bool on) override;
   void set_input(std::string_view terminal, std::optional<bool> active) override;
   [[nodiscard]] bool has_input(std::string_view terminal) const override;
   void raise_alarm(int code) override;
+  [[nodiscard]] std::span<const int> alarms() const override { return model_->alarms; }
+  void block_shaft(bool blocked) override;
+  bool push_shaft(std::int64_t pulses) override;
   [[nodiscard]] std::int64_t shaft_pulses() const override { return motor_.shaft(); }
-  [[nodiscard]] bool shaft_moving() const override { return motor_.moving(); }
+  [[nodiscard]] bool shaft_moving() const override { return motor_.moving() && !motor_.blocked(); }
   [[nodiscard]] int starts() const override { return starts_; }
   [[nodiscard]] std::uint16_t peek(std::uint16_t address) const override;
   void poke(std::uint16_t address, std::uint16_t value) override;
   [[nodiscard]] std::uint64_t eeprom_writes() const override { return memory_.eeprom_writes(); }
-  /// Electrical level of Y0..Y3 (`index` 0..3), inversion by 0x004B included.
+  /// Electrical level of Y0.. (`index` 0..), inversion by 0x004B included.
   [[nodiscard]] bool output_level(int index) const;
 
  private:
@@ -58,7 +64,14 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   [[nodiscard]] bool enabled() const { return enabled_ && !terminals_.active(Input::motor_free); }
   [[nodiscard]] std::uint16_t status() const;
   [[nodiscard]] bool output_active(int index) const;
+  [[nodiscard]] bool closed_loop() const { return model_->closed_loop && !open_loop_; }
+  /// A closed loop that has the motor: the shaft follows the pulses.
+  [[nodiscard]] bool in_control() const { return closed_loop() && ready() && enabled() && alarm_ == 0; }
+  [[nodiscard]] std::int64_t deviation_limit() const;
+  [[nodiscard]] std::int32_t position() const;
   void power_up();
+  void set_serial();
+  void show_alarm(int code);
   void clear_alarm();
   void configuration_changed();
 
@@ -96,8 +109,12 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   void homing_stopped();
   void homing_run(int direction, double rpm);
   void homing_reached();
+  void approach();
   [[nodiscard]] Input homing_reference() const;
+  [[nodiscard]] bool homing_ends_forwards() const;
+  [[nodiscard]] int approach_direction() const;
 
+  const SimulatedModel* model_;
   Behaviour behaviour_;
   simulation::SimulatedNodeSettings settings_;
   Memory memory_;
@@ -105,9 +122,12 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   Motor motor_;
   TimePoint now_{};
   std::uint8_t node_ = 0;
+  std::optional<simulation::Serial> serial_;  ///< since the last power-up; nothing: never joined a line
+  std::optional<int> dip_baud_;               ///< its switches; 0: "custom"
   bool powered_ = false;
   std::optional<TimePoint> boot_end_;
   std::uint16_t control_mode_ = 0;  ///< as it was at power-up (0x0018)
+  bool open_loop_ = false;          ///< 0x0012 of the models with an encoder
   bool enabled_ = false, in_position_ = false, homed_ = false;
   int alarm_ = 0, cause_ = 0;  ///< shown; 2 or 3 while the supply voltage is wrong
   int starts_ = 0;

@@ -10,6 +10,15 @@ Input SimulatedDrive::homing_reference() const {
   return mode == 2 ? Input::positive_limit : mode == 3 ? Input::negative_limit : Input::home;
 }
 
+/// Mode 1 ends forwards on some models (7.5): its search passes the switch, the slow approach comes back to
+/// it.
+bool SimulatedDrive::homing_ends_forwards() const {
+  return memory_.get(reg::homing_mode) == 1 &&
+         model_->homing_mode_1_ends_forwards != behaviour_.homing_mode_1_other_approach;
+}
+
+int SimulatedDrive::approach_direction() const { return homing_ends_forwards() ? 1 : homing_direction_; }
+
 void SimulatedDrive::homing_run(int direction, double rpm) {
   const double time = memory_.get(reg::homing_time);
   motor_.run(direction, rates(rpm, time, time));
@@ -30,7 +39,7 @@ Fail SimulatedDrive::start_homing() {
   homing_turns_ = 0;
   if (behaviour_.homing_accepts_active_switch && terminals_.active(homing_reference())) {
     phase_ = Phase::back_off;
-    homing_run(-homing_direction_, memory_.get(reg::homing_search_speed));
+    homing_run(-approach_direction(), memory_.get(reg::homing_search_speed));
     return Fail::none;
   }
   phase_ = Phase::search;
@@ -46,7 +55,7 @@ void SimulatedDrive::homing_edge(const InputEdge& edge) {
   } else if (phase_ == Phase::back_off && !edge.rising) {
     phase_ = Phase::left;
     motor_.brake();
-  } else if (phase_ == Phase::approach && edge.rising) {
+  } else if (phase_ == Phase::approach && (edge.rising || behaviour_.homing_mode_1_either_edge)) {
     motor_.stop(false);  // slow enough to stop at once, on the pulse
     homing_reached();
   }
@@ -69,6 +78,11 @@ void SimulatedDrive::homing_limits() {
   }
 }
 
+void SimulatedDrive::approach() {
+  phase_ = Phase::approach;
+  homing_run(approach_direction(), memory_.get(reg::homing_search_speed));
+}
+
 void SimulatedDrive::homing_stopped() {
   switch (phase_) {
     case Phase::turn:
@@ -76,25 +90,29 @@ void SimulatedDrive::homing_stopped() {
         finish();
         break;
       }
-      if (behaviour_.homing_same_edge && homing_turns_ % 2 == 1) {
+      if (behaviour_.homing_same_edge && !homing_ends_forwards() && homing_turns_ % 2 == 1) {
         phase_ =
             Phase::back_off;  // through the switch, until it has been left on the side where the search began
         homing_run(-homing_direction_, memory_.get(reg::homing_speed));
         break;
       }
-      if (!behaviour_.homing_same_edge) homing_direction_ = -homing_direction_;
+      if (!behaviour_.homing_same_edge || homing_ends_forwards()) homing_direction_ = -homing_direction_;
       phase_ = Phase::search;
       homing_run(homing_direction_, memory_.get(reg::homing_speed));
       break;
     case Phase::found:
+      if (homing_direction_ != approach_direction() &&
+          (!terminals_.active(Input::home) || behaviour_.homing_mode_1_either_edge)) {
+        approach();
+        break;
+      }
       phase_ = Phase::back_off;
       homing_run(
-          -homing_direction_,
+          -approach_direction(),
           memory_.get(behaviour_.back_off_at_homing_speed ? reg::homing_speed : reg::homing_search_speed));
       break;
     case Phase::left:
-      phase_ = Phase::approach;
-      homing_run(homing_direction_, memory_.get(reg::homing_search_speed));
+      approach();
       break;
     case Phase::compensate:
       if (!behaviour_.zero_before_compensation) motor_.clear_counter();

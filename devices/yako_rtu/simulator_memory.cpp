@@ -1,48 +1,67 @@
 #include "devices/yako_rtu/simulator_memory.hpp"
 
-#include <algorithm>
-
-#include "devices/ykd2405pr/parameters.hpp"
-
 namespace axisd::yako_rtu {
 
 namespace {
 
-const ParameterSpec* find_register(std::uint32_t address) {
-  static const auto by_address = [] {
-    std::array<const ParameterSpec*, reg::last + 1> all{};
-    for (const auto& parameter : ykd2405pr::parameters()) all.at(parameter.address) = &parameter;
-    return all;
-  }();
-  return address < by_address.size() ? by_address[address] : nullptr;
+std::uint16_t factory_value(const ParameterSpec& parameter) {
+  return static_cast<std::uint16_t>(parameter.default_value.value_or(0));
 }
 
-/// Above the last register it is "beyond the range" (04), in a hole "not allowed" (03): 6.2.4.
-Fail missing(std::uint32_t address) { return address > reg::last ? Fail::beyond : Fail::address; }
+bool can_be_saved(const ParameterSpec* parameter) {
+  return parameter != nullptr && (parameter->access == Access::rw || parameter->access == Access::rw_saved);
+}
 
 }  // namespace
 
-Memory::Memory(const Behaviour& behaviour, const std::map<std::uint16_t, std::uint16_t>& eeprom)
-    : behaviour_(&behaviour) {
-  for (const auto& parameter : ykd2405pr::parameters())
-    eeprom_.at(parameter.address) = static_cast<std::uint16_t>(parameter.default_value.value_or(0));
+Memory::Memory(const SimulatedModel& model, const Behaviour& behaviour,
+               const std::map<std::uint16_t, std::uint16_t>& eeprom)
+    : model_(&model),
+      behaviour_(&behaviour),
+      first_input_function_(behaviour.other_input_functions ? model.other_first_input_function
+                                                            : model.first_input_function),
+      specs_(model.last + std::size_t{1}),
+      eeprom_(specs_.size()) {
+  for (const auto& parameter : model.parameters()) {
+    const auto input = parameter.address - model.first_input_function;
+    const bool is_input = parameter.address >= model.first_input_function && input < model.inputs.size();
+    const auto address = is_input ? first_input_function_ + input : parameter.address;
+    specs_.at(address) = &parameter;
+    eeprom_.at(address) = factory_value(parameter);
+  }
   for (const auto& [address, value] : eeprom) eeprom_.at(address) = value;
-  power_up();
+  ram_ = eeprom_;
 }
 
-Fail Memory::check_read(std::uint32_t address, std::uint32_t count) {
+void Memory::power_up() {
+  ram_ = eeprom_;
+  if (!behaviour_->inputs_undefined_at_power_up) return;
+  for (std::size_t i = 0; i < model_->inputs.size(); ++i) ram_.at(first_input_function_ + i) = 0;
+}
+
+const ParameterSpec* Memory::find(std::uint32_t address) const {
+  return address < specs_.size() ? specs_[address] : nullptr;
+}
+
+Fail Memory::missing(std::uint32_t address) const {
+  return address > model_->last ? Fail::beyond : Fail::address;
+}
+
+Fail Memory::check_read(std::uint32_t address, std::uint32_t count) const {
   if (count < 1 || count > 16)
     return Fail::count;  // before all else: the example of 6.2.4 crosses a hole, too
   for (auto at = address; at < address + count; ++at) {
-    const auto* parameter = find_register(at);
+    const auto* parameter = find(at);
     if (parameter == nullptr) return missing(at);
-    if (parameter->access == Access::wo) return Fail::access;
+    if (parameter->access != Access::wo) continue;
+    // The table prints RW for the commands but 0x0027, whose read 6.2.4 refuses.
+    if (at == reg::start || !behaviour_->commands_readable) return Fail::access;
   }
   return Fail::none;
 }
 
-Fail Memory::check_write(std::uint32_t address, std::uint16_t value) {
-  const auto* parameter = find_register(address);
+Fail Memory::check_write(std::uint32_t address, std::uint16_t value) const {
+  const auto* parameter = find(address);
   if (parameter == nullptr) return missing(address);
   if (parameter->access == Access::ro) return Fail::access;
   const auto within = [&](std::int32_t number) {
@@ -57,13 +76,14 @@ std::int32_t Memory::get_long(std::uint16_t high, std::uint16_t low) const {
 }
 
 int Memory::pulses_per_revolution() const {
-  static constexpr std::array<int, 16> table{200,  400,  800,  1600, 3200, 6400,  12800, 25600,
-                                             1000, 2000, 4000, 5000, 8000, 10000, 20000, 40000};
-  return table.at(get(reg::microstep) & 0x0FU);
+  return model_->pulses_per_revolution.at(get(reg::microstep) & 0x0FU);
 }
 
 bool Memory::goes_to_eeprom(std::uint16_t address) const {
-  if (find_register(address)->access != Access::rw_saved) return false;
+  const bool saved = address == reg::overtravel_stop
+                         ? model_->overtravel_saved || behaviour_->overtravel_stop_saved
+                         : find(address)->access == Access::rw_saved;
+  if (!saved) return false;
   if (address == reg::eeprom_update && behaviour_->eeprom_switch_saves_itself) return true;
   if (behaviour_->pv_speeds_always_saved && address >= reg::segment_pv_speed &&
       address < reg::segment_pv_speed + 16)
@@ -79,18 +99,18 @@ void Memory::write(std::uint16_t address, std::uint16_t value) {
 }
 
 void Memory::restore_factory() {
-  for (const auto& parameter : ykd2405pr::parameters()) {
-    if (parameter.access != Access::rw && parameter.access != Access::rw_saved) continue;
-    eeprom_.at(parameter.address) = static_cast<std::uint16_t>(parameter.default_value.value_or(0));
+  for (std::size_t address = 0; address < specs_.size(); ++address) {
+    if (!can_be_saved(specs_[address])) continue;
+    eeprom_[address] = factory_value(*specs_[address]);
     ++writes_;
   }
   ram_ = eeprom_;
 }
 
 void Memory::save_all() {
-  for (const auto& parameter : ykd2405pr::parameters()) {
-    if (parameter.access != Access::rw && parameter.access != Access::rw_saved) continue;
-    eeprom_.at(parameter.address) = ram_.at(parameter.address);
+  for (std::size_t address = 0; address < specs_.size(); ++address) {
+    if (!can_be_saved(specs_[address])) continue;
+    eeprom_[address] = ram_[address];
     ++writes_;
   }
 }

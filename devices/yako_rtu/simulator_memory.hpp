@@ -1,11 +1,12 @@
 // Registers and EEPROM of the simulated drive: addresses, ranges, attributes (manual 6.1, 6.2.4).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
+#include <vector>
 
 #include "devices/yako_rtu/registers.hpp"
+#include "devices/yako_rtu/simulator_model.hpp"
 #include "devices/yako_rtu/simulator_switches.hpp"
 
 namespace axisd::yako_rtu {
@@ -25,13 +26,17 @@ enum class Fail : std::uint8_t {
 class Memory {
  public:
   /// `eeprom` holds what differs from the factory's settings.
-  Memory(const Behaviour& behaviour, const std::map<std::uint16_t, std::uint16_t>& eeprom);
+  Memory(const SimulatedModel& model, const Behaviour& behaviour,
+         const std::map<std::uint16_t, std::uint16_t>& eeprom);
 
   /// RAM becomes what the EEPROM holds.
-  void power_up() { ram_ = eeprom_; }
+  void power_up();
+  [[nodiscard]] std::uint16_t last() const { return model_->last; }
+  /// Register with the function of the first input.
+  [[nodiscard]] std::uint16_t first_input_function() const { return first_input_function_; }
   /// May `count` registers from `address` be read, or may `value` be written to `address`?
-  [[nodiscard]] static Fail check_read(std::uint32_t address, std::uint32_t count);
-  [[nodiscard]] static Fail check_write(std::uint32_t address, std::uint16_t value);
+  [[nodiscard]] Fail check_read(std::uint32_t address, std::uint32_t count) const;
+  [[nodiscard]] Fail check_write(std::uint32_t address, std::uint16_t value) const;
 
   [[nodiscard]] std::uint16_t get(std::uint16_t address) const { return ram_.at(address); }
   /// The value as the signed 16-bit number that some registers hold.
@@ -46,16 +51,24 @@ class Memory {
   void write(std::uint16_t address, std::uint16_t value);
   /// Past all rules, RAM only.
   void poke(std::uint16_t address, std::uint16_t value) { ram_.at(address) = value; }
+  /// As somebody left it: RAM and EEPROM, not counted as a write.
+  void preset(std::uint16_t address, std::uint16_t value) { ram_.at(address) = eeprom_.at(address) = value; }
   void restore_factory();
   void save_all();
   [[nodiscard]] std::uint64_t eeprom_writes() const { return writes_; }
 
  private:
-  using Image = std::array<std::uint16_t, reg::last + 1>;
+  using Image = std::vector<std::uint16_t>;
+  [[nodiscard]] const ParameterSpec* find(std::uint32_t address) const;
+  /// Above the last register it is "beyond the range" (04), in a hole "not allowed" (03): 6.2.4.
+  [[nodiscard]] Fail missing(std::uint32_t address) const;
   [[nodiscard]] bool goes_to_eeprom(std::uint16_t address) const;
 
+  const SimulatedModel* model_;
   const Behaviour* behaviour_;
-  Image ram_{}, eeprom_{};
+  std::uint16_t first_input_function_;
+  std::vector<const ParameterSpec*> specs_;  ///< by address; nullptr: a hole
+  Image ram_, eeprom_;
   std::uint64_t writes_ = 0;
 };
 

@@ -18,13 +18,13 @@ SimulatedDrive::Plan SimulatedDrive::position_plan(bool absolute) const {
   const std::int64_t value = memory_.get_long(reg::pulses_high, reg::pulses_low);
   const bool from_target =
       behaviour_.start_in_motion_from_target && motor_.moving() && activity_ == Activity::position;
-  const auto base = absolute      ? motor_.shaft() - motor_.counter()
+  const auto base = absolute      ? motor_.commanded() - motor_.counter()
                     : from_target ? last_target_
-                                  : motor_.shaft();
+                                  : motor_.commanded();
   const auto target = base + value;
   return {.activity = Activity::position,
           .target = target,
-          .direction = target < motor_.shaft() ? -1 : 1,
+          .direction = target < motor_.commanded() ? -1 : 1,
           .rates = rates(std::abs(memory_.get_signed(reg::maximum_speed)),
                          memory_.get(reg::acceleration_time), memory_.get(reg::deceleration_time))};
 }
@@ -76,7 +76,7 @@ void SimulatedDrive::launch(const Plan& plan) {
   activity_ = plan.activity;
   in_position_ = stopping_ = false;
   pending_.reset();
-  const auto distance = plan.target.value_or(0) - motor_.shaft();
+  const auto distance = plan.target.value_or(0) - motor_.commanded();
   if (plan.target) last_target_ = *plan.target;
   const bool turns = motor_.moving() && plan.direction != motor_.direction();
   const bool too_near = motor_.moving() && plan.target &&
@@ -122,7 +122,7 @@ void SimulatedDrive::cut() {
   if (!motor_.moving()) return;
   stopping_ = true;
   phase_ = Phase::ending;
-  motor_.stop(behaviour_.abrupt_stop_slips);
+  motor_.stop(behaviour_.abrupt_stop_slips && !closed_loop());
   on_stopped();
 }
 
@@ -131,7 +131,7 @@ void SimulatedDrive::on_stopped() {
     const auto plan = *pending_;
     // The braking may have carried it past the target.
     auto turned = plan;
-    if (plan.target) turned.direction = *plan.target < motor_.shaft() ? -1 : 1;
+    if (plan.target) turned.direction = *plan.target < motor_.commanded() ? -1 : 1;
     launch(turned);
     return;
   }
@@ -237,11 +237,11 @@ void SimulatedDrive::start_segment() {
   const auto at = [&](std::uint16_t first) { return static_cast<std::uint16_t>(first + segment_ - 1); };
   const std::int64_t value = memory_.get_long(at(reg::segment_pulses_high), at(reg::segment_pulses_low));
   const bool absolute = memory_.get(reg::terminal_move_mode) == 1;
-  const auto target = value + motor_.shaft() - (absolute ? motor_.counter() : 0);
+  const auto target = value + motor_.commanded() - (absolute ? motor_.counter() : 0);
   const double time = memory_.get(at(reg::segment_time));
   begin({.activity = Activity::pt,
          .target = target,
-         .direction = target < motor_.shaft() ? -1 : 1,
+         .direction = target < motor_.commanded() ? -1 : 1,
          .rates = rates(memory_.get(at(reg::segment_speed)), time, time)});
 }
 

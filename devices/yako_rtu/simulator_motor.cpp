@@ -9,13 +9,31 @@ namespace {
 std::int64_t whole_pulses(double distance) { return static_cast<std::int64_t>(std::floor(distance + 1e-4)); }
 }  // namespace
 
-bool Motor::advance(TimePoint now) {
+bool Motor::advance(TimePoint now, bool follows) {
   now_ = now;
-  if (!moving_) return false;
-  const bool ended = now >= ends();
-  shaft_ = from_ + direction_ * whole_pulses(ended ? profile_.total() : profile_.distance_at(elapsed()));
-  moving_ = !ended;
+  const auto before = commanded_;
+  const bool ended = moving_ && now >= ends();
+  if (moving_)
+    commanded_ =
+        from_ + direction_ * whole_pulses(ended ? profile_.total() : profile_.distance_at(elapsed()));
+  if (blocked_)
+    lag_ += commanded_ - before;
+  else if (follows)
+    lag_ = 0;
+  if (ended) moving_ = false;
   return ended;
+}
+
+void Motor::power_up() {
+  commanded_ = shaft();
+  lag_ = 0;
+  clear_counter();
+}
+
+void Motor::push(std::int64_t pulses, bool seen) {
+  if (blocked_) return;
+  commanded_ += pulses;
+  if (!seen) offset_ -= pulses;
 }
 
 void Motor::begin(int direction, const Profile& profile, const Rates& rates) {
@@ -23,7 +41,7 @@ void Motor::begin(int direction, const Profile& profile, const Rates& rates) {
   profile_ = profile;
   rates_ = rates;
   begin_ = now_;
-  from_ = shaft_;
+  from_ = commanded_;
   moving_ = true;
   braking_ = false;
 }
@@ -50,11 +68,7 @@ void Motor::brake(double deceleration) {
 
 void Motor::stop(bool slips) {
   if (!moving_) return;
-  if (slips) {
-    const auto lost = direction_ * whole_pulses(speed() * 0.01);
-    shaft_ += lost;
-    offset_ -= lost;
-  }
+  if (slips && !blocked_) lag_ -= direction_ * whole_pulses(speed() * 0.01);
   moving_ = false;
 }
 
@@ -73,9 +87,17 @@ TimePoint Motor::after(double seconds) const {
 
 TimePoint Motor::ends() const { return moving_ ? after(profile_.duration()) : TimePoint::max(); }
 
-TimePoint Motor::reaches(std::int64_t shaft) const {
+TimePoint Motor::commands(std::int64_t position) const {
   if (!moving_) return TimePoint::max();
-  return after(profile_.time_at(static_cast<double>((shaft - from_) * direction_)));
+  return after(profile_.time_at(static_cast<double>((position - from_) * direction_)));
+}
+
+TimePoint Motor::reaches(std::int64_t shaft) const {
+  return blocked_ ? TimePoint::max() : commands(shaft + lag_);
+}
+
+TimePoint Motor::lags(std::int64_t lag) const {
+  return blocked_ ? commands(shaft() + direction_ * lag) : TimePoint::max();
 }
 
 }  // namespace axisd::yako_rtu

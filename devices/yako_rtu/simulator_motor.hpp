@@ -8,11 +8,13 @@
 
 namespace axisd::yako_rtu {
 
-/// Positions in pulses. `shaft` is where the machine really is, `counter` what the drive believes.
+/// Positions in pulses. `commanded` is where the pulses sent so far would have brought the shaft, `shaft`
+/// where it really is; motions are planned in the former. The counters are both, from the drive's origin.
 class Motor {
  public:
-  /// Lets time pass. True if a motion ended by itself within it.
-  bool advance(TimePoint now);
+  /// Lets time pass. True if a motion ended by itself within it. `follows`: an energised closed loop brings
+  /// the shaft to where it should be, unless it is blocked.
+  bool advance(TimePoint now, bool follows = false);
 
   /// Begins a motion, or goes on from the present speed if one in the same direction is under way.
   void move(std::int64_t distance, const Rates& rates);
@@ -23,33 +25,45 @@ class Motor {
   /// No more pulses. `slips`: the rotor loses the field and turns on for 10 ms at its last speed.
   void stop(bool slips);
   /// The supply is gone: the counter begins at 0 where the shaft stands.
-  void power_up() { offset_ = -shaft_; }
-  void clear_counter() { offset_ = -shaft_; }
+  void power_up();
+  void clear_counter() { offset_ = -commanded_; }
+  /// While blocked the shaft stays where it is, and pulses do not turn it.
+  void block(bool blocked) { blocked_ = blocked; }
+  /// The load turns the shaft. `seen`: the counters follow (an encoder); else the origin moves along.
+  void push(std::int64_t pulses, bool seen);
 
   [[nodiscard]] bool moving() const { return moving_; }
   [[nodiscard]] bool braking() const { return moving_ && braking_; }
   [[nodiscard]] int direction() const { return direction_; }  ///< of the last motion, 1 or -1
   [[nodiscard]] double speed() const;                         ///< pulses/s, not signed
-  [[nodiscard]] std::int64_t shaft() const { return shaft_; }
-  [[nodiscard]] std::int32_t counter() const { return static_cast<std::int32_t>(shaft_ + offset_); }
+  [[nodiscard]] bool blocked() const { return blocked_; }
+  [[nodiscard]] std::int64_t shaft() const { return commanded_ - lag_; }
+  [[nodiscard]] std::int64_t commanded() const { return commanded_; }
+  /// Pulses that the shaft is behind.
+  [[nodiscard]] std::int64_t lag() const { return lag_; }
+  [[nodiscard]] std::int32_t counter() const { return static_cast<std::int32_t>(commanded_ + offset_); }
+  [[nodiscard]] std::int32_t encoder() const { return static_cast<std::int32_t>(shaft() + offset_); }
   /// Pulses that it takes to stop from the present speed with `rates`.
   [[nodiscard]] double stopping_distance(const Rates& rates) const;
   /// When the motion ends by itself; TimePoint::max() if it does not.
   [[nodiscard]] TimePoint ends() const;
   /// When the shaft gets to `shaft`, which lies ahead; TimePoint::max() if it does not.
   [[nodiscard]] TimePoint reaches(std::int64_t shaft) const;
+  /// When the shaft, blocked, is `lag` pulses behind on the side of the motion; TimePoint::max() if never.
+  [[nodiscard]] TimePoint lags(std::int64_t lag) const;
 
  private:
   void begin(int direction, const Profile& profile, const Rates& rates);
   [[nodiscard]] double elapsed() const;
   [[nodiscard]] TimePoint after(double seconds) const;
+  [[nodiscard]] TimePoint commands(std::int64_t position) const;
 
   TimePoint now_{}, begin_{};
   Profile profile_;
   Rates rates_;
   int direction_ = 1;
-  bool moving_ = false, braking_ = false;
-  std::int64_t shaft_ = 0, from_ = 0, offset_ = 0;
+  bool moving_ = false, braking_ = false, blocked_ = false;
+  std::int64_t commanded_ = 0, lag_ = 0, from_ = 0, offset_ = 0;
 };
 
 }  // namespace axisd::yako_rtu

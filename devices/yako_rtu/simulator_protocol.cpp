@@ -53,7 +53,7 @@ std::optional<std::vector<std::uint8_t>> SimulatedDrive::on_frame(std::span<cons
 
 Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) const {
   const auto first = word(frame, 2), count = word(frame, 4);
-  const auto fail = Memory::check_read(first, count);
+  const auto fail = memory_.check_read(first, count);
   if (fail != Fail::none) return fail;
   reply.push_back(static_cast<std::uint8_t>(2 * count));
   for (std::uint16_t i = 0; i < count; ++i) append_word(reply, peek(static_cast<std::uint16_t>(first + i)));
@@ -62,7 +62,7 @@ Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::
 
 Fail SimulatedDrive::write_one(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) {
   const auto address = word(frame, 2), value = word(frame, 4);
-  auto fail = Memory::check_write(address, value);
+  auto fail = memory_.check_write(address, value);
   if (fail == Fail::none) fail = execute(address, value);
   append_word(reply, address);
   append_word(reply, value);
@@ -76,7 +76,7 @@ Fail SimulatedDrive::write_many(std::span<const std::uint8_t> frame, std::vector
   auto fail = Fail::none;
   unsigned good = 0;
   while (good < count && fail == Fail::none) {
-    fail = Memory::check_write(first + good, value(good));
+    fail = memory_.check_write(first + good, value(good));
     if (fail == Fail::none) ++good;
   }
   if (fail != Fail::none && !behaviour_.partial_block_write) return fail;
@@ -117,6 +117,7 @@ Fail SimulatedDrive::execute(std::uint16_t address, std::uint16_t value) {
       break;
   }
   memory_.write(address, value);
+  if (address == reg::loop_mode && !behaviour_.loop_mode_from_power_up) open_loop_ = value == 1;
   if (address >= reg::input_levels && address < reg::output_levels) configuration_changed();
   return Fail::none;
 }

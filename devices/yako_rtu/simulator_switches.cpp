@@ -1,7 +1,6 @@
 #include "devices/yako_rtu/simulator_switches.hpp"
 
-#include <array>
-#include <cstddef>
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -9,10 +8,21 @@ namespace axisd::yako_rtu {
 
 namespace {
 
+/// One reading; where the models' manuals differ, each has an entry of its own for the same member.
 struct Entry {
   simulation::SwitchSpec spec;
   bool Behaviour::* member;
+  bool (*applies)(const SimulatedModel& model) = nullptr;  ///< nothing: to every model
 };
+
+bool is_closed_loop(const SimulatedModel& model) { return model.closed_loop; }
+bool ends_forwards(const SimulatedModel& model) { return model.homing_mode_1_ends_forwards; }
+bool ends_as_it_searches(const SimulatedModel& model) { return !model.homing_mode_1_ends_forwards; }
+bool has_other_model_code(const SimulatedModel& model) { return model.other_model_code != 0; }
+bool has_other_inputs(const SimulatedModel& model) { return model.other_first_input_function != 0; }
+bool has_few_segments(const SimulatedModel& model) { return model.segments < 16; }
+bool may_be_deaf(const SimulatedModel& model) { return model.undefined_custom_address == 0; }
+bool keeps_overtravel_in_ram(const SimulatedModel& model) { return !model.overtravel_saved; }
 
 // clang-format off
 constexpr Entry entries[] = {
@@ -39,7 +49,7 @@ constexpr Entry entries[] = {
      &Behaviour::unsigned_speed},
     {{"model_code_0302", false,
       "0x0000 reads 0x0302; off: 0x0301"},
-     &Behaviour::model_code_0302},
+     &Behaviour::other_model_code, &has_other_model_code},
     {{"in_position_at_power_up", false,
       "status bit 0 is 1 after power-up"},
      &Behaviour::in_position_at_power_up},
@@ -59,7 +69,7 @@ constexpr Entry entries[] = {
       "0x002C clears the counter while moving; off: acknowledged and ignored"},
      &Behaviour::position_clear_in_motion},
     {{"abrupt_stop_slips", false,
-      "a motor without pulses at speed turns on for 10 ms, which the counter does not see"},
+      "without pulses at speed a motor in open loop turns on for 10 ms, which the counter does not see"},
      &Behaviour::abrupt_stop_slips},
     {{"free_stop_releases", false,
       "the free stop at a limit (0x0017 = 0) releases the motor; off: it only stops the pulses"},
@@ -121,26 +131,69 @@ constexpr Entry entries[] = {
     {{"back_off_at_homing_speed", false,
       "leaving the switch runs at 0x0032; off: at 0x0033 (\"return speed after home is found\")"},
      &Behaviour::back_off_at_homing_speed},
+    {{"homing_mode_1_final_approach_same", false,
+      "homing mode 1 ends in the direction of its search, as on YKD2405PR; off: forwards (7.5)"},
+     &Behaviour::homing_mode_1_other_approach, &ends_forwards},
+    {{"homing_mode_1_final_approach_forwards", false,
+      "homing mode 1 ends forwards, as on SSD2608PR and ESS42-R; off: in the direction of its search"},
+     &Behaviour::homing_mode_1_other_approach, &ends_as_it_searches},
+    {{"homing_mode_1_either_edge", false,
+      "mode 1 turns where it stopped and ends at the first edge of the switch; off: it runs on until it has "
+      "passed the switch"},
+     &Behaviour::homing_mode_1_either_edge, &ends_forwards},
+    {{"input_functions_at_0043", false,
+      "the functions of X0..X4 are at 0x0043..0x0047 as 4.3 writes them, 0x0041 and 0x0042 are holes; off: at "
+      "0x0041..0x0045 (6.1)"},
+     &Behaviour::other_input_functions, &has_other_inputs},
+    {{"inputs_undefined_at_power_up", false,
+      "input functions are 0 after each power-up, as 4.3 says; off: as saved (6.1)"},
+     &Behaviour::inputs_undefined_at_power_up},
+    {{"more_than_7_segments", false,
+      "PIN3 and PIN4 select segments above 7; off: 7 at most (note of 7.3.2)"},
+     &Behaviour::all_segments, &has_few_segments},
+    {{"commands_readable", false,
+      "0x0028..0x002C and 0x0030 can be read, as 6.1 prints, and are 0; off: exception 06, as 0x0027"},
+     &Behaviour::commands_readable},
+    {{"overtravel_stop_saved", false,
+      "0x0017 is saved like its neighbours; off: printed without /S, only 0x002B = 2 saves it"},
+     &Behaviour::overtravel_stop_saved, &keeps_overtravel_in_ram},
+    {{"undefined_address_is_1", false,
+      "with the address switches off and 0x0013 undefined the address is 1; off: it answers nobody"},
+     &Behaviour::undefined_address_is_1, &may_be_deaf},
+    {{"position_is_commanded", false,
+      "0x000A counts the pulses sent to the motor; off: what the encoder saw"},
+     &Behaviour::position_is_commanded, &is_closed_loop},
+    {{"released_position_frozen", false,
+      "0x000A does not follow a shaft that is turned while released; off: it does"},
+     &Behaviour::released_position_frozen, &is_closed_loop},
+    {{"loop_mode_from_power_up", false,
+      "0x0012 counts from the next power-up; off: at once"},
+     &Behaviour::loop_mode_from_power_up, &is_closed_loop},
 };
 // clang-format on
 
-constexpr auto specs = [] {
-  std::array<simulation::SwitchSpec, std::size(entries)> all;
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = entries[i].spec;
-  return all;
-}();
+bool applies(const Entry& entry, const SimulatedModel& model) {
+  return entry.applies == nullptr || entry.applies(model);
+}
 
 }  // namespace
 
-std::span<const simulation::SwitchSpec> switch_specs() { return specs; }
+std::vector<simulation::SwitchSpec> switch_specs(const SimulatedModel& model) {
+  std::vector<simulation::SwitchSpec> specs;
+  for (const auto& entry : entries)
+    if (applies(entry, model)) specs.push_back(entry.spec);
+  return specs;
+}
 
-Behaviour behaviour_from(const simulation::Switches& switches) {
+Behaviour behaviour_from(const SimulatedModel& model, const simulation::Switches& switches) {
   Behaviour behaviour{};
-  for (const auto& entry : entries) behaviour.*entry.member = entry.spec.default_value;
+  for (const auto& entry : entries)
+    if (applies(entry, model)) behaviour.*entry.member = entry.spec.default_value;
   for (const auto& [name, on] : switches) {
-    const auto* found = std::begin(entries);
-    while (found != std::end(entries) && found->spec.name != name) ++found;
-    if (found == std::end(entries)) throw std::invalid_argument("ykd2405pr has no switch \"" + name + "\"");
+    const auto* found = std::ranges::find_if(
+        entries, [&](const Entry& entry) { return entry.spec.name == name && applies(entry, model); });
+    if (found == std::end(entries))
+      throw std::invalid_argument(std::string(model.name) + " has no switch \"" + name + "\"");
     behaviour.*found->member = on;
   }
   return behaviour;

@@ -2,16 +2,15 @@
 // way.
 #pragma once
 
-#include <span>
-
 #include "devices/simulation/simulator.hpp"
+#include "devices/yako_rtu/simulator_model.hpp"
 
 namespace axisd::yako_rtu {
 
 struct Behaviour {
   bool start_in_motion, start_in_motion_refused, start_in_motion_from_target;
   bool start_refused_when_disabled, reserved_start_refused, reserved_start_moves;
-  bool unsigned_speed, model_code_0302;
+  bool unsigned_speed, other_model_code;
   bool in_position_at_power_up, in_position_after_stop;
   bool enabled_at_power_up, eeprom_switch_saves_itself, pv_speeds_always_saved;
   bool position_clear_in_motion, abrupt_stop_slips, free_stop_releases, alarm_releases;
@@ -19,13 +18,15 @@ struct Behaviour {
   bool partial_block_write, limit_block_writes, crc_error_answered, function_error_code_1;
   bool pv_latched, speed_terminal_is_level, configuration_makes_edges, filter_home_and_limits;
   bool homed_stays_during_homing, homing_accepts_active_switch, homing_same_edge, homing_never_gives_up,
-      zero_before_compensation, back_off_at_homing_speed;
+      zero_before_compensation, back_off_at_homing_speed, homing_mode_1_other_approach,
+      homing_mode_1_either_edge;
+  bool other_input_functions, inputs_undefined_at_power_up, all_segments;
+  bool commands_readable, overtravel_stop_saved, undefined_address_is_1;
+  bool position_is_commanded, released_position_frozen, loop_mode_from_power_up;
 };
 
-/// Names, defaults and meanings, in the order of the documentation.
-std::span<const simulation::SwitchSpec> switch_specs();
-/// The defaults with `switches` over them. Throws std::invalid_argument for a name that is not in
-/// switch_specs().
-Behaviour behaviour_from(const simulation::Switches& switches);
+/// The defaults of `model` with `switches` over them. Throws std::invalid_argument for a name that is not in
+/// switch_specs(model).
+Behaviour behaviour_from(const SimulatedModel& model, const simulation::Switches& switches);
 
 }  // namespace axisd::yako_rtu

@@ -8,11 +8,9 @@ namespace {
 
 using simulation::SwitchKind;
 
-constexpr std::array<TerminalSpec, input_terminals> terminal_names{
-    {{"PU"}, {"DR"}, {"X0"}, {"X1"}, {"X2"}, {"X3"}, {"X4"}, {"X5"}, {"X6"}, {"X7"}}};
-
 Input function_of(std::size_t index, const Memory& memory) {
-  return static_cast<Input>(memory.get(static_cast<std::uint16_t>(reg::first_input_function + index)));
+  const auto code = memory.get(static_cast<std::uint16_t>(memory.first_input_function() + index));
+  return code < input_functions ? static_cast<Input>(code) : Input::none;
 }
 
 std::optional<SwitchKind> switch_of(Input function) {
@@ -24,22 +22,24 @@ std::optional<SwitchKind> switch_of(Input function) {
 
 }  // namespace
 
-Terminals::Terminals(const Behaviour& behaviour, const simulation::SimulatedNodeSettings& settings)
-    : behaviour_(&behaviour), mechanics_(settings.mechanics) {
-  for (std::size_t i = 0; i < input_terminals; ++i) {
-    const auto wire = settings.wires.find(terminal_names.at(i).name);
+Terminals::Terminals(const SimulatedModel& model, const Behaviour& behaviour,
+                     const simulation::SimulatedNodeSettings& settings)
+    : model_(&model),
+      behaviour_(&behaviour),
+      mechanics_(settings.mechanics),
+      terminals_(model.inputs.size()) {
+  for (std::size_t i = 0; i < terminals_.size(); ++i) {
+    const auto wire = settings.wires.find(model.inputs[i].name);
     if (wire == settings.wires.end()) continue;
-    terminals_.at(i).wire = wire->second;
+    terminals_[i].wire = wire->second;
     wired_.at(static_cast<std::size_t>(wire->second.kind)) = true;
   }
 }
 
-std::span<const TerminalSpec> Terminals::names() { return terminal_names; }
-
 void Terminals::drive(std::string_view terminal, std::optional<bool> high) {
-  const auto found = std::ranges::find(terminal_names, terminal, &TerminalSpec::name);
-  if (found != terminal_names.end())
-    terminals_.at(static_cast<std::size_t>(found - terminal_names.begin())).driven = high;
+  const auto found = std::ranges::find(model_->inputs, terminal, &TerminalSpec::name);
+  if (found != model_->inputs.end())
+    terminals_.at(static_cast<std::size_t>(found - model_->inputs.begin())).driven = high;
 }
 
 bool Terminals::switch_active(SwitchKind kind, std::int64_t shaft) const {
@@ -80,23 +80,24 @@ bool Terminals::raw(std::size_t index, std::int64_t shaft, const Memory& memory)
   return inverted;  // nothing connected: low level
 }
 
-/// 4.3: the pulse at X0..X7 must be longer than 10 ms, the default of the filters 0x0116..0x0119, which are
-/// taken as milliseconds. PU and DR are the high-speed inputs and have none.
+/// 4.3: a pulse must be longer than 10 ms, the default of the filters (one register for two inputs), which
+/// are taken as milliseconds. The high-speed inputs of YKD2405PR have none.
 Duration Terminals::filter(std::size_t index, const Memory& memory) const {
-  if (index < 2) return {};
+  if (index < model_->unfiltered_inputs) return {};
   if (switch_of(function_of(index, memory)) && !behaviour_->filter_home_and_limits) return {};
-  return std::chrono::milliseconds(memory.get(static_cast<std::uint16_t>(0x0116 + (index - 2) / 2)));
+  const auto pair = (index - model_->unfiltered_inputs) / 2;
+  return std::chrono::milliseconds(memory.get(static_cast<std::uint16_t>(model_->first_filter + pair)));
 }
 
 std::array<bool, input_functions> Terminals::evaluate(const Memory& memory) const {
   std::array<bool, input_functions> functions{};
-  for (std::size_t i = 0; i < input_terminals; ++i)
+  for (std::size_t i = 0; i < terminals_.size(); ++i)
     if (terminals_.at(i).active) functions.at(static_cast<std::size_t>(function_of(i, memory))) = true;
   return functions;
 }
 
 std::vector<InputEdge> Terminals::sample(TimePoint now, std::int64_t shaft, const Memory& memory) {
-  for (std::size_t i = 0; i < input_terminals; ++i) {
+  for (std::size_t i = 0; i < terminals_.size(); ++i) {
     auto& terminal = terminals_.at(i);
     const bool level = raw(i, shaft, memory);
     if (level == terminal.active) {
@@ -117,7 +118,7 @@ std::vector<InputEdge> Terminals::sample(TimePoint now, std::int64_t shaft, cons
 }
 
 void Terminals::settle(std::int64_t shaft, const Memory& memory) {
-  for (std::size_t i = 0; i < input_terminals; ++i) {
+  for (std::size_t i = 0; i < terminals_.size(); ++i) {
     terminals_.at(i).active = raw(i, shaft, memory);
     terminals_.at(i).due = TimePoint::max();
   }
@@ -128,7 +129,7 @@ TimePoint Terminals::next_event() const { return std::ranges::min(terminals_, {}
 
 std::uint16_t Terminals::bits() const {
   unsigned bits = 0;
-  for (std::size_t i = 0; i < input_terminals; ++i) bits |= terminals_.at(i).active ? 1U << i : 0U;
+  for (std::size_t i = 0; i < terminals_.size(); ++i) bits |= terminals_.at(i).active ? 1U << i : 0U;
   return static_cast<std::uint16_t>(bits);
 }
 
@@ -137,7 +138,8 @@ int Terminals::segment() const {
   for (int pin = 0; pin < 5; ++pin)
     if (functions_.at(static_cast<std::size_t>(Input::pin0) + static_cast<std::size_t>(pin)))
       number |= 1 << pin;
-  return number <= 16 ? number : 0;  // 7.3.2 lists 1..16
+  const int most = behaviour_->all_segments ? 16 : model_->segments;
+  return number <= most ? number : 0;  // 7.3.2 lists 1..16; its note on ESS42-R: 7 at most
 }
 
 }  // namespace axisd::yako_rtu

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string_view>
 #include <vector>
 
@@ -15,7 +14,7 @@
 
 namespace axisd::yako_rtu {
 
-/// Codes of 0x0041..0x004A.
+/// Codes of the input functions (6.1).
 enum class Input : std::uint8_t {
   none,
   home,
@@ -39,7 +38,7 @@ enum class Input : std::uint8_t {
   pin3,
   pin4
 };
-inline constexpr std::size_t input_functions = 21, input_terminals = 10;
+inline constexpr std::size_t input_functions = 21;
 
 struct InputEdge {
   Input function;
@@ -48,9 +47,9 @@ struct InputEdge {
 
 class Terminals {
  public:
-  Terminals(const Behaviour& behaviour, const simulation::SimulatedNodeSettings& settings);
+  Terminals(const SimulatedModel& model, const Behaviour& behaviour,
+            const simulation::SimulatedNodeSettings& settings);
 
-  static std::span<const TerminalSpec> names();
   /// Over any switch; nothing gives the terminal back to its switch.
   void drive(std::string_view terminal, std::optional<bool> high);
 
@@ -86,10 +85,11 @@ class Terminals {
   [[nodiscard]] Duration filter(std::size_t index, const Memory& memory) const;
   [[nodiscard]] std::array<bool, input_functions> evaluate(const Memory& memory) const;
 
+  const SimulatedModel* model_;
   const Behaviour* behaviour_;
   simulation::Mechanics mechanics_;
-  std::array<Terminal, input_terminals> terminals_{};
-  std::array<bool, 3> wired_{};  ///< by SwitchKind: has a terminal of its own
+  std::vector<Terminal> terminals_;  ///< in the order of the model's inputs
+  std::array<bool, 3> wired_{};      ///< by SwitchKind: has a terminal of its own
   std::array<bool, input_functions> functions_{};
 };
 

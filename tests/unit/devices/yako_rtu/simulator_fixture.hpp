@@ -1,4 +1,4 @@
-// A simulated YKD2405PR in virtual time, spoken to in frames.
+// A simulated drive of the family in virtual time, spoken to in frames.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -44,8 +44,8 @@ inline std::string hex_of(const std::optional<Bytes>& bytes) {
 /// One drive at address 1 and the time that it lives in.
 class Bench {
  public:
-  explicit Bench(simulation::SimulatedNodeSettings settings = {})
-      : drive_(std::make_unique<SimulatedDrive>(std::move(settings))) {
+  explicit Bench(simulation::SimulatedNodeSettings settings = {}, std::string_view model = "ykd2405pr")
+      : simulator_(simulation::find_simulator(model)), drive_(make(*simulator_, std::move(settings))) {
     drive_->advance(now_);
   }
 
@@ -97,9 +97,11 @@ class Bench {
     wait(400ms);
   }
   void assign(std::string_view terminal, Input function) {
-    const int index = terminal == "PU" ? 0 : terminal == "DR" ? 1 : terminal[1] - '0' + 2;
-    ASSERT_EQ(
-        0, write(static_cast<std::uint16_t>(reg::first_input_function + index), static_cast<int>(function)));
+    const auto at = std::ranges::find(simulator_->inputs, terminal, &TerminalSpec::name);
+    ASSERT_NE(simulator_->inputs.end(), at);
+    const auto first = simulator_->model == "ess42-r" ? 0x0043 : 0x0041;
+    ASSERT_EQ(0, write(static_cast<std::uint16_t>(first + (at - simulator_->inputs.begin())),
+                       static_cast<int>(function)));
   }
   void pulse(std::string_view terminal) {
     drive_->set_input(terminal, true);
@@ -109,6 +111,11 @@ class Bench {
   }
 
  private:
+  static std::unique_ptr<SimulatedDrive> make(const simulation::Simulator& simulator,
+                                              simulation::SimulatedNodeSettings settings) {
+    auto node = simulator.make(std::move(settings));
+    return std::unique_ptr<SimulatedDrive>(dynamic_cast<SimulatedDrive*>(node.release()));
+  }
   static void put(Bytes& frame, int value) {
     frame.push_back(static_cast<std::uint8_t>(value >> 8 & 0xFF));
     frame.push_back(static_cast<std::uint8_t>(value & 0xFF));
@@ -122,6 +129,7 @@ class Bench {
   }
 
   TimePoint now_{1s};
+  const simulation::Simulator* simulator_;
   std::unique_ptr<SimulatedDrive> drive_;
 };
 

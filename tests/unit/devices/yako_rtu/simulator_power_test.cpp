@@ -101,7 +101,8 @@ TEST(SimulatorEeprom, SaveAllKeepsTheMotionParametersToo) {
 TEST(SimulatorEeprom, FactoryResetRestoresRamAndEeprom) {
   simulation::SimulatedNodeSettings settings;
   settings.address = 40;
-  SimulatedDrive drive{settings};
+  Bench bench{settings};
+  auto& drive = bench.drive();
   EXPECT_EQ(40, drive.address());
   drive.advance(TimePoint{1s});
   Bytes frame{40, 6, 0, 0x2B, 0, 1};
