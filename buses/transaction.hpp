@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
+#include "buses/modbus_rtu/settings.hpp"
 
 namespace axisd {
 
@@ -25,6 +27,12 @@ struct TransactionOptions {
   TransactionClass transaction_class = TransactionClass::parameters;
   TimePoint deadline = TimePoint::max();  ///< not sent after this
   MotionGuard guard{};                    ///< for motion frames
+  /// Of this node in this exchange (saving to an EEPROM takes long); nothing: the bus's. A stop cannot cut
+  /// the wait earlier.
+  std::optional<Duration> turnaround_max{};
+  /// The line is switched to these for this exchange alone; nothing: the bus's own. Noise to every other
+  /// node: never for classes stop and motion.
+  std::optional<modbus_rtu::SerialSettings> serial{};
 };
 
 }  // namespace axisd

@@ -33,6 +33,8 @@ const char* why(const modbus_rtu::ExchangeResult& result) {
       return "corrupt";
     case ExchangeStatus::not_sent:
       return result.verdict == Verdict::expired ? "not sent: expired" : "not sent: superseded";
+    case ExchangeStatus::unsupported:
+      return "unsupported";
     case ExchangeStatus::io_error:
       return "port lost";
   }
@@ -71,7 +73,8 @@ Result<modbus_rtu::ExchangeObserver> open_wire_log(const std::string& path) {
   return [log](const std::string& bus, const modbus_rtu::Exchange& exchange,
                const modbus_rtu::ExchangeResult& result) {
     const auto ns = [](TimePoint t) { return t.time_since_epoch().count(); };
-    if (result.status != modbus_rtu::ExchangeStatus::not_sent)
+    if (result.status != modbus_rtu::ExchangeStatus::not_sent &&
+        result.status != modbus_rtu::ExchangeStatus::unsupported)
       log->info("{} {} tx {}", ns(result.request_begin), bus, modbus_rtu::to_hex(exchange.frame.bytes()));
     if (result.reply_frame.size() > 0)
       log->info("{} {} rx {}", ns(result.reply_begin), bus, modbus_rtu::to_hex(result.reply_frame.bytes()));

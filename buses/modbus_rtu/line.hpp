@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "buses/modbus_rtu/frame.hpp"
+#include "buses/modbus_rtu/settings.hpp"
 #include "buses/transaction.hpp"
 
 namespace axisd::modbus_rtu {
@@ -19,16 +20,18 @@ struct Exchange {
   TimePoint deadline = TimePoint::max();
   Duration reply_timeout{};   ///< from the last byte of the request to the last byte of the reply
   Duration turnaround_max{};  ///< from the last byte of the request; after it a stop may cut the wait
+  std::optional<SerialSettings> serial{};  ///< other settings than the line's, for this exchange alone
 };
 
 enum class ExchangeStatus : std::uint8_t {
-  replied,   ///< `reply` answers the request (a match or an exception)
-  timeout,   ///< sent completely; no valid reply within the timeout
-  cut,       ///< like timeout, but the wait was cut short by cut_wait() past turnaround_max
-  corrupt,   ///< sent completely; only damaged bytes came back
-  not_sent,  ///< no byte went out: refused at the bind (`verdict` says why), or `send`: the port was lost
-             ///< before
-  io_error,  ///< the port failed; `native_error` is errno. Some bytes may have gone out.
+  replied,      ///< `reply` answers the request (a match or an exception)
+  timeout,      ///< sent completely; no valid reply within the timeout
+  cut,          ///< like timeout, but the wait was cut short by cut_wait() past turnaround_max
+  corrupt,      ///< sent completely; only damaged bytes came back
+  not_sent,     ///< no byte went out: refused at the bind (`verdict` says why), or `send`: the port was lost
+                ///< before
+  unsupported,  ///< no byte went out: the port cannot do `serial`
+  io_error,     ///< the port failed; `native_error` is errno. Some bytes may have gone out.
 };
 
 struct ExchangeResult {
@@ -61,8 +64,8 @@ class Line {
   /// Sets the callbacks and starts opening the port (again and again, with back-off).
   virtual void start(ResultHandler on_result, PortHandler on_port) = 0;
   /// Puts `exchange` into the one-place slot. It is bound, and its guard checked, when the silence has
-  /// passed. Precondition: the port is open, the slot is empty and nothing is under way. Ends with exactly
-  /// one on_result, unless revoke() succeeds.
+  /// passed; the line then has the serial settings of `exchange`. Precondition: the port is open, the slot is
+  /// empty and nothing is under way. Ends with exactly one on_result, unless revoke() succeeds.
   virtual void arm(const Exchange& exchange) = 0;
   /// Takes the armed exchange back. False: it was already bound, its result will come.
   virtual bool revoke() = 0;

@@ -1,7 +1,9 @@
 #include "buses/modbus_rtu/rtu_bus.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -11,6 +13,10 @@ namespace {
 
 /// Margin for the operating system and USB adapters on top of what the wire and the node take.
 constexpr auto timeout_margin = std::chrono::milliseconds(10);
+/// So long after its time a reply may still come: gateways and drives that save to their EEPROM.
+constexpr auto latest_reply = std::chrono::seconds(5);
+/// Damaged replies in a row that are no accident any more.
+constexpr int garbled_often = 3;
 
 ExchangeResult not_sent(Verdict verdict, TimePoint now) {
   return {.status = ExchangeStatus::not_sent, .verdict = verdict, .request_begin = now, .request_end = now};
@@ -31,6 +37,21 @@ Error not_sent_error(Verdict verdict) {
   }
 }
 
+Error garbled_error(int in_a_row) {
+  Error error{.reason = Reason::no_reply,
+              .message = "only damaged bytes came back",
+              .remedy = "check termination, shielding and that no address is used twice",
+              .outcome = Outcome::unknown};
+  if (in_a_row >= garbled_often) {
+    error.message =
+        fmt::format("only damaged bytes came back, {} times in a row: two nodes on one address?", in_a_row);
+    error.remedy =
+        "switch off one node after the other to find a second one with this address; else check the "
+        "baud rate, termination and shielding";
+  }
+  return error;
+}
+
 }  // namespace
 
 RtuBus::RtuBus(Executor executor, Clock& clock, LineSettings settings, std::unique_ptr<Line> line)
@@ -48,10 +69,32 @@ void RtuBus::start(ExchangeObserver observer) {
                [this](const PortStatus& status) { on_port(status); });
 }
 
+bool RtuBus::may_come_late(std::uint8_t node, std::uint16_t count) const {
+  const auto late = late_reads_.find(node);
+  if (late == late_reads_.end()) return false;
+  const auto read = late->second.find(count);
+  return read != late->second.end() && read->second >= clock_->now();
+}
+
 bool RtuBus::needs_resync(const Request& request) const {
-  const auto late = late_reads_.find(request.node);
-  return late != late_reads_.end() && request.function == Function::read_holding_registers &&
-         request.count > 1 && late->second.contains(request.count);
+  return request.function == Function::read_holding_registers && may_come_late(request.node, request.count);
+}
+
+int RtuBus::garbled(std::uint8_t node) const {
+  const auto found = garbled_.find(node);
+  return found == garbled_.end() ? 0 : found->second;
+}
+
+Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOptions options) const {
+  const auto turnaround = options.turnaround_max.value_or(settings_.turnaround_max);
+  const auto reply = wire_time(options.serial.value_or(settings_.serial()), reply_size(request));
+  return {.request = std::move(request),
+          .frame = frame,
+          .guard = std::move(options.guard),
+          .deadline = options.deadline,
+          .reply_timeout = turnaround + reply + timeout_margin,
+          .turnaround_max = turnaround,
+          .serial = options.serial == settings_.serial() ? std::nullopt : options.serial};
 }
 
 Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {
@@ -63,15 +106,11 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
     error.where.bus = settings_.name;
     co_return fail(std::move(error));
   }
+  if (options.serial && options.transaction_class <= TransactionClass::motion)
+    co_return fail(Reason::internal, "stops and motion go out with the line's own serial settings only");
   auto transaction = std::make_unique<Transaction>();
   transaction->transaction_class = options.transaction_class;
-  transaction->exchange = {
-      .request = request,
-      .frame = *frame,
-      .guard = std::move(options.guard),
-      .deadline = options.deadline,
-      .reply_timeout = settings_.turnaround_max + wire_time(settings_, reply_size(request)) + timeout_margin,
-      .turnaround_max = settings_.turnaround_max};
+  transaction->exchange = exchange_for(std::move(request), *frame, std::move(options));
 
   Promise<Result<Answer>> promise(executor_, *clock_);
   transaction->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
@@ -121,7 +160,8 @@ void RtuBus::arm_next() {
 }
 
 /// Another length than any late reply's: those are then discarded as foreign, not taken for this answer.
-/// Decided here and not when the read is queued: what it waits for may time out meanwhile.
+/// Shorter if there is such a length, else longer; an exception is as good an answer. Decided here and not
+/// when the read is queued: what it waits for may time out meanwhile.
 TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   auto resync = std::make_unique<Transaction>();
   resync->transaction_class = waiting->transaction_class;
@@ -129,7 +169,15 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   resync->exchange = waiting->exchange;
   auto& request = resync->exchange.request;
   while (request.count > 1 && needs_resync(request)) --request.count;
-  resync->exchange.frame = *encode(request);
+  while (needs_resync(request)) ++request.count;
+  constexpr int addresses = 0x10000;
+  request.address = static_cast<std::uint16_t>(std::min<int>(request.address, addresses - request.count));
+  const auto frame = encode(request);
+  if (!frame) return waiting;  // every length that there is was tried within latest_reply
+  resync->exchange.frame = *frame;
+  resync->exchange.reply_timeout +=
+      wire_time(resync->exchange.serial.value_or(settings_.serial()), reply_size(request)) -
+      wire_time(resync->exchange.serial.value_or(settings_.serial()), reply_size(waiting->exchange.request));
   auto held = std::make_shared<TransactionPtr>(std::move(waiting));
   resync->on_end.emplace_back([this, held](const Transaction&, const ExchangeResult& result) {
     if (result.status == ExchangeStatus::replied) return queue_.put_back(std::move(*held));
@@ -154,6 +202,7 @@ void RtuBus::on_result(const ExchangeResult& result) {
   if (!ended) return;
   if (observer_) observer_(settings_.name, ended->exchange, result);
   note_late_read(ended->exchange.request, result);
+  note_garbled(ended->exchange.request, result);
   end(std::move(ended), result);
   pump();
 }
@@ -167,10 +216,22 @@ void RtuBus::note_late_read(const Request& request, const ExchangeResult& result
     case ExchangeStatus::cut:
     case ExchangeStatus::corrupt:
       if (request.function == Function::read_holding_registers)
-        late_reads_[request.node].insert(request.count);
+        late_reads_[request.node][request.count] = clock_->now() + latest_reply;
       break;
     default:
       break;
+  }
+}
+
+void RtuBus::note_garbled(const Request& request, const ExchangeResult& result) {
+  if (result.status == ExchangeStatus::corrupt) {
+    const int in_a_row = ++garbled_[request.node];
+    if (in_a_row != garbled_often) return;
+    auto error = garbled_error(in_a_row);
+    error.where = {.bus = settings_.name, .node = request.node};
+    spdlog::warn("{}", to_string(error));
+  } else if (result.status != ExchangeStatus::not_sent && result.status != ExchangeStatus::unsupported) {
+    garbled_.erase(request.node);
   }
 }
 
@@ -214,6 +275,8 @@ void RtuBus::count(const ExchangeResult& result) {
     case ExchangeStatus::corrupt:
       ++counters_.corrupt;
       break;
+    case ExchangeStatus::unsupported:
+      break;
     case ExchangeStatus::not_sent:
       ++(result.verdict == Verdict::expired ? counters_.dropped_expired : counters_.dropped_superseded);
       break;
@@ -225,50 +288,51 @@ void RtuBus::count(const ExchangeResult& result) {
 
 Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResult& result) const {
   const auto& request = transaction.exchange.request;
-  const Address where{.bus = settings_.name, .node = request.node, .object = request.address};
-  const auto with_address = [&](Error error) {
-    error.where.bus = where.bus;
-    error.where.node = where.node;
-    error.where.object = where.object;
-    return fail(std::move(error));
-  };
+  if (result.status == ExchangeStatus::replied && result.reply.kind != ReplyKind::exception)
+    return Answer{.registers = result.reply.registers,
+                  .sent_at = result.request_begin,
+                  .answered_at = result.reply_end};
+  auto error = error_of(transaction.exchange, result);
+  error.where.bus = settings_.name;
+  error.where.node = request.node;
+  error.where.object = request.address;
+  return fail(std::move(error));
+}
+
+Error RtuBus::error_of(const Exchange& exchange, const ExchangeResult& result) const {
   switch (result.status) {
-    case ExchangeStatus::replied:
-      if (result.reply.kind == ReplyKind::exception) {
-        auto error = Error{
-            .reason = Reason::refused,
-            .message = fmt::format("the node answered with exception {:02}", result.reply.exception_code),
-            .outcome = Outcome::refused};
-        error.where.native_code = result.reply.exception_code;
-        return with_address(std::move(error));
-      }
-      return Answer{.registers = result.reply.registers,
-                    .sent_at = result.request_begin,
-                    .answered_at = result.reply_end};
+    case ExchangeStatus::replied: {
+      Error error{
+          .reason = Reason::refused,
+          .message = fmt::format("the node answered with exception {:02}", result.reply.exception_code),
+          .outcome = Outcome::refused};
+      error.where.native_code = result.reply.exception_code;
+      return error;
+    }
     case ExchangeStatus::timeout:
     case ExchangeStatus::cut:
-      return with_address({.reason = Reason::no_reply,
-                           .message = "no reply",
-                           .remedy = "check power, wiring, address and baud rate of the node",
-                           .outcome = Outcome::unknown});
+      return {.reason = Reason::no_reply,
+              .message = "no reply",
+              .remedy = "check power, wiring, address and baud rate of the node",
+              .outcome = Outcome::unknown};
     case ExchangeStatus::corrupt:
-      return with_address({.reason = Reason::no_reply,
-                           .message = "only damaged bytes came back",
-                           .remedy = "check termination, shielding and that no address is used twice",
-                           .outcome = Outcome::unknown});
+      return garbled_error(garbled(exchange.request.node));
+    case ExchangeStatus::unsupported:
+      return {.reason = Reason::not_supported,
+              .message = fmt::format("port {} cannot do {}", settings_.port,
+                                     to_string(exchange.serial.value_or(settings_.serial()))),
+              .remedy = "choose other settings, or another adapter"};
     case ExchangeStatus::not_sent:
-      if (result.verdict == Verdict::send)
-        return with_address(port_.error.value_or(
-            Error{.reason = Reason::bus_down, .message = "the port was lost before it could be sent"}));
-      return with_address(not_sent_error(result.verdict));
+      if (result.verdict != Verdict::send) return not_sent_error(result.verdict);
+      return port_.error.value_or(
+          Error{.reason = Reason::bus_down, .message = "the port was lost before it could be sent"});
     case ExchangeStatus::io_error:
-      return with_address(
-          {.reason = Reason::bus_down,
-           .message = fmt::format("port {}: {}", settings_.port, std::strerror(result.native_error)),
-           .remedy = "check the adapter; it is opened again by itself",
-           .outcome = Outcome::unknown});
+      return {.reason = Reason::bus_down,
+              .message = fmt::format("port {}: {}", settings_.port, std::strerror(result.native_error)),
+              .remedy = "check the adapter; it is opened again by itself",
+              .outcome = Outcome::unknown};
   }
-  return with_address({.reason = Reason::internal, .message = "unhandled exchange status"});
+  return {.reason = Reason::internal, .message = "unhandled exchange status"};
 }
 
 }  // namespace axisd::modbus_rtu

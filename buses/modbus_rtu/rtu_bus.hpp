@@ -3,7 +3,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -43,7 +42,8 @@ class RtuBus {
   void start(ExchangeObserver observer = {});
 
   /// Queues one request and waits for its end. Errors: `superseded`, `expired`, `lease_lost` (not sent),
-  /// `bus_down`, `refused` (native_code is the exception), `no_reply` (outcome unknown).
+  /// `bus_down`, `refused` (native_code is the exception), `no_reply` (outcome unknown), `not_supported` (the
+  /// port cannot do options.serial: not sent).
   Task<Result<Answer>> transact(Request request, TransactionOptions options);
 
   /// Moves queued frames whose gate was raised out of the way and takes an armed one back. Called for each
@@ -61,10 +61,14 @@ class RtuBus {
   /// Fires when the port opens or is lost.
   [[nodiscard]] Signal& port_changed() { return port_changed_; }
   [[nodiscard]] const BusCounters& counters() const { return counters_; }
+  /// Damaged replies of `node` in a row, without a sound one or silence between them.
+  [[nodiscard]] int garbled(std::uint8_t node) const;
   [[nodiscard]] TimePoint last_progress() const { return line_->last_progress(); }
 
  private:
+  [[nodiscard]] Exchange exchange_for(Request request, const Frame& frame, TransactionOptions options) const;
   [[nodiscard]] bool needs_resync(const Request& request) const;
+  [[nodiscard]] bool may_come_late(std::uint8_t node, std::uint16_t count) const;
   void pump();
   void arm_next();
   TransactionPtr resync_before(TransactionPtr waiting);
@@ -74,7 +78,9 @@ class RtuBus {
   void end(TransactionPtr transaction, const ExchangeResult& result);
   void count(const ExchangeResult& result);
   void note_late_read(const Request& request, const ExchangeResult& result);
+  void note_garbled(const Request& request, const ExchangeResult& result);
   [[nodiscard]] Result<Answer> answer(const Transaction& transaction, const ExchangeResult& result) const;
+  [[nodiscard]] Error error_of(const Exchange& exchange, const ExchangeResult& result) const;
 
   Executor executor_;
   Clock* clock_;
@@ -84,9 +90,10 @@ class RtuBus {
   Signal port_changed_;
   TransactionQueue queue_;
   TransactionPtr current_;  ///< armed or under way
-  /// Lengths of reads that timed out, by node: their replies may still come, and an FC03 reply does not say
-  /// which registers it carries.
-  std::map<std::uint8_t, std::set<std::uint16_t>> late_reads_;
+  /// Lengths of reads that timed out, by node, and until when their replies may still come: an FC03 reply
+  /// does not say which registers it carries.
+  std::map<std::uint8_t, std::map<std::uint16_t, TimePoint>> late_reads_;
+  std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Clock::Timer expiry_;
   BusCounters counters_;
   bool closed_ = false;

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <system_error>
 #include <utility>
@@ -130,7 +131,29 @@ Error RtuWorker::serve(SerialPort port) {
   return lost_error(settings_, path, lost);
 }
 
+/// Gives the port the serial settings of `exchange`. False: it was reported as not sent.
+bool RtuWorker::prepare(WireSession& session, const Exchange& exchange, int& lost) {
+  const auto wanted = exchange.serial.value_or(settings_.serial());
+  if (session.uses(wanted)) return true;
+  const int failed = session.use(wanted);
+  if (failed == EINVAL && exchange.serial) {
+    const auto now = monotonic_now();
+    report(ExchangeResult{.status = ExchangeStatus::unsupported,
+                          .native_error = EINVAL,
+                          .request_begin = now,
+                          .request_end = now,
+                          .reply_end = now});
+    return false;
+  }
+  lost = failed != 0 ? failed : session.keep_silence();  // the silence of the new rate may be longer
+  if (lost == 0) return true;
+  report(PortStatus{.open = false, .error = lost_error(settings_, session.path(), lost)});
+  report(ExchangeResult{.status = ExchangeStatus::not_sent, .native_error = lost});
+  return false;
+}
+
 void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) {
+  if (!prepare(session, exchange, lost)) return;
   const auto now = monotonic_now();
   const auto verdict = now > exchange.deadline ? Verdict::expired : may_send(exchange.guard, now);
   if (verdict != Verdict::send) {

@@ -98,13 +98,13 @@ unsigned format_flags(const Format& format) {
   return flags;
 }
 
-termios2 raw_settings(const LineSettings& line) {
+termios2 raw_settings(const SerialSettings& serial) {
   termios2 settings{};
-  settings.c_cflag = BOTHER | CREAD | CLOCAL | format_flags(line.format);
-  if (line.format.parity != Parity::none) settings.c_iflag = INPCK;
+  settings.c_cflag = BOTHER | CREAD | CLOCAL | format_flags(serial.format);
+  if (serial.format.parity != Parity::none) settings.c_iflag = INPCK;
   // With a minimum of 1 an empty port reads as EAGAIN and a lost one as 0, so that the two differ.
   settings.c_cc[VMIN] = 1;
-  settings.c_ispeed = settings.c_ospeed = static_cast<speed_t>(line.baud);
+  settings.c_ispeed = settings.c_ospeed = static_cast<speed_t>(serial.baud);
   return settings;
 }
 
@@ -113,24 +113,40 @@ bool close_enough(speed_t actual, int asked) {
   return std::abs(static_cast<long>(actual) - asked) * 50L <= asked;
 }
 
-Result<void> configure(const LineSettings& line, const std::string& path, int descriptor) {
-  auto settings = raw_settings(line);
+struct Applied {
+  int native_error = 0;
+  speed_t speed = 0;  ///< what the adapter made of it
+  bool right_speed = false, right_format = false;
+  [[nodiscard]] bool as_asked() const { return native_error == 0 && right_speed && right_format; }
+};
+
+/// Sets the port and reads back what became of it.
+Applied apply(const SerialSettings& serial, int descriptor) {
+  const auto settings = raw_settings(serial);
   termios2 actual{};
-  if (ioctl(descriptor, TCSETS2, &settings) != 0 || ioctl(descriptor, TCGETS2, &actual) != 0) {
-    if (errno == ENOTTY)
-      return port_error(line, errno, fmt::format("port {} is not a serial port", path), "correct `port:`");
-    return cannot_open(line, path, errno);
-  }
-  if (!close_enough(actual.c_ospeed, line.baud) || !close_enough(actual.c_ispeed, line.baud))
+  if (ioctl(descriptor, TCSETS2, &settings) != 0 || ioctl(descriptor, TCGETS2, &actual) != 0)
+    return {.native_error = errno};
+  const unsigned checked = is_pty(descriptor) ? CSTOPB : CSIZE | PARENB | PARODD | CSTOPB;
+  ioctl(descriptor, TCFLSH, TCIOFLUSH);  // bytes from before are nobody's reply
+  return {
+      .speed = actual.c_ospeed,
+      .right_speed = close_enough(actual.c_ospeed, serial.baud) && close_enough(actual.c_ispeed, serial.baud),
+      .right_format = ((actual.c_cflag ^ settings.c_cflag) & checked) == 0};
+}
+
+Result<void> configure(const LineSettings& line, const std::string& path, int descriptor) {
+  const auto applied = apply(line.serial(), descriptor);
+  if (applied.native_error == ENOTTY)
+    return port_error(line, ENOTTY, fmt::format("port {} is not a serial port", path), "correct `port:`");
+  if (applied.native_error != 0) return cannot_open(line, path, applied.native_error);
+  if (!applied.right_speed)
     return port_error(
         line, EINVAL,
-        fmt::format("port {} cannot do {} bit/s (it offers {})", path, line.baud, actual.c_ospeed),
+        fmt::format("port {} cannot do {} bit/s (it offers {})", path, line.baud, applied.speed),
         "choose another `baud:` on drives and bus, or another adapter");
-  const unsigned checked = is_pty(descriptor) ? CSTOPB : CSIZE | PARENB | PARODD | CSTOPB;
-  if (((actual.c_cflag ^ settings.c_cflag) & checked) != 0)
+  if (!applied.right_format)
     return port_error(line, EINVAL, fmt::format("port {} cannot do this parity or number of stop bits", path),
                       "choose another `format:` on drives and bus, or another adapter");
-  ioctl(descriptor, TCFLSH, TCIOFLUSH);  // bytes from before are nobody's reply
   return {};
 }
 
@@ -184,6 +200,11 @@ SerialPort::~SerialPort() {
   // Only the owner of the lock has set it; on a pty the mark would outlive this descriptor.
   if (context_) ioctl(descriptor_, TIOCNXCL);
   close(descriptor_);
+}
+
+int SerialPort::set_serial(const SerialSettings& serial) {
+  const auto applied = apply(serial, descriptor_);
+  return applied.as_asked() || applied.native_error != 0 ? applied.native_error : EINVAL;
 }
 
 int SerialPort::send(const Frame& request) {

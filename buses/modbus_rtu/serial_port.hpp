@@ -43,6 +43,10 @@ class SerialPort {
   SerialPort& operator=(SerialPort&&) = delete;
   ~SerialPort();
 
+  /// Changes speed and format; only while the line is silent. 0, EINVAL (the adapter cannot do it: the port
+  /// now has no settings to rely on) or the errno with which the port was lost.
+  int set_serial(const SerialSettings& serial);
+
   [[nodiscard]] int descriptor() const { return descriptor_; }
   [[nodiscard]] const std::string& path() const { return path_; }
 

@@ -17,6 +17,14 @@ struct Format {
   [[nodiscard]] int bits_per_character() const {
     return 1 + 8 + (parity == Parity::none ? 0 : 1) + stop_bits;
   }
+  bool operator==(const Format&) const = default;
+};
+
+/// What both ends of a line must agree on.
+struct SerialSettings {
+  int baud = 115200;  ///< bit/s, > 0
+  Format format{};
+  bool operator==(const SerialSettings&) const = default;
 };
 
 /// One RS-485 line as the YAML describes it.
@@ -28,11 +36,21 @@ struct LineSettings {
   Duration turnaround_max =
       std::chrono::milliseconds(20);  ///< longest time a node takes before its first byte
   [[nodiscard]] bool simulated() const { return port == "sim"; }
+  [[nodiscard]] SerialSettings serial() const { return {.baud = baud, .format = format}; }
 };
 
+/// "8N1"
+std::string to_string(const Format& format);
+/// "9600 baud 8E1"
+std::string to_string(const SerialSettings& serial);
+
 /// Time that `bytes` characters take on the wire.
-Duration wire_time(const LineSettings& line, std::size_t bytes);
+Duration wire_time(const SerialSettings& serial, std::size_t bytes);
+inline Duration wire_time(const LineSettings& line, std::size_t bytes) {
+  return wire_time(line.serial(), bytes);
+}
 /// Silence before each request: 3.5 characters, 1.75 ms above 19200 baud (Modbus over serial line 2.5.1.1).
-Duration silence(const LineSettings& line);
+Duration silence(const SerialSettings& serial);
+inline Duration silence(const LineSettings& line) { return silence(line.serial()); }
 
 }  // namespace axisd::modbus_rtu

@@ -12,7 +12,9 @@ bool is_read(const Transaction& transaction) {
 }
 
 bool sends_the_same(const Transaction& a, const Transaction& b) {
-  return a.exchange.frame == b.exchange.frame && !a.exchange.guard.gate && !b.exchange.guard.gate;
+  return a.exchange.frame == b.exchange.frame && !a.exchange.guard.gate && !b.exchange.guard.gate &&
+         a.exchange.serial == b.exchange.serial && a.exchange.reply_timeout == b.exchange.reply_timeout &&
+         a.exchange.turnaround_max == b.exchange.turnaround_max;
 }
 
 bool before(const TransactionPtr& a, const TransactionPtr& b) {

@@ -40,12 +40,13 @@ WireSession::WireSession(SerialPort port, const LineSettings& line, Wakeup& wake
                          std::atomic<TimePoint::rep>& progress)
     : port_(std::move(port)),
       line_(line),
+      serial_(line.serial()),
       wakeup_(wakeup),
       progress_(progress),
       last_byte_(monotonic_now()),  // whatever was said before the opening may just have ended
       request_end_(last_byte_) {}
 
-WireSession::~WireSession() { block_until(request_end_ + wire_time(line_, 1)); }
+WireSession::~WireSession() { block_until(request_end_ + wire_time(serial_, 1)); }
 
 void WireSession::touch() {
   progress_.store(monotonic_now().time_since_epoch().count(), std::memory_order_relaxed);
@@ -92,7 +93,7 @@ WireSession::Bytes WireSession::absorb() {
     if (!got) return {.count = total.count, .native_error = got.error()};
     if (*got == 0) return total;
     const auto now = monotonic_now();
-    if (total.count == 0 && now - last_byte_ >= silence(line_)) ++stray_frames_;
+    if (total.count == 0 && now - last_byte_ >= silence(serial_)) ++stray_frames_;
     last_byte_ = now;
     total.count += *got;
     if (total.count > 16 * Frame::capacity)
@@ -103,7 +104,7 @@ WireSession::Bytes WireSession::absorb() {
 int WireSession::keep_silence() {
   const auto give_up = monotonic_now() + babble_limit;
   for (;;) {
-    block_until(last_byte_ + silence(line_));
+    block_until(last_byte_ + silence(serial_));
     const auto heard = absorb();
     if (heard.native_error != 0) return heard.native_error;
     if (heard.count == 0 || monotonic_now() > give_up) return 0;
@@ -124,13 +125,23 @@ WireSession::Bytes WireSession::read_until_full(std::span<std::uint8_t> buffer, 
   return total;
 }
 
+int WireSession::use(const SerialSettings& serial) {
+  if (uses(serial)) return 0;
+  serial_known_ = false;
+  if (const int failed = port_.set_serial(serial); failed != 0) return failed;
+  serial_ = serial;
+  serial_known_ = true;
+  return 0;
+}
+
 int WireSession::find_echo() {
   if (echo_known_) return 0;
+  if (const int lost = use(line_.serial()); lost != 0) return lost;
   const auto probe = make_probe();
   for (int attempt = 0; attempt < echo_attempts && !echo_known_; ++attempt) {
     if (const int lost = keep_silence(); lost != 0) return lost;
     if (const int lost = port_.send(probe); lost != 0) return lost;
-    request_end_ = last_byte_ = monotonic_now() + wire_time(line_, probe.size());
+    request_end_ = last_byte_ = monotonic_now() + wire_time(serial_, probe.size());
     std::array<std::uint8_t, Frame::capacity> buffer;
     const auto heard = read_until_full(std::span(buffer).first(probe.size()), request_end_ + echo_latency);
     if (heard.native_error != 0) return heard.native_error;
@@ -153,7 +164,8 @@ void WireSession::end(ExchangeResult& result, ExchangeStatus status, int native_
 /// After damage: the sender may not have finished. Its remaining bytes belong to no later request.
 void WireSession::settle(ExchangeResult& result) {
   const auto give_up = monotonic_now() + babble_limit;
-  while (monotonic_now() < give_up && wait_until(monotonic_now() + silence(line_), nullptr) == Wait::bytes) {
+  while (monotonic_now() < give_up &&
+         wait_until(monotonic_now() + silence(serial_), nullptr) == Wait::bytes) {
     std::array<std::uint8_t, Frame::capacity> buffer;
     const auto got = port_.read_available(buffer);
     if (!got) return;  // the next use of the port finds it lost
@@ -241,7 +253,7 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
     end(result, ExchangeStatus::io_error, lost);
     return result;
   }
-  result.request_end = monotonic_now() + wire_time(line_, exchange.frame.size());
+  result.request_end = monotonic_now() + wire_time(serial_, exchange.frame.size());
   request_end_ = last_byte_ = result.request_end;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
   if (echo_ && !pass_echo(exchange, result)) return result;

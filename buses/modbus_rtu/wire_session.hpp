@@ -14,7 +14,7 @@ namespace axisd::modbus_rtu {
 
 /// Silences, echoes and exchanges on one open port. Thread: the line's worker.
 ///
-///   find_echo -> { keep_silence -> exchange | idle }* -> the port is lost
+///   find_echo -> { keep_silence -> [use -> keep_silence] -> exchange | idle }* -> the port is lost
 ///
 /// Functions that return `int` return 0 or the errno with which the port was lost; it is useless afterwards.
 class WireSession {
@@ -28,6 +28,10 @@ class WireSession {
 
   /// Finds out whether the adapter hears what it sends, where that is not known.
   int find_echo();
+  [[nodiscard]] bool uses(const SerialSettings& serial) const { return serial_known_ && serial_ == serial; }
+  /// Brings the port to other serial settings; the line must be silent. 0, EINVAL (the port cannot do them)
+  /// or the errno with which it was lost.
+  int use(const SerialSettings& serial);
   /// Blocks until the line has been silent for as long as must be before a request.
   int keep_silence();
   /// Blocks until the wakeup is notified, bytes that nobody asked for come, or `limit` has passed.
@@ -57,6 +61,8 @@ class WireSession {
 
   SerialPort port_;
   const LineSettings& line_;
+  SerialSettings serial_;     ///< as the port is set: of the last bytes, and of the next
+  bool serial_known_ = true;  ///< false after a change that failed: the port may have anything
   Wakeup& wakeup_;
   std::atomic<TimePoint::rep>& progress_;
   TimePoint last_byte_;       ///< end of the last character on the wire, sent or received

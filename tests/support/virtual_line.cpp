@@ -11,7 +11,10 @@ using namespace modbus_rtu;
 VirtualLine::VirtualLine(VirtualWorld& world, LineSettings settings)
     : world_(&world),
       settings_(std::move(settings)),
-      network_({.baud = settings_.baud, .bits_per_character = settings_.format.bits_per_character()}) {}
+      serial_(settings_.serial()),
+      network_({.baud = settings_.baud, .bits_per_character = settings_.format.bits_per_character()}) {
+  network_.set_serial({.baud = serial_.baud, .format = serial_.format});
+}
 
 void VirtualLine::start(ResultHandler on_result, PortHandler on_port) {
   on_result_ = std::move(on_result);
@@ -34,8 +37,21 @@ void VirtualLine::set_open(bool open) {
 
 void VirtualLine::arm(const Exchange& exchange) {
   armed_ = &exchange;
-  timer_ =
-      world_->clock().call_at(std::max(world_->now(), quiet_since_ + silence(settings_)), [this] { bind(); });
+  timer_ = world_->clock().call_at(earliest_begin(), [this] { bind(); });
+}
+
+/// Of what is armed: silent for as long as the last bytes and its own require.
+TimePoint VirtualLine::earliest_begin() const {
+  const auto next = armed_->serial.value_or(settings_.serial());
+  return std::max(world_->now(), quiet_since_ + std::max(silence(serial_), silence(next)));
+}
+
+bool VirtualLine::use(const SerialSettings& serial) {
+  if (serial == serial_) return true;
+  if (can_do_ && !can_do_(serial)) return false;
+  serial_ = serial;
+  network_.set_serial({.baud = serial.baud, .format = serial.format});
+  return true;
 }
 
 bool VirtualLine::revoke() {
@@ -50,16 +66,18 @@ void VirtualLine::bind() {
   const auto& exchange = *std::exchange(armed_, nullptr);
   result_ = {};
   result_.request_begin = result_.request_end = now;
+  if (!use(exchange.serial.value_or(settings_.serial()))) return end(ExchangeStatus::unsupported);
   if (exchange.deadline < now) return end(ExchangeStatus::not_sent, Verdict::expired);
   if (const auto verdict = may_send(exchange.guard, now); verdict != Verdict::send)
     return end(ExchangeStatus::not_sent, verdict);
   under_way_ = &exchange;
-  result_.request_end = now + wire_time(settings_, exchange.frame.size());
+  result_.request_end = now + wire_time(serial_, exchange.frame.size());
   const auto bytes = exchange.frame.bytes();
   wire_.push_back({.begin = now,
                    .end = result_.request_end,
                    .request = {bytes.begin(), bytes.end()},
-                   .status = ExchangeStatus::timeout});
+                   .status = ExchangeStatus::timeout,
+                   .serial = serial_});
   if (on_bind_) on_bind_(wire_.back());
   timer_ = world_->clock().call_at(result_.request_end, [this] { request_sent(); });
 }
@@ -71,7 +89,7 @@ void VirtualLine::request_sent() {
   if (network_.take_hang_up()) return set_open(false);
   if (reply) {
     // A node, and the adapter too, delivers in order: nothing overtakes a reply that is late.
-    const auto shift = std::max(Duration{}, last_reply_end_ + silence(settings_) - reply->begin);
+    const auto shift = std::max(Duration{}, last_reply_end_ + silence(serial_) - reply->begin);
     reply->begin += shift;
     last_reply_end_ = reply->end += shift;
   }
@@ -93,7 +111,7 @@ void VirtualLine::request_sent() {
 void VirtualLine::hear(std::vector<std::uint8_t> bytes) {
   quiet_since_ = std::max(quiet_since_, world_->now());
   if (armed_ != nullptr) {  // the silence begins anew
-    timer_ = world_->clock().call_at(quiet_since_ + silence(settings_), [this] { bind(); });
+    timer_ = world_->clock().call_at(earliest_begin(), [this] { bind(); });
     return;
   }
   // Bytes that arrive while the request is being sent are lost with it.

@@ -19,6 +19,7 @@ struct WireEntry {
   TimePoint end{};  ///< last byte on the wire because of it, or the end of the wait
   std::vector<std::uint8_t> request;
   modbus_rtu::ExchangeStatus status;
+  modbus_rtu::SerialSettings serial{};  ///< of the line, while this was on it
   [[nodiscard]] std::uint8_t node() const { return request.at(0); }
   [[nodiscard]] std::uint8_t function() const { return request.at(1); }
   [[nodiscard]] std::uint16_t address() const {
@@ -50,6 +51,10 @@ class VirtualLine final : public modbus_rtu::Line {
   void forget_wire() { wire_.clear(); }
   /// Called at the bind of each frame, before its first byte.
   void set_on_bind(std::function<void(const WireEntry&)> on_bind) { on_bind_ = std::move(on_bind); }
+  /// What the adapter can do; everything if unset.
+  void set_can_do(std::function<bool(const modbus_rtu::SerialSettings&)> can_do) {
+    can_do_ = std::move(can_do);
+  }
   /// Plugs the adapter in or out.
   void set_open(bool open);
 
@@ -60,13 +65,17 @@ class VirtualLine final : public modbus_rtu::Line {
   [[nodiscard]] TimePoint last_progress() const override { return world_->now(); }
 
  private:
+  [[nodiscard]] TimePoint earliest_begin() const;
   void bind();
+  bool use(const modbus_rtu::SerialSettings& serial);
   void request_sent();
   void hear(std::vector<std::uint8_t> bytes);
   void end(modbus_rtu::ExchangeStatus status, Verdict verdict = Verdict::send);
 
   VirtualWorld* world_;
   modbus_rtu::LineSettings settings_;
+  modbus_rtu::SerialSettings serial_;  ///< as the port is set now
+  std::function<bool(const modbus_rtu::SerialSettings&)> can_do_;
   simulation::RtuNetwork network_;
   ResultHandler on_result_;
   PortHandler on_port_;
