@@ -41,8 +41,7 @@ Result<std::unique_ptr<SimulatedLines>> SimulatedLines::open(const config::Confi
       nodes.push_back(simulator->make(simulated_node(entry)));
     }
     auto line = simulation::PtyLine::open(
-        {.network = {.baud = bus.baud, .bits_per_character = bus.format.bits_per_character()}},
-        std::move(nodes));
+        {.serial = {.baud = bus.baud, .format = bus.format}, .link = {}, .observer = {}}, std::move(nodes));
     if (!line) return fail(line.error());
     lines->lines_.emplace(bus.name, std::move(*line));
   }

@@ -35,7 +35,8 @@ struct Options {
 
 void declare(CLI::App& app, Options& options) {
   app.add_option("--link", options.link, "symbolic link to the terminal that clients open");
-  app.add_option("--baud", options.baud, "wire speed in bit/s")->check(CLI::Range(1200, 4'000'000));
+  app.add_option("--baud", options.baud, "bit/s that the drives are set to; the line follows its client")
+      ->check(CLI::Range(1200, 4'000'000));
   app.add_option("--format", options.format, "8N1, 8N2, 8E1 or 8O1")
       ->check(CLI::IsMember({"8N1", "8N2", "8E1", "8O1"}));
   app.add_option("--turnaround-us", options.turnaround_us, "from request to reply; at least 3.5 characters")
@@ -44,7 +45,7 @@ void declare(CLI::App& app, Options& options) {
          "--drive", options.drives,
          "a drive: node=N,model=NAME[,home=FROM:TO][,positive_limit=N][,negative_limit=N]"
          "[,switch.NAME=on|off][,eeprom.REGISTER=VALUE][,wire.TERMINAL=home|positive_limit|negative_limit"
-         "[:nc]][,boot_ms=N][,powered=off]; may be repeated")
+         "[:nc]][,dip=ADDRESS][,dip_baud=BAUD|custom][,boot_ms=N][,powered=off]; may be repeated")
       ->allow_extra_args(false);
   app.add_option("--node", options.node, "address of a single drive")->check(CLI::Range(1, 127));
   app.add_option("--model", options.model, "its model");
@@ -99,6 +100,12 @@ void print_switches() {
       fmt::print("{} {}={} {}\n", simulator->model, one.name, one.default_value ? "on" : "off", one.meaning);
 }
 
+/// The option is checked to be one of four.
+modbus_rtu::Format format_from(std::string_view text) {
+  using enum modbus_rtu::Parity;
+  return {.parity = text[1] == 'E' ? even : text[1] == 'O' ? odd : none, .stop_bits = text[2] - '0'};
+}
+
 using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
 /// One line per frame, written at once, so that a reader sees the wire as it is.
@@ -126,9 +133,8 @@ int serve(const Options& options) {
 
   auto nodes = make_nodes(options);
   if (!nodes) return complain(nodes.error());
-  PtyLineSettings settings{.network = {.baud = options.baud,
-                                       .bits_per_character = options.format == "8N1" ? 10 : 11,
-                                       .turnaround = std::chrono::microseconds(options.turnaround_us)},
+  PtyLineSettings settings{.serial = {.baud = options.baud, .format = format_from(options.format)},
+                           .turnaround = std::chrono::microseconds(options.turnaround_us),
                            .link = options.link,
                            .observer = {}};
   File log(nullptr, &std::fclose);

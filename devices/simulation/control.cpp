@@ -1,6 +1,9 @@
 #include "devices/simulation/control.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 
 #include "devices/simulation/text.hpp"
 
@@ -11,9 +14,9 @@ namespace {
 using Words = std::span<const std::string_view>;
 
 constexpr std::string_view usage =
-    "power N on|off; input N TERMINAL on|off|auto; alarm N CODE; fault KIND key=value...; fault clear; cut; "
-    "join; "
-    "hangup; replug; shaft N; peek N REGISTER; poke N REGISTER VALUE; eeprom N; help";
+    "power N on|off; input N TERMINAL on|off|auto; alarm N CODE; block N on|off; push N PULSES; shaft N; "
+    "peek N REGISTER; poke N REGISTER VALUE; eeprom N; fault KIND key=value...; fault clear; cut; join; "
+    "hangup; replug; help (N: an address, or @K for the K-th drive)";
 
 std::string power(SimulatedRtuNode& node, Words words) {
   const auto on = words.size() == 1 ? parse_on_off(words[0]) : std::nullopt;
@@ -33,9 +36,24 @@ std::string input(SimulatedRtuNode& node, Words words) {
 
 std::string alarm(SimulatedRtuNode& node, Words words) {
   const auto code = words.size() == 1 ? parse_number<int>(words[0]) : std::nullopt;
-  if (!code || *code < 0 || *code > 5) return "error use: alarm N 0..5 (0: the cause is gone)";
+  const auto known = node.alarms();
+  if (!code || (*code != 0 && std::ranges::find(known, *code) == known.end()))
+    return fmt::format("error use: alarm N CODE, with {} (0: the cause is gone)", fmt::join(known, ", "));
   node.raise_alarm(*code);
   return "ok";
+}
+
+std::string block(SimulatedRtuNode& node, Words words) {
+  const auto on = words.size() == 1 ? parse_on_off(words[0]) : std::nullopt;
+  if (!on) return "error use: block N on|off";
+  node.block_shaft(*on);
+  return "ok";
+}
+
+std::string push(SimulatedRtuNode& node, Words words) {
+  const auto pulses = words.size() == 1 ? parse_number<std::int32_t>(words[0]) : std::nullopt;
+  if (!pulses) return "error use: push N PULSES";
+  return node.push_shaft(*pulses) ? "ok" : "error the shaft is held; release the drive or switch it off";
 }
 
 std::string shaft(SimulatedRtuNode& node, Words words) {
@@ -67,57 +85,69 @@ struct NodeCommand {
   std::string_view name;
   std::string (*run)(SimulatedRtuNode& node, Words words);
 };
-constexpr NodeCommand node_commands[] = {{"power", &power},  {"input", &input}, {"alarm", &alarm},
-                                         {"shaft", &shaft},  {"peek", &peek},   {"poke", &poke},
-                                         {"eeprom", &eeprom}};
+constexpr NodeCommand node_commands[] = {{"power", &power}, {"input", &input}, {"alarm", &alarm},
+                                         {"block", &block}, {"push", &push},   {"shaft", &shaft},
+                                         {"peek", &peek},   {"poke", &poke},   {"eeprom", &eeprom}};
 
-std::string fault(PtyLine& line, std::string_view text) {
+std::string fault(RtuNetwork& network, std::string_view text) {
   if (text == "clear") {
-    line.with_network([](RtuNetwork& network) { network.faults().clear(); });
+    network.faults().clear();
     return "ok";
   }
   auto parsed = parse_fault(text);
   if (!parsed) return fmt::format("error {}; {}", parsed.error().message, parsed.error().remedy);
-  line.with_network([&](RtuNetwork& network) { network.faults().add(std::move(*parsed)); });
+  network.faults().add(std::move(*parsed));
   return "ok";
 }
 
-std::string node_command(PtyLine& line, Words words) {
+/// "5": address; "@2": the second drive of the line. nullptr: there is none.
+SimulatedRtuNode* find_node(RtuNetwork& network, std::string_view name) {
+  if (name.starts_with('@')) {
+    const auto place = parse_number<std::size_t>(name.substr(1));
+    const auto nodes = network.nodes();
+    return place && *place >= 1 && *place <= nodes.size() ? nodes[*place - 1].get() : nullptr;
+  }
+  const auto address = parse_number<std::uint8_t>(name);
+  return address ? network.node(*address) : nullptr;
+}
+
+std::string node_command(RtuNetwork& network, Words words) {
   for (const auto& command : node_commands) {
     if (command.name != words[0]) continue;
-    const auto address = words.size() > 1 ? parse_number<std::uint8_t>(words[1]) : std::nullopt;
-    if (!address) return fmt::format("error {} needs a node", words[0]);
-    return line.with_network([&](RtuNetwork& network) {
-      auto* node = network.node(*address);
-      return node == nullptr ? fmt::format("error no node {}", *address)
-                             : command.run(*node, words.subspan(2));
-    });
+    if (words.size() < 2) return fmt::format("error {} needs a node", words[0]);
+    auto* node = find_node(network, words[1]);
+    return node == nullptr ? fmt::format("error no node {}", words[1]) : command.run(*node, words.subspan(2));
   }
   return fmt::format("error \"{}\" is no command; use: {}", words[0], usage);
 }
 
 }  // namespace
 
-std::string execute_control(PtyLine& line, std::string_view command) {
+std::string execute_control(RtuNetwork& network, std::string_view command) {
   const auto words = split(command, ' ');
   if (words.empty()) return fmt::format("error empty; use: {}", usage);
   if (words[0] == "fault") {
     const auto rest = command.find("fault") + 5;
-    return fault(line, command.substr(std::min(command.find_first_not_of(' ', rest), command.size())));
+    return fault(network, command.substr(std::min(command.find_first_not_of(' ', rest), command.size())));
   }
-  if (words.size() > 1) return node_command(line, words);
+  if (words.size() > 1) return node_command(network, words);
   if (words[0] == "help") return fmt::format("ok {}", usage);
-  if (words[0] == "cut" || words[0] == "join") {
-    line.with_network([&](RtuNetwork& network) { network.set_connected(words[0] == "join"); });
-    return "ok";
-  }
-  if (words[0] == "hangup") {
+  if (words[0] != "cut" && words[0] != "join") return node_command(network, words);
+  network.set_connected(words[0] == "join");
+  return "ok";
+}
+
+std::string execute_control(PtyLine& line, std::string_view command) {
+  const auto words = split(command, ' ');
+  if (words.size() == 1 && words[0] == "hangup") {
     line.hang_up();
     return "ok";
   }
-  if (words[0] != "replug") return node_command(line, words);
-  const auto plugged = line.replug();
-  return plugged ? "ok " + line.path() : "error " + plugged.error().message;
+  if (words.size() == 1 && words[0] == "replug") {
+    const auto plugged = line.replug();
+    return plugged ? "ok " + line.path() : "error " + plugged.error().message;
+  }
+  return line.with_network([&](RtuNetwork& network) { return execute_control(network, command); });
 }
 
 }  // namespace axisd::simulation

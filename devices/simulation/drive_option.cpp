@@ -76,6 +76,15 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
     if (node) settings.address = *node;
     return node.has_value();
   }
+  if (key == "dip") {
+    const auto dip = parse_number<std::uint8_t>(value);
+    if (dip) settings.dip_address = *dip;
+    return dip.has_value();
+  }
+  if (key == "dip_baud") {
+    settings.dip_baud = value == "custom" ? 0 : parse_number<int>(value);
+    return settings.dip_baud && (value == "custom" || *settings.dip_baud > 0);
+  }
   if (key == "powered") {
     const auto on = parse_on_off(value);
     if (on) settings.powered = *on;
@@ -95,10 +104,11 @@ Result<DriveOption> parse_drive(std::string_view text) {
   for (const auto part : split(text, ',')) {
     const auto [key, value] = key_value(part);
     if (!parse_part(key, value, option))
-      return fail(Reason::invalid_argument, fmt::format("\"{}\" is not understood", part),
-                  "use node=, model=, home=FROM:TO, positive_limit=, negative_limit=, switch.NAME=on|off, "
-                  "eeprom.REGISTER=VALUE, wire.TERMINAL=home|positive_limit|negative_limit[:nc], boot_ms=, "
-                  "powered=on|off");
+      return fail(
+          Reason::invalid_argument, fmt::format("\"{}\" is not understood", part),
+          "use node=, model=, home=FROM:TO, positive_limit=, negative_limit=, switch.NAME=on|off, "
+          "eeprom.REGISTER=VALUE, wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
+          "dip_baud=BAUD|custom, boot_ms=, powered=on|off");
   }
   if (option.model.empty() || option.settings.address == 0)
     return fail(Reason::invalid_argument, fmt::format("\"{}\" names no drive", text),

@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <sys/eventfd.h>
 #include <sys/stat.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <array>
@@ -14,6 +13,7 @@
 #include <cstring>
 
 #include "devices/simulation/crc.hpp"
+#include "devices/simulation/pty_serial.hpp"
 
 namespace axisd::simulation {
 
@@ -69,7 +69,9 @@ PtyLine::Held::~Held() {
   line_.wake();
 }
 
-PtyLine::PtyLine(PtyLineSettings settings) : settings_(std::move(settings)), network_(settings_.network) {
+PtyLine::PtyLine(PtyLineSettings settings)
+    : settings_(std::move(settings)), network_({.turnaround = settings_.turnaround}) {
+  network_.set_serial(settings_.serial);
   network_.set_observer(settings_.observer);
 }
 
@@ -97,15 +99,12 @@ Result<void> PtyLine::plug() {
   const int master = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (master < 0) return system_failure("posix_openpt");
   std::array<char, 128> name{};
-  termios raw{};
   if (grantpt(master) != 0 || unlockpt(master) != 0 || ptsname_r(master, name.data(), name.size()) != 0 ||
-      tcgetattr(master, &raw) != 0) {
+      !set_pty_serial(master, settings_.serial)) {
     auto failure = system_failure("pty");
     close(master);
     return failure;
   }
-  cfmakeraw(&raw);
-  tcsetattr(master, TCSANOW, &raw);
   terminal_ = name.data();
   if (!settings_.link.empty()) {
     if (auto linked = make_link(settings_.link, terminal_); !linked) {
@@ -200,6 +199,7 @@ void PtyLine::read_master(TimePoint now) {
   const auto size = read(master_, buffer.data(), buffer.size());
   if (size > 0) {
     orphaned_ = false;
+    if (const auto serial = pty_serial(master_, settings_.serial)) network_.set_serial(*serial);
     receive(std::span(buffer).first(static_cast<std::size_t>(size)), now);
   } else if (size < 0 && errno == EIO) {
     orphaned_ = true;

@@ -15,7 +15,9 @@
 namespace axisd::simulation {
 
 struct PtyLineSettings {
-  RtuNetworkSettings network{};
+  /// What the drives join; the terminal begins with it and follows its client from then on.
+  Serial serial{};
+  Duration turnaround = RtuNetworkSettings{}.turnaround;
   std::string
       link{};  ///< symbolic link to the terminal; empty: none. Replaced if it is a link, else an error
   FrameObserver observer{};  ///< called while the line is held: must not call back

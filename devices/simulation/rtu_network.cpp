@@ -29,6 +29,18 @@ void append(ReplyPlan& plan, std::span<const std::uint8_t> bytes, TimePoint begi
   }
 }
 
+/// Two nodes with one address drive the line at once: a bit is 0 where either of them pulls it there. Never
+/// quite at once, even if they say the same: the second is taken to be one bit late.
+void collide(std::vector<std::uint8_t>& reply, std::span<const std::uint8_t> late) {
+  reply.resize(std::max(reply.size(), late.size()), 0xFF);
+  std::uint8_t idle = 1;
+  for (std::size_t i = 0; i < late.size(); ++i) {
+    reply[i] &= static_cast<std::uint8_t>(late[i] << 1U | idle);  // the lowest bit is the first on the wire
+    idle = late[i] >> 7U;
+  }
+  if (frame_is_sound(reply)) reply.front() ^= 1U;
+}
+
 }  // namespace
 
 RtuNetwork::RtuNetwork(RtuNetworkSettings settings) : settings_(settings) {}
@@ -85,13 +97,10 @@ std::optional<std::vector<std::uint8_t>> RtuNetwork::dispatch(std::span<const st
     if (!hears(*node)) continue;
     const auto one = node->on_frame(frame);
     if (!one) continue;
-    if (!reply) {
+    if (reply)
+      collide(*reply, *one);
+    else
       reply = one;
-      continue;
-    }
-    // Two nodes with one address drive the line at once: a bit is 0 where either of them pulls it there.
-    reply->resize(std::max(reply->size(), one->size()), 0xFF);
-    for (std::size_t i = 0; i < one->size(); ++i) (*reply)[i] &= (*one)[i];
   }
   return reply;
 }

@@ -1,6 +1,7 @@
 #include "devices/simulation/simulator.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -31,9 +32,21 @@ bool contains(std::span<const Named> all, std::string_view name) {
 
 Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,
                                                     SimulatedNodeSettings settings) {
-  if (settings.address < 1 || settings.address > 127)
-    return fail(Reason::out_of_range, fmt::format("node {} is not a Modbus address", settings.address),
-                "use 1 to 127");
+  if (settings.address < 1 || settings.address > simulator.maximum_node)
+    return fail(Reason::out_of_range,
+                fmt::format("node {} is no address of {}", settings.address, simulator.model),
+                fmt::format("use 1 to {}", simulator.maximum_node));
+  if (settings.dip_address > simulator.maximum_dip_address)
+    return fail(
+        Reason::out_of_range,
+        fmt::format("the address switches of {} do not go to {}", simulator.model, *settings.dip_address),
+        fmt::format("use dip=0 to {}", simulator.maximum_dip_address));
+  if (settings.dip_baud.value_or(0) != 0 &&
+      std::ranges::find(simulator.dip_bauds, *settings.dip_baud) == simulator.dip_bauds.end())
+    return fail(Reason::out_of_range,
+                fmt::format("{} has no switch for {} bit/s", simulator.model, *settings.dip_baud),
+                fmt::format("use dip_baud=custom{}{}", simulator.dip_bauds.empty() ? "" : " or ",
+                            fmt::join(simulator.dip_bauds, ", ")));
   for (const auto& [name, on] : settings.switches)
     if (!contains(simulator.switches, name))
       return fail(Reason::invalid_argument, fmt::format("{} has no switch \"{}\"", simulator.model, name),

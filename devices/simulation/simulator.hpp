@@ -33,7 +33,8 @@ std::span<const Simulator* const> simulators();
 /// nullptr if there is none of that name.
 const Simulator* find_simulator(std::string_view model);
 
-/// Makes a node. Errors: unknown model, switch or terminal of a wire; an address outside 1..127.
+/// Makes a node. Errors: unknown model, switch or terminal of a wire; an address or baud rate that the model
+/// cannot be set to.
 Result<std::unique_ptr<SimulatedRtuNode>> make_node(std::string_view model, SimulatedNodeSettings settings);
 /// The same for a simulator at hand.
 Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,

@@ -72,7 +72,7 @@ class PtyLineTest : public ::testing::Test {
     std::vector<std::unique_ptr<SimulatedRtuNode>> nodes;
     nodes.push_back(*make_node("ykd2405pr", SimulatedNodeSettings{}));
     auto opened =
-        PtyLine::open({.network = {},
+        PtyLine::open({.serial = {},
                        .link = folder + "/line",
                        .observer = [this](TimePoint, bool received,
                                           std::span<const std::uint8_t>) { (received ? rx : tx)++; }},
@@ -194,8 +194,8 @@ TEST_F(PtyLineTest, ControlSocketAnswersLineByLine) {
 TEST_F(PtyLineTest, PathsThatAreTakenAreRefusedAndLeftAlone) {
   const auto taken = folder + "/taken";
   ASSERT_EQ(0, mkdir(taken.c_str(), 0700));
-  EXPECT_FALSE(PtyLine::open({.network = {}, .link = taken, .observer = {}}, {}));
-  EXPECT_FALSE(PtyLine::open({.network = {}, .link = folder + "/no/such", .observer = {}}, {}));
+  EXPECT_FALSE(PtyLine::open({.serial = {}, .link = taken, .observer = {}}, {}));
+  EXPECT_FALSE(PtyLine::open({.serial = {}, .link = folder + "/no/such", .observer = {}}, {}));
   EXPECT_FALSE(ControlSocket::open(taken, [](std::string_view) { return std::string(); }));
   EXPECT_EQ(0, rmdir(taken.c_str()));
 }
