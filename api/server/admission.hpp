@@ -16,7 +16,7 @@ class Admission {
  public:
   struct Limits {
     int calls = 256;   ///< calls that wait for the core, per client
-    int streams = 64;  ///< open WatchAxes and WatchCommand, per client
+    int streams = 64;  ///< open streams of all kinds, per client
   };
   enum class Kind : std::uint8_t { call, stream };
 

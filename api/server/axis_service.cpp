@@ -9,18 +9,12 @@
 #include "api/server/convert.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
+#include "api/server/reply_stream.hpp"
 #include "api/server/status.hpp"
 #include "api/server/watch_hub.hpp"
 
 namespace axisd::server {
 namespace {
-
-/// A stream that ends before it begins.
-class RefusedStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
- public:
-  explicit RefusedStream(const grpc::Status& status) { Finish(status); }
-  void OnDone() override { delete this; }
-};
 
 grpc::ServerUnaryReactor* refuse(grpc::CallbackServerContext* context, const std::string& client,
                                  std::string_view what, const Error& error) {
@@ -94,19 +88,19 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* AxisServiceImpl::WatchAxes(Context* 
   v1::WatchAxesRequest parsed;
   auto bytes = *request;
   if (!grpc::SerializationTraits<v1::WatchAxesRequest>::Deserialize(&bytes, &parsed).ok())
-    return new RefusedStream(to_status({.reason = Reason::invalid_argument,
-                                        .message = "the request is not a WatchAxesRequest",
-                                        .remedy = "use the published proto files"}));
+    return new RefusedStream<grpc::ByteBuffer>(to_status({.reason = Reason::invalid_argument,
+                                                          .message = "the request is not a WatchAxesRequest",
+                                                          .remedy = "use the published proto files"}));
   auto axes = watched_axes(parsed, services_.machine);
-  if (!axes) return new RefusedStream(to_status(axes.error()));
+  if (!axes) return new RefusedStream<grpc::ByteBuffer>(to_status(axes.error()));
   const auto period = watch_period(parsed);
-  if (!period) return new RefusedStream(to_status(period.error()));
+  if (!period) return new RefusedStream<grpc::ByteBuffer>(to_status(period.error()));
   const auto client = client_of(*context);
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
-  if (!ticket) return new RefusedStream(to_status(ticket.error()));
+  if (!ticket) return new RefusedStream<grpc::ByteBuffer>(to_status(ticket.error()));
   spdlog::debug("{}: watches {} axes", client, axes->size());
   auto* stream = services_.hub.open(services_, context, *std::move(ticket), *std::move(axes), *period);
-  return stream != nullptr ? stream : new RefusedStream(shutting_down());
+  return stream != nullptr ? stream : new RefusedStream<grpc::ByteBuffer>(shutting_down());
 }
 
 AxisServiceImpl::Reactor* AxisServiceImpl::Enable(Context* context, const v1::EnableRequest* request,

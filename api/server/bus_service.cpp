@@ -1,30 +1,107 @@
 #include "api/server/bus_service.hpp"
 
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
 #include <memory>
 #include <utility>
 #include <vector>
 
+#include "api/server/bus_convert.hpp"
+#include "api/server/bus_validate.hpp"
 #include "api/server/convert.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
+#include "api/server/progress_stream.hpp"
 #include "api/server/status.hpp"
+#include "api/server/value_reply.hpp"
 
 namespace axisd::server {
 
-grpc::ServerUnaryReactor* BusServiceImpl::ListBuses(grpc::CallbackServerContext* context,
-                                                    const v1::ListBusesRequest*,
-                                                    v1::ListBusesResponse* response) {
+using Call = std::shared_ptr<PendingCall>;
+using Words = std::vector<std::uint16_t>;
+
+BusServiceImpl::Reactor* BusServiceImpl::ListBuses(Context* context, const v1::ListBusesRequest*,
+                                                   v1::ListBusesResponse* response) {
   auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
-  return PendingCall::start(services_, context, *std::move(ticket),
-                            [&](const std::shared_ptr<PendingCall>& call) {
-                              services_.machine.buses([call, response](std::vector<BusStatus> buses) {
-                                call->complete([response, buses = std::move(buses)] {
-                                  for (const auto& bus : buses) to_proto(bus, *response->add_buses());
-                                  return grpc::Status::OK;
-                                });
-                              });
-                            });
+  return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
+    services_.machine.buses([call, response](std::vector<BusStatus> buses) {
+      call->complete([response, buses = std::move(buses)] {
+        for (const auto& bus : buses) to_proto(bus, *response->add_buses());
+        return grpc::Status::OK;
+      });
+    });
+  });
+}
+
+BusServiceImpl::Reactor* BusServiceImpl::ListDevices(Context* context, const v1::ListDevicesRequest*,
+                                                     v1::ListDevicesResponse* response) {
+  for (const auto& device : services_.machine.bus_access().devices())
+    to_proto(*device, *response->add_devices());
+  return answer(context, grpc::Status::OK);
+}
+
+BusServiceImpl::Reactor* BusServiceImpl::WriteDevice(Context* context, const v1::WriteDeviceRequest* request,
+                                                     v1::WriteDeviceResponse* response) {
+  auto& buses = services_.machine.bus_access();
+  if (auto valid = check_device_write(*request, buses); !valid)
+    return answer(context, to_status(valid.error()));
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
+    buses.write_device(request->device(), request->register_(), request->value(),
+                       reply_with_value<double>(
+                           call, [response](double written) { response->set_value(written); },
+                           fmt::format("{}: {} {} = {}", client, request->device(), request->register_(),
+                                       request->value())));
+  });
+}
+
+BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::TransactRequest* request,
+                                                  v1::TransactResponse* response) {
+  auto transaction = to_transact(*request);
+  if (!transaction) return answer(context, to_status(transaction.error()));
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
+    const auto& values = transaction->values;
+    std::string what;
+    if (!values.empty())
+      what = fmt::format("{}: writes {} registers from {} of {} node {}", client, values.size(),
+                         transaction->address, transaction->bus, transaction->node);
+    services_.machine.bus_access().transact(*std::move(transaction), reply_with_value<Words>(
+                                                                         call,
+                                                                         [response](const Words& words) {
+                                                                           for (const auto word : words)
+                                                                             response->add_values(word);
+                                                                         },
+                                                                         std::move(what)));
+  });
+}
+
+grpc::ServerWriteReactor<v1::ScanResponse>* BusServiceImpl::Scan(Context* context,
+                                                                 const v1::ScanRequest* request) {
+  using Refused = RefusedStream<v1::ScanResponse>;
+  using Stream = ProgressStream<v1::ScanResponse, ScanProgress>;
+  auto scan = to_scan(*request);
+  if (!scan) return new Refused(to_status(scan.error()));
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::stream);
+  if (!ticket) return new Refused(to_status(ticket.error()));
+  spdlog::info("{}: scans {} from node {} to {}", client, scan->bus, scan->first_node, scan->last_node);
+  auto* stream = Stream::start(
+      services_, context, *std::move(ticket),
+      [&](Stream::Callback callback) {
+        return services_.machine.bus_access().scan(*std::move(scan), std::move(callback));
+      },
+      [](const ScanProgress& from, v1::ScanResponse& to) {
+        to_proto(from, to);
+        return from.finished;
+      });
+  return stream != nullptr ? stream : new Refused(shutting_down());
 }
 
 }  // namespace axisd::server

@@ -5,14 +5,22 @@
 
 namespace axisd::server {
 
-/// BusService. Thread: gRPC.
+/// BusService: validates, converts, asks the machine. Thread: gRPC.
 class BusServiceImpl final : public v1::BusService::CallbackService {
  public:
   explicit BusServiceImpl(const Services& services) : services_(services) {}
 
-  grpc::ServerUnaryReactor* ListBuses(grpc::CallbackServerContext* context,
-                                      const v1::ListBusesRequest* request,
-                                      v1::ListBusesResponse* response) override;
+  using Context = grpc::CallbackServerContext;
+  using Reactor = grpc::ServerUnaryReactor;
+  Reactor* ListBuses(Context* context, const v1::ListBusesRequest* request,
+                     v1::ListBusesResponse* response) override;
+  Reactor* ListDevices(Context* context, const v1::ListDevicesRequest* request,
+                       v1::ListDevicesResponse* response) override;
+  Reactor* WriteDevice(Context* context, const v1::WriteDeviceRequest* request,
+                       v1::WriteDeviceResponse* response) override;
+  Reactor* Transact(Context* context, const v1::TransactRequest* request,
+                    v1::TransactResponse* response) override;
+  grpc::ServerWriteReactor<v1::ScanResponse>* Scan(Context* context, const v1::ScanRequest* request) override;
 
  private:
   const Services services_;

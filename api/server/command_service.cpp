@@ -14,17 +14,6 @@
 #include "api/server/validate.hpp"
 
 namespace axisd::server {
-namespace {
-
-/// A stream that ends before it begins.
-class RefusedStream final : public grpc::ServerWriteReactor<v1::WatchCommandResponse> {
- public:
-  explicit RefusedStream(const grpc::Status& status) { Finish(status); }
-  void OnDone() override { delete this; }
-};
-
-}  // namespace
-
 grpc::ServerUnaryReactor* CommandServiceImpl::GetCommand(Context* context,
                                                          const v1::GetCommandRequest* request,
                                                          v1::GetCommandResponse* response) {
@@ -48,13 +37,13 @@ grpc::ServerUnaryReactor* CommandServiceImpl::GetCommand(Context* context,
 grpc::ServerWriteReactor<v1::WatchCommandResponse>* CommandServiceImpl::WatchCommand(
     Context* context, const v1::WatchCommandRequest* request) {
   if (const auto valid = check_command_id(request->id()); !valid)
-    return new RefusedStream(to_status(valid.error()));
+    return new RefusedStream<v1::WatchCommandResponse>(to_status(valid.error()));
   const auto client = client_of(*context);
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
-  if (!ticket) return new RefusedStream(to_status(ticket.error()));
+  if (!ticket) return new RefusedStream<v1::WatchCommandResponse>(to_status(ticket.error()));
   spdlog::debug("{}: watches command {}", client, request->id());
-  auto* stream = CommandStream::start(services_, request->id(), *std::move(ticket));
-  return stream != nullptr ? stream : new RefusedStream(shutting_down());
+  auto* stream = CommandStream::start(services_, context, request->id(), *std::move(ticket));
+  return stream != nullptr ? stream : new RefusedStream<v1::WatchCommandResponse>(shutting_down());
 }
 
 grpc::ServerUnaryReactor* CommandServiceImpl::CancelCommand(Context* context,

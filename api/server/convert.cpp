@@ -24,6 +24,7 @@ static_assert(std::to_underlying(AxisState::error_stop) + 1 == v1::State_MAX);
 static_assert(std::to_underlying(LinkState::online) + 1 == v1::LinkState_MAX);
 static_assert(std::to_underlying(PositionTrust::restored) + 1 == v1::PositionTrust_MAX);
 static_assert(std::to_underlying(PositionSource::encoder) == v1::PositionSource_MAX);
+static_assert(std::to_underlying(MotionCause::unknown) + 1 == v1::MotionCause_MAX);
 static_assert(std::to_underlying(CommandKind::set_position) + 1 == v1::CommandKind_MAX);
 static_assert(std::to_underlying(CommandState::unknown) + 1 == v1::CommandState_MAX);
 
@@ -41,6 +42,7 @@ v1::State to_proto(AxisState state) { return one_further<v1::State>(state); }
 v1::LinkState to_proto(LinkState state) { return one_further<v1::LinkState>(state); }
 v1::PositionTrust to_proto(PositionTrust trust) { return one_further<v1::PositionTrust>(trust); }
 v1::PositionSource to_proto(PositionSource source) { return static_cast<v1::PositionSource>(source); }
+v1::MotionCause to_proto(MotionCause cause) { return one_further<v1::MotionCause>(cause); }
 v1::CommandKind to_proto(CommandKind kind) { return one_further<v1::CommandKind>(kind); }
 v1::CommandState to_proto(CommandState state) { return one_further<v1::CommandState>(state); }
 
@@ -112,6 +114,7 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   to.set_velocity(from.velocity);
   if (from.target) to.set_target(*from.target);
   to.set_moving(from.moving);
+  to.set_motion_cause(to_proto(from.motion_cause));
   to.set_positive_direction(from.positive_direction);
   to.set_in_position(from.in_position);
   to.set_homed(from.homed);
@@ -134,6 +137,8 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   to.set_model(from.model);
   if (from.identity) to.set_drive_version(from.identity->version);
   to.set_drive_reboots(static_cast<std::uint32_t>(from.reboots));
+  to.set_drift(from.drift);
+  to.set_eeprom_writes(from.eeprom_writes);
   to.set_revision(from.revision);
 }
 

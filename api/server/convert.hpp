@@ -16,6 +16,7 @@ namespace axisd::server {
 [[nodiscard]] v1::LinkState to_proto(LinkState state);
 [[nodiscard]] v1::PositionTrust to_proto(PositionTrust trust);
 [[nodiscard]] v1::PositionSource to_proto(PositionSource source);
+[[nodiscard]] v1::MotionCause to_proto(MotionCause cause);
 [[nodiscard]] v1::CommandKind to_proto(CommandKind kind);
 [[nodiscard]] v1::CommandState to_proto(CommandState state);
 

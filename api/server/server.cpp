@@ -14,6 +14,9 @@
 #include "api/server/axis_service.hpp"
 #include "api/server/bus_service.hpp"
 #include "api/server/command_service.hpp"
+#include "api/server/drive_service.hpp"
+#include "api/server/event_hub.hpp"
+#include "api/server/event_service.hpp"
 #include "api/server/status.hpp"
 #include "api/server/system_service.hpp"
 #include "api/server/watch_hub.hpp"
@@ -56,23 +59,31 @@ struct Server::Parts {
   Parts(Machine& machine, const ServerOptions& options)
       : reply(std::make_shared<ReplyThread>()),
         calls(std::make_shared<OpenCalls>()),
+        guard(std::make_shared<StallGuard>(options.stalled_reader_limit)),
         admission(options.limits),
         hub(std::make_shared<WatchHub>(machine, reply, options.stalled_reader_limit)),
-        services{machine, reply, calls, admission, *hub},
+        events(std::make_shared<EventHub>(reply)),
+        services{machine, reply, calls, guard, admission, *hub, *events},
         axis(services),
         command(services),
         system(services),
-        bus(services) {}
+        bus(services),
+        drive(services),
+        event(services) {}
 
   std::shared_ptr<ReplyThread> reply;
   std::shared_ptr<OpenCalls> calls;
+  std::shared_ptr<StallGuard> guard;
   Admission admission;
   std::shared_ptr<WatchHub> hub;
+  std::shared_ptr<EventHub> events;
   Services services;
   AxisServiceImpl axis;
   CommandServiceImpl command;
   SystemServiceImpl system;
   BusServiceImpl bus;
+  DriveServiceImpl drive;
+  EventServiceImpl event;
   std::unique_ptr<AcceptLoop::Acceptor> tcp_acceptor, unix_acceptor;
   std::unique_ptr<grpc::Server> server;
   AcceptLoop accept;
@@ -84,6 +95,9 @@ Server::Server(Machine& machine, ServerOptions options)
   // The machine may publish after this server is gone.
   machine_.on_published([hub = std::weak_ptr(parts_->hub)] {
     if (const auto alive = hub.lock()) alive->published();
+  });
+  machine_.events().on_event([hub = std::weak_ptr(parts_->events)] {
+    if (const auto alive = hub.lock()) alive->happened();
   });
 }
 
@@ -106,8 +120,8 @@ Result<int> Server::start() {
   enable_plugins();
   grpc::ServerBuilder builder;
   limit_transport(builder);
-  for (grpc::Service* service :
-       std::initializer_list<grpc::Service*>{&parts_->axis, &parts_->command, &parts_->system, &parts_->bus})
+  for (grpc::Service* service : std::initializer_list<grpc::Service*>{
+           &parts_->axis, &parts_->command, &parts_->system, &parts_->bus, &parts_->drive, &parts_->event})
     builder.RegisterService(service);
   constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
   parts_->tcp_acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
@@ -117,7 +131,9 @@ Result<int> Server::start() {
   if (!parts_->server)
     return fail(Reason::internal, "gRPC refuses to start", "see the log; GRPC_VERBOSITY=debug tells more");
   parts_->serving = true;
-  parts_->reply->start([hub = parts_->hub.get()](TimePoint now) { return hub->tick(now); });
+  parts_->reply->start([hub = parts_->hub.get(), guard = parts_->guard.get()](TimePoint now) {
+    return std::min(hub->tick(now), guard->tick(now));
+  });
 
   int port = 0;
   std::vector<AcceptLoop::Entry> entries;
@@ -131,7 +147,8 @@ Result<int> Server::start() {
   auto* health = parts_->server->GetHealthCheckService();
   health->SetServingStatus(true);
   for (const auto* name : {v1::AxisService::service_full_name(), v1::CommandService::service_full_name(),
-                           v1::SystemService::service_full_name(), v1::BusService::service_full_name()})
+                           v1::SystemService::service_full_name(), v1::BusService::service_full_name(),
+                           v1::DriveService::service_full_name(), v1::EventService::service_full_name()})
     health->SetServingStatus(name, true);
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,

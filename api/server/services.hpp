@@ -6,20 +6,24 @@
 #include "api/server/admission.hpp"
 #include "api/server/open_calls.hpp"
 #include "api/server/reply_thread.hpp"
+#include "api/server/stall_guard.hpp"
 #include "devices/machine.hpp"
 
 namespace axisd::server {
 
+class EventHub;
 class WatchHub;
 
-/// The calls themselves keep `reply` and `calls` alive: a command's callback may come after the server is
-/// gone.
+/// The calls themselves keep `reply`, `calls` and `guard` alive: a command's callback may come after the
+/// server is gone.
 struct Services {
   Machine& machine;
   std::shared_ptr<ReplyThread> reply;
   std::shared_ptr<OpenCalls> calls;
+  std::shared_ptr<StallGuard> guard;
   Admission& admission;
   WatchHub& hub;
+  EventHub& events;
 };
 
 }  // namespace axisd::server

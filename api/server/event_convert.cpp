@@ -1,0 +1,55 @@
+#include "api/server/event_convert.hpp"
+
+#include <variant>
+
+#include "api/server/convert.hpp"
+
+namespace axisd::server {
+namespace {
+
+void fill(const TerminalEdge& from, v1::Event& event) {
+  auto& to = *event.mutable_terminal_edge();
+  to.set_terminal(from.terminal);
+  to.set_function(from.function);
+  to.set_active(from.active);
+  to_proto(from.after, *to.mutable_after());
+  to_proto(from.before, *to.mutable_before());
+}
+
+void fill(const StateChange& from, v1::Event& event) {
+  auto& to = *event.mutable_state_change();
+  to.set_from(to_proto(from.from));
+  to.set_to(to_proto(from.to));
+  to.set_cause(to_proto(from.cause));
+}
+
+void fill(const LinkChange& from, v1::Event& event) {
+  auto& to = *event.mutable_link_change();
+  to.set_to(to_proto(from.to));
+  to.set_detail(from.detail);
+}
+
+void fill(const ConfigurationDrift& from, v1::Event& event) {
+  event.mutable_configuration_drift()->set_text(from.text);
+}
+
+}  // namespace
+
+v1::EventKind kind_of(const Event& event) {
+  struct Kind {
+    v1::EventKind operator()(const TerminalEdge&) const { return v1::EVENT_KIND_TERMINAL_EDGE; }
+    v1::EventKind operator()(const StateChange&) const { return v1::EVENT_KIND_STATE_CHANGE; }
+    v1::EventKind operator()(const LinkChange&) const { return v1::EVENT_KIND_LINK_CHANGE; }
+    v1::EventKind operator()(const ConfigurationDrift&) const { return v1::EVENT_KIND_CONFIGURATION_DRIFT; }
+  };
+  return std::visit(Kind{}, event.content);
+}
+
+void to_proto(const Event& from, v1::Event& to) {
+  to.set_sequence(from.sequence);
+  to_proto(from.at, *to.mutable_at());
+  to.set_axis(from.axis);
+  std::visit([&to](const auto& content) { fill(content, to); }, from.content);
+}
+
+}  // namespace axisd::server

@@ -1,0 +1,47 @@
+// Values as answers.
+#pragma once
+
+#include <spdlog/spdlog.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "api/server/pending_call.hpp"
+#include "api/server/status.hpp"
+
+namespace axisd::server {
+
+/// The callback that ends `call`: with the value, given to `fill` on the reply thread while the response
+/// exists, or with the error's status. `what` ("local:unix: feeder save_parameters") is logged with the
+/// outcome, also if the client has left; empty: nothing is logged.
+template <class Value, class Fill>
+[[nodiscard]] std::function<void(Result<Value>)> reply_with_value(std::shared_ptr<PendingCall> call,
+                                                                  Fill fill, std::string what = {}) {
+  return [call = std::move(call), fill = std::move(fill), what = std::move(what)](Result<Value> result) {
+    // On the core thread: nothing but handing over.
+    const auto shared = std::make_shared<const Result<Value>>(std::move(result));
+    call->complete(
+        [fill, shared]() -> grpc::Status {
+          if (!*shared) return to_status(shared->error());
+          if constexpr (std::is_void_v<Value>) {
+            fill();
+          } else {
+            fill(**shared);
+          }
+          return grpc::Status::OK;
+        },
+        [what, shared] {
+          if (what.empty()) return;
+          if (*shared) {
+            spdlog::info("{}: done", what);
+          } else {
+            spdlog::info("{}: {}", what, to_string(shared->error()));
+          }
+        });
+  };
+}
+
+}  // namespace axisd::server
