@@ -12,6 +12,8 @@ class BorrowedNode final : public simulation::SimulatedRtuNode {
  public:
   explicit BorrowedNode(simulation::SimulatedRtuNode& node) : node_(&node) {}
   [[nodiscard]] std::uint8_t address() const override { return node_->address(); }
+  /// What it has become by joining a line for the first time; who owns it lets it join, once.
+  [[nodiscard]] std::optional<simulation::Serial> serial() const override { return node_->serial(); }
   void advance(TimePoint now) override { node_->advance(now); }
   std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) override {
     return node_->on_frame(frame);
@@ -24,6 +26,9 @@ class BorrowedNode final : public simulation::SimulatedRtuNode {
     return node_->has_input(terminal);
   }
   void raise_alarm(int code) override { node_->raise_alarm(code); }
+  [[nodiscard]] std::span<const int> alarms() const override { return node_->alarms(); }
+  void block_shaft(bool blocked) override { node_->block_shaft(blocked); }
+  bool push_shaft(std::int64_t pulses) override { return node_->push_shaft(pulses); }
   [[nodiscard]] std::int64_t shaft_pulses() const override { return node_->shaft_pulses(); }
   [[nodiscard]] bool shaft_moving() const override { return node_->shaft_moving(); }
   [[nodiscard]] int starts() const override { return node_->starts(); }
