@@ -1,19 +1,16 @@
+#include "config/axis_checks.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <optional>
-#include <set>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "config/checks.hpp"
 #include "config/quantity.hpp"
 #include "config/text.hpp"
-#include "devices/descriptor.hpp"
 
 namespace axisd::config {
 
@@ -22,77 +19,37 @@ namespace {
 /// Relative slack in comparisons of motor speeds: the YAML's decimals pass through divisions.
 constexpr double slack = 1e-9;
 
-class AxisChecks {
- public:
-  AxisChecks(AxisEntry& entry, Diagnostics& diagnostics, const Places& places)
-      : entry_(entry),
-        axis_(entry.axis),
-        path_(fmt::format("axes.{}.", axis_.name)),
-        diagnostics_(diagnostics),
-        places_(places),
-        model_(usable("model") ? find_drive_model(axis_.model) : nullptr) {}
+}  // namespace
 
-  void run() {
-    check_node();
-    check_microstep();
-    complete_scale();
-    check_policies();
-    check_poll();
-    check_functions(axis_.inputs, "inputs");
-    check_functions(axis_.outputs, "outputs");
-    check_simulated_switches();
-    if (axis_.scale.modulo && given("limits.position")) {
-      add("scale.modulo", "'modulo' and limits.position exclude each other",
-          "an axis that wraps has no software limits; leave one of them out");
-    }
-    if (model_ != nullptr) {
-      add_default_settings(axis_, *model_);
-      check_times();
-    }
-    if (scale_) check_distances();
-    if (scale_ && model_ != nullptr) check_speeds();
-    if (axis_.homing) check_homing();
+void AxisChecks::run() {
+  check_node();
+  check_microstep();
+  complete_scale();
+  check_policies();
+  check_poll();
+  if (axis_.scale.modulo && given("limits.position")) {
+    add("scale.modulo", "'modulo' and limits.position exclude each other",
+        "an axis that wraps has no software limits; leave one of them out");
   }
+  if (model_ != nullptr) {
+    add_default_settings(axis_, *model_);
+    check_times();
+  }
+  if (scale_) check_distances();
+  if (scale_ && model_ != nullptr) check_speeds();
+  if (axis_.homing) check_homing();
+  check_terminals();
+  if (axis_.segments) check_segments();
+}
 
- private:
-  [[nodiscard]] bool given(std::string_view key) const { return places_.given(path_ + std::string(key)); }
-  [[nodiscard]] bool usable(std::string_view key) const { return places_.usable(path_ + std::string(key)); }
-  void add(std::string_view key, std::string message, std::string suggestion) {
-    if (!reported_.emplace(key).second) return;  // the first finding of a key mostly causes the others
-    diagnostics_.add(places_.mark(path_ + std::string(key)), std::move(message), std::move(suggestion));
-  }
-  [[nodiscard]] std::string velocity_text(double value) const {
-    return fmt::format("{} {}/s", format_number(value), axis_.scale.unit);
-  }
+void AxisChecks::add(std::string_view key, std::string message, std::string suggestion) {
+  if (!reported_.emplace(key).second) return;
+  diagnostics_.add(places_.mark(path_ + std::string(key)), std::move(message), std::move(suggestion));
+}
 
-  void check_node();
-  void check_microstep();
-  void complete_scale();
-  void check_policies();
-  void check_poll();
-  void check_functions(const std::vector<TerminalSettings>& terminals, std::string_view section);
-  void check_simulated_switches();
-  void check_times();
-  void check_time(std::string_view key, Duration value, int minimum_ms);
-  void check_distances();
-  void check_speeds();
-  void check_speed(std::string_view key, double velocity, double minimum_rpm, double maximum_rpm);
-  void check_homing();
-  [[nodiscard]] bool has_input(std::string_view function) const {
-    return std::ranges::find(axis_.inputs, function, &TerminalSettings::function) != axis_.inputs.end();
-  }
-  /// Says that `key` needs an input terminal; silent if the inputs have errors of their own.
-  void need_input(std::string_view key, std::string_view function, const std::string& message);
-
-  AxisEntry& entry_;
-  AxisSettings& axis_;
-  std::string path_;
-  Diagnostics& diagnostics_;
-  const Places& places_;
-  const DriveDescriptor* model_;  ///< nullptr if it is not known
-  std::optional<Scale> scale_;    ///< once it is known to be right
-  std::set<std::string, std::less<>> reported_;
-};
+std::string AxisChecks::velocity_text(double value) const {
+  return fmt::format("{} {}/s", format_number(value), axis_.scale.unit);
+}
 
 void AxisChecks::check_node() {
   if (model_ == nullptr || !usable("node")) return;
@@ -151,54 +108,6 @@ void AxisChecks::check_poll() {
       "make poll.idle at least poll.moving");
 }
 
-void AxisChecks::check_functions(const std::vector<TerminalSettings>& terminals, std::string_view section) {
-  if (model_ == nullptr) return;
-  const auto functions = section == "inputs" ? model_->input_functions : model_->output_functions;
-  std::map<std::string_view, std::string_view> owners;
-  for (const auto& terminal : terminals) {
-    const auto* function = find_function(functions, terminal.function);
-    if (function == nullptr || function->code == 0) continue;  // code 0: no function
-    const auto [owner, is_first] = owners.try_emplace(terminal.function, terminal.terminal);
-    if (is_first) continue;
-    add(fmt::format("{}.{}.function", section, terminal.terminal),
-        fmt::format("function '{}' is assigned to {} already", terminal.function, owner->second),
-        "one terminal per function");
-  }
-}
-
-void AxisChecks::need_input(std::string_view key, std::string_view function, const std::string& message) {
-  if (has_input(function) || model_ == nullptr || !places_.clean(path_ + "inputs")) return;
-  const auto used = [&](const TerminalSpec& t) {
-    return std::ranges::find(axis_.inputs, t.name, &TerminalSettings::terminal) != axis_.inputs.end();
-  };
-  const auto free = std::ranges::find_if_not(model_->inputs, used);
-  add(key, fmt::format("{} needs an input with function '{}'", message, function),
-      free == model_->inputs.end() ? "" : fmt::format("add inputs: {{ {}: {} }}", free->name, function));
-}
-
-void AxisChecks::check_simulated_switches() {
-  const auto& simulation = entry_.simulation;
-  if (given("simulate.home_switch")) need_input("simulate.home_switch", "home", "'home_switch'");
-  if (given("simulate.positive_limit"))
-    need_input("simulate.positive_limit", "positive_limit", "'positive_limit'");
-  if (given("simulate.negative_limit"))
-    need_input("simulate.negative_limit", "negative_limit", "'negative_limit'");
-  if (given("simulate.home_width") && !given("simulate.home_switch")) {
-    add("simulate.home_width", "'home_width' has no effect without home_switch",
-        "add home_switch or leave it out");
-  }
-  if (!places_.clean(path_ + "simulate")) return;
-  const double lowest = simulation.negative_limit.value_or(-std::numeric_limits<double>::infinity());
-  const double highest = simulation.positive_limit.value_or(std::numeric_limits<double>::infinity());
-  if (lowest >= highest) {
-    add("simulate.positive_limit", "the simulated limits are reversed",
-        "make positive_limit larger than negative_limit");
-  } else if (simulation.start_position <= lowest || simulation.start_position >= highest) {
-    add("simulate.start_position", "the load would start on a limit switch",
-        "start between the simulated limits");
-  }
-}
-
 void AxisChecks::check_time(std::string_view key, Duration value, int minimum_ms) {
   if (!given(key) || !usable(key)) return;
   const auto maximum_ms = model_->capabilities.maximum_time_ms;
@@ -222,36 +131,37 @@ void AxisChecks::check_times() {
   }
 }
 
-void AxisChecks::check_distances() {
+void AxisChecks::check_distance(std::string_view key, std::optional<double> value) {
   // The drives count in signed 32 bit.
   constexpr std::int64_t largest = std::numeric_limits<std::int32_t>::max();
-  const auto check = [&](std::string_view key, std::optional<double> value) {
-    if (!value || !given(key) || !usable(key)) return;
-    const auto pulses = scale_->checked_pulses(*value);
-    if (pulses && *pulses <= largest && *pulses >= -largest) return;
-    add(key, fmt::format("{} {} is more than the drive can count", format_number(*value), axis_.scale.unit),
-        fmt::format("at most {} {} either way", format_number(std::abs(scale_->to_units(largest))),
-                    axis_.scale.unit));
-  };
-  check("scale.modulo", axis_.scale.modulo);
-  check("limits.position", axis_.limits.position_minimum);
-  check("limits.position", axis_.limits.position_maximum);
-  check("jog_travel", axis_.jog_travel);
-  check("position_tolerance", axis_.position_tolerance);
+  if (!value || !given(key) || !usable(key)) return;
+  const auto pulses = scale_->checked_pulses(*value);
+  if (pulses && *pulses <= largest && *pulses >= -largest) return;
+  add(key, fmt::format("{} {} is more than the drive can count", format_number(*value), axis_.scale.unit),
+      fmt::format("at most {} {} either way", format_number(std::abs(scale_->to_units(largest))),
+                  axis_.scale.unit));
+}
+
+void AxisChecks::check_distances() {
+  check_distance("scale.modulo", axis_.scale.modulo);
+  check_distance("limits.position", axis_.limits.position_minimum);
+  check_distance("limits.position", axis_.limits.position_maximum);
+  check_distance("jog_travel", axis_.jog_travel);
+  check_distance("position_tolerance", axis_.position_tolerance);
   // It bounds what an axis with limits may do while its position is unknown.
   if (given("jog_travel") && usable("limits") && !given("limits.position"))
     add("jog_travel", "'jog_travel' has no effect without limits: { position: ... }",
         "leave it out, or add the limits");
   if (axis_.homing) {
-    check("homing.position", axis_.homing->position);
-    check("homing.backoff", axis_.homing->backoff);
-    check("homing.max_travel", axis_.homing->max_travel);
+    check_distance("homing.position", axis_.homing->position);
+    check_distance("homing.backoff", axis_.homing->backoff);
+    check_distance("homing.max_travel", axis_.homing->max_travel);
   }
-  check("simulate.home_switch", entry_.simulation.home_switch);
-  check("simulate.home_width", entry_.simulation.home_width);
-  check("simulate.positive_limit", entry_.simulation.positive_limit);
-  check("simulate.negative_limit", entry_.simulation.negative_limit);
-  check("simulate.start_position", entry_.simulation.start_position);
+  check_distance("simulate.home_switch", entry_.simulation.home_switch);
+  check_distance("simulate.home_width", entry_.simulation.home_width);
+  check_distance("simulate.positive_limit", entry_.simulation.positive_limit);
+  check_distance("simulate.negative_limit", entry_.simulation.negative_limit);
+  check_distance("simulate.start_position", entry_.simulation.start_position);
 }
 
 void AxisChecks::check_speed(std::string_view key, double velocity, double minimum_rpm, double maximum_rpm) {
@@ -268,17 +178,18 @@ void AxisChecks::check_speed(std::string_view key, double velocity, double minim
       fmt::format("write {} {}", direction, velocity_text(std::abs(scale_->velocity_to_units(bound)))));
 }
 
-void AxisChecks::check_speeds() {
+double AxisChecks::maximum_rpm() const {
+  // 200 kHz of pulses; the drives take whole r/min.
   const auto& capabilities = model_->capabilities;
-  // M11: 200 kHz of pulses; the drives take whole r/min.
   const auto pulse_limit = 60 * capabilities.maximum_pulse_rate_hz / axis_.scale.pulses_per_revolution;
-  const auto maximum_rpm = static_cast<double>(std::min<std::int64_t>(capabilities.maximum_rpm, pulse_limit));
-  check_speed("limits.velocity", axis_.limits.velocity, capabilities.minimum_rpm, maximum_rpm);
+  return static_cast<double>(std::min<std::int64_t>(capabilities.maximum_rpm, pulse_limit));
+}
 
+void AxisChecks::check_start_speed() {
+  const auto& capabilities = model_->capabilities;
   const int start = axis_.limits.start_speed_rpm;
-  if (!usable("limits.start_speed")) {
-    // reported
-  } else if (start < capabilities.minimum_start_rpm || start > capabilities.maximum_start_rpm) {
+  if (!usable("limits.start_speed")) return;
+  if (start < capabilities.minimum_start_rpm || start > capabilities.maximum_start_rpm) {
     add("limits.start_speed", fmt::format("'start_speed' {} r/min is out of range", start),
         fmt::format("model {} takes {} to {} r/min", axis_.model, capabilities.minimum_start_rpm,
                     capabilities.maximum_start_rpm));
@@ -291,12 +202,18 @@ void AxisChecks::check_speeds() {
           "start slower");
     }
   }
+}
+
+void AxisChecks::check_speeds() {
+  const auto& capabilities = model_->capabilities;
+  check_speed("limits.velocity", axis_.limits.velocity, capabilities.minimum_rpm, maximum_rpm());
+  check_start_speed();
   if (!axis_.homing) return;
   const auto& homing = *axis_.homing;
   check_speed("homing.velocity", homing.velocity, capabilities.minimum_homing_rpm,
-              std::min<double>(capabilities.maximum_homing_rpm, maximum_rpm));
+              std::min<double>(capabilities.maximum_homing_rpm, maximum_rpm()));
   check_speed("homing.search_velocity", homing.search_velocity, capabilities.minimum_search_rpm,
-              std::min<double>(capabilities.maximum_search_rpm, maximum_rpm));
+              std::min<double>(capabilities.maximum_search_rpm, maximum_rpm()));
   const auto offset = scale_->checked_pulses(homing.offset);
   const std::int64_t largest = capabilities.maximum_homing_offset_pulses;
   if (usable("homing.offset") && (!offset || std::abs(*offset) > largest)) {
@@ -307,28 +224,18 @@ void AxisChecks::check_speeds() {
   }
 }
 
-void AxisChecks::check_homing() {
-  const auto& homing = *axis_.homing;
-  if (usable("homing.velocity") && usable("limits.velocity") && homing.velocity > axis_.limits.velocity) {
-    add("homing.velocity",
-        fmt::format("homing.velocity {} is above limits.velocity", velocity_text(homing.velocity)),
-        fmt::format("write at most {}", velocity_text(axis_.limits.velocity)));
-  }
-  if (usable("homing.search_velocity") && usable("homing.velocity") &&
-      homing.search_velocity > homing.velocity) {
-    add("homing.search_velocity",
-        fmt::format("homing.search_velocity {} is above homing.velocity",
-                    velocity_text(homing.search_velocity)),
-        fmt::format("write at most {}", velocity_text(homing.velocity)));
-  }
-  if (!usable("homing.method")) return;
-  const auto name = homing_methods()[static_cast<std::size_t>(homing.method)];
-  const bool by_switch =
-      homing.method == HomingMethod::home_positive || homing.method == HomingMethod::home_negative;
-  need_input("homing.method", by_switch ? "home" : name, fmt::format("homing method '{}'", name));
+void AxisChecks::check_below(std::string_view key, double velocity, std::string_view limit_key,
+                             double limit) {
+  if (!usable(key) || !usable(limit_key) || velocity <= limit) return;
+  add(key, fmt::format("{} {} is above {}", key, velocity_text(velocity), limit_key),
+      fmt::format("write at most {}", velocity_text(limit)));
 }
 
-}  // namespace
+void AxisChecks::check_homing() {
+  const auto& homing = *axis_.homing;
+  check_below("homing.velocity", homing.velocity, "limits.velocity", axis_.limits.velocity);
+  check_below("homing.search_velocity", homing.search_velocity, "homing.velocity", homing.velocity);
+}
 
 void complete_axis(AxisEntry& entry, Diagnostics& diagnostics, const Places& places) {
   AxisChecks(entry, diagnostics, places).run();

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "config/schema.hpp"
 
 // The keys of an axis. Ranges that depend on the model or on other keys are in axis_checks.cpp.
@@ -205,10 +207,33 @@ constexpr KeySpec simulate_keys[] = {
      .apply = [](Target& t, const Value& v) { t.axis->simulation.start_position = v.number; }},
 };
 
+constexpr KeySpec brake_keys[] = {
+    {.key = "release_time",
+     .kind = Kind::duration,
+     .description = "The axis does not move before this time after its power stage is on.",
+     .example = "80 ms",
+     .default_value = "0 ms",
+     .minimum = 0,
+     .maximum = 10'000,
+     .apply = [](Target& t, const Value& v) { t.axis->axis.brake.release_time = v.duration; }},
+    {.key = "engage_time",
+     .kind = Kind::duration,
+     .description = "Disable is not done before this time after the power stage is off.",
+     .example = "50 ms",
+     .default_value = "0 ms",
+     .minimum = 0,
+     .maximum = 10'000,
+     .apply = [](Target& t, const Value& v) { t.axis->axis.brake.engage_time = v.duration; }},
+};
+
 constexpr std::string_view loads[] = {"normal", "vertical"};
 constexpr std::string_view escalations[] = {"none", "release"};
 
-constexpr KeySpec axis_keys[] = {
+bool has(const std::vector<std::string>& items, std::string_view item) {
+  return std::ranges::find(items, item) != items.end();
+}
+
+const KeySpec axis_keys[] = {
     {.key = "bus",
      .kind = Kind::text,
      .required = true,
@@ -258,6 +283,17 @@ constexpr KeySpec axis_keys[] = {
      .kind = Kind::terminals,
      .description = "Functions of input terminals, in axis direction."},
     {.key = "outputs", .kind = Kind::terminals, .description = "Functions of output terminals."},
+    {.key = "brake",
+     .kind = Kind::section,
+     .description = "Delays of the brake that an output with function brake works.",
+     .children = brake_keys},
+    {.key = "segments",
+     .kind = Kind::section,
+     .description =
+         "The drive's own table of motions, selected and started by terminals. Rows that are not given are "
+         "cleared; without the section the drive's table is left alone.",
+     .children = segment_schema(),
+     .apply = [](Target& t, const Value&) { t.axis->axis.segments.emplace(); }},
     {.key = "load",
      .kind = Kind::choice,
      .description = "vertical: the power stage is never released by a policy.",
@@ -314,12 +350,29 @@ constexpr KeySpec axis_keys[] = {
      .minimum = 10,
      .maximum = 10'000,
      .apply = [](Target& t, const Value& v) { t.axis->axis.stop_margin = v.duration; }},
+    {.key = "drift_check",
+     .kind = Kind::duration,
+     .description = "How often it is checked that the terminals still have their functions.",
+     .example = "30 s",
+     .default_value = "10 s",
+     .minimum = 1000,
+     .maximum = 3'600'000,
+     .apply = [](Target& t, const Value& v) { t.axis->axis.drift_check = v.duration; }},
     {.key = "persist",
-     .kind = Kind::boolean,
-     .description = "Save the configuration in the drive's EEPROM.",
-     .example = "true",
+     .kind = Kind::parts,
+     .description =
+         "What is saved in the drive's EEPROM: true (all), false (nothing), or a list of parts. drive: "
+         "microstep and the keys under drive.",
+     .example = "[terminals, segments]",
      .default_value = "false",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.persist = v.boolean; }},
+     .choices = persist_parts,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.axis->axis.persist = {.terminals = has(v.items, "terminals"),
+                                   .segments = has(v.items, "segments"),
+                                   .homing = has(v.items, "homing"),
+                                   .drive = has(v.items, "drive")};
+         }},
     {.key = "drive", .kind = Kind::model_settings, .description = "Settings that only this model has."},
     {.key = "simulate",
      .kind = Kind::section,

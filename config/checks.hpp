@@ -7,8 +7,11 @@
 
 namespace axisd::config {
 
-/// Server, buses, and how axes share them.
+/// Server, buses, and how axes and devices share them.
 void check_machine(const Configuration& configuration, Diagnostics& diagnostics, const Places& places);
+
+/// Each device by itself.
+void check_devices(const Configuration& configuration, Diagnostics& diagnostics, const Places& places);
 
 /// Fills in what follows from other keys (travel, settings of the model), then checks the axis by itself.
 void complete_axis(AxisEntry& entry, Diagnostics& diagnostics, const Places& places);

@@ -9,6 +9,7 @@
 
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/axis/settings.hpp"
+#include "devices/generic/settings.hpp"
 
 namespace axisd::config {
 
@@ -43,6 +44,7 @@ struct Configuration {
   ServerSettings server;
   std::vector<modbus_rtu::LineSettings> buses;
   std::vector<AxisEntry> axes;
+  std::vector<DeviceSettings> devices;  ///< nodes that are not axes
 };
 
 /// One finding in a configuration file.

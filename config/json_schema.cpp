@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -48,10 +49,24 @@ std::string strings(std::span<const std::string_view> items) {
   return array(result);
 }
 
+/// "[terminals, segments]" as JSON.
+std::string parts(std::string_view list) {
+  std::vector<std::string> items;
+  for (list = list.substr(1, list.size() - 2); !list.empty();) {
+    const auto end = std::min(list.find(", "), list.size());
+    items.push_back(json_string(list.substr(0, end)));
+    list.remove_prefix(std::min(end + 2, list.size()));
+  }
+  return array(items);
+}
+
 /// What YAML makes of it: numbers and booleans as such, lists as they are written, the rest as text.
 std::string as_written(const KeySpec& spec, std::string_view text) {
-  const bool bare = spec.kind == Kind::integer || spec.kind == Kind::boolean ||
-                    spec.kind == Kind::position_range || (spec.kind == Kind::position && parse_decimal(text));
+  if (spec.kind == Kind::register_address) return std::to_string(std::stol(std::string(text), nullptr, 0));
+  if (spec.kind == Kind::parts && text.starts_with('[')) return parts(text);
+  const bool bare = spec.kind == Kind::integer || spec.kind == Kind::number || spec.kind == Kind::boolean ||
+                    spec.kind == Kind::parts || spec.kind == Kind::position_range ||
+                    (spec.kind == Kind::position && parse_decimal(text));
   return bare ? std::string(text) : json_string(text);
 }
 
@@ -82,9 +97,38 @@ Object quantity(std::string_view pattern) {
 Object named_sections(const KeySpec& spec) {
   Object names, result;
   names.text("pattern", whole(name_pattern)).raw("maxLength", std::to_string(longest_name));
-  result.text("type", "object").raw("minProperties", "1").raw("propertyNames", names.json());
+  if (spec.may_be_empty) {
+    result.raw("type", R"(["object","null"])");
+  } else {
+    result.text("type", "object").raw("minProperties", "1");
+  }
+  result.raw("propertyNames", names.json());
   result.raw("additionalProperties", section(spec.children).json());
   return result;
+}
+
+/// What a key may be that stands for a number, from 1 on: JSON's keys are strings.
+std::string numbers_to(int last) {
+  std::vector<std::string> keys;
+  for (int i = 1; i <= last; ++i) keys.push_back(fmt::format("\"{}\"", i));
+  return Object().raw("enum", array(keys)).json();
+}
+
+Object numbered_sections(const KeySpec& spec) {
+  Object result;
+  result.text("type", "object").raw("minProperties", "1");
+  result.raw("propertyNames", numbers_to(static_cast<int>(*spec.maximum)));
+  result.raw("additionalProperties", section(spec.children).json());
+  return result;
+}
+
+Object parts_of(std::span<const std::string_view> names) {
+  const auto list = Object()
+                        .text("type", "array")
+                        .raw("items", Object().raw("enum", strings(names)).json())
+                        .raw("minItems", "1")
+                        .raw("uniqueItems", "true");
+  return Object().raw("anyOf", array({Object().text("type", "boolean").json(), list.json()}));
 }
 
 std::vector<std::string_view> model_names() {
@@ -100,6 +144,8 @@ Object type_of(const KeySpec& spec) {
       return section(spec.children);
     case Kind::named_sections:
       return named_sections(spec);
+    case Kind::numbered_sections:
+      return numbered_sections(spec);
     case Kind::terminals:
     case Kind::model_settings:
       return result.text("type", "object");  // refined per model
@@ -110,12 +156,17 @@ Object type_of(const KeySpec& spec) {
     case Kind::model:
       return result.raw("enum", strings(model_names()));
     case Kind::integer:
+    case Kind::register_address:
       result.text("type", "integer");
       break;
+    case Kind::number:
+      return result.text("type", "number").raw("not", Object().raw("const", "0").json());
     case Kind::boolean:
       return result.text("type", "boolean");
     case Kind::choice:
       return result.raw("enum", strings(spec.choices));
+    case Kind::parts:
+      return parts_of(spec.choices);
     case Kind::duration:
       return quantity("(us|ms|s|min)");
     case Kind::motor_speed:
@@ -190,6 +241,16 @@ std::string terminals(std::span<const TerminalSpec> list, std::span<const Termin
   return closed(all).json();
 }
 
+/// Tables of segments whose numbers the model's inputs can select.
+std::string segments_to(int last) {
+  Object tables;
+  for (const auto& spec : segment_schema()) {
+    if (spec.kind != Kind::numbered_sections) continue;
+    tables.raw(spec.key, Object().raw("propertyNames", numbers_to(last)).json());
+  }
+  return tables.json();
+}
+
 std::string if_model(const DriveDescriptor& model) {
   Object settings;
   for (const auto& setting : model.settings)
@@ -208,6 +269,8 @@ std::string if_model(const DriveDescriptor& model) {
   then.raw("inputs", terminals(model.inputs, model.input_functions));
   then.raw("outputs", terminals(model.outputs, model.output_functions));
   then.raw("drive", closed(settings).json());
+  then.raw("segments", Object().raw("properties", segments_to(model.capabilities.maximum_segments)).json());
+  if (find_function(model.output_functions, "brake") == nullptr) then.raw("brake", "false");
 
   Object is_model, condition, result;
   is_model.raw("model", Object().text("const", model.model).json());

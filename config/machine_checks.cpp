@@ -57,17 +57,36 @@ void check_ports(const Configuration& configuration, Diagnostics& diagnostics, c
   }
 }
 
+/// A participant of a bus as the file names it.
+struct Participant {
+  std::string path;  ///< "axes.feeder."
+  std::string text;  ///< "axis 'feeder'"
+  const std::string& bus;
+  int node;
+};
+
+std::vector<Participant> participants(const Configuration& configuration) {
+  std::vector<Participant> all;
+  for (const auto& entry : configuration.axes) {
+    const auto& axis = entry.axis;
+    all.push_back(
+        {fmt::format("axes.{}.", axis.name), fmt::format("axis '{}'", axis.name), axis.bus, axis.node});
+  }
+  for (const auto& device : configuration.devices)
+    all.push_back({fmt::format("devices.{}.", device.name), fmt::format("device '{}'", device.name),
+                   device.bus, device.node});
+  return all;
+}
+
 void check_nodes(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   std::map<std::pair<std::string, int>, std::string> owners;
-  for (const auto& [axis, simulation] : configuration.axes) {
-    const auto path = fmt::format("axes.{}.", axis.name);
+  for (const auto& [path, text, bus, node] : participants(configuration)) {
     if (!places.usable(path + "bus") || !places.usable(path + "node")) continue;
-    const auto [owner, is_first] = owners.try_emplace({axis.bus, axis.node}, axis.name);
+    const auto [owner, is_first] = owners.try_emplace({bus, node}, text);
     if (!is_first) {
-      diagnostics.add(
-          places.mark(path + "node"),
-          fmt::format("node {} on bus '{}' is axis '{}' already", axis.node, axis.bus, owner->second),
-          "give each drive an address of its own");
+      diagnostics.add(places.mark(path + "node"),
+                      fmt::format("node {} on bus '{}' is {} already", node, bus, owner->second),
+                      "give each node an address of its own");
     }
   }
 }
@@ -76,11 +95,21 @@ void check_bus_names(const Configuration& configuration, Diagnostics& diagnostic
   if (!places.clean("buses")) return;  // a bus may be missing because of its own errors
   const auto names =
       names_of(configuration.buses, [](const auto& bus) -> std::string_view { return bus.name; });
+  for (const auto& [participant, text, bus, node] : participants(configuration)) {
+    const auto path = participant + "bus";
+    if (!places.usable(path) || std::ranges::find(names, bus) != names.end()) continue;
+    diagnostics.add(places.mark(path), fmt::format("there is no bus {}", quoted(bus)), suggest(bus, names));
+  }
+}
+
+void check_drive_counts(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+  constexpr int most = 30;  // what one RS-485 line carries (RTU manuals 4.4)
+  std::map<std::string_view, int> counts;
   for (const auto& [axis, simulation] : configuration.axes) {
     const auto path = fmt::format("axes.{}.bus", axis.name);
-    if (!places.usable(path) || std::ranges::find(names, axis.bus) != names.end()) continue;
-    diagnostics.add(places.mark(path), fmt::format("there is no bus {}", quoted(axis.bus)),
-                    suggest(axis.bus, names));
+    if (!places.usable(path) || ++counts[axis.bus] != most + 1) continue;
+    diagnostics.add(places.mark(path), fmt::format("bus '{}' has more than {} drives", axis.bus, most),
+                    "put the rest on another line");
   }
 }
 
@@ -122,6 +151,7 @@ void check_machine(const Configuration& configuration, Diagnostics& diagnostics,
   check_ports(configuration, diagnostics, places);
   check_bus_names(configuration, diagnostics, places);
   check_nodes(configuration, diagnostics, places);
+  check_drive_counts(configuration, diagnostics, places);
   check_bauds(configuration, diagnostics, places);
   check_simulation(configuration, diagnostics, places);
 }

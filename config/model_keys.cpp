@@ -32,6 +32,13 @@ constexpr KeySpec terminal_keys[] = {
      .apply = [](Target& t, const Value& v) { t.terminal->active_low = v.text == "low"; }},
 };
 
+/// Then it is no typing error: this model lacks it.
+bool other_model_has(std::string_view function, bool inputs) {
+  return std::ranges::any_of(drive_models(), [&](const DriveDescriptor* model) {
+    return find_function(inputs ? model->input_functions : model->output_functions, function) != nullptr;
+  });
+}
+
 SettingValue to_setting(const SettingSpec& setting, const Value& value) {
   if (setting.kind == "integer") return value.integer;
   if (setting.kind == "boolean") return value.boolean;
@@ -102,7 +109,8 @@ void Reader::read_terminal(const Node& value, const std::string& path, bool inpu
     report(function_path, places_.mark(function_path),
            fmt::format("model {} has no {} function {}", model->model, inputs ? "input" : "output",
                        quoted(terminal.function)),
-           suggest(terminal.function, names));
+           other_model_has(terminal.function, inputs) ? "permitted: " + alternatives(names)
+                                                      : suggest(terminal.function, names));
   }
 }
 

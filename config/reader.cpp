@@ -156,7 +156,8 @@ void Reader::read_key(const KeySpec& spec, const Node& key, const Node& value, c
       read_section(value, key.mark, spec.children, path);
       return;
     case Kind::named_sections:
-      read_named_sections(spec, value, path);
+    case Kind::numbered_sections:
+      read_sections(spec, value, path);
       return;
     case Kind::terminals:
       read_terminals(value, path, spec.key == "inputs");
@@ -186,25 +187,37 @@ void Reader::read_value(const KeySpec& spec, const Node& value, const std::strin
     report(path, parsed.error().mark, parsed.error().message, parsed.error().suggestion);
     return;
   }
-  spec.apply(target_, *parsed);
+  if (spec.apply != nullptr) spec.apply(target_, *parsed);
 }
 
-void Reader::read_named_sections(const KeySpec& spec, const Node& value, const std::string& path) {
+std::optional<Value> Reader::read_section_key(const KeySpec& spec, const Node& key, const std::string& path) {
+  if (spec.kind == Kind::named_sections) {
+    if (key.text.size() <= longest_name && matches(key.text, name_pattern)) return Value{.text = key.text};
+    report(path, key.mark, fmt::format("{} is not a name", quoted(key.text)),
+           "a letter, then letters, digits, - or _; lower case");
+    return std::nullopt;
+  }
+  const auto number = matches(key.text, "[1-9][0-9]{0,5}") ? std::stoi(key.text) : 0;
+  if (number >= *spec.minimum && number <= *spec.maximum) return Value{.integer = number};
+  report(path, key.mark, fmt::format("{} is not a number of '{}'", quoted(key.text), spec.key),
+         fmt::format("write a whole number between {} and {}", *spec.minimum, *spec.maximum));
+  return std::nullopt;
+}
+
+void Reader::read_sections(const KeySpec& spec, const Node& value, const std::string& path) {
+  if (spec.may_be_empty && value.kind == Node::Kind::null) return;
   if (!check_is_section(value, spec.key, path)) return;
-  if (value.entries.empty()) report(path, places_.mark(path), fmt::format("'{}' is empty", spec.key));
+  if (value.entries.empty() && !spec.may_be_empty)
+    report(path, places_.mark(path), fmt::format("'{}' is empty", spec.key));
   for (const auto& [key, section] : unique_entries(value)) {
-    const auto here = join(path, key.text);
+    const auto here = join(path, printable(key.text));
     places_.add(here, key.mark);
-    if (key.text.size() > longest_name || !matches(key.text, name_pattern)) {
-      report(here, key.mark, fmt::format("{} is not a name", quoted(key.text)),
-             "a letter, then letters, digits, - or _; lower case");
-      continue;
-    }
-    if (!check_is_section(section, key.text, here)) continue;
-    spec.apply(target_, Value{.text = key.text});
+    const auto name = read_section_key(spec, key, here);
+    if (!name || !check_is_section(section, key.text, here)) continue;
+    const auto outside = target_;
+    spec.apply(target_, *name);
     read_section(section, key.mark, spec.children, here);
-    target_.bus = nullptr;
-    target_.axis = nullptr;
+    target_ = outside;
   }
 }
 

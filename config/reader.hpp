@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -55,7 +56,10 @@ class Reader {
                   std::set<std::string_view>& probably_meant);
   void read_key(const KeySpec& spec, const Node& key, const Node& value, const std::string& path);
   void read_value(const KeySpec& spec, const Node& value, const std::string& path);
-  void read_named_sections(const KeySpec& spec, const Node& value, const std::string& path);
+  /// Sections under names or numbers.
+  void read_sections(const KeySpec& spec, const Node& value, const std::string& path);
+  /// The name or number of a section; reports what is neither.
+  std::optional<Value> read_section_key(const KeySpec& spec, const Node& key, const std::string& path);
   // Of a model (model_keys.cpp).
   void read_terminals(const Node& value, const std::string& path, bool inputs);
   void read_terminal(const Node& value, const std::string& path, bool inputs);

@@ -142,13 +142,22 @@ std::span<const KeySpec> schema() {
            }},
       {.key = "axes",
        .kind = Kind::named_sections,
-       .required = true,
+       .may_be_empty = true,  // a machine builder starts with the buses and scans them
        .description = "The axes, by name.",
        .children = axis_schema(),
        .apply =
            [](Target& t, const Value& v) {
              t.axis = &t.configuration->axes.emplace_back();
              t.axis->axis.name = v.text;
+           }},
+      {.key = "devices",
+       .kind = Kind::named_sections,
+       .description = "Nodes on the buses that are not axes, by name.",
+       .children = device_schema(),
+       .apply =
+           [](Target& t, const Value& v) {
+             t.device = &t.configuration->devices.emplace_back();
+             t.device->name = v.text;
            }},
   };
   return top_keys;

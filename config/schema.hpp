@@ -7,21 +7,26 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "config/configuration.hpp"
 
 namespace axisd::config {
 
 enum class Kind : std::uint8_t {
-  section,         ///< `children` under fixed keys
-  named_sections,  ///< any number of sections with `children`, under names
-  terminals,       ///< terminals of the model: function, or {function, active}
-  model_settings,  ///< keys of the model's descriptor
-  text,            ///< matches `pattern`, at most longest_text_value characters
-  model,           ///< name of a drive model
-  integer,         ///< minimum..maximum
+  section,            ///< `children` under fixed keys
+  named_sections,     ///< any number of sections with `children`, under names
+  numbered_sections,  ///< the same under numbers, minimum..maximum
+  terminals,          ///< terminals of the model: function, or {function, active}
+  model_settings,     ///< keys of the model's descriptor
+  text,               ///< matches `pattern`, at most longest_text_value characters
+  model,              ///< name of a drive model
+  integer,            ///< minimum..maximum
+  register_address,   ///< 256 or 0x0100; minimum..maximum
+  number,             ///< "-0.1": a decimal number without unit, not 0
   boolean,
   choice,          ///< one of `choices`
+  parts,           ///< true (all `choices`), false (none), or a list of some of them
   duration,        ///< "150 ms"; minimum..maximum in ms
   motor_speed,     ///< "5 r/min"; whole numbers
   microstep,       ///< "10000 pulses/rev"
@@ -34,27 +39,34 @@ enum class Kind : std::uint8_t {
 
 /// A value as read, in the form that its kind has.
 struct Value {
-  std::string text = {};     ///< text, choice
-  std::int64_t integer = 0;  ///< integer, motor_speed (r/min), microstep
+  std::string text = {};  ///< text, choice; name of a named section
+  std::int64_t integer =
+      0;  ///< integer, register_address, motor_speed (r/min), microstep; of a numbered section
   bool boolean = false;
-  double number = 0;                            ///< position, velocity; first of a position_range
+  std::vector<std::string> items = {};          ///< parts
+  double number = 0;                            ///< number, position, velocity; first of a position_range
   double second = 0;                            ///< of a position_range
   std::int64_t numerator = 0, denominator = 1;  ///< ratio, travel
   Duration duration{};
 };
 
-/// Where values go. `bus`, `axis` and `terminal` are set inside of one.
+/// Where values go. All but `configuration` are set inside of one only.
 struct Target {
   Configuration* configuration = nullptr;
   modbus_rtu::LineSettings* bus = nullptr;
   AxisEntry* axis = nullptr;
   TerminalSettings* terminal = nullptr;
+  PositionSegment* position_segment = nullptr;
+  VelocitySegment* velocity_segment = nullptr;
+  DeviceSettings* device = nullptr;
+  RegisterSettings* device_register = nullptr;
 };
 
 struct KeySpec {
   std::string_view key;
   Kind kind = Kind::text;
   bool required = false;
+  bool may_be_empty = false;  ///< of named_sections
   std::string_view description = {};
   std::string_view example = {};  ///< as written in YAML; never the default
   std::string_view default_value =
@@ -65,7 +77,8 @@ struct KeySpec {
   std::string_view pattern = {};       ///< of a text: ECMAScript regular expression, whole text
   std::string_view pattern_hint = {};  ///< what to say when it does not match
   std::span<const KeySpec> children = {};
-  /// Stores a value; of a section: prepares it. Of named_sections: unused. nullptr: nothing to store.
+  /// Stores a value; of a section: prepares it; of named and numbered ones: prepares each, by its `text` or
+  /// `integer`. nullptr: nothing to store.
   void (*apply)(Target&, const Value&) = nullptr;
 };
 
@@ -74,6 +87,10 @@ std::span<const KeySpec> schema();
 /// The keys of one axis, in the order in which they are read: unit and model come before what depends on
 /// them.
 std::span<const KeySpec> axis_schema();
+/// The keys of an axis's `segments`.
+std::span<const KeySpec> segment_schema();
+/// The keys of one device that is not an axis.
+std::span<const KeySpec> device_schema();
 /// Names of buses, axes and the machine.
 inline constexpr std::string_view name_pattern = "[a-z][a-z0-9_-]*";
 inline constexpr std::size_t longest_name = 64;
@@ -82,5 +99,9 @@ inline constexpr std::size_t longest_text_value = 255;
 std::size_t choice_index(std::span<const std::string_view> choices, std::string_view choice);
 /// Spellings of HomingMethod, in its order.
 std::span<const std::string_view> homing_methods();
+/// Parts of `persist`.
+inline constexpr std::string_view persist_parts[] = {"terminals", "segments", "homing", "drive"};
+/// Numbers of segments in the drives' tables (RTU manuals 6.1, 0x0090..0x00EF).
+inline constexpr int last_segment = 16;
 
 }  // namespace axisd::config

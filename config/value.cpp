@@ -81,6 +81,31 @@ Parsed parse_integer(const KeySpec& spec, const Node& node) {
   return Value{.integer = number->numerator};
 }
 
+/// What YAML 1.1 and 1.2 both read as the same number: no leading zeros, lower-case 0x.
+Parsed parse_register_address(const KeySpec& spec, const Node& node) {
+  const bool hexadecimal = node.text.starts_with("0x");
+  if (!node.plain || !matches(node.text, "0x[0-9A-Fa-f]{1,8}|-?(0|[1-9][0-9]{0,9})")) {
+    return wrong(node, fmt::format("'{}' must be a register address, not {}", spec.key, quoted(node.text)),
+                 "write it in decimal or hexadecimal and without quotes, such as 256 or 0x0100");
+  }
+  const auto address =
+      std::stoll(hexadecimal ? node.text.substr(2) : node.text, nullptr, hexadecimal ? 16 : 10);
+  if (auto ok = check_bounds(spec, node, static_cast<double>(address), ""); !ok)
+    return std::unexpected(ok.error());
+  return Value{.integer = address};
+}
+
+Parsed parse_number(const KeySpec& spec, const Node& node) {
+  if (!node.plain || !matches(node.text, "-?(0|[1-9][0-9]{0,17})(\\.[0-9]{1,18})?")) {
+    return wrong(node, fmt::format("'{}' must be a number, not {}", spec.key, quoted(node.text)),
+                 fmt::format("write it in decimal and without unit or quotes, such as {}", spec.example));
+  }
+  const auto number = parse_decimal(node.text);
+  if (!number) return wrong(spec, node, number.error());
+  if (number->numerator == 0) return wrong(node, fmt::format("'{}' must not be 0", spec.key));
+  return Value{.number = number->value};
+}
+
 Parsed parse_boolean(const KeySpec& spec, const Node& node) {
   if (!node.plain || (node.text != "true" && node.text != "false")) {
     return wrong(node, fmt::format("'{}' must be true or false, not {}", spec.key, quoted(node.text)));
@@ -166,6 +191,31 @@ Parsed parse_position_range(const KeySpec& spec, const Node& node, std::string_v
   return result;
 }
 
+Parsed parse_parts(const KeySpec& spec, const Node& node) {
+  const auto how = fmt::format("write true, false or a list, such as {}", spec.example);
+  if (node.kind == Node::Kind::scalar && node.plain && node.text == "false") return Value{};
+  if (node.kind == Node::Kind::scalar && node.plain && node.text == "true")
+    return Value{.items = {spec.choices.begin(), spec.choices.end()}};
+  if (node.kind == Node::Kind::scalar)
+    return wrong(node, fmt::format("'{}' cannot be {}", spec.key, quoted(node.text)), how);
+  if (node.kind != Node::Kind::list)
+    return wrong(node, fmt::format("'{}' cannot be {}", spec.key, kind_name(node)), how);
+  if (node.items.empty()) return wrong(node, fmt::format("'{}' is an empty list", spec.key), "write false");
+  Value result;
+  for (const auto& item : node.items) {
+    if (item->kind != Node::Kind::scalar)
+      return wrong(*item, fmt::format("'{}' must be a list of names, not of {}", spec.key, kind_name(*item)),
+                   how);
+    if (std::ranges::find(spec.choices, item->text) == spec.choices.end())
+      return wrong(*item, fmt::format("'{}' has no part {}", spec.key, quoted(item->text)),
+                   suggest(item->text, spec.choices));
+    if (std::ranges::find(result.items, item->text) != result.items.end())
+      return wrong(*item, fmt::format("'{}' names {} twice", spec.key, quoted(item->text)), "once is enough");
+    result.items.push_back(item->text);
+  }
+  return result;
+}
+
 }  // namespace
 
 std::string_view kind_name(const Node& node) {
@@ -193,6 +243,7 @@ bool matches(std::string_view text, std::string_view pattern) {
 
 std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& node, std::string_view unit) {
   if (spec.kind == Kind::position_range) return parse_position_range(spec, node, unit);
+  if (spec.kind == Kind::parts) return parse_parts(spec, node);
   if (node.kind != Node::Kind::scalar) {
     return wrong(node, fmt::format("'{}' must be a single value, not {}", spec.key, kind_name(node)),
                  spec.example.empty() ? "" : fmt::format("for example {}", spec.example));
@@ -204,6 +255,10 @@ std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& no
       return parse_model(spec, node);
     case Kind::integer:
       return parse_integer(spec, node);
+    case Kind::register_address:
+      return parse_register_address(spec, node);
+    case Kind::number:
+      return parse_number(spec, node);
     case Kind::boolean:
       return parse_boolean(spec, node);
     case Kind::choice:
@@ -222,8 +277,10 @@ std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& no
     case Kind::velocity:
       return parse_in_axis_unit(spec, node, unit);
     case Kind::position_range:
+    case Kind::parts:
     case Kind::section:
     case Kind::named_sections:
+    case Kind::numbered_sections:
     case Kind::terminals:
     case Kind::model_settings:
       break;

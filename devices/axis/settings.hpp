@@ -25,6 +25,45 @@ struct TerminalSettings {
   bool active_low = false;
 };
 
+/// One row of the drive's own table of positions (multi-position, PT; RTU manuals 7.3). User units.
+struct PositionSegment {
+  int number = 1;                                  ///< 1..16, as the terminals pin0..pin4 select it
+  double target = 0;                               ///< distance, or position with SegmentSettings::absolute
+  double velocity = 0;                             ///< per second, > 0
+  Duration acceleration_time = milliseconds(100);  ///< and deceleration; shared with the velocity segment
+  bool operator==(const PositionSegment&) const = default;
+};
+
+/// One row of the drive's table of velocities (multi-speed, PV; 7.4); pv_direction selects the direction.
+struct VelocitySegment {
+  int number = 1;
+  double velocity = 0;  ///< per second, > 0
+  Duration acceleration_time = milliseconds(100);
+  bool operator==(const VelocitySegment&) const = default;
+};
+
+struct SegmentSettings {
+  bool absolute = false;  ///< 0x0026: what position segments and moves started by terminals mean
+  std::vector<PositionSegment> positions{};
+  std::vector<VelocitySegment> velocities{};
+  bool operator==(const SegmentSettings&) const = default;
+};
+
+/// What is saved in the drive's EEPROM: `persist: true`, `false`, or a list of these.
+struct PersistSettings {
+  bool terminals = false, segments = false, homing = false;
+  bool drive = false;  ///< microstep and everything under `drive:`
+  [[nodiscard]] bool any() const { return terminals || segments || homing || drive; }
+  static constexpr PersistSettings all() { return {true, true, true, true}; }
+  bool operator==(const PersistSettings&) const = default;
+};
+
+/// A brake that an output of the drive works (M2). The drive switches the output with its power stage.
+struct BrakeSettings {
+  Duration release_time{};  ///< after the power stage is on: the axis does not move before
+  Duration engage_time{};   ///< after it is off: Disable is not done before
+};
+
 struct LimitSettings {
   std::optional<double> position_minimum, position_maximum;  ///< user units; both or none
   double velocity = 0;                                       ///< user units per second, > 0, required
@@ -64,9 +103,12 @@ struct AxisSettings {
   double position_tolerance = 0;  ///< user units; 0: one pulse
   Duration poll_moving = milliseconds(20);
   Duration poll_idle = milliseconds(200);
-  Duration reboot_guard = milliseconds(100);             ///< M6; below the drive's shortest boot time
-  Duration stop_margin = milliseconds(300);              ///< beyond the deceleration time, before escalating
-  bool persist = false;                                  ///< save configuration to the drive's EEPROM
+  Duration reboot_guard = milliseconds(100);        ///< M6; below the drive's shortest boot time
+  Duration stop_margin = milliseconds(300);         ///< beyond the deceleration time, before escalating
+  Duration drift_check = std::chrono::seconds(10);  ///< how often the terminals' functions are read again
+  PersistSettings persist{};
+  BrakeSettings brake{};
+  std::optional<SegmentSettings> segments{};             ///< nothing: the drive's table is left alone
   std::map<std::string, SettingValue> model_settings{};  ///< by the descriptor's schema
 };
 

@@ -78,6 +78,36 @@ void dump_scale_and_limits(Dump& dump, const AxisSettings& axis) {
   dump.field("start_speed_rpm", axis.limits.start_speed_rpm);
 }
 
+void dump_segments(Dump& dump, const SegmentSettings& segments) {
+  dump.field("segments.absolute", segments.absolute);
+  for (const auto& row : segments.positions) {
+    const auto path = fmt::format("segments.positions.{}.", row.number);
+    dump.field(path + "target", row.target);
+    dump.field(path + "velocity", row.velocity);
+    dump.field(path + "acceleration_time", row.acceleration_time);
+  }
+  for (const auto& row : segments.velocities) {
+    const auto path = fmt::format("segments.velocities.{}.", row.number);
+    dump.field(path + "velocity", row.velocity);
+    dump.field(path + "acceleration_time", row.acceleration_time);
+  }
+}
+
+void dump_device(Dump& dump, const DeviceSettings& device) {
+  dump.enter(fmt::format("devices.{}", device.name));
+  dump.field("bus", device.bus);
+  dump.field("node", device.node);
+  dump.field("poll", device.poll);
+  for (const auto& entry : device.registers) {
+    const auto path = fmt::format("registers.{}.", entry.name);
+    dump.field(path + "address", entry.address);
+    dump.field(path + "type", entry.type);
+    dump.field(path + "scale", entry.scale);
+    dump.field(path + "unit", entry.unit);
+    dump.field(path + "writable", entry.writable);
+  }
+}
+
 void dump_axis(Dump& dump, const AxisSettings& axis) {
   dump.enter(fmt::format("axes.{}", axis.name));
   dump.field("bus", axis.bus);
@@ -96,7 +126,12 @@ void dump_axis(Dump& dump, const AxisSettings& axis) {
   dump.field("poll_idle", axis.poll_idle);
   dump.field("reboot_guard", axis.reboot_guard);
   dump.field("stop_margin", axis.stop_margin);
-  dump.field("persist", axis.persist);
+  dump.field("drift_check", axis.drift_check);
+  dump.field("persist", fmt::format("terminals={} segments={} homing={} drive={}", axis.persist.terminals,
+                                    axis.persist.segments, axis.persist.homing, axis.persist.drive));
+  dump.field("release_time", axis.brake.release_time);
+  dump.field("engage_time", axis.brake.engage_time);
+  if (axis.segments) dump_segments(dump, *axis.segments);
   for (const auto& [key, value] : axis.model_settings) dump.field("drive." + key, value);
 }
 
@@ -126,6 +161,7 @@ std::string dump(const Configuration& configuration) {
     dump.field("negative_limit", simulation.negative_limit);
     dump.field("start_position", simulation.start_position);
   }
+  for (const auto& device : configuration.devices) dump_device(dump, device);
   return dump.text();
 }
 

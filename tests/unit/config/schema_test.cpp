@@ -65,7 +65,7 @@ class Emitter {
 };
 
 struct Leaf {
-  std::string path;  ///< with * for names
+  std::string path;  ///< with * for names and numbers
   const KeySpec* spec;
 };
 
@@ -73,7 +73,8 @@ void collect(std::span<const KeySpec> keys, const std::string& path, std::vector
   for (const auto& spec : keys) {
     const auto here = path.empty() ? std::string(spec.key) : fmt::format("{}.{}", path, spec.key);
     if (spec.kind == Kind::section) collect(spec.children, here, leaves);
-    if (spec.kind == Kind::named_sections) collect(spec.children, here + ".*", leaves);
+    if (spec.kind == Kind::named_sections || spec.kind == Kind::numbered_sections)
+      collect(spec.children, here + ".*", leaves);
     if (spec.children.empty()) leaves.push_back({here, &spec});
   }
 }
@@ -102,9 +103,11 @@ class Schema : public ::testing::Test {
   [[nodiscard]] std::string in_reference(const std::string& pattern) const {
     const auto star = pattern.find('*');
     if (star == std::string::npos) return find(*root_, pattern) == nullptr ? "" : pattern;
-    for (const auto& [name, section] : find(*root_, pattern.substr(0, star - 1))->entries) {
-      const auto path = pattern.substr(0, star) + name->text + pattern.substr(star + 1);
-      if (find(*root_, path) != nullptr) return path;
+    const auto* sections = find(*root_, pattern.substr(0, star - 1));
+    if (sections == nullptr) return "";
+    for (const auto& [name, section] : sections->entries) {
+      const auto path = in_reference(pattern.substr(0, star) + name->text + pattern.substr(star + 1));
+      if (!path.empty()) return path;
     }
     return "";
   }
@@ -122,7 +125,8 @@ TEST_F(Schema, IsDocumented) {
     EXPECT_FALSE(spec->description.empty()) << path;
     const bool of_model = spec->kind == Kind::terminals || spec->kind == Kind::model_settings;
     EXPECT_EQ(spec->example.empty(), of_model) << path;
-    EXPECT_EQ(spec->apply == nullptr, of_model) << path;
+    const bool only_choice = spec->kind == Kind::choice && spec->choices.size() == 1;
+    EXPECT_EQ(spec->apply == nullptr, of_model || only_choice) << path;
     if (spec->kind == Kind::text) EXPECT_FALSE(spec->pattern.empty() || spec->pattern_hint.empty()) << path;
     if (spec->required) EXPECT_TRUE(spec->default_value.empty()) << path;
   }
@@ -137,10 +141,10 @@ TEST_F(Schema, EveryKeyHasAnEffect) {
   for (const auto& [pattern, spec] : leaves()) {
     if (spec->example.empty()) continue;  // of the model: below
     const auto path = in_reference(pattern);
-    if (spec->kind == Kind::model) {
+    if (spec->kind == Kind::model || spec->choices.size() == 1) {
       const auto refused = load_text(Emitter().replace(path, "none").text(*root_), "changed.yaml");
       EXPECT_FALSE(refused.configuration) << path;
-    } else if (spec->key == "unit") {
+    } else if (pattern == "axes.*.unit") {
       auto text = Emitter().text(*root_);
       for (auto at = text.find("mm"); at != std::string::npos; at = text.find("mm", at))
         text.replace(at, 2, "cm");
@@ -187,6 +191,7 @@ TEST_F(Schema, MisspeltKeysAreSuggested) {
 
 TEST_F(Schema, EverySettingOfEveryModelHasAnEffect) {
   for (const auto* model : drive_models()) {
+    const auto of_model = [&] { return Emitter().replace("axes.feeder.model", model->model); };
     for (const auto& setting : model->settings) {
       std::vector<std::string> values(setting.choices.begin(), setting.choices.end());
       if (setting.kind == "boolean") values = {"true", "false"};
@@ -195,15 +200,14 @@ TEST_F(Schema, EverySettingOfEveryModelHasAnEffect) {
       std::set<std::string> dumps;
       for (const auto& value : values) {
         const auto drive = fmt::format("{{ {}: {} }}", setting.key, value);
-        dumps.insert(
-            loaded(Emitter().replace("axes.feeder.model", model->model).replace("axes.feeder.drive", drive)));
+        dumps.insert(loaded(of_model().replace("axes.feeder.drive", drive)));
       }
       EXPECT_EQ(dumps.size(), values.size()) << setting.key;
       EXPECT_GE(values.size(), 2U) << setting.key;
       if (!setting.default_value.empty()) {
         const auto drive = fmt::format("{{ {}: {} }}", setting.key, setting.default_value);
-        EXPECT_EQ(loaded(Emitter().replace("axes.feeder.drive", drive)),
-                  loaded(Emitter().erase("axes.feeder.drive")))
+        EXPECT_EQ(loaded(of_model().replace("axes.feeder.drive", drive)),
+                  loaded(of_model().erase("axes.feeder.drive")))
             << setting.key;
       }
     }
@@ -222,6 +226,7 @@ TEST_F(Schema, EveryTerminalTakesEveryFunction) {
                 fmt::format("{{ {}: {{ function: {}, active: {} }} }}", terminal.name, function.name, level);
             dumps.insert(loaded(Emitter()
                                     .erase("axes.feeder.homing")
+                                    .erase("axes.feeder.drive")
                                     .replace("axes.feeder.model", model->model)
                                     .replace(fmt::format("axes.feeder.{}", section), text)));
             ++expected;

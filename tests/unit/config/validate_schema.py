@@ -8,31 +8,60 @@ import yaml
 
 # Only the loader can tell these: relations between keys, arithmetic, and what the YAML parser drops silently.
 LOADER_ONLY = {
+    "baud_of_model",
+    "device_nodes",
+    "device_same_address",
     "function_twice",
+    "function_twice_inverted",
+    "home_approach",
     "homing_without_switch",
     "jog_travel",
+    "limit_homing_without_switch",
     "limits_beyond_counter",
     "listen_port",
     "merge_key",
     "missing_travel",
     "modulo_with_limits",
     "plaintext",
+    "pv_direction",
     "reversed_limits",
     "same_node",
     "same_port",
     "scale_too_fine",
+    "segment_selection",
+    "segment_targets",
+    "segment_times",
+    "segment_values",
+    "segments_without_effect",
     "simulate_on_real_bus",
     "simulate_without_effect",
     "start_above_velocity",
     "start_speed",
     "tag",
     "times",
+    "too_many_drives",
     "unknown_bus",
     "velocity_too_high",
     "velocity_too_low",
     "vertical",
 }
 UNREADABLE = {"alias_loop", "two_documents", "syntax_bracket", "syntax_indent", "syntax_tab"}
+
+
+def as_json(value, done):
+    """Numbers that are keys become strings, as in JSON. Aliases stay shared: some files multiply them."""
+    if id(value) not in done:
+        if isinstance(value, dict):
+            done[id(value)] = {str(key): as_json(item, done) for key, item in value.items()}
+        elif isinstance(value, list):
+            done[id(value)] = [as_json(item, done) for item in value]
+        else:
+            return value
+    return done[id(value)]
+
+
+def load(file):
+    return as_json(yaml.safe_load(file.read_text()), {})
 
 
 def main():
@@ -42,7 +71,7 @@ def main():
     validator = jsonschema.Draft202012Validator(schema)
     failures = 0
     for file in sorted(source.glob("config/examples/*.yaml")):
-        for error in validator.iter_errors(yaml.safe_load(file.read_text())):
+        for error in validator.iter_errors(load(file)):
             print(f"{file.name}: refused: {list(error.absolute_path)}: {error.message[:200]}")
             failures += 1
     seen = set()
@@ -50,7 +79,7 @@ def main():
         seen.add(file.stem)
         if file.stem in UNREADABLE:
             continue
-        accepted = validator.is_valid(yaml.safe_load(file.read_text()))
+        accepted = validator.is_valid(load(file))
         if accepted != (file.stem in LOADER_ONLY):
             print(f"{file.name}: {'accepted' if accepted else 'refused'} by the schema")
             failures += 1

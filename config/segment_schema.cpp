@@ -1,0 +1,86 @@
+#include "config/schema.hpp"
+
+// The keys of an axis's segments. What depends on the model or on other keys is in segment_checks.cpp.
+namespace axisd::config {
+
+namespace {
+
+constexpr std::string_view modes[] = {"relative", "absolute"};
+
+constexpr KeySpec position_keys[] = {
+    {.key = "target",
+     .kind = Kind::position,
+     .required = true,
+     .description = "Distance in mode relative, position in mode absolute; axis direction.",
+     .example = "20 mm",
+     .apply = [](Target& t, const Value& v) { t.position_segment->target = v.number; }},
+    {.key = "velocity",
+     .kind = Kind::velocity,
+     .required = true,
+     .description = "Of this segment.",
+     .example = "50 mm/s",
+     .apply = [](Target& t, const Value& v) { t.position_segment->velocity = v.number; }},
+    {.key = "acceleration_time",
+     .kind = Kind::duration,
+     .description = "Also of the deceleration; shared with the velocity segment of the same number, whose "
+                    "time counts if "
+                    "this one is not given.",
+     .example = "120 ms",
+     .default_value = "100 ms",
+     .apply = [](Target& t, const Value& v) { t.position_segment->acceleration_time = v.duration; }},
+};
+
+constexpr KeySpec velocity_keys[] = {
+    {.key = "velocity",
+     .kind = Kind::velocity,
+     .required = true,
+     .description = "Of this segment; an input with function pv_direction selects the direction.",
+     .example = "20 mm/s",
+     .apply = [](Target& t, const Value& v) { t.velocity_segment->velocity = v.number; }},
+    {.key = "acceleration_time",
+     .kind = Kind::duration,
+     .description = "Also of the deceleration; shared with the position segment of the same number, whose "
+                    "time counts if "
+                    "this one is not given.",
+     .example = "120 ms",
+     .default_value = "100 ms",
+     .apply = [](Target& t, const Value& v) { t.velocity_segment->acceleration_time = v.duration; }},
+};
+
+constexpr KeySpec segment_keys[] = {
+    {.key = "mode",
+     .kind = Kind::choice,
+     .description = "What targets mean, also that of a move started by an input with position_start.",
+     .example = "absolute",
+     .default_value = "relative",
+     .choices = modes,
+     .apply = [](Target& t, const Value& v) { t.axis->axis.segments->absolute = v.text == "absolute"; }},
+    {.key = "positions",
+     .kind = Kind::numbered_sections,
+     .description = "Moves, by the number that pin0..pin4 select; started by an input with pt_enable.",
+     .minimum = 1,
+     .maximum = last_segment,
+     .children = position_keys,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.position_segment = &t.axis->axis.segments->positions.emplace_back();
+           t.position_segment->number = static_cast<int>(v.integer);
+         }},
+    {.key = "velocities",
+     .kind = Kind::numbered_sections,
+     .description = "Velocities, by the number that pin0..pin4 select; run by an input with pv_enable.",
+     .minimum = 1,
+     .maximum = last_segment,
+     .children = velocity_keys,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.velocity_segment = &t.axis->axis.segments->velocities.emplace_back();
+           t.velocity_segment->number = static_cast<int>(v.integer);
+         }},
+};
+
+}  // namespace
+
+std::span<const KeySpec> segment_schema() { return segment_keys; }
+
+}  // namespace axisd::config

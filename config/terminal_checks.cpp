@@ -1,0 +1,128 @@
+// Terminals, and what cannot work without one.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <string>
+
+#include "config/axis_checks.hpp"
+#include "config/text.hpp"
+
+namespace axisd::config {
+
+namespace {
+
+constexpr std::string_view brake = "brake";
+
+/// The first terminal that the axis does not name; empty if there is none.
+std::string_view free_terminal(std::span<const TerminalSpec> all, const std::vector<TerminalSettings>& used) {
+  const auto free = std::ranges::find_if(all, [&](const TerminalSpec& terminal) {
+    return std::ranges::find(used, terminal.name, &TerminalSettings::terminal) == used.end();
+  });
+  return free == all.end() ? std::string_view() : free->name;
+}
+
+}  // namespace
+
+void AxisChecks::check_terminals() {
+  check_functions(axis_.inputs, "inputs");
+  check_functions(axis_.outputs, "outputs");
+  check_pv_direction();
+  check_brake();
+  check_homing_switch();
+  check_simulated_switches();
+}
+
+const TerminalSettings* AxisChecks::input_with(std::string_view function) const {
+  const auto found = std::ranges::find(axis_.inputs, function, &TerminalSettings::function);
+  return found == axis_.inputs.end() ? nullptr : &*found;
+}
+
+void AxisChecks::check_pv_direction() {
+  const auto* enable = input_with("pv_enable");
+  if (enable == nullptr || !axis_.scale.invert || !usable("scale.invert")) return;
+  // M18: the direction of a multi-speed run is that of the terminal alone (7.4.2), the segment has none.
+  need_input(fmt::format("inputs.{}.function", enable->terminal), "pv_direction",
+             "'pv_enable' of an inverted axis");
+}
+
+void AxisChecks::check_brake() {
+  if (!given(brake) || model_ == nullptr || !clean("outputs")) return;
+  if (find_function(model_->output_functions, brake) == nullptr) {
+    add(brake, fmt::format("'brake' has no effect: model {} has no output function 'brake'", axis_.model),
+        "leave it out");
+    return;
+  }
+  if (std::ranges::find(axis_.outputs, brake, &TerminalSettings::function) != axis_.outputs.end()) return;
+  const auto free = free_terminal(model_->outputs, axis_.outputs);
+  add(brake, "'brake' needs an output with function 'brake'",
+      free.empty() ? "" : fmt::format("add outputs: {{ {}: brake }}", free));
+}
+
+void AxisChecks::check_homing_switch() {
+  if (!axis_.homing || !usable("homing.method")) return;
+  const auto method = axis_.homing->method;
+  const auto name = homing_methods()[static_cast<std::size_t>(method)];
+  const bool by_switch = method == HomingMethod::home_positive || method == HomingMethod::home_negative;
+  need_input("homing.method", by_switch ? "home" : name, fmt::format("homing method '{}'", name));
+  if (!by_switch || !axis_.scale.invert || !usable("scale.invert") || model_ == nullptr) return;
+  // M18: mirrored it would end at the other edge of the switch.
+  const auto approach = axis_.model_settings.find("home_approach");
+  const bool as_searched =
+      approach != axis_.model_settings.end() && approach->second == SettingValue(std::string("as_searched"));
+  if (model_->capabilities.home_approach_mirrors || as_searched || !usable("drive.home_approach")) return;
+  add("homing.method",
+      fmt::format(
+          "homing method '{}' cannot be mirrored for an inverted axis: model {} always approaches the "
+          "switch in its own forward direction",
+          name, axis_.model),
+      "home on a limit switch, or turn the motor's direction instead of scale.invert");
+}
+
+void AxisChecks::check_functions(const std::vector<TerminalSettings>& terminals, std::string_view section) {
+  if (model_ == nullptr) return;
+  const auto functions = section == "inputs" ? model_->input_functions : model_->output_functions;
+  std::map<std::string_view, std::string_view> owners;
+  for (const auto& terminal : terminals) {
+    const auto* function = find_function(functions, terminal.function);
+    if (function == nullptr || function->code == 0) continue;  // code 0: no function
+    const auto [owner, is_first] = owners.try_emplace(terminal.function, terminal.terminal);
+    if (is_first) continue;
+    add(fmt::format("{}.{}.function", section, terminal.terminal),
+        fmt::format("function '{}' is assigned to {} already", terminal.function, owner->second),
+        "one terminal per function");
+  }
+}
+
+void AxisChecks::need_input(std::string_view key, std::string_view function, const std::string& message) {
+  if (input_with(function) != nullptr || model_ == nullptr || !clean("inputs")) return;
+  const auto free = free_terminal(model_->inputs, axis_.inputs);
+  add(key, fmt::format("{} needs an input with function '{}'", message, function),
+      free.empty() ? "" : fmt::format("add inputs: {{ {}: {} }}", free, function));
+}
+
+void AxisChecks::check_simulated_switches() {
+  const auto& simulation = entry_.simulation;
+  if (given("simulate.home_switch")) need_input("simulate.home_switch", "home", "'home_switch'");
+  if (given("simulate.positive_limit"))
+    need_input("simulate.positive_limit", "positive_limit", "'positive_limit'");
+  if (given("simulate.negative_limit"))
+    need_input("simulate.negative_limit", "negative_limit", "'negative_limit'");
+  if (given("simulate.home_width") && !given("simulate.home_switch")) {
+    add("simulate.home_width", "'home_width' has no effect without home_switch",
+        "add home_switch or leave it out");
+  }
+  if (!clean("simulate")) return;
+  const double lowest = simulation.negative_limit.value_or(-std::numeric_limits<double>::infinity());
+  const double highest = simulation.positive_limit.value_or(std::numeric_limits<double>::infinity());
+  if (lowest >= highest) {
+    add("simulate.positive_limit", "the simulated limits are reversed",
+        "make positive_limit larger than negative_limit");
+  } else if (simulation.start_position <= lowest || simulation.start_position >= highest) {
+    add("simulate.start_position", "the load would start on a limit switch",
+        "start between the simulated limits");
+  }
+}
+
+}  // namespace axisd::config
