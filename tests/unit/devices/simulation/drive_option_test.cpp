@@ -9,7 +9,8 @@ TEST(DriveOption, ReadsEveryPart) {
   const auto option = parse_drive(
       "node=3,model=ykd2405pr,home=-50:600,positive_limit=90000,negative_limit=-2000,switch.start_in_motion="
       "on,"
-      "switch.unsigned_speed=off,eeprom.0x0011=13,wire.X1=positive_limit:nc,boot_ms=250,powered=off");
+      "switch.unsigned_speed=off,eeprom.0x0011=13,wire.X1=positive_limit:nc,dip=0,dip_baud=custom,boot_ms="
+      "250,powered=off");
   ASSERT_TRUE(option);
   EXPECT_EQ("ykd2405pr", option->model);
   const auto& settings = option->settings;
@@ -24,12 +25,16 @@ TEST(DriveOption, ReadsEveryPart) {
   EXPECT_TRUE(settings.wires.at("X1").normally_closed);
   EXPECT_EQ(std::chrono::milliseconds(250), settings.boot_time);
   EXPECT_FALSE(settings.powered);
+  EXPECT_EQ(0, settings.dip_address);
+  EXPECT_EQ(0, settings.dip_baud);
+  EXPECT_EQ(38400, parse_drive("node=1,model=ess42-r,dip_baud=38400")->settings.dip_baud);
 }
 
 TEST(DriveOption, NamesThePartThatIsWrong) {
   for (const std::string wrong :
        {"node=0x1FF", "home=5", "home=6:5", "positive_limit=far", "switch.a=maybe", "eeprom.1=x",
-        "eeprom.1=70000", "wire.X0=somewhere", "boot_ms=-1", "powered=1", "color=red", "model="}) {
+        "eeprom.1=70000", "wire.X0=somewhere", "boot_ms=-1", "dip=x", "dip=256", "dip_baud=0",
+        "dip_baud=fast", "powered=1", "color=red", "model="}) {
     const auto option = parse_drive("node=1,model=ykd2405pr," + wrong);
     ASSERT_FALSE(option) << wrong;
     EXPECT_NE(std::string::npos, option.error().message.find(wrong));

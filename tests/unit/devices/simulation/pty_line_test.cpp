@@ -1,10 +1,12 @@
 // The line behind a real pseudo terminal. Waits have generous ends and no test asserts a measured time.
 #include "devices/simulation/pty_line.hpp"
 
+#include <asm/termbits.h>
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -34,6 +36,15 @@ class Client {
   ~Client() { close(fd_); }
   Client(const Client&) = delete;
   [[nodiscard]] bool is_open() const { return fd_ >= 0; }
+
+  /// What a daemon sets; any rate, also one without a constant of its own.
+  void set(int baud, int stop_bits = 1) {
+    termios2 settings{};
+    ASSERT_EQ(0, ioctl(fd_, TCGETS2, &settings));
+    settings.c_cflag = BOTHER | CS8 | CREAD | (stop_bits == 2 ? CSTOPB : 0U);
+    settings.c_ispeed = settings.c_ospeed = static_cast<speed_t>(baud);
+    ASSERT_EQ(0, ioctl(fd_, TCSETS2, &settings));
+  }
 
   void send(Bytes request) {
     append_frame_crc(request);
@@ -140,6 +151,44 @@ TEST_F(PtyLineTest, ACutCableAnswersNothingUntilItIsJoined) {
   EXPECT_EQ("ok", command("join"));
   EXPECT_EQ(7U, client.ask(read_speed, 7).size());
   EXPECT_EQ(1, tx);
+}
+
+TEST_F(PtyLineTest, FollowsTheSettingsOfItsClient) {
+  Client client(line->path());
+  EXPECT_EQ(7U, client.ask(read_speed, 7).size()) << "it begins as the drives are set";
+  int heard = rx;
+  const auto not_heard = [&] {
+    client.send(read_speed);
+    while (rx == heard) line->with_network([](RtuNetwork&) {});
+    heard = rx;
+    return line->with_network([](RtuNetwork& network) { return network.serial(); });
+  };
+  client.set(14400);
+  EXPECT_EQ(14400, not_heard()->baud);
+  client.set(115200, 2);
+  EXPECT_EQ(2, not_heard()->format.stop_bits);
+  client.set(115200);
+  EXPECT_EQ(7U, client.ask(read_speed, 7).size());
+  EXPECT_EQ(2, tx) << "and nothing while the settings differed";
+}
+
+TEST_F(PtyLineTest, FindsADriveAtAnyCustomRate) {
+  line->with_network([](RtuNetwork& network) {
+    for (const std::uint16_t code : {1, 2, 3}) {
+      SimulatedNodeSettings settings;
+      settings.address = static_cast<std::uint8_t>(10 + code);
+      settings.dip_baud = 0;
+      settings.eeprom = {{0x0014, code}};
+      network.add(*make_node("ssd2608pr", settings));
+    }
+  });
+  Client client(line->path());
+  std::uint8_t node = 11;
+  for (const int baud : {14400, 128000, 256000}) {
+    client.set(baud);
+    EXPECT_EQ(node, client.ask({node, 3, 0, 0x23, 0, 1}, 7).at(0));
+    ++node;
+  }
 }
 
 TEST_F(PtyLineTest, TakesControlCommands) {

@@ -101,6 +101,76 @@ TEST_F(RtuNetworkTest, AClashOfAddressesDamagesTheReply) {
   EXPECT_FALSE(frame_is_sound(ask(framed({1, 3, 0, 0x11, 0, 1}))->bytes));
 }
 
+/// One drive with switches for `baud` and the format code of 0x0015 in its EEPROM.
+std::unique_ptr<SimulatedRtuNode> drive_at(int baud, std::uint16_t format) {
+  SimulatedNodeSettings settings;
+  settings.dip_baud = baud;
+  settings.eeprom = {{0x0015, format}};
+  return *make_node("ykd2405pr", settings);
+}
+
+TEST(RtuNetworkSerial, OtherSettingsThanTheNodesAreGarbageToIt) {
+  using enum modbus_rtu::Parity;
+  struct Case {
+    Serial line;
+    bool heard;
+  };
+  RtuNetwork network;
+  TimePoint t{1s};
+  network.advance(t);
+  network.add(drive_at(19200, 2));  // 8E1
+  EXPECT_TRUE(network.on_request(read_block, t)) << "nobody said how the line is set";
+  for (const auto& [line, heard] :
+       {Case{{.baud = 19200, .format = {.parity = even}}, true},
+        Case{{.baud = 38400, .format = {.parity = even}}, false}, Case{{.baud = 19200}, false},
+        Case{{.baud = 19200, .format = {.parity = odd}}, false},
+        Case{{.baud = 19200, .format = {.stop_bits = 2}}, false},
+        Case{{.baud = 19200, .format = {}, .parity_hidden = true}, true},
+        Case{{.baud = 19200, .format = {.stop_bits = 2}, .parity_hidden = true}, false}}) {
+    network.set_serial(line);
+    EXPECT_EQ(heard, network.on_request(read_block, t += 100ms).has_value())
+        << line.baud << ' ' << line.format.stop_bits;
+  }
+}
+
+TEST(RtuNetworkSerial, TimesFollowTheLine) {
+  RtuNetwork network;
+  network.set_serial({.baud = 9600, .format = {.parity = modbus_rtu::Parity::even}});
+  EXPECT_EQ(Duration(1'145'833), network.character_time());
+  network.set_serial({.baud = 128000});
+  EXPECT_EQ(Duration(78'125), network.character_time());
+}
+
+TEST(RtuNetworkSerial, NodesJoinTheLineThatTheyAreAddedToOrThatIsSetFirst) {
+  for (const bool before : {false, true}) {
+    RtuNetwork network;
+    TimePoint t{1s};
+    network.advance(t);
+    if (before) network.set_serial({.baud = 38400, .format = {.stop_bits = 2}});
+    auto& node = network.add(*make_node("ykd2405pr", {}));
+    if (!before) network.set_serial({.baud = 38400, .format = {.stop_bits = 2}});
+    EXPECT_EQ(1, node.peek(0x0015));
+    EXPECT_TRUE(network.on_request(read_block, t += 100ms));
+    network.set_serial({.baud = 115200});
+    EXPECT_FALSE(network.on_request(read_block, t += 100ms)) << "a later change is the master's alone";
+  }
+}
+
+TEST(RtuNetworkSerial, AChangeOfTheNodesCountsFromItsNextPowerUp) {
+  RtuNetwork network;
+  TimePoint t{1s};
+  network.advance(t);
+  network.set_serial({.baud = 115200});
+  auto& node = network.add(*make_node("ykd2405pr", {}));
+  EXPECT_TRUE(network.on_request(framed({1, 6, 0, 0x15, 0, 3}), t += 100ms));
+  EXPECT_TRUE(network.on_request(read_block, t += 100ms));
+  node.set_power(false);
+  node.set_power(true);
+  EXPECT_FALSE(network.on_request(read_block, t += 1s));
+  network.set_serial({.baud = 115200, .format = {.parity = modbus_rtu::Parity::odd}});
+  EXPECT_TRUE(network.on_request(read_block, t += 100ms));
+}
+
 TEST_F(RtuNetworkTest, ACutCableLeavesTheDrivesRunning) {
   ask(framed({1, 6, 0, 0x27, 0, 2}));
   network.set_connected(false);
@@ -240,6 +310,19 @@ TEST(MakeNode, RefusesWhatItDoesNotKnow) {
   settings.wires.clear();
   settings.address = 128;
   EXPECT_EQ(Reason::out_of_range, make_node("ykd2405pr", settings).error().reason);
+  settings.address = 33;
+  EXPECT_TRUE(make_node("ykd2405pr", settings));
+  EXPECT_THAT(make_node("ess42-r", settings).error().remedy, ::testing::HasSubstr("1 to 32"));
+  settings.address = 1;
+  settings.dip_address = 16;
+  EXPECT_TRUE(make_node("ykd2405pr", settings));
+  EXPECT_THAT(make_node("ess42-r", settings).error().remedy, ::testing::HasSubstr("0 to 15"));
+  settings.dip_address.reset();
+  settings.dip_baud = 38400;
+  EXPECT_TRUE(make_node("ykd2405pr", settings));
+  EXPECT_THAT(make_node("ess42-r", settings).error().remedy, ::testing::HasSubstr("custom"));
+  settings.dip_baud = 0;
+  EXPECT_TRUE(make_node("ess42-r", settings));
 }
 
 }  // namespace
