@@ -49,6 +49,16 @@ std::string strings(std::span<const std::string_view> items) {
   return array(result);
 }
 
+/// Permitted texts; one that YAML reads as a number, such as 1000, also as that.
+std::string choices_of(const KeySpec& spec) {
+  std::vector<std::string> result;
+  for (const auto choice : spec.choices) {
+    result.push_back(json_string(choice));
+    if (std::ranges::all_of(choice, [](char c) { return c >= '0' && c <= '9'; })) result.emplace_back(choice);
+  }
+  return array(result);
+}
+
 /// "[terminals, segments]" as JSON.
 std::string parts(std::string_view list) {
   std::vector<std::string> items;
@@ -164,7 +174,7 @@ Object type_of(const KeySpec& spec) {
     case Kind::boolean:
       return result.text("type", "boolean");
     case Kind::choice:
-      return result.raw("enum", strings(spec.choices));
+      return result.raw("enum", choices_of(spec));
     case Kind::parts:
       return parts_of(spec.choices);
     case Kind::duration:

@@ -34,7 +34,7 @@ TEST(Loader, SaysExactlyWhatIsBroken) {
   }
 }
 
-TEST(Loader, DemoIsThreeSimulatedAxes) {
+TEST(Loader, DemoIsFiveSimulatedAxesOfThreeModels) {
   const auto result = load_file(source_path("config/examples/demo.yaml"));
   ASSERT_TRUE(result.configuration) << findings(result);
   const auto& configuration = *result.configuration;
@@ -42,7 +42,7 @@ TEST(Loader, DemoIsThreeSimulatedAxes) {
   EXPECT_EQ(configuration.server.listen, "localhost:7443");
   ASSERT_EQ(configuration.buses.size(), 1U);
   EXPECT_TRUE(configuration.buses[0].simulated());
-  ASSERT_EQ(configuration.axes.size(), 3U);
+  ASSERT_EQ(configuration.axes.size(), 5U);
 
   const auto& [feeder, mechanics] = configuration.axes[0];
   EXPECT_EQ(feeder.name, "feeder");
@@ -72,6 +72,171 @@ TEST(Loader, DemoIsThreeSimulatedAxes) {
   EXPECT_EQ(turntable.scale.modulo, 360);
   EXPECT_EQ(turntable.scale.travel_numerator, 360) << "the default of unit deg";
   EXPECT_EQ(turntable.limits.position_minimum, std::nullopt);
+
+  const auto& pusher = configuration.axes[3].axis;
+  EXPECT_EQ(pusher.model, "ssd2608pr");
+  ASSERT_TRUE(pusher.segments);
+  EXPECT_TRUE(pusher.segments->absolute);
+  EXPECT_EQ(pusher.segments->positions[2],
+            (PositionSegment{.number = 3, .target = 140, .velocity = 150, .acceleration_time = 200ms}));
+  EXPECT_EQ(pusher.segments->velocities, std::vector<VelocitySegment>());
+  EXPECT_FALSE(feeder.segments);
+  EXPECT_EQ(configuration.axes[4].axis.model, "ess42-r");
+}
+
+/// A machine with one axis `x` on line `a`.
+LoadResult load_axis(const std::string& more, const std::string& model = "ykd2405pr", bool invert = false) {
+  return load_text(
+      "machine: m\nbuses: { a: { modbus_rtu: { port: sim } } }\naxes:\n  x:\n    bus: a\n    node: 1\n    "
+      "unit: "
+      "mm\n    scale: { microstep: 4000 pulses/rev, travel: 10 mm/rev, invert: " +
+          std::string(invert ? "true" : "false") +
+          " }\n    limits: { velocity: 100 mm/s }\n    model: " + model + "\n" + more,
+      "m.yaml");
+}
+
+TEST(Loader, AxesMayBeMissingBeforeTheFirstScan) {
+  const std::string buses = "machine: m\nbuses: { a: { modbus_rtu: { port: /dev/ttyUSB0 } } }\n";
+  for (const auto* axes : {"", "axes:\n", "axes: {}\n", "axes: # none yet\n"}) {
+    const auto result = load_text(buses + axes, "m.yaml");
+    ASSERT_TRUE(result.configuration) << axes << findings(result);
+    EXPECT_EQ(result.configuration->buses.size(), 1U);
+    EXPECT_TRUE(result.configuration->axes.empty());
+  }
+  EXPECT_FALSE(load_text("machine: m\n", "m.yaml").configuration) << "without a bus there is nothing to scan";
+  EXPECT_FALSE(load_text(buses + "axes: []\n", "m.yaml").configuration);
+}
+
+TEST(Loader, PersistIsAllNothingOrParts) {
+  const auto persist = [](const std::string& value) {
+    const auto result = load_axis("    persist: " + value + "\n");
+    EXPECT_TRUE(result.configuration) << findings(result);
+    return result.configuration ? result.configuration->axes[0].axis.persist : PersistSettings{};
+  };
+  EXPECT_EQ(persist("true"), PersistSettings::all());
+  EXPECT_EQ(persist("false"), PersistSettings());
+  EXPECT_EQ(persist("[terminals]"), PersistSettings{.terminals = true});
+  EXPECT_EQ(persist("[segments, drive]"), (PersistSettings{.segments = true, .drive = true}));
+  EXPECT_EQ(persist("[drive, homing, segments, terminals]"), PersistSettings::all());
+}
+
+TEST(Loader, OneNumberHasOneAccelerationTime) {
+  const auto result = load_axis(R"(
+    inputs: { X0: pt_enable, X1: pv_enable, X2: pin0, X3: pin1 }
+    segments:
+      positions:
+        1: { target: -1.5 mm, velocity: 20 mm/s, acceleration_time: 300 ms }
+        2: { target: 2, velocity: 20 mm/s }
+        3: { target: 2, velocity: 20 mm/s }
+      velocities:
+        1: { velocity: 30 mm/s }
+        2: { velocity: 30 mm/s, acceleration_time: 400 ms }
+        3: { velocity: 30 mm/s }
+)");
+  ASSERT_TRUE(result.configuration) << findings(result);
+  const auto& segments = *result.configuration->axes[0].axis.segments;
+  EXPECT_FALSE(segments.absolute);
+  ASSERT_EQ(segments.positions.size(), 3U);
+  ASSERT_EQ(segments.velocities.size(), 3U);
+  const Duration expected[] = {300ms, 400ms, 100ms};
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(segments.positions[i].acceleration_time, expected[i]);
+    EXPECT_EQ(segments.velocities[i].acceleration_time, expected[i]);
+  }
+  EXPECT_EQ(segments.positions[0].target, -1.5);
+  EXPECT_EQ(segments.velocities[2].velocity, 30);
+}
+
+TEST(Loader, SegmentsThatTheInputsOfAModelCanSelect) {
+  // pin0 is the lowest bit of the number (7.3.2).
+  const auto loads = [](const std::string& model, int number, const std::string& pins) {
+    return load_axis("    inputs: { X0: pt_enable, " + pins + " }\n    segments: { positions: { " +
+                         std::to_string(number) + ": { target: 2, velocity: 20 mm/s } } }\n",
+                     model)
+        .configuration.has_value();
+  };
+  EXPECT_TRUE(loads("ess42-r", 7, "X1: pin0, X2: pin1, X3: pin2"));
+  EXPECT_FALSE(loads("ess42-r", 8, "X1: pin3")) << "7 at most (7.3.2 of its manual)";
+  EXPECT_TRUE(loads("ssd2608pr", 15, "X1: pin0, X2: pin1, X3: pin2, X4: pin3"));
+  EXPECT_FALSE(loads("ssd2608pr", 16, "X1: pin4"));
+  EXPECT_TRUE(loads("ykd2405pr", 16, "X1: pin4"));
+  EXPECT_FALSE(loads("ykd2405pr", 16, "X1: pin3"));
+  EXPECT_TRUE(loads("ykd2405pr", 8, "X1: pin3"));
+  EXPECT_TRUE(loads("ykd2405pr", 4, "X1: { function: pin2, active: low }"));
+  EXPECT_FALSE(loads("ykd2405pr", 5, "X1: { function: pin2, active: low }"));
+}
+
+TEST(Loader, SegmentTimesAreThoseOfTheModel) {
+  const auto loads = [](const std::string& model, const std::string& time) {
+    return load_axis(
+               "    inputs: { X0: pv_enable, X1: pin0 }\n    segments: { velocities: { 1: { velocity: 20 "
+               "mm/s, acceleration_time: " +
+                   time + " } } }\n",
+               model)
+        .configuration.has_value();
+  };
+  EXPECT_TRUE(loads("ykd2405pr", "30 ms"));
+  EXPECT_FALSE(loads("ykd2405pr", "29 ms"));
+  for (const auto* model : {"ssd2608pr", "ess42-r"}) {
+    EXPECT_TRUE(loads(model, "0 ms")) << model;
+    EXPECT_TRUE(loads(model, "2000 ms")) << model;
+    EXPECT_FALSE(loads(model, "2001 ms")) << model;
+  }
+}
+
+TEST(Loader, MirrorsOnlyWhatTheDriveMirrors) {
+  const auto homes = [](const std::string& method, const std::string& model, const std::string& drive) {
+    return load_axis("    homing: { method: " + method +
+                         ", velocity: 20 mm/s, search_velocity: 2 mm/s }\n    inputs: { X0: home, X1: "
+                         "positive_limit, X2: negative_limit }\n    drive: " +
+                         drive + "\n",
+                     model, true)
+        .configuration.has_value();
+  };
+  for (const auto* model : {"ssd2608pr", "ess42-r"}) {
+    for (const auto* method : {"home_positive", "home_negative"}) {
+      EXPECT_FALSE(homes(method, model, "{}")) << model;
+      EXPECT_FALSE(homes(method, model, "{ home_approach: forward }")) << model;
+      EXPECT_TRUE(homes(method, model, "{ home_approach: as_searched }")) << model;
+      EXPECT_TRUE(homes(method, "ykd2405pr", "{}"));
+    }
+    EXPECT_TRUE(homes("positive_limit", model, "{}")) << model;
+    EXPECT_TRUE(homes("negative_limit", model, "{}")) << model;
+  }
+}
+
+TEST(Loader, DevicesHaveRegistersByName) {
+  const auto result = load_text(R"(machine: m
+buses: { a: { modbus_rtu: { port: sim, baud: 4800 } } }
+devices:
+  oven:
+    bus: a
+    node: 247
+    model: modbus-generic
+    registers:
+      first: { address: 0xFFFe, type: f32, unit: "%" }
+      second: { address: 16, type: i16, scale: -0.25, unit: degC, access: rw }
+      third: { address: 17, type: u32 }
+)",
+                                "m.yaml");
+  ASSERT_TRUE(result.configuration) << findings(result);
+  ASSERT_EQ(result.configuration->devices.size(), 1U);
+  const auto& oven = result.configuration->devices[0];
+  EXPECT_EQ(oven.name, "oven");
+  EXPECT_EQ(oven.bus, "a");
+  EXPECT_EQ(oven.node, 247);
+  EXPECT_EQ(oven.poll, 500ms);
+  ASSERT_EQ(oven.registers.size(), 3U);
+  EXPECT_EQ(oven.registers[0].address, 0xFFFE);
+  EXPECT_EQ(oven.registers[0].type, RegisterType::f32);
+  EXPECT_EQ(oven.registers[0].unit, "%");
+  EXPECT_FALSE(oven.registers[0].writable);
+  EXPECT_EQ(oven.registers[1].address, 16);
+  EXPECT_EQ(oven.registers[1].type, RegisterType::i16);
+  EXPECT_EQ(oven.registers[1].scale, -0.25);
+  EXPECT_TRUE(oven.registers[1].writable);
+  EXPECT_EQ(oven.registers[2].type, RegisterType::u32);
+  EXPECT_EQ(oven.registers[2].scale, 1);
 }
 
 TEST(Loader, ReferenceLoads) {

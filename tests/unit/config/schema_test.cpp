@@ -136,6 +136,19 @@ TEST_F(Schema, ReferenceShowsEveryKey) {
   for (const auto& [path, spec] : leaves()) EXPECT_NE(in_reference(path), "") << path;
 }
 
+TEST_F(Schema, ReferenceShowsEverySettingOfEveryModel) {
+  std::map<std::string, const Node*, std::less<>> drives;
+  for (const auto& [name, axis] : find(*root_, "axes")->entries) {
+    if (const auto* drive = axis->find("drive")) drives.emplace(axis->find("model")->text, drive);
+  }
+  for (const auto* model : drive_models()) {
+    const auto drive = drives.find(model->model);
+    ASSERT_NE(drive, drives.end()) << model->model;
+    for (const auto& setting : model->settings)
+      EXPECT_NE(drive->second->find(setting.key), nullptr) << model->model << ": " << setting.key;
+  }
+}
+
 TEST_F(Schema, EveryKeyHasAnEffect) {
   const auto before = loaded(Emitter());
   for (const auto& [pattern, spec] : leaves()) {
