@@ -131,13 +131,14 @@ void AxisChecks::check_times() {
   }
 }
 
-void AxisChecks::check_distance(std::string_view key, std::optional<double> value) {
+void AxisChecks::check_distance(std::string_view key, std::optional<double> value, std::string_view from) {
   // The drives count in signed 32 bit.
   constexpr std::int64_t largest = std::numeric_limits<std::int32_t>::max();
   if (!value || !given(key) || !usable(key)) return;
   const auto pulses = scale_->checked_pulses(*value);
   if (pulses && *pulses <= largest && *pulses >= -largest) return;
-  add(key, fmt::format("{} {} is more than the drive can count", format_number(*value), axis_.scale.unit),
+  add(key,
+      fmt::format("{} {}{} is more than the drive can count", format_number(*value), axis_.scale.unit, from),
       fmt::format("at most {} {} either way", format_number(std::abs(scale_->to_units(largest))),
                   axis_.scale.unit));
 }

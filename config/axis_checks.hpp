@@ -48,7 +48,7 @@ class AxisChecks {
   void check_homing();
   // One value, if it was given and could be read.
   void check_time(std::string_view key, Duration value, int minimum_ms);
-  void check_distance(std::string_view key, std::optional<double> value);
+  void check_distance(std::string_view key, std::optional<double> value, std::string_view from = "");
   void check_speed(std::string_view key, double velocity, double minimum_rpm, double maximum_rpm);
   void check_below(std::string_view key, double velocity, std::string_view limit_key, double limit);
   /// M11: of the motor, in whole r/min. Precondition: the model is known.
@@ -67,6 +67,7 @@ class AxisChecks {
 
   // The drive's table of segments (segment_checks.cpp).
   void check_segments();
+  void check_mode();
   void check_segment_selection(std::string_view table, std::string_view enable,
                                const std::vector<int>& numbers);
   void check_segment_number(const std::string& key, int number);

@@ -28,13 +28,9 @@ std::vector<int> numbers_of(const std::vector<Segment>& segments) {
 
 void AxisChecks::check_segments() {
   const auto& segments = *axis_.segments;
-  const bool empty = !given(positions) && !given(velocities);
-  if (empty && !given("segments.mode"))
+  if (!given(positions) && !given(velocities) && !given("segments.mode") && clean("segments"))
     add("segments", "'segments' is empty", "add positions or velocities, or leave it out");
-  if (given("segments.mode") && !given(positions) && input_with("position_start") == nullptr &&
-      clean("inputs"))
-    add("segments.mode", "'mode' has no effect without positions or an input with function 'position_start'",
-        "leave it out");
+  check_mode();
   share_times();
   if (model_ == nullptr) return;
   const auto& capabilities = model_->capabilities;
@@ -51,6 +47,18 @@ void AxisChecks::check_segments() {
   check_segment_selection(positions, "pt_enable", numbers_of(segments.positions));
   check_segment_selection(velocities, "pv_enable", numbers_of(segments.velocities));
   if (scale_) check_targets();
+}
+
+void AxisChecks::check_mode() {
+  if (!given("segments.mode") || !usable("segments.mode")) return;
+  if (!given(positions) && input_with("position_start") == nullptr && clean("segments") && clean("inputs")) {
+    add("segments.mode", "'mode' has no effect without positions or an input with function 'position_start'",
+        "leave it out");
+  } else if (axis_.segments->absolute && axis_.scale.modulo) {
+    // M19: whoever started a motion by terminal would not know.
+    add("segments.mode", "'mode: absolute' and scale.modulo exclude each other",
+        "the drive's counter of an endless axis starts again from zero: use mode: relative");
+  }
 }
 
 void AxisChecks::check_segment_number(const std::string& key, int number) {
@@ -86,7 +94,12 @@ void AxisChecks::check_targets() {
   for (const auto& row : segments.positions) {
     const auto key = fmt::format("{}.{}.target", positions, row.number);
     if (!given(key) || !usable(key) || !usable("segments.mode")) continue;
-    check_distance(key, row.target);
+    // The drive counts absolute targets from its own zero, which homing puts at homing.position.
+    if (segments.absolute && axis_.homing) {
+      check_distance(key, row.target - axis_.homing->position, " from homing.position");
+    } else {
+      check_distance(key, row.target);
+    }
     const auto text = fmt::format("{} {}", format_number(row.target), axis_.scale.unit);
     if (segments.absolute) {
       if (limited && (row.target < *limits.position_minimum || row.target > *limits.position_maximum))

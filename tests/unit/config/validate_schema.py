@@ -32,7 +32,7 @@ LOADER_ONLY = {
     "segment_targets",
     "segment_times",
     "segment_values",
-    "segments_without_effect",
+    "segments_mode",
     "simulate_on_real_bus",
     "simulate_without_effect",
     "start_above_velocity",
