@@ -21,6 +21,7 @@ class RegisterNode final : public simulation::SimulatedRtuNode {
 
   std::map<std::uint16_t, std::uint16_t> registers;
   bool silent = false;
+  bool ignores_unknown = false;                ///< no exception for registers that it has not
   std::optional<std::uint16_t> highest_value;  ///< what is written above it is clamped
   int reads = 0;
   std::size_t longest_read = 0;
@@ -37,7 +38,9 @@ class RegisterNode final : public simulation::SimulatedRtuNode {
     const std::size_t count = frame[1] == 6 ? 1 : word(4);
     for (std::size_t i = 0; i < count; ++i)
       if (!registers.contains(static_cast<std::uint16_t>(first + i)))
-        return reply({address_, static_cast<std::uint8_t>(frame[1] | 0x80U), 2});
+        return ignores_unknown
+                   ? std::nullopt
+                   : std::optional(reply({address_, static_cast<std::uint8_t>(frame[1] | 0x80U), 2}));
     if (frame[1] == 3) {
       ++reads;
       longest_read = std::max(longest_read, count);

@@ -134,7 +134,7 @@ void VirtualLine::hear(std::vector<std::uint8_t> bytes) {
 }
 
 void VirtualLine::cut_wait() {
-  if (under_way_ == nullptr || reply_coming_ || world_->now() < result_.request_end) return;
+  if (under_way_ == nullptr || reply_coming_) return;
   const auto when = std::max(world_->now(), result_.request_end + under_way_->turnaround_max);
   cut_timer_ = world_->clock().call_at(when, [this] {
     if (under_way_ != nullptr && !reply_coming_) end(ExchangeStatus::cut);

@@ -4,46 +4,14 @@
 
 #include <algorithm>
 
-#include "devices/simulation/simulator.hpp"
-#include "tests/support/virtual_line.hpp"
+#include "bus_rig.hpp"
 
 namespace axisd::modbus_rtu {
 namespace {
 
 using namespace std::chrono_literals;
 using simulation::FaultKind;
-
-struct BusRig {
-  test::VirtualWorld world;
-  test::VirtualLine* line = nullptr;
-  std::unique_ptr<RtuBus> bus;
-  std::map<std::string, Result<Answer>> results;
-
-  BusRig() {
-    auto made = std::make_unique<test::VirtualLine>(world, LineSettings{.name = "a", .port = "sim"});
-    line = made.get();
-    for (const std::uint8_t node : {1, 2})
-      line->network().add(simulation::find_simulator("ykd2405pr")->make({.address = node}));
-    bus = std::make_unique<RtuBus>(world.executor(), world.clock(), LineSettings{.name = "a", .port = "sim"},
-                                   std::move(made));
-    bus->start();
-    world.run_for(10ms);
-  }
-  ~BusRig() { world.run_for(2s); }
-
-  void transact(std::string name, Request request, TransactionOptions options = {}) {
-    auto one = [](BusRig& rig, std::string key, Request r, TransactionOptions o) -> Task<> {
-      auto result = co_await rig.bus->transact(std::move(r), std::move(o));
-      rig.results.insert_or_assign(std::move(key), std::move(result));
-    };
-    spawn(world.executor(), one(*this, std::move(name), std::move(request), std::move(options)), "test");
-  }
-  void read(std::string name, std::uint16_t address, std::uint16_t count, std::uint8_t node = 1) {
-    transact(
-        std::move(name),
-        {.node = node, .function = Function::read_holding_registers, .address = address, .count = count});
-  }
-};
+using test::BusRig;
 
 /// An FC03 reply does not say which registers it carries: a late one must never answer another read.
 TEST(RtuBus, ALateReplyNeverAnswersAnotherRead) {

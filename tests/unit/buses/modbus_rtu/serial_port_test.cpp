@@ -15,8 +15,12 @@
 #include <string>
 #include <vector>
 
+#include "terminal.hpp"
+
 namespace axisd::modbus_rtu {
 namespace {
+
+using test::speed_of;
 
 using std::chrono::milliseconds;
 
@@ -46,21 +50,6 @@ struct Pty {
   std::string path;
 };
 
-/// The kernel's termios2, which cannot be included beside <termios.h>; glibc's has no speed beyond its list.
-struct KernelTermios {
-  std::uint32_t flags[4];
-  std::uint8_t discipline;
-  std::uint8_t characters[19];
-  std::uint32_t input_speed, output_speed;
-};
-
-std::uint32_t speed_of(int descriptor) {
-  KernelTermios settings{};
-  EXPECT_EQ(ioctl(descriptor, _IOR('T', 0x2A, KernelTermios), &settings), 0);
-  EXPECT_EQ(settings.input_speed, settings.output_speed);
-  return settings.output_speed;
-}
-
 LineSettings line(int baud = 115200, Parity parity = Parity::none, int stop_bits = 1) {
   return {.name = "line-a", .port = "", .baud = baud, .format = {.parity = parity, .stop_bits = stop_bits}};
 }
@@ -78,8 +67,24 @@ TEST(SerialPort, OpensEverySpeedAndFormat) {
         const Pty pty;
         const auto port = SerialPort::open(line(baud, parity, stop_bits), pty.path);
         ASSERT_TRUE(port) << to_string(port.error());
-        EXPECT_EQ(speed_of(port->descriptor()), static_cast<std::uint32_t>(baud));
+        EXPECT_EQ(speed_of(port->descriptor()), baud);
       }
+    }
+  }
+}
+
+TEST(SerialPort, AnOpenPortCanBeChangedAndBack) {
+  const Pty pty;
+  auto port = SerialPort::open(line(), pty.path);
+  ASSERT_TRUE(port);
+  for (const int baud : {9600, 128000, 1200, 115200}) {
+    for (const int stop_bits : {1, 2}) {
+      const Format format{.parity = Parity::even, .stop_bits = stop_bits};
+      EXPECT_EQ(port->set_serial({.baud = baud, .format = format}), 0);
+      EXPECT_EQ(speed_of(port->descriptor()), baud);
+      termios settings{};
+      ASSERT_EQ(tcgetattr(port->descriptor(), &settings), 0);
+      EXPECT_EQ((settings.c_cflag & CSTOPB) != 0, stop_bits == 2);
     }
   }
 }

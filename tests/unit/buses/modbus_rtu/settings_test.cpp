@@ -21,6 +21,12 @@ TEST(WireTime, CountsStartDataParityAndStopBits) {
   EXPECT_EQ(wire_time(line(10000, Parity::odd, 2), 2), microseconds(2400));
 }
 
+TEST(SerialSettings, AsText) {
+  EXPECT_EQ(to_string(Format{}), "8N1");
+  EXPECT_EQ(to_string(Format{.parity = Parity::odd, .stop_bits = 2}), "8O2");
+  EXPECT_EQ(to_string(line(9600, Parity::even).serial()), "9600 baud 8E1");
+}
+
 TEST(WireTime, IsNeverRoundedDown) {
   EXPECT_EQ(wire_time(line(115200), 1), nanoseconds(86806));  // 86805.55..
   EXPECT_EQ(wire_time(line(115200), 256), nanoseconds(22'222'223));

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "buses/modbus_rtu/rtu_worker.hpp"
+#include "terminal.hpp"
 
 namespace axisd::modbus_rtu::test {
 
@@ -86,6 +87,13 @@ class ScriptedNode {
     const std::scoped_lock lock(mutex_);
     return seen_;
   }
+  /// Thread: any. How the terminal is set now: a pty keeps speed and stop bits.
+  [[nodiscard]] termios terminal() const {
+    termios settings{};
+    if (tcgetattr(slave_, &settings) != 0) throw std::runtime_error("tcgetattr");
+    return settings;
+  }
+  [[nodiscard]] int terminal_speed() const { return speed_of(slave_); }
   /// Thread: any. How many echo probes came.
   [[nodiscard]] int probes() const { return probes_; }
 
