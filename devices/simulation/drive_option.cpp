@@ -78,7 +78,7 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
   }
   if (key == "dip") {
     const auto dip = parse_number<std::uint8_t>(value);
-    if (dip) settings.dip_address = *dip;
+    settings.dip_address = dip;
     return dip.has_value();
   }
   if (key == "dip_baud") {

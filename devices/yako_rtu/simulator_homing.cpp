@@ -67,10 +67,8 @@ void SimulatedDrive::homing_limits() {
   const int direction = motor_.direction();
   const auto ahead = direction > 0 ? Input::positive_limit : Input::negative_limit;
   if (!terminals_.active(ahead) || ahead == homing_reference()) return;
-  if (phase_ == Phase::search) {
-    phase_ = Phase::turn;
-    motor_.brake();
-  } else if (phase_ == Phase::back_off && homing_turns_ > 0 && behaviour_.homing_never_gives_up) {
+  const bool goes_on = phase_ == Phase::back_off && homing_turns_ > 0 && behaviour_.homing_never_gives_up;
+  if (phase_ == Phase::search || goes_on) {
     phase_ = Phase::turn;
     motor_.brake();
   } else if (phase_ == Phase::back_off || phase_ == Phase::approach) {
