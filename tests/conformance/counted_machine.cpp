@@ -1,0 +1,170 @@
+#include "tests/conformance/counted_machine.hpp"
+
+#include <string>
+#include <string_view>
+
+namespace axisd::conformance {
+
+namespace {
+
+using Token = std::shared_ptr<void>;
+
+/// Starts something whose token the caller wants at once, although it begins on the core thread.
+template <class Start>
+Token deferred(CallLedger& ledger, Start start) {
+  auto token = std::make_shared<Token>();
+  ledger.enter([start = std::move(start), weak = std::weak_ptr(token)](CallLedger::TicketPtr ticket) {
+    if (const auto held = weak.lock()) *held = start(std::move(ticket));
+  });
+  return token;
+}
+
+class CountedDrives final : public DriveAccess {
+ public:
+  CountedDrives(DriveAccess& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
+
+  void drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->drive_info(axis, ledger_->answer(ticket, callback)); });
+  }
+  void read_parameters(std::string axis, std::vector<std::uint32_t> addresses,
+                       ValuesCallback callback) override {
+    ledger_->enter([=, this](auto ticket) {
+      inner_->read_parameters(axis, addresses, ledger_->answer(ticket, callback));
+    });
+  }
+  void write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+                        ValuesCallback callback) override {
+    ledger_->enter([=, this](auto ticket) {
+      inner_->write_parameters(axis, values, client, ledger_->answer(ticket, callback));
+    });
+  }
+  void save_parameters(std::string axis, std::string client,
+                       std::function<void(Result<void>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->save_parameters(axis, client, ledger_->answer(ticket, callback)); });
+  }
+  void restore_factory(std::string axis, std::string client,
+                       std::function<void(Result<std::string>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->restore_factory(axis, client, ledger_->answer(ticket, callback)); });
+  }
+  void read_segments(std::string axis, SegmentsCallback callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->read_segments(axis, ledger_->answer(ticket, callback)); });
+  }
+  void write_segments(std::string axis, SegmentSettings segments, std::string client,
+                      SegmentsCallback callback) override {
+    ledger_->enter([=, this](auto ticket) {
+      inner_->write_segments(axis, segments, client, ledger_->answer(ticket, callback));
+    });
+  }
+  /// Counts until the first phase is reported: what follows waits for somebody to switch the drive off and
+  /// on.
+  Token change_serial(std::string axis, SerialChange change, std::string client,
+                      std::function<void(Result<SerialProgress>)> callback) override {
+    return deferred(*ledger_, [=, this](auto ticket) {
+      return inner_->change_serial(axis, change, client, ledger_->answer(ticket, callback));
+    });
+  }
+
+ private:
+  DriveAccess* inner_;
+  CallLedger* ledger_;
+};
+
+class CountedBuses final : public BusAccess {
+ public:
+  CountedBuses(BusAccess& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
+
+  void transact(TransactRequest request,
+                std::function<void(Result<std::vector<std::uint16_t>>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->transact(request, ledger_->answer(ticket, callback)); });
+  }
+  /// Counts until it is finished, or nobody listens any more.
+  Token scan(ScanRequest request, std::function<void(Result<ScanProgress>)> callback) override {
+    return deferred(*ledger_, [=, this](CallLedger::TicketPtr ticket) {
+      return inner_->scan(request, [=](const Result<ScanProgress>& progress) {
+        callback(progress);
+        if (!progress || progress->finished) ticket->release();
+      });
+    });
+  }
+  [[nodiscard]] std::vector<DeviceSnapshotPtr> devices() const override { return inner_->devices(); }
+  void write_device(std::string device, std::string name, double value,
+                    std::function<void(Result<double>)> callback) override {
+    ledger_->enter([=, this](auto ticket) {
+      inner_->write_device(device, name, value, ledger_->answer(ticket, callback));
+    });
+  }
+
+ private:
+  BusAccess* inner_;
+  CallLedger* ledger_;
+};
+
+class CountedMachine final : public Machine {
+ public:
+  CountedMachine(Machine& inner, CallLedger& ledger)
+      : inner_(&inner),
+        ledger_(&ledger),
+        drives_(inner.drive_access(), ledger),
+        buses_(inner.bus_access(), ledger) {}
+
+  [[nodiscard]] std::vector<std::string> axis_names() const override { return inner_->axis_names(); }
+  [[nodiscard]] AxisSnapshotPtr snapshot(std::string_view axis) const override {
+    return inner_->snapshot(axis);
+  }
+  [[nodiscard]] MachineInfo info() const override { return inner_->info(); }
+
+  void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
+              CommandCallback callback) override {
+    ledger_->enter([=, this](auto ticket) {
+      inner_->submit(axis, action, options, until, ledger_->answer(ticket, callback));
+    });
+  }
+  void release_stop(std::string axis, CommandCallback callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->release_stop(axis, ledger_->answer(ticket, callback)); });
+  }
+  void stop_all(std::string client, WaitUntil until,
+                std::function<void(std::vector<Result<Command>>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->stop_all(client, until, ledger_->answer(ticket, callback)); });
+  }
+  void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->release_inhibit(client, ledger_->answer(ticket, callback)); });
+  }
+  void get_command(std::string id, CommandCallback callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->get_command(id, ledger_->answer(ticket, callback)); });
+  }
+  Token watch_command(std::string id, CommandCallback callback) override {
+    return inner_->watch_command(std::move(id), std::move(callback));
+  }
+  void cancel_command(std::string id, CommandCallback callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->cancel_command(id, ledger_->answer(ticket, callback)); });
+  }
+  void buses(std::function<void(std::vector<BusStatus>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->buses(ledger_->answer(ticket, callback)); });
+  }
+
+  [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
+  [[nodiscard]] BusAccess& bus_access() override { return buses_; }
+  [[nodiscard]] EventSource& events() override { return inner_->events(); }
+  void on_published(std::function<void()> notify) override { inner_->on_published(std::move(notify)); }
+  [[nodiscard]] WallTime wall(TimePoint t) const override { return inner_->wall(t); }
+  [[nodiscard]] TimePoint now() const override { return inner_->now(); }
+
+ private:
+  Machine* inner_;
+  CallLedger* ledger_;
+  CountedDrives drives_;
+  CountedBuses buses_;
+};
+
+}  // namespace
+
+std::unique_ptr<Machine> count_calls(Machine& inner, CallLedger& ledger) {
+  return std::make_unique<CountedMachine>(inner, ledger);
+}
+
+}  // namespace axisd::conformance

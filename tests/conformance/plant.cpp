@@ -1,0 +1,87 @@
+#include "tests/conformance/plant.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace axisd::conformance {
+
+namespace {
+
+std::vector<Wanted> inputs_of(const Recipe& recipe) {
+  std::vector<Wanted> inputs;
+  if (recipe.home_switch) inputs.push_back({"home"});
+  if (recipe.limit_switches) {
+    inputs.push_back({"positive_limit"});
+    inputs.push_back({"negative_limit"});
+  }
+  inputs.insert(inputs.end(), recipe.inputs.begin(), recipe.inputs.end());
+  return inputs;
+}
+
+std::string terminal_lines(const std::vector<std::string>& names, const std::vector<Wanted>& wanted) {
+  if (wanted.size() > names.size())
+    throw std::invalid_argument("the model has too few terminals for this recipe");
+  std::string text;
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    text += fmt::format("      {}: {{ function: {}, active: {} }}\n", names[i], wanted[i].function,
+                        wanted[i].active_low ? "low" : "high");
+  return text;
+}
+
+std::string mechanics_of(const Variant& variant, const Recipe& recipe) {
+  if (!recipe.mechanics) return {};
+  const auto pulses = [&](double mm) { return std::lround(mm * pulses_per_mm) * (variant.invert ? -1 : 1); };
+  std::string text;
+  if (recipe.home_switch)
+    text += fmt::format(",home={}:{}", pulses(variant.invert ? recipe.home_at.second : recipe.home_at.first),
+                        pulses(variant.invert ? recipe.home_at.first : recipe.home_at.second));
+  if (recipe.limit_switches)
+    text += fmt::format(",positive_limit={},negative_limit={}",
+                        pulses(variant.invert ? negative_limit_at : positive_limit_at),
+                        pulses(variant.invert ? positive_limit_at : negative_limit_at));
+  return text;
+}
+
+}  // namespace
+
+std::string Variant::name() const {
+  std::string text = invert ? "inverted" : "plain";
+  for (const auto& [name, on] : switches) text += fmt::format(" {}={}", name, on ? "on" : "off");
+  return text;
+}
+
+std::map<std::string, std::string> terminals_of(const Manual& manual, const Recipe& recipe) {
+  std::map<std::string, std::string> terminals;
+  const auto names = manual.list("inputs");
+  const auto inputs = inputs_of(recipe);
+  for (std::size_t i = 0; i < inputs.size(); ++i) terminals[inputs[i].function] = names.at(i);
+  return terminals;
+}
+
+Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& recipe) {
+  std::string yaml = fmt::format(
+      "machine: conformance\n"
+      "buses:\n  line: {{ modbus_rtu: {{ port: sim, baud: 115200 }} }}\n"
+      "axes:\n  axis:\n    bus: line\n    node: 1\n    model: {}\n    unit: mm\n"
+      "    scale: {{ microstep: 1000 pulses/rev, travel: 10 mm/rev, invert: {} }}\n"
+      "    limits: {{ {}velocity: 100 mm/s }}\n",
+      manual.model(), variant.invert, recipe.limits ? "position: [0, 400], " : "");
+  if (recipe.limits) yaml += "    jog_travel: 10 mm\n";
+  if (!recipe.homing.empty())
+    yaml += fmt::format("    homing: {{ method: {}, {} }}\n", recipe.homing, recipe.homing_keys);
+  if (const auto lines = terminal_lines(manual.list("inputs"), inputs_of(recipe)); !lines.empty())
+    yaml += "    inputs:\n" + lines;
+  if (!recipe.outputs.empty())
+    yaml += "    outputs:\n" + terminal_lines(manual.list("outputs"), recipe.outputs);
+  yaml += recipe.keys;
+
+  auto drive = fmt::format("node=1,model={}{}", manual.model(), mechanics_of(variant, recipe));
+  for (const auto& [name, on] : variant.switches)
+    drive += fmt::format(",switch.{}={}", name, on ? "on" : "off");
+  if (!recipe.drive.empty()) drive += "," + recipe.drive;
+  return {.yaml = std::move(yaml), .drives = {std::move(drive)}};
+}
+
+}  // namespace axisd::conformance

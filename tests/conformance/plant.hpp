@@ -1,0 +1,55 @@
+// Plants made from what a model is: never written out by hand.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tests/conformance/manual.hpp"
+#include "tests/conformance/target.hpp"
+
+namespace axisd::conformance {
+
+/// How the simulated drive and the axis are turned: each scenario has to pass in each of them.
+struct Variant {
+  bool invert = false;
+  std::map<std::string, bool> switches{};
+  [[nodiscard]] std::string name() const;
+};
+
+/// A terminal with a function; the terminal itself is chosen by the recipe.
+struct Wanted {
+  std::string function;
+  bool active_low = false;
+};
+
+/// One axis of a model, as a scenario wants it. The axis is "axis", its drive node 1.
+///
+/// 1000 pulses/rev and 10 mm/rev: 100 pulses per mm; 0..400 mm, 100 mm/s. Relative to where the load stands
+/// at power-up, in axis direction: home switch from -52 to -50 mm, limit switches at -60 and 460 mm.
+inline constexpr double pulses_per_mm = 100, home_from = -52, home_to = -50, positive_limit_at = 460,
+                        negative_limit_at = -60;
+
+struct Recipe {
+  bool limits = true;            ///< software limits
+  bool home_switch = true;       ///< an input for it, and the switch
+  bool limit_switches = true;    ///< likewise
+  bool mechanics = true;         ///< false: the switches are never reached
+  std::vector<Wanted> inputs{};  ///< beside the switches
+  std::vector<Wanted> outputs{};
+  std::string homing = "home_negative";  ///< method; empty: none
+  std::string homing_keys =
+      "velocity: 50 mm/s, search_velocity: 5 mm/s, position: 3, backoff: 5 mm, timeout: 40 s";
+  std::pair<double, double> home_at{home_from, home_to};
+  std::string keys{};   ///< further lines of the axis, "load: vertical\n..."
+  std::string drive{};  ///< further parts of --drive
+};
+
+/// Terminals of a recipe: function -> terminal, in the order in which they are given away.
+std::map<std::string, std::string> terminals_of(const Manual& manual, const Recipe& recipe);
+
+Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& recipe);
+
+}  // namespace axisd::conformance

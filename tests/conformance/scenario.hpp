@@ -1,0 +1,55 @@
+// The scenarios, and the variants that they are run in.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/conformance/bench.hpp"
+
+namespace axisd::conformance {
+
+struct Scenario {
+  std::string_view name;
+  std::string_view ability;  ///< row of the capability matrix
+  /// Says what the model showed ("yes", "7", "1 2 3 5"); expectations fail as in any test. May throw Broken.
+  std::string (*run)(const Setup& setup);
+};
+
+/// Scenarios of one subject. `varied`: every one in every variant, else with the simulator's defaults, plain
+/// and inverted.
+struct Subject {
+  std::string_view name;
+  bool varied = false;
+  std::span<const Scenario> scenarios;
+};
+
+std::span<const Scenario> power_scenarios();
+std::span<const Scenario> motion_scenarios();
+std::span<const Scenario> stop_scenarios();
+std::span<const Scenario> homing_scenarios();
+std::span<const Scenario> limit_scenarios();
+std::span<const Scenario> alarm_scenarios();
+std::span<const Scenario> reboot_scenarios();
+std::span<const Scenario> terminal_scenarios();
+std::span<const Scenario> segment_scenarios();
+std::span<const Scenario> parameter_scenarios();
+std::span<const Scenario> serial_scenarios();
+std::span<const Scenario> eeprom_scenarios();
+std::span<const Scenario> bus_scenarios();
+
+std::span<const Subject> subjects();
+
+/// Plain and inverted; each switch of the model's simulator flipped; seeded random pairs of them. `sampled`:
+/// a few of these only, for builds in which everything takes long.
+std::vector<Variant> variants_of(const std::string& model, bool varied, bool sampled);
+
+/// What a scenario came to.
+struct Finding {
+  std::string shown;                  ///< by the scenario; empty if it failed
+  std::vector<std::string> failures;  ///< with the variant
+};
+Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant);
+
+}  // namespace axisd::conformance

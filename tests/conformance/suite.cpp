@@ -1,0 +1,89 @@
+// The suite: every model of drive_models(), every subject, in parts that ctest runs side by side.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+
+#include "devices/descriptor.hpp"
+#include "tests/conformance/scenario.hpp"
+
+namespace axisd::conformance {
+
+namespace {
+
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+constexpr bool sampled = true;
+#else
+constexpr bool sampled = false;
+#endif
+#else
+constexpr bool sampled = false;
+#endif
+
+/// Parts that the variants of a varied subject are dealt to.
+constexpr int shards = sampled ? 2 : 4;
+
+struct Case {
+  std::string model;
+  const Subject* subject;
+  int shard, of;
+};
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const auto* model : drive_models())
+    for (const auto& subject : subjects()) {
+      const int of = subject.varied ? shards : 1;
+      for (int shard = 0; shard < of; ++shard)
+        all.push_back({std::string(model->model), &subject, shard, of});
+    }
+  return all;
+}
+
+std::string name_of(const ::testing::TestParamInfo<Case>& info) {
+  auto name = fmt::format("{}_{}", info.param.model, info.param.subject->name);
+  if (info.param.of > 1) name += fmt::format("_{}", info.param.shard + 1);
+  std::ranges::replace_if(name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+  return name;
+}
+
+/// One line per failure, the same one in many variants once.
+void report(const Finding& finding) {
+  for (const auto& failure : finding.failures) ADD_FAILURE() << failure;
+}
+
+class Suite : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Suite, Behaves) {
+  spdlog::set_level(spdlog::level::off);
+  const auto& [model, subject, shard, of] = GetParam();
+  const Manual manual(model);
+  const auto variants = variants_of(model, subject->varied, sampled);
+  int failed = 0;
+  for (std::size_t i = static_cast<std::size_t>(shard); i < variants.size();
+       i += static_cast<std::size_t>(of))
+    for (const auto& scenario : subject->scenarios) {
+      const auto finding = run_scenario(scenario, manual, variants[i]);
+      report(finding);
+      // A mistake mostly shows in every variant: the first ones tell enough.
+      if (!finding.failures.empty() && ++failed >= 8) FAIL() << "further variants are left out";
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Conformance, Suite, ::testing::ValuesIn(cases()), name_of);
+
+TEST(Conformance, EveryModelHasASimulatorAndItsManual) {
+  ASSERT_FALSE(drive_models().empty());
+  for (const auto* model : drive_models()) {
+    EXPECT_NO_THROW(Manual(std::string(model->model)));
+    EXPECT_GE(variants_of(std::string(model->model), true, false).size(), 2U);
+  }
+}
+
+}  // namespace
+
+}  // namespace axisd::conformance
