@@ -67,6 +67,17 @@ struct SettingSpec {
   std::int64_t minimum = 0, maximum = 0;
   std::string_view default_value;  ///< empty: the drive's value is left alone
   std::string_view description;
+  /// Register that holds it: the index of a choice, the integer, or 0/1. Nothing: the driver knows.
+  std::optional<std::uint32_t> object = std::nullopt;
+};
+
+/// How a Modbus RTU model is told from others, and how it is set (for identification and the bus scan).
+struct RtuIdentification {
+  std::span<const std::uint16_t> model_codes;   ///< of register 0x0000
+  std::optional<std::uint16_t> has_register{};  ///< read to tell models with the same code apart
+  std::optional<std::uint16_t> lacks_register{};
+  std::uint16_t microstep_register = 0x0011;
+  std::span<const std::int32_t> microstep_codes;  ///< pulses per revolution in the order of the codes
 };
 
 /// Ranges that hold for every command of this model.
@@ -79,6 +90,11 @@ struct Capabilities {
   int minimum_homing_rpm = 5, maximum_homing_rpm = 3000, minimum_search_rpm = 5, maximum_search_rpm = 300;
   int minimum_homing_time_ms = 30;
   std::int32_t maximum_homing_offset_pulses = 65535;
+  int maximum_segments = 16;  ///< of positions and velocities that the inputs can select
+  int minimum_segment_time_ms = 30;
+  /// The last approach to a home switch follows the search; else an inverted axis cannot use these methods
+  /// (M18), unless the model's setting `home_approach` says otherwise.
+  bool home_approach_mirrors = true;
   PositionSource position_source = PositionSource::unspecified;
   bool closed_loop = false;
   bool communication_watchdog = false;
@@ -105,6 +121,7 @@ struct DriveDescriptor {
   std::span<const AlarmSpec> alarms;
   std::span<const SettingSpec> settings;
   Capabilities capabilities;
+  RtuIdentification identification{};
   std::unique_ptr<Drive> (*make)(DriveContext context) = nullptr;
 };
 

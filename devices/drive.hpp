@@ -17,6 +17,7 @@
 namespace axisd {
 
 struct DriveDescriptor;
+struct SerialChange;
 
 /// What the drive itself says it is doing.
 enum class DriveMode : std::uint8_t { positioning, homing, multi_position, multi_velocity };
@@ -66,14 +67,42 @@ struct HomingProfile {
   std::int32_t offset_pulses = 0;
 };
 
+/// The drive's segment table in drive units and direction; index 0 is segment 1, unset ones are 0.
+struct DriveSegments {
+  struct Row {
+    std::int32_t pulses = 0;
+    int velocity_rpm = 0;  ///< of the position segment
+    Duration acceleration_time{};
+    int pv_velocity_rpm = 0;
+    bool operator==(const Row&) const = default;
+  };
+  bool absolute = false;
+  std::array<Row, 16> rows{};
+  bool operator==(const DriveSegments&) const = default;
+};
+
 /// What the axis wants the drive to be, in drive direction (already mirrored for inverted axes, M18).
 struct DriveSetup {
   std::int64_t pulses_per_revolution = 0;
   std::vector<TerminalSettings> inputs, outputs;
   std::optional<HomingProfile> homing;
-  bool persist = false;
+  PersistSettings persist{};
   Duration reboot_guard{};
   std::map<std::string, SettingValue> model_settings;
+  std::optional<DriveSegments> segments{};
+};
+
+/// A parameter by its address: Modbus register, or CANopen index << 8 | sub-index.
+struct ParameterValue {
+  std::uint32_t address = 0;
+  std::int64_t value = 0;
+  bool operator==(const ParameterValue&) const = default;
+};
+
+/// What the drive no longer holds as it was configured.
+struct Drift {
+  std::string text;            ///< names what differs; empty: nothing
+  bool scale_changed = false;  ///< positions mean something else now
 };
 
 /// Contents of drive memory that no power-up leaves behind: finding them proves that the drive kept its
@@ -101,6 +130,9 @@ class Drive {
   /// Reads the canary (M7). Error `rebooted` if the drive lost its memory since configure().
   virtual Task<Result<void>> check_continuity(TransactionClass transaction_class) = 0;
 
+  /// The drive follows its position by an encoder, as it is configured.
+  [[nodiscard]] virtual bool closed_loop() const = 0;
+
   /// What the drive's memory holds now, if that is known; and, after a restart of the daemon, what it should
   /// hold.
   [[nodiscard]] virtual std::optional<ContinuityMark> continuity_mark() const = 0;
@@ -120,6 +152,30 @@ class Drive {
 
   /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop does not) in class `stop`.
   virtual Task<Result<void>> stop(StopKind kind) = 0;
+
+  /// Reads back what the configuration owns among terminals and scale.
+  virtual Task<Result<Drift>> check_drift() = 0;
+  /// Registers that configure() and others saved to EEPROM since the last call.
+  virtual std::uint64_t take_eeprom_writes() = 0;
+  /// The key of the configuration that decides this parameter ("inputs.X0", "drive.current"), or empty.
+  [[nodiscard]] virtual std::string configured_by(std::uint32_t address) const = 0;
+
+  /// Reads parameters in as few block reads as the model permits, never across a hole. Results in the order
+  /// asked. Precondition: all are readable.
+  virtual Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t> addresses) = 0;
+  /// Writes in the order given, then reads all back. Errors: misconfigured (differs), refused, no_reply.
+  virtual Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values) = 0;
+  virtual Task<Result<DriveSegments>> read_segments() = 0;
+  /// Writes what differs and verifies. Only while released with their inputs inactive (M3).
+  virtual Task<Result<void>> write_segments(DriveSegments segments) = 0;
+  /// Neutral motion parameters first, then saves all RW registers, then another canary (M7, M27).
+  virtual Task<Result<void>> save_parameters() = 0;
+  /// Restores the factory settings; afterwards configure() is needed. The text says which address and serial
+  /// settings apply after the next power-up; refused (misconfigured) if that address is one of `taken`.
+  virtual Task<Result<std::string>> restore_factory(std::vector<std::uint8_t> taken) = 0;
+  /// Saves another address or other serial settings in the EEPROM and reads them back; the text says what has
+  /// to be done for them to count. Errors: out_of_range, not_supported.
+  virtual Task<Result<std::string>> change_serial(SerialChange change) = 0;
 
   virtual Task<Result<void>> clear_alarm() = 0;
   /// Sets the drive's position counter to zero; only at standstill. Verified by the caller's next sample.

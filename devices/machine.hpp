@@ -12,6 +12,9 @@
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "devices/axis/command.hpp"
 #include "devices/axis/snapshot.hpp"
+#include "devices/bus_access.hpp"
+#include "devices/drive_access.hpp"
+#include "devices/event.hpp"
 
 namespace axisd {
 
@@ -68,6 +71,10 @@ class Machine {
   virtual void cancel_command(std::string id, CommandCallback callback) = 0;
 
   virtual void buses(std::function<void(std::vector<BusStatus>)> callback) = 0;
+
+  [[nodiscard]] virtual DriveAccess& drive_access() = 0;
+  [[nodiscard]] virtual BusAccess& bus_access() = 0;
+  [[nodiscard]] virtual EventSource& events() = 0;
 
   /// Called on the core thread whenever any snapshot was published; set once before serving.
   virtual void on_published(std::function<void()> notify) = 0;

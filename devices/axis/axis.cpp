@@ -4,8 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/smart_ptr/make_shared.hpp>
-#include <cmath>
 
 namespace axisd {
 
@@ -23,6 +21,11 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
       stopped_(env_.executor, *env_.clock) {
+  if (env_.persistence != nullptr) {
+    const auto& axes = env_.persistence->loaded().axes;
+    if (const auto found = axes.find(settings_.name); found != axes.end())
+      eeprom_writes_ = found->second.eeprom_writes;
+  }
   publish();
 }
 
@@ -81,12 +84,12 @@ bool Axis::limit_active(bool positive) const {
 void Axis::on_sample(const DriveSample& sample) {
   const auto before = sample_;
   sample_ = sample;
+  if (before) tell_edges(*before, sample);
   if (!rezeroing_) tracker_.update(sample.position_pulses);
   if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
   // Open loop: the overtravel stop at a limit has no ramp (M20). Homing runs onto limits by design.
   const bool homing = activity_ && activity_->state == AxisState::homing;
-  if (sample.moving && !homing && !descriptor_->capabilities.closed_loop && limit_active(last_positive_))
-    lose_trust();
+  if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && before->moving && !sample.moving && before->mode != DriveMode::homing &&
       sample.mode != DriveMode::homing && limit_active(last_positive_))
@@ -119,8 +122,7 @@ void Axis::on_alarm(const DriveSample& sample) {
 }
 
 void Axis::on_released(const DriveSample& sample, bool enabled_before) {
-  if (!descriptor_->capabilities.closed_loop && sample.alarm_code == 0 &&
-      tracker_.trust() != PositionTrust::unknown)
+  if (!drive_->closed_loop() && sample.alarm_code == 0 && tracker_.trust() != PositionTrust::unknown)
     lose_trust();  // an open-loop motor without current can be turned by hand
   if (!enabled_by_us_ && !enabled_before) return;
   const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
@@ -145,6 +147,7 @@ void Axis::on_unexplained_motion(const DriveSample& sample) {
   // A motor that was told to stop, and has not confirmed it, is never a terminal's.
   if (!stop_owed_ && !fault_ && (segments || possible)) {
     terminal_motion_ = true;
+    if (sample.mode == DriveMode::homing) lose_trust();  // the drive's counter will begin anew
     return;
   }
   spdlog::warn("{}: moving without a command; stopping it", settings_.name);
@@ -180,80 +183,12 @@ AxisState Axis::state() const {
   if (stopping_.hold || (stopping_.running && stopping_.kind > StopKind::halt)) return AxisState::stopping;
   if (activity_ && activity_->state != AxisState::standstill) return activity_->state;
   if (stopping_.running && stopping_.shown != AxisState::standstill) return stopping_.shown;
-  if (terminal_motion_ && sample_)
+  if (terminal_motion_ && sample_) {
+    if (sample_->mode == DriveMode::homing) return AxisState::homing;
     return sample_->mode == DriveMode::multi_velocity ? AxisState::continuous_motion
                                                       : AxisState::discrete_motion;
+  }
   return sample_ && sample_->enabled ? AxisState::standstill : AxisState::disabled;
-}
-
-namespace {
-
-std::vector<TerminalState> terminal_states(std::span<const TerminalSpec> terminals,
-                                           const std::vector<TerminalSettings>& settings,
-                                           std::uint32_t bits) {
-  std::vector<TerminalState> states;
-  states.reserve(terminals.size());
-  for (std::size_t i = 0; i < terminals.size(); ++i) {
-    const auto configured = std::ranges::find(settings, terminals[i].name, &TerminalSettings::terminal);
-    states.push_back({.name = std::string(terminals[i].name),
-                      .function = configured == settings.end() ? std::string() : configured->function,
-                      .active = ((bits >> i) & 1U) != 0});
-  }
-  return states;
-}
-
-}  // namespace
-
-void Axis::publish() {
-  auto next = boost::make_shared<AxisSnapshot>();
-  next->name = settings_.name;
-  next->bus = settings_.bus;
-  next->node = settings_.node;
-  next->model = settings_.model;
-  next->unit = settings_.scale.unit;
-  next->simulated = simulated_;
-  next->state = state();
-  next->link = link_;
-  next->link_error = link_error_;
-  next->fault = fault_;
-  next->stop_held = stopping_.hold;
-  next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
-  next->enabled_by_us = enabled_by_us_;
-  next->trust = tracker_.trust();
-  next->position_source = descriptor_->capabilities.position_source;
-  next->position = tracker_.position();
-  if (settings_.scale.modulo) {
-    const auto turn = *settings_.scale.modulo;
-    next->position -= std::floor(next->position / turn) * turn;
-  }
-  next->identity = identity_;
-  next->reboots = reboots_;
-  next->revision = ++revision_;
-  next->positive_direction = last_positive_;
-  if (activity_) {
-    next->command_id = activity_->command->value().id;
-    if (activity_->plan.granted.position) next->target = activity_->plan.target;
-  }
-  const auto bits = sample_.value_or(DriveSample{});
-  next->inputs = terminal_states(descriptor_->inputs, settings_.inputs, bits.inputs);
-  next->outputs = terminal_states(descriptor_->outputs, settings_.outputs, bits.outputs);
-  if (sample_) {
-    next->enabled = bits.enabled;
-    // The sign of the speed register is not said; the direction register's is.
-    const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
-    next->velocity = last_positive_ || speed == 0 ? speed : -speed;
-    next->moving = bits.moving;
-    next->in_position = bits.in_position;
-    next->homed = bits.homed;
-    next->alarm_code = bits.alarm_code;
-    const auto alarm = std::ranges::find(descriptor_->alarms, bits.alarm_code, &AlarmSpec::code);
-    if (alarm != descriptor_->alarms.end()) next->alarm_name = alarm->name;
-    next->sampled_after = bits.asked_at;
-    next->sampled_before = bits.measured_at;
-    next->measured_at = env_.clock->wall(bits.measured_at);
-  }
-  snapshot_.store(next);
-  if (env_.published) env_.published();
 }
 
 }  // namespace axisd

@@ -37,6 +37,7 @@
 #include "devices/axis/snapshot.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
+#include "devices/event.hpp"
 #include "devices/persistence.hpp"
 
 namespace axisd {
@@ -50,6 +51,7 @@ struct AxisEnvironment {
   Persistence* persistence = nullptr;
   const bool* inhibited = nullptr;  ///< StopAll is latched
   std::function<void()> published;  ///< after each new snapshot
+  std::function<void(const std::string& axis, EventContent)> event{};
 };
 
 /// Thread: core, except gate() and snapshot().
@@ -75,6 +77,20 @@ class Axis {
   /// A flag outside changed (inhibit): publish again.
   void refresh() { publish(); }
 
+  // For work on the drive beside motion: parameters, segments, memory (drive_operations.hpp).
+  [[nodiscard]] Drive& drive() { return *drive_; }
+  [[nodiscard]] const DriveDescriptor& descriptor() const { return *descriptor_; }
+  [[nodiscard]] const Scale& scale() const { return scale_; }
+  [[nodiscard]] const std::optional<DriveIdentity>& identity() const { return identity_; }
+  [[nodiscard]] std::uint64_t eeprom_writes() const { return eeprom_writes_; }
+  /// Errors: offline, configuring.
+  [[nodiscard]] Result<void> check_online() const;
+  /// Keeps commands other than stops away from the drive while it lives. Errors: moving, fault (the power
+  /// stage is on), busy, and those of check_online().
+  Result<std::shared_ptr<void>> begin_maintenance();
+  /// The drive's memory is no longer what configure() made it: applied again. `position_lost`: the counter or
+  /// its meaning, too.
+  void reconfigure(const std::string& why, bool position_lost);
   [[nodiscard]] const AxisSettings& settings() const { return settings_; }
   /// Nothing moves, as far as is known, and no stop is under way.
   [[nodiscard]] bool at_rest() const;
@@ -133,6 +149,8 @@ class Axis {
   Task<Result<void>> prove_or_configure();
   Task<> poll();
   Task<bool> poll_once(int& failures);
+  Task<> look_for_drift();
+  void set_drift(const std::string& text);
   Task<> wait_for_port();
   void go_offline(const Error& cause);
   void on_reboot(const Error& cause);
@@ -143,7 +161,12 @@ class Axis {
   void on_released(const DriveSample& sample, bool enabled_before);
   void on_unexplained_motion(const DriveSample& sample);
   void publish();
+  void tell_edges(const DriveSample& before, const DriveSample& now);
+  void tell_changes(const AxisSnapshot& before, const AxisSnapshot& now);
+  [[nodiscard]] std::vector<TerminalState> inputs(std::uint32_t bits) const;
+  [[nodiscard]] std::vector<TerminalState> outputs(std::uint32_t bits) const;
   [[nodiscard]] AxisState state() const;
+  [[nodiscard]] MotionCause motion_cause() const;
   [[nodiscard]] bool busy() const;
   [[nodiscard]] bool input_active(std::string_view function) const;
   [[nodiscard]] bool limit_active(bool positive) const;
@@ -153,7 +176,6 @@ class Axis {
   // axis_requests.cpp: acceptance
   void renew_hold(const CommandPtr& command);
   [[nodiscard]] Result<void> check_common(const CommandOptions& options) const;
-  [[nodiscard]] Result<void> check_online() const;
   /// Holds for everything but stops; StopAll does not forbid what moves nothing.
   [[nodiscard]] Result<void> check_ready(const CommandOptions& options) const;
   [[nodiscard]] Result<void> check_motion(const CommandOptions& options) const;
@@ -232,7 +254,10 @@ class Axis {
   bool configured_ = false;  ///< in this power cycle of the drive
   bool restore_tried_ = false;
   int reboots_ = 0;
-  TimePoint continuity_checked_{};
+  TimePoint continuity_checked_{}, drift_checked_{};
+  std::string drift_;                ///< what the drive no longer holds as configured
+  std::weak_ptr<void> maintenance_;  ///< of begin_maintenance()
+  std::uint64_t eeprom_writes_ = 0;
 
   std::optional<DriveSample> sample_;
   Signal sampled_;  ///< a new sample, or the link changed

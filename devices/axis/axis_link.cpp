@@ -40,7 +40,8 @@ Task<> Axis::connect() {
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
-      continuity_checked_ = env_.clock->now();
+      continuity_checked_ = drift_checked_ = env_.clock->now();
+      set_drift({});
       spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
                    identity_ ? identity_->version : "");
       break;
@@ -101,7 +102,7 @@ Task<Result<void>> Axis::settle_found_motion() {
     stop_owed_ = true;
     const auto sent = co_await drive_->stop(kind);
     if (!sent) co_return sent;
-    if (kind == StopKind::quick_stop && !descriptor_->capabilities.closed_loop) lose_trust();
+    if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
     co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + found_motion_poll);
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
     if (!sample) co_return fail(sample.error());
@@ -130,7 +131,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     restorable = record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
                  record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
                  record.last_position_pulses == sample_->position_pulses &&
-                 (sample_->enabled || descriptor_->capabilities.closed_loop);
+                 (sample_->enabled || drive_->closed_loop());
     if (restorable) drive_->expect_mark(record.canary);
   }
   const auto void_record = [this] {  // what it says may come true again by chance, but never by right
@@ -174,9 +175,61 @@ Task<> Axis::poll() {
     const auto began = env_.clock->now();
     if (!co_await poll_once(failures)) co_return;
     if (failures > 0) continue;  // the bus's own timeouts pace the repetition
+    co_await look_for_drift();
     co_await wake_.wait_until(std::min(began + (busy() ? settings_.poll_moving : settings_.poll_idle),
                                        continuity_checked_ + continuity_latest));
   }
+}
+
+/// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
+/// once the drive is released, and forbids motion until then.
+Task<> Axis::look_for_drift() {
+  const auto now = env_.clock->now();
+  if (link_ != LinkState::online || busy() || !maintenance_.expired()) co_return;
+  if (now - drift_checked_ >= settings_.drift_check) {
+    drift_checked_ = now;
+    const auto drift = co_await drive_->check_drift();
+    if (!drift || link_ != LinkState::online) co_return;
+    if (drift->scale_changed) lose_trust();
+    set_drift(drift->text);
+  }
+  if (!drift_.empty() && sample_ && !sample_->enabled && !busy()) reconfigure(drift_, false);
+}
+
+void Axis::set_drift(const std::string& text) {
+  if (text == drift_) return;
+  if (!text.empty())
+    spdlog::warn("{}: the drive no longer holds its configuration: {}", settings_.name, text);
+  drift_ = text;
+  publish();
+}
+
+Result<std::shared_ptr<void>> Axis::begin_maintenance() {
+  if (auto online = check_online(); !online) return fail(online.error());
+  if (!maintenance_.expired() || activity_)
+    return fail(error(Reason::busy, "something else is being done to the drive", "wait for it"));
+  if (!at_rest() || terminal_motion_)
+    return fail(error(Reason::moving, "the axis moves", "wait for standstill"));
+  if (!sample_ || sample_->enabled)
+    return fail(error(Reason::moving, "the power stage is on: what is written could move the motor",
+                      "disable the axis first"));
+  auto token = std::make_shared<int>(0);
+  maintenance_ = token;
+  return token;
+}
+
+void Axis::reconfigure(const std::string& why, bool position_lost) {
+  spdlog::info("{}: applying the configuration again: {}", settings_.name, why);
+  configured_ = false;
+  link_ = LinkState::configuring;
+  link_error_ = error(Reason::configuring, "the configuration is applied again: " + why, "wait");
+  if (position_lost) {
+    lose_trust();
+    tracker_.forget_target();
+  }
+  publish();
+  sampled_.notify_all();
+  wake_.notify_all();
 }
 
 /// False: the link is gone.

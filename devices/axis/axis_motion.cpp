@@ -325,7 +325,7 @@ bool Axis::judge_rest(Activity& activity) {
   const bool terminal = input_active("stop") || input_active("quick_stop");
   // Without a ramp an open loop may have lost steps (M20). A short pulse at a terminal, or another master,
   // leaves nothing by which to tell the kind of stop.
-  if (!descriptor_->capabilities.closed_loop && !input_active("stop")) lose_trust();
+  if (!drive_->closed_loop() && !input_active("stop")) lose_trust();
   auto cause =
       terminal
           ? error(Reason::terminal, "a stop terminal of the drive ended the motion", "check the terminals")

@@ -48,6 +48,11 @@ Task<> Axis::run_enable(ActivityPtr activity) {
       co_return;
     }
     if (sample->enabled) {
+      // The drive opens its brake now (M2); until it is open nothing else is accepted.
+      if (settings_.brake.release_time > Duration{}) {
+        co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + settings_.brake.release_time);
+        if (!current(*activity)) co_return;
+      }
       enabled_by_us_ = true;
       finish(*activity, [](CommandRecord& command) { command.done(); });
       co_return;
@@ -76,6 +81,10 @@ Task<> Axis::run_disable(ActivityPtr activity) {
   const auto sample =
       result ? co_await sample_after(env_.clock->now(), sample_patience) : fail(result.error());
   if (!current(*activity)) co_return;
+  if (sample && !sample->enabled && settings_.brake.engage_time > Duration{}) {
+    co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + settings_.brake.engage_time);
+    if (!current(*activity)) co_return;
+  }
   finish(*activity, [&](CommandRecord& command) {
     if (sample && !sample->enabled)
       command.done();

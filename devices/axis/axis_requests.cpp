@@ -74,6 +74,11 @@ Result<void> Axis::check_ready(const CommandOptions& options) const {
     cause.outcome = Outcome::not_sent;
     return fail(std::move(cause));
   }
+  if (!maintenance_.expired())
+    return fail(error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
+  if (!drift_.empty())
+    return fail(error(Reason::misconfigured, "the drive no longer holds its configuration: " + drift_,
+                      "disable the axis: the configuration is then applied again"));
   return check_online();
 }
 
@@ -84,6 +89,8 @@ Result<void> Axis::check_motion(const CommandOptions& options) const {
   if (auto ready = check_ready(options); !ready) return ready;
   if (!sample_ || !sample_->enabled)
     return fail(error(Reason::disabled, "the power stage is off", "enable the axis first"));
+  if (activity_ && activity_->command->value().kind == CommandKind::enable)
+    return fail(error(Reason::disabled, "the axis is being enabled", "wait for the command to end"));
   if (activity_ && activity_->command->value().kind == CommandKind::disable)
     return fail(error(Reason::disabled, "the axis is being disabled", "enable it afterwards"));
   if (terminal_motion_)
@@ -333,7 +340,7 @@ Result<CommandPtr> Axis::accept(const SetPositionRequest& request, const Command
   if (activity_ || stopping_.running || sample_->moving)
     return fail(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
   // A released open-loop motor can be turned by hand: its position would be lost again at once (M20).
-  if (!sample_->enabled && !descriptor_->capabilities.closed_loop)
+  if (!sample_->enabled && !drive_->closed_loop())
     return fail(error(Reason::disabled, "the power stage is off, so the position would not hold",
                       "enable the axis first"));
   if (!scale_.checked_pulses(request.position))

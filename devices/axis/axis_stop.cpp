@@ -65,7 +65,7 @@ Task<> Axis::run_stop() {
   if (confirmed) {
     stop_owed_ = false;
     // Open loop: a stop without a ramp may have lost steps (M12).
-    if (kind == StopKind::quick_stop && !descriptor_->capabilities.closed_loop) lose_trust();
+    if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
     remember_position();
     for (const auto& command : commands) command->done();
   } else {

@@ -37,6 +37,11 @@ std::string_view to_string(PositionTrust trust) {
   return names.at(std::to_underlying(trust));
 }
 
+std::string_view to_string(MotionCause cause) {
+  static constexpr auto names = std::to_array<std::string_view>({"none", "command", "terminal", "unknown"});
+  return names.at(std::to_underlying(cause));
+}
+
 CommandKind kind_of(const Action& action) {
   struct Kind {
     CommandKind operator()(const EnableRequest&) const { return CommandKind::enable; }

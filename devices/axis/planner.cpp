@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "devices/axis/segments.hpp"
+
 namespace axisd {
 
 namespace {
@@ -194,17 +196,50 @@ HomingMethod mirrored(HomingMethod method) {
   return method;
 }
 
+Result<void> check_mirror(const AxisSettings& settings, const DriveDescriptor& descriptor) {
+  if (!settings.scale.invert) return {};
+  const auto has = [&](std::string_view function) {
+    return std::ranges::find(settings.inputs, function, &TerminalSettings::function) != settings.inputs.end();
+  };
+  if (has("pv_enable") && !has("pv_direction"))
+    return fail(Reason::misconfigured,
+                "pv_enable on an inverted axis would run the wrong way: the drive's own direction is fixed",
+                "assign pv_direction, too, or turn the motor's direction instead of scale.invert");
+  const auto approach = settings.model_settings.find("home_approach");
+  const bool mirrors = descriptor.capabilities.home_approach_mirrors ||
+                       (approach != settings.model_settings.end() &&
+                        approach->second == SettingValue(std::string("as_searched")));
+  const bool to_home = settings.homing && (settings.homing->method == HomingMethod::home_positive ||
+                                           settings.homing->method == HomingMethod::home_negative);
+  if (to_home && !mirrors)
+    return fail(
+        Reason::misconfigured,
+        "this model approaches a home switch always in its own forward direction: on an inverted axis "
+        "the other edge of the switch would be home",
+        "home on a limit switch (positive_limit, negative_limit), or turn the motor's direction "
+        "instead of scale.invert");
+  return {};
+}
+
 Result<DriveSetup> drive_setup(const AxisSettings& settings, const DriveDescriptor& descriptor) {
   const Scale scale(settings.scale);
   const auto homing = Planner(settings, descriptor, scale).homing();
   if (!homing) return fail(homing.error());
+  if (const auto mirrored = check_mirror(settings, descriptor); !mirrored) return fail(mirrored.error());
+  std::optional<DriveSegments> segments;
+  if (settings.segments) {
+    auto table = to_drive(*settings.segments, settings, scale, descriptor);
+    if (!table) return fail(table.error());
+    segments = *table;
+  }
   DriveSetup setup{.pulses_per_revolution = settings.scale.pulses_per_revolution,
                    .inputs = settings.inputs,
                    .outputs = settings.outputs,
                    .homing = *homing,
                    .persist = settings.persist,
                    .reboot_guard = settings.reboot_guard,
-                   .model_settings = settings.model_settings};
+                   .model_settings = settings.model_settings,
+                   .segments = segments};
   if (settings.scale.invert) {
     const auto mirror = [](std::vector<TerminalSettings>& terminals,
                            std::span<const TerminalFunctionSpec> functions) {
@@ -212,6 +247,9 @@ Result<DriveSetup> drive_setup(const AxisSettings& settings, const DriveDescript
         if (const auto* function = find_function(functions, terminal.function);
             function && !function->mirror.empty())
           terminal.function = function->mirror;
+      // The direction of PV is a level: the other one is the other direction.
+      for (auto& terminal : terminals)
+        if (terminal.function == "pv_direction") terminal.active_low = !terminal.active_low;
     };
     mirror(setup.inputs, descriptor.input_functions);
     mirror(setup.outputs, descriptor.output_functions);

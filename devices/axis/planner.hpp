@@ -63,6 +63,8 @@ Duration move_duration(double pulses, double start_speed, double speed, Duration
 
 /// The opposite direction for inverted axes (M18).
 HomingMethod mirrored(HomingMethod method);
+/// May this configuration be inverted? Errors: misconfigured, where the drive cannot be mirrored (M18).
+Result<void> check_mirror(const AxisSettings& settings, const DriveDescriptor& descriptor);
 /// What the drive of this axis has to be, mirrored if inverted.
 Result<DriveSetup> drive_setup(const AxisSettings& settings, const DriveDescriptor& descriptor);
 

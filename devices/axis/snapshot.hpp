@@ -32,6 +32,15 @@ std::string_view to_string(LinkState state);
 enum class PositionTrust : std::uint8_t { unknown, set, homed, restored };
 std::string_view to_string(PositionTrust trust);
 
+/// Who set the axis in motion.
+enum class MotionCause : std::uint8_t {
+  none,      ///< it does not move
+  command,   ///< a command of a client
+  terminal,  ///< the drive by itself: a terminal started it (segments, JOG, start functions)
+  unknown,   ///< nobody that is known: it is being stopped
+};
+std::string_view to_string(MotionCause cause);
+
 struct TerminalState {
   std::string name;      ///< "X0"
   std::string function;  ///< as configured; empty without one
@@ -51,6 +60,7 @@ struct AxisSnapshot {
   LinkState link = LinkState::offline;
   std::optional<Error> link_error{};  ///< why it is not online
   std::optional<Error> fault{};       ///< why it is in ErrorStop
+  std::string drift{};                ///< what the drive no longer holds as configured; empty: nothing
   bool enabled = false;               ///< the drive's power stage
   bool enabled_by_us = false;         ///< false with enabled: found energised
   bool stop_held = false;             ///< Stopping until ReleaseStop
@@ -60,6 +70,7 @@ struct AxisSnapshot {
   double velocity = 0;
   std::optional<double> target{};  ///< of the current motion
   bool moving = false;
+  MotionCause motion_cause = MotionCause::none;
   bool positive_direction = true;  ///< of the last motion
   bool in_position = false;
   bool homed = false;  ///< the drive's homing bit
@@ -70,6 +81,8 @@ struct AxisSnapshot {
   std::vector<TerminalState> inputs{}, outputs{};
   std::optional<DriveIdentity> identity{};
   int reboots = 0;  ///< seen since the daemon started
+  std::uint64_t eeprom_writes =
+      0;  ///< registers saved in the drive, since the axis is known on this computer
 
   TimePoint sampled_after{};  ///< the drive values are from between these two
   TimePoint sampled_before{};

@@ -4,16 +4,12 @@
 
 #include <algorithm>
 
-#include "devices/descriptor.hpp"
 #include "devices/yako_rtu/codec.hpp"
 #include "devices/yako_rtu/registers.hpp"
-#include "devices/ykd2405pr/settings.hpp"
 
 namespace axisd::yako_rtu {
 
 namespace {
-
-const DriveDescriptor& descriptor() { return *find_drive_model("ykd2405pr"); }
 
 template <class Range, class Projection>
 std::optional<std::size_t> index_of(const Range& range, std::string_view name, Projection projection) {
@@ -22,10 +18,10 @@ std::optional<std::size_t> index_of(const Range& range, std::string_view name, P
   return static_cast<std::size_t>(found - std::ranges::begin(range));
 }
 
-/// Function code and active level of each terminal of one side.
+/// Function and active level of each terminal of one side.
 struct Assignment {
   std::vector<const TerminalFunctionSpec*> functions;  ///< nullptr: not named
-  std::uint16_t levels = 0;
+  std::uint16_t levels = 0, named = 0;                 ///< bit per terminal
 };
 
 Result<Assignment> assign(const std::vector<TerminalSettings>& terminals, std::span<const TerminalSpec> known,
@@ -37,84 +33,163 @@ Result<Assignment> assign(const std::vector<TerminalSettings>& terminals, std::s
     if (!index || function == nullptr)
       return fail(Reason::misconfigured, fmt::format("terminal {} cannot have the function {}",
                                                      terminal.terminal, terminal.function));
+    const auto bit = static_cast<std::uint16_t>(1U << *index);
     assignment.functions[*index] = function;
-    if (terminal.active_low) assignment.levels |= static_cast<std::uint16_t>(1U << *index);
+    assignment.named |= bit;
+    if (terminal.active_low) assignment.levels |= bit;
   }
   return assignment;
 }
 
-void add_inputs(const Assignment& inputs, bool limits_and_stops, std::vector<RegisterSetting>& all) {
-  const auto is_limit_or_stop = [](std::uint16_t code) {
-    return code == 2 || code == 3 || code == 8 || code == 9;
-  };
+bool is_limit_or_stop(const TerminalFunctionSpec* function) {
+  static constexpr std::string_view names[] = {"positive_limit", "negative_limit", "stop", "quick_stop"};
+  return function != nullptr && std::ranges::find(names, function->name) != std::end(names);
+}
+
+void add_inputs(const Assignment& inputs, std::span<const TerminalSpec> terminals, std::uint16_t first,
+                bool limits_and_stops, bool saved, std::vector<RegisterSetting>& all) {
   for (std::size_t i = 0; i < inputs.functions.size(); ++i) {
     const auto* function = inputs.functions[i];
-    const std::uint16_t code = function == nullptr ? 0 : function->code;
-    if (is_limit_or_stop(code) != limits_and_stops) continue;
-    all.push_back({.address = static_cast<std::uint16_t>(reg::first_input_function + i),
-                   .value = code,
+    if (is_limit_or_stop(function) != limits_and_stops) continue;
+    all.push_back({.address = static_cast<std::uint16_t>(first + i),
+                   .value = function == nullptr ? std::uint16_t{0} : function->code,
+                   .key = fmt::format("inputs.{}", terminals[i].name),
+                   .saved = saved,
                    .starts_motion = function != nullptr && function->starts_motion,
-                   .input_bit = 1U << i});
+                   .input_bits = 1U << i});
   }
 }
 
-std::optional<std::string_view> text_setting(const DriveSetup& setup, const char* key) {
-  const auto found = setup.model_settings.find(key);
-  if (found == setup.model_settings.end()) return std::nullopt;
-  const auto* text = std::get_if<std::string>(&found->second);
-  return text == nullptr || text->empty() ? std::nullopt : std::optional<std::string_view>(*text);
+void add_outputs(const Assignment& outputs, std::span<const TerminalSpec> terminals, bool saved,
+                 std::vector<RegisterSetting>& all) {
+  for (std::size_t i = 0; i < outputs.functions.size(); ++i)
+    if (const auto* function = outputs.functions[i])
+      all.push_back({.address = static_cast<std::uint16_t>(reg::first_output_function + i),
+                     .value = function->code,
+                     .key = fmt::format("outputs.{}", terminals[i].name),
+                     .saved = saved});
 }
 
-void add_choice(const DriveSetup& setup, const char* key, std::span<const std::string_view> choices,
-                std::uint16_t address, std::vector<RegisterSetting>& all) {
-  const auto text = text_setting(setup, key);
-  if (!text) return;
-  if (const auto code = index_of(choices, *text, std::identity{}))
-    all.push_back({.address = address, .value = static_cast<std::uint16_t>(*code)});
+/// Settings that the model's descriptor ties to a register: a choice's index, a number, or 0 and 1.
+void add_settings(const DriveDescriptor& model, const DriveSetup& setup, std::vector<RegisterSetting>& all) {
+  for (const auto& spec : model.settings) {
+    if (!spec.object) continue;
+    const auto found = setup.model_settings.find(std::string(spec.key));
+    if (found == setup.model_settings.end()) continue;
+    std::optional<std::int64_t> code;
+    if (const auto* text = std::get_if<std::string>(&found->second)) {
+      if (const auto index = index_of(spec.choices, *text, std::identity{}))
+        code = static_cast<std::int64_t>(*index);
+    } else if (const auto* number = std::get_if<std::int64_t>(&found->second)) {
+      code = *number;
+    } else if (const auto* flag = std::get_if<bool>(&found->second)) {
+      code = *flag ? 1 : 0;
+    }
+    if (code)
+      all.push_back({.address = static_cast<std::uint16_t>(*spec.object),
+                     .value = static_cast<std::uint16_t>(*code),
+                     .key = fmt::format("drive.{}", spec.key),
+                     .saved = setup.persist.drive});
+  }
+}
+
+void add_homing(const DriveSetup& setup, std::vector<RegisterSetting>& all) {
+  static constexpr std::string_view keys[] = {"method", "velocity", "search_velocity", "acceleration_time",
+                                              "offset", "offset"};
+  const auto block = encode(*setup.homing);
+  for (std::size_t i = 0; i < block.size(); ++i)
+    all.push_back({.address = static_cast<std::uint16_t>(reg::homing_mode + i),
+                   .value = block.at(i),
+                   .key = fmt::format("homing.{}", keys[i]),
+                   .saved = setup.persist.homing});
 }
 
 }  // namespace
 
-bool starts_motion(std::uint16_t function_code) {
-  const auto functions = descriptor().input_functions;
+std::uint16_t first_input_function(const Model& model, const DriveSetup& setup) {
+  const auto found = setup.model_settings.find("terminal_registers");
+  const auto* reading =
+      found == setup.model_settings.end() ? nullptr : std::get_if<std::string>(&found->second);
+  const bool wiring = reading != nullptr && *reading == "wiring" && model.first_input_function_of_wiring != 0;
+  return wiring ? model.first_input_function_of_wiring : model.first_input_function;
+}
+
+bool starts_motion(const Model& model, std::uint16_t function_code) {
+  const auto functions = model.descriptor->input_functions;
   const auto found = std::ranges::find(functions, function_code, &TerminalFunctionSpec::code);
   return found != functions.end() && found->starts_motion;
 }
 
-Result<std::vector<RegisterSetting>> required_registers(const DriveSetup& setup) {
-  const auto& model = descriptor();
-  const auto inputs = assign(setup.inputs, model.inputs, model.input_functions);
+std::uint32_t segment_enables(const Model& model, const DriveSetup& setup) {
+  std::uint32_t bits = 0;
+  for (const auto& input : setup.inputs)
+    if (input.function == "pt_enable" || input.function == "pv_enable")
+      bits |= 1U << index_of(model.descriptor->inputs, input.terminal, &TerminalSpec::name).value_or(31);
+  return bits;
+}
+
+std::vector<RegisterSetting> segment_registers(const DriveSegments& segments, std::uint32_t enables) {
+  std::vector<RegisterSetting> all;
+  const auto add = [&](std::uint16_t first, std::size_t row, std::int64_t value) {
+    all.push_back({.address = static_cast<std::uint16_t>(first + row),
+                   .value = static_cast<std::uint16_t>(value & 0xFFFF),
+                   .key = "segments",
+                   .starts_motion = true,
+                   .input_bits = enables});
+  };
+  const auto& rows = segments.rows;
+  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_high, i, rows.at(i).pulses >> 16);
+  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_low, i, rows.at(i).pulses);
+  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_speed, i, rows.at(i).velocity_rpm);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    // Printed 30..2000 with the default 0, which cannot be written back: rows without motion keep theirs.
+    if (rows.at(i).velocity_rpm != 0 || rows.at(i).pv_velocity_rpm != 0)
+      add(reg::segment_time, i, rows.at(i).acceleration_time / std::chrono::milliseconds(1));
+  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pv_speed, i, rows.at(i).pv_velocity_rpm);
+  return all;
+}
+
+Result<std::vector<RegisterSetting>> required_registers(const Model& model, const DriveSetup& setup) {
+  const auto& descriptor = *model.descriptor;
+  const auto inputs = assign(setup.inputs, descriptor.inputs, descriptor.input_functions);
   if (!inputs) return fail(inputs.error());
-  const auto outputs = assign(setup.outputs, model.outputs, model.output_functions);
+  const auto outputs = assign(setup.outputs, descriptor.outputs, descriptor.output_functions);
   if (!outputs) return fail(outputs.error());
-  const auto microstep = std::ranges::find(ykd2405pr::microstep_codes, setup.pulses_per_revolution);
-  if (microstep == ykd2405pr::microstep_codes.end())
+  const auto codes = descriptor.identification.microstep_codes;
+  const auto microstep = std::ranges::find(codes, setup.pulses_per_revolution);
+  if (microstep == codes.end())
     return fail(Reason::misconfigured, fmt::format("the drive has no microstep setting of {} pulses/rev",
                                                    setup.pulses_per_revolution));
 
+  const auto first = first_input_function(model, setup);
+  const bool terminals_saved = setup.persist.terminals;
   std::vector<RegisterSetting> all;
-  all.push_back({.address = reg::eeprom_update, .value = static_cast<std::uint16_t>(setup.persist ? 0 : 1)});
-  all.push_back({.address = reg::input_levels, .value = inputs->levels});
-  if (!setup.outputs.empty()) all.push_back({.address = reg::output_levels, .value = outputs->levels});
-  add_inputs(*inputs, true, all);
-  all.push_back({.address = reg::control_mode, .value = 0});
+  all.push_back(
+      {.address = reg::input_levels, .value = inputs->levels, .key = "inputs", .saved = terminals_saved});
+  if (!setup.outputs.empty())
+    all.push_back({.address = reg::output_levels,
+                   .value = outputs->levels,
+                   .key = "outputs",
+                   .mask = outputs->named,
+                   .saved = terminals_saved});
+  add_inputs(*inputs, descriptor.inputs, first, true, terminals_saved, all);
   all.push_back({.address = reg::microstep,
-                 .value = static_cast<std::uint16_t>(microstep - ykd2405pr::microstep_codes.begin())});
-  static constexpr std::string_view halves[] = {"half", "full"};
-  static constexpr std::string_view overtravels[] = {"free", "quick_stop", "ignore"};
-  add_choice(setup, "overtravel_stop", overtravels, reg::overtravel_stop, all);
-  add_choice(setup, "current", ykd2405pr::current_choices, reg::current, all);
-  add_choice(setup, "lock_current", halves, reg::lock_current, all);
-  if (setup.homing) {
-    const auto block = encode(*setup.homing);
-    for (std::size_t i = 0; i < block.size(); ++i)
-      all.push_back({.address = static_cast<std::uint16_t>(reg::homing_mode + i), .value = block[i]});
+                 .value = static_cast<std::uint16_t>(microstep - codes.begin()),
+                 .key = "scale.microstep",
+                 .saved = setup.persist.drive});
+  add_settings(descriptor, setup, all);
+  if (setup.homing) add_homing(setup, all);
+  add_outputs(*outputs, descriptor.outputs, terminals_saved, all);
+  add_inputs(*inputs, descriptor.inputs, first, false, terminals_saved, all);
+  if (setup.segments) {
+    all.push_back({.address = reg::terminal_move_mode,
+                   .value = static_cast<std::uint16_t>(setup.segments->absolute ? 1 : 0),
+                   .key = "segments.mode"});
+    for (auto& row : segment_registers(*setup.segments, segment_enables(model, setup))) {
+      row.saved = setup.persist.segments;
+      all.push_back(std::move(row));
+    }
   }
-  for (std::size_t i = 0; i < outputs->functions.size(); ++i)
-    if (const auto* function = outputs->functions[i])
-      all.push_back(
-          {.address = static_cast<std::uint16_t>(reg::first_output_function + i), .value = function->code});
-  add_inputs(*inputs, false, all);
   return all;
 }
 

@@ -1,11 +1,122 @@
+// One drive of the family on its line.
 #pragma once
 
+#include <map>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "buses/modbus_rtu/node.hpp"
 #include "devices/descriptor.hpp"
+#include "devices/drive_access.hpp"
+#include "devices/yako_rtu/codec.hpp"
+#include "devices/yako_rtu/configuration.hpp"
+#include "devices/yako_rtu/model.hpp"
 
 namespace axisd::yako_rtu {
 
-std::unique_ptr<Drive> make_drive(DriveContext context);
+/// Thread: core.
+///
+/// The canary: registers 0x0020..0x0025 live in RAM. Whatever stands there after a power-up is never what
+/// this class last wrote, so one read of the block proves that the drive has not been restarted since (M6,
+/// M7).
+class YakoRtuDrive final : public Drive {
+ public:
+  YakoRtuDrive(const Model& model, DriveContext context);
+
+  // drive_connection.cpp
+  Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) override;
+  Task<Result<void>> configure() override;
+  Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
+  Task<Result<Drift>> check_drift() override;
+  [[nodiscard]] bool closed_loop() const override;
+
+  // drive_motion.cpp
+  Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
+  [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override {
+    return expected_.size() == 1 ? std::optional(expected_.front()) : std::nullopt;
+  }
+  void expect_mark(const ContinuityMark& mark) override { expected_ = {mark}; }
+  Task<Result<void>> enable(MotionGuard guard) override;
+  Task<Result<void>> disable(MotionGuard guard) override;
+  Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
+  Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) override;
+  Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
+  Task<Result<void>> stop(StopKind kind) override;
+  Task<Result<void>> clear_alarm() override;
+  Task<Result<void>> clear_position(MotionGuard guard) override;
+
+  // drive_parameters.cpp
+  std::uint64_t take_eeprom_writes() override { return std::exchange(eeprom_writes_, 0); }
+  [[nodiscard]] std::string configured_by(std::uint32_t address) const override;
+  Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t> addresses) override;
+  Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values) override;
+  Task<Result<DriveSegments>> read_segments() override;
+  Task<Result<void>> write_segments(DriveSegments segments) override;
+  Task<Result<void>> save_parameters() override;
+  Task<Result<std::string>> restore_factory(std::vector<std::uint8_t> taken) override;
+  Task<Result<std::string>> change_serial(SerialChange change) override;
+
+ private:
+  using Answer = modbus_rtu::Answer;
+  using Registers = std::map<std::uint16_t, std::uint16_t>;
+  struct Trigger {
+    std::uint16_t address;
+    std::uint16_t value;
+  };
+
+  // drive_connection.cpp
+  Task<bool> has_register(std::uint16_t address, TransactionClass transaction_class) const;
+  [[nodiscard]] Error wrong_model(std::uint16_t code, const std::string& found) const;
+  [[nodiscard]] bool readable(std::uint32_t address) const;
+  /// Reads what `settings` speak of, in blocks.
+  Task<Result<Registers>> read_registers(std::vector<std::uint16_t> addresses) const;
+  /// Writes what differs, each part saved or not as it says, and verifies it.
+  Task<Result<void>> bring_to(std::vector<RegisterSetting> required);
+  Task<Result<void>> write_differences(const std::vector<RegisterSetting>& required, Registers& present);
+  Task<Result<void>> verify(const std::vector<RegisterSetting>& required) const;
+  Task<Result<void>> neutralise_inputs(const std::vector<RegisterSetting>& required, Registers& present);
+  Task<Result<void>> check_inactive(const RegisterSetting& setting) const;
+  Task<Result<void>> write_run(std::uint16_t address, std::vector<std::uint16_t> values);
+  /// Sets the EEPROM switch (0x0016), if it is not so already.
+  Task<Result<void>> save_writes(bool saved);
+  [[nodiscard]] bool saves_at_rest() const;
+
+  // drive_motion.cpp
+  Task<Result<void>> write_canary(MotionBlock block, TransactionOptions options);
+  Task<Result<Answer>> read_canary(TransactionOptions options);
+  [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
+  [[nodiscard]] MotionBlock fresh_neutral_block() const;
+  [[nodiscard]] Result<void> check_control_mode() const;
+  Task<Result<void>> start(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
+                           MotionGuard guard);
+  Task<Result<void>> start_once(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
+                                MotionGuard guard);
+  Task<Result<void>> prepare_homing(HomingBlock block, TransactionOptions options);
+
+  // drive_parameters.cpp
+  [[nodiscard]] Result<std::vector<ParameterValue>> serial_registers(const SerialChange& change) const;
+  [[nodiscard]] std::string serial_advice(const SerialChange& change) const;
+
+  [[nodiscard]] std::unexpected<Error> failed(Error error) const;
+  [[nodiscard]] Error error_at(Reason reason, std::uint16_t address, std::string message,
+                               std::string remedy) const;
+
+  const Model* model_;
+  Clock* clock_;
+  modbus_rtu::Node node_;
+  DriveSetup setup_;
+  std::uint16_t first_input_function_;
+  std::vector<RegisterSetting> required_;  ///< by the setup; empty if it cannot be had (configure() says why)
+  std::optional<Error> setup_error_;
+  /// What the motion block may hold: one entry, two after a block write whose reply was lost.
+  std::vector<MotionBlock> expected_;
+  MotionBlock found_at_connect_ = factory_block;  ///< possibly what a power-up leaves (saved by 0x002B = 2)
+  std::optional<bool> saving_;                    ///< 0x0016, if it is known
+  std::uint64_t eeprom_writes_ = 0;
+};
+
+std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);
 
 }  // namespace axisd::yako_rtu

@@ -1,0 +1,174 @@
+#include "daemon/core/drive_access_service.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "buses/signal.hpp"
+#include "daemon/core/bus_access_scan.hpp"
+
+namespace axisd::core {
+
+namespace {
+
+constexpr auto look_again = std::chrono::milliseconds(500);
+
+Error no_such_axis(const std::string& axis) {
+  return {.reason = Reason::unknown_axis,
+          .message = fmt::format("there is no axis '{}'", axis),
+          .remedy = "list them: axisctl list"};
+}
+
+/// Holds what the sequence needs until it has ended.
+template <class T>
+Task<> answer(DriveOperations operations, std::function<Task<Result<T>>(DriveOperations)> operation,
+              std::function<void(Result<T>)> callback) {
+  callback(co_await operation(operations));
+}
+
+}  // namespace
+
+template <class T>
+void DriveAccessService::run(std::string axis, std::function<Task<Result<T>>(DriveOperations)> operation,
+                             std::function<void(Result<T>)> callback, const char* name) {
+  post(executor_, [this, axis = std::move(axis), operation = std::move(operation),
+                   callback = std::move(callback), name]() mutable {
+    auto* found = machine_->find(axis);
+    if (found == nullptr) return callback(fail(no_such_axis(axis)));
+    machine_->launch(answer<T>(DriveOperations(*found), std::move(operation), std::move(callback)), name);
+  });
+}
+
+void DriveAccessService::drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) {
+  post(executor_, [this, axis = std::move(axis), callback = std::move(callback)] {
+    auto* found = machine_->find(axis);
+    if (found == nullptr) return callback(fail(no_such_axis(axis)));
+    callback(DriveOperations(*found).info());
+  });
+}
+
+void DriveAccessService::read_parameters(std::string axis, std::vector<std::uint32_t> addresses,
+                                         ValuesCallback callback) {
+  run<std::vector<ParameterValue>>(
+      std::move(axis),
+      [addresses = std::move(addresses)](DriveOperations drive) { return drive.read_parameters(addresses); },
+      std::move(callback), "read parameters");
+}
+
+void DriveAccessService::write_parameters(std::string axis, std::vector<ParameterValue> values,
+                                          std::string client, ValuesCallback callback) {
+  audit(client, axis, fmt::format("writes {} parameters", values.size()));
+  run<std::vector<ParameterValue>>(
+      std::move(axis),
+      [values = std::move(values)](DriveOperations drive) { return drive.write_parameters(values); },
+      std::move(callback), "write parameters");
+}
+
+void DriveAccessService::save_parameters(std::string axis, std::string client,
+                                         std::function<void(Result<void>)> callback) {
+  audit(client, axis, "saves all parameters to the EEPROM");
+  run<void>(
+      std::move(axis), [](DriveOperations drive) { return drive.save_parameters(); }, std::move(callback),
+      "save parameters");
+}
+
+void DriveAccessService::restore_factory(std::string axis, std::string client,
+                                         std::function<void(Result<std::string>)> callback) {
+  audit(client, axis, "restores the factory settings");
+  const auto* found = machine_->find(axis);  // axes never change, nor do their settings
+  auto taken = found == nullptr ? std::vector<std::uint8_t>{} : others_on_bus(*found);
+  run<std::string>(
+      std::move(axis),
+      [taken = std::move(taken)](DriveOperations drive) { return drive.restore_factory(taken); },
+      std::move(callback), "restore factory settings");
+}
+
+void DriveAccessService::read_segments(std::string axis, SegmentsCallback callback) {
+  run<SegmentSettings>(
+      std::move(axis), [](DriveOperations drive) { return drive.read_segments(); }, std::move(callback),
+      "read segments");
+}
+
+void DriveAccessService::write_segments(std::string axis, SegmentSettings segments, std::string client,
+                                        SegmentsCallback callback) {
+  audit(client, axis, "writes the segment table");
+  run<SegmentSettings>(
+      std::move(axis),
+      [segments = std::move(segments)](DriveOperations drive) { return drive.write_segments(segments); },
+      std::move(callback), "write segments");
+}
+
+std::shared_ptr<void> DriveAccessService::change_serial(std::string axis, SerialChange change,
+                                                        std::string client, SerialCallback callback) {
+  audit(client, axis, "changes address or serial settings");
+  auto token = std::make_shared<int>(0);
+  post(executor_, [this, axis = std::move(axis), change, callback = std::move(callback),
+                   alive = std::weak_ptr<void>(token)]() mutable {
+    auto* found = machine_->find(axis);
+    if (found == nullptr) return callback(fail(no_such_axis(axis)));
+    machine_->launch(run_serial_change(*found, change, std::move(alive), std::move(callback)),
+                     "change address");
+  });
+  return token;
+}
+
+Task<> DriveAccessService::run_serial_change(Axis& axis, SerialChange change, std::weak_ptr<void> alive,
+                                             SerialCallback callback) {
+  const auto tell = [&](Result<SerialProgress> progress) {
+    if (const auto held = alive.lock()) callback(std::move(progress));
+  };
+  const auto written = co_await DriveOperations(axis).change_serial(change, others_on_bus(axis));
+  if (!written) co_return tell(fail(written.error()));
+  tell(SerialProgress{.phase = SerialProgress::Phase::written, .text = *written});
+  if (change.verify <= Duration{}) co_return;
+  tell(SerialProgress{.phase = SerialProgress::Phase::waiting, .text = "switch the drive off and on now"});
+  const auto found = co_await find_again(axis, change, alive);
+  if (!found) co_return tell(fail(found.error()));
+  tell(SerialProgress{.phase = SerialProgress::Phase::verified,
+                      .text = "the drive answers there; change the configuration accordingly"});
+}
+
+Task<Result<void>> DriveAccessService::find_again(Axis& axis, SerialChange change,
+                                                  std::weak_ptr<void> alive) {
+  auto& bus = *machine_->find_bus(axis.settings().bus);
+  const auto node = change.node.value_or(axis.settings().node);
+  ScanRequest request{.bus = axis.settings().bus, .first_node = node, .last_node = node};
+  if (change.baud) request.bauds = {*change.baud};
+  if (change.format) request.formats = {*change.format};
+  const auto deadline = clock_->now() + change.verify;
+  while (!alive.expired() && clock_->now() < deadline) {
+    BusScan scan(*machine_, bus, request, alive);
+    const auto progress = co_await scan.next();
+    if (!progress) co_return fail(progress.error());
+    if (!progress->found.empty() && !progress->found.front().model.empty()) {
+      if (progress->found.front().model == axis.descriptor().model) co_return Result<void>{};
+      co_return fail(Reason::wrong_model, fmt::format("a {} answers there", progress->found.front().model),
+                     "give each drive an address of its own");
+    }
+    co_await sleep_until(executor_, *clock_, clock_->now() + look_again);
+  }
+  co_return fail({.reason = Reason::no_reply,
+                  .message = "the drive does not answer with its new address or serial settings",
+                  .remedy =
+                      "check its switches, and that it was switched off and on; look for it with axisctl "
+                      "bus scan",
+                  .where = {.bus = request.bus, .node = node}});
+}
+
+std::vector<std::uint8_t> DriveAccessService::others_on_bus(const Axis& axis) const {
+  std::vector<std::uint8_t> nodes;
+  for (const auto& other : machine_->axes())
+    if (other.get() != &axis && other->settings().bus == axis.settings().bus)
+      nodes.push_back(other->settings().node);
+  for (const auto& device : machine_->devices())
+    if (device->settings().bus == axis.settings().bus) nodes.push_back(device->settings().node);
+  return nodes;
+}
+
+void DriveAccessService::audit(const std::string& client, const std::string& axis,
+                               std::string_view what) const {
+  spdlog::warn("{}: {} {}", axis, client, what);
+}
+
+}  // namespace axisd::core

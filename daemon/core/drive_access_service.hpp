@@ -1,0 +1,57 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "buses/task.hpp"
+#include "daemon/core/machine_core.hpp"
+#include "devices/axis/drive_operations.hpp"
+#include "devices/drive_access.hpp"
+
+namespace axisd::core {
+
+/// What the API can ask of the drives: hands it to the core thread, where each request is a sequence of its
+/// axis, so that closing the machine ends it. Thread: any, from construction (before the core runs) to
+/// destruction (after it ended).
+class DriveAccessService final : public DriveAccess {
+ public:
+  /// `machine` and `clock` outlive it.
+  DriveAccessService(Executor executor, Clock& clock, MachineCore& machine)
+      : executor_(std::move(executor)), clock_(&clock), machine_(&machine) {}
+
+  void drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) override;
+  void read_parameters(std::string axis, std::vector<std::uint32_t> addresses,
+                       ValuesCallback callback) override;
+  void write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+                        ValuesCallback callback) override;
+  void save_parameters(std::string axis, std::string client,
+                       std::function<void(Result<void>)> callback) override;
+  void restore_factory(std::string axis, std::string client,
+                       std::function<void(Result<std::string>)> callback) override;
+  void read_segments(std::string axis, SegmentsCallback callback) override;
+  void write_segments(std::string axis, SegmentSettings segments, std::string client,
+                      SegmentsCallback callback) override;
+  std::shared_ptr<void> change_serial(std::string axis, SerialChange change, std::string client,
+                                      std::function<void(Result<SerialProgress>)> callback) override;
+
+ private:
+  using SerialCallback = std::function<void(Result<SerialProgress>)>;
+  /// Runs `operation` on the axis as one of its sequences and calls back with its result.
+  template <class T>
+  void run(std::string axis, std::function<Task<Result<T>>(DriveOperations)> operation,
+           std::function<void(Result<T>)> callback, const char* name);
+  Task<> run_serial_change(Axis& axis, SerialChange change, std::weak_ptr<void> alive,
+                           SerialCallback callback);
+  /// Looks for the drive where it will be after its power cycle.
+  Task<Result<void>> find_again(Axis& axis, SerialChange change, std::weak_ptr<void> alive);
+  [[nodiscard]] std::vector<std::uint8_t> others_on_bus(const Axis& axis) const;
+  void audit(const std::string& client, const std::string& axis, std::string_view what) const;
+
+  Executor executor_;
+  Clock* clock_;
+  MachineCore* machine_;
+};
+
+}  // namespace axisd::core

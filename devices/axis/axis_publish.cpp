@@ -1,0 +1,136 @@
+// What the axis shows: snapshots, and events where something changed.
+#include <algorithm>
+#include <boost/smart_ptr/make_shared.hpp>
+#include <cmath>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+std::vector<TerminalState> terminal_states(std::span<const TerminalSpec> terminals,
+                                           const std::vector<TerminalSettings>& settings,
+                                           std::uint32_t bits) {
+  std::vector<TerminalState> states;
+  states.reserve(terminals.size());
+  for (std::size_t i = 0; i < terminals.size(); ++i) {
+    const auto configured = std::ranges::find(settings, terminals[i].name, &TerminalSettings::terminal);
+    states.push_back({.name = std::string(terminals[i].name),
+                      .function = configured == settings.end() ? std::string() : configured->function,
+                      .active = ((bits >> i) & 1U) != 0});
+  }
+  return states;
+}
+
+}  // namespace
+
+std::vector<TerminalState> Axis::inputs(std::uint32_t bits) const {
+  auto states = terminal_states(descriptor_->inputs, settings_.inputs, bits);
+  // The drive was given the other level of this one for an inverted axis (drive_setup).
+  if (settings_.scale.invert)
+    for (auto& terminal : states)
+      if (terminal.function == "pv_direction") terminal.active = !terminal.active;
+  return states;
+}
+
+std::vector<TerminalState> Axis::outputs(std::uint32_t bits) const {
+  return terminal_states(descriptor_->outputs, settings_.outputs, bits);
+}
+
+/// M29: the edge lies between the previous sample and this one.
+void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
+  if (!env_.event || (before.inputs == now.inputs && before.outputs == now.outputs)) return;
+  const auto tell = [&](const std::vector<TerminalState>& was, const std::vector<TerminalState>& is) {
+    for (std::size_t i = 0; i < is.size(); ++i)
+      if (was[i].active != is[i].active)
+        env_.event(settings_.name, TerminalEdge{.terminal = is[i].name,
+                                                .function = is[i].function,
+                                                .active = is[i].active,
+                                                .after = env_.clock->wall(before.asked_at),
+                                                .before = env_.clock->wall(now.measured_at)});
+  };
+  tell(inputs(before.inputs), inputs(now.inputs));
+  tell(outputs(before.outputs), outputs(now.outputs));
+}
+
+void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
+  if (!env_.event) return;
+  if (before.link != now.link)
+    env_.event(
+        settings_.name,
+        LinkChange{.to = now.link, .detail = now.link_error ? now.link_error->message : std::string()});
+  if (before.state != now.state)
+    env_.event(settings_.name, StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});
+  if (before.drift != now.drift) env_.event(settings_.name, ConfigurationDrift{.text = now.drift});
+}
+
+MotionCause Axis::motion_cause() const {
+  if (terminal_motion_) return MotionCause::terminal;
+  if ((activity_ && activity_->state != AxisState::standstill) || stopping_.running)
+    return sample_ && sample_->moving ? MotionCause::command : MotionCause::none;
+  return sample_ && sample_->moving ? MotionCause::unknown : MotionCause::none;
+}
+
+void Axis::publish() {
+  if (const auto written = drive_->take_eeprom_writes(); written > 0) {
+    eeprom_writes_ += written;
+    if (env_.persistence != nullptr) env_.persistence->count_eeprom_writes(settings_.name, written, {});
+  }
+  auto next = boost::make_shared<AxisSnapshot>();
+  next->name = settings_.name;
+  next->bus = settings_.bus;
+  next->node = settings_.node;
+  next->model = settings_.model;
+  next->unit = settings_.scale.unit;
+  next->simulated = simulated_;
+  next->state = state();
+  next->link = link_;
+  next->link_error = link_error_;
+  next->fault = fault_;
+  next->stop_held = stopping_.hold;
+  next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
+  next->enabled_by_us = enabled_by_us_;
+  next->trust = tracker_.trust();
+  next->position_source = descriptor_->capabilities.position_source;
+  next->position = tracker_.position();
+  if (settings_.scale.modulo) {
+    const auto turn = *settings_.scale.modulo;
+    next->position -= std::floor(next->position / turn) * turn;
+  }
+  next->identity = identity_;
+  next->reboots = reboots_;
+  next->drift = drift_;
+  next->eeprom_writes = eeprom_writes_;
+  next->motion_cause = motion_cause();
+  next->revision = ++revision_;
+  next->positive_direction = last_positive_;
+  if (activity_) {
+    next->command_id = activity_->command->value().id;
+    if (activity_->plan.granted.position) next->target = activity_->plan.target;
+  }
+  const auto bits = sample_.value_or(DriveSample{});
+  next->inputs = inputs(bits.inputs);
+  next->outputs = outputs(bits.outputs);
+  if (sample_) {
+    next->enabled = bits.enabled;
+    // The sign of the speed register is not said; the direction register's is.
+    const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
+    next->velocity = last_positive_ || speed == 0 ? speed : -speed;
+    next->moving = bits.moving;
+    next->in_position = bits.in_position;
+    next->homed = bits.homed;
+    next->alarm_code = bits.alarm_code;
+    const auto alarm = std::ranges::find(descriptor_->alarms, bits.alarm_code, &AlarmSpec::code);
+    if (alarm != descriptor_->alarms.end()) next->alarm_name = alarm->name;
+    next->sampled_after = bits.asked_at;
+    next->sampled_before = bits.measured_at;
+    next->measured_at = env_.clock->wall(bits.measured_at);
+  }
+  const auto before = snapshot_.load();
+  snapshot_.store(next);
+  if (before) tell_changes(*before, *next);
+  if (env_.published) env_.published();
+}
+
+}  // namespace axisd

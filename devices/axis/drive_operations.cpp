@@ -1,0 +1,136 @@
+#include "devices/axis/drive_operations.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+#include "devices/axis/segments.hpp"
+
+namespace axisd {
+
+Error DriveOperations::error(Reason reason, std::string message, std::string remedy) const {
+  const auto& settings = axis_->settings();
+  return {.reason = reason,
+          .message = fmt::format("{}: {}", settings.name, message),
+          .remedy = std::move(remedy),
+          .where = {.bus = settings.bus, .node = settings.node}};
+}
+
+const ParameterSpec* DriveOperations::find(std::uint32_t address) const {
+  const auto parameters = axis_->descriptor().parameters;
+  const auto found = std::ranges::find(parameters, address, &ParameterSpec::address);
+  return found == parameters.end() ? nullptr : &*found;
+}
+
+DriveInfo DriveOperations::info() const {
+  DriveInfo info{.descriptor = &axis_->descriptor(),
+                 .identity = axis_->identity(),
+                 .eeprom_writes = axis_->eeprom_writes(),
+                 .persist = axis_->settings().persist.any()};
+  for (const auto& parameter : info.descriptor->parameters)
+    if (auto owner = axis_->drive().configured_by(parameter.address); !owner.empty())
+      info.configured_by.emplace(parameter.address, std::move(owner));
+  return info;
+}
+
+Task<Result<std::vector<ParameterValue>>> DriveOperations::read_parameters(
+    std::vector<std::uint32_t> addresses) const {
+  for (const auto address : addresses) {
+    const auto* parameter = find(address);
+    if (parameter == nullptr || parameter->access == Access::wo)
+      co_return fail(error(
+          Reason::invalid_argument,
+          fmt::format("parameter {} cannot be read",
+                      parameter == nullptr ? fmt::format("0x{:04X}", address) : std::string(parameter->name)),
+          "list them: axisctl drive parameters"));
+  }
+  if (auto online = axis_->check_online(); !online) co_return fail(online.error());
+  co_return co_await axis_->drive().read_parameters(std::move(addresses));
+}
+
+Result<void> DriveOperations::check_write(const ParameterValue& value) const {
+  const auto* parameter = find(value.address);
+  const auto named = [&](std::string_view what, std::string remedy,
+                         Reason reason = Reason::invalid_argument) {
+    auto refusal = error(reason, fmt::format("{} {}", parameter->name, what), std::move(remedy));
+    refusal.where.object = value.address;
+    return fail(std::move(refusal));
+  };
+  if (parameter == nullptr)
+    return fail(error(Reason::invalid_argument, fmt::format("there is no parameter 0x{:04X}", value.address),
+                      "list them: axisctl drive parameters"));
+  if (parameter->access == Access::ro) return named("is read-only", "leave it out");
+  if (parameter->access == Access::wo)
+    return named("triggers an action and is no parameter", fmt::format("use {}", parameter->instead));
+  if (value.value < parameter->minimum || value.value > parameter->maximum) {
+    auto refusal = named(fmt::format("= {} is out of range", value.value),
+                         fmt::format("permitted: {} to {}", parameter->minimum, parameter->maximum),
+                         Reason::out_of_range);
+    refusal.error().permitted = Range{.minimum = static_cast<double>(parameter->minimum),
+                                      .maximum = static_cast<double>(parameter->maximum),
+                                      .unit = std::string(parameter->unit)};
+    return refusal;
+  }
+  if (const auto owner = axis_->drive().configured_by(value.address); !owner.empty())
+    return named(fmt::format("is decided by {}", owner), "change it there");
+  return {};
+}
+
+Task<Result<std::vector<ParameterValue>>> DriveOperations::write_parameters(
+    std::vector<ParameterValue> values) const {
+  for (const auto& value : values)
+    if (auto allowed = check_write(value); !allowed) co_return fail(allowed.error());
+  const auto maintenance = axis_->begin_maintenance();
+  if (!maintenance) co_return fail(maintenance.error());
+  co_return co_await axis_->drive().write_parameters(std::move(values));
+}
+
+Task<Result<SegmentSettings>> DriveOperations::read_segments() const {
+  if (auto online = axis_->check_online(); !online) co_return fail(online.error());
+  const auto segments = co_await axis_->drive().read_segments();
+  if (!segments) co_return fail(segments.error());
+  co_return from_drive(*segments, axis_->settings(), axis_->scale());
+}
+
+Task<Result<SegmentSettings>> DriveOperations::write_segments(SegmentSettings segments) const {
+  if (axis_->settings().segments)
+    co_return fail(error(Reason::invalid_argument, "the segments are decided by the configuration",
+                         "change them there"));
+  const auto table = to_drive(segments, axis_->settings(), axis_->scale(), axis_->descriptor());
+  if (!table) co_return fail(table.error());
+  const auto maintenance = axis_->begin_maintenance();
+  if (!maintenance) co_return fail(maintenance.error());
+  const auto written = co_await axis_->drive().write_segments(*table);
+  if (!written) co_return fail(written.error());
+  co_return co_await read_segments();
+}
+
+Task<Result<void>> DriveOperations::save_parameters() const {
+  const auto maintenance = axis_->begin_maintenance();
+  if (!maintenance) co_return fail(maintenance.error());
+  co_return co_await axis_->drive().save_parameters();
+}
+
+Task<Result<std::string>> DriveOperations::restore_factory(std::vector<std::uint8_t> taken) const {
+  auto maintenance = axis_->begin_maintenance();
+  if (!maintenance) co_return fail(maintenance.error());
+  auto restored = co_await axis_->drive().restore_factory(std::move(taken));
+  // Without a reply it may have been restored all the same.
+  if (restored || restored.error().outcome == Outcome::unknown)
+    axis_->reconfigure("the factory settings were restored", true);
+  co_return restored;
+}
+
+Task<Result<std::string>> DriveOperations::change_serial(SerialChange change,
+                                                         std::vector<std::uint8_t> taken) const {
+  if (change.node && std::ranges::find(taken, *change.node) != taken.end())
+    co_return fail(error(Reason::invalid_argument,
+                         fmt::format("address {} belongs to another node of this bus", *change.node),
+                         "choose a free one: axisctl bus scan"));
+  const auto maintenance = axis_->begin_maintenance();
+  if (!maintenance) co_return fail(maintenance.error());
+  co_return co_await axis_->drive().change_serial(change);
+}
+
+}  // namespace axisd

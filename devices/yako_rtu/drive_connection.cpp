@@ -1,0 +1,284 @@
+// Identity, state, and the configuration: compare, write what differs, verify.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/rtu_identification.hpp"
+#include "devices/yako_rtu/drive.hpp"
+#include "devices/yako_rtu/register_blocks.hpp"
+#include "devices/yako_rtu/registers.hpp"
+
+namespace axisd::yako_rtu {
+
+namespace {
+
+constexpr std::size_t longest_write = 16;
+constexpr int write_attempts = 3;
+
+TransactionOptions in(TransactionClass transaction_class) { return {.transaction_class = transaction_class}; }
+
+bool is_input_function(const RegisterSetting& setting) { return setting.key.starts_with("inputs."); }
+
+std::vector<std::uint16_t> addresses_of(const std::vector<RegisterSetting>& settings) {
+  std::vector<std::uint16_t> addresses;
+  for (const auto& setting : settings) addresses.push_back(setting.address);
+  return addresses;
+}
+
+}  // namespace
+
+YakoRtuDrive::YakoRtuDrive(const Model& model, DriveContext context)
+    : model_(&model),
+      clock_(context.clock),
+      node_(*context.rtu, context.node),
+      setup_(std::move(context.setup)),
+      first_input_function_(first_input_function(model, setup_)) {
+  auto required = required_registers(model, setup_);
+  if (required)
+    required_ = std::move(*required);
+  else
+    setup_error_ = required.error();
+}
+
+std::unexpected<Error> YakoRtuDrive::failed(Error error) const {
+  if (error.reason == Reason::refused && error.where.native_code)
+    error.message = fmt::format("the drive refused: {} (exception {:02})",
+                                exception_text(*error.where.native_code), *error.where.native_code);
+  return fail(std::move(error));
+}
+
+Error YakoRtuDrive::error_at(Reason reason, std::uint16_t address, std::string message,
+                             std::string remedy) const {
+  return {.reason = reason,
+          .message = std::move(message),
+          .remedy = std::move(remedy),
+          .outcome = Outcome::not_executed,
+          .where = {.bus = node_.bus().settings().name, .node = node_.address(), .object = address}};
+}
+
+Error YakoRtuDrive::wrong_model(std::uint16_t code, const std::string& found) const {
+  return error_at(Reason::wrong_model, reg::model,
+                  fmt::format("a drive with model code 0x{:04X} ({}) answers where {} is configured", code,
+                              found, model_->descriptor->model),
+                  "correct model or node in the configuration, or the address switches of the drives");
+}
+
+Task<Result<DriveIdentity>> YakoRtuDrive::identify(TransactionClass transaction_class) {
+  const auto answer = co_await node_.read(reg::model, 2, in(transaction_class));
+  if (!answer) co_return failed(answer.error());
+  const auto code = answer->registers[0];
+  const auto version = answer->registers[1];
+  const auto& identification = model_->descriptor->identification;
+  const auto setting = setup_.model_settings.find("model_code");
+  const auto* wanted =
+      setting == setup_.model_settings.end() ? nullptr : std::get_if<std::int64_t>(&setting->second);
+  const bool any = wanted == nullptr || *wanted == 0;
+  const auto& codes = identification.model_codes;
+  bool fits = any ? std::ranges::find(codes, code) != codes.end() : code == *wanted;
+  if (fits) {
+    const auto probed = co_await probes_fit(node_, identification, in(transaction_class));
+    if (!probed) co_return failed(probed.error());
+    fits = *probed;
+  }
+  if (!fits) {
+    const auto found = co_await find_rtu_model(node_, code, in(transaction_class));
+    if (!found) co_return failed(found.error());
+    co_return fail(wrong_model(code, *found == nullptr ? "unknown" : std::string((*found)->model)));
+  }
+  co_return DriveIdentity{.model_code = code,
+                          .version = fmt::format("V{}.{}", version >> 8U, (version >> 4U) & 0xFU)};
+}
+
+bool YakoRtuDrive::closed_loop() const {
+  const auto mode = setup_.model_settings.find("loop_mode");
+  const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
+  return model_->descriptor->capabilities.closed_loop && !open;
+}
+
+Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class) {
+  const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
+  if (!answer) co_return failed(answer.error());
+  auto sample = decode_state(answer->registers);
+  sample.asked_at = answer->sent_at;
+  sample.measured_at = answer->answered_at;
+  co_return sample;
+}
+
+bool YakoRtuDrive::readable(std::uint32_t address) const {
+  // Where the terminals' functions lie is a matter of reading for one model: the other places are holes.
+  if (address >= reg::first_input_function && address < reg::output_levels)
+    return address >= first_input_function_ &&
+           address < first_input_function_ + model_->descriptor->inputs.size();
+  const auto* parameter = find_parameter(model_->descriptor->parameters, address);
+  return parameter != nullptr && parameter->access != Access::wo;
+}
+
+Task<Result<YakoRtuDrive::Registers>> YakoRtuDrive::read_registers(
+    std::vector<std::uint16_t> addresses) const {
+  const auto blocks =
+      blocks_of(std::move(addresses), [this](std::uint32_t address) { return readable(address); });
+  Registers registers;
+  for (const auto& block : blocks) {
+    const auto answer =
+        co_await node_.read_patiently(block.address, block.count, in(TransactionClass::parameters));
+    if (!answer) co_return failed(answer.error());
+    for (std::uint16_t i = 0; i < block.count; ++i)
+      registers[static_cast<std::uint16_t>(block.address + i)] = answer->registers[i];
+  }
+  co_return registers;
+}
+
+Task<Result<void>> YakoRtuDrive::configure() {
+  expected_.clear();
+  if (setup_error_) co_return failed(*setup_error_);
+  // The canary goes first and is read last: a restart in between would undo what was found or written.
+  const auto found = co_await node_.read_patiently(reg::start_speed, 6, in(TransactionClass::parameters));
+  if (!found) co_return failed(found.error());
+  std::ranges::copy(found->registers, found_at_connect_.begin());
+  const auto marked =
+      co_await write_canary(distinct(fresh_neutral_block()), in(TransactionClass::parameters));
+  if (!marked) co_return marked;
+  if (const auto done = co_await bring_to(required_); !done) co_return done;
+  co_return co_await check_continuity(TransactionClass::parameters);
+}
+
+Task<Result<void>> YakoRtuDrive::bring_to(std::vector<RegisterSetting> required) {
+  auto addresses = addresses_of(required);
+  addresses.push_back(reg::eeprom_update);
+  auto before = co_await read_registers(std::move(addresses));
+  if (!before) co_return fail(before.error());
+  saving_ = before->at(reg::eeprom_update) == 0;
+  if (const auto done = co_await neutralise_inputs(required, *before); !done) co_return done;
+  if (const auto done = co_await write_differences(required, *before); !done) co_return done;
+  if (const auto done = co_await save_writes(saves_at_rest()); !done) co_return done;
+  co_return co_await verify(required);
+}
+
+bool YakoRtuDrive::saves_at_rest() const { return setup_.persist == PersistSettings::all(); }
+
+Task<Result<void>> YakoRtuDrive::save_writes(bool saved) {
+  if (saving_ == saved) co_return Result<void>{};
+  const std::uint16_t value = saved ? 0 : 1;
+  const auto written =
+      co_await node_.write_patiently(reg::eeprom_update, value, in(TransactionClass::parameters));
+  saving_.reset();
+  if (!written) co_return failed(written.error());
+  saving_ = saved;
+  ++eeprom_writes_;  // whether this register saves itself is not said: counted
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::write_differences(const std::vector<RegisterSetting>& required,
+                                                   Registers& present) {
+  for (std::size_t i = 0; i < required.size();) {
+    const auto& first = required[i];
+    if (first.holds(present.at(first.address))) {  // spares the EEPROM
+      ++i;
+      continue;
+    }
+    std::vector<std::uint16_t> values;
+    while (i < required.size() && values.size() < longest_write) {
+      const auto& next = required[i];
+      const bool fits = next.address == first.address + values.size() && next.saved == first.saved &&
+                        next.starts_motion == first.starts_motion && next.input_bits == first.input_bits;
+      if (!fits || next.holds(present.at(next.address))) break;
+      values.push_back(next.applied_to(present.at(next.address)));
+      ++i;
+    }
+    if (const auto switched = co_await save_writes(first.saved); !switched) co_return switched;
+    if (first.starts_motion)
+      if (const auto inactive = co_await check_inactive(first); !inactive) co_return inactive;
+    if (const auto written = co_await write_run(first.address, std::move(values)); !written)
+      co_return written;
+  }
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::write_run(std::uint16_t address, std::vector<std::uint16_t> values) {
+  Result<Answer> written = fail(Reason::internal, "no attempt was made");
+  for (int attempt = 0; attempt < write_attempts; ++attempt) {
+    written = values.size() == 1
+                  ? co_await node_.write(address, values.front(), in(TransactionClass::parameters))
+                  : co_await node_.write_block(address, values, in(TransactionClass::parameters));
+    if (written || written.error().reason != Reason::no_reply) break;
+  }
+  if (saving_.value_or(true))
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const auto* parameter = find_parameter(model_->descriptor->parameters, address + i);
+      if (parameter != nullptr && parameter->access == Access::rw_saved) ++eeprom_writes_;
+    }
+  if (!written) co_return failed(written.error());
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::verify(const std::vector<RegisterSetting>& required) const {
+  const auto after = co_await read_registers(addresses_of(required));
+  if (!after) co_return fail(after.error());
+  for (const auto& setting : required)
+    if (const auto actual = after->at(setting.address); !setting.holds(actual))
+      co_return fail(error_at(Reason::misconfigured, setting.address,
+                              fmt::format("register 0x{:04X} ({}) reads {} after {} was written",
+                                          setting.address, setting.key, actual, setting.value),
+                              "check whether another master writes to this drive, or its EEPROM fails"));
+  co_return Result<void>{};
+}
+
+/// Takes functions that can start motion off inputs that get another function or level: the new level could
+/// act like an edge of the old function.
+Task<Result<void>> YakoRtuDrive::neutralise_inputs(const std::vector<RegisterSetting>& required,
+                                                   Registers& present) {
+  const auto levels = std::ranges::find(required, reg::input_levels, &RegisterSetting::address);
+  if (levels == required.end()) co_return Result<void>{};
+  const unsigned turned = present.at(reg::input_levels) ^ levels->value;
+  for (const auto& input : required) {
+    if (!is_input_function(input)) continue;
+    auto& function = present.at(input.address);
+    const bool changes = function != input.value || (turned & input.input_bits) != 0;
+    if (!changes || !starts_motion(*model_, function)) continue;
+    if (const auto switched = co_await save_writes(input.saved); !switched) co_return switched;
+    if (const auto written = co_await write_run(input.address, {0}); !written) co_return written;
+    function = 0;
+  }
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::check_inactive(const RegisterSetting& setting) const {
+  const auto answer = co_await node_.read(reg::mode, state_count, in(TransactionClass::parameters));
+  if (!answer) co_return failed(answer.error());
+  const auto state = decode_state(answer->registers);
+  if (state.enabled || state.moving || (state.inputs & setting.input_bits) != 0)
+    co_return fail(error_at(
+        Reason::misconfigured, setting.address,
+        fmt::format("{} can start motion and is only written while the drive is released and the input "
+                    "inactive",
+                    setting.key),
+        "release the drive and open the input; it is tried again by itself"));
+  co_return Result<void>{};
+}
+
+Task<Result<Drift>> YakoRtuDrive::check_drift() {
+  std::vector<RegisterSetting> watched;
+  for (const auto& setting : required_)
+    if (setting.address == reg::microstep || setting.address == reg::overtravel_stop ||
+        (setting.address >= reg::input_levels && setting.address < reg::segment_pulses_high))
+      watched.push_back(setting);
+  const auto present = co_await read_registers(addresses_of(watched));
+  if (!present) co_return fail(present.error());
+  Drift drift;
+  for (const auto& setting : watched) {
+    const auto actual = present->at(setting.address);
+    if (setting.holds(actual)) continue;
+    drift.text +=
+        fmt::format("{}{} (register 0x{:04X}) reads {} instead of {}", drift.text.empty() ? "" : "; ",
+                    setting.key, setting.address, actual, setting.applied_to(actual));
+    drift.scale_changed = drift.scale_changed || setting.address == reg::microstep;
+  }
+  co_return drift;
+}
+
+std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context) {
+  return std::make_unique<YakoRtuDrive>(model, std::move(context));
+}
+
+}  // namespace axisd::yako_rtu

@@ -1,0 +1,180 @@
+// Power, starts and stops, and the canary that every start depends on.
+#include <algorithm>
+#include <utility>
+
+#include "devices/yako_rtu/drive.hpp"
+#include "devices/yako_rtu/registers.hpp"
+
+namespace axisd::yako_rtu {
+
+namespace {
+
+constexpr int chain_attempts = 3;
+
+TransactionOptions in(TransactionClass transaction_class) { return {.transaction_class = transaction_class}; }
+
+}  // namespace
+
+MotionBlock YakoRtuDrive::fresh_neutral_block() const {
+  // Pulses 0: should a terminal start a relative move, it goes nowhere.
+  // The deceleration time differs a little each time: a record of an earlier power cycle then never fits this
+  // one.
+  const auto moment = clock_->now().time_since_epoch() / std::chrono::milliseconds(1);
+  return {5, 100, static_cast<std::uint16_t>(101 + moment % 61), 60, 0, 0};
+}
+
+/// Keeps a block off every content that a power-up could leave.
+MotionBlock YakoRtuDrive::distinct(MotionBlock block) const {
+  while (block == factory_block || block == found_at_connect_)
+    block[1] = block[1] < 2000 ? block[1] + 1 : block[1] - 2;
+  return block;
+}
+
+Task<Result<void>> YakoRtuDrive::write_canary(MotionBlock block, TransactionOptions options) {
+  const auto written = co_await node_.write_block(reg::start_speed, block, std::move(options));
+  if (written) {
+    expected_ = {block};
+    co_return Result<void>{};
+  }
+  // Without a reply either content may stand there now.
+  if (written.error().outcome == Outcome::unknown) expected_.push_back(block);
+  co_return failed(written.error());
+}
+
+Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions options) {
+  auto answer = co_await node_.read(reg::start_speed, 6, std::move(options));
+  if (!answer) co_return failed(answer.error());
+  MotionBlock block{};
+  std::ranges::copy(answer->registers, block.begin());
+  if (std::ranges::find(expected_, block) == expected_.end()) {
+    expected_.clear();
+    co_return fail(error_at(Reason::rebooted, reg::start_speed,
+                            "the drive lost its memory: it was switched off and on",
+                            "home the axis again, then enable it; nothing resumes by itself"));
+  }
+  expected_ = {block};
+  co_return answer;
+}
+
+Task<Result<void>> YakoRtuDrive::check_continuity(TransactionClass transaction_class) {
+  const auto answer = co_await read_canary(in(transaction_class));
+  if (!answer) co_return fail(answer.error());
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::enable(MotionGuard guard) {
+  const auto canary = co_await read_canary({.transaction_class = TransactionClass::motion, .guard = guard});
+  if (!canary) co_return fail(canary.error());
+  const auto written =
+      co_await node_.write(reg::enable, 1, {.transaction_class = TransactionClass::motion, .guard = guard});
+  if (!written) co_return failed(written.error());
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::disable(MotionGuard guard) {
+  const auto written = co_await node_.write_patiently(
+      reg::enable, 0, {.transaction_class = TransactionClass::stop, .guard = std::move(guard)});
+  if (!written) co_return failed(written.error());
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::start_move(MoveProfile profile, MotionGuard guard) {
+  // 7.6.1: bit 0 position mode, bit 2 absolute. An absolute start that arrives twice goes nowhere the second
+  // time.
+  co_return co_await start(encode(profile), std::nullopt, {reg::start, 5}, std::move(guard));
+}
+
+Task<Result<void>> YakoRtuDrive::start_velocity(VelocityProfile profile, MotionGuard guard) {
+  co_return co_await start(encode(profile), std::nullopt, {reg::start, 2}, std::move(guard));
+}
+
+Task<Result<void>> YakoRtuDrive::start_homing(HomingProfile profile, MotionGuard guard) {
+  // Homing uses its own block; the motion block is only the canary, and keeps what it holds.
+  if (expected_.empty())
+    co_return fail(
+        error_at(Reason::configuring, reg::start_speed, "the drive is not configured yet", "wait"));
+  co_return co_await start(expected_.back(), encode(profile), {reg::homing_start, 1}, std::move(guard));
+}
+
+Result<void> YakoRtuDrive::check_control_mode() const {
+  const auto setting = setup_.model_settings.find("control_mode");
+  const auto* mode =
+      setting == setup_.model_settings.end() ? nullptr : std::get_if<std::string>(&setting->second);
+  if (mode == nullptr || *mode == "bus") return {};
+  return fail(error_at(Reason::not_supported, reg::control_mode,
+                       "the drive takes its motion from pulse inputs (drive.control_mode: " + *mode + ")",
+                       "set drive.control_mode to bus, and switch the drive off and on"));
+}
+
+Task<Result<void>> YakoRtuDrive::start(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
+                                       MotionGuard guard) {
+  auto result = check_control_mode();
+  if (!result) co_return result;
+  for (int attempt = 0; attempt < chain_attempts; ++attempt) {
+    result = co_await start_once(block, homing, trigger, guard);
+    if (result) break;
+    const auto& error = result.error();
+    const bool trigger_sent = error.where.object == trigger.address && error.outcome == Outcome::unknown;
+    // The canary had grown too old for the trigger, or a reply was lost before it: the chain begins anew.
+    const bool canary_expired = error.reason == Reason::expired && clock_->now() < guard.not_after;
+    const bool lost_before_trigger = error.reason == Reason::no_reply && !trigger_sent;
+    if (!canary_expired && !lost_before_trigger) break;
+  }
+  if (!result && result.error().where.object != trigger.address && result.error().outcome == Outcome::unknown)
+    result.error().outcome = Outcome::not_executed;  // only parameters were written
+  co_return result;
+}
+
+Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<HomingBlock> homing,
+                                            Trigger trigger, MotionGuard guard) {
+  const TransactionOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
+  const auto canary = co_await read_canary(motion);
+  if (!canary) co_return fail(canary.error());
+
+  if (homing) {
+    if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
+  } else if (const auto written = co_await write_canary(distinct(block), motion); !written) {
+    co_return written;
+  }
+
+  // A drive that restarts after the canary was read is silent for longer than reboot_guard: a trigger bound
+  // within it never meets default parameters.
+  auto fresh = motion;
+  fresh.guard.not_after = std::min(guard.not_after, canary->sent_at + setup_.reboot_guard);
+  const auto triggered = co_await node_.write(trigger.address, trigger.value, fresh);
+  if (!triggered) co_return failed(triggered.error());
+  co_return Result<void>{};
+}
+
+/// The block of homing is compared and not just written: with `persist` each write wears the EEPROM.
+Task<Result<void>> YakoRtuDrive::prepare_homing(HomingBlock block, TransactionOptions options) {
+  const auto present = co_await node_.read(reg::homing_mode, 6, options);
+  if (!present) co_return failed(present.error());
+  if (std::ranges::equal(present->registers, block)) co_return Result<void>{};
+  const auto written = co_await node_.write_block(reg::homing_mode, block, std::move(options));
+  if (saving_.value_or(true)) eeprom_writes_ += block.size();
+  if (!written) co_return failed(written.error());
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::stop(StopKind kind) {
+  const std::uint16_t value = kind == StopKind::quick_stop ? 1 : 0;  // 7.6.2: zero is a command
+  const auto written = co_await node_.write(reg::stop, value, in(TransactionClass::stop));
+  if (!written) co_return failed(written.error());
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::clear_alarm() {
+  const auto written = co_await node_.write_patiently(reg::alarm_clear, 1, in(TransactionClass::parameters));
+  if (!written) co_return failed(written.error());
+  co_return Result<void>{};
+}
+
+Task<Result<void>> YakoRtuDrive::clear_position(MotionGuard guard) {
+  const auto written = co_await node_.write(
+      reg::position_clear, 1, {.transaction_class = TransactionClass::motion, .guard = std::move(guard)});
+  if (!written) co_return failed(written.error());
+  co_return Result<void>{};
+}
+
+}  // namespace axisd::yako_rtu

@@ -1,0 +1,217 @@
+// The catalogue by number, the segment table, the drive's memory, and its address.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/yako_rtu/drive.hpp"
+#include "devices/yako_rtu/register_blocks.hpp"
+#include "devices/yako_rtu/registers.hpp"
+
+namespace axisd::yako_rtu {
+
+namespace {
+
+/// The manuals give no figure for how long 150 registers take to be saved; the drive may be silent meanwhile.
+constexpr auto eeprom_patience = std::chrono::seconds(3);
+constexpr std::array<std::string_view, 4> formats = {"8N1", "8N2", "8E1", "8O1"};  // codes of 0x0015
+
+TransactionOptions parameters() { return {.transaction_class = TransactionClass::parameters}; }
+TransactionOptions eeprom() {
+  auto options = parameters();
+  options.turnaround_max = eeprom_patience;
+  return options;
+}
+
+struct Owner {
+  std::uint16_t address;
+  std::string_view key;
+};
+/// Written with every motion, and what the canary is made of.
+constexpr Owner motion_owners[] = {{reg::start_speed, "limits.start_speed"},
+                                   {reg::acceleration_time, "limits.acceleration_time"},
+                                   {reg::deceleration_time, "limits.deceleration_time"},
+                                   {reg::maximum_speed, "limits.velocity"},
+                                   {reg::pulses_high, "each motion command"},
+                                   {reg::pulses_low, "each motion command"},
+                                   {reg::eeprom_update, "persist"},
+                                   {reg::custom_node, "DriveService.Readdress"},
+                                   {reg::custom_baud, "DriveService.SetSerial"},
+                                   {reg::serial_format, "DriveService.SetSerial"}};
+
+}  // namespace
+
+std::string YakoRtuDrive::configured_by(std::uint32_t address) const {
+  const auto required = std::ranges::find(required_, address, &RegisterSetting::address);
+  if (required != required_.end()) return required->key;
+  const auto owner = std::ranges::find(motion_owners, address, &Owner::address);
+  return owner == std::end(motion_owners) ? std::string() : std::string(owner->key);
+}
+
+Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_parameters(
+    std::vector<std::uint32_t> addresses) {
+  std::vector<std::uint16_t> wanted(addresses.begin(), addresses.end());
+  const auto registers = co_await read_registers(std::move(wanted));
+  if (!registers) co_return fail(registers.error());
+  std::vector<ParameterValue> values;
+  for (const auto address : addresses) {
+    const auto* parameter = find_parameter(model_->descriptor->parameters, address);
+    const auto word = registers->find(static_cast<std::uint16_t>(address));
+    if (parameter == nullptr || word == registers->end())
+      co_return fail(error_at(Reason::not_supported, static_cast<std::uint16_t>(address),
+                              "the drive as it is configured has no such register",
+                              "see drive.terminal_registers"));
+    values.push_back({.address = address, .value = number_of(*parameter, word->second)});
+  }
+  co_return values;
+}
+
+Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::vector<ParameterValue> values) {
+  std::vector<std::uint32_t> addresses;
+  for (const auto& value : values) {
+    addresses.push_back(value.address);
+    std::vector<std::uint16_t> word{static_cast<std::uint16_t>(value.value & 0xFFFF)};
+    const auto written = co_await write_run(static_cast<std::uint16_t>(value.address), std::move(word));
+    if (!written) co_return fail(written.error());
+  }
+  auto present = co_await read_parameters(std::move(addresses));
+  if (!present) co_return present;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (((*present)[i].value & 0xFFFF) != (values[i].value & 0xFFFF))
+      co_return fail(
+          error_at(Reason::misconfigured, static_cast<std::uint16_t>(values[i].address),
+                   fmt::format("reads {} after {} was written", (*present)[i].value, values[i].value),
+                   "check whether another master writes to this drive, or its EEPROM fails"));
+  co_return present;
+}
+
+Task<Result<DriveSegments>> YakoRtuDrive::read_segments() {
+  std::vector<std::uint16_t> addresses{reg::terminal_move_mode};
+  for (const auto first : {reg::segment_pulses_high, reg::segment_pulses_low, reg::segment_speed,
+                           reg::segment_time, reg::segment_pv_speed})
+    for (std::uint16_t i = 0; i < 16; ++i) addresses.push_back(static_cast<std::uint16_t>(first + i));
+  const auto registers = co_await read_registers(std::move(addresses));
+  if (!registers) co_return fail(registers.error());
+  DriveSegments segments{.absolute = registers->at(reg::terminal_move_mode) == 1};
+  for (std::uint16_t i = 0; i < 16; ++i) {
+    const auto at = [&](std::uint16_t first) { return registers->at(static_cast<std::uint16_t>(first + i)); };
+    segments.rows.at(i) = {
+        .pulses = static_cast<std::int32_t>(std::uint32_t{at(reg::segment_pulses_high)} << 16U |
+                                            at(reg::segment_pulses_low)),
+        .velocity_rpm = at(reg::segment_speed),
+        .acceleration_time = std::chrono::milliseconds(at(reg::segment_time)),
+        .pv_velocity_rpm = at(reg::segment_pv_speed)};
+  }
+  co_return segments;
+}
+
+Task<Result<void>> YakoRtuDrive::write_segments(DriveSegments segments) {
+  auto required = segment_registers(segments, segment_enables(*model_, setup_));
+  for (auto& row : required) row.saved = setup_.persist.segments;
+  required.push_back({.address = reg::terminal_move_mode,
+                      .value = static_cast<std::uint16_t>(segments.absolute ? 1 : 0),
+                      .key = "segments.mode"});
+  co_return co_await bring_to(std::move(required));
+}
+
+Task<Result<void>> YakoRtuDrive::save_parameters() {
+  // What is saved now stands there after the next power-up, when a terminal may start it: nothing that moves
+  // (M27).
+  MotionBlock neutral = fresh_neutral_block();
+  neutral[3] = 0;
+  if (const auto written = co_await write_canary(distinct(neutral), parameters()); !written)
+    co_return written;
+  const auto saved = co_await node_.write(reg::parameter_setting, 2, eeprom());
+  const auto& catalogue = model_->descriptor->parameters;
+  eeprom_writes_ += static_cast<std::uint64_t>(std::ranges::count_if(catalogue, [](const auto& parameter) {
+    return parameter.access == Access::rw || parameter.access == Access::rw_saved;
+  }));
+  found_at_connect_ = expected_.back();
+  if (!saved) co_return failed(saved.error());
+  // Saved, the canary would no longer tell a power-up (M7).
+  co_return co_await write_canary(distinct(fresh_neutral_block()), parameters());
+}
+
+Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t> taken) {
+  const auto before = co_await read_registers({reg::node, reg::custom_node, reg::custom_baud});
+  if (!before) co_return fail(before.error());
+  const auto node = before->at(reg::node);
+  const bool custom = before->at(reg::custom_node) == node;
+  if (custom && std::ranges::find(taken, model_->factory_custom_node) != taken.end())
+    co_return fail(
+        error_at(Reason::misconfigured, reg::custom_node,
+                 fmt::format("after the next power-up the drive would answer at address {}, which "
+                             "another axis of this bus has",
+                             model_->factory_custom_node),
+                 "set the drive's address switches first, or give the other drive another address"));
+  const auto restored = co_await node_.write(reg::parameter_setting, 1, eeprom());
+  eeprom_writes_ += static_cast<std::uint64_t>(
+      std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access));
+  expected_.clear();  // whatever stands there now, it is not ours
+  saving_.reset();
+  if (!restored) co_return failed(restored.error());
+  auto text =
+      custom ? fmt::format("after the next power-up: address {}",
+                           model_->factory_custom_node != 0 ? std::to_string(model_->factory_custom_node)
+                                                            : "undefined (set the address switches first)")
+             : fmt::format("after the next power-up: address {} by its switches", node);
+  co_return text + ", format 8N1, baud by its switches" +
+      (model_->custom_bauds.empty() ? "" : fmt::format(" or {}", model_->custom_bauds.front()));
+}
+
+Result<std::vector<ParameterValue>> YakoRtuDrive::serial_registers(const SerialChange& change) const {
+  std::vector<ParameterValue> values;
+  if (change.node) {
+    if (*change.node < model_->minimum_custom_node || *change.node > model_->maximum_custom_node) {
+      auto error = error_at(Reason::out_of_range, reg::custom_node,
+                            fmt::format("address {} cannot be set by register", *change.node),
+                            "use the address switches, or another address");
+      error.permitted = Range{.minimum = static_cast<double>(model_->minimum_custom_node),
+                              .maximum = static_cast<double>(model_->maximum_custom_node)};
+      return fail(std::move(error));
+    }
+    values.push_back({.address = reg::custom_node, .value = *change.node});
+  }
+  if (change.baud) {
+    const auto code = std::ranges::find(model_->custom_bauds, *change.baud);
+    if (code == model_->custom_bauds.end())
+      return fail(error_at(Reason::out_of_range, reg::custom_baud,
+                           fmt::format("{} baud cannot be set by register", *change.baud),
+                           fmt::format("possible: {}", fmt::join(model_->custom_bauds, ", "))));
+    values.push_back({.address = reg::custom_baud, .value = code - model_->custom_bauds.begin()});
+  }
+  if (change.format) {
+    const auto code = std::ranges::find(formats, to_string(*change.format));
+    if (code == formats.end())
+      return fail(error_at(Reason::out_of_range, reg::serial_format, "the drive has no such format",
+                           "possible: 8N1, 8N2, 8E1, 8O1"));
+    values.push_back({.address = reg::serial_format, .value = code - formats.begin()});
+  }
+  if (values.empty())
+    return fail(error_at(Reason::invalid_argument, reg::custom_node, "nothing to change",
+                         "name an address, a baud rate or a format"));
+  return values;
+}
+
+std::string YakoRtuDrive::serial_advice(const SerialChange& change) const {
+  std::string text = "saved; it counts from the next power-up";
+  if (change.node && model_->custom_node_switches[0] != '\0')
+    text += fmt::format(", with {}", model_->custom_node_switches);
+  if (change.baud && model_->custom_baud_switches[0] != '\0')
+    text += fmt::format(", with {}", model_->custom_baud_switches);
+  return text + ": switch the drive off and on, and change the configuration";
+}
+
+Task<Result<std::string>> YakoRtuDrive::change_serial(SerialChange change) {
+  auto values = serial_registers(change);
+  if (!values) co_return fail(values.error());
+  // Without `persist` the drive was told not to save: such a change would be gone when it counts.
+  if (const auto saving = co_await save_writes(true); !saving) co_return fail(saving.error());
+  const auto written = co_await write_parameters(std::move(*values));
+  const auto restored = co_await save_writes(saves_at_rest());
+  if (!written) co_return fail(written.error());
+  if (!restored) co_return fail(restored.error());
+  co_return serial_advice(change);
+}
+
+}  // namespace axisd::yako_rtu
