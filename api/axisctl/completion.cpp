@@ -33,8 +33,8 @@ void collect_valued(const CLI::App& app, std::set<std::string>& names) {
   for (const auto* command : app.get_subcommands(nullptr)) collect_valued(*command, names);
 }
 
-/// What the words after a subcommand are: subcommands, axes, files or nothing.
-std::string case_of(const CLI::App& command) {
+/// What the words after a subcommand are: subcommands, axes, files or nothing. Subcommands of a group follow.
+std::string case_of(const CLI::App& command, const std::string& path) {
   std::string kind = "none";
   for (const auto* option : command.get_options()) {
     if (!option->get_positional()) continue;
@@ -43,8 +43,19 @@ std::string case_of(const CLI::App& command) {
   }
   const std::string words = subcommands_of(command);
   if (!words.empty()) kind = "words";
-  return fmt::format("    {}) kind={}; words='{}'; options='{}' ;;\n", command.get_name(), kind, words,
-                     options_of(command));
+  std::string text =
+      fmt::format("    '{}') kind={}; words='{}'; options='{}' ;;\n", path, kind, words, options_of(command));
+  for (const auto* part : command.get_subcommands(nullptr))
+    text += case_of(*part, path + " " + part->get_name());
+  return text;
+}
+
+/// Subcommands that have subcommands.
+std::string groups_of(const CLI::App& app) {
+  std::string text;
+  for (const auto* command : app.get_subcommands(nullptr))
+    if (!command->get_subcommands(nullptr).empty()) text += fmt::format(" {}", command->get_name());
+  return text;
 }
 
 }  // namespace
@@ -53,7 +64,7 @@ std::string bash_completion(const CLI::App& app) {
   std::set<std::string> valued;
   collect_valued(app, valued);
   std::string cases;
-  for (const auto* command : app.get_subcommands(nullptr)) cases += case_of(*command);
+  for (const auto* command : app.get_subcommands(nullptr)) cases += case_of(*command, command->get_name());
   return fmt::format(R"bash(# bash completion for axisctl; printed by `axisctl completion bash`
 _axisctl() {{
   local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD-1]}}
@@ -68,6 +79,7 @@ _axisctl() {{
     elif [[ ' {1} ' == *" $word "* ]]; then skip=$word
     elif [[ $word == -* ]]; then :
     elif [[ -z $command ]]; then command=$word
+    elif [[ ' {4} ' == *" $command "* ]]; then command="$command $word"
     else ((seen++)); fi
   done
   case $command in
@@ -89,7 +101,7 @@ _axisctl() {{
 }}
 complete -F _axisctl axisctl
 )bash",
-                     subcommands_of(app), fmt::join(valued, " "), cases, options_of(app));
+                     subcommands_of(app), fmt::join(valued, " "), cases, options_of(app), groups_of(app));
 }
 
 }  // namespace axisd::axisctl

@@ -19,7 +19,7 @@ Values carry the axis's unit or none: 120mm, -10, 50mm/s. Times carry theirs: 15
 A command that was accepted goes on when axisctl ends, also by Ctrl-C or --timeout; only jog ends with it.
 
 Exit status:
-  0    ok; with --wait: the motion is Done
+  0    ok; with --wait: the motion is Done, with --verify: the drive was found
   1    the motion ended otherwise (Aborted, Error, Unknown)
   2    bad arguments or a bad configuration file
   3    the daemon cannot be reached or did not answer in time
@@ -101,6 +101,9 @@ int run(int argc, const char* const* argv) {
   add_jog_command(app, invocation);
   add_stop_commands(app, invocation);
   add_command_commands(app, invocation);
+  add_drive_commands(app, invocation);
+  add_bus_commands(app, invocation);
+  add_event_commands(app, invocation);
   add_system_commands(app, invocation);
   add_offline_commands(app, invocation);
   try {

@@ -36,6 +36,9 @@ void add_motion_commands(CLI::App& app,
 void add_jog_command(CLI::App& app, Invocation& invocation);  ///< jog
 void add_stop_commands(CLI::App& app, Invocation& invocation);     ///< halt, stop, quick-stop, release-stop
 void add_command_commands(CLI::App& app, Invocation& invocation);  ///< command get|watch|cancel
+void add_drive_commands(CLI::App& app, Invocation& invocation);    ///< drive ...
+void add_bus_commands(CLI::App& app, Invocation& invocation);      ///< bus scan|read|write, device list|write
+void add_event_commands(CLI::App& app, Invocation& invocation);    ///< events
 void add_system_commands(CLI::App& app, Invocation& invocation);   ///< buses, info
 void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, schema, completion
 

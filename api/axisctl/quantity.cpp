@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
+
 #include "api/axisctl/error.hpp"
 #include "config/quantity.hpp"
 
@@ -25,6 +27,21 @@ std::chrono::nanoseconds parse_duration(std::string_view text, std::string_view 
   const auto duration = config::parse_duration(text);
   if (!duration) throw usage(what, duration.error());
   return *duration;
+}
+
+std::int64_t parse_integer(std::string_view text, std::string_view what) {
+  std::string_view digits = text;
+  const bool negative = digits.starts_with('-');
+  if (negative) digits.remove_prefix(1);
+  const bool hex = digits.starts_with("0x") || digits.starts_with("0X");
+  if (hex) digits.remove_prefix(2);
+  std::int64_t value = 0;
+  const auto [end, error] =
+      std::from_chars(digits.data(), digits.data() + digits.size(), value, hex ? 16 : 10);
+  if (error != std::errc{} || end != digits.data() + digits.size() || digits.starts_with('-'))
+    throw Failure(ExitCode::usage,
+                  fmt::format("{}: '{}' is no whole number; write 12, -3 or 0x1F", what, text));
+  return negative ? -value : value;
 }
 
 }  // namespace axisd::axisctl

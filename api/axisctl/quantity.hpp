@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -12,7 +13,10 @@ namespace axisd::axisctl {
 double parse_value(std::string_view text, std::string_view unit, std::string_view what);
 
 /// A time with its unit, "150ms", "2s": a bare number would be ambiguous. Not negative. Throws Failure
-/// (usage). (usage).
+/// (usage).
 std::chrono::nanoseconds parse_duration(std::string_view text, std::string_view what);
+
+/// Decimal or 0x, signed. Throws Failure (usage). `what` names the argument.
+std::int64_t parse_integer(std::string_view text, std::string_view what);
 
 }  // namespace axisd::axisctl

@@ -58,6 +58,13 @@ class Details {
   std::string text_;
 };
 
+/// Who set it in motion, if that was not a command.
+std::string foreign_motion(const v1::AxisState& state) {
+  if (state.motion_cause() == v1::MOTION_CAUSE_TERMINAL) return "started by a terminal";
+  if (state.motion_cause() == v1::MOTION_CAUSE_UNKNOWN) return "started by nobody that is known";
+  return "";
+}
+
 std::string power(const v1::AxisState& state) {
   if (!state.enabled()) return "off";
   return state.enabled_by_daemon() ? "on" : "on, found so: nobody enabled it through this daemon";
@@ -72,6 +79,8 @@ std::string remarks(const v1::AxisState& state) {
   if (state.stop_held()) append(text, "stop held");
   if (state.alarm_code() != 0)
     append(text, fmt::format("alarm {} {}", state.alarm_code(), state.alarm_name()));
+  if (const auto cause = foreign_motion(state); !cause.empty()) append(text, cause);
+  if (!state.drift().empty()) append(text, "drift: " + state.drift());
   if (state.enabled() && !state.enabled_by_daemon()) append(text, "not enabled by us");
   if (state.has_fault() && state.alarm_code() == 0) append(text, state.fault().message());
   if (state.has_link_error()) append(text, state.link_error().message());
@@ -94,7 +103,9 @@ Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes) 
                state.model(),
                state.bus(),
                std::to_string(state.node()),
-               {remarks(state), state.has_fault() || state.has_link_error() ? Colour::red : Colour::none}});
+               {remarks(state), state.has_fault() || state.has_link_error() || !state.drift().empty()
+                                    ? Colour::red
+                                    : Colour::none}});
   return table;
 }
 
@@ -109,6 +120,7 @@ std::string state_details(const v1::AxisState& state, bool colour) {
     details.add("fault", coloured(describe(state.fault(), state.axis()), Colour::red, colour));
   if (state.alarm_code() != 0)
     details.add("alarm", fmt::format("{} {}", state.alarm_code(), state.alarm_name()));
+  if (!state.drift().empty()) details.add("drift", coloured(state.drift(), Colour::red, colour));
   details.add("power", power(state));
   details.add("position",
               fmt::format("{} ({}{})", with_unit(state.position(), state.unit()), trust(state),
@@ -117,6 +129,8 @@ std::string state_details(const v1::AxisState& state, bool colour) {
                                                                                    : ""));
   if (state.has_target()) details.add("target", with_unit(state.target(), state.unit()));
   details.add("velocity", with_unit(state.velocity(), state.unit() + "/s"));
+  if (state.moving())
+    details.add("motion", foreign_motion(state).empty() ? "by command" : foreign_motion(state));
   details.add("command", state.command_id());
   details.add("inputs", terminals(state.inputs()));
   details.add("outputs", terminals(state.outputs()));
@@ -127,6 +141,8 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   if (state.has_link_error())
     details.add("link error", coloured(describe(state.link_error(), state.axis()), Colour::red, colour));
   if (state.has_age()) details.add("measured", duration_text(seconds(state.age())) + " ago");
+  if (state.eeprom_writes() > 0)
+    details.add("EEPROM", fmt::format("{} registers saved", state.eeprom_writes()));
   if (state.drive_reboots() > 0) details.add("reboots", std::to_string(state.drive_reboots()));
   return std::move(details).text();
 }

@@ -30,6 +30,7 @@ bool EventStream::next(v1::WatchEventsResponse& to) {
     query_.cursor =
         batch.events.empty() ? std::max(query_.cursor, batch.newest) : batch.events.back().sequence;
     to.set_lost(to.lost() + batch.lost);
+    to.set_newest(batch.newest);
     for (const auto& event : batch.events)
       if (wanted(event)) to_proto(event, *to.add_events());
     // A batch that the filters leave empty is no message; the next one may have something.

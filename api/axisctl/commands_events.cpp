@@ -1,0 +1,106 @@
+// events: what happened, in order.
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+
+#include "api/axisctl/duration.hpp"
+#include "api/axisctl/event_text.hpp"
+#include "api/axisctl/format.hpp"
+#include "api/axisctl/interrupt.hpp"
+#include "api/axisctl/invocation.hpp"
+#include "api/axisctl/quantity.hpp"
+#include "api/axisctl/terminal.hpp"
+#include "axisd/v1/event_service.grpc.pb.h"
+#include "axisd/v1/system_service.grpc.pb.h"
+
+namespace axisd::axisctl {
+namespace {
+
+struct Arguments {
+  std::vector<std::string> axes, kinds;
+  std::string since;
+  bool follow = false;
+};
+
+bool is_number(const std::string& text) {
+  return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// The request, and the time before which events are not shown.
+struct Query {
+  v1::WatchEventsRequest request;
+  google::protobuf::Timestamp from;
+};
+
+Query query_of(Invocation& invocation, const Arguments& arguments) {
+  Query query;
+  for (const auto& axis : arguments.axes) query.request.add_axes(axis);
+  for (const auto& kind : arguments.kinds) query.request.add_kinds(parse_event_kind(kind));
+  query.request.set_after_sequence(0);
+  if (arguments.since == "now") {
+    query.request.clear_after_sequence();
+  } else if (is_number(arguments.since)) {
+    query.request.set_instance_id(
+        invocation.client()
+            .call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(), std::string_view())
+            .instance_id());
+    query.request.set_after_sequence(static_cast<std::uint64_t>(parse_integer(arguments.since, "--since")));
+  } else if (!arguments.since.empty()) {
+    set_ahead(query.from, -parse_duration(arguments.since, "--since"));
+  }
+  return query;
+}
+
+void show(const Invocation& invocation, const v1::WatchEventsResponse& batch,
+          const google::protobuf::Timestamp& from) {
+  if (batch.lost() > 0 && !invocation.json)
+    print_line(fmt::format("({} earlier events are no longer kept)", batch.lost()));
+  for (const auto& event : batch.events())
+    if (event.at() >= from) print_line(invocation.json ? json(event) : event_line(event));
+}
+
+void events(Invocation& invocation, const Arguments& arguments) {
+  const auto query = query_of(invocation, arguments);
+  grpc::ClientContext context;
+  const Interrupt interrupt([&context] { context.TryCancel(); });
+  v1::EventService::Stub stub(invocation.client().channel());
+  const auto stream = stub.WatchEvents(&context, query.request);
+  bool complete = false;
+  for (v1::WatchEventsResponse batch; !complete && stream->Read(&batch);) {
+    show(invocation, batch, query.from);
+    complete = !arguments.follow && batch.cursor() >= batch.newest();
+  }
+  if (complete) context.TryCancel();
+  const auto status = stream->Finish();
+  // Ctrl-C is how one stops following.
+  if (complete || interrupt.requested()) return;
+  if (status.ok()) throw Failure(ExitCode::unreachable, "the daemon ended the stream");
+  throw invocation.client().failure(status, arguments.axes.size() == 1 ? arguments.axes.front() : "");
+}
+
+}  // namespace
+
+void add_event_commands(CLI::App& app, Invocation& invocation) {
+  auto* command = app.add_subcommand("events", "What happened: terminal edges, states, links, drift");
+  const auto arguments = std::make_shared<Arguments>();
+  command->add_option("AXIS", arguments->axes, "Names of axes; none: all");
+  command
+      ->add_option("--kind", arguments->kinds, "terminal, state, link or configuration; several with commas")
+      ->type_name("LIST")
+      ->delimiter(',');
+  command->add_flag("--follow", arguments->follow, "Go on with new events until Ctrl-C");
+  command
+      ->add_option("--since", arguments->since,
+                   "Only events after a sequence number, younger than a time (10min), or from now on (now)")
+      ->type_name("WHEN");
+  command->footer(R"(
+Examples:
+  axisctl events feeder --since 5min
+  axisctl events --kind terminal --follow --since now)");
+  command->callback([&invocation, arguments] { events(invocation, *arguments); });
+}
+
+}  // namespace axisd::axisctl

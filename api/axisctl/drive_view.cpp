@@ -1,0 +1,166 @@
+#include "api/axisctl/drive_view.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fnmatch.h>
+
+#include "api/axisctl/error.hpp"
+#include "api/axisctl/format.hpp"
+#include "api/axisctl/quantity.hpp"
+
+namespace axisd::axisctl {
+namespace {
+
+std::string line(std::string_view name, std::string_view value) {
+  return value.empty() ? "" : fmt::format("{:<14}{}\n", fmt::format("{}:", name), value);
+}
+
+std::string names_of(const google::protobuf::RepeatedPtrField<v1::TerminalCapability>& terminals) {
+  std::string text;
+  for (const auto& terminal : terminals) text += (text.empty() ? "" : " ") + terminal.name();
+  return text;
+}
+
+/// "X0 X1 X2: none, home, ..."; all terminals of a side can have the same functions.
+std::string terminals(const google::protobuf::RepeatedPtrField<v1::TerminalCapability>& all) {
+  if (all.empty()) return "";
+  return fmt::format("{}: {}", names_of(all), fmt::join(all[0].functions(), ", "));
+}
+
+std::string remedy_of(v1::AlarmReset reset) {
+  switch (reset) {
+    case v1::ALARM_RESET_POWER_CYCLE:
+      return "power cycle";
+    case v1::ALARM_RESET_BY_ITSELF:
+      return "clears itself, then reset";
+    case v1::ALARM_RESET_BY_COMMAND:
+      return "reset";
+    default:
+      return "";
+  }
+}
+
+const char* access_text(v1::ParameterAccess access) {
+  switch (access) {
+    case v1::PARAMETER_ACCESS_READ_ONLY:
+      return "read";
+    case v1::PARAMETER_ACCESS_READ_WRITE:
+      return "read/write";
+    case v1::PARAMETER_ACCESS_READ_WRITE_SAVED:
+      return "saved";
+    case v1::PARAMETER_ACCESS_WRITE_ONLY:
+      return "trigger";
+    default:
+      return "";
+  }
+}
+
+std::string hexadecimal(std::uint32_t address) { return fmt::format("0x{:04X}", address); }
+
+const v1::ParameterValue* find(const google::protobuf::RepeatedPtrField<v1::ParameterValue>& values,
+                               const std::string& name) {
+  for (const auto& value : values)
+    if (value.name() == name) return &value;
+  return nullptr;
+}
+
+/// Who decides it: the configuration's key, or the RPC of a trigger.
+std::string owner(const v1::Parameter& parameter) {
+  if (!parameter.configured_by().empty()) return parameter.configured_by();
+  return parameter.instead().empty() ? "" : "use " + parameter.instead();
+}
+
+}  // namespace
+
+std::string drive_details(const v1::GetDriveResponse& drive) {
+  std::string text;
+  text += line("axis", drive.axis());
+  text += line("model", fmt::format("{} ({})", drive.model(), drive.title()));
+  if (drive.has_model_code())
+    text += line("reported",
+                 fmt::format("code {}, version {}", hexadecimal(drive.model_code()), drive.version()));
+  text += line("loop", drive.closed_loop() ? "closed" : "open");
+  text += line("position", drive.position_source() == v1::POSITION_SOURCE_ENCODER     ? "encoder"
+                           : drive.position_source() == v1::POSITION_SOURCE_COMMANDED ? "counted pulses"
+                                                                                      : "");
+  text += line("watchdog", drive.communication_watchdog() ? "of the communication"
+                                                          : "none: the drive does not notice a cut cable");
+  text += line("limits",
+               fmt::format("{} r/min, {} pulses/s", drive.maximum_rpm(), drive.maximum_pulse_rate_hz()));
+  text += line("pulses/rev", fmt::format("{}", fmt::join(drive.pulses_per_revolution(), ", ")));
+  text += line("homing", fmt::format("{}", fmt::join(drive.homing_methods(), ", ")));
+  text += line("segments", std::to_string(drive.maximum_segments()));
+  text += line("inputs", terminals(drive.inputs()));
+  text += line("outputs", terminals(drive.outputs()));
+  text += line("bauds", fmt::format("{}", fmt::join(drive.bauds(), ", ")));
+  text += line("EEPROM", fmt::format("{} registers saved from here{}", drive.eeprom_writes(),
+                                     drive.persist() ? "; the configuration says persist" : ""));
+  for (const auto& alarm : drive.alarms())
+    text += line(fmt::format("alarm {}", alarm.code()),
+                 fmt::format("{} ({}){}{}", alarm.name(), remedy_of(alarm.reset()),
+                             alarm.remedy().empty() ? "" : ": ", alarm.remedy()));
+  return text;
+}
+
+bool fits(const std::string& name, const std::string& pattern) {
+  if (pattern.find_first_of("*?[") == std::string::npos) return name.contains(pattern);
+  return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+}
+
+Table parameter_table(const v1::ListParametersResponse& catalogue,
+                      const google::protobuf::RepeatedPtrField<v1::ParameterValue>& values,
+                      ParameterColumns columns) {
+  std::vector<std::string> header{"NAME", "ADDRESS"};
+  std::vector<std::size_t> right;
+  if (columns.values) {
+    right = {2, 4};
+    header.emplace_back("VALUE");
+  } else {
+    right = {3};
+  }
+  for (const auto* name : {"RANGE", "DEFAULT", "ACCESS", "UNIT", "OWNER"}) header.emplace_back(name);
+  if (columns.descriptions) header.emplace_back("DESCRIPTION");
+  Table table(std::move(header), std::move(right));
+  for (const auto& parameter : catalogue.parameters()) {
+    std::vector<Cell> row{parameter.name(), hexadecimal(parameter.address())};
+    if (columns.values) {
+      const auto* value = find(values, parameter.name());
+      const bool differs =
+          value != nullptr && parameter.has_default_value() && value->value() != parameter.default_value();
+      row.emplace_back(value != nullptr ? std::to_string(value->value()) : "",
+                       differs ? Colour::bold : Colour::none);
+    }
+    row.emplace_back(fmt::format("{}..{}", parameter.minimum(), parameter.maximum()));
+    row.emplace_back(parameter.has_default_value() ? std::to_string(parameter.default_value()) : "");
+    row.emplace_back(access_text(parameter.access()));
+    row.emplace_back(parameter.unit());
+    row.emplace_back(owner(parameter), Colour::dim);
+    if (columns.descriptions) row.emplace_back(parameter.description());
+    table.add(std::move(row));
+  }
+  return table;
+}
+
+Table value_table(const v1::ListParametersResponse& catalogue,
+                  const google::protobuf::RepeatedPtrField<v1::ParameterValue>& values) {
+  Table table({"NAME", "ADDRESS", "VALUE", "UNIT"}, {2});
+  for (const auto& value : values) {
+    std::string unit;
+    for (const auto& parameter : catalogue.parameters())
+      if (parameter.name() == value.name()) unit = parameter.unit();
+    table.add({value.name(), hexadecimal(value.address()), std::to_string(value.value()), unit});
+  }
+  return table;
+}
+
+v1::ParameterValue parse_assignment(std::string_view text) {
+  const auto at = text.find('=');
+  if (at == std::string_view::npos || at == 0)
+    throw Failure(ExitCode::usage, fmt::format("'{}' is not NAME=VALUE", text));
+  v1::ParameterValue value;
+  value.set_name(std::string(text.substr(0, at)));
+  value.set_value(parse_integer(text.substr(at + 1), value.name()));
+  return value;
+}
+
+}  // namespace axisd::axisctl

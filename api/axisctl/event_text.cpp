@@ -1,0 +1,77 @@
+#include "api/axisctl/event_text.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
+#include <algorithm>
+
+#include "api/axisctl/error.hpp"
+#include "api/axisctl/format.hpp"
+
+namespace axisd::axisctl {
+namespace {
+
+using google::protobuf::util::TimeUtil;
+
+std::string text_of(const v1::TerminalEdge& edge) {
+  return fmt::format("{}{}{} {} (within {})", edge.terminal(), edge.function().empty() ? "" : " ",
+                     edge.function(), edge.active() ? "on" : "off",
+                     duration_text(seconds(edge.before() - edge.after())));
+}
+
+std::string text_of(const v1::StateChange& change) {
+  const auto state = [](v1::State value) { return camel_word(v1::State_Name(value), "STATE_"); };
+  std::string text = fmt::format("{} -> {}", state(change.from()), state(change.to()));
+  if (change.cause() == v1::MOTION_CAUSE_TERMINAL) text += ", started by a terminal";
+  if (change.cause() == v1::MOTION_CAUSE_UNKNOWN) text += ", started by nobody that is known";
+  return text;
+}
+
+std::string text_of(const v1::LinkChange& change) {
+  const auto link = lower_word(v1::LinkState_Name(change.to()), "LINK_STATE_");
+  return change.detail().empty() ? link : fmt::format("{}: {}", link, change.detail());
+}
+
+std::string text_of(const v1::ConfigurationDrift& drift) {
+  return drift.text().empty() ? "holds its configuration again" : "drift: " + drift.text();
+}
+
+std::string content(const v1::Event& event) {
+  switch (event.content_case()) {
+    case v1::Event::kTerminalEdge:
+      return text_of(event.terminal_edge());
+    case v1::Event::kStateChange:
+      return text_of(event.state_change());
+    case v1::Event::kLinkChange:
+      return text_of(event.link_change());
+    case v1::Event::kConfigurationDrift:
+      return text_of(event.configuration_drift());
+    case v1::Event::CONTENT_NOT_SET:
+      break;
+  }
+  return "an event that this axisctl does not know";
+}
+
+}  // namespace
+
+std::string event_line(const v1::Event& event) {
+  // Milliseconds: no bus is quicker.
+  const auto at = TimeUtil::MillisecondsToTimestamp(TimeUtil::TimestampToMilliseconds(event.at()));
+  return fmt::format("{}  {}  {}  {}", TimeUtil::ToString(at), event.sequence(), event.axis(),
+                     content(event));
+}
+
+v1::EventKind parse_event_kind(std::string_view text) {
+  for (int number = v1::EventKind_MIN + 1; number <= v1::EventKind_MAX; ++number) {
+    const auto kind = static_cast<v1::EventKind>(number);
+    auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
+    std::ranges::replace(name, ' ', '-');
+    if (text == name || text == name.substr(0, name.find('-'))) return kind;
+  }
+  throw Failure(ExitCode::usage,
+                fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
+                            "configuration",
+                            text));
+}
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,17 @@
+// Events as lines. Pure.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "axisd/v1/event_service.pb.h"
+
+namespace axisd::axisctl {
+
+/// "2026-01-02T03:04:05.678Z  12  feeder  X0 home on (within 20 ms)".
+std::string event_line(const v1::Event& event);
+/// "terminal-edge", "state-change", "link-change" or "configuration-drift", or their first words. Throws
+/// Failure (usage).
+v1::EventKind parse_event_kind(std::string_view text);
+
+}  // namespace axisd::axisctl
