@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "devices/machine.hpp"
+#include "tests/unit/api/fake_access.hpp"
 
 namespace axisd::testing {
 
@@ -39,6 +40,10 @@ class FakeMachine final : public Machine {
   void change(const Command& command);
   void set_now(TimePoint now) { now_ = now; }
 
+  FakeDrives& drives() { return drives_; }
+  FakeBuses& nodes() { return buses_; }
+  FakeEvents& event_log() { return events_; }
+
   [[nodiscard]] std::vector<Submitted> submitted() const;
   [[nodiscard]] std::vector<std::string> log()
       const;  ///< other calls: "release_stop feeder", "stop_all local:unix" ...
@@ -58,6 +63,9 @@ class FakeMachine final : public Machine {
   std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
   void cancel_command(std::string id, CommandCallback callback) override;
   void buses(std::function<void(std::vector<BusStatus>)> callback) override;
+  [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
+  [[nodiscard]] BusAccess& bus_access() override { return buses_; }
+  [[nodiscard]] EventSource& events() override { return events_; }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override;
   [[nodiscard]] TimePoint now() const override { return now_; }
@@ -80,6 +88,9 @@ class FakeMachine final : public Machine {
   std::vector<std::weak_ptr<CommandCallback>> watchers_;
   std::function<void()> notify_ = [] {};
   std::atomic<TimePoint> now_{TimePoint(std::chrono::hours(1))};
+  FakeDrives drives_{[this](Job job) { post(std::move(job)); }};
+  FakeBuses buses_{[this](Job job) { post(std::move(job)); }};
+  FakeEvents events_{[this](Job job) { post(std::move(job)); }};
   std::thread core_;
 };
 

@@ -48,6 +48,7 @@ TEST(Convert, EveryEnumValueHasItsNamesakeInTheContract) {
   expect_same_names(CommandKind::set_position, "COMMAND_KIND_",
                     [](auto v) { return v1::CommandKind_Name(v); });
   expect_same_names(CommandState::unknown, "COMMAND_STATE_", [](auto v) { return v1::CommandState_Name(v); });
+  expect_same_names(MotionCause::unknown, "MOTION_CAUSE_", [](auto v) { return v1::MotionCause_Name(v); });
   EXPECT_EQ(to_proto(Outcome::not_sent), v1::OUTCOME_NOT_SENT);
   EXPECT_EQ(to_proto(Outcome::refused), v1::OUTCOME_REFUSED);
   EXPECT_EQ(to_proto(Outcome::not_executed), v1::OUTCOME_NOT_EXECUTED);
@@ -81,6 +82,9 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   snapshot.measured_at = WallTime(1s + 500ms);
   snapshot.command_id = "c-9";
   snapshot.revision = 77;
+  snapshot.motion_cause = MotionCause::terminal;
+  snapshot.drift = "X1 has no function";
+  snapshot.eeprom_writes = 5;
 
   v1::AxisState state;
   to_proto(snapshot, TimePoint(10s + 20ms), state);
@@ -93,6 +97,7 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   EXPECT_EQ(state.measured_at().nanos(), 500'000'000);
   EXPECT_EQ(state.fault().reason(), v1::REASON_ALARM);
   EXPECT_TRUE(state.has_target());
+  EXPECT_EQ(state.motion_cause(), v1::MOTION_CAUSE_TERMINAL);
 }
 
 TEST(Convert, AxisThatNeverAnsweredHasNoAge) {

@@ -1,0 +1,186 @@
+#include "tests/unit/api/fake_access.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <boost/smart_ptr/make_shared.hpp>
+#include <chrono>
+#include <utility>
+
+namespace axisd::testing {
+
+using namespace std::chrono_literals;
+
+void FakeAccess::refuse_with(std::optional<Error> error) {
+  const std::lock_guard lock(mutex_);
+  refusal_ = std::move(error);
+}
+
+std::optional<Error> FakeAccess::refusal() const {
+  const std::lock_guard lock(mutex_);
+  return refusal_;
+}
+
+std::vector<std::string> FakeAccess::log() const {
+  const std::lock_guard lock(mutex_);
+  return log_;
+}
+
+bool FakeAccess::working() const {
+  const std::lock_guard lock(mutex_);
+  return !work_.expired();
+}
+
+void FakeAccess::note(std::string line) {
+  const std::lock_guard lock(mutex_);
+  log_.push_back(std::move(line));
+}
+
+std::shared_ptr<void> FakeAccess::begin_work(const std::function<void()>& remember) {
+  const auto token = std::make_shared<int>(0);
+  const std::lock_guard lock(mutex_);
+  remember();
+  work_ = token;
+  return token;
+}
+
+void FakeDrives::drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) {
+  note("drive_info " + axis);
+  answer<DriveInfo>(callback, DriveInfo{.descriptor = find_drive_model("ykd2405pr"),
+                                        .identity = DriveIdentity{.model_code = 0x301, .version = "V1.0"},
+                                        .eeprom_writes = 3,
+                                        .persist = true,
+                                        .configured_by = {{0x0011, "scale.microstep"}}});
+}
+
+void FakeDrives::read_parameters(std::string axis, std::vector<std::uint32_t> addresses,
+                                 ValuesCallback callback) {
+  note(fmt::format("read_parameters {} {:#x}", axis, fmt::join(addresses, " ")));
+  std::vector<ParameterValue> values;
+  for (const auto address : addresses) values.push_back({.address = address, .value = -1 - int(address)});
+  answer<std::vector<ParameterValue>>(callback, std::move(values));
+}
+
+void FakeDrives::write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+                                  ValuesCallback callback) {
+  std::string line = fmt::format("write_parameters {} by {}", axis, client);
+  for (const auto& value : values) line += fmt::format(" {:#x}={}", value.address, value.value);
+  note(std::move(line));
+  answer<std::vector<ParameterValue>>(callback, std::move(values));
+}
+
+void FakeDrives::save_parameters(std::string axis, std::string client,
+                                 std::function<void(Result<void>)> callback) {
+  note(fmt::format("save_parameters {} by {}", axis, client));
+  answer<void>(callback, {});
+}
+
+void FakeDrives::restore_factory(std::string axis, std::string client,
+                                 std::function<void(Result<std::string>)> callback) {
+  note(fmt::format("restore_factory {} by {}", axis, client));
+  answer<std::string>(callback, std::string("node by its switches, 9600 8N1"));
+}
+
+void FakeDrives::read_segments(std::string axis, SegmentsCallback callback) {
+  note("read_segments " + axis);
+  answer<SegmentSettings>(callback, segments_);
+}
+
+void FakeDrives::write_segments(std::string axis, SegmentSettings segments, std::string client,
+                                SegmentsCallback callback) {
+  std::string line =
+      fmt::format("write_segments {} by {}{}", axis, client, segments.absolute ? " absolute" : "");
+  for (const auto& row : segments.positions)
+    line += fmt::format(" {}:{}:{}:{}", row.number, row.target, row.velocity, row.acceleration_time / 1ms);
+  for (const auto& row : segments.velocities)
+    line += fmt::format(" {}:{}:{}", row.number, row.velocity, row.acceleration_time / 1ms);
+  note(std::move(line));
+  answer<SegmentSettings>(callback, std::move(segments));
+}
+
+std::shared_ptr<void> FakeDrives::change_serial(std::string axis, SerialChange change, std::string client,
+                                                std::function<void(Result<SerialProgress>)> callback) {
+  note(fmt::format("change_serial {} by {} node {} baud {} verify {}", axis, client, change.node.value_or(0),
+                   change.baud.value_or(0), change.verify / 1s));
+  return begin_work([&] { progress_ = std::move(callback); });
+}
+
+void FakeDrives::progress(Result<SerialProgress> progress) {
+  const std::lock_guard lock(mutex_);
+  post_([callback = progress_, progress = std::move(progress)] { callback(progress); });
+}
+
+void FakeBuses::progress(Result<ScanProgress> progress) {
+  const std::lock_guard lock(mutex_);
+  post_([callback = progress_, progress = std::move(progress)] { callback(progress); });
+}
+
+void FakeBuses::transact(TransactRequest request,
+                         std::function<void(Result<std::vector<std::uint16_t>>)> callback) {
+  note(fmt::format("transact {} {} {:#x} count {} writes {}", request.bus, request.node, request.address,
+                   request.count, fmt::join(request.values, ",")));
+  std::vector<std::uint16_t> words;
+  if (request.values.empty()) words.assign(request.count, 7);
+  answer<std::vector<std::uint16_t>>(callback, std::move(words));
+}
+
+std::shared_ptr<void> FakeBuses::scan(ScanRequest request,
+                                      std::function<void(Result<ScanProgress>)> callback) {
+  note(fmt::format("scan {} {}-{} bauds {} formats {}", request.bus, request.first_node, request.last_node,
+                   fmt::join(request.bauds, ","), request.formats.size()));
+  return begin_work([&] { progress_ = std::move(callback); });
+}
+
+std::vector<DeviceSnapshotPtr> FakeBuses::devices() const {
+  return {boost::make_shared<const DeviceSnapshot>(
+      DeviceSnapshot{.name = "valves",
+                     .bus = "line-a",
+                     .node = 40,
+                     .link = LinkState::online,
+                     .values = {{.name = "pressure", .unit = "bar", .value = 2.5, .writable = true},
+                                {.name = "flow", .unit = "", .value = {}, .writable = false}},
+                     .measured_at = WallTime(1s)})};
+}
+
+void FakeBuses::write_device(std::string device, std::string name, double value,
+                             std::function<void(Result<double>)> callback) {
+  note(fmt::format("write_device {} {} {}", device, name, value));
+  answer<double>(callback, value + 0.01);
+}
+
+void FakeEvents::add(std::string axis, EventContent content) {
+  std::function<void()> notify;
+  {
+    const std::lock_guard lock(mutex_);
+    events_.push_back({.sequence = ++newest_,
+                       .at = WallTime(std::chrono::seconds(newest_)),
+                       .axis = std::move(axis),
+                       .content = std::move(content)});
+    if (events_.size() > kept_) events_.erase(events_.begin());
+    notify = notify_;
+  }
+  post_(std::move(notify));
+}
+
+void FakeEvents::keep(std::size_t kept) {
+  const std::lock_guard lock(mutex_);
+  kept_ = kept;
+}
+
+EventSource::Batch FakeEvents::events_after(std::uint64_t cursor, std::size_t most) const {
+  const std::lock_guard lock(mutex_);
+  Batch batch{.newest = newest_};
+  if (events_.empty()) return batch;
+  const auto oldest = events_.front().sequence;
+  if (cursor + 1 < oldest) batch.lost = oldest - cursor - 1;
+  for (const auto& event : events_)
+    if (event.sequence > cursor && batch.events.size() < most) batch.events.push_back(event);
+  return batch;
+}
+
+void FakeEvents::on_event(std::function<void()> notify) {
+  const std::lock_guard lock(mutex_);
+  notify_ = std::move(notify);
+}
+
+}  // namespace axisd::testing
