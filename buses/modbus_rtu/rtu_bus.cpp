@@ -93,7 +93,7 @@ Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOp
           .guard = std::move(options.guard),
           .deadline = options.deadline,
           .reply_timeout = turnaround + reply + timeout_margin,
-          .turnaround_max = turnaround,
+          .turnaround_max = std::min(turnaround, settings_.turnaround_max),
           .serial = options.serial == settings_.serial() ? std::nullopt : options.serial};
 }
 

@@ -83,6 +83,20 @@ TEST(RtuBusOverrides, ATurnaroundOfItsOwnWaitsLonger) {
   EXPECT_TRUE(rig.results.at("patient"));
 }
 
+TEST(RtuBusOverrides, AStopDoesNotWaitForAPatientExchange) {
+  BusRig rig;
+  rig.transact("patient", read_of(9), {.turnaround_max = 3s});  // nobody answers there
+  rig.world.run_for(100ms);
+  const auto asked = rig.world.now();
+  rig.transact("stop",
+               {.node = 1, .function = Function::write_single_register, .address = 0x0028, .values = {0}},
+               {.transaction_class = TransactionClass::stop});
+  rig.world.run_for(100ms);
+  ASSERT_EQ(rig.line->wire().size(), 2U);
+  EXPECT_LE(rig.line->wire()[1].begin - asked, 25ms);
+  EXPECT_TRUE(rig.results.at("stop"));
+}
+
 TEST(RtuBusOverrides, IdenticalReadsMergeOnlyWithTheSameSettings) {
   BusRig rig;
   add_slow_node(rig);
