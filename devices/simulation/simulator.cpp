@@ -51,6 +51,10 @@ Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,
     if (!contains(simulator.switches, name))
       return fail(Reason::invalid_argument, fmt::format("{} has no switch \"{}\"", simulator.model, name),
                   "use one of " + names_of(simulator.switches));
+  if (!settings.eeprom.empty() && settings.eeprom.rbegin()->first > simulator.last_register)
+    return fail(Reason::out_of_range,
+                fmt::format("{} has no register 0x{:04X}", simulator.model, settings.eeprom.rbegin()->first),
+                fmt::format("its last is 0x{:04X}", simulator.last_register));
   for (const auto& [terminal, wire] : settings.wires)
     if (!contains(simulator.inputs, terminal))
       return fail(Reason::invalid_argument, fmt::format("{} has no input \"{}\"", simulator.model, terminal),

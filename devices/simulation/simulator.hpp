@@ -23,6 +23,7 @@ struct Simulator {
   std::unique_ptr<SimulatedRtuNode> (*make)(SimulatedNodeSettings settings) = nullptr;
   std::span<const SwitchSpec> switches{};
   std::span<const TerminalSpec> inputs{};
+  std::uint16_t last_register = 0xFFFF;
   std::uint8_t maximum_node = 127;
   std::uint8_t maximum_dip_address = 31;  ///< of the address switches
   std::span<const int> dip_bauds{};       ///< bit/s that the baud rate switches can be set to
@@ -33,8 +34,8 @@ std::span<const Simulator* const> simulators();
 /// nullptr if there is none of that name.
 const Simulator* find_simulator(std::string_view model);
 
-/// Makes a node. Errors: unknown model, switch or terminal of a wire; an address or baud rate that the model
-/// cannot be set to.
+/// Makes a node. Errors: unknown model, switch, register or terminal of a wire; an address or baud rate that
+/// the model cannot be set to.
 Result<std::unique_ptr<SimulatedRtuNode>> make_node(std::string_view model, SimulatedNodeSettings settings);
 /// The same for a simulator at hand.
 Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,

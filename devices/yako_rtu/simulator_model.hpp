@@ -62,6 +62,7 @@ std::span<const simulation::Simulator> simulators_of() {
            },
        .switches = switches,
        .inputs = model.inputs,
+       .last_register = model.last,
        .maximum_node = std::max(model.maximum_dip_address, model.last_custom_address),
        .maximum_dip_address = model.maximum_dip_address,
        .dip_bauds = model.dip_bauds}};

@@ -323,6 +323,9 @@ TEST(MakeNode, RefusesWhatItDoesNotKnow) {
   EXPECT_THAT(make_node("ess42-r", settings).error().remedy, ::testing::HasSubstr("custom"));
   settings.dip_baud = 0;
   EXPECT_TRUE(make_node("ess42-r", settings));
+  settings.eeprom[0x0139] = 20;
+  EXPECT_TRUE(make_node("ess42-r", settings));
+  EXPECT_THAT(make_node("ykd2405pr", settings).error().message, ::testing::HasSubstr("0x0139"));
 }
 
 }  // namespace
