@@ -41,8 +41,8 @@ struct SyntaxError {
   std::string message, suggestion;
 };
 
-inline constexpr std::size_t largest_text = 1024 * 1024;  ///< bytes
-inline constexpr std::size_t largest_tree = 50'000;       ///< nodes, aliases expanded
+inline constexpr std::size_t largest_text = std::size_t{1024} * 1024;  ///< bytes
+inline constexpr std::size_t largest_tree = 50'000;                    ///< nodes, aliases expanded
 
 /// Parses one YAML document. Plain aliases are resolved; merge keys, tags and a second document are refused,
 /// and so is anything larger than the limits. Never throws.

@@ -296,7 +296,7 @@ std::string indented(std::string_view json) {
   std::string result;
   int depth = 0;
   bool in_string = false, escaped = false;
-  const auto new_line = [&] { result.append("\n").append(static_cast<std::size_t>(2 * depth), ' '); };
+  const auto new_line = [&] { result.append("\n").append(2 * static_cast<std::size_t>(depth), ' '); };
   for (std::size_t i = 0; i < json.size(); ++i) {
     const char c = json[i];
     if (in_string) {

@@ -66,13 +66,13 @@ struct KeySpec {
   std::string_view key;
   Kind kind = Kind::text;
   bool required = false;
-  bool may_be_empty = false;  ///< of named_sections
+  bool may_be_empty = false;   ///< of named_sections
+  bool above_minimum = false;  ///< the minimum itself is excluded
   std::string_view description = {};
   std::string_view example = {};  ///< as written in YAML; never the default
   std::string_view default_value =
       {};  ///< as written in YAML; empty if there is none or the description says it
   std::optional<double> minimum = std::nullopt, maximum = std::nullopt;
-  bool above_minimum = false;  ///< the minimum itself is excluded
   std::span<const std::string_view> choices = {};
   std::string_view pattern = {};       ///< of a text: ECMAScript regular expression, whole text
   std::string_view pattern_hint = {};  ///< what to say when it does not match

@@ -20,6 +20,7 @@ constexpr std::string_view pins[] = {"pin0", "pin1", "pin2", "pin3", "pin4"};
 template <class Segment>
 std::vector<int> numbers_of(const std::vector<Segment>& segments) {
   std::vector<int> numbers;
+  numbers.reserve(segments.size());
   for (const auto& segment : segments) numbers.push_back(segment.number);
   return numbers;
 }

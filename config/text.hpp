@@ -25,6 +25,7 @@ std::string suggest(std::string_view text, std::span<const std::string_view> can
 template <class Range, class Projection>
 std::vector<std::string_view> names_of(const Range& range, Projection name) {
   std::vector<std::string_view> names;
+  names.reserve(std::size(range));
   for (const auto& item : range) names.push_back(name(item));
   return names;
 }
