@@ -10,17 +10,6 @@
 
 namespace axisd::core {
 
-namespace {
-
-modbus_rtu::RtuBus* bus_named(const std::vector<std::unique_ptr<modbus_rtu::RtuBus>>& buses,
-                              const std::string& name) {
-  const auto found =
-      std::ranges::find_if(buses, [&](const auto& bus) { return bus->settings().name == name; });
-  return found == buses.end() ? nullptr : found->get();
-}
-
-}  // namespace
-
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
     : parts_(std::move(parts)), book_(*parts_.clock, parts_.instance_id) {
   if (parts_.persistence != nullptr) {
@@ -30,9 +19,12 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
   for (const auto& line : configuration.buses)
     buses_.push_back(
         std::make_unique<modbus_rtu::RtuBus>(parts_.executor, *parts_.clock, line, parts_.make_line(line)));
+  const auto record = [this](const std::string& axis, EventContent content) {
+    events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
+  };
   for (const auto& entry : configuration.axes) {
     const auto& settings = entry.axis;
-    auto* bus = bus_named(buses_, settings.bus);
+    auto* bus = find_bus(settings.bus);
     const auto* descriptor = find_drive_model(settings.model);
     auto setup =
         descriptor == nullptr ? fail(Reason::internal, "unknown model") : drive_setup(settings, *descriptor);
@@ -51,7 +43,8 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                                                            .book = &book_,
                                                            .persistence = parts_.persistence,
                                                            .inhibited = &inhibited_,
-                                                           .published = parts_.published},
+                                                           .published = parts_.published,
+                                                           .event = record},
                                            settings, *descriptor, std::move(drive),
                                            std::make_shared<AxisGate>(), bus->settings().simulated()));
     by_name_.emplace(settings.name, axes_.back().get());
@@ -60,9 +53,28 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
     if (settings.vertical && !brake)
       spdlog::warn("{}: load: vertical, but no output has the function brake", settings.name);  // M2
   }
+  for (const auto& settings : configuration.devices) {
+    auto* bus = find_bus(settings.bus);
+    if (bus == nullptr) throw std::invalid_argument(fmt::format("device {}: unknown bus", settings.name));
+    devices_.push_back(std::make_unique<ModbusDevice>(parts_.executor, *parts_.clock, *bus, settings));
+  }
 }
 
 MachineCore::~MachineCore() = default;
+
+modbus_rtu::RtuBus* MachineCore::find_bus(std::string_view bus) const {
+  const auto found = std::ranges::find_if(buses_, [&](const auto& b) { return b->settings().name == bus; });
+  return found == buses_.end() ? nullptr : found->get();
+}
+
+void MachineCore::launch(Task<> sequence, const char* name) {
+  ++sequences_;
+  auto counted = [](Task<> inner, int& count) -> Task<> {
+    co_await std::move(inner);
+    --count;
+  };
+  spawn(parts_.executor, counted(std::move(sequence), sequences_), name);
+}
 
 void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
   inhibited_ = inhibited;
@@ -72,6 +84,7 @@ void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
 void MachineCore::start() {
   for (const auto& bus : buses_) bus->start(parts_.observer);
   for (const auto& axis : axes_) axis->start();
+  for (const auto& device : devices_) device->start();
 }
 
 Axis* MachineCore::find(std::string_view axis) const {
@@ -140,11 +153,13 @@ bool MachineCore::at_rest() const {
 
 void MachineCore::close() {
   for (const auto& axis : axes_) axis->close();
+  for (const auto& device : devices_) device->close();
   for (const auto& bus : buses_) bus->close();
 }
 
 bool MachineCore::closed() const {
-  return std::ranges::all_of(axes_, [](const auto& axis) { return axis->closed(); }) &&
+  return sequences_ == 0 && std::ranges::all_of(axes_, [](const auto& axis) { return axis->closed(); }) &&
+         std::ranges::all_of(devices_, [](const auto& device) { return device->closed(); }) &&
          std::ranges::all_of(buses_, [](const auto& bus) { return bus->idle(); });
 }
 

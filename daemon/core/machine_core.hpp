@@ -9,8 +9,10 @@
 
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "config/configuration.hpp"
+#include "daemon/core/event_log.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
+#include "devices/generic/modbus_device.hpp"
 #include "devices/machine.hpp"
 #include "devices/persistence.hpp"
 
@@ -27,20 +29,25 @@ struct MachineParts {
   std::function<void()> published;
 };
 
-/// All buses and axes of one machine. Thread: core.
+/// All buses, axes and other devices of one machine. Thread: core.
 class MachineCore {
  public:
   MachineCore(MachineParts parts, const config::Configuration& configuration);
   ~MachineCore();
   MachineCore(const MachineCore&) = delete;
 
-  /// Opens the buses and connects the axes. Moves nothing.
+  /// Opens the buses and connects axes and devices. Moves nothing.
   void start();
 
   [[nodiscard]] Axis* find(std::string_view axis) const;
   [[nodiscard]] const std::vector<std::unique_ptr<Axis>>& axes() const { return axes_; }
   [[nodiscard]] const std::vector<std::unique_ptr<modbus_rtu::RtuBus>>& buses() const { return buses_; }
+  /// nullptr if there is none of that name.
+  [[nodiscard]] modbus_rtu::RtuBus* find_bus(std::string_view bus) const;
+  /// Nodes that are not axes, in the order of the file.
+  [[nodiscard]] const std::vector<std::unique_ptr<ModbusDevice>>& devices() const { return devices_; }
   [[nodiscard]] CommandBook& book() { return book_; }
+  [[nodiscard]] EventLog& events() { return events_; }
 
   Result<CommandPtr> submit(const std::string& axis, const Action& action, const CommandOptions& options);
   /// Latches the inhibit first, then stops every axis, moving ones first (M14).
@@ -53,6 +60,8 @@ class MachineCore {
   void stop_moving_axes();
   [[nodiscard]] bool at_rest() const;
   [[nodiscard]] std::vector<BusStatus> bus_status() const;
+  /// Runs a sequence that uses what this owns; closed() waits for its end.
+  void launch(Task<> sequence, const char* name);
   /// Ends all sequences; then closed() comes true and the machine can be destroyed. Moves nothing.
   void close();
   [[nodiscard]] bool closed() const;
@@ -64,11 +73,14 @@ class MachineCore {
 
   MachineParts parts_;
   CommandBook book_;
+  EventLog events_;
   bool inhibited_ = false;
   int latches_ = 0;  ///< StopAlls so far
   boost::atomic_shared_ptr<const std::string> inhibited_by_;
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> buses_;
   std::vector<std::unique_ptr<Axis>> axes_;
+  std::vector<std::unique_ptr<ModbusDevice>> devices_;
+  int sequences_ = 0;  ///< launched ones that still run
   std::map<std::string, Axis*, std::less<>> by_name_;
 };
 

@@ -27,7 +27,12 @@ std::unexpected<Error> unknown_command(const std::string& id) {
 
 MachineService::MachineService(CoreLoop& loop, MachineCore& machine, std::string name,
                                std::string instance_id)
-    : loop_(&loop), machine_(&machine), name_(std::move(name)), instance_id_(std::move(instance_id)) {
+    : loop_(&loop),
+      machine_(&machine),
+      drive_access_(loop.executor(), loop.clock(), machine),
+      bus_access_(loop.executor(), machine),
+      name_(std::move(name)),
+      instance_id_(std::move(instance_id)) {
   for (const auto& axis : machine.axes()) {
     names_.push_back(axis->settings().name);
     axes_.emplace(axis->settings().name, axis.get());

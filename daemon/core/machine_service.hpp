@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/core/bus_access_service.hpp"
 #include "daemon/core/core_loop.hpp"
+#include "daemon/core/drive_access_service.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/machine.hpp"
 
@@ -30,6 +32,9 @@ class MachineService final : public Machine {
   std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
   void cancel_command(std::string id, CommandCallback callback) override;
   void buses(std::function<void(std::vector<BusStatus>)> callback) override;
+  [[nodiscard]] DriveAccess& drive_access() override { return drive_access_; }
+  [[nodiscard]] BusAccess& bus_access() override { return bus_access_; }
+  [[nodiscard]] EventSource& events() override { return machine_->events(); }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override { return loop_->clock().wall(t); }
   [[nodiscard]] TimePoint now() const override { return loop_->clock().now(); }
@@ -45,6 +50,8 @@ class MachineService final : public Machine {
 
   CoreLoop* loop_;
   MachineCore* machine_;
+  DriveAccessService drive_access_;
+  BusAccessService bus_access_;
   std::string name_;
   std::string instance_id_;
   std::atomic<bool> closing_{false};

@@ -28,6 +28,9 @@ class RegisterNode final : public simulation::SimulatedRtuNode {
 
   [[nodiscard]] std::uint8_t address() const override { return address_; }
   [[nodiscard]] std::optional<simulation::Serial> serial() const override { return serial_; }
+  void join(const simulation::Serial& line) override {
+    if (!serial_) serial_ = line;
+  }
   void advance(TimePoint) override {}
   std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) override {
     if (silent || frame.size() < 8 || frame[0] != address_) return std::nullopt;
