@@ -22,7 +22,7 @@ Error no_such_axis(const std::string& axis) {
 
 /// Holds what the sequence needs until it has ended.
 template <class T>
-Task<> answer(DriveOperations operations, std::function<Task<Result<T>>(DriveOperations)> operation,
+Task<> answer(DriveOperations operations, std::function<Task<Result<T>>(const DriveOperations&)> operation,
               std::function<void(Result<T>)> callback) {
   callback(co_await operation(operations));
 }
@@ -30,7 +30,8 @@ Task<> answer(DriveOperations operations, std::function<Task<Result<T>>(DriveOpe
 }  // namespace
 
 template <class T>
-void DriveAccessService::run(std::string axis, std::function<Task<Result<T>>(DriveOperations)> operation,
+void DriveAccessService::run(std::string axis,
+                             std::function<Task<Result<T>>(const DriveOperations&)> operation,
                              std::function<void(Result<T>)> callback, const char* name) {
   post(executor_, [this, axis = std::move(axis), operation = std::move(operation),
                    callback = std::move(callback), name]() mutable {
@@ -52,7 +53,9 @@ void DriveAccessService::read_parameters(std::string axis, std::vector<std::uint
                                          ValuesCallback callback) {
   run<std::vector<ParameterValue>>(
       std::move(axis),
-      [addresses = std::move(addresses)](DriveOperations drive) { return drive.read_parameters(addresses); },
+      [addresses = std::move(addresses)](const DriveOperations& drive) {
+        return drive.read_parameters(addresses);
+      },
       std::move(callback), "read parameters");
 }
 
@@ -61,7 +64,7 @@ void DriveAccessService::write_parameters(std::string axis, std::vector<Paramete
   audit(client, axis, fmt::format("writes {} parameters", values.size()));
   run<std::vector<ParameterValue>>(
       std::move(axis),
-      [values = std::move(values)](DriveOperations drive) { return drive.write_parameters(values); },
+      [values = std::move(values)](const DriveOperations& drive) { return drive.write_parameters(values); },
       std::move(callback), "write parameters");
 }
 
@@ -69,8 +72,8 @@ void DriveAccessService::save_parameters(std::string axis, std::string client,
                                          std::function<void(Result<void>)> callback) {
   audit(client, axis, "saves all parameters to the EEPROM");
   run<void>(
-      std::move(axis), [](DriveOperations drive) { return drive.save_parameters(); }, std::move(callback),
-      "save parameters");
+      std::move(axis), [](const DriveOperations& drive) { return drive.save_parameters(); },
+      std::move(callback), "save parameters");
 }
 
 void DriveAccessService::restore_factory(std::string axis, std::string client,
@@ -80,14 +83,14 @@ void DriveAccessService::restore_factory(std::string axis, std::string client,
   auto taken = found == nullptr ? std::vector<std::uint8_t>{} : others_on_bus(*found);
   run<std::string>(
       std::move(axis),
-      [taken = std::move(taken)](DriveOperations drive) { return drive.restore_factory(taken); },
+      [taken = std::move(taken)](const DriveOperations& drive) { return drive.restore_factory(taken); },
       std::move(callback), "restore factory settings");
 }
 
 void DriveAccessService::read_segments(std::string axis, SegmentsCallback callback) {
   run<SegmentSettings>(
-      std::move(axis), [](DriveOperations drive) { return drive.read_segments(); }, std::move(callback),
-      "read segments");
+      std::move(axis), [](const DriveOperations& drive) { return drive.read_segments(); },
+      std::move(callback), "read segments");
 }
 
 void DriveAccessService::write_segments(std::string axis, SegmentSettings segments, std::string client,
@@ -95,7 +98,9 @@ void DriveAccessService::write_segments(std::string axis, SegmentSettings segmen
   audit(client, axis, "writes the segment table");
   run<SegmentSettings>(
       std::move(axis),
-      [segments = std::move(segments)](DriveOperations drive) { return drive.write_segments(segments); },
+      [segments = std::move(segments)](const DriveOperations& drive) {
+        return drive.write_segments(segments);
+      },
       std::move(callback), "write segments");
 }
 

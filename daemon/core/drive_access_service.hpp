@@ -38,9 +38,10 @@ class DriveAccessService final : public DriveAccess {
 
  private:
   using SerialCallback = std::function<void(Result<SerialProgress>)>;
-  /// Runs `operation` on the axis as one of its sequences and calls back with its result.
+  /// Runs `operation` on the axis as a sequence of the machine and calls back with its result. By reference:
+  /// the sequence keeps the object that its coroutine is a member of.
   template <class T>
-  void run(std::string axis, std::function<Task<Result<T>>(DriveOperations)> operation,
+  void run(std::string axis, std::function<Task<Result<T>>(const DriveOperations&)> operation,
            std::function<void(Result<T>)> callback, const char* name);
   Task<> run_serial_change(Axis& axis, SerialChange change, std::weak_ptr<void> alive,
                            SerialCallback callback);

@@ -1,0 +1,238 @@
+// The drive's memory (M27), what others change in it, brakes (M2), motion by terminals and edges (M29).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "devices/axis/drive_operations.hpp"
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Runs an operation on the drive to its end.
+template <class T>
+Result<T> operate(Rig& rig, const std::function<Task<Result<T>>(const DriveOperations&)>& operation) {
+  std::optional<Result<T>> result;
+  auto run = [](DriveOperations drive, auto what, std::optional<Result<T>>& end) -> Task<> {
+    end = co_await what(drive);
+  };
+  spawn(rig.world.executor(), run(DriveOperations(rig.axis()), operation, result), "operation");
+  EXPECT_TRUE(rig.run_until([&] { return result.has_value(); }, 20s));
+  return result ? std::move(*result) : Result<T>(fail(Reason::internal, "did not end"));
+}
+
+Result<std::vector<ParameterValue>> write(Rig& rig, std::vector<ParameterValue> values) {
+  return operate<std::vector<ParameterValue>>(
+      rig, [values](const DriveOperations& drive) { return drive.write_parameters(values); });
+}
+
+Result<void> save(Rig& rig) {
+  return operate<void>(rig, [](const DriveOperations& drive) { return drive.save_parameters(); });
+}
+
+constexpr std::uint16_t first_motion_register = 0x0020, save_or_restore = 0x002B, microstep = 0x0011,
+                        x1_function = 0x0044, filter = 0x0118;
+
+TEST(M27, WritesAreCheckedBeforeAnythingIsSent) {
+  Rig rig;
+  rig.line->forget_wire();
+  const auto sent = [&] {
+    return std::ranges::count_if(rig.line->wire(), [](const WireEntry& entry) { return entry.is_write(); });
+  };
+  const auto good = ParameterValue{filter, 12};
+  EXPECT_EQ(write(rig, {good, {filter + 1, 70'000}}).error().reason, Reason::out_of_range);
+  EXPECT_EQ(write(rig, {good, {0x0019, 1}}).error().reason, Reason::invalid_argument);  // a hole
+  EXPECT_EQ(write(rig, {good, {0x0007, 1}}).error().reason, Reason::invalid_argument);  // read-only
+  const auto trigger = write(rig, {good, {0x0027, 5}});
+  EXPECT_EQ(trigger.error().remedy, "use AxisService.MoveAbsolute");
+  const auto owned = write(rig, {good, {x1_function, 0}});
+  EXPECT_NE(owned.error().message.find("inputs.X1"), std::string::npos) << owned.error().message;
+  EXPECT_FALSE(write(rig, {good, {first_motion_register, 10}}));
+  EXPECT_EQ(sent(), 0);
+  rig.enable();
+  rig.line->forget_wire();
+  EXPECT_EQ(write(rig, {good}).error().reason, Reason::moving);
+  EXPECT_EQ(sent(), 0);
+}
+
+TEST(M27, WritesAreReadBack) {
+  Rig rig;
+  rig.complete(DisableRequest{});
+  const auto written = write(rig, {{filter, 12}, {0x0110, 700}});
+  ASSERT_TRUE(written) << to_string(written.error());
+  EXPECT_EQ(*written, (std::vector<ParameterValue>{{filter, 12}, {0x0110, 700}}));
+  EXPECT_EQ(rig.drive->peek(filter), 12);
+}
+
+TEST(M27, ASavedDriveMovesNothingAndItsRestartIsStillNoticed) {
+  for_each_switch({}, [](const RigOptions& options) {
+    Rig rig(options);
+    rig.ready();
+    EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 5}).state, CommandState::done);
+    EXPECT_EQ(save(rig).error().reason, Reason::moving) << "the power stage is on";
+    rig.complete(DisableRequest{});
+    rig.line->forget_wire();
+    const auto saved = save(rig);
+    ASSERT_TRUE(saved) << to_string(saved.error());
+    // What the EEPROM holds now would go nowhere if a terminal started it.
+    const auto before = rig.first_write(first_motion_register);
+    ASSERT_GE(before, 0);
+    EXPECT_LT(before, rig.first_write(save_or_restore));
+    const auto block = rig.line->wire()[static_cast<std::size_t>(before)].block();
+    EXPECT_EQ(block.at(3), 0) << "speed";
+    EXPECT_EQ(block.at(4), 0);
+    EXPECT_EQ(block.at(5), 0) << "pulses";
+    rig.cycle_power();
+    EXPECT_TRUE(rig.run_until([&] { return rig.state()->reboots == 1; }, 5s));
+    rig.reconnect();
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    EXPECT_FALSE(rig.state()->enabled_by_us);
+  });
+}
+
+TEST(M27, RestoredSettingsAreConfiguredAgain) {
+  for_each_switch({}, [](const RigOptions& options) {
+    Rig rig(options);
+    rig.ready();
+    rig.complete(DisableRequest{});
+    const auto restored =
+        operate<std::string>(rig, [](const DriveOperations& drive) { return drive.restore_factory({}); });
+    ASSERT_TRUE(restored) << to_string(restored.error());
+    EXPECT_NE(restored->find("address 1"), std::string::npos) << *restored;
+    EXPECT_EQ(rig.state()->link, LinkState::configuring);
+    rig.reconnect();
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    EXPECT_EQ(rig.drive->peek(microstep), 8);  // 1000 pulses/rev
+    EXPECT_NE(rig.drive->peek(x1_function), 0);
+    EXPECT_EQ(rig.drive->starts(), 0);
+  });
+}
+
+TEST(M3, WhatAnotherMasterChangedIsAppliedAgainOnceReleased) {
+  Rig rig({.adjust = [](AxisSettings& axis) { axis.drift_check = 1s; }});
+  rig.complete(DisableRequest{});
+  const auto was = rig.drive->peek(x1_function);
+  rig.write_behind(x1_function, 0);
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::configuring; }, 3s));
+  rig.reconnect();
+  EXPECT_EQ(rig.drive->peek(x1_function), was);
+
+  rig.ready();
+  rig.write_behind(x1_function, 0);
+  EXPECT_TRUE(rig.run_until([&] { return !rig.state()->drift.empty(); }, 3s));
+  EXPECT_NE(rig.state()->drift.find("inputs.X1"), std::string::npos) << rig.state()->drift;
+  EXPECT_EQ(rig.drive->peek(x1_function), 0) << "not while the power stage is on";
+  const auto move = rig.try_submit(MoveRelativeRequest{.distance = 1});
+  ASSERT_FALSE(move);
+  EXPECT_EQ(move.error().reason, Reason::misconfigured);
+  EXPECT_EQ(rig.complete(DisableRequest{}).state, CommandState::done);
+  EXPECT_TRUE(rig.run_until([&] { return rig.drive->peek(x1_function) == was; }, 3s));
+  rig.reconnect();
+  EXPECT_TRUE(rig.state()->drift.empty());
+}
+
+TEST(M20, AnotherMicrostepCostsThePosition) {
+  Rig rig({.adjust = [](AxisSettings& axis) { axis.drift_check = 1s; }});
+  rig.ready();
+  rig.write_behind(microstep, 9);
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->trust == PositionTrust::unknown; }, 3s));
+}
+
+TEST(M2, ABrakeIsGivenItsTime) {
+  const RigOptions options{.adjust = [](AxisSettings& axis) {
+    axis.outputs = {{.terminal = "Y0", .function = "brake"}};
+    axis.brake = {.release_time = 300ms, .engage_time = 200ms};
+  }};
+  Rig rig(options);
+  auto began = rig.world.now();
+  const auto enable = rig.submit(EnableRequest{});
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->enabled; }, 1s));
+  EXPECT_EQ(rig.try_submit(MoveRelativeRequest{.distance = 1}).error().reason, Reason::disabled);
+  rig.run_until([&] { return enable->has_ended(); }, 2s);
+  EXPECT_EQ(enable->value().state, CommandState::done);
+  EXPECT_GE(rig.world.now() - began, 300ms);
+  EXPECT_EQ(rig.complete(MoveRelativeRequest{.distance = 1}).state, CommandState::done);
+  began = rig.world.now();
+  EXPECT_EQ(rig.complete(DisableRequest{}).state, CommandState::done);
+  EXPECT_GE(rig.world.now() - began, 200ms);
+}
+
+TEST(M29, AnEdgeLiesBetweenTwoSamples) {
+  Rig rig;
+  rig.run(1s);
+  const auto cursor = rig.machine->events().events_after(0, 1).newest;
+  rig.run(37ms);
+  const auto changed = rig.world.clock().wall(rig.world.now());
+  rig.set_input("X5", true);
+  rig.run(1s);
+  const auto batch = rig.machine->events().events_after(cursor, 100);
+  ASSERT_EQ(batch.events.size(), 1U);
+  EXPECT_EQ(batch.events[0].axis, "feeder");
+  const auto* edge = std::get_if<TerminalEdge>(&batch.events[0].content);
+  ASSERT_NE(edge, nullptr);
+  EXPECT_EQ(edge->terminal, "X5");
+  EXPECT_TRUE(edge->active);
+  EXPECT_LE(edge->after, changed);
+  EXPECT_GE(edge->before, changed);
+  EXPECT_LE(edge->before - edge->after, 500ms);
+}
+
+TEST(Segments, AMotionThatTerminalsStartIsTheDrivesOwn) {
+  both_directions({}, [](const RigOptions& base) {
+    auto options = base;
+    options.adjust = [](AxisSettings& axis) {
+      axis.inputs.insert(axis.inputs.end(), {{.terminal = "X3", .function = "pt_enable"},
+                                             {.terminal = "X4", .function = "pin0"},
+                                             {.terminal = "X5", .function = "pin1"}});
+      axis.segments = SegmentSettings{
+          .positions = {{.number = 2, .target = 20, .velocity = 50, .acceleration_time = 100ms}}};
+    };
+    options.connect = false;
+    options.switches["enabled_at_power_up"] = false;
+    Rig rig(options);
+    rig.reconnect();
+    rig.ready();
+    rig.set_input("X5", true);
+    rig.run(100ms);
+    rig.set_input("X3", true);
+    EXPECT_TRUE(rig.run_until([&] { return rig.state()->state == AxisState::discrete_motion; }, 1s));
+    EXPECT_EQ(rig.state()->motion_cause, MotionCause::terminal);
+    EXPECT_EQ(rig.try_submit(MoveRelativeRequest{.distance = 1}).error().reason, Reason::terminal);
+    EXPECT_TRUE(rig.run_until([&] { return rig.state()->state == AxisState::standstill; }, 5s));
+    EXPECT_EQ(rig.state()->motion_cause, MotionCause::none);
+    EXPECT_NEAR(rig.state()->position, 20, 0.01);
+    EXPECT_NEAR(rig.load_mm(), 20, 0.01);
+    EXPECT_EQ(rig.drive->starts(), 1);
+    EXPECT_EQ(rig.triggers(), 0) << "nothing of it came over the wire";
+  });
+}
+
+TEST(Eeprom, RestartsAndMovesWriteNothing) {
+  for (const auto persist : {PersistSettings{}, PersistSettings::all(), PersistSettings{.terminals = true}})
+    for_each_switch(
+        {.adjust = [persist](AxisSettings& axis) { axis.persist = persist; }, .persistence = true},
+        [](const RigOptions& options) {
+          Rig rig(options);
+          rig.ready();
+          const auto counted = [&] { return rig.store.saved.axes["feeder"].eeprom_writes; };
+          EXPECT_LE(rig.drive->eeprom_writes(), counted());
+          const auto written = rig.drive->eeprom_writes();
+          const auto shown = counted();
+          for (int restart = 0; restart < 2; ++restart) {
+            rig.stop_daemon();
+            rig.start_daemon();
+          }
+          rig.enable();
+          for (int move = 0; move < 20; ++move)
+            rig.complete(MoveRelativeRequest{.distance = move % 2 == 0 ? 1.0 : -1.0});
+          EXPECT_EQ(rig.complete(HomeRequest{}, 100s).state, CommandState::done);
+          EXPECT_EQ(rig.drive->eeprom_writes(), written);
+          EXPECT_EQ(counted(), shown);
+          EXPECT_EQ(rig.state()->eeprom_writes, shown);
+        });
+}
+
+}  // namespace
+}  // namespace axisd::test
