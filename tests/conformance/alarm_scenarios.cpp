@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 void raise_in_mid_move(Bench& bench, int code) {
   bench.ready();
   const auto move = bench.under_way(bench.client.move_to(300, {.velocity = 60}, v1::WAIT_UNTIL_STARTED));
-  bench.outside(fmt::format("alarm 1 {}", code));
+  bench.outside(fmt::format("alarm @1 {}", code));
   const auto state =
       bench.await([](const auto& s) { return s.state() == v1::STATE_ERROR_STOP; }, "in ErrorStop");
   EXPECT_EQ(state.alarm_code(), static_cast<unsigned>(code));
@@ -42,7 +42,7 @@ void expect_no_reset(Bench& bench) {
 void leave(Bench& bench, const std::string& rule) {
   if (rule == "by_command") return;
   expect_no_reset(bench);
-  bench.outside("alarm 1 0");
+  bench.outside("alarm @1 0");
   bench.pass(1s);
   expect_state(bench.state(), v1::STATE_ERROR_STOP);  // latched, although 2 and 3 clear themselves (M5)
   if (rule == "by_itself") {

@@ -31,7 +31,11 @@ Bench::Bench(const Setup& setup_of, const Plant& plant, const Recipe& recipe_of,
       target(make_virtual_target(plant)),
       client(*target, "axis"),
       terminals_(terminals_of(setup_of.manual, recipe_of)) {
-  if (connect) await_online();
+  if (!connect) return;
+  await([](const auto& s) { return s.link() != v1::LINK_STATE_OFFLINE; }, "reached");
+  pass(1s);
+  if (state().link() == v1::LINK_STATE_CONFIGURING && state().enabled()) expect_done(client.disable());
+  await_online();
 }
 
 v1::AxisState Bench::await(const std::function<bool(const v1::AxisState&)>& condition, std::string_view what,
@@ -46,6 +50,12 @@ v1::AxisState Bench::await(const std::function<bool(const v1::AxisState&)>& cond
   return now;
 }
 
+Duration Bench::now() {
+  const auto known = state();
+  return from_proto(known.measured_at()) + std::chrono::seconds(known.age().seconds()) +
+         std::chrono::nanoseconds(known.age().nanos());
+}
+
 std::string Bench::outside(const std::string& line) {
   const auto answer = target->control(line);
   if (!answer.starts_with("ok")) throw Broken(fmt::format("{}: {}", line, answer));
@@ -53,11 +63,11 @@ std::string Bench::outside(const std::string& line) {
 }
 
 Shaft Bench::shaft() {
-  const auto text = outside("shaft 1");
+  const auto text = outside("shaft @1");
   long long pulses = 0;
   int moving = 0, starts = 0;
   if (std::sscanf(text.c_str(), "position=%lld moving=%d starts=%d", &pulses, &moving, &starts) != 3)
-    throw Broken("shaft 1: " + text);
+    throw Broken("shaft @1: " + text);
   const double direction = setup.variant.invert ? -1 : 1;
   return {
       .mm = static_cast<double>(pulses) / pulses_per_mm * direction, .moving = moving != 0, .starts = starts};
@@ -66,17 +76,17 @@ Shaft Bench::shaft() {
 void Bench::set_input(const std::string& function, bool active) {
   const auto wanted = std::ranges::find(recipe.inputs, function, &Wanted::function);
   const bool low = wanted != recipe.inputs.end() && wanted->active_low;
-  outside(fmt::format("input 1 {} {}", terminal(function), active != low ? "on" : "off"));
+  outside(fmt::format("input @1 {} {}", terminal(function), active != low ? "on" : "off"));
 }
 
 void Bench::free_input(const std::string& function) {
-  outside(fmt::format("input 1 {} auto", terminal(function)));
+  outside(fmt::format("input @1 {} auto", terminal(function)));
 }
 
 void Bench::cycle_power(Duration off) {
-  outside("power 1 off");
+  outside("power @1 off");
   pass(off);
-  outside("power 1 on");
+  outside("power @1 on");
 }
 
 void Bench::enable() { expect_done(client.enable()); }

@@ -36,7 +36,8 @@ struct Shaft {
 
 class Bench {
  public:
-  /// Throws Broken unless the axis comes online (with `connect`).
+  /// Throws Broken unless the axis comes online (with `connect`). An axis whose terminals can start motion is
+  /// released first where the drive powers up energised: these functions are written only then (M3).
   Bench(const Setup& setup, const Recipe& recipe = {}, bool connect = true);
   Bench(const Setup& setup, const Plant& plant, const Recipe& recipe = {}, bool connect = true);
   Bench(const Bench&) = delete;
@@ -56,10 +57,12 @@ class Bench {
     return await([](const auto& s) { return s.link() == v1::LINK_STATE_ONLINE; }, "online");
   }
 
+  /// The daemon's clock: the wall-clock time of now.
+  Duration now();
   /// One line to the outside world; throws Broken if it is not understood. The words after "ok".
   std::string outside(const std::string& line);
   Shaft shaft();
-  [[nodiscard]] std::uint64_t eeprom_writes() { return std::stoull(outside("eeprom 1")); }
+  [[nodiscard]] std::uint64_t eeprom_writes() { return std::stoull(outside("eeprom @1")); }
   /// Makes the terminal with this function active or not, whatever its active level.
   void set_input(const std::string& function, bool active);
   /// Gives it back to the switch that is wired to it.

@@ -2,12 +2,23 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 namespace axisd::conformance {
 
 namespace {
+
+/// Where a manual contradicts itself, the other reading is one key of the configuration (drive:).
+struct Reading {
+  std::string_view switch_name;  ///< not in its default position
+  std::string_view key, value;
+};
+constexpr Reading other_readings[] = {
+    {"input_functions_at_0043", "terminal_registers", "wiring"},
+    {"homing_mode_1_final_approach_same", "home_approach", "as_searched"},
+};
 
 std::vector<Wanted> inputs_of(const Recipe& recipe) {
   std::vector<Wanted> inputs;
@@ -46,6 +57,17 @@ std::string mechanics_of(const Variant& variant, const Recipe& recipe) {
 
 }  // namespace
 
+bool can_home_on_the_home_switch(const Manual& manual, const Variant& variant) {
+  const bool as_searched = std::ranges::any_of(other_readings, [&](const Reading& one) {
+    return one.key == "home_approach" && variant.switches.contains(std::string(one.switch_name));
+  });
+  return !variant.invert || as_searched || manual.text("homing_mode_1_final_approach") == "backward";
+}
+
+std::string any_homing_method(const Manual& manual, const Variant& variant) {
+  return can_home_on_the_home_switch(manual, variant) ? "home_negative" : "negative_limit";
+}
+
 std::string Variant::name() const {
   std::string text = invert ? "inverted" : "plain";
   for (const auto& [name, on] : switches) text += fmt::format(" {}={}", name, on ? "on" : "off");
@@ -63,21 +85,28 @@ std::map<std::string, std::string> terminals_of(const Manual& manual, const Reci
 Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& recipe) {
   std::string yaml = fmt::format(
       "machine: conformance\n"
-      "buses:\n  line: {{ modbus_rtu: {{ port: sim, baud: 115200 }} }}\n"
-      "axes:\n  axis:\n    bus: line\n    node: 1\n    model: {}\n    unit: mm\n"
+      "buses:\n  line: {{ modbus_rtu: {{ port: sim, baud: {} }} }}\n"
+      "axes:\n  axis:\n    bus: line\n    node: {}\n    model: {}\n    unit: mm\n"
       "    scale: {{ microstep: 1000 pulses/rev, travel: 10 mm/rev, invert: {} }}\n"
       "    limits: {{ {}velocity: 100 mm/s }}\n",
-      manual.model(), variant.invert, recipe.limits ? "position: [0, 400], " : "");
+      recipe.baud, recipe.node, manual.model(), variant.invert, recipe.limits ? "position: [0, 400], " : "");
   if (recipe.limits) yaml += "    jog_travel: 10 mm\n";
   if (!recipe.homing.empty())
-    yaml += fmt::format("    homing: {{ method: {}, {} }}\n", recipe.homing, recipe.homing_keys);
+    yaml += fmt::format("    homing: {{ method: {}, {} }}\n",
+                        recipe.homing == "any" ? any_homing_method(manual, variant) : recipe.homing,
+                        recipe.homing_keys);
   if (const auto lines = terminal_lines(manual.list("inputs"), inputs_of(recipe)); !lines.empty())
     yaml += "    inputs:\n" + lines;
   if (!recipe.outputs.empty())
     yaml += "    outputs:\n" + terminal_lines(manual.list("outputs"), recipe.outputs);
+  std::string settings = recipe.settings;
+  for (const auto& one : other_readings)
+    if (variant.switches.contains(std::string(one.switch_name)))
+      settings += fmt::format("{}{}: {}", settings.empty() ? "" : ", ", one.key, one.value);
+  if (!settings.empty()) yaml += fmt::format("    drive: {{ {} }}\n", settings);
   yaml += recipe.keys;
 
-  auto drive = fmt::format("node=1,model={}{}", manual.model(), mechanics_of(variant, recipe));
+  auto drive = fmt::format("node={},model={}{}", recipe.node, manual.model(), mechanics_of(variant, recipe));
   for (const auto& [name, on] : variant.switches)
     drive += fmt::format(",switch.{}={}", name, on ? "on" : "off");
   if (!recipe.drive.empty()) drive += "," + recipe.drive;

@@ -25,27 +25,36 @@ struct Wanted {
   bool active_low = false;
 };
 
-/// One axis of a model, as a scenario wants it. The axis is "axis", its drive node 1.
+/// One axis of a model, as a scenario wants it. The axis is "axis", its drive the first of the line (@1).
 ///
 /// 1000 pulses/rev and 10 mm/rev: 100 pulses per mm; 0..400 mm, 100 mm/s. Relative to where the load stands
-/// at power-up, in axis direction: home switch from -52 to -50 mm, limit switches at -60 and 460 mm.
-inline constexpr double pulses_per_mm = 100, home_from = -52, home_to = -50, positive_limit_at = 460,
+/// at power-up, in axis direction: home switch from -52 to -50 mm, limit switches at -60 and 410 mm.
+inline constexpr double pulses_per_mm = 100, home_from = -52, home_to = -50, positive_limit_at = 410,
                         negative_limit_at = -60;
 
 struct Recipe {
+  int node = 1;
+  int baud = 115200;
   bool limits = true;            ///< software limits
   bool home_switch = true;       ///< an input for it, and the switch
   bool limit_switches = true;    ///< likewise
   bool mechanics = true;         ///< false: the switches are never reached
   std::vector<Wanted> inputs{};  ///< beside the switches
   std::vector<Wanted> outputs{};
-  std::string homing = "home_negative";  ///< method; empty: none
+  std::string homing = "any";  ///< method; "any": one that this variant can have; empty: none
   std::string homing_keys =
-      "velocity: 50 mm/s, search_velocity: 5 mm/s, position: 3, backoff: 5 mm, timeout: 40 s";
+      "velocity: 100 mm/s, search_velocity: 20 mm/s, position: 3, backoff: 5 mm, timeout: 40 s";
   std::pair<double, double> home_at{home_from, home_to};
-  std::string keys{};   ///< further lines of the axis, "load: vertical\n..."
-  std::string drive{};  ///< further parts of --drive
+  std::string settings{};  ///< of the model, under drive:
+  std::string keys{};      ///< further lines of the axis, "load: vertical\n..."
+  std::string drive{};     ///< further parts of --drive
 };
+
+/// M18: where the last approach of the home methods has a direction of its own, an inverted axis cannot
+/// mirror it.
+[[nodiscard]] bool can_home_on_the_home_switch(const Manual& manual, const Variant& variant);
+/// What `homing: any` stands for.
+[[nodiscard]] std::string any_homing_method(const Manual& manual, const Variant& variant);
 
 /// Terminals of a recipe: function -> terminal, in the order in which they are given away.
 std::map<std::string, std::string> terminals_of(const Manual& manual, const Recipe& recipe);

@@ -41,7 +41,7 @@ std::string enable_and_disable(const Setup& setup) {
 }
 
 std::string released_by_terminal(const Setup& setup) {
-  Bench bench(setup, {.limit_switches = false, .inputs = {{"motor_free"}}});
+  Bench bench(setup, {.limit_switches = false, .inputs = {{"motor_free"}}, .homing = ""});
   bench.ready();
   bench.set_input("motor_free", true);
   bench.await([](const auto& s) { return !s.enabled(); }, "released by the terminal");

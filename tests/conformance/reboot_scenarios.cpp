@@ -61,9 +61,9 @@ std::string restart_and_power_cycle(const Setup& setup) {
   Bench bench(setup);
   bench.ready();
   expect_done(bench.client.move_to(30));
-  bench.outside("power 1 off");
+  bench.outside("power @1 off");
   bench.target->restart();
-  bench.outside("power 1 on");
+  bench.outside("power @1 on");
   bench.pass(3s);
   expect_lost(bench);
   expect_refused(bench.client.move_to(1),

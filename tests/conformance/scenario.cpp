@@ -13,10 +13,11 @@ namespace axisd::conformance {
 
 std::span<const Subject> subjects() {
   static const Subject all[] = {
-      {"power", true, power_scenarios()},    {"motion", true, motion_scenarios()},
-      {"stop", true, stop_scenarios()},      {"homing", true, homing_scenarios()},
-      {"limits", true, limit_scenarios()},   {"alarms", false, alarm_scenarios()},
-      {"reboot", false, reboot_scenarios()},
+      {"power", true, power_scenarios()},      {"motion", true, motion_scenarios()},
+      {"stop", true, stop_scenarios()},        {"homing", true, homing_scenarios()},
+      {"limits", true, limit_scenarios()},     {"alarms", false, alarm_scenarios()},
+      {"reboot", false, reboot_scenarios()},   {"terminals", true, terminal_scenarios()},
+      {"segments", true, segment_scenarios()}, {"parameters", false, parameter_scenarios()},
   };
   return all;
 }

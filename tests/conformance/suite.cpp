@@ -33,6 +33,10 @@ struct Case {
   int shard, of;
 };
 
+void PrintTo(const Case& one, std::ostream* out) {
+  *out << one.model << ' ' << one.subject->name << ' ' << one.shard + 1 << " of " << one.of;
+}
+
 std::vector<Case> cases() {
   std::vector<Case> all;
   for (const auto* model : drive_models())
