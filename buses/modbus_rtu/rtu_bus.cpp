@@ -44,7 +44,7 @@ Error garbled_error(int in_a_row) {
               .outcome = Outcome::unknown};
   if (in_a_row >= garbled_often) {
     error.message =
-        fmt::format("only damaged bytes came back, {} times in a row: two nodes on one address?", in_a_row);
+        fmt::format("only damaged bytes came back, {} times in a row (two nodes on one address?)", in_a_row);
     error.remedy =
         "switch off one node after the other to find a second one with this address; else check the "
         "baud rate, termination and shielding";

@@ -87,6 +87,24 @@ TEST_F(BusAccessTest, TransactSaysWhatIsKnown) {
   EXPECT_EQ(transact({.bus = "line-a", .node = 9}).error().reason, Reason::bus_down);
 }
 
+TEST_F(BusAccessTest, TwoDrivesOnOneAddressAreReportedAsSuch) {
+  add_drive("ess42-r", {.address = 2});
+  machine_->start();
+  const auto reported = [this] {
+    const auto state = machine_->find("a2")->snapshot();
+    return state->link_error &&
+           state->link_error->message.find("two nodes on one address") != std::string::npos;
+  };
+  ASSERT_TRUE(world_.run_until(reported, 10s));
+  const auto state = machine_->find("a2")->snapshot();
+  EXPECT_EQ(state->link, LinkState::offline);
+  EXPECT_EQ(state->link_error->reason, Reason::no_reply);
+  EXPECT_EQ(state->link_error->where.bus, "line-a");
+  EXPECT_EQ(state->link_error->where.node, 2);
+  EXPECT_FALSE(was_written(2));
+  EXPECT_EQ(machine_->find("a1")->snapshot()->link, LinkState::online);
+}
+
 TEST_F(BusAccessTest, ClosingEndsWhatIsUnderWay) {
   start();
   std::optional<Result<std::vector<std::uint16_t>>> answer;
