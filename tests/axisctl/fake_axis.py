@@ -34,6 +34,9 @@ class FakeAxis:
             simulated=True, bus="line-a", node=node, model="ykd2405pr", drive_version="1.0",
             inputs=[types_pb2.Terminal(name="X0", function="home", active=False)],
             outputs=[types_pb2.Terminal(name="Y0", function="alarm", active=False)])
+        if name == "turntable":
+            self.state.drift, self.state.eeprom_writes = "X1 has no function", 12
+            self.state.moving, self.state.motion_cause = True, types_pb2.MOTION_CAUSE_TERMINAL
         if name == "ghost":
             self.state.link = types_pb2.LINK_STATE_OFFLINE
             self.state.link_error.CopyFrom(offline_detail())

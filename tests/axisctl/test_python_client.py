@@ -165,6 +165,81 @@ class WholeMachine(ClientTest):
         await self.feeder.move(1)
 
 
+class Drives(ClientTest):
+    async def test_parameters(self):
+        drive = self.feeder.drive
+        info = await drive.info()
+        self.assertEqual((info.model, info.inputs[0].functions[1], info.alarms[0].reset),
+                         ("ykd2405pr", "home", "by_itself"))
+        catalogue = await drive.parameters()
+        self.assertEqual((catalogue["current"].default, catalogue["current"].access), (6, "read_write_saved"))
+        self.assertIsNone(catalogue["version"].default)
+        self.assertEqual(catalogue["microstep"].configured_by, "scale.microstep")
+        self.assertEqual(await drive.write(maximum_speed=-100, current=7), {"maximum_speed": -100, "current": 7})
+        self.assertEqual(await drive.read("current"), {"current": 7})
+        self.assertEqual(len(await drive.read()), 5)
+        with self.assertRaises(axisd.RefusedError) as raised:
+            await drive.write(stop=1)
+        self.assertEqual((raised.exception.remedy, raised.exception.detail.object), ("use AxisService.Stop", 0x28))
+
+    async def test_memory_needs_the_name_again(self):
+        with self.assertRaises(axisd.RefusedError):
+            await self.feeder.drive.save(confirm="yes")
+        await self.feeder.drive.save(confirm="feeder")
+        self.assertIn("9600", await self.feeder.drive.restore_factory(confirm="feeder"))
+
+    async def test_segments(self):
+        table = axisd.Segments(positions=(axisd.PositionSegment(1, 50, 20, 0.15),),
+                               velocities=(axisd.VelocitySegment(2, 5),), absolute=True)
+        self.assertEqual(await self.feeder.drive.write_segments(table), table)
+        self.assertEqual(await self.feeder.drive.segments(), table)
+
+    async def test_readdress_and_set_serial(self):
+        phases = [change.phase async for change in self.feeder.drive.readdress(7, confirm="feeder", verify=60)]
+        self.assertEqual(phases, ["written", "waiting", "verified"])
+        phases = [change.phase async for change in self.feeder.drive.set_serial(baud=9600, confirm="feeder")]
+        self.assertEqual(phases, ["written"])
+        self.assertEqual((self.calls("Readdress")[0].node, self.calls("SetSerial")[0].baud), (7, 9600))
+
+    async def test_scan_and_registers(self):
+        found = [node async for progress in self.machine.scan("line-a", last_node=9) for node in progress.found]
+        self.assertEqual([(node.node, node.model, node.configured_as) for node in found],
+                         [(1, "ykd2405pr", "feeder"), (5, "ykd2405pr", ""), (8, "", "")])
+        self.assertEqual(await self.machine.read_registers("line-a", 9, 16, 2), [65535, 65534])
+        await self.machine.write_registers("line-a", 9, 16, [5])
+        self.assertEqual(list(self.calls("Transact")[1].write.values), [5])
+
+    async def test_devices(self):
+        self.assertEqual((await self.machine.devices())["valves"].values, {"pressure": 2.5, "flow": None})
+        self.assertEqual(await self.machine.write_device("valves", "pressure", 3.04), 3.0)
+
+    async def test_state_shows_cause_and_drift(self):
+        state = await self.machine.axis("turntable").state()
+        self.assertEqual((state.motion_cause, state.drift, state.eeprom_writes),
+                         (axisd.MotionCause.TERMINAL, "X1 has no function", 12))
+
+    async def test_events_go_on_at_their_cursor(self):
+        async def first(count, **arguments):
+            seen = []
+            async for event in self.machine.events(**arguments):
+                seen.append(event)
+                if len(seen) == count:
+                    return seen
+        kept = await first(4, kept=True)
+        self.assertEqual([type(event.content).__name__ for event in kept],
+                         ["StateChange", "TerminalEdge", "LinkChange", "ConfigurationDrift"])
+        self.assertIs(kept[0].content.cause, axisd.MotionCause.TERMINAL)
+        self.assertEqual((kept[1].content.before - kept[1].content.after).total_seconds(), 0.02)
+        rest = await first(2, after=kept[1].cursor)
+        self.assertEqual([event.sequence for event in rest], [3, 4])
+        waiting = asyncio.create_task(first(1, axes=["feeder"]))
+        while len(self.calls("WatchEvents")) < 3:
+            await asyncio.sleep(0.01)
+        self.fake.happen("ghost")
+        self.fake.happen("feeder", configuration_drift={})
+        self.assertEqual((await waiting)[0].content, axisd.ConfigurationDrift(""))
+
+
 class Errors(ClientTest):
     async def test_refusal_carries_the_detail(self):
         with self.assertRaises(axisd.RefusedError) as raised:

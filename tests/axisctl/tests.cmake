@@ -7,8 +7,11 @@ if(AXISD_GRPC)
   find_program(AXISD_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
   add_test(NAME axisctl.against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl.py)
+  add_test(NAME axisctl.drives_against_fake_daemon
+           COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_drives.py)
   add_test(NAME python_client.against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_python_client.py)
-  set_tests_properties(axisctl.against_fake_daemon python_client.against_fake_daemon PROPERTIES
+  set_tests_properties(axisctl.against_fake_daemon axisctl.drives_against_fake_daemon
+                       python_client.against_fake_daemon PROPERTIES
                        ENVIRONMENT "AXISCTL=$<TARGET_FILE:axisctl>" TIMEOUT 600)
 endif()

@@ -6,13 +6,19 @@
         await feeder.home()
         await feeder.move(120, velocity=50)
 """
+from .drive import Drive
+from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FoundNode, LinkChange, Parameter,
+                     PositionSegment, ScanProgress, Segments, SerialProgress, StateChange, TerminalCapability,
+                     TerminalEdge, VelocitySegment)
 from .errors import AxisdError, MotionError, RefusedError, UnreachableError
 from .machine import Axis, Jog, Machine, connect
-from .types import (AxisState, Bus, Command, CommandState, ErrorDetail, Info, Link, MotionValues, PermittedRange,
-                    State, StopResult, Terminal, Tick, Trust)
+from .types import (AxisState, Bus, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
+                    PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
-    "Axis", "AxisState", "AxisdError", "Bus", "Command", "CommandState", "ErrorDetail", "Info", "Jog", "Link",
-    "Machine", "MotionError", "MotionValues", "PermittedRange", "RefusedError", "State", "StopResult", "Terminal",
-    "Tick", "Trust", "UnreachableError", "connect",
+    "Alarm", "Axis", "AxisState", "AxisdError", "Bus", "Command", "CommandState", "ConfigurationDrift", "Cursor",
+    "Device", "Drive", "DriveInfo", "ErrorDetail", "Event", "FoundNode", "Info", "Jog", "Link", "LinkChange",
+    "Machine", "MotionCause", "MotionError", "MotionValues", "Parameter", "PermittedRange", "PositionSegment",
+    "RefusedError", "ScanProgress", "Segments", "SerialProgress", "State", "StateChange", "StopResult", "Terminal",
+    "TerminalCapability", "TerminalEdge", "Tick", "Trust", "UnreachableError", "VelocitySegment", "connect",
 ]

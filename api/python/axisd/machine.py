@@ -14,10 +14,13 @@ import grpc
 import grpc.aio
 from google.protobuf.duration_pb2 import Duration
 
+from .drive import Drive
+from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, MotionError, translate
 from .types import AxisState, Bus, Command, CommandState, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
-                 command_service_pb2_grpc, system_service_pb2, system_service_pb2_grpc, types_pb2)
+                 command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
+                 system_service_pb2, system_service_pb2_grpc, types_pb2)
 
 Seconds = float | datetime.timedelta
 
@@ -85,6 +88,8 @@ class Machine:
         self._commands = command_service_pb2_grpc.CommandServiceStub(ordinary)
         self._cancels = command_service_pb2_grpc.CommandServiceStub(stops)
         self._buses = bus_service_pb2_grpc.BusServiceStub(ordinary)
+        self._drives = drive_service_pb2_grpc.DriveServiceStub(ordinary)
+        self._events = event_service_pb2_grpc.EventServiceStub(ordinary)
         self._system = system_service_pb2_grpc.SystemServiceStub(ordinary)
         self._system_stops = system_service_pb2_grpc.SystemServiceStub(stops)
         return self
@@ -175,6 +180,54 @@ class Machine:
         response = await self._call(self._buses.ListBuses, bus_service_pb2.ListBusesRequest(), "")
         return [Bus.of(bus) for bus in response.buses]
 
+    async def scan(self, bus: str, *, first_node: int = 1, last_node: int = 127, bauds: Iterable[int] = (),
+                   formats: Iterable[str] = (), reply_timeout: Seconds | None = None) -> AsyncIterator[ScanProgress]:
+        """Looks for nodes; leaving the loop ends it. Other rates and formats than the bus's own are refused while any of
+        its axes is enabled."""
+        request = bus_service_pb2.ScanRequest(bus=bus, first_node=first_node, last_node=last_node, bauds=list(bauds),
+                                              formats=list(formats), reply_timeout=_duration(reply_timeout))
+        async with contextlib.aclosing(self._stream(self._buses.Scan, request, bus)) as stream:
+            async for progress in stream:
+                yield ScanProgress.of(progress)
+
+    async def read_registers(self, bus: str, node: int, address: int, count: int = 1) -> list[int]:
+        """Reads holding registers of any node, through the bus's queue."""
+        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=address, read=count)
+        return list((await self._call(self._buses.Transact, request, bus)).values)
+
+    async def write_registers(self, bus: str, node: int, address: int, values: Iterable[int]) -> None:
+        """Writes holding registers of a node that no axis owns."""
+        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=address,
+                                                  write=bus_service_pb2.RegisterValues(values=list(values)))
+        await self._call(self._buses.Transact, request, bus)
+
+    async def devices(self) -> dict[str, Device]:
+        """The nodes that are not axes, as they were last read."""
+        response = await self._call(self._buses.ListDevices, bus_service_pb2.ListDevicesRequest(), "")
+        return {device.name: Device.of(device) for device in response.devices}
+
+    async def write_device(self, device: str, register: str, value: float) -> float:
+        """Writes one named register; returns the value as written."""
+        request = bus_service_pb2.WriteDeviceRequest(device=device, register=register, value=value)
+        return (await self._call(self._buses.WriteDevice, request, device)).value
+
+    async def events(self, axes: Iterable[str] = (), *, after: Cursor | None = None,
+                     kept: bool = False) -> AsyncIterator[Event]:
+        """What happens from now on, in order and without end. `after`: the cursor of the last event that was seen, to go
+        on there, also after a lost connection. `kept`: first everything that the daemon still keeps."""
+        request = event_service_pb2.WatchEventsRequest(axes=list(axes))
+        if after is not None:
+            request.instance_id, request.after_sequence = after.instance_id, after.sequence
+        elif kept:
+            request.after_sequence = 0
+        async with contextlib.aclosing(self._stream(self._events.WatchEvents, request, "events")) as stream:
+            lost = 0
+            async for batch in stream:
+                lost += batch.lost
+                for event in batch.events:
+                    yield Event.of(event, batch.instance_id, lost)
+                    lost = 0
+
     async def info(self) -> Info:
         return Info.of(await self._call(self._system.GetInfo, system_service_pb2.GetInfoRequest(), ""))
 
@@ -193,6 +246,7 @@ class Axis:
     def __init__(self, machine: Machine, name: str) -> None:
         self._machine = machine
         self.name = name
+        self.drive = Drive(machine, name)
 
     def __repr__(self) -> str:
         return f"Axis({self.name!r} at {self._machine.server})"

@@ -42,6 +42,15 @@ class Trust(enum.Enum):
     RESTORED = "Restored"
 
 
+class MotionCause(enum.Enum):
+    """Who set an axis in motion."""
+    UNSPECIFIED = "Unspecified"
+    NONE = "None"
+    COMMAND = "Command"
+    TERMINAL = "Terminal"
+    UNKNOWN = "Unknown"
+
+
 class CommandState(enum.Enum):
     UNSPECIFIED = "Unspecified"
     ACCEPTED = "Accepted"
@@ -167,6 +176,9 @@ class AxisState:
     model: str
     bus: str
     node: int
+    motion_cause: MotionCause
+    drift: str
+    eeprom_writes: int
     raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -183,7 +195,9 @@ class AxisState:
             inputs=tuple(Terminal(t.name, t.function, t.active) for t in raw.inputs),
             outputs=tuple(Terminal(t.name, t.function, t.active) for t in raw.outputs),
             measured_at=_optional_time(raw, "measured_at"), age=_optional_seconds(raw, "age"),
-            simulated=raw.simulated, command_id=raw.command_id, model=raw.model, bus=raw.bus, node=raw.node, raw=raw)
+            simulated=raw.simulated, command_id=raw.command_id, model=raw.model, bus=raw.bus, node=raw.node,
+            motion_cause=_member(MotionCause, types_pb2.MotionCause.DESCRIPTOR, "MOTION_CAUSE_", raw.motion_cause),
+            drift=raw.drift, eeprom_writes=raw.eeprom_writes, raw=raw)
 
 
 @dataclasses.dataclass(frozen=True)

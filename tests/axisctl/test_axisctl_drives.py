@@ -1,0 +1,205 @@
+"""The real axisctl against the fake daemon: drives, buses, devices, events."""
+import pathlib
+import re
+import signal
+import tempfile
+import unittest
+
+from support import AxisctlTest
+
+
+class Drives(AxisctlTest):
+    def test_info(self):
+        text = self.ok("drive", "info", "feeder")
+        self.assertRegex(text, r"model: +ykd2405pr \(YKD2405PR\)")
+        self.assertRegex(text, r"inputs: +X0 X1: none, home, positive_limit")
+        self.assertRegex(text, r"alarm 2: +overvoltage \(clears itself, then reset\): check the supply")
+        self.assertRegex(text, r"EEPROM: +3 registers")
+        self.assertEqual(self.json("drive", "info", "feeder")[0]["model_code"], 0x301)
+        self.assertIn("no axis 'nobody'", self.fails(4, "drive", "info", "nobody"))
+
+    def test_parameters_are_a_table_without_touching_the_bus(self):
+        lines = self.ok("drive", "parameters", "feeder").splitlines()
+        self.assertRegex(lines[0], r"^NAME +ADDRESS +RANGE +DEFAULT +ACCESS +UNIT +OWNER$")
+        self.assertEqual(len(lines), 7)
+        self.assertRegex(lines[3], r"^microstep +0x0011 +0\.\.15 +8 +saved +scale\.microstep$")
+        self.assertRegex(lines[6], r"^stop +0x0028 +0\.\.2 +trigger +use AxisService\.Stop$")
+        self.assertEqual(self.server.calls("ReadParameters"), [])
+
+    def test_parameters_by_pattern_with_values(self):
+        lines = self.ok("drive", "parameters", "feeder", "speed", "--read", "--describe").splitlines()
+        self.assertEqual(len(lines), 3)
+        self.assertRegex(lines[2], r"^maximum_speed +0x0023 +-60 +-3000\.\.3000 +60 +read/write +r/min +Speed of")
+        self.assertEqual(list(self.server.calls("ReadParameters")[0].names), ["start_speed", "maximum_speed"])
+        self.assertEqual(len(self.ok("drive", "parameters", "feeder", "m*").splitlines()), 3)
+        self.assertIn("no parameter of ykd2405pr fits 'xyz'",
+                      self.fails(2, "drive", "parameters", "feeder", "xyz"))
+        # What cannot be read is not asked for.
+        self.ok("drive", "parameters", "feeder", "--read")
+        self.assertNotIn("stop", self.server.calls("ReadParameters")[-1].names)
+        listed, values = self.json("drive", "parameters", "feeder", "speed", "--read")
+        self.assertEqual((len(listed["parameters"]), values["values"][1]["value"]), (2, "-60"))
+
+    def test_read_and_write(self):
+        self.assertRegex(self.ok("drive", "read", "feeder", "start_speed"), r"start_speed +0x0020 +5 +r/min")
+        text = self.ok("drive", "write", "feeder", "current=0x7", "maximum_speed=-100")
+        self.assertRegex(text, r"(?s)current +0x0010 +7.*maximum_speed +0x0023 +-100 +r/min")
+        (request,) = self.server.calls("WriteParameters")
+        self.assertEqual([(v.name, v.value) for v in request.values], [("current", 7), ("maximum_speed", -100)])
+        self.assertEqual(self.json("drive", "read", "feeder", "current")[0]["values"][0]["value"], "7")
+        self.assertEqual(self.fails(4, "drive", "read", "feeder", "curent"),
+                         'axisctl: feeder: ykd2405pr has no parameter "curent"; did you mean current?')
+        self.assertEqual(self.fails(4, "drive", "write", "feeder", "stop=1"),
+                         "axisctl: feeder: line-a node 1 object 0x0028: stop triggers an action; use AxisService.Stop")
+
+    def test_bad_assignments_reach_nothing(self):
+        for text in ("current", "=3", "current=", "current=six", "current=0x", "current=--3"):
+            self.fails(2, "drive", "write", "feeder", text)
+        self.fails(2, "drive", "write", "feeder")
+        self.assertEqual(self.server.calls("WriteParameters"), [])
+
+    def test_save_and_restore_need_the_name_again(self):
+        self.assertIn("--confirm", self.fails(2, "drive", "save", "feeder"))
+        self.assertIn("repeat the axis's name", self.fails(4, "drive", "restore", "feeder", "--confirm", "yes"))
+        self.assertIn("saved", self.ok("drive", "save", "feeder", "--confirm", "feeder"))
+        self.assertIn("next power-up: node by its switches, 9600 8N1",
+                      self.ok("drive", "restore", "feeder", "--confirm", "feeder"))
+
+    def test_segments(self):
+        self.assertEqual(self.ok("drive", "segments", "feeder"), "no segments\n")
+        text = self.ok("drive", "segments", "feeder", "--position", "2:-50mm:20mm/s", "--position",
+                       "1:50mm:20mm/s:100ms", "--velocity", "2:5mm/s")
+        self.assertRegex(text, r"1 +50 mm +20 mm/s +100 ms\n +2 +-50 mm +20 mm/s +5 mm/s")
+        (request,) = self.server.calls("WriteSegments")
+        self.assertEqual([(r.number, r.target, r.velocity) for r in request.segments.positions],
+                         [(2, -50, 20), (1, 50, 20)])
+        with tempfile.TemporaryDirectory() as directory:
+            path = pathlib.Path(directory) / "table.json"
+            path.write_text(self.ok("--json", "drive", "segments", "feeder"))
+            self.ok("drive", "segments", "feeder", "--clear")
+            self.assertEqual(self.ok("drive", "segments", "feeder"), "no segments\n")
+            self.ok("drive", "segments", "feeder", "--set", str(path))
+            self.assertEqual(self.server.calls("WriteSegments")[-1], request)
+            path.write_text("{")
+            self.assertIn("not a segment table", self.fails(2, "drive", "segments", "feeder", "--set", str(path)))
+        for text in ("1:5mm", "0:5mm:1mm/s", "1:5deg:1mm/s", "1:2:3:4ms:5"):
+            self.fails(2, "drive", "segments", "feeder", "--position", text)
+        self.assertIn("give one of", self.fails(2, "drive", "segments", "feeder", "--clear", "--absolute"))
+
+    def test_readdress_says_what_is_left_to_do(self):
+        lines = self.ok("drive", "readdress", "feeder", "7", "--confirm", "feeder").splitlines()
+        self.assertIn("switch the drive off and on. SW1 to SW5 must be off", lines[0])
+        self.assertIn("'node: 7' under 'axes: feeder:'", lines[-1])
+        text = self.ok("drive", "readdress", "feeder", "7", "--confirm", "feeder", "--verify", "60s")
+        self.assertRegex(text, r"(?s)saved in the drive.*waiting.*found\. it answers.*the configuration must say so")
+        self.assertEqual(self.server.calls("Readdress")[1].verify.seconds, 60)
+        self.assertIn("confirm", self.fails(4, "drive", "readdress", "feeder", "7", "--confirm", "x"))
+
+    def test_set_serial(self):
+        text = self.ok("drive", "set-serial", "feeder", "--baud", "9600", "--format", "8E1", "--confirm", "feeder")
+        self.assertIn("'baud: 9600, format: 8E1' of its bus", text)
+        (request,) = self.server.calls("SetSerial")
+        self.assertEqual((request.baud, request.format), (9600, "8E1"))
+        self.ok("drive", "set-serial", "feeder", "--format", "8N1", "--confirm", "feeder")
+        self.assertFalse(self.server.calls("SetSerial")[1].HasField("baud"))
+        self.assertIn("--baud", self.fails(2, "drive", "set-serial", "feeder", "--confirm", "feeder"))
+
+    def test_ctrl_c_ends_the_looking(self):
+        status, shown = self.on_terminal("drive", "readdress", "feeder", "7", "--confirm", "feeder", "--verify",
+                                         "600s", interrupt_at=r"waiting")
+        self.assertEqual(status, 130, shown)
+        self.assertIn("what was saved in the drive stays", shown)
+
+    def test_state_shows_cause_drift_and_wear(self):
+        text = self.ok("state", "turntable")
+        self.assertRegex(text, r"(?s)drift: +X1 has no function.*motion: +started by a terminal.*EEPROM: +12 registers")
+        self.assertRegex(self.ok("list"), r"turntable .*started by a terminal, drift: X1 has no function")
+
+
+class Buses(AxisctlTest):
+    def test_scan_ends_with_lines_for_the_configuration(self):
+        text = self.ok("bus", "scan", "line-a", "--nodes", "1-10", "--baud", "9600,115200", "--format", "8N1,8E1",
+                       "--reply-timeout", "20ms")
+        self.assertRegex(text, r"\n +1 +115200 +8N1 +ykd2405pr +V1\.0 +10000 +feeder\n")
+        self.assertRegex(text, r"\n +8 +115200 +8N1 +unknown +garbled replies")
+        self.assertTrue(text.endswith("  axis-5:\n    bus: line-a\n    node: 5\n    model: ykd2405pr\n    unit: rev\n"
+                                      "    scale: { microstep: 2000 pulses/rev }\n    limits: { velocity: 1 rev/s }\n"))
+        (request,) = self.server.calls("Scan")
+        self.assertEqual((request.first_node, request.last_node, list(request.bauds), list(request.formats),
+                          request.reply_timeout.nanos), (1, 10, [9600, 115200], ["8N1", "8E1"], 20_000_000))
+
+    def test_yaml_only_loads(self):
+        fragment = self.ok("bus", "scan", "line-a", "--yaml")
+        with tempfile.TemporaryDirectory() as directory:
+            path = pathlib.Path(directory) / "machine.yaml"
+            path.write_text("machine: press-1\nbuses:\n  line-a:\n    modbus_rtu: { port: sim }\naxes:\n" + fragment)
+            self.assertIn("axes: 1", self.ok("check", str(path)))
+
+    def test_scan_shows_progress_on_a_terminal(self):
+        status, shown = self.on_terminal("bus", "scan", "line-a")
+        self.assertEqual(status, 0, shown)
+        self.assertRegex(shown, r"line-a  \d+ of 127  \[#* *\]  \d found")
+
+    def test_an_interrupted_scan_shows_what_was_found(self):
+        status, shown = self.on_terminal("bus", "scan", "endless", interrupt_at=r"1 found")
+        self.assertEqual(status, 130, shown)
+        self.assertRegex(shown, r"9 +9600 +8N1 +\S*unknown")
+
+    def test_nothing_found_and_bad_ranges(self):
+        self.assertEqual(self.ok("bus", "scan", "line-a", "--nodes", "20"), "line-a: no node answered\n")
+        self.assertEqual(self.server.calls("Scan")[0].last_node, 20)
+        for nodes in ("0-5", "1-", "a", "1-300"):
+            self.fails(2, "bus", "scan", "line-a", "--nodes", nodes)
+
+    def test_read_and_write(self):
+        text = self.ok("bus", "read", "line-a", "9", "0x10", "2")
+        self.assertRegex(text, r"0x0010 +0xFFFF +65535 +-1\n0x0011 +0xFFFE +65534 +-2\n")
+        self.assertEqual(self.server.calls("Transact")[0].address, 16)
+        self.assertIn("3 registers written", self.ok("bus", "write", "line-a", "9", "16", "-5", "0xFF", "7"))
+        self.assertEqual(list(self.server.calls("Transact")[1].write.values), [65531, 255, 7])
+        self.assertIn("node 1 is the axis feeder", self.fails(4, "bus", "write", "line-a", "1", "0", "1"))
+        self.assertIn("permitted: -32768 to 65535", self.fails(2, "bus", "write", "line-a", "9", "0", "65536"))
+
+    def test_devices(self):
+        self.assertRegex(self.ok("device", "list"), r"valves +line-a +40 +pressure +2\.5 +bar +read/write +online\n")
+        self.assertEqual(self.ok("device", "write", "valves", "pressure", "3.04bar"), "valves pressure = 3 bar\n")
+        self.assertEqual(self.server.calls("WriteDevice")[0].value, 3.04)
+        self.assertIn("bar", self.fails(2, "device", "write", "valves", "pressure", "3mm"))
+
+
+class Events(AxisctlTest):
+    def test_all_that_are_kept(self):
+        lines = self.ok("events").splitlines()
+        self.assertEqual(lines, [
+            "2023-11-14T22:13:20.123Z  1  feeder  Standstill -> DiscreteMotion, started by a terminal",
+            "2023-11-14T22:13:20.124Z  2  feeder  X0 home on (within 20 ms)",
+            "2023-11-14T22:13:20.125Z  3  ghost  offline: no reply",
+            "2023-11-14T22:13:20.126Z  4  turntable  drift: X1 has no function"])
+
+    def test_filters_and_since(self):
+        self.assertEqual(len(self.ok("events", "feeder", "ghost").splitlines()), 3)
+        self.assertEqual(len(self.ok("events", "--kind", "terminal,link").splitlines()), 2)
+        self.assertEqual(len(self.ok("events", "--since", "3").splitlines()), 1)
+        self.assertEqual(self.ok("events", "--since", "10min"), "")
+        self.assertEqual(self.ok("events", "--since", "now"), "")
+        self.assertIn("permitted: terminal, state", self.fails(2, "events", "--kind", "noise"))
+        self.fails(2, "events", "--since", "yesterday")
+        self.assertEqual([event["sequence"] for event in self.json("events", "feeder")], ["1", "2"])
+
+    def test_follow_until_ctrl_c(self):
+        status, shown = self.on_terminal("events", "--follow", interrupt_at=r"turntable")
+        self.assertEqual(status, 0, shown)
+
+
+class Help(AxisctlTest):
+    def test_every_command_has_help(self):
+        for group in ("drive", "bus", "device"):
+            text = self.ok(group, "--help")
+            self.assertIn("Example", text)
+            for name in re.findall(r"(?m)^  ([a-z-]+) {2,}[A-Z]", text.partition("Subcommands:")[2]):
+                self.assertIn("Usage: axisctl", self.ok(group, name, "--help"))
+
+
+if __name__ == "__main__":
+    signal.alarm(600)  # a hang names itself instead of blocking a test run
+    unittest.main()

@@ -1,0 +1,83 @@
+#include "api/axisctl/yaml_fragment.hpp"
+
+#include <gmock/gmock.h>
+
+#include "config/configuration.hpp"
+#include "devices/descriptor.hpp"
+
+namespace axisd::axisctl {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+v1::FoundNode found(std::uint32_t node, const std::string& model, std::uint32_t baud = 115200,
+                    std::uint32_t pulses = 10000) {
+  v1::FoundNode result;
+  result.set_node(node);
+  result.set_baud(baud);
+  result.set_format("8N1");
+  result.set_model(model);
+  result.set_pulses_per_revolution(pulses);
+  return result;
+}
+
+const FragmentContext context{.bus = "line-a", .baud = 115200, .taken = {"feeder", "axis-4"}};
+
+/// A whole file with the fragment as its axes.
+config::LoadResult load(const std::string& fragment) {
+  return config::load_text(
+      "machine: press-1\nbuses:\n  line-a:\n    modbus_rtu: { port: sim, baud: 115200 }\naxes:\n" + fragment,
+      "scanned.yaml");
+}
+
+TEST(YamlFragment, LoadsAsItIs) {
+  const auto fragment = yaml_fragment({found(3, "ykd2405pr"), found(4, "ykd2405pr", 115200, 200)}, context);
+  const auto result = load(fragment);
+  for (const auto& diagnostic : result.diagnostics)
+    ADD_FAILURE() << to_string(diagnostic) << "\n" << fragment;
+  ASSERT_TRUE(result.configuration);
+  ASSERT_EQ(result.configuration->axes.size(), 2U);
+  const auto& first = result.configuration->axes[0].axis;
+  EXPECT_EQ(first.name, "axis-3");
+  EXPECT_EQ(first.bus, "line-a");
+  EXPECT_EQ(first.node, 3);
+  EXPECT_EQ(first.model, "ykd2405pr");
+  EXPECT_EQ(first.limits.velocity, 1);
+  EXPECT_EQ(result.configuration->axes[1].axis.name, "line-a-axis-4");  // the other name is taken
+}
+
+TEST(YamlFragment, LoadsForEveryModelAndMicrostep) {
+  for (const auto* model : drive_models())
+    for (const auto pulses : model->capabilities.pulses_per_revolution) {
+      const auto fragment = yaml_fragment(
+          {found(1, std::string(model->model), 115200, static_cast<std::uint32_t>(pulses))}, context);
+      const auto result = load(fragment);
+      EXPECT_TRUE(result.configuration) << fragment << to_string(result.diagnostics.at(0));
+    }
+}
+
+TEST(YamlFragment, LeavesOutWhatIsConfiguredOrUnknown) {
+  auto known = found(3, "ykd2405pr");
+  known.set_configured_as("feeder");
+  EXPECT_EQ(yaml_fragment({known, found(9, "")}, context), "");
+}
+
+TEST(YamlFragment, NamesInCommentsWhatCannotBeAnAxisYet) {
+  const auto fragment = yaml_fragment({found(3, "ykd2405pr"), found(3, "ykd2405pr"),
+                                       found(5, "ykd2405pr", 9600), found(6, "ykd2405pr", 115200, 0)},
+                                      context);
+  EXPECT_THAT(fragment,
+              HasSubstr("# node 3 (ykd2405pr, 115200 bit/s, 8N1): a second drive with this address"));
+  EXPECT_THAT(fragment,
+              HasSubstr("# node 5 (ykd2405pr, 9600 bit/s, 8N1): set its switches to the bus's 115200"));
+  EXPECT_THAT(fragment,
+              HasSubstr("# node 6 (ykd2405pr, 115200 bit/s, 8N1): its microstep could not be read"));
+  EXPECT_THAT(fragment, Not(HasSubstr("axis-5")));
+  const auto result = load(fragment);
+  ASSERT_TRUE(result.configuration);
+  EXPECT_EQ(result.configuration->axes.size(), 1U);
+}
+
+}  // namespace
+}  // namespace axisd::axisctl
