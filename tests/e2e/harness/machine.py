@@ -28,7 +28,8 @@ class Axis:
                        {"bus": self.bus, "node": self.node, "model": "ykd2405pr", **PATIENT, **self.keys}.items())
 
     def option(self):
-        words = f"node={self.node},model=ykd2405pr,switch.enabled_at_power_up=off"
+        model = self.keys.get("model", "ykd2405pr")
+        words = f"node={self.node},model={model},switch.enabled_at_power_up=off"
         return words + (f",{self.simulated}" if self.simulated else "")
 
 
