@@ -45,7 +45,7 @@ struct FoundNode {
 };
 
 struct ScanProgress {
-  int probed = 0, total = 0;  ///< probes: node x baud x format
+  int probed = 0, total = 0;       ///< probes: node x baud x format
   std::vector<FoundNode> found{};  ///< since the last report
   bool finished = false;
 };
@@ -77,16 +77,16 @@ class BusAccess {
   virtual void transact(TransactRequest request,
                         std::function<void(Result<std::vector<std::uint16_t>>)> callback) = 0;
 
-  /// Looks for nodes in class `scan`. Calls back with progress, last with `finished` or an error. Other serial
-  /// settings than the bus's own are tried only while every axis of the bus is released or offline (frames in
-  /// another rate are noise to the rest of the line). Dropping the token ends it.
+  /// Looks for nodes in class `scan`. Calls back with progress, last with `finished` or an error. Other
+  /// serial settings than the bus's own are tried only while every axis of the bus is released or offline
+  /// (frames in another rate are noise to the rest of the line). Dropping the token ends it.
   virtual std::shared_ptr<void> scan(ScanRequest request,
                                      std::function<void(Result<ScanProgress>)> callback) = 0;
 
   /// All `devices:`, in the order of the file, without waiting for the core.
   [[nodiscard]] virtual std::vector<DeviceSnapshotPtr> devices() const = 0;
-  /// Writes one named register; calls back with the value as written. Errors: invalid_argument (unknown or not
-  /// writable), out_of_range (not representable), and those of the wire.
+  /// Writes one named register; calls back with the value as written. Errors: invalid_argument (unknown or
+  /// not writable), out_of_range (not representable), and those of the wire.
   virtual void write_device(std::string device, std::string name, double value,
                             std::function<void(Result<double>)> callback) = 0;
 };

@@ -173,8 +173,8 @@ class Drive {
   /// Restores the factory settings; afterwards configure() is needed. The text says which address and serial
   /// settings apply after the next power-up; refused (misconfigured) if that address is one of `taken`.
   virtual Task<Result<std::string>> restore_factory(std::vector<std::uint8_t> taken) = 0;
-  /// Saves another address or other serial settings in the EEPROM and reads them back; the text says what has
-  /// to be done for them to count. Errors: out_of_range, not_supported.
+  /// Saves another address or other serial settings in the EEPROM and reads them back; the text says from when
+  /// they count, and how the drive's switches must stand for that. Errors: out_of_range, not_supported.
   virtual Task<Result<std::string>> change_serial(SerialChange change) = 0;
 
   virtual Task<Result<void>> clear_alarm() = 0;

@@ -150,11 +150,10 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
   expected_.clear();  // whatever stands there now, it is not ours
   saving_.reset();
   if (!restored) co_return failed(restored.error());
-  auto text =
-      custom ? fmt::format("after the next power-up: address {}",
-                           model_->factory_custom_node != 0 ? std::to_string(model_->factory_custom_node)
-                                                            : "undefined (set the address switches first)")
-             : fmt::format("after the next power-up: address {} by its switches", node);
+  auto text = custom ? fmt::format("address {}", model_->factory_custom_node != 0
+                                                     ? std::to_string(model_->factory_custom_node)
+                                                     : "undefined (set the address switches first)")
+                     : fmt::format("address {} by its switches", node);
   co_return text + ", format 8N1, baud by its switches" +
       (model_->custom_bauds.empty() ? "" : fmt::format(" or {}", model_->custom_bauds.front()));
 }
@@ -194,12 +193,12 @@ Result<std::vector<ParameterValue>> YakoRtuDrive::serial_registers(const SerialC
 }
 
 std::string YakoRtuDrive::serial_advice(const SerialChange& change) const {
-  std::string text = "saved; it counts from the next power-up";
+  std::string text = "it counts from the next power-up";
   if (change.node && model_->custom_node_switches[0] != '\0')
     text += fmt::format(", with {}", model_->custom_node_switches);
   if (change.baud && model_->custom_baud_switches[0] != '\0')
     text += fmt::format(", with {}", model_->custom_baud_switches);
-  return text + ": switch the drive off and on, and change the configuration";
+  return text;
 }
 
 Task<Result<std::string>> YakoRtuDrive::change_serial(SerialChange change) {
