@@ -65,11 +65,13 @@ v1::VelocitySegment parse_velocity_segment(std::string_view text, std::string_vi
 v1::SegmentTable parse_segment_json(const std::string& text, std::string_view what) {
   v1::SegmentTable table;
   const auto status = google::protobuf::util::JsonStringToMessage(text, &table);
-  if (!status.ok())
-    throw Failure(ExitCode::usage, fmt::format("{}: not a segment table in JSON: {}; 'axisctl --json drive "
-                                               "segments AXIS' prints one",
-                                               what, std::string_view(status.message())));
-  return table;
+  if (status.ok()) return table;
+  // Its further lines show the place with a mark below; an error here is one line.
+  const std::string message(status.message().data(), status.message().size());
+  throw Failure(ExitCode::usage,
+                fmt::format("{}: not a segment table in JSON: {}; 'axisctl --json drive segments "
+                            "AXIS' prints one",
+                            what, message.substr(0, message.find('\n'))));
 }
 
 Table segment_table(const v1::SegmentTable& segments, std::string_view unit) {

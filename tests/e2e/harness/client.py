@@ -11,10 +11,12 @@ from .programs import LIMIT, wait_for
 package.load()
 from axisd.v1 import (axis_service_pb2 as axis_pb, axis_service_pb2_grpc, bus_service_pb2 as bus_pb,  # noqa: E402
                       bus_service_pb2_grpc, command_service_pb2 as command_pb, command_service_pb2_grpc,
-                      error_pb2 as error_pb, system_service_pb2 as system_pb, system_service_pb2_grpc,
-                      types_pb2 as pb)
+                      drive_service_pb2 as drive_pb, drive_service_pb2_grpc, error_pb2 as error_pb,
+                      event_service_pb2 as event_pb, event_service_pb2_grpc, system_service_pb2 as system_pb,
+                      system_service_pb2_grpc, types_pb2 as pb)
 
-__all__ = ["Client", "CallFailed", "axis_pb", "bus_pb", "command_pb", "error_pb", "pb", "system_pb"]
+__all__ = ["Client", "CallFailed", "axis_pb", "bus_pb", "command_pb", "drive_pb", "error_pb", "event_pb", "pb",
+           "system_pb"]
 
 ACCEPTED, STARTED, DONE = pb.WAIT_UNTIL_ACCEPTED, pb.WAIT_UNTIL_STARTED, pb.WAIT_UNTIL_DONE
 ENDED = (pb.COMMAND_STATE_DONE, pb.COMMAND_STATE_ABORTED, pb.COMMAND_STATE_ERROR, pb.COMMAND_STATE_UNKNOWN)
@@ -61,6 +63,8 @@ class Client:
         self.axis = axis_service_pb2_grpc.AxisServiceStub(self.channel)
         self.command = command_service_pb2_grpc.CommandServiceStub(self.channel)
         self.bus = bus_service_pb2_grpc.BusServiceStub(self.channel)
+        self.drive = drive_service_pb2_grpc.DriveServiceStub(self.channel)
+        self.event = event_service_pb2_grpc.EventServiceStub(self.channel)
         self.system = system_service_pb2_grpc.SystemServiceStub(self.channel)
 
     def close(self):
