@@ -19,7 +19,7 @@ inline constexpr TerminalFunctionSpec input_functions[] = {
     {"motor_free", 4, {}},
     {"alarm_clear", 5, {}},
     {"pv_enable", 6, {}, true},
-    {"pv_direction", 7, {}, true},
+    {"pv_direction", 7, {}},  // turns a run that pv_enable starts; it starts none (7.4.2)
     {"stop", 8, {}},
     {"quick_stop", 9, {}},
     {"position_start", 10, {}, true},
