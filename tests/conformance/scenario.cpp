@@ -18,6 +18,8 @@ std::span<const Subject> subjects() {
       {"limits", true, limit_scenarios()},     {"alarms", false, alarm_scenarios()},
       {"reboot", false, reboot_scenarios()},   {"terminals", true, terminal_scenarios()},
       {"segments", true, segment_scenarios()}, {"parameters", false, parameter_scenarios()},
+      {"serial", false, serial_scenarios()},   {"eeprom", false, eeprom_scenarios()},
+      {"bus", false, bus_scenarios()},
   };
   return all;
 }

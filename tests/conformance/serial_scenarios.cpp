@@ -1,0 +1,124 @@
+// Another address, baud rate or format for a drive: explicit, confirmed, verified after a power cycle.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "tests/conformance/scenario.hpp"
+
+namespace axisd::conformance {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A drive whose address and serial settings are custom: its switches are all off, or it has none.
+Recipe custom_recipe(const Manual& manual) {
+  const auto nodes = manual.text("nodes_custom");
+  Recipe recipe{.node = std::stoi(nodes) + 1};
+  recipe.drive = "dip=0";
+  if (!manual.list("bauds_dip").empty()) {
+    recipe.drive += ",dip_baud=0";
+    recipe.baud = 9600;
+  }
+  return recipe;
+}
+
+/// A serial service, phase by phase; `between` lets something happen after the first.
+template <class Response, class Request, class Stub, class Between>
+std::vector<v1::SerialPhase> follow(
+    Bench& bench,
+    std::unique_ptr<grpc::ClientReader<Response>> (Stub::*method)(grpc::ClientContext*, const Request&),
+    const Request& request, grpc::Status& status, Between between) {
+  grpc::ClientContext context;
+  Client::set_deadline(context);
+  Stub stub(bench.target->channel());
+  auto reader = (stub.*method)(&context, request);
+  std::vector<v1::SerialPhase> phases;
+  for (Response response; reader->Read(&response);) {
+    EXPECT_FALSE(response.text().empty());
+    if (phases.empty()) {
+      EXPECT_NE(response.text().find("off and on"), std::string::npos)
+          << "it does not say that a power cycle is needed: " << response.text();
+      between();
+    }
+    phases.push_back(response.phase());
+  }
+  status = reader->Finish();
+  return phases;
+}
+
+void power_cycle(Bench& bench) {
+  bench.cycle_power(2s);
+  bench.pass(20s);
+}
+
+std::string readdress(const Setup& setup) {
+  const auto recipe = custom_recipe(setup.manual);
+  Bench bench(setup, recipe);
+  bench.ready();
+  v1::ReaddressRequest request;
+  request.set_axis("axis");
+  request.set_node(static_cast<std::uint32_t>(recipe.node + 3));
+  to_proto(60s, *request.mutable_verify());
+  grpc::Status status;
+  const auto attempt = [&](auto between) {
+    return follow<v1::ReaddressResponse>(bench, &v1::DriveService::Stub::Readdress, request, status, between);
+  };
+  EXPECT_TRUE(attempt([] {}).empty());
+  expect_refused(status, Client::detail_of(status), v1::REASON_INVALID_ARGUMENT);  // not confirmed
+  request.set_confirm("axis");
+  EXPECT_TRUE(attempt([] {}).empty()) << "while enabled";
+  EXPECT_FALSE(status.ok());
+  expect_done(bench.client.disable());
+  request.set_node(200);
+  EXPECT_TRUE(attempt([] {}).empty());
+  expect_refused(status, Client::detail_of(status), v1::REASON_OUT_OF_RANGE);
+
+  request.set_node(static_cast<std::uint32_t>(recipe.node + 3));
+  const auto phases = attempt([&] { power_cycle(bench); });
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  if (phases.empty()) throw Broken("Readdress: no phase");
+  EXPECT_EQ(phases.front(), v1::SERIAL_PHASE_WRITTEN);
+  EXPECT_EQ(phases.back(), v1::SERIAL_PHASE_VERIFIED) << status.error_message();
+  // It answers at its new address, and no longer at the one of the configuration.
+  bench.outside(fmt::format("shaft {}", recipe.node + 3));
+  bench.await([](const auto& s) { return s.link() == v1::LINK_STATE_OFFLINE; }, "offline at its old address");
+  bench.finish(0);
+  return setup.manual.text("nodes_custom");
+}
+
+std::string set_serial(const Setup& setup) {
+  const auto recipe = custom_recipe(setup.manual);
+  const auto bauds = setup.manual.list("bauds_custom");
+  for (const auto& [baud, format] : {std::pair(std::stoi(bauds[1]), ""), std::pair(0, "8E1")}) {
+    SCOPED_TRACE(fmt::format("{} {}", baud, format));
+    Bench bench(setup, recipe);
+    expect_done(bench.client.disable());
+    v1::SetSerialRequest request;
+    request.set_axis("axis");
+    request.set_confirm("axis");
+    if (baud != 0) request.set_baud(static_cast<std::uint32_t>(baud));
+    request.set_format(format);
+    to_proto(60s, *request.mutable_verify());
+    grpc::Status status;
+    const auto phases = follow<v1::SetSerialResponse>(bench, &v1::DriveService::Stub::SetSerial, request,
+                                                      status, [&] { power_cycle(bench); });
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    if (phases.empty()) throw Broken("SetSerial: no phase");
+    EXPECT_EQ(phases.front(), v1::SERIAL_PHASE_WRITTEN);
+    EXPECT_EQ(phases.back(), v1::SERIAL_PHASE_VERIFIED) << status.error_message();
+    bench.await([](const auto& s) { return s.link() == v1::LINK_STATE_OFFLINE; }, "deaf to its old settings");
+    bench.finish(0);
+  }
+  return setup.manual.text("bauds_custom");
+}
+
+constexpr Scenario scenarios[] = {
+    {"readdress", "address changed and verified", &readdress},
+    {"set_serial", "baud rate and format changed and verified", &set_serial},
+};
+
+}  // namespace
+
+std::span<const Scenario> serial_scenarios() { return scenarios; }
+
+}  // namespace axisd::conformance
