@@ -41,7 +41,7 @@ v1::TransactRequest request_of(const Arguments& arguments) {
 void read(Invocation& invocation, const Arguments& arguments) {
   auto request = request_of(arguments);
   request.set_read(word(arguments.count, "COUNT"));
-  const auto response = invocation.client().call(&Stub::Transact, request, arguments.bus);
+  const auto response = invocation.client().call(&Stub::Transact, request, std::string_view());
   if (invocation.json) return print_line(json(response));
   Table table({"ADDRESS", "HEX", "UNSIGNED", "SIGNED"}, {2, 3});
   auto address = request.address();
@@ -54,7 +54,7 @@ void read(Invocation& invocation, const Arguments& arguments) {
 void write(Invocation& invocation, const Arguments& arguments) {
   auto request = request_of(arguments);
   for (const auto& text : arguments.values) request.mutable_write()->add_values(word(text, "VALUE", -32768));
-  const auto response = invocation.client().call(&Stub::Transact, request, arguments.bus);
+  const auto response = invocation.client().call(&Stub::Transact, request, std::string_view());
   const auto count = arguments.values.size();
   print_line(invocation.json ? json(response)
                              : fmt::format("{} node {}: {} register{} written", arguments.bus, request.node(),

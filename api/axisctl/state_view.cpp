@@ -142,7 +142,8 @@ std::string state_details(const v1::AxisState& state, bool colour) {
     details.add("link error", coloured(describe(state.link_error(), state.axis()), Colour::red, colour));
   if (state.has_age()) details.add("measured", duration_text(seconds(state.age())) + " ago");
   if (state.eeprom_writes() > 0)
-    details.add("EEPROM", fmt::format("{} registers saved", state.eeprom_writes()));
+    details.add("EEPROM", fmt::format("{} register{} saved", state.eeprom_writes(),
+                                      state.eeprom_writes() == 1 ? "" : "s"));
   if (state.drive_reboots() > 0) details.add("reboots", std::to_string(state.drive_reboots()));
   return std::move(details).text();
 }
