@@ -61,8 +61,8 @@ std::string scan(const Setup& setup) {
   int node = 2;
   for (const auto& model : all_models()) {
     const Manual manual(model);
-    // 0x0014 = code of 9600 where there are no switches for it (ESS42-R: 3).
-    const auto slow = manual.list("bauds_dip").empty() ? "eeprom.0x0014=3" : "dip_baud=9600";
+    // 0x0014 = code of 19200 where there are no switches for it (ESS42-R: 2).
+    const auto slow = manual.list("bauds_dip").empty() ? "eeprom.0x0014=2" : "dip_baud=19200";
     plant.drives.push_back(fmt::format("node={},model={}", node, model));
     expected[node++] = model;
     plant.drives.push_back(fmt::format("node={},model={},{}", node, model, slow));
@@ -74,7 +74,7 @@ std::string scan(const Setup& setup) {
   request.set_bus("line");
   request.set_last_node(12);
   request.add_bauds(115200);
-  request.add_bauds(9600);
+  request.add_bauds(19200);
   grpc::ClientContext context;
   Client::set_deadline(context);
   v1::BusService::Stub stub(bench.target->channel());
@@ -90,7 +90,7 @@ std::string scan(const Setup& setup) {
       EXPECT_EQ(one.format(), "8N1");
       EXPECT_FALSE(one.version().empty());
       EXPECT_EQ(one.configured_as(), one.node() == 1 ? "axis" : "") << one.node();
-      EXPECT_EQ(one.baud(), one.node() > 1 && one.node() % 2 == 1 ? 9600U : 115200U) << one.node();
+      EXPECT_EQ(one.baud(), one.node() > 1 && one.node() % 2 == 1 ? 19200U : 115200U) << one.node();
       EXPECT_GT(one.pulses_per_revolution(), 0U);
     }
   }
@@ -136,7 +136,7 @@ std::string other_nodes(const Setup& setup) {
   EXPECT_TRUE(transact(bench, 9, 0x0021, 321).ok());
   EXPECT_EQ(transact(bench, 9, 0x0021)->values(0), 321U);
   const auto hole = transact(bench, 9, 0x0019);
-  expect_refused(hole, v1::REASON_REFUSED);
+  EXPECT_EQ(hole.error.reason(), v1::REASON_REFUSED) << hole.status.error_message();
   EXPECT_EQ(hole.error.native_code(), 3U);
 
   v1::WriteDeviceRequest write;
@@ -186,8 +186,8 @@ std::string thirty_drives(const Setup& setup) {
     });
   };
   int tenths = 0;
-  for (; tenths < 50 && online() < 30; ++tenths) bench.pass(100ms);
-  EXPECT_EQ(online(), 30) << "after 5 s of line time";
+  for (; tenths < 300 && online() < 30; ++tenths) bench.pass(100ms);
+  EXPECT_LE(tenths, 50) << "5 s of line time";
   bench.pass(5s);
   EXPECT_EQ(online(), 30) << "not healthy";
   bench.finish(0);

@@ -16,7 +16,7 @@ Recipe custom_recipe(const Manual& manual) {
   Recipe recipe{.node = std::stoi(nodes) + 1};
   recipe.drive = "dip=0";
   if (!manual.list("bauds_dip").empty()) {
-    recipe.drive += ",dip_baud=0";
+    recipe.drive += ",dip_baud=custom";
     recipe.baud = 9600;
   }
   return recipe;
@@ -36,7 +36,7 @@ std::vector<v1::SerialPhase> follow(
   for (Response response; reader->Read(&response);) {
     EXPECT_FALSE(response.text().empty());
     if (phases.empty()) {
-      EXPECT_NE(response.text().find("off and on"), std::string::npos)
+      EXPECT_NE(response.text().find("power-up"), std::string::npos)
           << "it does not say that a power cycle is needed: " << response.text();
       between();
     }
