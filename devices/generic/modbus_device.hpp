@@ -46,9 +46,9 @@ class ModbusDevice {
 
  private:
   Task<> run();
-  Task<> wait_for_port();
+  Task<bool> port_is_open();
   Task<Result<void>> poll_once();
-  Task<Result<void>> read_block(const RegisterBlock& block);
+  Task<Result<void>> read_block(const RegisterBlock& block, TransactionClass urgency);
   void go_online(const Result<void>& polled);
   void go_offline(const Error& cause);
   void publish();

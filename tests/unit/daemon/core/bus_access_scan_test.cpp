@@ -27,6 +27,7 @@ TEST_F(BusScanTest, FindsAndNamesWhatAnswersAtTheBusesOwnSettings) {
   const auto log = scan({});
   ASSERT_FALSE(log.error) << to_string(*log.error);
   std::vector<int> nodes;
+  nodes.reserve(log.found.size());
   for (const auto& found : log.found) nodes.push_back(found.node);
   EXPECT_EQ(nodes, (std::vector{1, 2, 9, 30, 31, 40}));
   const auto& axis = *log.node(1);

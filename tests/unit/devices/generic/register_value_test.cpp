@@ -89,6 +89,7 @@ TEST(RegisterBlocks, NeighboursAreReadTogetherAndGapsNotBridged) {
 
 TEST(RegisterBlocks, AtMostSixteenAndNoValueTorn) {
   std::vector<RegisterSettings> many;
+  many.reserve(21);
   for (int i = 0; i < 20; ++i)
     many.push_back({.name = "r",
                     .address = static_cast<std::uint16_t>(1 + 2 * i),
