@@ -148,7 +148,7 @@ TEST(Configuration, SegmentsAreOwnedWholeButForTimesThatCannotBeWrittenBack) {
 
 TEST(Configuration, FunctionsThatCanStartMotion) {
   for (std::uint16_t code = 0; code <= 20; ++code) {
-    const bool expected = code == 6 || code == 7 || (code >= 10 && code <= 15);
+    const bool expected = code == 6 || (code >= 10 && code <= 15);
     EXPECT_EQ(starts_motion(ykd, code), expected) << code;
   }
   EXPECT_FALSE(starts_motion(ykd, 99));
