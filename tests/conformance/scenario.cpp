@@ -7,6 +7,7 @@
 #include <exception>
 #include <random>
 
+#include "devices/descriptor.hpp"
 #include "devices/simulation/simulator.hpp"
 
 namespace axisd::conformance {
@@ -24,28 +25,47 @@ std::span<const Subject> subjects() {
   return all;
 }
 
-std::vector<Variant> variants_of(const std::string& model, bool varied, bool sampled) {
-  constexpr int pairs = 12;
-  const auto switches = simulation::find_simulator(model)->switches;
+std::vector<Variant> variants_of(const std::string& model, const Subject& subject, bool sampled) {
+  constexpr std::size_t pairs = 12, part = 4;
   std::vector<Variant> all{{.invert = false}, {.invert = true}};
-  if (!varied) return all;
+  if (!subject.varied) return all;
+  const auto switches = simulation::find_simulator(model)->switches;
   const auto flipped = [](const simulation::SwitchSpec& one) {
     return std::pair<const std::string, bool>(one.name, !one.default_value);
   };
-  std::mt19937 random(20240731);
-  std::size_t index = 0;
-  for (const auto& one : switches) {
-    // In a sampled run each switch is seen every fourth time only, and which ones differs between the models.
-    if (sampled && (index++ + model.size()) % 4 != 0) continue;
-    all.push_back({.invert = random() % 2 == 0, .switches = {flipped(one)}});
-    if (!sampled) all.push_back({.invert = !all.back().invert, .switches = {flipped(one)}});
-  }
-  for (int i = 0; i < (sampled ? pairs / 4 : pairs); ++i) {
+  const auto salt = subject.name.size() + model.size();
+  for (std::size_t i = 0; i < switches.size(); ++i)
+    if (!sampled || (i + salt) % part == 0)
+      all.push_back({.invert = (i / part + salt) % 2 != 0, .switches = {flipped(switches[i])}});
+  std::mt19937 random(static_cast<std::uint32_t>(salt));
+  for (std::size_t i = 0; i < (sampled ? pairs / part : pairs); ++i) {
     const auto& first = switches[random() % switches.size()];
     const auto& second = switches[random() % switches.size()];
     all.push_back({.invert = random() % 2 == 0, .switches = {flipped(first), flipped(second)}});
   }
   return all;
+}
+
+std::string capability_matrix(std::vector<std::string>& failures) {
+  std::vector<Manual> manuals;
+  for (const auto* model : drive_models()) manuals.emplace_back(std::string(model->model));
+  std::string text = "| |", rule = "| --- |";
+  for (const auto& manual : manuals) {
+    text += fmt::format(" {} |", manual.model());
+    rule += " --- |";
+  }
+  text += "\n" + rule + "\n";
+  for (const auto& subject : subjects())
+    for (const auto& scenario : subject.scenarios) {
+      text += fmt::format("| {} |", scenario.ability);
+      for (const auto& manual : manuals) {
+        const auto finding = run_scenario(scenario, manual, {});
+        text += fmt::format(" {} |", finding.failures.empty() ? finding.shown : "FAILED");
+        failures.insert(failures.end(), finding.failures.begin(), finding.failures.end());
+      }
+      text += "\n";
+    }
+  return text;
 }
 
 Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant) {

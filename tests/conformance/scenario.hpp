@@ -41,15 +41,20 @@ std::span<const Scenario> bus_scenarios();
 
 std::span<const Subject> subjects();
 
-/// Plain and inverted; each switch of the model's simulator flipped; seeded random pairs of them. `sampled`:
-/// a few of these only, for builds in which everything takes long.
-std::vector<Variant> variants_of(const std::string& model, bool varied, bool sampled);
+/// Plain and inverted; for a varied subject also each switch of the model's simulator flipped, and seeded
+/// random pairs of them, some plain and some inverted. `sampled`: a quarter of these, for builds in which
+/// everything takes long; each subject has another quarter, so that each switch is flipped in some.
+std::vector<Variant> variants_of(const std::string& model, const Subject& subject, bool sampled);
 
 /// What a scenario came to.
 struct Finding {
   std::string shown;                  ///< by the scenario; empty if it failed
   std::vector<std::string> failures;  ///< with the variant
 };
+/// Abilities by models, in Markdown: what the scenarios show with the simulators' defaults. What failed is in
+/// `failures`.
+std::string capability_matrix(std::vector<std::string>& failures);
+
 Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant);
 
 }  // namespace axisd::conformance

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <iterator>
 
 #include "devices/descriptor.hpp"
+#include "devices/simulation/simulator.hpp"
 #include "tests/conformance/scenario.hpp"
 
 namespace axisd::conformance {
@@ -66,7 +68,7 @@ TEST_P(Suite, Behaves) {
   spdlog::set_level(spdlog::level::off);
   const auto& [model, subject, shard, of] = GetParam();
   const Manual manual(model);
-  const auto variants = variants_of(model, subject->varied, sampled);
+  const auto variants = variants_of(model, *subject, sampled);
   int failed = 0;
   for (std::size_t i = static_cast<std::size_t>(shard); i < variants.size();
        i += static_cast<std::size_t>(of))
@@ -84,8 +86,39 @@ TEST(Conformance, EveryModelHasASimulatorAndItsManual) {
   ASSERT_FALSE(drive_models().empty());
   for (const auto* model : drive_models()) {
     EXPECT_NO_THROW(Manual(std::string(model->model)));
-    EXPECT_GE(variants_of(std::string(model->model), true, false).size(), 2U);
+    EXPECT_NE(simulation::find_simulator(model->model), nullptr) << model->model;
   }
+}
+
+/// Each switch is flipped in some subject, also in a sampled run, plain and inverted ones among them.
+TEST(Conformance, EverySwitchIsFlippedSomewhere) {
+  for (const auto* model : drive_models())
+    for (const auto& one : simulation::find_simulator(model->model)->switches) {
+      int subjects_with_it = 0;
+      for (const auto& subject : subjects())
+        subjects_with_it += std::ranges::any_of(
+            variants_of(std::string(model->model), subject, sampled),
+            [&](const Variant& variant) { return variant.switches.contains(std::string(one.name)); });
+      EXPECT_GT(subjects_with_it, 0) << model->model << ' ' << one.name;
+    }
+}
+
+TEST(Conformance, TheReadmeShowsTheMatrix) {
+  spdlog::set_level(spdlog::level::off);
+  std::vector<std::string> failures;
+  const auto matrix = capability_matrix(failures);
+  for (const auto& failure : failures) ADD_FAILURE() << failure;
+  std::ifstream file(AXISD_SOURCE_DIR "/README.md");
+  const std::string readme{std::istreambuf_iterator<char>(file), {}};
+  const std::string_view begin = "<!-- capability matrix -->\n",
+                         end = "<!-- end of the capability matrix -->";
+  const auto from = readme.find(begin), to = readme.find(end);
+  ASSERT_TRUE(from != std::string::npos && to != std::string::npos && from < to)
+      << "README.md has no " << begin << " ... " << end
+      << "; it shows what test_conformance --matrix prints:\n"
+      << matrix;
+  EXPECT_EQ(readme.substr(from + begin.size(), to - from - begin.size()), matrix)
+      << "replace it by what test_conformance --matrix prints";
 }
 
 }  // namespace
