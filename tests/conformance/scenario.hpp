@@ -42,8 +42,8 @@ std::span<const Scenario> bus_scenarios();
 std::span<const Subject> subjects();
 
 /// Plain and inverted; for a varied subject also each switch of the model's simulator flipped, and seeded
-/// random pairs of them, some plain and some inverted. `sampled`: a quarter of these, for builds in which
-/// everything takes long; each subject has another quarter, so that each switch is flipped in some.
+/// random pairs of them, some plain and some inverted. `sampled`: a fifth of these, for builds in which
+/// everything takes long; each subject has another fifth, so that each switch is flipped in some.
 std::vector<Variant> variants_of(const std::string& model, const Subject& subject, bool sampled);
 
 /// What a scenario came to.
