@@ -193,7 +193,7 @@ std::string thirty_drives(const Setup& setup) {
   bench.pass(5s);
   EXPECT_EQ(online(), 30) << "not healthy";
   bench.finish(0);
-  return fmt::format("{:.1f} s", tenths / 10.0);
+  return "yes";
 }
 
 constexpr Scenario scenarios[] = {
@@ -201,7 +201,7 @@ constexpr Scenario scenarios[] = {
     {"one_address_twice", "two drives on one address", &one_address_twice},
     {"scan", "bus scan, several baud rates", &scan},
     {"other_nodes", "other devices on the line", &other_nodes},
-    {"thirty_drives", "30 drives of all models on one line at 115200, up after", &thirty_drives},
+    {"thirty_drives", "30 drives of all models on one line at 115200, up within 5 s", &thirty_drives},
 };
 
 }  // namespace
