@@ -113,11 +113,12 @@ std::string_view to_string(LinkState state) {
 Error error_of(const SendResult& result, const std::string& bus, const Frame& frame) {
   assert(result.status != SendStatus::sent);
   const auto words = wording(result.status);
-  return {.reason = words.reason,
-          .message = fmt::format("frame {} {}", to_string(frame), words.what),
-          .remedy = std::string(words.remedy),
-          .outcome = result.status == SendStatus::unknown ? Outcome::unknown : Outcome::not_sent,
-          .where = {.bus = bus}};
+  Error error{.reason = words.reason,
+              .message = fmt::format("frame {} {}", to_string(frame), words.what),
+              .remedy = std::string(words.remedy),
+              .outcome = result.status == SendStatus::unknown ? Outcome::unknown : Outcome::not_sent};
+  error.where.bus = bus;
+  return error;
 }
 
 }  // namespace axisd::can

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <memory>
+
+#include "buses/can/link_monitor.hpp"
+#include "buses/can/port_core.hpp"
+
+struct msghdr;
+struct can_frame;
+
+namespace axisd::can {
+
+/// A CAN interface of the kernel. It is neither configured nor set up or down here: that takes privileges.
+/// Thread: core.
+class SocketCanPort final : public PortCore {
+ public:
+  SocketCanPort(const Executor& executor, Clock& clock, PortSettings settings);
+
+ private:
+  void open() override;
+  void shut() override;
+  Written write(const Frame& frame) override;
+  void catch_up() override;
+  bool drained() override;
+
+  void on_report(const LinkReport& report);
+  void on_up(const LinkReport& report);
+  bool open_socket(int index);
+  void close_socket();
+  void wait();
+  /// Reads at most `most` frames; false: nothing is left.
+  bool read_some(int most);
+  void on_message(const can_frame& frame, msghdr& message);
+  /// The socket failed with `error`: what that says of the link.
+  void on_error(int error);
+  void try_again_later();
+  void try_again();
+
+  LinkMonitor monitor_;
+  boost::asio::posix::stream_descriptor socket_;
+  std::shared_ptr<SocketCanPort*> self_;  ///< a handler that is already queued finds out that this is gone
+  int index_ = 0;                         ///< interface that the socket is bound to; 0: none
+  bool echo_is_proof_ = false;
+  std::uint32_t overflows_ = 0;  ///< of this socket
+  Clock::Timer retry_;
+  Duration back_off_{};
+};
+
+}  // namespace axisd::can

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "buses/can/port.hpp"
+
+namespace axisd::can {
+
+/// What one port has still to send and what it waits to see confirmed. Pure: no I/O, no clock of its own, and
+/// it calls nobody; ended frames are taken out with take_ended(). Thread: core.
+///
+/// A frame is bound late: class, guard and deadline are looked at when it is handed over, so that what waits
+/// here is never out of date. A stop does not get past the window: what the kernel holds goes first anyway.
+class TxQueue {
+ public:
+  struct Ended {
+    SendResult result;
+    Completion completion;
+  };
+
+  explicit TxQueue(const PortSettings& settings)
+      : window_(settings.window), limit_(settings.queue_limit), stall_timeout_(settings.stall_timeout) {}
+
+  /// Queues a frame; at once `invalid` or `queue_full` where it cannot be.
+  void push(const Frame& frame, const SendOptions& options, Completion completion);
+  /// The frame to hand over now, or none (nothing waits, the window is full, or the kernel was full just
+  /// before). Valid until the next call.
+  const Frame* next(TimePoint now);
+  /// The kernel took what next() gave.
+  void handed_over(TimePoint now);
+  /// The kernel's queue was full (ENOBUFS): next() gives nothing for a while. poll(2) is no help: it says
+  /// writable.
+  void no_buffer(TimePoint now);
+
+  /// An own frame came back, with its time stamp. `proof`: seeing it means that the network took it; else the
+  /// frame is confirmed by drained(). False: nobody waits for it.
+  bool echo(const Frame& frame, TimePoint at, TimePoint now, bool proof = true);
+  /// The kernel holds no frame of ours any more: whatever came back is sent.
+  void drained(TimePoint now);
+  /// Something came back that is no proof: ask the kernel whether it still holds frames.
+  [[nodiscard]] bool awaits_drain() const;
+
+  /// Ends queued frames whose deadline or validity has passed.
+  void reap(TimePoint now);
+  /// Ends queued frames whose guard forbids sending.
+  void purge_superseded(TimePoint now);
+  /// The port cannot send any more: queued frames end as `port_down`, unconfirmed ones as `unknown`.
+  void end_all();
+
+  /// Neither a confirmation nor room in the kernel's queue for stall_timeout.
+  [[nodiscard]] bool stalled(TimePoint now) const;
+  /// When next(), reap(), stalled() or awaits_drain() should be looked at again; TimePoint::max(): no need.
+  [[nodiscard]] TimePoint next_event() const;
+  std::vector<Ended> take_ended();
+  [[nodiscard]] std::size_t queued() const;
+  [[nodiscard]] std::size_t unconfirmed() const { return unconfirmed_.size(); }
+
+ private:
+  struct Waiting {
+    Frame frame;
+    SendOptions options;
+    Completion completion;
+  };
+  struct Unconfirmed {
+    Frame frame;
+    Completion completion;
+    TimePoint handed_over;
+    bool echoed = false;
+  };
+  using Lane = std::deque<Waiting>;
+
+  static SendStatus judge(const Waiting& waiting, TimePoint now);
+  void end(Completion completion, SendResult result);
+  void confirm(std::deque<Unconfirmed>::iterator which, TimePoint at, TimePoint now);
+  Lane* first_lane();
+  [[nodiscard]] TimePoint stalls_at() const;
+  template <class Predicate>
+  void end_where(Predicate status_of);
+
+  std::size_t window_;
+  std::size_t limit_;
+  Duration stall_timeout_;
+  std::array<Lane, transaction_class_count> lanes_;
+  std::deque<Unconfirmed> unconfirmed_;  ///< in the order of handing over
+  std::vector<Ended> ended_;
+  TimePoint progress_{};                    ///< last confirmation, or the hand-over that began the waiting
+  TimePoint looked_at_{};                   ///< last time that a drain was waited for
+  TimePoint retry_at_{};                    ///< the kernel was full: not before
+  Duration back_off_{};                     ///< of the next ENOBUFS
+  std::optional<TimePoint> refused_since_;  ///< first ENOBUFS without room since
+};
+
+}  // namespace axisd::can
