@@ -1,0 +1,45 @@
+#!/bin/bash
+# Runs a command as root in a User Mode Linux guest: a Linux kernel that is an ordinary process, with this machine's
+# file system and SocketCAN, which the kernel of this machine need not have. vcan0 and vcan1 are up there.
+#   tests/guest/run.sh [-t SECONDS] [-m MEMORY] COMMAND [ARGUMENT...]
+# Prints what the command prints (standard output and error in one). Exits with its status; 124: it ran past the limit
+# (default 60 s); 125: the guest failed, and its console is printed. UML_DEBUG=1 prints the console in any case.
+# Needs the packages of deploy/install-packages.sh test. AddressSanitizer and ThreadSanitizer programs do not start in
+# it: there is too little address space. It has one CPU and HZ=100: test behaviour there, not microseconds.
+set -uo pipefail
+here=$(dirname "$(readlink -f "$0")")
+
+die() { echo "run.sh: $*" >&2; exit 125; }
+
+limit=60 memory=512M
+while getopts t:m: option; do
+  case $option in
+    t) limit=$OPTARG ;;
+    m) memory=$OPTARG ;;
+    *) die "usage: run.sh [-t SECONDS] [-m MEMORY] COMMAND [ARGUMENT...]" ;;
+  esac
+done
+shift $((OPTIND - 1))
+[ $# -gt 0 ] || die "no command given"
+command -v linux.uml >/dev/null || die "there is no linux.uml: install user-mode-linux (deploy/install-packages.sh test)"
+
+job=$(mktemp -d /tmp/axisd-guest.XXXXXX) || die "cannot create a directory in /tmp"
+trap 'rm -rf "$job"' EXIT
+trap 'exit 125' INT TERM
+{ export -p; printf 'cd %q && exec' "$PWD"; printf ' %q' "$@"; echo; } >"$job/command"
+"${CC:-cc}" -O2 -shared -fPIC -o "$job/xstate.so" "$here/xstate.c" || die "cannot compile xstate.c"
+
+# All of the guest on one CPU: system calls take a sixth of the time that they take across two.
+mapfile -t cpus < <(taskset -cp $$ | sed 's/.*: //' | tr , '\n' | while IFS=- read -r a b; do seq "$a" "${b:-$a}"; done)
+cpu=${cpus[RANDOM % ${#cpus[@]}]}
+
+# /dev/shm: the guest's memory is a file there, which must not be on a disk. HOME: the guest writes its sockets to it.
+HOME=$job TMPDIR=/dev/shm LD_PRELOAD=$job/xstate.so timeout -k 5 $((limit + 15)) taskset -c "$cpu" \
+  linux.uml mem="$memory" quiet rootfstype=hostfs rootflags=/ rw initcall_blacklist=raid6_select_algo lpj=20000000 \
+  pty.legacy_count=0 con=null con0=null,fd:1 ssl=null init="$here/init.sh" GUEST_JOB="$job" GUEST_LIMIT="$limit" \
+  </dev/null >"$job/console" 2>&1
+[ ! -f "$job/output" ] || cat "$job/output"
+[ -z "${UML_DEBUG:-}" ] || cat "$job/console" >&2
+[ ! -s "$job/status" ] || exit "$(cat "$job/status")"
+cat "$job/console" >&2
+die "the guest failed"
