@@ -1,0 +1,33 @@
+// Values of an EDS file, one by one. Used by eds.cpp.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "buses/canopen/eds.hpp"
+
+namespace axisd::canopen {
+
+std::string lower_case(std::string_view text);
+std::string_view trimmed(std::string_view text);
+
+/// Decimal, octal (0...) or hexadecimal (0x...), with a sign; nothing: not a number, or beyond 64 bits.
+/// Numbers above the largest signed one wrap.
+std::optional<std::int64_t> parse_integer(std::string_view text);
+/// A constant, "$NODEID", or a sum of both in either order.
+std::optional<EdsNumber> parse_number(std::string_view text);
+/// The same, read as `type`: 0x80000000 of an INTEGER32 is negative. Nothing also where the type cannot hold
+/// it.
+std::optional<EdsNumber> parse_number(std::string_view text, DataType type);
+std::optional<double> parse_real(std::string_view text);
+std::optional<Access> parse_access(std::string_view text);
+
+/// What the name of a section stands for: an object ("6040", "1018sub1"); nothing: something else.
+struct ObjectSection {
+  Object object;
+  bool has_sub = false;
+};
+std::optional<ObjectSection> parse_object_section(std::string_view name);
+
+}  // namespace axisd::canopen

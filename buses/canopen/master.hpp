@@ -1,0 +1,99 @@
+// A CANopen master on one network: hands each frame to whoever it concerns.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "buses/can/port.hpp"
+#include "buses/canopen/emcy.hpp"
+#include "buses/canopen/nmt.hpp"
+#include "buses/canopen/remote_node.hpp"
+#include "buses/canopen/sync.hpp"
+
+namespace axisd::canopen {
+
+/// Told on the core thread. None may destroy the master.
+struct MasterHandlers {
+  std::function<void(const NodeEvent&)> on_node;
+  std::function<void(const Emergency&)> on_emergency;
+  std::function<void(const can::PortState&)> on_port;
+};
+
+/// Frames that concern no configured node, and what was wrong with others; since start.
+struct MasterCounters {
+  std::uint64_t unknown_cob = 0;   ///< no service of ours, and no PDO that somebody subscribed to
+  std::uint64_t foreign_node = 0;  ///< of a node that is not configured, or of another master
+  std::uint64_t malformed = 0;     ///< of a configured node, but not as CiA 301 has it
+};
+
+/// Thread: core. Adopts nodes as they are: starting it sends nothing (M25).
+class Master {
+ public:
+  using PdoHandler = std::function<void(const can::ReceivedFrame&)>;
+
+  Master(Executor executor, Clock& clock, std::unique_ptr<can::Port> port, SdoSettings sdo = {});
+  ~Master();
+  Master(const Master&) = delete;
+  Master& operator=(const Master&) = delete;
+
+  /// Opens the port. Once only.
+  void start(MasterHandlers handlers);
+  /// Ends everything that is under way; no handler is called after it. Call it before destroying, and let the
+  /// core run what it ended.
+  void close();
+
+  /// Listens to `node`: boot-up, heartbeat (0: its absence is no event), EMCY. Twice: a new timeout.
+  Result<void> add_node(std::uint8_t node, Duration heartbeat_timeout = {});
+
+  /// Sends an NMT command to one node, and waits until it is on the network. That the node followed is seen
+  /// in its heartbeat. A reset makes the drive forget its position: only when asked for explicitly (M25).
+  Task<Result<void>> command(std::uint8_t node, NmtCommand command,
+                             TransactionClass transaction_class = TransactionClass::parameters);
+
+  /// Sends a PDO, and waits until it is on the network; no node confirms it. Precondition of motion: the
+  /// guard of its axis. Errors: as the port's.
+  Task<Result<can::SendResult>> send_pdo(std::uint32_t cob_id, Bytes bytes, can::SendOptions options);
+  /// Calls `handler` for each PDO with this identifier; an empty one ends that. misconfigured: the identifier
+  /// belongs to another service, or somebody has it already.
+  Result<void> subscribe_pdo(std::uint32_t cob_id, PdoHandler handler);
+
+  /// For each stop, before its frame is queued: nothing that its axis's gate forbids waits any longer.
+  void purge_superseded();
+
+  [[nodiscard]] RemoteNode node(std::uint8_t id) { return {sdo_, id}; }
+  [[nodiscard]] SdoClient& sdo() { return sdo_; }
+  /// Stops by itself when the link is lost, and stays so (M24).
+  [[nodiscard]] SyncProducer& sync() { return sync_; }
+  [[nodiscard]] const NmtMonitor& nmt() const { return nmt_; }
+  [[nodiscard]] const EmergencyHistory& emergencies() const { return emergencies_; }
+  [[nodiscard]] const can::Port& port() const { return *port_; }
+  [[nodiscard]] const MasterCounters& counters() const { return counters_; }
+  /// Nodes that are not configured but heard.
+  [[nodiscard]] const std::set<std::uint8_t>& foreign_nodes() const { return foreign_nodes_; }
+
+ private:
+  void on_frame(const can::ReceivedFrame& received);
+  void on_service(std::uint8_t node, std::uint32_t id, const can::ReceivedFrame& received);
+  void on_heartbeat(std::uint8_t node, const can::ReceivedFrame& received);
+  void on_emergency(std::uint8_t node, const can::ReceivedFrame& received);
+  void on_node_event(const NodeEvent& event);
+  void on_port_state(const can::PortState& state);
+  Task<can::SendResult> sent(can::Frame frame, can::SendOptions options);
+
+  Executor executor_;
+  Clock* clock_;
+  std::unique_ptr<can::Port> port_;
+  MasterHandlers handlers_;
+  SdoClient sdo_;
+  NmtMonitor nmt_;
+  SyncProducer sync_;
+  EmergencyHistory emergencies_;
+  std::set<std::uint8_t> nodes_, foreign_nodes_;
+  std::map<std::uint32_t, PdoHandler> pdos_;
+  MasterCounters counters_;
+};
+
+}  // namespace axisd::canopen

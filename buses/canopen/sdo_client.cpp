@@ -1,0 +1,465 @@
+#include "buses/canopen/sdo_client.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "buses/canopen/cob.hpp"
+
+namespace axisd::canopen {
+
+namespace {
+
+/// Of so many requests one comes from a lower class than the highest, so that polling starves nobody.
+constexpr unsigned reservation = 8;
+
+Error no_reply_error(const SdoTransfer& transfer) {
+  return {.reason = Reason::no_reply,
+          .message = fmt::format("object {}: no reply", to_string(transfer.object())),
+          .remedy = "check power, wiring, node-ID and bit rate of the node",
+          .outcome = transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed};
+}
+
+Error expired_error() {
+  return {
+      .reason = Reason::expired, .message = "not sent: its time had passed", .remedy = "repeat the request"};
+}
+
+Error rebooted_error(Outcome outcome) {
+  return {.reason = Reason::rebooted,
+          .message = "the node booted before it answered",
+          .remedy = "check the drive's supply; configure it again, then repeat the request",
+          .outcome = outcome};
+}
+
+}  // namespace
+
+struct SdoClient::Request {
+  bool download = false;
+  Object object;
+  Bytes bytes;
+  SdoOptions options;
+  int attempts = 1;
+  bool perhaps_done = false;  ///< an earlier attempt may have been executed
+  std::function<void(Result<SdoAnswer>)> done;
+};
+
+struct SdoClient::Active {
+  RequestPtr request;
+  SdoTransfer transfer;
+  bool probe = false;  ///< `transfer` reads another object, to bring both sides in step before `request`
+  bool ambiguous = false;
+  std::uint64_t frame_id = 0;            ///< of the frame that was sent last
+  TimePoint first_sent{};                ///< end of the first frame
+  std::optional<TimePoint> last_sent{};  ///< end of the last frame; nothing while it waits in the port
+  TimePoint limit = TimePoint::max();    ///< of the whole transfer
+  [[nodiscard]] bool any_sent() const { return first_sent != TimePoint{}; }
+};
+
+struct SdoClient::Node {
+  std::uint8_t id = 0;
+  std::array<std::deque<RequestPtr>, transaction_class_count> waiting;
+  std::optional<Active> active;
+  LateReplies late;
+  unsigned bound = 0;  ///< requests that overtook a lower class
+  Clock::Timer timer;
+
+  std::deque<RequestPtr>& lane(TransactionClass transaction_class) {
+    return waiting.at(std::to_underlying(transaction_class));
+  }
+  [[nodiscard]] bool stop_waits() const { return !waiting.front().empty(); }
+  [[nodiscard]] std::size_t count() const {
+    std::size_t sum = 0;
+    for (const auto& one : waiting) sum += one.size();
+    return sum;
+  }
+  RequestPtr pop() {
+    auto first = std::ranges::find_if(waiting, [](const auto& one) { return !one.empty(); });
+    if (first == waiting.end()) return nullptr;
+    if (first != waiting.begin()) {
+      const auto lower = std::find_if(first + 1, waiting.end(), [](const auto& one) { return !one.empty(); });
+      if (lower != waiting.end() && ++bound % reservation == 0) first = lower;
+    }
+    auto request = std::move(first->front());
+    first->pop_front();
+    return request;
+  }
+};
+
+SdoClient::SdoClient(Executor executor, Clock& clock, can::Port& port, SdoSettings settings)
+    : executor_(std::move(executor)), clock_(&clock), port_(&port), settings_(settings) {}
+
+SdoClient::~SdoClient() = default;
+
+SdoClient::Node& SdoClient::node(std::uint8_t id) {
+  auto& slot = nodes_[id];
+  if (!slot) {
+    slot = std::make_unique<Node>();
+    slot->id = id;
+  }
+  return *slot;
+}
+
+Task<Result<SdoAnswer>> SdoClient::upload(std::uint8_t node, Object object, SdoOptions options) {
+  auto request = std::make_unique<Request>();
+  request->object = object;
+  request->attempts = options.attempts.value_or(settings_.upload_attempts);
+  request->options = std::move(options);
+  co_return co_await transact(node, std::move(request));
+}
+
+Task<Result<SdoAnswer>> SdoClient::download(std::uint8_t node, Object object, Bytes bytes,
+                                            SdoOptions options) {
+  auto request = std::make_unique<Request>();
+  request->download = true;
+  request->object = object;
+  request->bytes = std::move(bytes);
+  request->attempts = options.attempts.value_or(1);
+  request->options = std::move(options);
+  co_return co_await transact(node, std::move(request));
+}
+
+Task<Result<SdoAnswer>> SdoClient::transact(std::uint8_t id, RequestPtr request) {
+  std::optional<Error> why;
+  auto& state = port_->state();
+  if (!valid_node(id))
+    why = Error{.reason = Reason::invalid_argument,
+                .message = fmt::format("node-ID {} does not exist", id),
+                .remedy = "use 1 to 127"};
+  else if (request->download && request->bytes.empty())
+    why = Error{.reason = Reason::invalid_argument,
+                .message = fmt::format("object {}: nothing to write", to_string(request->object)),
+                .remedy = "give at least one byte"};
+  else if (closed_)
+    why = Error{.reason = Reason::cancelled, .message = "the bus is being closed"};
+  else if (!state.can_send())
+    why = state.error.value_or(Error{.reason = Reason::bus_down,
+                                     .message = fmt::format("the link is {}", can::to_string(state.link))});
+  else if (auto& known = node(id);
+           known.count() >=
+           settings_.queue_limit * (request->options.transaction_class == TransactionClass::stop ? 2 : 1))
+    why = Error{.reason = Reason::busy,
+                .message = fmt::format("{} requests wait for this node", known.count()),
+                .remedy = "retry later"};
+  if (why) {
+    ++counters_.rejected;
+    why->where = {.bus = port_->settings().bus, .node = id, .object = request->object.key()};
+    co_return fail(std::move(*why));
+  }
+
+  Promise<Result<SdoAnswer>> promise(executor_, *clock_);
+  request->done = [&promise](Result<SdoAnswer> result) { promise.set(std::move(result)); };
+  auto& target = node(id);
+  target.lane(request->options.transaction_class).push_back(std::move(request));
+  pump(target);
+  co_return co_await promise.get();
+}
+
+/// Begins what may begin. After each change of a node.
+void SdoClient::pump(Node& node) {
+  if (closed_) return;
+  reap(node);
+  if (node.active && node.stop_waits() && node.active->last_sent &&
+      node.active->request->options.transaction_class != TransactionClass::stop &&
+      clock_->now() >= *node.active->last_sent + settings_.turnaround)
+    cut(node);
+  while (!node.active) {
+    auto request = node.pop();
+    if (!request) break;
+    begin(node, std::move(request));
+  }
+  arm(node);
+}
+
+void SdoClient::reap(Node& node) {
+  const auto now = clock_->now();
+  end_queued(node, [now](const Request& request) -> std::optional<Error> {
+    if (request.options.deadline < now) return expired_error();
+    switch (may_send(request.options.guard, now)) {
+      case Verdict::send:
+        return std::nullopt;
+      case Verdict::expired:
+        return expired_error();
+      case Verdict::lease_lost:
+        return Error{.reason = Reason::lease_lost,
+                     .message = "not sent: the lease is gone",
+                     .remedy = "acquire it again"};
+      case Verdict::superseded:
+        break;
+    }
+    return Error{.reason = Reason::superseded,
+                 .message = "not sent: a stop or a newer command took its place"};
+  });
+}
+
+void SdoClient::end_queued(Node& node, const std::function<std::optional<Error>(const Request&)>& why) {
+  for (auto& lane : node.waiting) {
+    for (auto& request : lane) {
+      if (auto error = why(*request)) complete(node, std::move(request), fail(std::move(*error)));
+    }
+    std::erase(lane, nullptr);
+  }
+}
+
+void SdoClient::begin(Node& node, RequestPtr request) {
+  const auto now = clock_->now();
+  const bool held = node.late.may_come(request->object, now);
+  const bool probe = held && request->options.transaction_class != TransactionClass::stop;
+  const auto limit = request->options.upload_limit.value_or(settings_.upload_limit);
+  auto transfer = request->download ? SdoTransfer::download(request->object, request->bytes)
+                                    : SdoTransfer::upload(request->object, limit);
+  if (probe) {
+    const auto object = node.late.probe(now);
+    if (!object) {
+      complete(node, std::move(request),
+               fail(Reason::no_reply, "not sent: the node has not answered for too long",
+                    "check power, wiring, node-ID and bit rate of the node"));
+      return;
+    }
+    ++counters_.resynchronisations;
+    transfer = SdoTransfer::upload(*object, settings_.upload_limit);
+  }
+  node.active.emplace(Active{.request = std::move(request),
+                             .transfer = std::move(transfer),
+                             .probe = probe,
+                             .ambiguous = held && !probe});
+  ++counters_.transfers;
+  send(node, node.active->transfer.first_frame());
+}
+
+void SdoClient::send(Node& node, const SdoData& data) {
+  auto& active = *node.active;
+  const auto& options = active.request->options;
+  active.frame_id = ++last_frame_id_;
+  active.last_sent.reset();
+  can::SendOptions how{.transaction_class = options.transaction_class};
+  if (!active.any_sent()) how.deadline = options.deadline;
+  if (!active.probe) how.guard = options.guard;
+  const auto frame = can::make_frame(sdo_request_id(node.id), data);
+  port_->send(frame, how,
+              [this, id = node.id, frame_id = active.frame_id, frame](const can::SendResult& result) {
+                on_sent(id, frame_id, result, frame);
+              });
+}
+
+/// Ahead of whatever its class would wait for: the server is busy until it gets this.
+void SdoClient::send_abort(Node& node, const SdoData& data, TransactionClass transaction_class) {
+  port_->send(
+      can::make_frame(sdo_request_id(node.id), data),
+      {.transaction_class = transaction_class, .deadline = clock_->now() + settings_.timeout},
+      [](const can::SendResult&) { /* nobody waits for it, and its loss costs a repetition at most */ });
+}
+
+void SdoClient::on_sent(std::uint8_t id, std::uint64_t frame_id, const can::SendResult& result,
+                        const can::Frame& frame) {
+  auto& target = node(id);
+  if (!target.active || target.active->frame_id != frame_id) return;
+  auto& active = *target.active;
+  if (result.status == can::SendStatus::sent) {
+    active.last_sent = result.sent_at;
+    if (!active.any_sent()) {
+      active.first_sent = result.sent_at;
+      active.limit =
+          result.sent_at + active.request->options.transfer_limit.value_or(settings_.transfer_limit);
+    }
+    return pump(target);
+  }
+  auto error = can::error_of(result, port_->settings().bus, frame);
+  if (result.status == can::SendStatus::unknown) {
+    target.late.expect(active.transfer.object(), clock_->now());
+    error.outcome = active.transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed;
+  } else if (active.any_sent()) {
+    send_abort(target, active.transfer.abort(SdoAbort::general), active.request->options.transaction_class);
+    error.outcome = Outcome::not_executed;
+  }
+  fail_active(target, std::move(error), false);
+  pump(target);
+}
+
+void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
+  const auto found = nodes_.find(id);
+  if (found == nodes_.end() || !found->second->active) {
+    ++counters_.unexpected_replies;
+    return;
+  }
+  auto& target = *found->second;
+  auto& active = *target.active;
+  auto step = active.transfer.on_reply(parse_sdo_reply(received.frame));
+  using Kind = SdoTransfer::Step::Kind;
+  if (step.kind == Kind::ignored) {
+    ++counters_.unexpected_replies;
+    return;
+  }
+  if (!active.ambiguous) target.late.forget();
+  const bool over = step.kind != Kind::send;
+  if (over && active.probe) {
+    // An abort is as good an answer: both sides are in step again.
+    if (step.kind == Kind::failed && step.frame)
+      send_abort(target, *step.frame, active.request->options.transaction_class);
+    auto request = std::move(active.request);
+    target.active.reset();
+    target.lane(request->options.transaction_class).push_front(std::move(request));
+  } else if (step.kind == Kind::send) {
+    if (target.stop_waits() && active.request->options.transaction_class != TransactionClass::stop)
+      cut(target);
+    else
+      send(target, *step.frame);
+  } else if (step.kind == Kind::done) {
+    finish(target, SdoAnswer{.bytes = active.transfer.is_download() ? Bytes{} : active.transfer.bytes(),
+                             .size_indicated = active.transfer.size_indicated(),
+                             .ambiguous = active.ambiguous,
+                             .sent_at = active.first_sent,
+                             .answered_at = received.at});
+  } else {
+    ++(step.frame ? counters_.protocol_errors : counters_.aborted_by_node);
+    if (step.frame) send_abort(target, *step.frame, active.request->options.transaction_class);
+    finish(target, fail(std::move(step.error)));
+  }
+  pump(target);
+}
+
+/// A reply or the whole transfer is overdue.
+void SdoClient::on_due(Node& node) {
+  if (node.active && node.active->last_sent) {
+    auto& active = *node.active;
+    const auto now = clock_->now();
+    const auto timeout = active.request->options.timeout.value_or(settings_.timeout);
+    const bool endless = now >= active.limit;
+    if (endless || now >= *active.last_sent + timeout) {
+      ++counters_.timeouts;
+      auto error = no_reply_error(active.transfer);
+      if (endless && active.limit > active.first_sent + timeout) {
+        error.message = fmt::format("object {}: the transfer did not end in time, {} bytes so far",
+                                    to_string(active.transfer.object()), active.transfer.bytes().size());
+        error.remedy = "check that the drive's object dictionary is the expected one";
+      }
+      node.late.expect(active.transfer.object(), now);
+      send_abort(node, active.transfer.abort(SdoAbort::timed_out), active.request->options.transaction_class);
+      fail_active(node, std::move(error), !endless);
+    }
+  }
+  pump(node);
+}
+
+/// A stop takes the place of what is under way.
+void SdoClient::cut(Node& node) {
+  auto& active = *node.active;
+  ++counters_.cut_by_stop;
+  node.late.expect(active.transfer.object(), clock_->now());
+  send_abort(node, active.transfer.abort(SdoAbort::general), TransactionClass::stop);
+  if (active.probe) {
+    auto request = std::move(active.request);
+    node.active.reset();
+    node.lane(request->options.transaction_class).push_front(std::move(request));
+    return;
+  }
+  finish(
+      node,
+      fail({.reason = Reason::superseded,
+            .message = fmt::format("object {}: a stop took its place", to_string(active.transfer.object())),
+            .remedy = "read back before repeating it",
+            .outcome = active.transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed}));
+}
+
+/// Ends what is under way; with `may_retry`, and attempts left, it is asked again.
+void SdoClient::fail_active(Node& node, Error error, bool may_retry) {
+  if (node.active->probe) {
+    error.message = "not sent: " + error.message;
+    error.outcome = Outcome::not_sent;
+  } else if (may_retry && --node.active->request->attempts > 0) {
+    auto request = std::move(node.active->request);
+    request->perhaps_done |= error.outcome == Outcome::unknown;
+    node.active.reset();
+    node.lane(request->options.transaction_class).push_front(std::move(request));
+    return;
+  }
+  finish(node, fail(std::move(error)));
+}
+
+void SdoClient::finish(Node& node, Result<SdoAnswer> result) {
+  auto request = std::move(node.active->request);
+  node.active.reset();
+  complete(node, std::move(request), std::move(result));
+}
+
+void SdoClient::complete(Node& node, RequestPtr request, Result<SdoAnswer> result) {
+  if (!result) {
+    if (request->perhaps_done) result.error().outcome = Outcome::unknown;
+    auto& where = result.error().where;
+    where.bus = port_->settings().bus;
+    where.node = node.id;
+    where.object = request->object.key();
+  }
+  request->done(std::move(result));
+}
+
+void SdoClient::on_boot(std::uint8_t id) {
+  const auto found = nodes_.find(id);
+  if (found == nodes_.end()) return;
+  auto& target = *found->second;
+  target.late.forget();  // frames of a node keep their order: nothing of before can follow
+  if (target.active && target.active->any_sent())
+    finish(target,
+           fail(rebooted_error(target.active->transfer.complete_at_server() ? Outcome::unknown
+                                                                            : Outcome::not_executed)));
+  end_queued(target, [](const Request& request) -> std::optional<Error> {
+    if (request.options.transaction_class == TransactionClass::stop) return std::nullopt;
+    return rebooted_error(Outcome::not_sent);
+  });
+  pump(target);
+}
+
+void SdoClient::on_port(const can::PortState& state) {
+  if (state.can_send()) return;
+  const auto error = state.error.value_or(Error{
+      .reason = Reason::bus_down, .message = fmt::format("the link is {}", can::to_string(state.link))});
+  for (auto& [id, each] : nodes_) {
+    end_queued(*each, [&error](const Request&) { return std::optional(error); });
+    if (!each->active || !each->active->last_sent) continue;  // in the port: it ends by its completion
+    each->late.expect(each->active->transfer.object(), clock_->now());
+    auto lost = error;
+    lost.outcome = each->active->transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed;
+    fail_active(*each, std::move(lost), false);
+    arm(*each);
+  }
+}
+
+void SdoClient::purge_superseded() {
+  for (auto& [id, each] : nodes_) pump(*each);
+}
+
+void SdoClient::close() {
+  closed_ = true;
+  const Error error{.reason = Reason::cancelled, .message = "the bus is being closed"};
+  for (auto& [id, each] : nodes_) {
+    each->timer.reset();
+    end_queued(*each, [&error](const Request&) { return std::optional(error); });
+    if (!each->active) continue;
+    auto lost = error;
+    if (each->active->transfer.complete_at_server()) lost.outcome = Outcome::unknown;
+    finish(*each, fail(std::move(lost)));
+  }
+}
+
+void SdoClient::arm(Node& node) {
+  auto when = TimePoint::max();
+  if (node.active && node.active->last_sent) {
+    const auto sent = *node.active->last_sent;
+    when = std::min(node.active->limit,
+                    sent + node.active->request->options.timeout.value_or(settings_.timeout));
+    if (node.stop_waits() && node.active->request->options.transaction_class != TransactionClass::stop)
+      when = std::min(when, sent + settings_.turnaround);
+  }
+  for (const auto& lane : node.waiting) {
+    for (const auto& request : lane) {
+      const auto last = std::min(request->options.deadline, request->options.guard.not_after);
+      if (last != TimePoint::max()) when = std::min(when, last + std::chrono::nanoseconds(1));
+    }
+  }
+  node.timer =
+      when == TimePoint::max() ? Clock::Timer{} : clock_->call_at(when, [this, &node] { on_due(node); });
+}
+
+}  // namespace axisd::canopen
