@@ -27,7 +27,7 @@ job=$(mktemp -d /tmp/axisd-guest.XXXXXX) || die "cannot create a directory in /t
 trap 'rm -rf "$job"' EXIT
 trap 'exit 125' INT TERM
 { export -p; printf 'cd %q && exec' "$PWD"; printf ' %q' "$@"; echo; } >"$job/command"
-"${CC:-cc}" -O2 -shared -fPIC -o "$job/xstate.so" "$here/xstate.c" || die "cannot compile xstate.c"
+clang-19 -O2 -shared -fPIC -o "$job/xstate.so" "$here/xstate.c" || die "cannot compile xstate.c"
 
 # All of the guest on one CPU: system calls take a sixth of the time that they take across two.
 mapfile -t cpus < <(taskset -cp $$ | sed 's/.*: //' | tr , '\n' | while IFS=- read -r a b; do seq "$a" "${b:-$a}"; done)
