@@ -236,7 +236,8 @@ Object section(std::span<const KeySpec> keys) {
 /// The short form (a function) or the long one ({function, active}).
 std::string terminals(std::span<const TerminalSpec> list, std::span<const TerminalFunctionSpec> functions) {
   std::vector<std::string_view> names;
-  for (const auto& function : functions) names.push_back(function.name);
+  for (const auto& function : functions)
+    if (function.unusable.empty()) names.push_back(function.name);
   const auto function = Object().raw("enum", strings(names));
   Object properties;
   for (const auto& spec : terminal_schema()) {

@@ -52,9 +52,8 @@ void AxisChecks::check_segments() {
 
 void AxisChecks::check_mode() {
   if (!given("segments.mode") || !usable("segments.mode")) return;
-  if (!given(positions) && input_with("position_start") == nullptr && clean("segments") && clean("inputs")) {
-    add("segments.mode", "'mode' has no effect without positions or an input with function 'position_start'",
-        "leave it out");
+  if (!given(positions) && clean("segments")) {
+    add("segments.mode", "'mode' has no effect without positions", "leave it out");
   } else if (axis_.segments->absolute && axis_.scale.modulo) {
     // M19: whoever started a motion by terminal would not know.
     add("segments.mode", "'mode: absolute' and scale.modulo exclude each other",

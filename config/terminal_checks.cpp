@@ -87,10 +87,13 @@ void AxisChecks::check_functions(const std::vector<TerminalSettings>& terminals,
   for (const auto& terminal : terminals) {
     const auto* function = find_function(functions, terminal.function);
     if (function == nullptr || function->code == 0) continue;  // code 0: no function
+    const auto key = fmt::format("{}.{}.function", section, terminal.terminal);
+    if (!function->unusable.empty())
+      add(key, fmt::format("function '{}' is never assigned", terminal.function),
+          std::string(function->unusable));
     const auto [owner, is_first] = owners.try_emplace(terminal.function, terminal.terminal);
     if (is_first) continue;
-    add(fmt::format("{}.{}.function", section, terminal.terminal),
-        fmt::format("function '{}' is assigned to {} already", terminal.function, owner->second),
+    add(key, fmt::format("function '{}' is assigned to {} already", terminal.function, owner->second),
         "one terminal per function");
   }
 }

@@ -31,8 +31,9 @@ struct TerminalSpec {
 struct TerminalFunctionSpec {
   std::string_view name;  ///< "positive_limit"
   std::uint16_t code;
-  std::string_view mirror;     ///< empty: direction does not matter
-  bool starts_motion = false;  ///< M3: written only while released and the input is inactive
+  std::string_view mirror;      ///< empty: direction does not matter
+  bool starts_motion = false;   ///< M3: written only while released and the input is inactive
+  std::string_view unusable{};  ///< why the drive has it and axisd never assigns it; empty: it does
 };
 
 enum class Access : std::uint8_t { ro, rw, rw_saved, wo };

@@ -101,8 +101,9 @@ struct ParameterValue {
 
 /// What the drive no longer holds as it was configured.
 struct Drift {
-  std::string text;            ///< names what differs; empty: nothing
-  bool scale_changed = false;  ///< positions mean something else now
+  std::string text;             ///< names what differs; empty: nothing
+  bool scale_changed = false;   ///< positions mean something else now
+  bool limits_changed = false;  ///< a limit or stop terminal, or what the drive does at one
 };
 
 /// Contents of drive memory that no power-up leaves behind: finding them proves that the drive kept its
@@ -154,7 +155,9 @@ class Drive {
   virtual Task<Result<void>> stop(StopKind kind) = 0;
 
   /// Reads back what the configuration owns among terminals and scale.
-  virtual Task<Result<Drift>> check_drift() = 0;
+  virtual Task<Result<Drift>> check_drift(TransactionClass transaction_class) = 0;
+  /// The drive takes its motion from elsewhere, as it is configured (pulse inputs): axisd watches it.
+  [[nodiscard]] virtual bool moves_by_itself() const = 0;
   /// Registers that configure() and others saved to EEPROM since the last call.
   virtual std::uint64_t take_eeprom_writes() = 0;
   /// The key of the configuration that decides this parameter ("inputs.X0", "drive.current"), or empty.
@@ -173,8 +176,8 @@ class Drive {
   /// Restores the factory settings; afterwards configure() is needed. The text says which address and serial
   /// settings apply after the next power-up; refused (misconfigured) if that address is one of `taken`.
   virtual Task<Result<std::string>> restore_factory(std::vector<std::uint8_t> taken) = 0;
-  /// Saves another address or other serial settings in the EEPROM and reads them back; the text says from when
-  /// they count, and how the drive's switches must stand for that. Errors: out_of_range, not_supported.
+  /// Saves another address or other serial settings in the EEPROM and reads them back; the text says from
+  /// when they count, and how the drive's switches must stand for that. Errors: out_of_range, not_supported.
   virtual Task<Result<std::string>> change_serial(SerialChange change) = 0;
 
   virtual Task<Result<void>> clear_alarm() = 0;

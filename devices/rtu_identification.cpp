@@ -8,10 +8,18 @@ namespace {
 
 Task<Result<bool>> has_register(const modbus_rtu::Node& node, std::uint16_t address,
                                 TransactionOptions options) {
-  const auto answer = co_await node.read_patiently(address, 1, std::move(options));
-  if (answer) co_return true;
-  if (answer.error().reason == Reason::refused) co_return false;
-  co_return fail(answer.error());
+  // Exception 01 means a damaged frame with these drives (manuals 6.2.4): it says nothing of the register.
+  constexpr std::uint32_t damaged = 1;
+  constexpr int attempts = 3;
+  for (int attempt = 1;; ++attempt) {
+    const auto answer = co_await node.read_patiently(address, 1, options);
+    if (answer) co_return true;
+    const auto& error = answer.error();
+    const bool unclear = error.reason == Reason::refused && error.where.native_code == damaged;
+    if (unclear && attempt < attempts) continue;
+    if (error.reason == Reason::refused && !unclear) co_return false;
+    co_return fail(error);
+  }
 }
 
 }  // namespace

@@ -88,13 +88,15 @@ int RtuBus::garbled(std::uint8_t node) const {
 Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOptions options) const {
   const auto turnaround = options.turnaround_max.value_or(settings_.turnaround_max);
   const auto reply = wire_time(options.serial.value_or(settings_.serial()), reply_size(request));
+  const bool overrides = options.serial && options.serial != settings_.serial();
+  if (overrides) options.guard = {.gate = override_gate_, .epoch = override_gate_->epoch()};
   return {.request = std::move(request),
           .frame = frame,
           .guard = std::move(options.guard),
           .deadline = options.deadline,
           .reply_timeout = turnaround + reply + timeout_margin,
           .turnaround_max = std::min(turnaround, settings_.turnaround_max),
-          .serial = options.serial == settings_.serial() ? std::nullopt : options.serial};
+          .serial = overrides ? options.serial : std::nullopt};
 }
 
 Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {
@@ -122,6 +124,11 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
 }
 
 void RtuBus::purge_superseded() { pump(); }
+
+void RtuBus::drop_overrides() {
+  override_gate_->raise();
+  pump();
+}
 
 void RtuBus::hasten(std::uint8_t node, TransactionClass to) { queue_.hasten(node, to); }
 

@@ -49,6 +49,9 @@ class RtuBus {
   /// Moves queued frames whose gate was raised out of the way and takes an armed one back. Called for each
   /// stop before its frame is queued.
   void purge_superseded();
+  /// A node of this line is about to be energised: exchanges with serial settings of their own that have not
+  /// gone out end as superseded, since their frames are noise to it.
+  void drop_overrides();
   /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
   void hasten(std::uint8_t node, TransactionClass to);
 
@@ -98,6 +101,7 @@ class RtuBus {
   BusCounters counters_;
   bool closed_ = false;
   ExchangeObserver observer_;
+  std::shared_ptr<AxisGate> override_gate_ = std::make_shared<AxisGate>();
 };
 
 }  // namespace axisd::modbus_rtu

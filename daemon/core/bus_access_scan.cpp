@@ -93,7 +93,13 @@ BusScan::Probe BusScan::probe_at(int index) const {
 
 TransactionOptions BusScan::options(const Probe& probe) const {
   TransactionOptions options{.transaction_class = TransactionClass::scan, .serial = probe.serial};
-  if (request_.reply_timeout > Duration{}) options.turnaround_max = request_.reply_timeout;
+  // Waiting long for silent nodes blinds the line: only while nothing on it moves.
+  const bool rests = std::ranges::all_of(machine_->axes(), [&](const auto& axis) {
+    return axis->settings().bus != bus_->settings().name || axis->at_rest();
+  });
+  if (request_.reply_timeout > Duration{})
+    options.turnaround_max =
+        rests ? request_.reply_timeout : std::min(request_.reply_timeout, bus_->settings().turnaround_max);
   return options;
 }
 
@@ -145,6 +151,11 @@ Task<Result<BusScan::Heard>> BusScan::ask(Probe probe, std::uint16_t address, st
       co_return heard;
     }
     const auto reason = answer.error().reason;
+    if (reason == Reason::superseded)
+      co_return fail({.reason = Reason::moving,
+                      .message = "the scan ends: an axis of this bus is being enabled",
+                      .remedy = "scan again while the axes of this bus are disabled",
+                      .where = answer.error().where});
     if (reason == Reason::refused) {
       heard.answered = true;
       co_return heard;

@@ -41,6 +41,31 @@ void DriveAccessService::run(std::string axis,
   });
 }
 
+template <class T>
+void DriveAccessService::run_at_rest(std::string axis,
+                                     std::function<Task<Result<T>>(const DriveOperations&)> operation,
+                                     std::function<void(Result<T>)> callback, const char* name) {
+  auto guarded = [this, axis, operation = std::move(operation)](const DriveOperations& drive) {
+    auto refused = [](Error error) -> Task<Result<T>> { co_return fail(std::move(error)); };
+    const auto rests = check_bus_rests(*machine_->find(axis));
+    return rests ? operation(drive) : refused(rests.error());
+  };
+  run<T>(std::move(axis), std::move(guarded), std::move(callback), name);
+}
+
+Result<void> DriveAccessService::check_bus_rests(const Axis& axis) const {
+  for (const auto& other : machine_->axes())
+    if (other->settings().bus == axis.settings().bus && !other->at_rest())
+      return fail(
+          {.reason = Reason::moving,
+           .message = fmt::format("axis '{}' of the same bus moves: a drive that saves may be silent for "
+                                  "seconds, and its line with it",
+                                  other->settings().name),
+           .remedy = "wait for standstill",
+           .where = {.bus = axis.settings().bus, .node = axis.settings().node}});
+  return {};
+}
+
 void DriveAccessService::drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) {
   post(executor_, [this, axis = std::move(axis), callback = std::move(callback)] {
     auto* found = machine_->find(axis);
@@ -71,7 +96,7 @@ void DriveAccessService::write_parameters(std::string axis, std::vector<Paramete
 void DriveAccessService::save_parameters(std::string axis, std::string client,
                                          std::function<void(Result<void>)> callback) {
   audit(client, axis, "saves all parameters to the EEPROM");
-  run<void>(
+  run_at_rest<void>(
       std::move(axis), [](const DriveOperations& drive) { return drive.save_parameters(); },
       std::move(callback), "save parameters");
 }
@@ -81,7 +106,7 @@ void DriveAccessService::restore_factory(std::string axis, std::string client,
   audit(client, axis, "restores the factory settings");
   const auto* found = machine_->find(axis);  // axes never change, nor do their settings
   auto taken = found == nullptr ? std::vector<std::uint8_t>{} : others_on_bus(*found);
-  run<std::string>(
+  run_at_rest<std::string>(
       std::move(axis),
       [taken = std::move(taken)](const DriveOperations& drive) { return drive.restore_factory(taken); },
       std::move(callback), "restore factory settings");

@@ -41,12 +41,17 @@ class DriveAccessService final : public DriveAccess {
   /// Runs `operation` on the axis as a sequence of the machine and calls back with its result. By reference:
   /// the sequence keeps the object that its coroutine is a member of.
   template <class T>
+  void run_at_rest(std::string axis, std::function<Task<Result<T>>(const DriveOperations&)> operation,
+                   std::function<void(Result<T>)> callback, const char* name);
+  template <class T>
   void run(std::string axis, std::function<Task<Result<T>>(const DriveOperations&)> operation,
            std::function<void(Result<T>)> callback, const char* name);
   Task<> run_serial_change(Axis& axis, SerialChange change, std::weak_ptr<void> alive,
                            SerialCallback callback);
   /// Looks for the drive where it will be after its power cycle.
   Task<Result<void>> find_again(Axis& axis, SerialChange change, std::weak_ptr<void> alive);
+  /// A drive that saves may be silent for seconds, and its line with it.
+  [[nodiscard]] Result<void> check_bus_rests(const Axis& axis) const;
   [[nodiscard]] std::vector<std::uint8_t> others_on_bus(const Axis& axis) const;
   void audit(const std::string& client, const std::string& axis, std::string_view what) const;
 

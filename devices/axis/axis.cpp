@@ -20,7 +20,8 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       simulated_(simulated),
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
-      stopped_(env_.executor, *env_.clock) {
+      stopped_(env_.executor, *env_.clock),
+      absolute_segments_(settings_.segments && settings_.segments->absolute) {
   if (env_.persistence != nullptr) {
     const auto& axes = env_.persistence->loaded().axes;
     if (const auto found = axes.find(settings_.name); found != axes.end())
@@ -66,6 +67,14 @@ bool Axis::at_rest() const {
          !(sample_ && sample_->moving);
 }
 
+bool Axis::has_input(std::string_view function) const {
+  return std::ranges::find(settings_.inputs, function, &TerminalSettings::function) != settings_.inputs.end();
+}
+
+std::int64_t Axis::home_offset() const {
+  return scale_.to_pulses(settings_.homing ? settings_.homing->position : 0);
+}
+
 bool Axis::input_active(std::string_view function) const {
   if (!sample_) return false;
   for (const auto& input : settings_.inputs) {
@@ -89,6 +98,9 @@ void Axis::on_sample(const DriveSample& sample) {
   if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
   // Open loop: the overtravel stop at a limit has no ramp (M20). Homing runs onto limits by design.
   const bool homing = activity_ && activity_->state == AxisState::homing;
+  // Homing that is not ours zeroes the counter; so does one that came and went between two samples (M20).
+  const bool homed_by_others = !homing && !stopping_.running && before && !before->homed && sample.homed;
+  if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && before->moving && !sample.moving && before->mode != DriveMode::homing &&
@@ -145,9 +157,8 @@ void Axis::on_unexplained_motion(const DriveSample& sample) {
     return function != nullptr && function->starts_motion;
   });
   // A motor that was told to stop, and has not confirmed it, is never a terminal's.
-  if (!stop_owed_ && !fault_ && (segments || possible)) {
+  if (!stop_owed_ && !fault_ && (segments || possible || drive_->moves_by_itself())) {
     terminal_motion_ = true;
-    if (sample.mode == DriveMode::homing) lose_trust();  // the drive's counter will begin anew
     return;
   }
   spdlog::warn("{}: moving without a command; stopping it", settings_.name);

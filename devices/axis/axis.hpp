@@ -88,6 +88,12 @@ class Axis {
   /// Keeps commands other than stops away from the drive while it lives. Errors: moving, fault (the power
   /// stage is on), busy, and those of check_online().
   Result<std::shared_ptr<void>> begin_maintenance();
+  /// The drive's canary is another one: what is kept for a restart of the daemon has to know it.
+  void memory_marked() { remember_position(); }
+  /// The drive's segment table holds targets that count from its own zero.
+  void set_absolute_segments(bool absolute) { absolute_segments_ = absolute; }
+  /// The position is the drive's counter and the configured position at home, nothing else.
+  [[nodiscard]] bool position_is_from_home() const { return tracker_.offset() == home_offset(); }
   /// The drive's memory is no longer what configure() made it: applied again. `position_lost`: the counter or
   /// its meaning, too.
   void reconfigure(const std::string& why, bool position_lost);
@@ -150,6 +156,7 @@ class Axis {
   Task<> poll();
   Task<bool> poll_once(int& failures);
   Task<> look_for_drift();
+  Task<Result<void>> check_for_drift();
   void set_drift(const std::string& text);
   Task<> wait_for_port();
   void go_offline(const Error& cause);
@@ -168,6 +175,8 @@ class Axis {
   [[nodiscard]] AxisState state() const;
   [[nodiscard]] MotionCause motion_cause() const;
   [[nodiscard]] bool busy() const;
+  [[nodiscard]] std::int64_t home_offset() const;
+  [[nodiscard]] bool has_input(std::string_view function) const;
   [[nodiscard]] bool input_active(std::string_view function) const;
   [[nodiscard]] bool limit_active(bool positive) const;
   void lose_trust();
@@ -178,6 +187,7 @@ class Axis {
   [[nodiscard]] Result<void> check_common(const CommandOptions& options) const;
   /// Holds for everything but stops; StopAll does not forbid what moves nothing.
   [[nodiscard]] Result<void> check_ready(const CommandOptions& options) const;
+  [[nodiscard]] Result<void> check_maintenance() const;
   [[nodiscard]] Result<void> check_motion(const CommandOptions& options) const;
   [[nodiscard]] Result<void> check_direction(bool positive) const;
   Result<CommandPtr> accept(const EnableRequest& request, const CommandOptions& options);
@@ -258,6 +268,7 @@ class Axis {
   std::string drift_;                ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;  ///< of begin_maintenance()
   std::uint64_t eeprom_writes_ = 0;
+  bool absolute_segments_ = false;
 
   std::optional<DriveSample> sample_;
   Signal sampled_;  ///< a new sample, or the link changed

@@ -31,17 +31,19 @@ Task<> Axis::connect() {
   Duration backoff = first_backoff;
   while (!closing_ && link_ != LinkState::online) {
     co_await wait_for_port();
+    // Both would write to the drive's memory.
+    while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
     if (closing_) co_return;
     // The first contact is as urgent as any state; repeated silence must not cost the neighbours much.
     const bool first = backoff == first_backoff;
     const auto connected =
         co_await try_connect(first ? TransactionClass::idle_state : TransactionClass::scan);
     if (closing_) co_return;
+    if (connected && !configured_) continue;  // it was told to begin again meanwhile
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
-      continuity_checked_ = drift_checked_ = env_.clock->now();
-      set_drift({});
+      continuity_checked_ = env_.clock->now();
       spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
                    identity_ ? identity_->version : "");
       break;
@@ -93,7 +95,9 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact) {
 
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
-  const auto by_terminal = [this] { return !stop_owed_ && sample_->mode >= DriveMode::multi_position; };
+  const auto by_terminal = [this] {
+    return !stop_owed_ && (sample_->mode >= DriveMode::multi_position || drive_->moves_by_itself());
+  };
   const auto began = env_.clock->now();
   const auto patience = deceleration_bound() + settings_.stop_margin;
   auto kind = StopKind::stop;
@@ -151,13 +155,18 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (sample_->moving)
       co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
     const auto configured = co_await drive_->configure();
+    if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
     if (!configured) co_return configured;
     configured_ = true;
     restore_tried_ = true;
+    drift_checked_ = env_.clock->now();
+    set_drift({});
     if (restorable) {
       tracker_.restore(stored->offset->offset_pulses);
       remember_position();
     }
+  } else if (const auto checked = co_await check_for_drift(); !checked) {
+    co_return checked;  // somebody may have changed it while it was out of reach
   }
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
@@ -186,14 +195,26 @@ Task<> Axis::poll() {
 Task<> Axis::look_for_drift() {
   const auto now = env_.clock->now();
   if (link_ != LinkState::online || busy() || !maintenance_.expired()) co_return;
-  if (now - drift_checked_ >= settings_.drift_check) {
-    drift_checked_ = now;
-    const auto drift = co_await drive_->check_drift();
-    if (!drift || link_ != LinkState::online) co_return;
-    if (drift->scale_changed) lose_trust();
-    set_drift(drift->text);
+  if (now - drift_checked_ >= settings_.drift_check && !co_await check_for_drift()) co_return;
+  const bool free = link_ == LinkState::online && !busy() && maintenance_.expired();
+  if (!drift_.empty() && free && sample_ && !sample_->enabled) reconfigure(drift_, false);
+}
+
+Task<Result<void>> Axis::check_for_drift() {
+  drift_checked_ = env_.clock->now();
+  const auto drift = co_await drive_->check_drift(TransactionClass::idle_state);
+  if (!drift) co_return fail(drift.error());
+  if (drift->scale_changed) lose_trust();
+  set_drift(drift->text);
+  // A motion that was accepted while this was being read goes on without what it relies on.
+  if ((drift->scale_changed || drift->limits_changed) && activity_ &&
+      activity_->state != AxisState::standstill) {
+    enter_error_stop(error(Reason::misconfigured,
+                           "the drive no longer holds its configuration: " + drift->text,
+                           "disable the axis: the configuration is then applied again; then reset it"));
+    begin_stop(StopKind::stop, false, nullptr);
   }
-  if (!drift_.empty() && sample_ && !sample_->enabled && !busy()) reconfigure(drift_, false);
+  co_return Result<void>{};
 }
 
 void Axis::set_drift(const std::string& text) {
@@ -265,6 +286,8 @@ Task<bool> Axis::poll_once(int& failures) {
 }
 
 void Axis::go_offline(const Error& cause) {
+  // Homing that a terminal starts meanwhile would zero the counter, and nobody would have seen it.
+  if (has_input("homing_start")) lose_trust();
   spdlog::warn("{}: offline: {}", settings_.name, to_string(cause));
   link_ = LinkState::offline;
   link_error_ = cause;

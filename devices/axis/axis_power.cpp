@@ -33,8 +33,9 @@ Task<> Axis::run_enable(ActivityPtr activity) {
     co_return;
   }
   activity->command->activate();
-  const auto deadline = env_.clock->now() + std::chrono::seconds(1);
+  auto deadline = env_.clock->now() + std::chrono::seconds(1);
   const auto before = tracker_.counter();
+  std::optional<TimePoint> open;  // when the drive's brake is (M2)
   while (env_.clock->now() < deadline) {
     const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
     if (!current(*activity)) co_return;
@@ -48,11 +49,12 @@ Task<> Axis::run_enable(ActivityPtr activity) {
       co_return;
     }
     if (sample->enabled) {
-      // The drive opens its brake now (M2); until it is open nothing else is accepted.
-      if (settings_.brake.release_time > Duration{}) {
-        co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + settings_.brake.release_time);
-        if (!current(*activity)) co_return;
+      // The drive opens its brake now; until it is open nothing else is accepted, and nothing may move.
+      if (!open) {
+        open = env_.clock->now() + settings_.brake.release_time;
+        deadline = *open + std::chrono::seconds(1);
       }
+      if (env_.clock->now() < *open) continue;
       enabled_by_us_ = true;
       finish(*activity, [](CommandRecord& command) { command.done(); });
       co_return;

@@ -74,12 +74,16 @@ Result<void> Axis::check_ready(const CommandOptions& options) const {
     cause.outcome = Outcome::not_sent;
     return fail(std::move(cause));
   }
-  if (!maintenance_.expired())
-    return fail(error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
+  if (auto free = check_maintenance(); !free) return free;
   if (!drift_.empty())
     return fail(error(Reason::misconfigured, "the drive no longer holds its configuration: " + drift_,
                       "disable the axis: the configuration is then applied again"));
   return check_online();
+}
+
+Result<void> Axis::check_maintenance() const {
+  if (maintenance_.expired()) return {};
+  return fail(error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
 }
 
 Result<void> Axis::check_motion(const CommandOptions& options) const {
@@ -132,6 +136,7 @@ Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptio
   if (activity_ && activity_->state != AxisState::standstill)
     return fail(error(Reason::moving, "the axis moves", "it is enabled already"));
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
+  env_.bus->drop_overrides();
   const auto activity = begin(request, options, AxisState::standstill, {});
   // Not yet enabled: state() follows the drive's own bit.
   launch(run_enable(activity), "enable");
@@ -318,6 +323,7 @@ Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions
 Result<CommandPtr> Axis::accept(const ResetRequest& request, const CommandOptions& options) {
   if (auto common = check_common(options); !common) return fail(common.error());
   if (auto online = check_online(); !online) return fail(online.error());
+  if (auto free = check_maintenance(); !free) return fail(free.error());
   if (stopping_.running) return fail(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
   if (sample_ && sample_->alarm_code != 0) {
@@ -339,6 +345,10 @@ Result<CommandPtr> Axis::accept(const SetPositionRequest& request, const Command
   if (auto allowed = check_ready(options); !allowed) return fail(allowed.error());
   if (activity_ || stopping_.running || sample_->moving)
     return fail(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
+  if (absolute_segments_ && tracker_.offset_for(request.position) != home_offset())
+    return fail(error(Reason::not_supported,
+                      "the drive's absolute segments count from home: another position would not move them",
+                      "home the axis instead"));
   // A released open-loop motor can be turned by hand: its position would be lost again at once (M20).
   if (!sample_->enabled && !drive_->closed_loop())
     return fail(error(Reason::disabled, "the power stage is off, so the position would not hold",

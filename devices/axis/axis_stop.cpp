@@ -105,9 +105,11 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto since = env_.clock->now();
     const auto patience =
         settings_.stop_margin + (kind == StopKind::quick_stop ? Duration{0} : deceleration_bound());
-    const bool polled = link_ != LinkState::offline;
-    const bool rests = polled ? co_await standstill_by(since, since + patience, requests)
-                              : sent && co_await standstill_unpolled(since + patience);
+    // Only an axis that is online is polled.
+    const bool polled = link_ == LinkState::online;
+    const bool rests =
+        polled ? co_await standstill_by(since, since + patience, requests)
+               : (sent || link_ != LinkState::offline) && co_await standstill_unpolled(since + patience);
     if (rests) co_return Result<void>{};
     if (link_ == LinkState::offline) {
       auto cause = error(Reason::not_confirmed, "the drive fell silent before its standstill was confirmed",
@@ -161,11 +163,21 @@ Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests
 /// The same for a node that nobody polls, because it is not (or not yet) online.
 Task<bool> Axis::standstill_unpolled(TimePoint deadline) {
   constexpr auto pause = milliseconds(30);
+  constexpr int resting_in_homing = 6;  // samples; between its phases the motor rests, too
+  int resting = 0, silent = 0;
+  std::int32_t resting_at = 0;
   for (;;) {
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
-    if (!sample) co_return false;
-    if (!sample->moving && sample->mode != DriveMode::homing) co_return true;
-    if (sample->asked_at >= deadline) co_return false;
+    if (!sample && ++silent == stop_attempts) co_return false;
+    if (sample) {
+      silent = 0;
+      const bool rests = !sample->moving && (resting == 0 || sample->position_pulses == resting_at);
+      resting = rests ? resting + 1 : 0;
+      resting_at = sample->position_pulses;
+      if (resting > 0 && sample->mode != DriveMode::homing) co_return true;
+      if (resting >= resting_in_homing) co_return true;
+      if (sample->asked_at >= deadline && resting == 0) co_return false;
+    }
     co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + pause);
   }
 }

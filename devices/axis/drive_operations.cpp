@@ -101,6 +101,11 @@ Task<Result<SegmentSettings>> DriveOperations::write_segments(SegmentSettings se
   if (!table) co_return fail(table.error());
   const auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
+  if (segments.absolute && !axis_->position_is_from_home())
+    co_return fail(error(Reason::not_trusted,
+                         "absolute segments count from home, but the position was declared elsewhere",
+                         "home the axis first"));
+  axis_->set_absolute_segments(segments.absolute);
   const auto written = co_await axis_->drive().write_segments(*table);
   if (!written) co_return fail(written.error());
   co_return co_await read_segments();
@@ -109,7 +114,9 @@ Task<Result<SegmentSettings>> DriveOperations::write_segments(SegmentSettings se
 Task<Result<void>> DriveOperations::save_parameters() const {
   const auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
-  co_return co_await axis_->drive().save_parameters();
+  const auto saved = co_await axis_->drive().save_parameters();
+  axis_->memory_marked();
+  co_return saved;
 }
 
 Task<Result<std::string>> DriveOperations::restore_factory(std::vector<std::uint8_t> taken) const {

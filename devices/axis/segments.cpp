@@ -121,6 +121,16 @@ Result<void> Rows::add(const VelocitySegment& segment) {
 
 Result<DriveSegments> to_drive(const SegmentSettings& segments, const AxisSettings& axis, const Scale& scale,
                                const DriveDescriptor& descriptor) {
+  if (segments.absolute && axis.scale.modulo)
+    return fail(Reason::not_supported,
+                "absolute segments do not fit an axis that wraps: its counter is set to zero",
+                "use relative segments, or leave scale.modulo out");
+  if (segments.absolute && axis.homing && axis.homing->offset != 0)
+    return fail(
+        Reason::not_supported,
+        "absolute segments and homing.offset: whether the drive counts from the switch or from beyond the "
+        "offset is not said in its manual",
+        "use homing.position instead of homing.offset");
   Rows rows(axis, scale, descriptor.capabilities);
   for (const auto& segment : segments.positions)
     if (const auto added = rows.add(segment, segments.absolute); !added) return fail(added.error());

@@ -12,8 +12,9 @@ namespace axisd::simulation {
 
 namespace {
 
-constexpr std::array<std::pair<FaultKind, std::string_view>, 11> kind_names{{
+constexpr std::array<std::pair<FaultKind, std::string_view>, 12> kind_names{{
     {FaultKind::drop_request, "drop_request"},
+    {FaultKind::corrupt_request, "corrupt_request"},
     {FaultKind::drop_reply, "drop_reply"},
     {FaultKind::delay_reply, "delay_reply"},
     {FaultKind::corrupt_reply, "corrupt_reply"},

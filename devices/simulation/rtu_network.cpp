@@ -127,7 +127,9 @@ std::optional<ReplyPlan> RtuNetwork::on_request(std::span<const std::uint8_t> fr
     return std::nullopt;
   }
   if (const auto* fault = find(faults, FaultKind::reboot_before)) reboot(frame, fault->delay);
-  auto reply = find(faults, FaultKind::drop_request) != nullptr ? std::nullopt : dispatch(frame);
+  std::vector<std::uint8_t> heard(frame.begin(), frame.end());
+  if (find(faults, FaultKind::corrupt_request) != nullptr) heard.back() ^= 1U;  // of the CRC
+  auto reply = find(faults, FaultKind::drop_request) != nullptr ? std::nullopt : dispatch(heard);
   if (find(faults, FaultKind::drop_reply) != nullptr) reply.reset();
   if (const auto* fault = find(faults, FaultKind::reboot_after)) {
     reboot(frame, fault->delay);

@@ -33,6 +33,10 @@ Result<Assignment> assign(const std::vector<TerminalSettings>& terminals, std::s
     if (!index || function == nullptr)
       return fail(Reason::misconfigured, fmt::format("terminal {} cannot have the function {}",
                                                      terminal.terminal, terminal.function));
+    if (!function->unusable.empty())
+      return fail(Reason::misconfigured,
+                  fmt::format("terminal {} must not have the function {}: {}", terminal.terminal,
+                              terminal.function, function->unusable));
     const auto bit = static_cast<std::uint16_t>(1U << *index);
     assignment.functions[*index] = function;
     assignment.named |= bit;
@@ -129,7 +133,11 @@ std::uint32_t segment_enables(const Model& model, const DriveSetup& setup) {
 }
 
 std::vector<RegisterSetting> segment_registers(const DriveSegments& segments, std::uint32_t enables) {
-  std::vector<RegisterSetting> all;
+  std::vector<RegisterSetting> all{{.address = reg::terminal_move_mode,
+                                    .value = static_cast<std::uint16_t>(segments.absolute ? 1 : 0),
+                                    .key = "segments.mode",
+                                    .starts_motion = true,
+                                    .input_bits = enables}};
   const auto add = [&](std::uint16_t first, std::size_t row, std::int64_t value) {
     all.push_back({.address = static_cast<std::uint16_t>(first + row),
                    .value = static_cast<std::uint16_t>(value & 0xFFFF),
@@ -140,11 +148,12 @@ std::vector<RegisterSetting> segment_registers(const DriveSegments& segments, st
   const auto& rows = segments.rows;
   for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_high, i, rows.at(i).pulses >> 16);
   for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_low, i, rows.at(i).pulses);
-  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_speed, i, rows.at(i).velocity_rpm);
   for (std::size_t i = 0; i < rows.size(); ++i)
     // Printed 30..2000 with the default 0, which cannot be written back: rows without motion keep theirs.
     if (rows.at(i).velocity_rpm != 0 || rows.at(i).pv_velocity_rpm != 0)
       add(reg::segment_time, i, rows.at(i).acceleration_time / std::chrono::milliseconds(1));
+  // Last, so that a row can be started only when all of it is there.
+  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_speed, i, rows.at(i).velocity_rpm);
   for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pv_speed, i, rows.at(i).pv_velocity_rpm);
   return all;
 }
@@ -182,9 +191,6 @@ Result<std::vector<RegisterSetting>> required_registers(const Model& model, cons
   add_outputs(*outputs, descriptor.outputs, terminals_saved, all);
   add_inputs(*inputs, descriptor.inputs, first, false, terminals_saved, all);
   if (setup.segments) {
-    all.push_back({.address = reg::terminal_move_mode,
-                   .value = static_cast<std::uint16_t>(setup.segments->absolute ? 1 : 0),
-                   .key = "segments.mode"});
     for (auto& row : segment_registers(*setup.segments, segment_enables(model, setup))) {
       row.saved = setup.persist.segments;
       all.push_back(std::move(row));

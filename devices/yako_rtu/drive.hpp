@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,8 @@ class YakoRtuDrive final : public Drive {
   Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) override;
   Task<Result<void>> configure() override;
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
-  Task<Result<Drift>> check_drift() override;
+  Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
+  [[nodiscard]] bool moves_by_itself() const override;
   [[nodiscard]] bool closed_loop() const override;
 
   // drive_motion.cpp
@@ -71,11 +73,14 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] Error wrong_model(std::uint16_t code, const std::string& found) const;
   [[nodiscard]] bool readable(std::uint32_t address) const;
   /// Reads what `settings` speak of, in blocks.
-  Task<Result<Registers>> read_registers(std::vector<std::uint16_t> addresses) const;
+  Task<Result<Registers>> read_registers(std::vector<std::uint16_t> addresses,
+                                         TransactionOptions options) const;
   /// Writes what differs, each part saved or not as it says, and verifies it.
   Task<Result<void>> bring_to(std::vector<RegisterSetting> required);
+  Task<Result<void>> write_all(const std::vector<RegisterSetting>& required, Registers& present);
   Task<Result<void>> write_differences(const std::vector<RegisterSetting>& required, Registers& present);
-  Task<Result<void>> verify(const std::vector<RegisterSetting>& required) const;
+  Task<Result<void>> verify(const std::vector<RegisterSetting>& required);
+  Task<Result<void>> silence_segments(const std::vector<RegisterSetting>& required, Registers& present);
   Task<Result<void>> neutralise_inputs(const std::vector<RegisterSetting>& required, Registers& present);
   Task<Result<void>> check_inactive(const RegisterSetting& setting) const;
   Task<Result<void>> write_run(std::uint16_t address, std::vector<std::uint16_t> values);
@@ -87,6 +92,10 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> write_canary(MotionBlock block, TransactionOptions options);
   Task<Result<Answer>> read_canary(TransactionOptions options);
   [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
+  /// A content that a power-up may leave: never a canary.
+  void note_power_up_block(const MotionBlock& block);
+  /// The drive was switched off and on, and came up with `block`.
+  void forget_power_cycle(const MotionBlock& block);
   [[nodiscard]] MotionBlock fresh_neutral_block() const;
   [[nodiscard]] Result<void> check_control_mode() const;
   Task<Result<void>> start(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
@@ -100,6 +109,8 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] std::string serial_advice(const SerialChange& change) const;
 
   [[nodiscard]] std::unexpected<Error> failed(Error error) const;
+  [[nodiscard]] Error lost_memory() const;
+  [[nodiscard]] Error not_held(const RegisterSetting& setting, std::uint16_t actual) const;
   [[nodiscard]] Error error_at(Reason reason, std::uint16_t address, std::string message,
                                std::string remedy) const;
 
@@ -112,8 +123,10 @@ class YakoRtuDrive final : public Drive {
   std::optional<Error> setup_error_;
   /// What the motion block may hold: one entry, two after a block write whose reply was lost.
   std::vector<MotionBlock> expected_;
-  MotionBlock found_at_connect_ = factory_block;  ///< possibly what a power-up leaves (saved by 0x002B = 2)
-  std::optional<bool> saving_;                    ///< 0x0016, if it is known
+  std::vector<MotionBlock> power_up_blocks_{factory_block};  ///< what a power-up may leave; the newest last
+  std::optional<bool> saving_;                               ///< 0x0016, if it is known
+  std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
+  std::set<std::uint16_t> unsaved_;   ///< saved registers that did not hold what was written
   std::uint64_t eeprom_writes_ = 0;
 };
 

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t longest_write = 16;
 constexpr int write_attempts = 3;
+constexpr std::uint16_t segment_rows = 16;
 
 TransactionOptions in(TransactionClass transaction_class) { return {.transaction_class = transaction_class}; }
 
@@ -93,8 +94,11 @@ Task<Result<DriveIdentity>> YakoRtuDrive::identify(TransactionClass transaction_
 bool YakoRtuDrive::closed_loop() const {
   const auto mode = setup_.model_settings.find("loop_mode");
   const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
-  return model_->descriptor->capabilities.closed_loop && !open;
+  // Whether 0x0012 counts at once or from the next power-up is not said: a drive that came up open is open.
+  return model_->descriptor->capabilities.closed_loop && !open && found_closed_.value_or(false);
 }
+
+bool YakoRtuDrive::moves_by_itself() const { return !check_control_mode(); }
 
 Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class) {
   const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
@@ -114,14 +118,13 @@ bool YakoRtuDrive::readable(std::uint32_t address) const {
   return parameter != nullptr && parameter->access != Access::wo;
 }
 
-Task<Result<YakoRtuDrive::Registers>> YakoRtuDrive::read_registers(
-    std::vector<std::uint16_t> addresses) const {
+Task<Result<YakoRtuDrive::Registers>> YakoRtuDrive::read_registers(std::vector<std::uint16_t> addresses,
+                                                                   TransactionOptions options) const {
   const auto blocks =
       blocks_of(std::move(addresses), [this](std::uint32_t address) { return readable(address); });
   Registers registers;
   for (const auto& block : blocks) {
-    const auto answer =
-        co_await node_.read_patiently(block.address, block.count, in(TransactionClass::parameters));
+    const auto answer = co_await node_.read_patiently(block.address, block.count, options);
     if (!answer) co_return failed(answer.error());
     for (std::uint16_t i = 0; i < block.count; ++i)
       registers[static_cast<std::uint16_t>(block.address + i)] = answer->registers[i];
@@ -130,12 +133,17 @@ Task<Result<YakoRtuDrive::Registers>> YakoRtuDrive::read_registers(
 }
 
 Task<Result<void>> YakoRtuDrive::configure() {
-  expected_.clear();
   if (setup_error_) co_return failed(*setup_error_);
   // The canary goes first and is read last: a restart in between would undo what was found or written.
   const auto found = co_await node_.read_patiently(reg::start_speed, 6, in(TransactionClass::parameters));
   if (!found) co_return failed(found.error());
-  std::ranges::copy(found->registers, found_at_connect_.begin());
+  MotionBlock block{};
+  std::ranges::copy(found->registers, block.begin());
+  const bool known = std::ranges::find(expected_, block) != expected_.end();
+  const bool restarted = !known && !expected_.empty();
+  if (!known) forget_power_cycle(block);
+  // Whatever asked for this: a restart that nobody had noticed must not be overwritten here.
+  if (restarted) co_return fail(lost_memory());
   const auto marked =
       co_await write_canary(distinct(fresh_neutral_block()), in(TransactionClass::parameters));
   if (!marked) co_return marked;
@@ -146,13 +154,52 @@ Task<Result<void>> YakoRtuDrive::configure() {
 Task<Result<void>> YakoRtuDrive::bring_to(std::vector<RegisterSetting> required) {
   auto addresses = addresses_of(required);
   addresses.push_back(reg::eeprom_update);
-  auto before = co_await read_registers(std::move(addresses));
+  if (model_->descriptor->capabilities.closed_loop) addresses.push_back(reg::loop_mode);
+  auto before = co_await read_registers(std::move(addresses), in(TransactionClass::parameters));
   if (!before) co_return fail(before.error());
   saving_ = before->at(reg::eeprom_update) == 0;
-  if (const auto done = co_await neutralise_inputs(required, *before); !done) co_return done;
-  if (const auto done = co_await write_differences(required, *before); !done) co_return done;
-  if (const auto done = co_await save_writes(saves_at_rest()); !done) co_return done;
+  if (const auto mode = before->find(reg::loop_mode);
+      model_->descriptor->capabilities.closed_loop && mode != before->end() && !found_closed_)
+    found_closed_ = mode->second == 0;
+  const auto written = co_await write_all(required, *before);
+  // Also after a failure: what is written next must not wear the EEPROM.
+  const auto restored = co_await save_writes(saves_at_rest());
+  if (!written) co_return written;
+  if (!restored) co_return restored;
   co_return co_await verify(required);
+}
+
+Task<Result<void>> YakoRtuDrive::write_all(const std::vector<RegisterSetting>& required, Registers& present) {
+  if (const auto done = co_await neutralise_inputs(required, present); !done) co_return done;
+  if (const auto done = co_await silence_segments(required, present); !done) co_return done;
+  co_return co_await write_differences(required, present);
+}
+
+/// Speed 0 for every row of the segment table that is about to change: a row that a lost frame leaves half
+/// written must not be one that a terminal can start.
+Task<Result<void>> YakoRtuDrive::silence_segments(const std::vector<RegisterSetting>& required,
+                                                  Registers& present) {
+  const auto differs = [&](std::uint16_t address) {
+    const auto found = std::ranges::find(required, address, &RegisterSetting::address);
+    return found != required.end() && !found->holds(present.at(address));
+  };
+  const auto enables = segment_enables(*model_, setup_);
+  for (std::uint16_t row = 0; row < segment_rows; ++row) {
+    const auto at = [row](std::uint16_t first) { return static_cast<std::uint16_t>(first + row); };
+    const bool changes = differs(reg::terminal_move_mode) || differs(at(reg::segment_pulses_high)) ||
+                         differs(at(reg::segment_pulses_low)) || differs(at(reg::segment_time));
+    for (const auto speed : {at(reg::segment_speed), at(reg::segment_pv_speed)}) {
+      const auto held = present.find(speed);
+      if (!changes || held == present.end() || held->second == 0) continue;
+      const RegisterSetting silence{
+          .address = speed, .key = "segments", .starts_motion = true, .input_bits = enables};
+      if (const auto switched = co_await save_writes(setup_.persist.segments); !switched) co_return switched;
+      if (const auto inactive = co_await check_inactive(silence); !inactive) co_return inactive;
+      if (const auto written = co_await write_run(speed, {0}); !written) co_return written;
+      held->second = 0;
+    }
+  }
+  co_return Result<void>{};
 }
 
 bool YakoRtuDrive::saves_at_rest() const { return setup_.persist == PersistSettings::all(); }
@@ -186,6 +233,9 @@ Task<Result<void>> YakoRtuDrive::write_differences(const std::vector<RegisterSet
       values.push_back(next.applied_to(present.at(next.address)));
       ++i;
     }
+    // Again and again it would only wear the EEPROM.
+    if (first.saved && unsaved_.contains(first.address))
+      co_return fail(not_held(first, present.at(first.address)));
     if (const auto switched = co_await save_writes(first.saved); !switched) co_return switched;
     if (first.starts_motion)
       if (const auto inactive = co_await check_inactive(first); !inactive) co_return inactive;
@@ -203,7 +253,8 @@ Task<Result<void>> YakoRtuDrive::write_run(std::uint16_t address, std::vector<st
                   : co_await node_.write_block(address, values, in(TransactionClass::parameters));
     if (written || written.error().reason != Reason::no_reply) break;
   }
-  if (saving_.value_or(true))
+  const bool executed = written || written.error().outcome == Outcome::unknown;
+  if (executed && saving_.value_or(true))
     for (std::size_t i = 0; i < values.size(); ++i) {
       const auto* parameter = find_parameter(model_->descriptor->parameters, address + i);
       if (parameter != nullptr && parameter->access == Access::rw_saved) ++eeprom_writes_;
@@ -212,15 +263,22 @@ Task<Result<void>> YakoRtuDrive::write_run(std::uint16_t address, std::vector<st
   co_return Result<void>{};
 }
 
-Task<Result<void>> YakoRtuDrive::verify(const std::vector<RegisterSetting>& required) const {
-  const auto after = co_await read_registers(addresses_of(required));
+Error YakoRtuDrive::not_held(const RegisterSetting& setting, std::uint16_t actual) const {
+  return error_at(Reason::misconfigured, setting.address,
+                  fmt::format("register 0x{:04X} ({}) reads {} after {} was written", setting.address,
+                              setting.key, actual, setting.applied_to(actual)),
+                  "check whether another master writes to this drive, or its EEPROM fails; what is saved is "
+                  "written again after the drive's next power-up");
+}
+
+Task<Result<void>> YakoRtuDrive::verify(const std::vector<RegisterSetting>& required) {
+  const auto after = co_await read_registers(addresses_of(required), in(TransactionClass::parameters));
   if (!after) co_return fail(after.error());
   for (const auto& setting : required)
-    if (const auto actual = after->at(setting.address); !setting.holds(actual))
-      co_return fail(error_at(Reason::misconfigured, setting.address,
-                              fmt::format("register 0x{:04X} ({}) reads {} after {} was written",
-                                          setting.address, setting.key, actual, setting.value),
-                              "check whether another master writes to this drive, or its EEPROM fails"));
+    if (const auto actual = after->at(setting.address); !setting.holds(actual)) {
+      if (setting.saved) unsaved_.insert(setting.address);
+      co_return fail(not_held(setting, actual));
+    }
   co_return Result<void>{};
 }
 
@@ -257,13 +315,16 @@ Task<Result<void>> YakoRtuDrive::check_inactive(const RegisterSetting& setting) 
   co_return Result<void>{};
 }
 
-Task<Result<Drift>> YakoRtuDrive::check_drift() {
-  std::vector<RegisterSetting> watched;
+Task<Result<Drift>> YakoRtuDrive::check_drift(TransactionClass transaction_class) {
+  // Homing's block is compared before each homing, the performance group moves nothing.
+  std::vector<RegisterSetting> watched{{.address = reg::eeprom_update,
+                                        .value = static_cast<std::uint16_t>(saves_at_rest() ? 0 : 1),
+                                        .key = "persist"}};
   for (const auto& setting : required_)
-    if (setting.address == reg::microstep || setting.address == reg::overtravel_stop ||
-        (setting.address >= reg::input_levels && setting.address < reg::segment_pulses_high))
+    if (setting.address < reg::homing_start ||
+        (setting.address >= reg::input_levels && setting.address < reg::performance))
       watched.push_back(setting);
-  const auto present = co_await read_registers(addresses_of(watched));
+  const auto present = co_await read_registers(addresses_of(watched), in(transaction_class));
   if (!present) co_return fail(present.error());
   Drift drift;
   for (const auto& setting : watched) {
@@ -273,6 +334,8 @@ Task<Result<Drift>> YakoRtuDrive::check_drift() {
         fmt::format("{}{} (register 0x{:04X}) reads {} instead of {}", drift.text.empty() ? "" : "; ",
                     setting.key, setting.address, actual, setting.applied_to(actual));
     drift.scale_changed = drift.scale_changed || setting.address == reg::microstep;
+    drift.limits_changed = drift.limits_changed || setting.address == reg::overtravel_stop ||
+                           setting.address == reg::input_levels || is_input_function(setting);
   }
   co_return drift;
 }

@@ -10,6 +10,7 @@ namespace axisd::yako_rtu {
 namespace {
 
 constexpr int chain_attempts = 3;
+constexpr int stop_attempts = 3;
 
 TransactionOptions in(TransactionClass transaction_class) { return {.transaction_class = transaction_class}; }
 
@@ -23,9 +24,29 @@ MotionBlock YakoRtuDrive::fresh_neutral_block() const {
   return {5, 100, static_cast<std::uint16_t>(101 + moment % 61), 60, 0, 0};
 }
 
+void YakoRtuDrive::note_power_up_block(const MotionBlock& block) {
+  constexpr std::size_t most = 8;
+  if (block == factory_block) return;  // it is the first, for ever
+  std::erase(power_up_blocks_, block);
+  power_up_blocks_.push_back(block);
+  if (power_up_blocks_.size() > most) power_up_blocks_.erase(std::next(power_up_blocks_.begin()));
+}
+
+void YakoRtuDrive::forget_power_cycle(const MotionBlock& block) {
+  expected_.clear();
+  note_power_up_block(block);
+  found_closed_.reset();
+  unsaved_.clear();
+}
+
+Error YakoRtuDrive::lost_memory() const {
+  return error_at(Reason::rebooted, reg::start_speed, "the drive lost its memory: it was switched off and on",
+                  "home the axis again, then enable it; nothing resumes by itself");
+}
+
 /// Keeps a block off every content that a power-up could leave.
 MotionBlock YakoRtuDrive::distinct(MotionBlock block) const {
-  while (block == factory_block || block == found_at_connect_)
+  while (std::ranges::find(power_up_blocks_, block) != power_up_blocks_.end())
     block[1] = block[1] < 2000 ? block[1] + 1 : block[1] - 2;
   return block;
 }
@@ -47,10 +68,8 @@ Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions op
   MotionBlock block{};
   std::ranges::copy(answer->registers, block.begin());
   if (std::ranges::find(expected_, block) == expected_.end()) {
-    expected_.clear();
-    co_return fail(error_at(Reason::rebooted, reg::start_speed,
-                            "the drive lost its memory: it was switched off and on",
-                            "home the axis again, then enable it; nothing resumes by itself"));
+    forget_power_cycle(block);
+    co_return fail(lost_memory());
   }
   expected_ = {block};
   co_return answer;
@@ -152,16 +171,21 @@ Task<Result<void>> YakoRtuDrive::prepare_homing(HomingBlock block, TransactionOp
   if (!present) co_return failed(present.error());
   if (std::ranges::equal(present->registers, block)) co_return Result<void>{};
   const auto written = co_await node_.write_block(reg::homing_mode, block, std::move(options));
-  if (saving_.value_or(true)) eeprom_writes_ += block.size();
+  const bool executed = written || written.error().outcome == Outcome::unknown;
+  if (executed && saving_.value_or(true)) eeprom_writes_ += block.size();
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }
 
 Task<Result<void>> YakoRtuDrive::stop(StopKind kind) {
   const std::uint16_t value = kind == StopKind::quick_stop ? 1 : 0;  // 7.6.2: zero is a command
-  const auto written = co_await node_.write(reg::stop, value, in(TransactionClass::stop));
-  if (!written) co_return failed(written.error());
-  co_return Result<void>{};
+  for (int attempt = 1;; ++attempt) {
+    const auto written = co_await node_.write(reg::stop, value, in(TransactionClass::stop));
+    if (written) co_return Result<void>{};
+    // A refusal mostly means that the frame was damaged (01, which some firmware answers): at once again.
+    if (written.error().reason != Reason::refused || attempt == stop_attempts)
+      co_return failed(written.error());
+  }
 }
 
 Task<Result<void>> YakoRtuDrive::clear_alarm() {

@@ -14,6 +14,7 @@ namespace {
 
 /// The manuals give no figure for how long 150 registers take to be saved; the drive may be silent meanwhile.
 constexpr auto eeprom_patience = std::chrono::seconds(3);
+constexpr int canary_attempts = 3;
 constexpr std::array<std::string_view, 4> formats = {"8N1", "8N2", "8E1", "8O1"};  // codes of 0x0015
 
 TransactionOptions parameters() { return {.transaction_class = TransactionClass::parameters}; }
@@ -51,7 +52,7 @@ std::string YakoRtuDrive::configured_by(std::uint32_t address) const {
 Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_parameters(
     std::vector<std::uint32_t> addresses) {
   std::vector<std::uint16_t> wanted(addresses.begin(), addresses.end());
-  const auto registers = co_await read_registers(std::move(wanted));
+  const auto registers = co_await read_registers(std::move(wanted), parameters());
   if (!registers) co_return fail(registers.error());
   std::vector<ParameterValue> values;
   for (const auto address : addresses) {
@@ -68,10 +69,13 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_parameters(
 
 Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::vector<ParameterValue> values) {
   std::vector<std::uint32_t> addresses;
-  for (const auto& value : values) {
-    addresses.push_back(value.address);
-    std::vector<std::uint16_t> word{static_cast<std::uint16_t>(value.value & 0xFFFF)};
-    const auto written = co_await write_run(static_cast<std::uint16_t>(value.address), std::move(word));
+  for (const auto& value : values) addresses.push_back(value.address);
+  const auto before = co_await read_parameters(addresses);
+  if (!before) co_return fail(before.error());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (((*before)[i].value & 0xFFFF) == (values[i].value & 0xFFFF)) continue;  // spares the EEPROM
+    std::vector<std::uint16_t> word{static_cast<std::uint16_t>(values[i].value & 0xFFFF)};
+    const auto written = co_await write_run(static_cast<std::uint16_t>(values[i].address), std::move(word));
     if (!written) co_return fail(written.error());
   }
   auto present = co_await read_parameters(std::move(addresses));
@@ -90,7 +94,7 @@ Task<Result<DriveSegments>> YakoRtuDrive::read_segments() {
   for (const auto first : {reg::segment_pulses_high, reg::segment_pulses_low, reg::segment_speed,
                            reg::segment_time, reg::segment_pv_speed})
     for (std::uint16_t i = 0; i < 16; ++i) addresses.push_back(static_cast<std::uint16_t>(first + i));
-  const auto registers = co_await read_registers(std::move(addresses));
+  const auto registers = co_await read_registers(std::move(addresses), parameters());
   if (!registers) co_return fail(registers.error());
   DriveSegments segments{.absolute = registers->at(reg::terminal_move_mode) == 1};
   for (std::uint16_t i = 0; i < 16; ++i) {
@@ -108,9 +112,6 @@ Task<Result<DriveSegments>> YakoRtuDrive::read_segments() {
 Task<Result<void>> YakoRtuDrive::write_segments(DriveSegments segments) {
   auto required = segment_registers(segments, segment_enables(*model_, setup_));
   for (auto& row : required) row.saved = setup_.persist.segments;
-  required.push_back({.address = reg::terminal_move_mode,
-                      .value = static_cast<std::uint16_t>(segments.absolute ? 1 : 0),
-                      .key = "segments.mode"});
   co_return co_await bring_to(std::move(required));
 }
 
@@ -119,21 +120,28 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
   // (M27).
   MotionBlock neutral = fresh_neutral_block();
   neutral[3] = 0;
-  if (const auto written = co_await write_canary(distinct(neutral), parameters()); !written)
-    co_return written;
+  neutral = distinct(neutral);
+  if (const auto written = co_await write_canary(neutral, parameters()); !written) co_return written;
   const auto saved = co_await node_.write(reg::parameter_setting, 2, eeprom());
-  const auto& catalogue = model_->descriptor->parameters;
-  eeprom_writes_ += static_cast<std::uint64_t>(std::ranges::count_if(catalogue, [](const auto& parameter) {
-    return parameter.access == Access::rw || parameter.access == Access::rw_saved;
-  }));
-  found_at_connect_ = expected_.back();
+  const bool executed = saved || saved.error().outcome == Outcome::unknown;
+  if (executed) {
+    eeprom_writes_ += static_cast<std::uint64_t>(
+        std::ranges::count_if(model_->descriptor->parameters, [](const auto& parameter) {
+          return parameter.access == Access::rw || parameter.access == Access::rw_saved;
+        }));
+    // Saved, this block would no longer tell a power-up (M7): whatever comes now, it is no proof any more.
+    note_power_up_block(neutral);
+    const auto fresh = distinct(fresh_neutral_block());
+    for (int attempt = 0; attempt < canary_attempts; ++attempt)
+      if (co_await write_canary(fresh, parameters())) break;
+    std::erase(expected_, neutral);
+  }
   if (!saved) co_return failed(saved.error());
-  // Saved, the canary would no longer tell a power-up (M7).
-  co_return co_await write_canary(distinct(fresh_neutral_block()), parameters());
+  co_return co_await check_continuity(TransactionClass::parameters);
 }
 
 Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t> taken) {
-  const auto before = co_await read_registers({reg::node, reg::custom_node, reg::custom_baud});
+  const auto before = co_await read_registers({reg::node, reg::custom_node}, parameters());
   if (!before) co_return fail(before.error());
   const auto node = before->at(reg::node);
   const bool custom = before->at(reg::custom_node) == node;
@@ -145,10 +153,13 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
                              model_->factory_custom_node),
                  "set the drive's address switches first, or give the other drive another address"));
   const auto restored = co_await node_.write(reg::parameter_setting, 1, eeprom());
-  eeprom_writes_ += static_cast<std::uint64_t>(
-      std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access));
-  expected_.clear();  // whatever stands there now, it is not ours
-  saving_.reset();
+  if (restored || restored.error().outcome == Outcome::unknown) {
+    eeprom_writes_ += static_cast<std::uint64_t>(
+        std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access));
+    expected_.clear();  // whatever stands there now, it is not ours
+    saving_.reset();
+    unsaved_.clear();
+  }
   if (!restored) co_return failed(restored.error());
   auto text = custom ? fmt::format("address {}", model_->factory_custom_node != 0
                                                      ? std::to_string(model_->factory_custom_node)

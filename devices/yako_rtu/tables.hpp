@@ -10,6 +10,10 @@
 
 namespace axisd::yako_rtu {
 
+/// 0x0020..0x0025 are what such a terminal would run with: after a MoveAbsolute to 300 mm, 300 mm further.
+inline constexpr std::string_view runs_last_command =
+    "it would start whatever the last command left in the drive; use segments with pt_enable or pv_enable";
+
 /// Functions of the input terminals, in the order of their codes.
 inline constexpr TerminalFunctionSpec input_functions[] = {
     {"none", 0, {}},
@@ -22,8 +26,8 @@ inline constexpr TerminalFunctionSpec input_functions[] = {
     {"pv_direction", 7, {}},  // turns a run that pv_enable starts; it starts none (7.4.2)
     {"stop", 8, {}},
     {"quick_stop", 9, {}},
-    {"position_start", 10, {}, true},
-    {"speed_start", 11, {}, true},
+    {"position_start", 10, {}, true, runs_last_command},
+    {"speed_start", 11, {}, true, runs_last_command},
     {"jog_positive", 12, "jog_negative", true},
     {"jog_negative", 13, "jog_positive", true},
     {"homing_start", 14, {}, true},

@@ -92,6 +92,170 @@ TEST(M27, ASavedDriveMovesNothingAndItsRestartIsStillNoticed) {
   });
 }
 
+/// The reply to the saving is lost, or that to the canary after it: a power cycle must still be seen.
+TEST(M27, ASavedBlockIsNoProofWhateverGetsLost) {
+  for (const std::uint16_t lost : {save_or_restore, first_motion_register})
+    for (const int skip : {0, 1}) {
+      Rig rig;
+      rig.ready();
+      rig.complete(DisableRequest{});
+      rig.fault({.kind = simulation::FaultKind::drop_reply,
+                 .function = lost == save_or_restore ? 0x06 : 0x10,
+                 .register_address = lost,
+                 .skip = skip,
+                 .count = 4});
+      (void)save(rig);
+      rig.faults().clear();
+      rig.reconnect();
+      rig.enable();
+      rig.complete(SetPositionRequest{.position = 30});
+      rig.drive->advance(rig.world.now());
+      rig.drive->set_power(false);
+      rig.run(20ms);
+      rig.drive->advance(rig.world.now());
+      rig.drive->set_power(true);
+      EXPECT_TRUE(rig.run_until([&] { return rig.state()->trust == PositionTrust::unknown; }, 5s))
+          << lost << skip;
+    }
+}
+
+TEST(M7, ARestartIsSeenWhileTheConfigurationIsAppliedAgain) {
+  // Drift first, then a power cycle before it was applied again: configure() must not overwrite the evidence.
+  Rig rig({.switches = {{"enabled_at_power_up", false}},
+           .adjust = [](AxisSettings& axis) { axis.drift_check = 1s; }});
+  rig.ready();
+  rig.complete(DisableRequest{});
+  rig.enable();
+  rig.complete(SetPositionRequest{.position = 30});
+  for (int blip = 0; blip < 20; ++blip) {
+    rig.enable();
+    rig.complete(SetPositionRequest{.position = 30});
+    rig.run(std::chrono::milliseconds(50 * blip));
+    const int seen = rig.state()->reboots;
+    rig.cycle_power(10ms);
+    EXPECT_TRUE(rig.run_until([&] { return rig.state()->reboots == seen + 1; }, 5s)) << blip;
+    rig.reconnect();
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+  }
+}
+
+TEST(M3, DriftOutlastsAShortLossOfTheLink) {
+  Rig rig({.adjust = [](AxisSettings& axis) { axis.drift_check = 1s; }});
+  rig.ready();
+  rig.write_behind(x1_function, 0);
+  EXPECT_TRUE(rig.run_until([&] { return !rig.state()->drift.empty(); }, 3s));
+  rig.fault({.kind = simulation::FaultKind::drop_request, .count = 8});
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 5s));
+  rig.reconnect();
+  EXPECT_FALSE(rig.state()->drift.empty());
+  EXPECT_EQ(rig.try_submit(MoveRelativeRequest{.distance = 1}).error().reason, Reason::misconfigured);
+}
+
+TEST(M3, TerminalsChangedWhileTheLinkWasLostAreSeenBeforeAnythingMoves) {
+  Rig rig;
+  rig.ready();
+  rig.fault({.kind = simulation::FaultKind::drop_request, .count = 8});
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 5s));
+  rig.write_behind(x1_function, 0);
+  rig.reconnect();
+  EXPECT_FALSE(rig.state()->drift.empty());
+}
+
+TEST(M14, AStopThatTheDriveCallsDamagedIsRepeatedAtOnce) {
+  Rig rig({.switches = {{"crc_error_answered", true}}});
+  rig.ready();
+  const auto move = rig.submit(
+      MoveAbsoluteRequest{.position = 300, .with = {.position = {}, .distance = {}, .velocity = 50}});
+  rig.run_until([&] { return rig.state()->position > 20; }, 5s);
+  rig.line->forget_wire();
+  rig.fault({.kind = simulation::FaultKind::corrupt_request, .register_address = 0x0028});
+  const auto before = rig.load_mm();
+  const auto stop = rig.submit(StopRequest{.kind = StopKind::stop});
+  rig.run_until([&] { return stop->has_ended(); }, 5s);
+  EXPECT_EQ(stop->value().state, CommandState::done);
+  EXPECT_EQ(rig.state()->trust, PositionTrust::set) << "no quick stop was needed";
+  EXPECT_LT(rig.load_mm() - before, 10);
+  EXPECT_EQ(rig.writes_of(0x0028), 2);
+}
+
+TEST(M14, AStopEndsOnAnAxisThatStaysUnconfigured) {
+  Rig rig({.connect = false, .before_start = [](simulation::SimulatedRtuNode& drive, VirtualWorld&) {
+             drive.poke(0x0000, 0x0999);  // another model answers
+           }});
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::configuring; }, 5s));
+  const auto stop = rig.submit(StopRequest{.kind = StopKind::stop});
+  EXPECT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 10s));
+  EXPECT_EQ(stop->value().state, CommandState::done) << describe(stop->value());
+  EXPECT_TRUE(rig.axis().at_rest());
+}
+
+TEST(M20, HomingThatATerminalStartedWhileTheLinkWasLostCostsThePosition) {
+  Rig rig({.switches = {{"enabled_at_power_up", false}}, .adjust = [](AxisSettings& axis) {
+             axis.inputs.push_back({.terminal = "X6", .function = "homing_start"});
+           }});
+  rig.ready();
+  rig.fault({.kind = simulation::FaultKind::drop_request, .count = 12});
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 5s));
+  EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+}
+
+TEST(M2, WhatMovesWhileTheBrakeOpensIsStopped) {
+  Rig rig({.switches = {{"enabled_at_power_up", false}}, .adjust = [](AxisSettings& axis) {
+             axis.outputs = {{.terminal = "Y0", .function = "brake"}};
+             axis.brake = {.release_time = 1s};
+             axis.inputs.push_back({.terminal = "X6", .function = "jog_positive"});
+           }});
+  const auto enable = rig.submit(EnableRequest{});
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->enabled; }, 1s));
+  rig.run(100ms);
+  rig.set_input("X6", true);
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->state == AxisState::error_stop; }, 1s));
+  EXPECT_NE(enable->value().state, CommandState::done);
+}
+
+TEST(Segments, ALostFrameNeverLeavesARowThatRunsElsewhere) {
+  for (int skip = 0; skip < 12; ++skip) {
+    SCOPED_TRACE(skip);
+    Rig rig({.switches = {{"enabled_at_power_up", false}}, .adjust = [](AxisSettings& axis) {
+               axis.inputs.insert(axis.inputs.end(), {{.terminal = "X3", .function = "pt_enable"},
+                                                      {.terminal = "X4", .function = "pin0"}});
+             }});
+    const auto write_table = [&](double target) {
+      return operate<SegmentSettings>(rig, [target](const DriveOperations& drive) {
+        return drive.write_segments(
+            {.positions = {{.number = 1, .target = target, .velocity = 50, .acceleration_time = 50ms}}});
+      });
+    };
+    ASSERT_TRUE(write_table(60));
+    rig.fault({.kind = simulation::FaultKind::drop_request, .function = 0x06, .skip = skip, .count = 100});
+    const bool whole = write_table(-7).has_value();
+    rig.faults().clear();
+    rig.reconnect();
+    rig.enable();
+    rig.set_input("X4", true);
+    rig.run(50ms);
+    rig.set_input("X3", true);
+    rig.run(5s);
+    const auto went = rig.load_mm();
+    EXPECT_TRUE(std::abs(went) < 0.01 || std::abs(went - 60) < 0.01 || std::abs(went + 7) < 0.01) << went;
+    if (whole) EXPECT_NEAR(went, -7, 0.01);
+  }
+}
+
+TEST(Segments, AbsoluteOnesLeaveNoOtherPositionThanHome) {
+  Rig rig({.adjust =
+               [](AxisSettings& axis) {
+                 axis.segments = SegmentSettings{.absolute = true,
+                                                 .positions = {{.number = 1, .target = 20, .velocity = 50}}};
+               },
+           .connect = false});
+  rig.run(1s);
+  rig.complete(DisableRequest{});
+  rig.reconnect();
+  rig.enable();
+  EXPECT_EQ(rig.try_submit(SetPositionRequest{.position = 30}).error().reason, Reason::not_supported);
+}
+
 TEST(M27, RestoredSettingsAreConfiguredAgain) {
   for_each_switch({}, [](const RigOptions& options) {
     Rig rig(options);
