@@ -2,14 +2,14 @@
 # Installs what is missing, builds, and runs the tests; the last lines are ctest's summary of all of them.
 #   tests/run.sh quick    preset dev
 #   tests/run.sh all      the same tests under AddressSanitizer + UBSan (preset asan), those without gRPC, whose library
-#                         is not instrumented, under ThreadSanitizer (preset tsan), and clang-tidy on changed files.
-#                         Default. Not the preset dev as well: it differs from asan in the sanitizers only.
+#                         is not instrumented, under ThreadSanitizer (preset tsan), clang-tidy on changed files, and
+#                         the conformance suite in all its variants in preset dev (asan runs a sample). Default.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 
 case "${1:-all}" in
-  quick) presets=(dev) selection=(--label-exclude slow) ;;
-  all) presets=(asan tsan) selection=() ;;
+  quick) presets=(dev) whole=() selection=(--label-exclude slow) ;;
+  all) presets=(asan tsan) whole=(test_conformance) selection=() ;;
   *) echo "usage: tests/run.sh [quick|all]" >&2; exit 2 ;;
 esac
 jobs=$(nproc)
@@ -25,22 +25,28 @@ export UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:external_symbolizer_pat
 export TSAN_OPTIONS="halt_on_error=1:second_deadlock_stack=1:external_symbolizer_path=$symbolizer"
 
 failed=()
-for preset in "${presets[@]}"; do
+build() {  # PRESET [TARGET ...]
+  local preset=$1 begun=$SECONDS
+  shift
   mkdir -p "build/$preset"
-  echo "== build $preset"
-  begun=$SECONDS
+  echo "== build $preset $*"
   if ! cmake --preset "$preset" >"build/$preset/configure.log" 2>&1; then
     cat "build/$preset/configure.log"
     failed+=("$preset (configure)")
-  elif ! ninja -C "build/$preset" -j "$jobs" --quiet; then
+  elif ! ninja -C "build/$preset" -j "$jobs" --quiet "$@"; then
     failed+=("$preset (build)")
   fi
   echo "== $preset: $((SECONDS - begun)) s"
-done
+}
+for preset in "${presets[@]}"; do build "$preset"; done
+[ "${#whole[@]}" -eq 0 ] || build dev "${whole[@]}"
 
 # One run over all presets: one pool of jobs, one summary. What could not be built fails in it, too.
 mkdir -p build/all
-for preset in "${presets[@]}"; do printf 'subdirs("%s")\n' "$PWD/build/$preset"; done >build/all/CTestTestfile.cmake
+{
+  for preset in "${presets[@]}"; do printf 'subdirs("%s")\n' "$PWD/build/$preset"; done
+  for target in "${whole[@]}"; do printf 'include("%s")\n' "$PWD/build/dev/tests/$target"*_include.cmake; done
+} >build/all/CTestTestfile.cmake
 [ "${#failed[@]}" -eq 0 ] || printf 'run.sh: FAILED: %s\n' "${failed[@]}"
 status=0
 ctest --test-dir build/all -j "$jobs" --output-on-failure --no-tests=error "${selection[@]}" || status=$?
