@@ -8,6 +8,7 @@
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <tuple>
 #include <utility>
 
 #include "buses/canopen/eds_values.hpp"
@@ -37,7 +38,7 @@ class Reader {
     else if (read_sections(text))
       read_all();
     if (problems_.empty()) return std::move(eds_);
-    std::ranges::stable_sort(problems_, {}, &EdsProblem::line);
+    std::ranges::sort(problems_, {}, [](const EdsProblem& one) { return std::tie(one.line, one.message); });
     return std::unexpected(std::move(problems_));
   }
 

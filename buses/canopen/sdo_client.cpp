@@ -7,13 +7,11 @@
 #include <utility>
 
 #include "buses/canopen/cob.hpp"
+#include "buses/canopen/sdo_client_state.hpp"
 
 namespace axisd::canopen {
 
 namespace {
-
-/// Of so many requests one comes from a lower class than the highest, so that polling starves nobody.
-constexpr unsigned reservation = 8;
 
 Error no_reply_error(const SdoTransfer& transfer) {
   return {.reason = Reason::no_reply,
@@ -35,58 +33,6 @@ Error rebooted_error(Outcome outcome) {
 }
 
 }  // namespace
-
-struct SdoClient::Request {
-  bool download = false;
-  Object object;
-  Bytes bytes;
-  SdoOptions options;
-  int attempts = 1;
-  bool perhaps_done = false;  ///< an earlier attempt may have been executed
-  std::function<void(Result<SdoAnswer>)> done;
-};
-
-struct SdoClient::Active {
-  RequestPtr request;
-  SdoTransfer transfer;
-  bool probe = false;  ///< `transfer` reads another object, to bring both sides in step before `request`
-  bool ambiguous = false;
-  std::uint64_t frame_id = 0;            ///< of the frame that was sent last
-  TimePoint first_sent{};                ///< end of the first frame
-  std::optional<TimePoint> last_sent{};  ///< end of the last frame; nothing while it waits in the port
-  TimePoint limit = TimePoint::max();    ///< of the whole transfer
-  [[nodiscard]] bool any_sent() const { return first_sent != TimePoint{}; }
-};
-
-struct SdoClient::Node {
-  std::uint8_t id = 0;
-  std::array<std::deque<RequestPtr>, transaction_class_count> waiting;
-  std::optional<Active> active;
-  LateReplies late;
-  unsigned bound = 0;  ///< requests that overtook a lower class
-  Clock::Timer timer;
-
-  std::deque<RequestPtr>& lane(TransactionClass transaction_class) {
-    return waiting.at(std::to_underlying(transaction_class));
-  }
-  [[nodiscard]] bool stop_waits() const { return !waiting.front().empty(); }
-  [[nodiscard]] std::size_t count() const {
-    std::size_t sum = 0;
-    for (const auto& one : waiting) sum += one.size();
-    return sum;
-  }
-  RequestPtr pop() {
-    auto first = std::ranges::find_if(waiting, [](const auto& one) { return !one.empty(); });
-    if (first == waiting.end()) return nullptr;
-    if (first != waiting.begin()) {
-      const auto lower = std::find_if(first + 1, waiting.end(), [](const auto& one) { return !one.empty(); });
-      if (lower != waiting.end() && ++bound % reservation == 0) first = lower;
-    }
-    auto request = std::move(first->front());
-    first->pop_front();
-    return request;
-  }
-};
 
 SdoClient::SdoClient(Executor executor, Clock& clock, can::Port& port, SdoSettings settings)
     : executor_(std::move(executor)), clock_(&clock), port_(&port), settings_(settings) {}

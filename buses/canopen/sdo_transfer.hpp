@@ -33,7 +33,7 @@ class SdoTransfer {
     Error error{};
   };
 
-  [[nodiscard]] SdoData first_frame();
+  SdoData first_frame();
   Step on_reply(const SdoReply& reply);
   /// Tells the server that nobody waits any more.
   [[nodiscard]] SdoData abort(SdoAbort code) const;
