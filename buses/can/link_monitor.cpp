@@ -53,11 +53,10 @@ void LinkMonitor::close() {
 
 void LinkMonitor::wait() {
   socket_.async_wait(boost::asio::posix::stream_descriptor::wait_read,
-                     [self = std::weak_ptr(self_)](const boost::system::error_code& error) {
-                       const auto alive = self.lock();
-                       if (error || !alive) return;
-                       (*alive)->read_all();
-                       if ((*alive)->socket_.is_open()) (*alive)->wait();
+                     [self = self_](const boost::system::error_code& error) {
+                       if (error || *self == nullptr) return;
+                       (*self)->read_all();
+                       if ((*self)->socket_.is_open()) (*self)->wait();
                      });
 }
 

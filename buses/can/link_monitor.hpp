@@ -19,6 +19,8 @@ class LinkMonitor {
   /// `interface`: the one that query() asks for; the kernel reports changes of all.
   LinkMonitor(const Executor& executor, std::string interface,
               std::function<void(const LinkReport&)> on_report);
+  ~LinkMonitor() { *self_ = nullptr; }
+  LinkMonitor(const LinkMonitor&) = delete;
 
   /// Begins to listen, and asks. Error: the kernel gives no such socket, or the name is none.
   Result<void> open();

@@ -90,7 +90,6 @@ class NetworkPort final : public PortCore {
   void shut() override;
   Written write(const Frame& frame) override;
   void catch_up() override {}  // the network reports at once
-  bool drained() override { return network_->waiting(id_) == 0; }
   void leave();
 
   static constexpr std::size_t interface_queue = 10;  ///< as txqueuelen of a CAN interface

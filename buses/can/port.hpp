@@ -138,7 +138,8 @@ class Port {
   /// Ends queued motion frames whose gate was raised. Called for each stop before its frame is queued.
   virtual void purge_superseded() = 0;
   /// Ends everything as when the port goes down, completed before this returns, and sends nothing any more.
-  /// No handler is called after it. The destructor calls nothing at all: close first.
+  /// No handler is called after it. The destructor calls nothing at all: close first. A handler may
+  /// call it, but not destroy the port.
   virtual void close() = 0;
 
   [[nodiscard]] virtual const PortState& state() const = 0;

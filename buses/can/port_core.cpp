@@ -39,7 +39,6 @@ void PortCore::purge_superseded() {
 void PortCore::close() {
   if (std::exchange(closed_, true)) return;
   shut();
-  handlers_ = {};
   tracker_.down();
   queue_.end_all();
   tell();
@@ -108,8 +107,8 @@ void PortCore::tell() {
                                          : counters_.not_sent);
       if (ended->completion) ended->completion(ended->result);
     } else if (const auto* received = std::get_if<ReceivedFrame>(&event)) {
-      if (handlers_.on_frame) handlers_.on_frame(*received);
-    } else if (handlers_.on_state) {
+      if (!closed_ && handlers_.on_frame) handlers_.on_frame(*received);
+    } else if (!closed_ && handlers_.on_state) {
       handlers_.on_state(std::get<PortState>(event));
     }
   }

@@ -25,6 +25,7 @@ using namespace std::chrono_literals;
 constexpr Duration first_back_off = 250ms;
 constexpr Duration longest_back_off = 4s;
 constexpr int frames_per_turn = 64;  // then others have their turn on the core thread
+constexpr int most_turns = 64;       // what the receive buffer holds at most, several times over
 constexpr int receive_buffer = 1 << 20;
 
 template <class T>
@@ -162,17 +163,16 @@ void SocketCanPort::close_socket() {
 
 void SocketCanPort::wait() {
   socket_.async_wait(boost::asio::posix::stream_descriptor::wait_read,
-                     [self = std::weak_ptr(self_), index = index_](const boost::system::error_code& error) {
-                       const auto alive = self.lock();
-                       if (error || !alive || (*alive)->index_ != index) return;
-                       (*alive)->read_some(frames_per_turn);
-                       (*alive)->settle();
-                       if ((*alive)->index_ == index) (*alive)->wait();
+                     [self = self_, index = index_](const boost::system::error_code& error) {
+                       if (error || *self == nullptr || (*self)->index_ != index) return;
+                       (*self)->read_some(frames_per_turn);
+                       (*self)->settle();
+                       if ((*self)->index_ == index) (*self)->wait();
                      });
 }
 
 void SocketCanPort::catch_up() {
-  while (read_some(frames_per_turn)) {
+  for (int turns = 0; turns < most_turns && read_some(frames_per_turn); ++turns) {
   }
 }
 

@@ -16,6 +16,7 @@ namespace axisd::can {
 class SocketCanPort final : public PortCore {
  public:
   SocketCanPort(const Executor& executor, Clock& clock, PortSettings settings);
+  ~SocketCanPort() override { *self_ = nullptr; }
 
  private:
   void open() override;

@@ -83,7 +83,7 @@ void TxQueue::no_buffer(TimePoint now) {
   retry_at_ = now + back_off_;
 }
 
-void TxQueue::confirm(std::deque<Unconfirmed>::iterator which, TimePoint at, TimePoint now) {
+void TxQueue::confirm(const std::deque<Unconfirmed>::iterator& which, TimePoint at, TimePoint now) {
   progress_ = now;
   end(std::move(which->completion),
       {.status = SendStatus::sent, .handed_over = which->handed_over, .sent_at = at});

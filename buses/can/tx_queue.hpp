@@ -75,7 +75,7 @@ class TxQueue {
 
   static SendStatus judge(const Waiting& waiting, TimePoint now);
   void end(Completion completion, SendResult result);
-  void confirm(std::deque<Unconfirmed>::iterator which, TimePoint at, TimePoint now);
+  void confirm(const std::deque<Unconfirmed>::iterator& which, TimePoint at, TimePoint now);
   Lane* first_lane();
   [[nodiscard]] TimePoint stalls_at() const;
   template <class Predicate>

@@ -184,6 +184,40 @@ TEST(CanPort, ExpiredFramesEndThoughTheWireIsBusy) {
   EXPECT_EQ(bench.endings.texts(), Texts{"5:expired"});
 }
 
+TEST(CanPort, AFullInterfaceIsTriedAgainAndChosenForAnew) {
+  axisd::test::VirtualWorld world;
+  Network network(world.clock(), 1'000'000);
+  NetworkPort port(world.clock(), {.window = 20, .stall_timeout = 1s}, network);
+  test::Endings endings;
+  port.start({});
+  network.set_stalled(true);
+  for (std::uint32_t id = 1; id <= 12; ++id) port.send(frame_of(id), {}, endings.of(id));
+  world.run_for(20ms);
+  EXPECT_GT(port.counters().no_buffer, 1U);
+  EXPECT_TRUE(endings.texts().empty());
+  port.send(frame_of(13), options_of(Class::stop), endings.of(13));
+  network.set_stalled(false);
+  world.run_for(20ms);
+  ASSERT_EQ(endings.texts().size(), 13U);
+  EXPECT_EQ(endings.texts().at(10), "13:sent");
+  EXPECT_EQ(endings.texts().at(11), "11:sent");
+}
+
+TEST(CanPort, AHandlerThatClosesIsTheLastToBeCalled) {
+  axisd::test::VirtualWorld world;
+  Network network(world.clock(), 1'000'000);
+  NetworkPort port(world.clock(), {}, network);
+  int calls = 0;
+  port.start({.on_frame = [&port, &calls](const ReceivedFrame&) {
+    port.close();
+    ++calls;
+  }});
+  const auto node = network.join([](const Frame&, TimePoint, bool) {});
+  for (std::uint32_t id = 1; id <= 3; ++id) network.transmit(node, frame_of(id));
+  world.run_for(10ms);
+  EXPECT_EQ(calls, 1);
+}
+
 TEST(CanPort, AHandlerMaySendAndClose) {
   Bench bench;
   bench.port.send(frame_of(1), {}, [&](const SendResult&) {
