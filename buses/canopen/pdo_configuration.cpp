@@ -175,8 +175,9 @@ Task<Result<PdoState>> read_pdo(RemoteNode node, PdoDirection direction, std::ui
   if (!count) co_return fail(count.error());
   // More than 64 are no count: 254 and 255 say that values are mapped in the manner of an MPDO.
   if (*count > most_entries) co_return state;
-  for (std::uint8_t sub = 1; sub <= *count; ++sub) {
-    const auto entry = co_await node.read(mapping_object(direction, number, sub), options);
+  for (unsigned sub = 1; sub <= *count; ++sub) {
+    const auto entry =
+        co_await node.read(mapping_object(direction, number, static_cast<std::uint8_t>(sub)), options);
     if (!entry) co_return fail(entry.error());
     state.mapping.push_back(MappedObject::of(static_cast<std::uint32_t>(*entry)));
   }

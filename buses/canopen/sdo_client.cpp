@@ -11,29 +11,6 @@
 
 namespace axisd::canopen {
 
-namespace {
-
-Error no_reply_error(const SdoTransfer& transfer) {
-  return {.reason = Reason::no_reply,
-          .message = fmt::format("object {}: no reply", to_string(transfer.object())),
-          .remedy = "check power, wiring, node-ID and bit rate of the node",
-          .outcome = transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed};
-}
-
-Error expired_error() {
-  return {
-      .reason = Reason::expired, .message = "not sent: its time had passed", .remedy = "repeat the request"};
-}
-
-Error rebooted_error(Outcome outcome) {
-  return {.reason = Reason::rebooted,
-          .message = "the node booted before it answered",
-          .remedy = "check the drive's supply; configure it again, then repeat the request",
-          .outcome = outcome};
-}
-
-}  // namespace
-
 SdoClient::SdoClient(Executor executor, Clock& clock, can::Port& port, SdoSettings settings)
     : executor_(std::move(executor)), clock_(&clock), port_(&port), settings_(settings) {}
 

@@ -1,6 +1,8 @@
 // What the SDO client keeps for each node. Used by sdo_client.cpp only.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -8,6 +10,25 @@
 #include "buses/canopen/sdo_client.hpp"
 
 namespace axisd::canopen {
+
+inline Error no_reply_error(const SdoTransfer& transfer) {
+  return {.reason = Reason::no_reply,
+          .message = fmt::format("object {}: no reply", to_string(transfer.object())),
+          .remedy = "check power, wiring, node-ID and bit rate of the node",
+          .outcome = transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed};
+}
+
+inline Error expired_error() {
+  return {
+      .reason = Reason::expired, .message = "not sent: its time had passed", .remedy = "repeat the request"};
+}
+
+inline Error rebooted_error(Outcome outcome) {
+  return {.reason = Reason::rebooted,
+          .message = "the node booted before it answered",
+          .remedy = "check the drive's supply; configure it again, then repeat the request",
+          .outcome = outcome};
+}
 
 struct SdoClient::Request {
   bool download = false;
