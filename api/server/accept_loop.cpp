@@ -31,8 +31,8 @@ int descriptor_limit() {
 }  // namespace
 
 Result<void> AcceptLoop::start(std::vector<Entry> entries, int most) {
-  wake_.reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  wake_ = FileDescriptor(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  reserve_ = FileDescriptor(open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (wake_.get() < 0 || reserve_.get() < 0)
     return fail(Reason::internal,
                 "cannot open descriptors for the accept loop: " + std::generic_category().message(errno),
@@ -82,7 +82,7 @@ bool AcceptLoop::accept_one(const Entry& entry) {
     return code != ENOBUFS && code != ENOMEM;  // the rest concerns one connection that is gone already
   }
   if (connection.get() >= first_refused_descriptor_) {
-    connection.reset();
+    connection = {};
     const auto count = ++refused_;
     if (std::has_single_bit(count)) spdlog::warn("too many connections: {} turned away since start", count);
     return true;
@@ -99,11 +99,11 @@ bool AcceptLoop::accept_one(const Entry& entry) {
 }
 
 bool AcceptLoop::turn_away(const Entry& entry) {
-  reserve_.reset();
+  reserve_ = {};
   FileDescriptor surplus(accept4(entry.socket.fd.get(), nullptr, nullptr, SOCK_CLOEXEC));
   const bool closed = surplus.get() >= 0;
-  surplus.reset();
-  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  surplus = {};
+  reserve_ = FileDescriptor(open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (!closed) return false;  // somebody else took the reserve meanwhile
   const auto count = ++refused_;
   if (std::has_single_bit(count))

@@ -76,7 +76,7 @@ int bound_port(int fd) {
 // daemon would get every other client.
 Result<ListeningSocket> listen_tcp(const std::string& name, const addrinfo& info, int port, bool v6_only) {
   ListeningSocket result;
-  result.fd.reset(socket(info.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  result.fd = FileDescriptor(socket(info.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (result.fd.get() < 0) return system_error(name, "open a socket");
   const int on = 1, only = v6_only ? 1 : 0;
   setsockopt(result.fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
@@ -147,7 +147,7 @@ Result<std::vector<ListeningSocket>> listen_unix(const std::string& name, const 
   if (errno == ECONNREFUSED && stat(path.c_str(), &existing) == 0 && S_ISSOCK(existing.st_mode))
     unlink(path.c_str());
   ListeningSocket result;
-  result.fd.reset(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  result.fd = FileDescriptor(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (result.fd.get() < 0) return system_error(name, "open a socket");
   if (bind(result.fd.get(), address, sizeof target) != 0) return system_error(name, "bind");
   result.unix_path = path;

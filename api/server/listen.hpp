@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "api/server/file_descriptor.hpp"
+#include "buses/file_descriptor.hpp"
 #include "buses/error.hpp"
 
 namespace axisd::server {

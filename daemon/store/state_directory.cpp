@@ -26,13 +26,6 @@ std::string text_of(int error) { return std::generic_category().message(error); 
 
 }  // namespace
 
-FileDescriptor::~FileDescriptor() { close(); }
-
-int FileDescriptor::close() {
-  if (fd_ < 0) return 0;
-  return ::close(std::exchange(fd_, -1)) == 0 ? 0 : errno;
-}
-
 std::unexpected<Error> StateDirectory::failed(std::string_view what, std::string_view name, int error) const {
   return fail(Reason::storage, fmt::format("cannot {} {}: {}", what, (path_ / name).string(), text_of(error)),
               "check the disk and the directory's permissions");

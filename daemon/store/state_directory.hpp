@@ -8,28 +8,10 @@
 #include <utility>
 
 #include "buses/error.hpp"
+#include "buses/file_descriptor.hpp"
 #include "daemon/store/state_text.hpp"
 
 namespace axisd::store {
-
-/// A file descriptor with an owner.
-class FileDescriptor {
- public:
-  FileDescriptor() = default;
-  explicit FileDescriptor(int fd) : fd_(fd) {}
-  FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  ~FileDescriptor();
-  [[nodiscard]] int get() const { return fd_; }
-  /// Closes it now; 0, or the errno: a delayed write error may show only here.
-  int close();
-
- private:
-  int fd_ = -1;
-};
 
 /// A directory that one process at a time uses. `state.v1` is the newest generation and is never absent once
 /// it was written; `state.v1.previous` is the one before. Thread: one at a time.

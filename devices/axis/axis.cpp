@@ -18,10 +18,10 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       drive_(std::move(drive)),
       gate_(std::move(gate)),
       simulated_(simulated),
+      absolute_segments_(settings_.segments && settings_.segments->absolute),
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
-      stopped_(env_.executor, *env_.clock),
-      absolute_segments_(settings_.segments && settings_.segments->absolute) {
+      stopped_(env_.executor, *env_.clock) {
   if (env_.persistence != nullptr) {
     const auto& axes = env_.persistence->loaded().axes;
     if (const auto found = axes.find(settings_.name); found != axes.end())

@@ -3,25 +3,12 @@
 
 #include <algorithm>
 
-#include "devices/axis/drive_operations.hpp"
-#include "tests/support/rig.hpp"
+#include "tests/rules/operate.hpp"
 
 namespace axisd::test {
 namespace {
 
 using namespace std::chrono_literals;
-
-/// Runs an operation on the drive to its end.
-template <class T>
-Result<T> operate(Rig& rig, const std::function<Task<Result<T>>(const DriveOperations&)>& operation) {
-  std::optional<Result<T>> result;
-  auto run = [](DriveOperations drive, auto what, std::optional<Result<T>>& end) -> Task<> {
-    end = co_await what(drive);
-  };
-  spawn(rig.world.executor(), run(DriveOperations(rig.axis()), operation, result), "operation");
-  EXPECT_TRUE(rig.run_until([&] { return result.has_value(); }, 20s));
-  return result ? std::move(*result) : Result<T>(fail(Reason::internal, "did not end"));
-}
 
 Result<std::vector<ParameterValue>> write(Rig& rig, std::vector<ParameterValue> values) {
   return operate<std::vector<ParameterValue>>(
@@ -213,49 +200,6 @@ TEST(M2, WhatMovesWhileTheBrakeOpensIsStopped) {
   EXPECT_NE(enable->value().state, CommandState::done);
 }
 
-TEST(Segments, ALostFrameNeverLeavesARowThatRunsElsewhere) {
-  for (int skip = 0; skip < 12; ++skip) {
-    SCOPED_TRACE(skip);
-    Rig rig({.switches = {{"enabled_at_power_up", false}}, .adjust = [](AxisSettings& axis) {
-               axis.inputs.insert(axis.inputs.end(), {{.terminal = "X3", .function = "pt_enable"},
-                                                      {.terminal = "X4", .function = "pin0"}});
-             }});
-    const auto write_table = [&](double target) {
-      return operate<SegmentSettings>(rig, [target](const DriveOperations& drive) {
-        return drive.write_segments(
-            {.positions = {{.number = 1, .target = target, .velocity = 50, .acceleration_time = 50ms}}});
-      });
-    };
-    ASSERT_TRUE(write_table(60));
-    rig.fault({.kind = simulation::FaultKind::drop_request, .function = 0x06, .skip = skip, .count = 100});
-    const bool whole = write_table(-7).has_value();
-    rig.faults().clear();
-    rig.reconnect();
-    rig.enable();
-    rig.set_input("X4", true);
-    rig.run(50ms);
-    rig.set_input("X3", true);
-    rig.run(5s);
-    const auto went = rig.load_mm();
-    EXPECT_TRUE(std::abs(went) < 0.01 || std::abs(went - 60) < 0.01 || std::abs(went + 7) < 0.01) << went;
-    if (whole) EXPECT_NEAR(went, -7, 0.01);
-  }
-}
-
-TEST(Segments, AbsoluteOnesLeaveNoOtherPositionThanHome) {
-  Rig rig({.adjust =
-               [](AxisSettings& axis) {
-                 axis.segments = SegmentSettings{.absolute = true,
-                                                 .positions = {{.number = 1, .target = 20, .velocity = 50}}};
-               },
-           .connect = false});
-  rig.run(1s);
-  rig.complete(DisableRequest{});
-  rig.reconnect();
-  rig.enable();
-  EXPECT_EQ(rig.try_submit(SetPositionRequest{.position = 30}).error().reason, Reason::not_supported);
-}
-
 TEST(M27, RestoredSettingsAreConfiguredAgain) {
   for_each_switch({}, [](const RigOptions& options) {
     Rig rig(options);
@@ -341,36 +285,6 @@ TEST(M29, AnEdgeLiesBetweenTwoSamples) {
   EXPECT_LE(edge->after, changed);
   EXPECT_GE(edge->before, changed);
   EXPECT_LE(edge->before - edge->after, 500ms);
-}
-
-TEST(Segments, AMotionThatTerminalsStartIsTheDrivesOwn) {
-  both_directions({}, [](const RigOptions& base) {
-    auto options = base;
-    options.adjust = [](AxisSettings& axis) {
-      axis.inputs.insert(axis.inputs.end(), {{.terminal = "X3", .function = "pt_enable"},
-                                             {.terminal = "X4", .function = "pin0"},
-                                             {.terminal = "X5", .function = "pin1"}});
-      axis.segments = SegmentSettings{
-          .positions = {{.number = 2, .target = 20, .velocity = 50, .acceleration_time = 100ms}}};
-    };
-    options.connect = false;
-    options.switches["enabled_at_power_up"] = false;
-    Rig rig(options);
-    rig.reconnect();
-    rig.ready();
-    rig.set_input("X5", true);
-    rig.run(100ms);
-    rig.set_input("X3", true);
-    EXPECT_TRUE(rig.run_until([&] { return rig.state()->state == AxisState::discrete_motion; }, 1s));
-    EXPECT_EQ(rig.state()->motion_cause, MotionCause::terminal);
-    EXPECT_EQ(rig.try_submit(MoveRelativeRequest{.distance = 1}).error().reason, Reason::terminal);
-    EXPECT_TRUE(rig.run_until([&] { return rig.state()->state == AxisState::standstill; }, 5s));
-    EXPECT_EQ(rig.state()->motion_cause, MotionCause::none);
-    EXPECT_NEAR(rig.state()->position, 20, 0.01);
-    EXPECT_NEAR(rig.load_mm(), 20, 0.01);
-    EXPECT_EQ(rig.drive->starts(), 1);
-    EXPECT_EQ(rig.triggers(), 0) << "nothing of it came over the wire";
-  });
 }
 
 TEST(Eeprom, RestartsAndMovesWriteNothing) {

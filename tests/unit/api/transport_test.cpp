@@ -9,14 +9,13 @@
 #include <fstream>
 #include <iterator>
 
-#include "api/server/file_descriptor.hpp"
+#include "buses/file_descriptor.hpp"
 #include "tests/unit/api/serving.hpp"
 
 namespace axisd::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using server::FileDescriptor;
 using server::Server;
 using server::ServerOptions;
 using ::testing::HasSubstr;
