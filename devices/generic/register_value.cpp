@@ -64,7 +64,7 @@ Result<std::vector<std::uint16_t>> encode(const RegisterSettings& settings, doub
   const auto raw = is_float ? value / settings.scale : std::round(value / settings.scale);
   const auto bounds = raw_bounds(settings.type);
   if (!(raw >= bounds.minimum && raw <= bounds.maximum)) {  // also what is no number
-    const auto [low, high] = std::minmax(bounds.minimum * settings.scale, bounds.maximum * settings.scale);
+    const auto [low, high] = std::minmax({bounds.minimum * settings.scale, bounds.maximum * settings.scale});
     Error error{.reason = Reason::out_of_range,
                 .message = fmt::format("{} cannot be {} {}", settings.name, value, settings.unit),
                 .remedy = "choose a value in the permitted range",
