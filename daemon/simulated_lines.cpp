@@ -18,7 +18,7 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
   auto& mechanics = node.mechanics;
   if (simulate.home_switch) {
     const auto edges =
-        std::minmax(pulses(*simulate.home_switch), pulses(*simulate.home_switch + simulate.home_width));
+        std::minmax({pulses(*simulate.home_switch), pulses(*simulate.home_switch + simulate.home_width)});
     mechanics.home_switch_from = edges.first;
     mechanics.home_switch_to = edges.second;
   }
