@@ -27,8 +27,8 @@ struct TransactionOptions {
   TransactionClass transaction_class = TransactionClass::parameters;
   TimePoint deadline = TimePoint::max();  ///< not sent after this
   MotionGuard guard{};                    ///< for motion frames
-  /// Of this node in this exchange (saving to an EEPROM takes long); nothing: the bus's. A stop still cuts the
-  /// wait after the bus's: its bound is worth more than a reply that may collide with it.
+  /// Of this node in this exchange (saving to an EEPROM takes long); nothing: the bus's. A stop still cuts
+  /// the wait after the bus's: its bound is worth more than a reply that may collide with it.
   std::optional<Duration> turnaround_max{};
   /// The line is switched to these for this exchange alone; nothing: the bus's own. Noise to every other
   /// node: never for classes stop and motion.

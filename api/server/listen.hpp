@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "buses/file_descriptor.hpp"
 #include "buses/error.hpp"
+#include "buses/file_descriptor.hpp"
 
 namespace axisd::server {
 
