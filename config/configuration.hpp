@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "buses/canopen/settings.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/generic/settings.hpp"
@@ -42,7 +43,8 @@ struct Configuration {
   std::string machine;
   std::string state_directory = "/var/lib/axisd";  ///< where the daemon keeps its persistent state
   ServerSettings server;
-  std::vector<modbus_rtu::LineSettings> buses;
+  std::vector<modbus_rtu::LineSettings> lines;     ///< `buses:` of the kind modbus_rtu
+  std::vector<canopen::NetworkSettings> networks;  ///< of the kind canopen
   std::vector<AxisEntry> axes;
   std::vector<DeviceSettings> devices;  ///< nodes that are not axes
 };

@@ -45,7 +45,7 @@ void check_server(const Configuration& configuration, Diagnostics& diagnostics, 
 
 void check_ports(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   std::map<std::string, std::string> owners;
-  for (const auto& bus : configuration.buses) {
+  for (const auto& bus : configuration.lines) {
     const auto path = fmt::format("buses.{}.modbus_rtu.port", bus.name);
     if (!places.usable(path) || bus.simulated()) continue;
     const auto [owner, is_first] = owners.try_emplace(bus.port, bus.name);
@@ -94,7 +94,7 @@ void check_nodes(const Configuration& configuration, Diagnostics& diagnostics, c
 void check_bus_names(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   if (!places.clean("buses")) return;  // a bus may be missing because of its own errors
   const auto names =
-      names_of(configuration.buses, [](const auto& bus) -> std::string_view { return bus.name; });
+      names_of(configuration.lines, [](const auto& bus) -> std::string_view { return bus.name; });
   for (const auto& [participant, text, bus, node] : participants(configuration)) {
     const auto path = participant + "bus";
     if (!places.usable(path) || std::ranges::find(names, bus) != names.end()) continue;
@@ -117,8 +117,8 @@ void check_bauds(const Configuration& configuration, Diagnostics& diagnostics, c
   std::set<std::pair<std::string, std::string>> reported;  // bus and model
   for (const auto& [axis, simulation] : configuration.axes) {
     const auto* model = find_drive_model(axis.model);
-    const auto bus = std::ranges::find(configuration.buses, axis.bus, &modbus_rtu::LineSettings::name);
-    if (model == nullptr || bus == configuration.buses.end()) continue;
+    const auto bus = std::ranges::find(configuration.lines, axis.bus, &modbus_rtu::LineSettings::name);
+    if (model == nullptr || bus == configuration.lines.end()) continue;
     const auto path = fmt::format("buses.{}.modbus_rtu.baud", bus->name);
     if (!places.usable(path) || std::ranges::find(model->bauds, bus->baud) != model->bauds.end()) continue;
     if (!reported.emplace(bus->name, axis.model).second) continue;
@@ -135,8 +135,8 @@ void check_bauds(const Configuration& configuration, Diagnostics& diagnostics, c
 void check_simulation(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   for (const auto& [axis, simulation] : configuration.axes) {
     const auto path = fmt::format("axes.{}.simulate", axis.name);
-    const auto bus = std::ranges::find(configuration.buses, axis.bus, &modbus_rtu::LineSettings::name);
-    if (!places.given(path) || bus == configuration.buses.end() || bus->simulated()) continue;
+    const auto bus = std::ranges::find(configuration.lines, axis.bus, &modbus_rtu::LineSettings::name);
+    if (!places.given(path) || bus == configuration.lines.end() || bus->simulated()) continue;
     if (!places.usable(fmt::format("buses.{}.modbus_rtu.port", bus->name))) continue;
     diagnostics.add(places.mark(path),
                     fmt::format("'simulate' has no effect: bus '{}' is not simulated", bus->name),

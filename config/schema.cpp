@@ -137,7 +137,7 @@ std::span<const KeySpec> schema() {
        .children = bus_keys,
        .apply =
            [](Target& t, const Value& v) {
-             t.bus = &t.configuration->buses.emplace_back();
+             t.bus = &t.configuration->lines.emplace_back();
              t.bus->name = v.text;
            }},
       {.key = "axes",

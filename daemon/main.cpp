@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   if (!options.listen.empty()) configuration.server.listen = options.listen;
   if (options.check) {
     std::cout << options.config << ": ok (" << configuration.axes.size() << " axes on "
-              << configuration.buses.size() << " buses)\n";
+              << configuration.lines.size() + configuration.networks.size() << " buses)\n";
     return 0;
   }
   return axisd::run_daemon(options, std::move(configuration));

@@ -30,7 +30,7 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
 
 Result<std::unique_ptr<SimulatedLines>> SimulatedLines::open(const config::Configuration& configuration) {
   auto lines = std::make_unique<SimulatedLines>();
-  for (const auto& bus : configuration.buses) {
+  for (const auto& bus : configuration.lines) {
     if (!bus.simulated()) continue;
     std::vector<std::unique_ptr<simulation::SimulatedRtuNode>> nodes;
     for (const auto& entry : configuration.axes) {

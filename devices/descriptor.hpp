@@ -19,6 +19,9 @@ namespace axisd {
 namespace modbus_rtu {
 class RtuBus;
 }
+namespace canopen {
+class CanopenBus;
+}
 
 enum class BusKind : std::uint8_t { modbus_rtu, canopen };
 
@@ -105,7 +108,8 @@ struct Capabilities {
 struct DriveContext {
   Executor executor;
   Clock* clock = nullptr;
-  modbus_rtu::RtuBus* rtu = nullptr;  ///< of the axis's bus, for modbus_rtu models
+  modbus_rtu::RtuBus* rtu = nullptr;       ///< of the axis's bus, for modbus_rtu models
+  canopen::CanopenBus* canopen = nullptr;  ///< likewise for canopen models
   std::uint8_t node = 0;
   DriveSetup setup;
 };

@@ -37,7 +37,8 @@ void check(Invocation& invocation, const std::string& path) {
   for (const auto& diagnostic : result.diagnostics) fmt::print(stderr, "{}\n", config::to_string(diagnostic));
   if (result.configuration)
     print_line(fmt::format("{}: ok, machine '{}', axes: {}, buses: {}", path, result.configuration->machine,
-                           result.configuration->axes.size(), result.configuration->buses.size()));
+                           result.configuration->axes.size(),
+                           result.configuration->lines.size() + result.configuration->networks.size()));
   else
     fmt::print(stderr, "axisctl: {}: {} error{}\n", path, result.diagnostics.size(),
                result.diagnostics.size() == 1 ? "" : "s");

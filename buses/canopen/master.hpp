@@ -67,6 +67,7 @@ class Master {
   [[nodiscard]] SdoClient& sdo() { return sdo_; }
   /// Stops by itself when the link is lost, and stays so (M24).
   [[nodiscard]] SyncProducer& sync() { return sync_; }
+  [[nodiscard]] const SyncProducer& sync() const { return sync_; }
   [[nodiscard]] const NmtMonitor& nmt() const { return nmt_; }
   [[nodiscard]] const EmergencyHistory& emergencies() const { return emergencies_; }
   [[nodiscard]] const can::Port& port() const { return *port_; }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 
+#include "buses/bus.hpp"
 #include "buses/modbus_rtu/frame.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "buses/transaction.hpp"
@@ -45,12 +46,6 @@ struct ExchangeResult {
   TimePoint request_end{};    ///< last byte out (computed from the baud rate)
   TimePoint reply_begin{};    ///< first byte in; unset without a reply
   TimePoint reply_end{};      ///< last byte in, or the end of the wait
-};
-
-/// State of the port below.
-struct PortStatus {
-  bool open = false;
-  std::optional<Error> error;  ///< why it is not open
 };
 
 /// Carries one exchange at a time, with the mandatory silence before each. All calls from the core thread;

@@ -125,7 +125,7 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
 
 void RtuBus::purge_superseded() { pump(); }
 
-void RtuBus::drop_overrides() {
+void RtuBus::about_to_energise() {
   override_gate_->raise();
   pump();
 }

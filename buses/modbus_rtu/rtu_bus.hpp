@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "buses/bus.hpp"
 #include "buses/clock.hpp"
 #include "buses/modbus_rtu/line.hpp"
 #include "buses/modbus_rtu/settings.hpp"
@@ -33,10 +34,10 @@ using ExchangeObserver = std::function<void(const std::string& bus, const Exchan
 
 /// One RS-485 line on the core thread: queues transactions, hands the line one at a time, and tells each
 /// caller exactly once how its transaction ended. Thread: core.
-class RtuBus {
+class RtuBus final : public Bus {
  public:
   RtuBus(Executor executor, Clock& clock, LineSettings settings, std::unique_ptr<Line> line);
-  ~RtuBus();
+  ~RtuBus() override;
   RtuBus(const RtuBus&) = delete;
 
   void start(ExchangeObserver observer = {});
@@ -46,27 +47,22 @@ class RtuBus {
   /// port cannot do options.serial: not sent).
   Task<Result<Answer>> transact(Request request, TransactionOptions options);
 
-  /// Moves queued frames whose gate was raised out of the way and takes an armed one back. Called for each
-  /// stop before its frame is queued.
-  void purge_superseded();
-  /// A node of this line is about to be energised: exchanges with serial settings of their own that have not
-  /// gone out end as superseded, since their frames are noise to it.
-  void drop_overrides();
-  /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
-  void hasten(std::uint8_t node, TransactionClass to);
-
-  /// Ends everything that waits; what is under way is still awaited. Nothing is accepted any more.
-  void close();
-  [[nodiscard]] bool idle() const { return current_ == nullptr && queue_.size() == 0; }
+  void purge_superseded() override;
+  /// Exchanges with serial settings of their own end.
+  void about_to_energise() override;
+  void hasten(std::uint8_t node, TransactionClass to) override;
+  void close() override;
+  [[nodiscard]] bool idle() const override { return current_ == nullptr && queue_.size() == 0; }
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
-  [[nodiscard]] const PortStatus& port() const { return port_; }
-  /// Fires when the port opens or is lost.
-  [[nodiscard]] Signal& port_changed() { return port_changed_; }
+  [[nodiscard]] const std::string& name() const override { return settings_.name; }
+  [[nodiscard]] bool simulated() const override { return settings_.simulated(); }
+  [[nodiscard]] const PortStatus& port() const override { return port_; }
+  [[nodiscard]] Signal& port_changed() override { return port_changed_; }
   [[nodiscard]] const BusCounters& counters() const { return counters_; }
   /// Damaged replies of `node` in a row, without a sound one or silence between them.
   [[nodiscard]] int garbled(std::uint8_t node) const;
-  [[nodiscard]] TimePoint last_progress() const { return line_->last_progress(); }
+  [[nodiscard]] TimePoint last_progress() const override { return line_->last_progress(); }
 
  private:
   [[nodiscard]] Exchange exchange_for(Request request, const Frame& frame, TransactionOptions options) const;

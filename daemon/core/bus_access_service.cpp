@@ -43,9 +43,9 @@ BusAccessService::BusAccessService(Executor executor, MachineCore& machine)
     : executor_(std::move(executor)), machine_(&machine) {}
 
 Result<modbus_rtu::RtuBus*> BusAccessService::bus_named(const std::string& name) const {
-  if (auto* bus = machine_->find_bus(name)) return bus;
+  if (auto* bus = machine_->find_line(name)) return bus;
   std::string known;
-  for (const auto& bus : machine_->buses()) known += (known.empty() ? "" : ", ") + bus->settings().name;
+  for (const auto& bus : machine_->buses()) known += (known.empty() ? "" : ", ") + bus->name();
   return fail(Reason::invalid_argument, fmt::format("there is no bus '{}'", name),
               fmt::format("the configuration has: {}", known));
 }

@@ -161,7 +161,7 @@ Task<> DriveAccessService::run_serial_change(Axis& axis, SerialChange change, st
 
 Task<Result<void>> DriveAccessService::find_again(Axis& axis, SerialChange change,
                                                   std::weak_ptr<void> alive) {
-  auto& bus = *machine_->find_bus(axis.settings().bus);
+  auto& bus = *machine_->find_line(axis.settings().bus);
   const auto node = change.node.value_or(axis.settings().node);
   ScanRequest request{.bus = axis.settings().bus, .first_node = node, .last_node = node};
   if (change.baud) request.bauds = {*change.baud};

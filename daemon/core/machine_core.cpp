@@ -16,9 +16,16 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
     const auto& inhibit = parts_.persistence->loaded().inhibit;
     set_inhibit(inhibit.active, inhibit.by);
   }
-  for (const auto& line : configuration.buses)
-    buses_.push_back(
+  for (const auto& line : configuration.lines) {
+    lines_.push_back(
         std::make_unique<modbus_rtu::RtuBus>(parts_.executor, *parts_.clock, line, parts_.make_line(line)));
+    buses_.push_back(lines_.back().get());
+  }
+  for (const auto& network : configuration.networks) {
+    networks_.push_back(std::make_unique<canopen::CanopenBus>(parts_.executor, *parts_.clock, network,
+                                                              parts_.make_port(network)));
+    buses_.push_back(networks_.back().get());
+  }
   const auto record = [this](const std::string& axis, EventContent content) {
     events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
   };
@@ -34,7 +41,8 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
           fmt::format("axis {}: {}", settings.name, setup ? "unknown bus" : setup.error().message));
     auto drive = descriptor->make({.executor = parts_.executor,
                                    .clock = parts_.clock,
-                                   .rtu = bus,
+                                   .rtu = find_line(settings.bus),
+                                   .canopen = find_network(settings.bus),
                                    .node = settings.node,
                                    .setup = std::move(*setup)});
     axes_.push_back(std::make_unique<Axis>(AxisEnvironment{.executor = parts_.executor,
@@ -46,7 +54,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                                                            .published = parts_.published,
                                                            .event = record},
                                            settings, *descriptor, std::move(drive),
-                                           std::make_shared<AxisGate>(), bus->settings().simulated()));
+                                           std::make_shared<AxisGate>(), bus->simulated()));
     by_name_.emplace(settings.name, axes_.back().get());
     const bool brake =
         std::ranges::any_of(settings.outputs, [](const auto& o) { return o.function == "brake"; });
@@ -54,7 +62,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
       spdlog::warn("{}: load: vertical, but no output has the function brake", settings.name);  // M2
   }
   for (const auto& settings : configuration.devices) {
-    auto* bus = find_bus(settings.bus);
+    auto* bus = find_line(settings.bus);
     if (bus == nullptr) throw std::invalid_argument(fmt::format("device {}: unknown bus", settings.name));
     devices_.push_back(std::make_unique<ModbusDevice>(parts_.executor, *parts_.clock, *bus, settings));
   }
@@ -62,9 +70,19 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
 
 MachineCore::~MachineCore() = default;
 
-modbus_rtu::RtuBus* MachineCore::find_bus(std::string_view bus) const {
-  const auto found = std::ranges::find_if(buses_, [&](const auto& b) { return b->settings().name == bus; });
-  return found == buses_.end() ? nullptr : found->get();
+Bus* MachineCore::find_bus(std::string_view bus) const {
+  const auto found = std::ranges::find_if(buses_, [&](const auto* b) { return b->name() == bus; });
+  return found == buses_.end() ? nullptr : *found;
+}
+
+modbus_rtu::RtuBus* MachineCore::find_line(std::string_view bus) const {
+  const auto found = std::ranges::find_if(lines_, [&](const auto& b) { return b->name() == bus; });
+  return found == lines_.end() ? nullptr : found->get();
+}
+
+canopen::CanopenBus* MachineCore::find_network(std::string_view bus) const {
+  const auto found = std::ranges::find_if(networks_, [&](const auto& b) { return b->name() == bus; });
+  return found == networks_.end() ? nullptr : found->get();
 }
 
 void MachineCore::launch(Task<> sequence, const char* name) {
@@ -82,7 +100,8 @@ void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
 }
 
 void MachineCore::start() {
-  for (const auto& bus : buses_) bus->start(parts_.observer);
+  for (const auto& line : lines_) line->start(parts_.observer);
+  for (const auto& network : networks_) network->start();
   for (const auto& axis : axes_) axis->start();
   for (const auto& device : devices_) device->start();
 }
@@ -154,18 +173,18 @@ bool MachineCore::at_rest() const {
 void MachineCore::close() {
   for (const auto& axis : axes_) axis->close();
   for (const auto& device : devices_) device->close();
-  for (const auto& bus : buses_) bus->close();
+  for (auto* bus : buses_) bus->close();
 }
 
 bool MachineCore::closed() const {
   return sequences_ == 0 && std::ranges::all_of(axes_, [](const auto& axis) { return axis->closed(); }) &&
          std::ranges::all_of(devices_, [](const auto& device) { return device->closed(); }) &&
-         std::ranges::all_of(buses_, [](const auto& bus) { return bus->idle(); });
+         std::ranges::all_of(buses_, [](const auto* bus) { return bus->idle(); });
 }
 
 std::vector<BusStatus> MachineCore::bus_status() const {
   std::vector<BusStatus> all;
-  for (const auto& bus : buses_)
+  for (const auto& bus : lines_)
     all.push_back({.name = bus->settings().name,
                    .port = bus->settings().port,
                    .baud = bus->settings().baud,
@@ -178,7 +197,7 @@ std::vector<BusStatus> MachineCore::bus_status() const {
 
 bool MachineCore::buses_reported() const {
   return std::ranges::all_of(
-      buses_, [](const auto& bus) { return bus->port().open || bus->port().error.has_value(); });
+      buses_, [](const auto* bus) { return bus->port().open || bus->port().error.has_value(); });
 }
 
 }  // namespace axisd::core

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "buses/canopen/canopen_bus.hpp"
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "config/configuration.hpp"
 #include "daemon/core/event_log.hpp"
@@ -25,6 +26,8 @@ struct MachineParts {
   Persistence* persistence = nullptr;  ///< may be null: nothing is kept
   std::string instance_id;
   std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line;
+  /// May be empty where the configuration has no CAN network.
+  std::function<std::unique_ptr<can::Port>(const canopen::NetworkSettings&)> make_port{};
   modbus_rtu::ExchangeObserver observer;
   std::function<void()> published;
 };
@@ -41,9 +44,17 @@ class MachineCore {
 
   [[nodiscard]] Axis* find(std::string_view axis) const;
   [[nodiscard]] const std::vector<std::unique_ptr<Axis>>& axes() const { return axes_; }
-  [[nodiscard]] const std::vector<std::unique_ptr<modbus_rtu::RtuBus>>& buses() const { return buses_; }
+  /// All buses, of either kind.
+  [[nodiscard]] const std::vector<Bus*>& buses() const { return buses_; }
+  [[nodiscard]] const std::vector<std::unique_ptr<canopen::CanopenBus>>& networks() const {
+    return networks_;
+  }
   /// nullptr if there is none of that name.
-  [[nodiscard]] modbus_rtu::RtuBus* find_bus(std::string_view bus) const;
+  [[nodiscard]] Bus* find_bus(std::string_view bus) const;
+  /// The same, if it is an RS-485 line.
+  [[nodiscard]] modbus_rtu::RtuBus* find_line(std::string_view bus) const;
+  /// The same, if it is a CAN network.
+  [[nodiscard]] canopen::CanopenBus* find_network(std::string_view bus) const;
   /// Nodes that are not axes, in the order of the file.
   [[nodiscard]] const std::vector<std::unique_ptr<ModbusDevice>>& devices() const { return devices_; }
   [[nodiscard]] CommandBook& book() { return book_; }
@@ -77,7 +88,9 @@ class MachineCore {
   bool inhibited_ = false;
   int latches_ = 0;  ///< StopAlls so far
   boost::atomic_shared_ptr<const std::string> inhibited_by_;
-  std::vector<std::unique_ptr<modbus_rtu::RtuBus>> buses_;
+  std::vector<std::unique_ptr<modbus_rtu::RtuBus>> lines_;
+  std::vector<std::unique_ptr<canopen::CanopenBus>> networks_;
+  std::vector<Bus*> buses_;
   std::vector<std::unique_ptr<Axis>> axes_;
   std::vector<std::unique_ptr<ModbusDevice>> devices_;
   int sequences_ = 0;  ///< launched ones that still run

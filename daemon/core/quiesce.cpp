@@ -39,8 +39,8 @@ class Rest {
   std::int32_t position_ = 0;
 };
 
-Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, Drive& drive,
-                             modbus_rtu::RtuBus& bus, Times times) {
+Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, Drive& drive, Bus& bus,
+                             Times times) {
   QuiesceReport report{.axis = std::move(axis)};
   Rest rest;
   report.detail = "the port did not open";
@@ -76,7 +76,7 @@ Task<std::vector<QuiesceReport>> quiesce(
     std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line,
     Duration limit) {
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> buses;
-  for (const auto& line : configuration.buses) {
+  for (const auto& line : configuration.lines) {
     buses.push_back(std::make_unique<modbus_rtu::RtuBus>(executor, clock, line, make_line(line)));
     buses.back()->start();
   }

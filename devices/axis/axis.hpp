@@ -25,9 +25,9 @@
 #include <string>
 #include <vector>
 
+#include "buses/bus.hpp"
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
-#include "buses/modbus_rtu/rtu_bus.hpp"
 #include "buses/signal.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/command_book.hpp"
@@ -46,7 +46,7 @@ namespace axisd {
 struct AxisEnvironment {
   Executor executor;
   Clock* clock = nullptr;
-  modbus_rtu::RtuBus* bus = nullptr;
+  Bus* bus = nullptr;
   CommandBook* book = nullptr;
   Persistence* persistence = nullptr;
   const bool* inhibited = nullptr;  ///< StopAll is latched

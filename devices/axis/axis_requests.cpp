@@ -136,7 +136,7 @@ Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptio
   if (activity_ && activity_->state != AxisState::standstill)
     return fail(error(Reason::moving, "the axis moves", "it is enabled already"));
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
-  env_.bus->drop_overrides();
+  env_.bus->about_to_energise();
   const auto activity = begin(request, options, AxisState::standstill, {});
   // Not yet enabled: state() follows the drive's own bit.
   launch(run_enable(activity), "enable");

@@ -15,17 +15,17 @@ using Words = std::span<const std::string_view>;
 
 constexpr std::string_view usage =
     "power N on|off; input N TERMINAL on|off|auto; alarm N CODE; block N on|off; push N PULSES; shaft N; "
-    "peek N REGISTER; poke N REGISTER VALUE; eeprom N; fault KIND key=value...; fault clear; cut; join; "
+    "peek N ADDRESS; poke N ADDRESS VALUE; eeprom N; fault KIND key=value...; fault clear; cut; join; "
     "hangup; replug; help (N: an address, or @K for the K-th drive)";
 
-std::string power(SimulatedRtuNode& node, Words words) {
+std::string power(SimulatedNode& node, Words words) {
   const auto on = words.size() == 1 ? parse_on_off(words[0]) : std::nullopt;
   if (!on) return "error use: power N on|off";
   node.set_power(*on);
   return "ok";
 }
 
-std::string input(SimulatedRtuNode& node, Words words) {
+std::string input(SimulatedNode& node, Words words) {
   if (words.size() != 2) return "error use: input N TERMINAL on|off|auto";
   if (!node.has_input(words[0])) return fmt::format("error no input {}", words[0]);
   const auto level = parse_on_off(words[1]);
@@ -34,7 +34,7 @@ std::string input(SimulatedRtuNode& node, Words words) {
   return "ok";
 }
 
-std::string alarm(SimulatedRtuNode& node, Words words) {
+std::string alarm(SimulatedNode& node, Words words) {
   const auto code = words.size() == 1 ? parse_number<int>(words[0]) : std::nullopt;
   const auto known = node.alarms();
   if (!code || (*code != 0 && std::ranges::find(known, *code) == known.end()))
@@ -43,47 +43,47 @@ std::string alarm(SimulatedRtuNode& node, Words words) {
   return "ok";
 }
 
-std::string block(SimulatedRtuNode& node, Words words) {
+std::string block(SimulatedNode& node, Words words) {
   const auto on = words.size() == 1 ? parse_on_off(words[0]) : std::nullopt;
   if (!on) return "error use: block N on|off";
   node.block_shaft(*on);
   return "ok";
 }
 
-std::string push(SimulatedRtuNode& node, Words words) {
+std::string push(SimulatedNode& node, Words words) {
   const auto pulses = words.size() == 1 ? parse_number<std::int32_t>(words[0]) : std::nullopt;
   if (!pulses) return "error use: push N PULSES";
   return node.push_shaft(*pulses) ? "ok" : "error the shaft is held; release the drive or switch it off";
 }
 
-std::string shaft(SimulatedRtuNode& node, Words words) {
+std::string shaft(SimulatedNode& node, Words words) {
   if (!words.empty()) return "error use: shaft N";
   return fmt::format("ok position={} moving={} starts={}", node.shaft_pulses(), node.shaft_moving() ? 1 : 0,
                      node.starts());
 }
 
-std::string peek(SimulatedRtuNode& node, Words words) {
-  const auto address = words.size() == 1 ? parse_number<std::uint16_t>(words[0]) : std::nullopt;
-  if (!address) return "error use: peek N REGISTER";
+std::string peek(SimulatedNode& node, Words words) {
+  const auto address = words.size() == 1 ? parse_number<std::uint32_t>(words[0]) : std::nullopt;
+  if (!address) return "error use: peek N ADDRESS";
   return fmt::format("ok {}", node.peek(*address));
 }
 
-std::string poke(SimulatedRtuNode& node, Words words) {
-  const auto address = words.size() == 2 ? parse_number<std::uint16_t>(words[0]) : std::nullopt;
-  const auto value = words.size() == 2 ? parse_number<std::uint16_t>(words[1]) : std::nullopt;
-  if (!address || !value) return "error use: poke N REGISTER VALUE";
+std::string poke(SimulatedNode& node, Words words) {
+  const auto address = words.size() == 2 ? parse_number<std::uint32_t>(words[0]) : std::nullopt;
+  const auto value = words.size() == 2 ? parse_number<std::uint32_t>(words[1]) : std::nullopt;
+  if (!address || !value) return "error use: poke N ADDRESS VALUE";
   node.poke(*address, *value);
   return "ok";
 }
 
-std::string eeprom(SimulatedRtuNode& node, Words words) {
+std::string eeprom(SimulatedNode& node, Words words) {
   if (!words.empty()) return "error use: eeprom N";
   return fmt::format("ok {}", node.eeprom_writes());
 }
 
 struct NodeCommand {
   std::string_view name;
-  std::string (*run)(SimulatedRtuNode& node, Words words);
+  std::string (*run)(SimulatedNode& node, Words words);
 };
 constexpr NodeCommand node_commands[] = {{"power", &power}, {"input", &input}, {"alarm", &alarm},
                                          {"block", &block}, {"push", &push},   {"shaft", &shaft},

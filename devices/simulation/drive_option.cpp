@@ -31,10 +31,10 @@ bool parse_switch(std::string_view name, std::string_view value, Switches& switc
 }
 
 bool parse_eeprom(std::string_view address, std::string_view value, SimulatedNodeSettings& settings) {
-  const auto at = parse_number<std::uint16_t>(address);
-  const auto number = parse_number<std::int32_t>(value);
-  if (!at || !number || *number < -32768 || *number > 65535) return false;
-  settings.eeprom[*at] = static_cast<std::uint16_t>(*number);
+  const auto at = parse_number<std::uint32_t>(address);
+  const auto number = parse_number<std::int64_t>(value);
+  if (!at || !number || *number < INT32_MIN || *number > UINT32_MAX) return false;
+  settings.eeprom[*at] = static_cast<std::uint32_t>(*number);
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "buses/can/port.hpp"
 #include "buses/clock.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 
@@ -31,21 +32,14 @@ struct Serial {
   }
 };
 
-/// One node on an RS-485 line. Not thread-safe: owned by its line.
-class SimulatedRtuNode {
+/// A simulated drive, whatever wire it is on. Not thread-safe: owned by its wire.
+class SimulatedNode {
  public:
-  virtual ~SimulatedRtuNode() = default;
+  virtual ~SimulatedNode() = default;
+  /// Modbus unit or CANopen node-ID, as it is now.
   [[nodiscard]] virtual std::uint8_t address() const = 0;
-  /// What it listens with since its last power-up; nothing: with whatever the line has.
-  [[nodiscard]] virtual std::optional<Serial> serial() const { return std::nullopt; }
-  /// It is put on a line with these settings: what its own settings leave open becomes like them, as if
-  /// somebody had set its switches and registers for this line.
-  virtual void join(const Serial& /*line*/) {}
   /// Lets time pass until `now` (motor, timers, alarms). Calls never go backwards.
   virtual void advance(TimePoint now) = 0;
-  /// A complete frame on the wire, for any node, ending at the time of the last advance(). The reply, or
-  /// nothing.
-  virtual std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) = 0;
 
   /// The power supply: off clears RAM, position and the power stage; on boots for the model's boot time
   /// (silent).
@@ -67,11 +61,40 @@ class SimulatedRtuNode {
   [[nodiscard]] virtual bool shaft_moving() const = 0;
   /// How many times a start of motion (start command, homing, terminal) was executed since creation.
   [[nodiscard]] virtual int starts() const = 0;
-  [[nodiscard]] virtual std::uint16_t peek(
-      std::uint16_t address) const = 0;  ///< register, without access rules
-  virtual void poke(std::uint16_t address, std::uint16_t value) = 0;
-  /// Registers written to EEPROM since creation.
+  /// A register, or an object (index << 8 | sub-index), without access rules; the bits of a signed value.
+  [[nodiscard]] virtual std::uint32_t peek(std::uint32_t address) const = 0;
+  virtual void poke(std::uint32_t address, std::uint32_t value) = 0;
+  /// Registers or objects written to EEPROM since creation.
   [[nodiscard]] virtual std::uint64_t eeprom_writes() const { return 0; }
+};
+
+/// One node on an RS-485 line.
+class SimulatedRtuNode : public SimulatedNode {
+ public:
+  /// What it listens with since its last power-up; nothing: with whatever the line has.
+  [[nodiscard]] virtual std::optional<Serial> serial() const { return std::nullopt; }
+  /// It is put on a line with these settings: what its own settings leave open becomes like them, as if
+  /// somebody had set its switches and registers for this line.
+  virtual void join(const Serial& /*line*/) {}
+  /// A complete frame on the wire, for any node, ending at the time of the last advance(). The reply, or
+  /// nothing.
+  virtual std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) = 0;
+};
+
+/// One node on a CAN network.
+class SimulatedCanNode : public SimulatedNode {
+ public:
+  /// bit/s that it listens with since its last power-up; nothing: whatever the network has.
+  [[nodiscard]] virtual std::optional<std::uint32_t> bitrate() const { return std::nullopt; }
+  /// It is put on a network with this bit rate: what its settings leave open becomes like it.
+  virtual void join(std::uint32_t /*bitrate*/) {}
+  /// A frame of another participant, ending at the time of the last advance().
+  virtual void on_frame(const can::Frame& frame) = 0;
+  /// What it sends, oldest first, after each advance() and on_frame().
+  virtual std::optional<can::Frame> take_frame() = 0;
+  /// When advance() has something to do next (boot-up, reply, heartbeat, PDO, motion that changes an event
+  /// PDO); TimePoint::max() if nothing waits.
+  [[nodiscard]] virtual TimePoint next_event() const = 0;
 };
 
 /// The mechanics around a simulated drive, in pulses of the shaft from its position at creation.
@@ -102,8 +125,9 @@ struct SimulatedNodeSettings {
   Mechanics mechanics{};
   Switches switches{};
   bool powered = true;
-  /// EEPROM contents that differ from the factory's (register -> value), as a commissioned drive would have.
-  std::map<std::uint16_t, std::uint16_t> eeprom{};
+  /// EEPROM contents that differ from the factory's (register, or object as index << 8 | sub-index -> value),
+  /// as a commissioned drive would have.
+  std::map<std::uint32_t, std::uint32_t> eeprom{};
   std::map<std::string, Wire, std::less<>> wires{};     ///< terminal -> switch
   Duration boot_time = std::chrono::milliseconds(300);  ///< silent after power-up; the manuals give no figure
 };

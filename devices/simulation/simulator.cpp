@@ -28,10 +28,8 @@ bool contains(std::span<const Named> all, std::string_view name) {
   return std::ranges::any_of(all, [&](const Named& one) { return one.name == name; });
 }
 
-}  // namespace
-
-Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,
-                                                    SimulatedNodeSettings settings) {
+/// What the model cannot be set to.
+Result<void> check(const Simulator& simulator, const SimulatedNodeSettings& settings) {
   if (settings.address < 1 || settings.address > simulator.maximum_node)
     return fail(Reason::out_of_range,
                 fmt::format("node {} is no address of {}", settings.address, simulator.model),
@@ -59,16 +57,45 @@ Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,
     if (!contains(simulator.inputs, terminal))
       return fail(Reason::invalid_argument, fmt::format("{} has no input \"{}\"", simulator.model, terminal),
                   "use one of " + names_of(simulator.inputs));
-  return simulator.make(std::move(settings));
+  return {};
 }
 
-Result<std::unique_ptr<SimulatedRtuNode>> make_node(std::string_view model, SimulatedNodeSettings settings) {
-  const auto* simulator = find_simulator(model);
-  if (simulator != nullptr) return make_node(*simulator, std::move(settings));
+Error wrong_bus(std::string_view model) {
+  return {.reason = Reason::invalid_argument,
+          .message = fmt::format("{} is not for this kind of bus", model),
+          .remedy = "put it on another: RS-485 and CAN drives do not mix"};
+}
+
+Result<const Simulator*> find_or_explain(std::string_view model) {
+  if (const auto* simulator = find_simulator(model)) return simulator;
   std::string known;
   for (const auto* one : simulators()) known += fmt::format("{}{}", known.empty() ? "" : ", ", one->model);
   return fail(Reason::invalid_argument, fmt::format("there is no simulator for \"{}\"", model),
               "use one of " + known);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,
+                                                    SimulatedNodeSettings settings) {
+  if (const auto possible = check(simulator, settings); !possible) return fail(possible.error());
+  if (simulator.make == nullptr) return fail(wrong_bus(simulator.model));
+  return simulator.make(std::move(settings));
+}
+
+Result<std::unique_ptr<SimulatedRtuNode>> make_node(std::string_view model, SimulatedNodeSettings settings) {
+  const auto simulator = find_or_explain(model);
+  if (!simulator) return fail(simulator.error());
+  return make_node(**simulator, std::move(settings));
+}
+
+Result<std::unique_ptr<SimulatedCanNode>> make_can_node(std::string_view model,
+                                                        SimulatedNodeSettings settings) {
+  const auto simulator = find_or_explain(model);
+  if (!simulator) return fail(simulator.error());
+  if (const auto possible = check(**simulator, settings); !possible) return fail(possible.error());
+  if ((*simulator)->make_can == nullptr) return fail(wrong_bus(model));
+  return (*simulator)->make_can(std::move(settings));
 }
 
 }  // namespace axisd::simulation

@@ -20,10 +20,12 @@ struct SwitchSpec {
 /// What a model folder exports for its simulator.
 struct Simulator {
   std::string_view model;  ///< as in the YAML: "ykd2405pr"
+  /// One of the two, by the model's bus.
   std::unique_ptr<SimulatedRtuNode> (*make)(SimulatedNodeSettings settings) = nullptr;
+  std::unique_ptr<SimulatedCanNode> (*make_can)(SimulatedNodeSettings settings) = nullptr;
   std::span<const SwitchSpec> switches{};
   std::span<const TerminalSpec> inputs{};
-  std::uint16_t last_register = 0xFFFF;
+  std::uint32_t last_register = 0xFFFF;  ///< highest address that `eeprom` may name
   std::uint8_t maximum_node = 127;
   std::uint8_t maximum_dip_address = 31;  ///< of the address switches
   std::span<const int> dip_bauds{};       ///< bit/s that the baud rate switches can be set to
@@ -37,6 +39,9 @@ const Simulator* find_simulator(std::string_view model);
 /// Makes a node. Errors: unknown model, switch, register or terminal of a wire; an address or baud rate that
 /// the model cannot be set to.
 Result<std::unique_ptr<SimulatedRtuNode>> make_node(std::string_view model, SimulatedNodeSettings settings);
+/// Likewise on a CAN network.
+Result<std::unique_ptr<SimulatedCanNode>> make_can_node(std::string_view model,
+                                                        SimulatedNodeSettings settings);
 /// The same for a simulator at hand.
 Result<std::unique_ptr<SimulatedRtuNode>> make_node(const Simulator& simulator,
                                                     SimulatedNodeSettings settings);

@@ -238,7 +238,8 @@ bool SimulatedDrive::output_level(int index) const {
   return ready() && output_active(index) != ((memory_.get(reg::output_levels) >> index & 1U) != 0);
 }
 
-std::uint16_t SimulatedDrive::peek(std::uint16_t address) const {
+std::uint32_t SimulatedDrive::peek(std::uint32_t wide) const {
+  const auto address = static_cast<std::uint16_t>(wide);
   const auto counter = static_cast<std::uint32_t>(position());
   switch (address) {
     case reg::node:
@@ -276,9 +277,10 @@ std::uint16_t SimulatedDrive::peek(std::uint16_t address) const {
   }
 }
 
-void SimulatedDrive::poke(std::uint16_t address, std::uint16_t value) {
+void SimulatedDrive::poke(std::uint32_t wide, std::uint32_t value) {
+  const auto address = static_cast<std::uint16_t>(wide);
   if (address > model_->last) return;
-  memory_.poke(address, value);
+  memory_.poke(address, static_cast<std::uint16_t>(value));
   if (address == reg::loop_mode && !behaviour_.loop_mode_from_power_up) open_loop_ = value == 1;
   configuration_changed();
 }

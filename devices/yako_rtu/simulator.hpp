@@ -40,8 +40,8 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   [[nodiscard]] std::int64_t shaft_pulses() const override { return motor_.shaft(); }
   [[nodiscard]] bool shaft_moving() const override { return motor_.moving() && !motor_.blocked(); }
   [[nodiscard]] int starts() const override { return starts_; }
-  [[nodiscard]] std::uint16_t peek(std::uint16_t address) const override;
-  void poke(std::uint16_t address, std::uint16_t value) override;
+  [[nodiscard]] std::uint32_t peek(std::uint32_t address) const override;
+  void poke(std::uint32_t address, std::uint32_t value) override;
   [[nodiscard]] std::uint64_t eeprom_writes() const override { return memory_.eeprom_writes(); }
   /// Electrical level of Y0.. (`index` 0..), inversion by 0x004B included.
   [[nodiscard]] bool output_level(int index) const;

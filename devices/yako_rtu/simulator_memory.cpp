@@ -15,7 +15,7 @@ bool can_be_saved(const ParameterSpec* parameter) {
 }  // namespace
 
 Memory::Memory(const SimulatedModel& model, const Behaviour& behaviour,
-               const std::map<std::uint16_t, std::uint16_t>& eeprom)
+               const std::map<std::uint32_t, std::uint32_t>& eeprom)
     : model_(&model),
       behaviour_(&behaviour),
       first_input_function_(behaviour.other_input_functions ? model.other_first_input_function
@@ -29,7 +29,7 @@ Memory::Memory(const SimulatedModel& model, const Behaviour& behaviour,
     specs_.at(address) = &parameter;
     eeprom_.at(address) = factory_value(parameter);
   }
-  for (const auto& [address, value] : eeprom) eeprom_.at(address) = value;
+  for (const auto& [address, value] : eeprom) eeprom_.at(address) = static_cast<std::uint16_t>(value);
   ram_ = eeprom_;
 }
 
@@ -94,7 +94,7 @@ bool Memory::goes_to_eeprom(std::uint16_t address) const {
 void Memory::write(std::uint16_t address, std::uint16_t value) {
   ram_.at(address) = value;
   if (!goes_to_eeprom(address)) return;
-  eeprom_.at(address) = value;
+  eeprom_.at(address) = static_cast<std::uint16_t>(value);
   ++writes_;
 }
 

@@ -27,7 +27,7 @@ class Memory {
  public:
   /// `eeprom` holds what differs from the factory's settings.
   Memory(const SimulatedModel& model, const Behaviour& behaviour,
-         const std::map<std::uint16_t, std::uint16_t>& eeprom);
+         const std::map<std::uint32_t, std::uint32_t>& eeprom);
 
   /// RAM becomes what the EEPROM holds.
   void power_up();

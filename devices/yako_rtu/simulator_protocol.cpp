@@ -56,7 +56,7 @@ Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::
   const auto fail = memory_.check_read(first, count);
   if (fail != Fail::none) return fail;
   reply.push_back(static_cast<std::uint8_t>(2 * count));
-  for (std::uint16_t i = 0; i < count; ++i) append_word(reply, peek(static_cast<std::uint16_t>(first + i)));
+  for (std::uint16_t i = 0; i < count; ++i) append_word(reply, static_cast<std::uint16_t>(peek(first + i)));
   return Fail::none;
 }
 

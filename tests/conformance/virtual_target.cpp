@@ -78,8 +78,8 @@ struct Daemon {
 class VirtualTarget final : public Target {
  public:
   explicit VirtualTarget(const Plant& plant) : configuration_(load(plant.yaml)) {
-    if (configuration_.buses.size() != 1) throw std::invalid_argument("a plant has one line");
-    const auto serial = configuration_.buses.front().serial();
+    if (configuration_.lines.size() != 1) throw std::invalid_argument("a plant has one line");
+    const auto serial = configuration_.lines.front().serial();
     for (const auto& drive : plant.drives) {
       drives_.push_back(make_drive(drive));
       drives_.back()->advance(world_.now());

@@ -29,7 +29,7 @@ constexpr int axis_count = 3;
 
 config::Configuration three_axes() {
   config::Configuration configuration{.machine = "rig"};
-  configuration.buses.push_back({.name = "line-a", .port = "sim"});
+  configuration.lines.push_back({.name = "line-a", .port = "sim"});
   for (int i = 1; i <= axis_count; ++i) {
     AxisSettings axis{.name = "axis-" + std::to_string(i),
                       .bus = "line-a",

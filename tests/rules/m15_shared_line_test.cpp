@@ -16,7 +16,7 @@ class Line {
  public:
   Line(int count, int baud) {
     configuration_.machine = "line";
-    configuration_.buses.push_back({.name = "line-a", .port = "sim", .baud = baud});
+    configuration_.lines.push_back({.name = "line-a", .port = "sim", .baud = baud});
     for (int i = 1; i <= count; ++i) {
       AxisSettings axis{.name = "a" + std::to_string(i),
                         .bus = "line-a",

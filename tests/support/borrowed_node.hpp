@@ -32,8 +32,8 @@ class BorrowedNode final : public simulation::SimulatedRtuNode {
   [[nodiscard]] std::int64_t shaft_pulses() const override { return node_->shaft_pulses(); }
   [[nodiscard]] bool shaft_moving() const override { return node_->shaft_moving(); }
   [[nodiscard]] int starts() const override { return node_->starts(); }
-  [[nodiscard]] std::uint16_t peek(std::uint16_t address) const override { return node_->peek(address); }
-  void poke(std::uint16_t address, std::uint16_t value) override { node_->poke(address, value); }
+  [[nodiscard]] std::uint32_t peek(std::uint32_t address) const override { return node_->peek(address); }
+  void poke(std::uint32_t address, std::uint32_t value) override { node_->poke(address, value); }
   [[nodiscard]] std::uint64_t eeprom_writes() const override { return node_->eeprom_writes(); }
 
  private:

@@ -67,8 +67,12 @@ class RegisterNode final : public simulation::SimulatedRtuNode {
   [[nodiscard]] std::int64_t shaft_pulses() const override { return 0; }
   [[nodiscard]] bool shaft_moving() const override { return false; }
   [[nodiscard]] int starts() const override { return 0; }
-  [[nodiscard]] std::uint16_t peek(std::uint16_t address) const override { return registers.at(address); }
-  void poke(std::uint16_t address, std::uint16_t value) override { registers[address] = value; }
+  [[nodiscard]] std::uint32_t peek(std::uint32_t address) const override {
+    return registers.at(static_cast<std::uint16_t>(address));
+  }
+  void poke(std::uint32_t address, std::uint32_t value) override {
+    registers[static_cast<std::uint16_t>(address)] = static_cast<std::uint16_t>(value);
+  }
 
  private:
   static std::vector<std::uint8_t> reply(std::vector<std::uint8_t> bytes) {

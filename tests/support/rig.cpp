@@ -54,7 +54,7 @@ simulation::SimulatedNodeSettings drive_of(const RigOptions& options) {
 
 Rig::Rig(RigOptions options) : store(world.executor()), options_(std::move(options)) {
   configuration.machine = "test";
-  configuration.buses.push_back({.name = "line-a", .port = "sim"});
+  configuration.lines.push_back({.name = "line-a", .port = "sim"});
   configuration.axes.push_back({.axis = feeder(options_)});
   drive = simulation::find_simulator("ykd2405pr")->make(drive_of(options_));
   drive->advance(world.now());

@@ -145,7 +145,7 @@ std::string dump(const Configuration& configuration) {
   if (const auto& tls = configuration.server.tls) {
     dump.field("tls", fmt::format("{} {} {}", tls->certificate, tls->key, tls->client_ca));
   }
-  for (const auto& bus : configuration.buses) {
+  for (const auto& bus : configuration.lines) {
     dump.enter(fmt::format("buses.{}", bus.name));
     dump.field("port", bus.port);
     dump.field("baud", bus.baud);

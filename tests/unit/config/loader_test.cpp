@@ -40,8 +40,8 @@ TEST(Loader, DemoIsFiveSimulatedAxesOfThreeModels) {
   const auto& configuration = *result.configuration;
   EXPECT_EQ(configuration.machine, "demo");
   EXPECT_EQ(configuration.server.listen, "localhost:7443");
-  ASSERT_EQ(configuration.buses.size(), 1U);
-  EXPECT_TRUE(configuration.buses[0].simulated());
+  ASSERT_EQ(configuration.lines.size(), 1U);
+  EXPECT_TRUE(configuration.lines[0].simulated());
   ASSERT_EQ(configuration.axes.size(), 5U);
 
   const auto& [feeder, mechanics] = configuration.axes[0];
@@ -100,7 +100,7 @@ TEST(Loader, AxesMayBeMissingBeforeTheFirstScan) {
   for (const auto* axes : {"", "axes:\n", "axes: {}\n", "axes: # none yet\n"}) {
     const auto result = load_text(buses + axes, "m.yaml");
     ASSERT_TRUE(result.configuration) << axes << findings(result);
-    EXPECT_EQ(result.configuration->buses.size(), 1U);
+    EXPECT_EQ(result.configuration->lines.size(), 1U);
     EXPECT_TRUE(result.configuration->axes.empty());
   }
   EXPECT_FALSE(load_text("machine: m\n", "m.yaml").configuration) << "without a bus there is nothing to scan";

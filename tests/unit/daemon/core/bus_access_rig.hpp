@@ -25,7 +25,7 @@ class BusAccessRig : public testing::Test {
  protected:
   BusAccessRig() {
     configuration_.machine = "m";
-    configuration_.buses.push_back({.name = "line-a", .port = "sim"});
+    configuration_.lines.push_back({.name = "line-a", .port = "sim"});
     for (const std::uint8_t node : {1, 2}) {
       AxisSettings axis{
           .name = "a" + std::to_string(node), .bus = "line-a", .node = node, .model = "ykd2405pr"};

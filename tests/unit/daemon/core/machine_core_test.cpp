@@ -18,7 +18,7 @@ class ThreeAxes : public testing::Test {
  protected:
   ThreeAxes() : store_(world_.executor()) {
     configuration_.machine = "three";
-    configuration_.buses.push_back({.name = "line-a", .port = "sim"});
+    configuration_.lines.push_back({.name = "line-a", .port = "sim"});
     for (const std::uint8_t node : {1, 2, 3}) {
       AxisSettings axis{
           .name = "a" + std::to_string(node), .bus = "line-a", .node = node, .model = "ykd2405pr"};

@@ -1,0 +1,46 @@
+// A wire as an axis sees it, whatever is spoken on it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "buses/error.hpp"
+#include "buses/signal.hpp"
+#include "buses/transaction.hpp"
+
+namespace axisd {
+
+/// State of the port below a bus.
+struct PortStatus {
+  bool open = false;
+  std::optional<Error> error;  ///< why it is not open, or what is wrong though it is
+};
+
+/// Thread: core, unless said otherwise.
+class Bus {
+ public:
+  virtual ~Bus() = default;
+  [[nodiscard]] virtual const std::string& name() const = 0;
+  [[nodiscard]] virtual bool simulated() const = 0;
+  [[nodiscard]] virtual const PortStatus& port() const = 0;
+  /// Fires when the port opens or is lost.
+  [[nodiscard]] virtual Signal& port_changed() = 0;
+
+  /// Motion frames whose gate was raised end, whether they wait or are armed. Called for each stop before its
+  /// frame is queued.
+  virtual void purge_superseded() = 0;
+  /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
+  virtual void hasten(std::uint8_t node, TransactionClass to) = 0;
+  /// A node of this bus is about to be energised: what would be noise to it ends as superseded, unless it has
+  /// gone out.
+  virtual void about_to_energise() = 0;
+
+  /// Ends everything that waits; what is under way is still awaited. Nothing is accepted any more.
+  virtual void close() = 0;
+  [[nodiscard]] virtual bool idle() const = 0;
+  /// Time of the last progress of a thread of its own (for the watchdog). Thread: any.
+  [[nodiscard]] virtual TimePoint last_progress() const = 0;
+};
+
+}  // namespace axisd

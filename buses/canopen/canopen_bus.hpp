@@ -1,0 +1,92 @@
+// One CANopen network as axes and drives use it.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "buses/bus.hpp"
+#include "buses/canopen/master.hpp"
+#include "buses/canopen/settings.hpp"
+
+namespace axisd::canopen {
+
+/// What a drive wants to hear of its node. Called on the core thread; must not wait.
+struct NodeHandlers {
+  std::function<void(const NodeEvent&)> on_event;  ///< boot-up, heartbeat lost and back, state changed
+  std::function<void(const Emergency&)> on_emergency;
+};
+
+/// The master of one network, with what its nodes share: the port's state, and SYNC. Thread: core.
+///
+/// SYNC (M24): it runs only while the port can send and no attached node may hold a set-point that the next
+/// SYNC would start. So it starts when each attached node was either settled by its drive (nothing is armed)
+/// or found absent; it stops with the port, and every node has to be settled again.
+class CanopenBus final : public Bus {
+ public:
+  CanopenBus(Executor executor, Clock& clock, NetworkSettings settings, std::unique_ptr<can::Port> port);
+  ~CanopenBus() override;
+  CanopenBus(const CanopenBus&) = delete;
+
+  /// Opens the port.
+  void start();
+
+  /// Registers the drive of a node, before start(). Errors: not a node-ID, attached twice.
+  Result<void> attach(std::uint8_t node, NodeHandlers handlers);
+  /// The drive is going away.
+  void detach(std::uint8_t node);
+  /// From now on `node` is expected to be heard at least every `timeout` (0: not watched).
+  void watch_heartbeat(std::uint8_t node, Duration timeout);
+
+  enum class Readiness : std::uint8_t {
+    unknown,  ///< it may hold an armed set-point: no SYNC is started
+    absent,   ///< it does not answer
+    settled,  ///< its drive knows that nothing waits for a SYNC
+  };
+  void set_readiness(std::uint8_t node, Readiness readiness);
+  /// Called when a SYNC is on the network, with its time, in the order of subscription; dropping the token
+  /// ends it.
+  [[nodiscard]] std::shared_ptr<void> on_sync(std::function<void(TimePoint)> handler);
+  [[nodiscard]] bool sync_running() const { return master_.sync().running(); }
+
+  [[nodiscard]] Master& master() { return master_; }
+  [[nodiscard]] const Master& master() const { return master_; }
+  [[nodiscard]] const NetworkSettings& settings() const { return settings_; }
+  /// Of the port, more precise than port(): bus-off and stall need a cycle of the link (M26).
+  [[nodiscard]] const can::PortState& link() const { return master_.port().state(); }
+
+  [[nodiscard]] const std::string& name() const override { return settings_.name; }
+  [[nodiscard]] bool simulated() const override { return settings_.simulated(); }
+  [[nodiscard]] const PortStatus& port() const override { return port_; }
+  [[nodiscard]] Signal& port_changed() override { return port_changed_; }
+  void purge_superseded() override { master_.purge_superseded(); }
+  /// Each node has a queue of its own, in which nothing waits behind another's requests.
+  void hasten(std::uint8_t /*node*/, TransactionClass /*to*/) override {}
+  void about_to_energise() override {}
+  void close() override;
+  [[nodiscard]] bool idle() const override { return closed_; }
+  [[nodiscard]] TimePoint last_progress() const override { return TimePoint::max(); }
+
+ private:
+  struct Node {
+    NodeHandlers handlers;
+    Readiness readiness = Readiness::unknown;
+  };
+  void on_port(const can::PortState& state);
+  void on_node(const NodeEvent& event);
+  void consider_sync();
+  void tell_sync(TimePoint at);
+
+  NetworkSettings settings_;
+  PortStatus port_;
+  Signal port_changed_;
+  Master master_;
+  std::map<std::uint8_t, Node> nodes_;
+  std::map<int, std::weak_ptr<std::function<void(TimePoint)>>> sync_handlers_;
+  int last_sync_handler_ = 0;
+  bool closed_ = false;
+};
+
+}  // namespace axisd::canopen
