@@ -1,0 +1,77 @@
+// What distinguishes one CiA 402 drive from another, as data: the driver has no code for any model.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "buses/canopen/object.hpp"
+#include "buses/canopen/remote_node.hpp"
+#include "devices/descriptor.hpp"
+
+namespace axisd::cia402 {
+
+/// Code of a homing method in 6098h.
+struct HomingCode {
+  HomingMethod method = HomingMethod::home_positive;
+  std::int8_t code = 0;
+  /// Of drives that number the methods otherwise: taken where `code` is refused as out of range (abort
+  /// 0609003xh), and then for all methods.
+  std::optional<std::int8_t> alternative{};
+};
+
+/// Bits of the status word that CiA 402 leaves to the manufacturer; 0: the drive has no such bit.
+struct StatusBits {
+  std::uint16_t alarm = 0;             ///< an alarm is active
+  std::uint16_t homed = 0;             ///< homing was done
+  std::uint16_t set_point_mirror = 0;  ///< bit 4 of the control word, as the drive holds it
+  std::uint16_t enabled = 0;           ///< the power stage is on
+  std::uint16_t moving = 0;
+  std::uint16_t in_position = 0;
+};
+
+/// Objects that CiA 402 does not have, or not always. Absent: the drive has no such object.
+struct VendorObjects {
+  std::optional<canopen::Object> moving{};          ///< not 0: the motor turns
+  std::optional<canopen::Object> velocity{};        ///< present velocity (606Ch, or the maker's)
+  std::optional<canopen::Object> inputs{};          ///< levels, bit per terminal in the descriptor's order
+  std::optional<canopen::Object> outputs{};         ///< likewise
+  std::optional<canopen::Object> start_speed{};     ///< of each ramp, r/min
+  std::optional<canopen::Object> microstep{};       ///< index into Capabilities::pulses_per_revolution
+  std::optional<canopen::Object> loop_mode{};       ///< 0 closed loop, 1 open loop
+  std::optional<canopen::Object> eeprom_switch{};   ///< 0: writes are saved, 1: they are not
+  std::optional<canopen::Object> memory{};          ///< 1 restores the factory settings, 2 saves everything
+  std::optional<canopen::Object> alarm_clear{};     ///< 1 clears the alarm
+  std::optional<canopen::Object> position_clear{};  ///< 1 zeroes the position
+  std::optional<canopen::Object> hardware_version{}, software_version{};  ///< numbers
+  // Terminals: one object for all levels, then one object per terminal's function.
+  std::optional<canopen::Object> input_levels{}, first_input_function{};
+  std::optional<canopen::Object> output_levels{}, first_output_function{};
+};
+
+/// What a drive's values mean.
+struct Meaning {
+  /// 6083h, 6084h and 609Ah are times in ms from start speed to speed; else rates in velocity units per
+  /// second.
+  bool ramps_are_times = true;
+  /// Velocities are r/min; else in pulses per second.
+  bool velocity_in_rpm = true;
+  /// 603Fh and EMCY: `code & alarm_mask` is the alarm's code where `code & ~alarm_mask` is `alarm_prefix`;
+  /// everything else is reported as it is.
+  std::uint16_t alarm_mask = 0xFFFF, alarm_prefix = 0;
+  /// 605Dh for a stop on the ramp, and for one without: both keep Operation Enabled.
+  std::int16_t halt_on_ramp = 1, halt_at_once = 2;
+};
+
+struct Model {
+  const DriveDescriptor* descriptor = nullptr;
+  canopen::ExpectedIdentity identity{.profile = 402};
+  std::span<const HomingCode> homing_codes;
+  StatusBits status{};
+  VendorObjects objects{};
+  Meaning meaning{};
+  /// The manual prints an EMCY identifier that is another service's: 1014h is set to 80h + node first (M24).
+  bool sets_emergency_id = true;
+};
+
+}  // namespace axisd::cia402
