@@ -48,11 +48,16 @@ std::string_view to_string(Reason reason) {
   return names.at(std::to_underlying(reason));
 }
 
+std::string object_text(std::uint32_t object) {
+  if (object <= 0xFFFF) return fmt::format("register 0x{:04X}", object);
+  return fmt::format("object {:04X}h:{:02X}", object >> 8U, object & 0xFFU);
+}
+
 std::string to_string(const Error& error) {
   std::string text;
   if (!error.where.bus.empty()) text += error.where.bus;
   if (error.where.node) text += fmt::format("{}node {}", text.empty() ? "" : " ", *error.where.node);
-  if (error.where.object) text += fmt::format(" register 0x{:04X}", *error.where.object);
+  if (error.where.object) text += " " + object_text(*error.where.object);
   if (!text.empty()) text += ": ";
   text += error.message.empty() ? std::string(to_string(error.reason)) : error.message;
   if (error.permitted)

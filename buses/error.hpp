@@ -84,6 +84,8 @@ struct Error {
   std::optional<Range> permitted{};
 };
 
+/// "register 0x0027"; beyond 16 bits, where only CANopen's are, "object 6041h:00".
+std::string object_text(std::uint32_t object);
 /// "line-a node 3 register 0x0027: drive refused: value out of range (exception 07); check the value".
 std::string to_string(const Error& error);
 

@@ -1,11 +1,18 @@
 #include "devices/descriptor.hpp"
 
+#include <algorithm>
+
 namespace axisd {
 
 const DriveDescriptor* find_drive_model(std::string_view model) {
   for (const auto* descriptor : drive_models())
     if (descriptor->model == model) return descriptor;
   return nullptr;
+}
+
+const ParameterSpec* find_parameter(std::span<const ParameterSpec> catalogue, std::uint32_t address) {
+  const auto found = std::ranges::lower_bound(catalogue, address, {}, &ParameterSpec::address);
+  return found == catalogue.end() || found->address != address ? nullptr : &*found;
 }
 
 const TerminalFunctionSpec* find_function(std::span<const TerminalFunctionSpec> functions,

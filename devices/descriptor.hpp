@@ -2,6 +2,7 @@
 // walk.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -40,19 +41,29 @@ struct TerminalFunctionSpec {
 };
 
 enum class Access : std::uint8_t { ro, rw, rw_saved, wo };
-/// One register of the catalogue.
+/// Size and sign of a register or object.
+enum class ParameterType : std::uint8_t { u8, i8, u16, i16, u32, i32 };
+[[nodiscard]] constexpr std::size_t size_of(ParameterType type) {
+  return std::size_t{1} << (static_cast<unsigned>(type) / 2U);
+}
+[[nodiscard]] constexpr bool is_signed(ParameterType type) { return static_cast<unsigned>(type) % 2U != 0; }
+/// One register or object of the catalogue.
 struct ParameterSpec {
-  std::uint32_t address;
+  std::uint32_t address;  ///< Modbus register, or CANopen index << 8 | sub-index
   std::string_view name;  ///< "start_speed"
   Access access;
-  std::int32_t minimum, maximum;
-  std::optional<std::int32_t> default_value;
+  std::int64_t minimum, maximum;
+  std::optional<std::int64_t> default_value;
   std::string_view unit;
   std::string_view description;
   /// Of a trigger register (wo) the RPC that does what it does, "AxisService.Stop": such a register is never
   /// written as a parameter. Empty for all others.
   std::string_view instead = {};
+  /// How the drive counts. A range with both 65535 and negative numbers is one of any words: unsigned.
+  ParameterType type = ParameterType::u16;
 };
+/// nullptr if the catalogue, which is in order of address, has no such parameter.
+const ParameterSpec* find_parameter(std::span<const ParameterSpec> catalogue, std::uint32_t address);
 
 /// How an alarm goes away.
 enum class AlarmReset : std::uint8_t { power_cycle, by_itself, by_command };

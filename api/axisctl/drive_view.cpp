@@ -55,8 +55,6 @@ const char* access_text(v1::ParameterAccess access) {
   }
 }
 
-std::string hexadecimal(std::uint32_t address) { return fmt::format("0x{:04X}", address); }
-
 const v1::ParameterValue* find(const google::protobuf::RepeatedPtrField<v1::ParameterValue>& values,
                                const std::string& name) {
   for (const auto& value : values)
@@ -77,8 +75,7 @@ std::string drive_details(const v1::GetDriveResponse& drive) {
   text += line("axis", drive.axis());
   text += line("model", fmt::format("{} ({})", drive.model(), drive.title()));
   if (drive.has_model_code())
-    text += line("reported",
-                 fmt::format("code {}, version {}", hexadecimal(drive.model_code()), drive.version()));
+    text += line("reported", fmt::format("code 0x{:04X}, version {}", drive.model_code(), drive.version()));
   text += line("loop", drive.closed_loop() ? "closed" : "open");
   text += line("position", drive.position_source() == v1::POSITION_SOURCE_ENCODER     ? "encoder"
                            : drive.position_source() == v1::POSITION_SOURCE_COMMANDED ? "counted pulses"
@@ -122,7 +119,7 @@ Table parameter_table(const v1::ListParametersResponse& catalogue,
   if (columns.descriptions) header.emplace_back("DESCRIPTION");
   Table table(std::move(header), std::move(right));
   for (const auto& parameter : catalogue.parameters()) {
-    std::vector<Cell> row{parameter.name(), hexadecimal(parameter.address())};
+    std::vector<Cell> row{parameter.name(), address_text(parameter.address())};
     if (columns.values) {
       const auto* value = find(values, parameter.name());
       const bool differs =
@@ -148,7 +145,7 @@ Table value_table(const v1::ListParametersResponse& catalogue,
     std::string unit;
     for (const auto& parameter : catalogue.parameters())
       if (parameter.name() == value.name()) unit = parameter.unit();
-    table.add({value.name(), hexadecimal(value.address()), std::to_string(value.value()), unit});
+    table.add({value.name(), address_text(value.address()), std::to_string(value.value()), unit});
   }
   return table;
 }

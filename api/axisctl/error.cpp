@@ -49,8 +49,7 @@ std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
   std::string text;
   if (!detail.bus().empty()) text = detail.bus();
   if (detail.has_node()) text += fmt::format("{}node {}", text.empty() ? "" : " ", detail.node());
-  if (detail.has_object())
-    text += fmt::format("{}0x{:04X}", text.empty() ? "object " : " object ", detail.object());
+  if (detail.has_object()) text += (text.empty() ? "object " : " object ") + address_text(detail.object());
   if (!text.empty()) text += ": ";
   text += message.empty() ? lower_word(v1::Reason_Name(detail.reason()), "REASON_") : message;
   if (detail.has_permitted() && !message.contains("permitted"))

@@ -131,6 +131,11 @@ std::string command_line(const v1::Command& command, std::string_view unit) {
   return text;
 }
 
+std::string address_text(std::uint32_t address) {
+  if (address <= 0xFFFF) return fmt::format("0x{:04X}", address);
+  return fmt::format("{:04X}h:{:02X}", address >> 8U, address & 0xFFU);
+}
+
 std::string json(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
   options.preserve_proto_field_names = true;

@@ -35,6 +35,9 @@ std::string granted_text(const v1::Command& command, std::string_view unit);
 /// One line: id, axis, kind, state, granted values, cause, time taken.
 std::string command_line(const v1::Command& command, std::string_view unit);
 
+/// "0x0027", a Modbus register; beyond 16 bits, where only CANopen's are, "6041h:00": object and sub-index.
+std::string address_text(std::uint32_t address);
+
 /// One line of JSON with the names of the proto.
 std::string json(const google::protobuf::Message& message);
 

@@ -1,7 +1,6 @@
 #include "api/server/drive_convert.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 #include <utility>
 
@@ -49,6 +48,23 @@ void to_proto(const Capabilities& from, v1::GetDriveResponse& to) {
 v1::ParameterAccess to_proto(Access access) {
   return static_cast<v1::ParameterAccess>(std::to_underlying(access) + 1);
 }
+v1::ParameterType to_proto(ParameterType type) {
+  switch (type) {  // the contract grew: its numbers are not in order of size
+    case ParameterType::u8:
+      return v1::PARAMETER_TYPE_UINT8;
+    case ParameterType::i8:
+      return v1::PARAMETER_TYPE_INT8;
+    case ParameterType::u16:
+      return v1::PARAMETER_TYPE_UINT16;
+    case ParameterType::i16:
+      return v1::PARAMETER_TYPE_INT16;
+    case ParameterType::u32:
+      return v1::PARAMETER_TYPE_UINT32;
+    case ParameterType::i32:
+      return v1::PARAMETER_TYPE_INT32;
+  }
+  return v1::PARAMETER_TYPE_UNSPECIFIED;
+}
 v1::AlarmReset to_proto(AlarmReset reset) {
   return static_cast<v1::AlarmReset>(std::to_underlying(reset) + 1);
 }
@@ -60,10 +76,9 @@ static_assert(std::to_underlying(AlarmReset::by_command) + 1 == v1::AlarmReset_M
 static_assert(std::to_underlying(SerialProgress::Phase::verified) + 1 == v1::SerialPhase_MAX);
 
 void to_proto(const ParameterSpec& from, std::string_view configured_by, v1::Parameter& to) {
-  const bool is_signed = from.minimum < 0 && from.maximum <= std::numeric_limits<std::int16_t>::max();
   to.set_name(std::string(from.name));
   to.set_address(from.address);
-  to.set_type(is_signed ? v1::PARAMETER_TYPE_INT16 : v1::PARAMETER_TYPE_UINT16);
+  to.set_type(to_proto(from.type));
   to.set_unit(std::string(from.unit));
   to.set_minimum(from.minimum);
   to.set_maximum(from.maximum);

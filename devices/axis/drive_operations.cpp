@@ -18,9 +18,7 @@ Error DriveOperations::error(Reason reason, std::string message, std::string rem
 }
 
 const ParameterSpec* DriveOperations::find(std::uint32_t address) const {
-  const auto parameters = axis_->descriptor().parameters;
-  const auto found = std::ranges::find(parameters, address, &ParameterSpec::address);
-  return found == parameters.end() ? nullptr : &*found;
+  return find_parameter(axis_->descriptor().parameters, address);
 }
 
 DriveInfo DriveOperations::info() const {
@@ -39,11 +37,11 @@ Task<Result<std::vector<ParameterValue>>> DriveOperations::read_parameters(
   for (const auto address : addresses) {
     const auto* parameter = find(address);
     if (parameter == nullptr || parameter->access == Access::wo)
-      co_return fail(error(
-          Reason::invalid_argument,
-          fmt::format("parameter {} cannot be read",
-                      parameter == nullptr ? fmt::format("0x{:04X}", address) : std::string(parameter->name)),
-          "list them: axisctl drive parameters"));
+      co_return fail(
+          error(Reason::invalid_argument,
+                fmt::format("parameter {} cannot be read",
+                            parameter == nullptr ? object_text(address) : std::string(parameter->name)),
+                "list them: axisctl drive parameters"));
   }
   if (auto online = axis_->check_online(); !online) co_return fail(online.error());
   co_return co_await axis_->drive().read_parameters(std::move(addresses));
@@ -58,7 +56,8 @@ Result<void> DriveOperations::check_write(const ParameterValue& value) const {
     return fail(std::move(refusal));
   };
   if (parameter == nullptr)
-    return fail(error(Reason::invalid_argument, fmt::format("there is no parameter 0x{:04X}", value.address),
+    return fail(error(Reason::invalid_argument,
+                      fmt::format("there is no parameter {}", object_text(value.address)),
                       "list them: axisctl drive parameters"));
   if (parameter->access == Access::ro) return named("is read-only", "leave it out");
   if (parameter->access == Access::wo)

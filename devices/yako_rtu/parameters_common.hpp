@@ -41,7 +41,7 @@ consteval auto status_rows(const StatusGroup& model) {
     {0x000A, "position_high", ro, 0, 65535, {}, "pulse",
      "Position counter, high word of a signed 32-bit number"},
     {0x000B, "position_low", ro, 0, 65535, {}, "pulse", "Position counter, low word"},
-    {0x000C, "speed", ro, -3000, 3000, {}, "r/min", "Present speed"},
+    {0x000C, "speed", ro, -3000, 3000, {}, "r/min", "Present speed", {}, ParameterType::i16},
   });
 }
 
@@ -70,7 +70,8 @@ consteval auto motion_rows(std::int32_t maximum_stop) {
     {0x0022, "deceleration_time", rw, 0, 2000, 100, "ms",
      "Time from maximum speed to start speed; a stop uses the value set before its motion"},
     {0x0023, "maximum_speed", rw, -3000, 3000, 60, "r/min",
-     "Speed of the motion; its sign is the direction in speed mode; at most 200 kHz of pulses"},
+     "Speed of the motion; its sign is the direction in speed mode; at most 200 kHz of pulses", {},
+     ParameterType::i16},
     {0x0024, "pulses_high", rw, -32768, 65535, 0, "pulse",
      "Distance or target, high word of a signed 32-bit number"},
     {0x0025, "pulses_low", rw, -32768, 65535, 5000, "pulse", "Distance or target, low word"},

@@ -8,22 +8,11 @@
 #include <string_view>
 
 #include "devices/descriptor.hpp"
+#include "devices/parameter_rows.hpp"
 
 namespace axisd::yako_rtu {
 
 inline constexpr std::size_t segment_count = 16;
-
-/// Puts the blocks of a catalogue one after the other.
-template <std::size_t... sizes>
-consteval auto join(const std::array<ParameterSpec, sizes>&... blocks) {
-  std::array<ParameterSpec, (sizes + ...)> all{};
-  std::size_t next = 0;
-  const auto append = [&](const auto& block) {
-    for (const auto& row : block) all[next++] = row;
-  };
-  (append(blocks), ...);
-  return all;
-}
 
 /// One line of the manual: 16 registers, one for each segment.
 struct SegmentBlock {
@@ -44,25 +33,9 @@ inline constexpr SegmentBlock segment_time{
     0x00C0, "time", 0, 2000, "ms", "PT and PV", "acceleration and deceleration time"};
 inline constexpr SegmentBlock segment_pv_speed{0x00E0, "pv_speed", 0, 3000, "r/min", "PV", "speed"};
 
-/// Characters that live as long as the program, so that a row can point to them.
-struct Text {
-  std::array<char, 112> characters{};
-  std::size_t size = 0;
-
-  constexpr void append(std::string_view part) {
-    for (const char one : part) characters.at(size++) = one;
-  }
-  /// From 1 to 99.
-  constexpr void append_number(std::size_t number) {
-    if (number >= 10) characters.at(size++) = static_cast<char>('0' + number / 10);
-    characters.at(size++) = static_cast<char>('0' + number % 10);
-  }
-  constexpr std::string_view view() const { return {characters.data(), size}; }
-};
-
-consteval std::array<Text, segment_count> segment_texts(std::string_view before, std::string_view between,
-                                                        std::string_view after) {
-  std::array<Text, segment_count> texts{};
+consteval std::array<RowText, segment_count> segment_texts(std::string_view before, std::string_view between,
+                                                           std::string_view after) {
+  std::array<RowText, segment_count> texts{};
   for (std::size_t i = 0; i < segment_count; ++i) {
     texts[i].append(before);
     texts[i].append_number(i + 1);
@@ -72,8 +45,8 @@ consteval std::array<Text, segment_count> segment_texts(std::string_view before,
   return texts;
 }
 
-consteval Text segment_prefix(std::string_view mode) {
-  Text prefix;
+consteval RowText segment_prefix(std::string_view mode) {
+  RowText prefix;
   prefix.append(mode);
   prefix.append(" segment ");
   return prefix;

@@ -10,14 +10,8 @@ constexpr int longest_read = 16;
 
 }  // namespace
 
-const ParameterSpec* find_parameter(std::span<const ParameterSpec> catalogue, std::uint32_t address) {
-  const auto found = std::ranges::lower_bound(catalogue, address, {}, &ParameterSpec::address);
-  return found == catalogue.end() || found->address != address ? nullptr : &*found;
-}
-
 std::int64_t number_of(const ParameterSpec& parameter, std::uint16_t word) {
-  const bool is_signed = parameter.minimum < 0 && parameter.maximum <= INT16_MAX;
-  return is_signed ? static_cast<std::int16_t>(word) : word;
+  return is_signed(parameter.type) ? static_cast<std::int16_t>(word) : word;
 }
 
 std::vector<RegisterBlock> blocks_of(std::vector<std::uint16_t> addresses,

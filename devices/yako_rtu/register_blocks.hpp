@@ -19,9 +19,7 @@ struct RegisterBlock {
 /// nobody asked for may lie in between. `addresses` in any order; unreadable ones are left out.
 std::vector<RegisterBlock> blocks_of(std::vector<std::uint16_t> addresses,
                                      const std::function<bool(std::uint32_t)>& readable);
-/// nullptr if the model has no such register.
-const ParameterSpec* find_parameter(std::span<const ParameterSpec> catalogue, std::uint32_t address);
-/// The word of a register as the number that its range means.
+/// The word of a register as the number that it means.
 std::int64_t number_of(const ParameterSpec& parameter, std::uint16_t word);
 
 }  // namespace axisd::yako_rtu

@@ -201,8 +201,8 @@ TEST_F(DriveValidate, AddressesAndSerialSettingsAreThoseOfTheModel) {
   EXPECT_EQ(change->format->parity, modbus_rtu::Parity::even);
 }
 
-TEST(DriveConvert, TypeFollowsTheRange) {
-  const auto type = [](std::int32_t minimum, std::int32_t maximum) {
+TEST(DriveConvert, TypeSaysSizeAndSign) {
+  const auto converted = [](ParameterType type, std::int64_t minimum, std::int64_t maximum) {
     v1::Parameter parameter;
     to_proto(ParameterSpec{.address = 1,
                            .name = "x",
@@ -211,15 +211,20 @@ TEST(DriveConvert, TypeFollowsTheRange) {
                            .maximum = maximum,
                            .default_value = {},
                            .unit = "",
-                           .description = ""},
+                           .description = "",
+                           .type = type},
              "", parameter);
     EXPECT_FALSE(parameter.has_default_value());
+    EXPECT_EQ(parameter.minimum(), minimum);
+    EXPECT_EQ(parameter.maximum(), maximum);
     return parameter.type();
   };
-  EXPECT_EQ(type(-3000, 3000), v1::PARAMETER_TYPE_INT16);
-  EXPECT_EQ(type(-32768, 32767), v1::PARAMETER_TYPE_INT16);
-  EXPECT_EQ(type(0, 65535), v1::PARAMETER_TYPE_UINT16);
-  EXPECT_EQ(type(-32768, 65535), v1::PARAMETER_TYPE_UINT16);  // any word, however it is written
+  EXPECT_EQ(converted(ParameterType::u8, 0, 255), v1::PARAMETER_TYPE_UINT8);
+  EXPECT_EQ(converted(ParameterType::i8, -128, 127), v1::PARAMETER_TYPE_INT8);
+  EXPECT_EQ(converted(ParameterType::u16, -32768, 65535), v1::PARAMETER_TYPE_UINT16);  // any word
+  EXPECT_EQ(converted(ParameterType::i16, -3000, 3000), v1::PARAMETER_TYPE_INT16);
+  EXPECT_EQ(converted(ParameterType::u32, 0, 4294967295), v1::PARAMETER_TYPE_UINT32);
+  EXPECT_EQ(converted(ParameterType::i32, -1000000, 1000000), v1::PARAMETER_TYPE_INT32);
 }
 
 }  // namespace

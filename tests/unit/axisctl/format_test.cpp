@@ -76,6 +76,13 @@ TEST(Format, EndedCommandsTellCauseAndTime) {
   EXPECT_FALSE(ended(move_command()));
 }
 
+TEST(Format, AddressesAreThoseOfTheManuals) {
+  EXPECT_EQ(address_text(0x0027), "0x0027");
+  EXPECT_EQ(address_text(0xFFFF), "0xFFFF");
+  EXPECT_EQ(address_text(0x604100), "6041h:00");
+  EXPECT_EQ(address_text(0x20300C), "2030h:0C");
+}
+
 TEST(Format, JsonKeepsTheNamesOfTheProtoAndZeros) {
   const std::string text = json(move_command());
   EXPECT_TRUE(text.contains(R"("request_id":"")")) << text;

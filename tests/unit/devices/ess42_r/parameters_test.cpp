@@ -10,7 +10,7 @@ namespace axisd::ess42_r {
 using yako_rtu::RegisterGroup;
 namespace {
 
-const ParameterSpec* find(std::uint32_t address) { return yako_rtu::find_parameter(parameters(), address); }
+const ParameterSpec* find(std::uint32_t address) { return find_parameter(parameters(), address); }
 
 TEST(Ess42rParameters, AreThe171RegistersOfTheManualWithItsHoles) {
   const RegisterGroup groups[] = {{0x00, 0x0C}, {0x10, 0x17}, {0x20, 0x2C}, {0x30, 0x36}, {0x40, 0x40},
@@ -45,7 +45,7 @@ TEST(Ess42rParameters, HaveTheirOwnBitRateCodes) {
 TEST(Ess42rParameters, DifferFromTheSsd2608prInTheTerminalsOnly) {
   for (std::uint32_t address = 0; address <= 0x139; ++address) {
     const bool ours = find(address) != nullptr;
-    const bool theirs = yako_rtu::find_parameter(ssd2608pr::parameters(), address) != nullptr;
+    const bool theirs = find_parameter(ssd2608pr::parameters(), address) != nullptr;
     const bool differs = address == 0x41 || address == 0x42 || address == 0x46 || address == 0x4E;
     EXPECT_EQ(differs, ours != theirs) << std::hex << address;
   }

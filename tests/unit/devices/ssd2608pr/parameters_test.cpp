@@ -9,7 +9,7 @@ namespace axisd::ssd2608pr {
 using yako_rtu::RegisterGroup;
 namespace {
 
-const ParameterSpec* find(std::uint32_t address) { return yako_rtu::find_parameter(parameters(), address); }
+const ParameterSpec* find(std::uint32_t address) { return find_parameter(parameters(), address); }
 
 TEST(Ssd2608prParameters, AreThe173RegistersOfTheManualWithItsHoles) {
   const RegisterGroup groups[] = {{0x00, 0x0C}, {0x10, 0x17}, {0x20, 0x2C}, {0x30, 0x36},  {0x40, 0x45},

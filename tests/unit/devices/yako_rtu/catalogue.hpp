@@ -19,12 +19,6 @@ struct RegisterGroup {
   std::uint32_t first, last;
 };
 
-/// nullptr if the catalogue does not have it.
-inline const ParameterSpec* find_parameter(std::span<const ParameterSpec> all, std::uint32_t address) {
-  const auto found = std::ranges::find(all, address, &ParameterSpec::address);
-  return found == all.end() ? nullptr : &*found;
-}
-
 /// Exactly the registers of these groups, in order of address.
 inline void expect_groups(std::span<const ParameterSpec> all, std::span<const RegisterGroup> groups) {
   std::vector<std::uint32_t> printed, ours;

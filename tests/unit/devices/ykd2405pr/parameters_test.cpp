@@ -13,7 +13,7 @@ namespace reg = yako_rtu::reg;
 using yako_rtu::RegisterGroup;
 namespace {
 
-const ParameterSpec* find(std::uint32_t address) { return yako_rtu::find_parameter(parameters(), address); }
+const ParameterSpec* find(std::uint32_t address) { return find_parameter(parameters(), address); }
 
 TEST(Ykd2405prParameters, AreThe148RegistersOfTheManualWithItsHoles) {
   const RegisterGroup groups[] = {{0x00, 0x0C}, {0x10, 0x18}, {0x20, 0x2C}, {0x30, 0x36},
