@@ -143,11 +143,30 @@ void AxisChecks::check_distance(std::string_view key, std::optional<double> valu
                   axis_.scale.unit));
 }
 
+void AxisChecks::check_target(std::string_view key, std::optional<double> value, std::string_view from) {
+  check_distance(key, value, from);
+  if (!value || model_ == nullptr || !given(key) || !usable(key) || reported_.contains(key)) return;
+  const auto pulses = scale_->to_pulses(*value);
+  const std::int64_t lowest = model_->capabilities.minimum_target_pulses;
+  const std::int64_t highest = model_->capabilities.maximum_target_pulses;
+  if (pulses >= lowest && pulses <= highest) return;
+  const auto [first, last] = std::minmax({scale_->to_units(lowest), scale_->to_units(highest)});
+  add(key,
+      fmt::format("{} {}{} is {} pulses: more than model {} can be sent", format_number(*value),
+                  axis_.scale.unit, from, pulses, axis_.model),
+      fmt::format("between {} and {} {}{}", format_number(first), format_number(last), axis_.scale.unit,
+                  from));
+}
+
 void AxisChecks::check_distances() {
-  check_distance("scale.modulo", axis_.scale.modulo);
-  check_distance("limits.position", axis_.limits.position_minimum);
-  check_distance("limits.position", axis_.limits.position_maximum);
-  check_distance("jog_travel", axis_.jog_travel);
+  check_target("scale.modulo", axis_.scale.modulo);
+  for (const auto limit : {axis_.limits.position_minimum, axis_.limits.position_maximum}) {
+    check_distance("limits.position", limit);
+    // The drive counts from where it was homed.
+    if (limit && axis_.homing && usable("homing.position"))
+      check_target("limits.position", *limit - axis_.homing->position, " from homing.position");
+  }
+  check_target("jog_travel", axis_.jog_travel);
   check_distance("position_tolerance", axis_.position_tolerance);
   // It bounds what an axis with limits may do while its position is unknown.
   if (given("jog_travel") && usable("limits") && !given("limits.position"))
@@ -155,7 +174,7 @@ void AxisChecks::check_distances() {
         "leave it out, or add the limits");
   if (axis_.homing) {
     check_distance("homing.position", axis_.homing->position);
-    check_distance("homing.backoff", axis_.homing->backoff);
+    check_target("homing.backoff", axis_.homing->backoff);
     check_distance("homing.max_travel", axis_.homing->max_travel);
   }
   check_distance("simulate.home_switch", entry_.simulation.home_switch);

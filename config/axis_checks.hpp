@@ -49,6 +49,8 @@ class AxisChecks {
   // One value, if it was given and could be read.
   void check_time(std::string_view key, Duration value, int minimum_ms);
   void check_distance(std::string_view key, std::optional<double> value, std::string_view from = "");
+  /// Also within what one motion of the model can be told.
+  void check_target(std::string_view key, std::optional<double> value, std::string_view from = "");
   void check_speed(std::string_view key, double velocity, double minimum_rpm, double maximum_rpm);
   void check_below(std::string_view key, double velocity, std::string_view limit_key, double limit);
   /// M11: of the motor, in whole r/min. Precondition: the model is known.

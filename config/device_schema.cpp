@@ -1,3 +1,4 @@
+#include "config/quantity.hpp"
 #include "config/schema.hpp"
 
 // The keys of nodes that are not axes. What depends on other keys is in device_checks.cpp.
@@ -5,9 +6,43 @@ namespace axisd::config {
 
 namespace {
 
-constexpr std::string_view models[] = {"modbus-generic"};
-constexpr std::string_view types[] = {"u16", "i16", "u32", "i32", "f32"};  // in the order of RegisterType
+constexpr std::string_view models[] = {"modbus-generic", "canopen-generic"};  // in the order of BusKind
+constexpr std::string_view object_types[] = {"u16", "i16", "u32", "i32", "f32", "u8", "i8"};  // of ValueType
+constexpr std::span<const std::string_view> register_types = std::span(object_types).first(5);
 constexpr std::string_view accesses[] = {"ro", "rw"};
+
+void set_type(Target& t, const Value& v) {
+  t.device_value->type = static_cast<ValueType>(choice_index(object_types, v.text));
+}
+
+// What registers and objects have alike.
+constexpr KeySpec scale_key{.key = "scale",
+                            .kind = Kind::number,
+                            .description = "Value = raw number x scale.",
+                            .example = "0.1",
+                            .default_value = "1",
+                            .apply = [](Target& t, const Value& v) { t.device_value->scale = v.number; }};
+constexpr KeySpec unit_key{
+    .key = "unit",
+    .kind = Kind::text,
+    .description = "Of the value; only shown.",
+    .example = "degC",
+    .pattern = "[A-Za-z%][A-Za-z0-9%/*^._-]{0,15}",
+    .pattern_hint = "use up to 16 letters, digits or any of % / * ^ . _ -, such as degC or l/min",
+    .apply = [](Target& t, const Value& v) { t.device_value->unit = v.text; }};
+constexpr KeySpec access_key{
+    .key = "access",
+    .kind = Kind::choice,
+    .description = "rw: may be written, too.",
+    .example = "rw",
+    .default_value = "ro",
+    .choices = accesses,
+    .apply = [](Target& t, const Value& v) { t.device_value->writable = v.text == "rw"; }};
+
+void add_value(Target& t, const Value& v) {
+  t.device_value = &t.device->values.emplace_back();
+  t.device_value->name = v.text;
+}
 
 constexpr KeySpec register_keys[] = {
     {.key = "address",
@@ -18,37 +53,38 @@ constexpr KeySpec register_keys[] = {
      .minimum = 0,
      .maximum = 65535,
      .apply = [](Target& t,
-                 const Value& v) { t.device_register->address = static_cast<std::uint16_t>(v.integer); }},
+                 const Value& v) { t.device_value->address = static_cast<std::uint16_t>(v.integer); }},
     {.key = "type",
      .kind = Kind::choice,
      .description = "How the value lies in the registers; 32 bits take two, high word first.",
      .example = "i32",
      .default_value = "u16",
-     .choices = types,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.device_register->type = static_cast<RegisterType>(choice_index(types, v.text));
-         }},
-    {.key = "scale",
-     .kind = Kind::number,
-     .description = "Value = register x scale.",
-     .example = "0.1",
-     .default_value = "1",
-     .apply = [](Target& t, const Value& v) { t.device_register->scale = v.number; }},
-    {.key = "unit",
+     .choices = register_types,
+     .apply = &set_type},
+    scale_key,
+    unit_key,
+    access_key,
+};
+
+constexpr KeySpec object_keys[] = {
+    {.key = "object",
      .kind = Kind::text,
-     .description = "Of the value; only shown.",
-     .example = "degC",
-     .pattern = "[A-Za-z%][A-Za-z0-9%/*^._-]{0,15}",
-     .pattern_hint = "use up to 16 letters, digits or any of % / * ^ . _ -, such as degC or l/min",
-     .apply = [](Target& t, const Value& v) { t.device_register->unit = v.text; }},
-    {.key = "access",
+     .required = true,
+     .description = "Index and sub-index, both hexadecimal.",
+     .example = "6401h:01",
+     .pattern = "[0-9A-Fa-f]{4}h:[0-9A-Fa-f]{2}",
+     .pattern_hint = "write INDEXh:SUB, both hexadecimal, such as 6401h:01",
+     .apply = [](Target& t, const Value& v) { t.device_value->address = *parse_object_address(v.text); }},
+    {.key = "type",
      .kind = Kind::choice,
-     .description = "rw: may be written, too.",
-     .example = "rw",
-     .default_value = "ro",
-     .choices = accesses,
-     .apply = [](Target& t, const Value& v) { t.device_register->writable = v.text == "rw"; }},
+     .required = true,
+     .description = "Of the object; its size must be right, too.",
+     .example = "i32",
+     .choices = object_types,
+     .apply = &set_type},
+    scale_key,
+    unit_key,
+    access_key,
 };
 
 constexpr KeySpec device_keys[] = {
@@ -71,12 +107,14 @@ constexpr KeySpec device_keys[] = {
     {.key = "model",
      .kind = Kind::choice,
      .required = true,
-     .description = "modbus-generic: holding registers by name.",
+     .description = "modbus-generic: holding registers by name; canopen-generic: objects by name.",
      .example = "modbus-generic",
-     .choices = models},
+     .choices = models,
+     .apply = [](Target& t,
+                 const Value& v) { t.device->kind = static_cast<BusKind>(choice_index(models, v.text)); }},
     {.key = "poll",
      .kind = Kind::duration,
-     .description = "How often the registers are read.",
+     .description = "How often its values are read.",
      .example = "250 ms",
      .default_value = "500 ms",
      .minimum = 10,
@@ -84,14 +122,14 @@ constexpr KeySpec device_keys[] = {
      .apply = [](Target& t, const Value& v) { t.device->poll = v.duration; }},
     {.key = "registers",
      .kind = Kind::named_sections,
-     .required = true,
-     .description = "The device's registers, by name.",
+     .description = "Of modbus-generic: its registers, by name.",
      .children = register_keys,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.device_register = &t.device->registers.emplace_back();
-           t.device_register->name = v.text;
-         }},
+     .apply = &add_value},
+    {.key = "objects",
+     .kind = Kind::named_sections,
+     .description = "Of canopen-generic: its objects, by name.",
+     .children = object_keys,
+     .apply = &add_value},
 };
 
 }  // namespace

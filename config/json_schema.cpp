@@ -112,8 +112,10 @@ Object named_sections(const KeySpec& spec) {
   } else {
     result.text("type", "object").raw("minProperties", "1");
   }
+  auto each = section(spec.children);
+  if (spec.one_of) each.raw("minProperties", "1").raw("maxProperties", "1");
   result.raw("propertyNames", names.json());
-  result.raw("additionalProperties", section(spec.children).json());
+  result.raw("additionalProperties", each.json());
   return result;
 }
 
@@ -215,6 +217,16 @@ Object closed(const Object& properties) {
   return result;
 }
 
+/// A device of this model has the one kind of values and not the other.
+std::string device_of(std::string_view model, std::string_view values, std::string_view others) {
+  const auto properties =
+      Object().raw("model", Object().text("const", model).json()).raw(others, "false").json();
+  return Object()
+      .raw("properties", properties)
+      .raw("required", strings(std::vector<std::string_view>{values}))
+      .json();
+}
+
 Object section(std::span<const KeySpec> keys) {
   Object properties;
   std::vector<std::string_view> required;
@@ -224,6 +236,9 @@ Object section(std::span<const KeySpec> keys) {
   }
   auto result = closed(properties);
   if (!required.empty()) result.raw("required", strings(required));
+  if (keys.data() == device_schema().data())
+    result.raw("oneOf", array({device_of("modbus-generic", "registers", "objects"),
+                               device_of("canopen-generic", "objects", "registers")}));
   if (keys.data() == axis_schema().data()) {  // what the model adds
     std::vector<std::string> models;
     for (const auto* model : drive_models())
@@ -280,7 +295,10 @@ std::string if_model(const DriveDescriptor& model) {
   then.raw("inputs", terminals(model.inputs, model.input_functions));
   then.raw("outputs", terminals(model.outputs, model.output_functions));
   then.raw("drive", closed(settings).json());
-  then.raw("segments", Object().raw("properties", segments_to(model.capabilities.maximum_segments)).json());
+  const int last_segment_of_model = model.capabilities.maximum_segments;
+  then.raw("segments", last_segment_of_model == 0
+                           ? "false"
+                           : Object().raw("properties", segments_to(last_segment_of_model)).json());
   if (find_function(model.output_functions, "brake") == nullptr) then.raw("brake", "false");
 
   Object is_model, condition, result;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -43,17 +44,49 @@ void check_server(const Configuration& configuration, Diagnostics& diagnostics, 
   }
 }
 
-void check_ports(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
-  std::map<std::string, std::string> owners;
-  for (const auto& bus : configuration.lines) {
-    const auto path = fmt::format("buses.{}.modbus_rtu.port", bus.name);
-    if (!places.usable(path) || bus.simulated()) continue;
+/// A bus as the file describes it, of whatever kind.
+struct BusEntry {
+  std::string_view name;
+  BusKind kind;
+  bool simulated;
+  std::int64_t rate;      ///< baud or bit/s
+  std::string_view port;  ///< or network interface
+  std::string_view port_key, rate_key;
+
+  [[nodiscard]] std::string_view kind_name() const {
+    return kind == BusKind::modbus_rtu ? "modbus_rtu" : "canopen";
+  }
+  [[nodiscard]] std::string path(std::string_view key) const {
+    return fmt::format("buses.{}.{}.{}", name, kind_name(), key);
+  }
+};
+
+std::vector<BusEntry> buses(const Configuration& configuration) {
+  std::vector<BusEntry> all;
+  for (const auto& line : configuration.lines)
+    all.push_back({line.name, BusKind::modbus_rtu, line.simulated(), line.baud, line.port, "port", "baud"});
+  for (const auto& network : configuration.networks)
+    all.push_back({network.name, BusKind::canopen, network.simulated(), network.bitrate, network.interface,
+                   "interface", "bitrate"});
+  return all;
+}
+
+const BusEntry* find_bus(std::span<const BusEntry> all, std::string_view name) {
+  const auto found = std::ranges::find(all, name, &BusEntry::name);
+  return found == all.end() ? nullptr : &*found;
+}
+
+void check_ports(std::span<const BusEntry> all, Diagnostics& diagnostics, const Places& places) {
+  std::map<std::string_view, std::string_view> owners;  // a device file has a slash, a network interface none
+  for (const auto& bus : all) {
+    const auto path = bus.path(bus.port_key);
+    if (!places.usable(path) || bus.simulated) continue;
     const auto [owner, is_first] = owners.try_emplace(bus.port, bus.name);
-    if (!is_first) {
-      diagnostics.add(places.mark(path),
-                      fmt::format("port {} belongs to bus '{}' already", quoted(bus.port), owner->second),
-                      "one bus per port");
-    }
+    if (is_first) continue;
+    diagnostics.add(
+        places.mark(path),
+        fmt::format("{} {} belongs to bus '{}' already", bus.port_key, quoted(bus.port), owner->second),
+        fmt::format("one bus per {}", bus.port_key));
   }
 }
 
@@ -91,69 +124,100 @@ void check_nodes(const Configuration& configuration, Diagnostics& diagnostics, c
   }
 }
 
-void check_bus_names(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+void check_bus_names(const Configuration& configuration, std::span<const BusEntry> all,
+                     Diagnostics& diagnostics, const Places& places) {
   if (!places.clean("buses")) return;  // a bus may be missing because of its own errors
-  const auto names =
-      names_of(configuration.lines, [](const auto& bus) -> std::string_view { return bus.name; });
+  const auto names = names_of(all, [](const BusEntry& bus) { return bus.name; });
   for (const auto& [participant, text, bus, node] : participants(configuration)) {
     const auto path = participant + "bus";
-    if (!places.usable(path) || std::ranges::find(names, bus) != names.end()) continue;
+    if (!places.usable(path) || find_bus(all, bus) != nullptr) continue;
     diagnostics.add(places.mark(path), fmt::format("there is no bus {}", quoted(bus)), suggest(bus, names));
   }
 }
 
-void check_drive_counts(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
-  constexpr int most = 30;  // what one RS-485 line carries (RTU manuals 4.4)
+/// A model speaks one protocol.
+void check_kinds(const Configuration& configuration, std::span<const BusEntry> all, Diagnostics& diagnostics,
+                 const Places& places) {
+  const auto check = [&](const std::string& section, const std::string& bus_name, std::string_view model,
+                         BusKind kind) {
+    const auto* bus = find_bus(all, bus_name);
+    const auto path = section + ".bus";
+    if (bus == nullptr || bus->kind == kind || !places.usable(path) || !places.usable(section + ".model") ||
+        !places.usable("buses." + bus_name))
+      return;
+    const bool on_can = bus->kind == BusKind::canopen;
+    diagnostics.add(places.mark(path),
+                    fmt::format("model {} cannot be on bus '{}', which is {}", model, bus_name,
+                                on_can ? "a CAN network" : "an RS-485 line"),
+                    on_can ? "name a bus of the kind modbus_rtu" : "name a bus of the kind canopen");
+  };
+  for (const auto& [axis, simulation] : configuration.axes)
+    if (const auto* model = find_drive_model(axis.model))
+      check("axes." + axis.name, axis.bus, axis.model, model->bus);
+  for (const auto& device : configuration.devices)
+    check("devices." + device.name, device.bus,
+          device.kind == BusKind::canopen ? "canopen-generic" : "modbus-generic", device.kind);
+}
+
+void check_drive_counts(const Configuration& configuration, std::span<const BusEntry> all,
+                        Diagnostics& diagnostics, const Places& places) {
   std::map<std::string_view, int> counts;
   for (const auto& [axis, simulation] : configuration.axes) {
     const auto path = fmt::format("axes.{}.bus", axis.name);
-    if (!places.usable(path) || ++counts[axis.bus] != most + 1) continue;
+    const auto* bus = find_bus(all, axis.bus);
+    if (bus == nullptr || !places.usable(path)) continue;
+    const int most = bus->kind == BusKind::modbus_rtu ? 30 : 32;  // manuals of both kinds, 4.4
+    if (++counts[axis.bus] != most + 1) continue;
     diagnostics.add(places.mark(path), fmt::format("bus '{}' has more than {} drives", axis.bus, most),
-                    "put the rest on another line");
+                    "put the rest on another bus");
   }
 }
 
-void check_bauds(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+void check_rates(const Configuration& configuration, std::span<const BusEntry> all, Diagnostics& diagnostics,
+                 const Places& places) {
   std::set<std::pair<std::string, std::string>> reported;  // bus and model
   for (const auto& [axis, simulation] : configuration.axes) {
     const auto* model = find_drive_model(axis.model);
-    const auto bus = std::ranges::find(configuration.lines, axis.bus, &modbus_rtu::LineSettings::name);
-    if (model == nullptr || bus == configuration.lines.end()) continue;
-    const auto path = fmt::format("buses.{}.modbus_rtu.baud", bus->name);
-    if (!places.usable(path) || std::ranges::find(model->bauds, bus->baud) != model->bauds.end()) continue;
+    const auto* bus = find_bus(all, axis.bus);
+    if (model == nullptr || bus == nullptr || model->bus != bus->kind) continue;
+    const auto path = bus->path(bus->rate_key);
+    if (!places.usable(path) || std::ranges::find(model->bauds, bus->rate) != model->bauds.end()) continue;
     if (!reported.emplace(bus->name, axis.model).second) continue;
     std::vector<std::string> texts;
-    for (const auto baud : model->bauds) texts.push_back(std::to_string(baud));
+    for (const auto rate : model->bauds) texts.push_back(std::to_string(rate));
     const auto permitted = names_of(texts, [](const std::string& text) -> std::string_view { return text; });
-    diagnostics.add(
-        places.mark(path),
-        fmt::format("model {} of axis '{}' cannot be set to {} baud", axis.model, axis.name, bus->baud),
-        "permitted: " + alternatives(permitted));
+    diagnostics.add(places.mark(path),
+                    fmt::format("model {} of axis '{}' cannot be set to {} {}", axis.model, axis.name,
+                                bus->rate, bus->kind == BusKind::modbus_rtu ? "baud" : "bit/s"),
+                    "permitted: " + alternatives(permitted));
   }
 }
 
-void check_simulation(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+void check_simulation(const Configuration& configuration, std::span<const BusEntry> all,
+                      Diagnostics& diagnostics, const Places& places) {
   for (const auto& [axis, simulation] : configuration.axes) {
     const auto path = fmt::format("axes.{}.simulate", axis.name);
-    const auto bus = std::ranges::find(configuration.lines, axis.bus, &modbus_rtu::LineSettings::name);
-    if (!places.given(path) || bus == configuration.lines.end() || bus->simulated()) continue;
-    if (!places.usable(fmt::format("buses.{}.modbus_rtu.port", bus->name))) continue;
+    const auto* bus = find_bus(all, axis.bus);
+    if (!places.given(path) || bus == nullptr || bus->simulated) continue;
+    if (!places.usable(bus->path(bus->port_key))) continue;
     diagnostics.add(places.mark(path),
                     fmt::format("'simulate' has no effect: bus '{}' is not simulated", bus->name),
-                    "leave it out, or set port: sim");
+                    fmt::format("leave it out, or set {}: sim", bus->port_key));
   }
 }
 
 }  // namespace
 
 void check_machine(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+  const auto all = buses(configuration);
   check_server(configuration, diagnostics, places);
-  check_ports(configuration, diagnostics, places);
-  check_bus_names(configuration, diagnostics, places);
+  check_ports(all, diagnostics, places);
+  check_bus_names(configuration, all, diagnostics, places);
+  check_kinds(configuration, all, diagnostics, places);
   check_nodes(configuration, diagnostics, places);
-  check_drive_counts(configuration, diagnostics, places);
-  check_bauds(configuration, diagnostics, places);
-  check_simulation(configuration, diagnostics, places);
+  check_drive_counts(configuration, all, diagnostics, places);
+  check_rates(configuration, all, diagnostics, places);
+  check_simulation(configuration, all, diagnostics, places);
 }
 
 }  // namespace axisd::config

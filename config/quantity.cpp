@@ -247,6 +247,23 @@ QuantityResult<Decimal> parse_ratio_in_unit(std::string_view text, std::string_v
   return ratio;
 }
 
+QuantityResult<std::uint32_t> parse_object_address(std::string_view text) {
+  const auto hexadecimal = [](std::string_view digits, std::size_t longest) -> std::optional<std::uint32_t> {
+    std::uint32_t value = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
+    const bool whole = error == std::errc() && end == digits.data() + digits.size();
+    return whole && digits.size() <= longest ? std::optional(value) : std::nullopt;
+  };
+  if (text.starts_with("0x")) {
+    if (const auto address = hexadecimal(text.substr(2), 6)) return *address;
+  } else if (text.size() == 8 && text.substr(4, 2) == "h:") {
+    const auto index = hexadecimal(text.substr(0, 4), 4), sub_index = hexadecimal(text.substr(6), 2);
+    if (index && sub_index) return *index << 8U | *sub_index;
+  }
+  return wrong(fmt::format("{} is no object address", quoted(text)),
+               "write index and sub-index, both hexadecimal, such as 6041h:00");
+}
+
 std::string format_number(double value) { return fmt::format("{:.9g}", value); }
 
 std::string format_duration(Duration duration) {
@@ -256,6 +273,10 @@ std::string format_duration(Duration duration) {
   }
   return duration.count() == 0 ? "0 ms"
                                : fmt::format("{} {}", duration.count() / best.nanoseconds, best.name);
+}
+
+std::string format_object_address(std::uint32_t address) {
+  return fmt::format("{:04X}h:{:02X}", address >> 8U, address & 0xFFU);
 }
 
 }  // namespace axisd::config

@@ -46,9 +46,14 @@ QuantityResult<Decimal> parse_ratio(std::string_view text);
 /// A decimal or ratio in this unit: "5 mm/rev", "22/7 mm/rev". Greater than zero.
 QuantityResult<Decimal> parse_ratio_in_unit(std::string_view text, std::string_view unit);
 
+/// An object of a CANopen node, "6041h:00" or "0x604100": its index << 8 | sub-index, at most 0xFFFFFF.
+QuantityResult<std::uint32_t> parse_object_address(std::string_view text);
+
 /// Up to 9 significant digits, without trailing zeros: 100, 0.25, 33.3333333.
 std::string format_number(double value);
 /// "150 ms", "2 s": in the largest unit that needs no fraction.
 std::string format_duration(Duration duration);
+/// "6041h:00"
+std::string format_object_address(std::uint32_t address);
 
 }  // namespace axisd::config

@@ -12,7 +12,6 @@ namespace axisd::config {
 namespace {
 
 /// What is known, but not part of this release: says so instead of guessing at a typing error.
-constexpr std::string_view canopen = "canopen";
 constexpr std::string_view on_lease_loss = "on_lease_loss";
 
 std::vector<std::string_view> keys_of(std::span<const KeySpec> keys) {
@@ -102,11 +101,6 @@ void Reader::check_keys(std::span<const Entry> entries, std::span<const KeySpec>
   for (const auto& [key, value] : entries) {
     if (find(keys, key.text) != nullptr) continue;
     const auto here = join(path, printable(key.text));
-    if (key.text == canopen && find(keys, "modbus_rtu") != nullptr) {
-      report(here, key.mark, "bus kind 'canopen' is not supported by this release", "supported: modbus_rtu");
-      probably_meant.insert("modbus_rtu");
-      continue;
-    }
     if (key.text == on_lease_loss && find(keys, "homing") != nullptr) {
       // A machine builder who reads it in the file would rely on it.
       report(here, key.mark, "'on_lease_loss' is not supported by this release, which has no leases",
@@ -190,6 +184,25 @@ void Reader::read_value(const KeySpec& spec, const Node& value, const std::strin
   if (spec.apply != nullptr) spec.apply(target_, *parsed);
 }
 
+void Reader::check_one_of(const KeySpec& spec, const Node& key, const Node& section,
+                          const std::string& path) {
+  const auto known = alternatives(keys_of(spec.children));
+  const KeySpec* first = nullptr;
+  for (const auto& [name, value] : section.entries) {
+    const auto* child = find(spec.children, name->text);
+    if (child == nullptr || child == first) continue;
+    if (first == nullptr) {
+      first = child;
+      continue;
+    }
+    report(path, name->mark, fmt::format("{} has both '{}' and '{}'", path, first->key, child->key),
+           fmt::format("leave one out: it is either {}", known));
+    return;
+  }
+  if (first == nullptr && places_.clean(path))
+    report(path, key.mark, fmt::format("{} is of no kind", path), fmt::format("write {} below it", known));
+}
+
 std::optional<Value> Reader::read_section_key(const KeySpec& spec, const Node& key, const std::string& path) {
   if (spec.kind == Kind::named_sections) {
     if (key.text.size() <= longest_name && matches(key.text, name_pattern)) return Value{.text = key.text};
@@ -217,6 +230,7 @@ void Reader::read_sections(const KeySpec& spec, const Node& value, const std::st
     const auto outside = target_;
     spec.apply(target_, *name);
     read_section(section, key.mark, spec.children, here);
+    if (spec.one_of) check_one_of(spec, key, section, here);
     target_ = outside;
   }
 }

@@ -58,6 +58,8 @@ class Reader {
   void read_value(const KeySpec& spec, const Node& value, const std::string& path);
   /// Sections under names or numbers.
   void read_sections(const KeySpec& spec, const Node& value, const std::string& path);
+  /// Reports a section that has none or several of the keys of which it must have one.
+  void check_one_of(const KeySpec& spec, const Node& key, const Node& section, const std::string& path);
   /// The name or number of a section; reports what is neither.
   std::optional<Value> read_section_key(const KeySpec& spec, const Node& key, const std::string& path);
   // Of a model (model_keys.cpp).

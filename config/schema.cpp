@@ -70,7 +70,7 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .example = "/dev/serial/by-id/usb-FTDI_0002",
      .pattern = "sim|/.+",
      .pattern_hint = "write an absolute path such as /dev/ttyUSB0, or sim",
-     .apply = [](Target& t, const Value& v) { t.bus->port = v.text; }},
+     .apply = [](Target& t, const Value& v) { t.line->port = v.text; }},
     {.key = "baud",
      .kind = Kind::integer,
      .description = "Bit rate, as set at the drives.",
@@ -78,7 +78,7 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .default_value = "115200",
      .minimum = 1200,
      .maximum = 1'000'000,
-     .apply = [](Target& t, const Value& v) { t.bus->baud = static_cast<int>(v.integer); }},
+     .apply = [](Target& t, const Value& v) { t.line->baud = static_cast<int>(v.integer); }},
     {.key = "format",
      .kind = Kind::choice,
      .description = "Data bits, parity and stop bits, as set at the drives.",
@@ -86,7 +86,7 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .default_value = "8N1",
      .choices = formats,
      .apply = [](Target& t,
-                 const Value& v) { t.bus->format = format_values[choice_index(formats, v.text)]; }},
+                 const Value& v) { t.line->format = format_values[choice_index(formats, v.text)]; }},
     {.key = "turnaround_max",
      .kind = Kind::duration,
      .description =
@@ -95,15 +95,64 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .default_value = "20 ms",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t, const Value& v) { t.bus->turnaround_max = v.duration; }},
+     .apply = [](Target& t, const Value& v) { t.line->turnaround_max = v.duration; }},
+};
+
+constexpr KeySpec canopen_keys[] = {
+    {.key = "interface",
+     .kind = Kind::text,
+     .required = true,
+     .description =
+         "Network interface, which somebody else configures and sets up (deploy/); or 'sim' for simulated "
+         "drives.",
+     .example = "can1",
+     .pattern = "[A-Za-z][A-Za-z0-9_.-]{0,14}",
+     .pattern_hint = "write the name of a network interface such as can0, or sim",
+     .apply = [](Target& t, const Value& v) { t.network->interface = v.text; }},
+    {.key = "bitrate",
+     .kind = Kind::integer,
+     .description = "In bit/s, as set at the drives and at the interface; axisd does not change it.",
+     .example = "500000",
+     .default_value = "1000000",
+     .minimum = 10'000,
+     .maximum = 1'000'000,
+     .apply = [](Target& t, const Value& v) { t.network->bitrate = static_cast<std::uint32_t>(v.integer); }},
+    {.key = "sync_period",
+     .kind = Kind::duration,
+     .description = "How often axisd sends SYNC. Without it there is none, and drives report by events.",
+     .example = "20 ms",
+     .minimum = 1,
+     .maximum = 1000,
+     .apply = [](Target& t, const Value& v) { t.network->sync_period = v.duration; }},
+    {.key = "sdo_timeout",
+     .kind = Kind::duration,
+     .description = "Longest time that a node takes to answer an SDO request.",
+     .example = "250 ms",
+     .default_value = "100 ms",
+     .minimum = 5,
+     .maximum = 5000,
+     .apply = [](Target& t, const Value& v) { t.network->sdo_timeout = v.duration; }},
 };
 
 constexpr KeySpec bus_keys[] = {
     {.key = "modbus_rtu",
      .kind = Kind::section,
-     .required = true,
      .description = "An RS-485 line.",
-     .children = modbus_rtu_keys},
+     .children = modbus_rtu_keys,
+     .apply =
+         [](Target& t, const Value&) {
+           t.line = &t.configuration->lines.emplace_back();
+           t.line->name = t.bus_name;
+         }},
+    {.key = "canopen",
+     .kind = Kind::section,
+     .description = "A CAN network.",
+     .children = canopen_keys,
+     .apply =
+         [](Target& t, const Value&) {
+           t.network = &t.configuration->networks.emplace_back();
+           t.network->name = t.bus_name;
+         }},
 };
 
 }  // namespace
@@ -133,13 +182,10 @@ std::span<const KeySpec> schema() {
       {.key = "buses",
        .kind = Kind::named_sections,
        .required = true,
-       .description = "The wires, by name.",
+       .one_of = true,
+       .description = "The wires, by name, each of one kind.",
        .children = bus_keys,
-       .apply =
-           [](Target& t, const Value& v) {
-             t.bus = &t.configuration->lines.emplace_back();
-             t.bus->name = v.text;
-           }},
+       .apply = [](Target& t, const Value& v) { t.bus_name = v.text; }},
       {.key = "axes",
        .kind = Kind::named_sections,
        .may_be_empty = true,  // a machine builder starts with the buses and scans them

@@ -53,13 +53,15 @@ struct Value {
 /// Where values go. All but `configuration` are set inside of one only.
 struct Target {
   Configuration* configuration = nullptr;
-  modbus_rtu::LineSettings* bus = nullptr;
+  std::string bus_name = {};
+  modbus_rtu::LineSettings* line = nullptr;
+  canopen::NetworkSettings* network = nullptr;
   AxisEntry* axis = nullptr;
   TerminalSettings* terminal = nullptr;
   PositionSegment* position_segment = nullptr;
   VelocitySegment* velocity_segment = nullptr;
   DeviceSettings* device = nullptr;
-  RegisterSettings* device_register = nullptr;
+  ValueSettings* device_value = nullptr;
 };
 
 struct KeySpec {
@@ -67,6 +69,7 @@ struct KeySpec {
   Kind kind = Kind::text;
   bool required = false;
   bool may_be_empty = false;   ///< of named_sections
+  bool one_of = false;         ///< of named_sections: each has exactly one of the `children`
   bool above_minimum = false;  ///< the minimum itself is excluded
   std::string_view description = {};
   std::string_view example = {};  ///< as written in YAML; never the default

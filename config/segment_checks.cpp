@@ -28,6 +28,10 @@ std::vector<int> numbers_of(const std::vector<Segment>& segments) {
 }  // namespace
 
 void AxisChecks::check_segments() {
+  if (model_ != nullptr && model_->capabilities.maximum_segments == 0) {
+    add("segments", fmt::format("model {} has no table of segments", axis_.model), "leave it out");
+    return;
+  }
   const auto& segments = *axis_.segments;
   if (!given(positions) && !given(velocities) && !given("segments.mode") && clean("segments"))
     add("segments", "'segments' is empty", "add positions or velocities, or leave it out");

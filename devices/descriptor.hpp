@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,6 +14,7 @@
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
 #include "buses/task.hpp"
+#include "devices/bus_kind.hpp"
 #include "devices/drive.hpp"
 
 namespace axisd {
@@ -23,8 +25,6 @@ class RtuBus;
 namespace canopen {
 class CanopenBus;
 }
-
-enum class BusKind : std::uint8_t { modbus_rtu, canopen };
 
 struct TerminalSpec {
   std::string_view name;  ///< "X0"; its index in the list is its bit in DriveSample
@@ -95,6 +95,13 @@ struct RtuIdentification {
   std::span<const std::int32_t> microstep_codes;  ///< pulses per revolution in the order of the codes
 };
 
+/// How a CANopen model is told from others: its device type (1000h) and identity (1018h).
+struct CanIdentification {
+  std::uint32_t vendor = 0, product = 0;
+  std::uint32_t device_type = 0;  ///< low 16 bits: profile (402)
+  [[nodiscard]] constexpr std::uint16_t profile() const { return static_cast<std::uint16_t>(device_type); }
+};
+
 /// Ranges that hold for every command of this model.
 struct Capabilities {
   std::span<const std::int32_t> pulses_per_revolution;  ///< permitted microstep settings
@@ -105,6 +112,9 @@ struct Capabilities {
   int minimum_homing_rpm = 5, maximum_homing_rpm = 3000, minimum_search_rpm = 5, maximum_search_rpm = 300;
   int minimum_homing_time_ms = 30;
   std::int32_t maximum_homing_offset_pulses = 65535;
+  /// Of targets and distances of single motions, as the drive counts them.
+  std::int32_t minimum_target_pulses = std::numeric_limits<std::int32_t>::min();
+  std::int32_t maximum_target_pulses = std::numeric_limits<std::int32_t>::max();
   int maximum_segments = 16;  ///< of positions and velocities that the inputs can select
   int minimum_segment_time_ms = 30;
   /// The last approach to a home switch follows the search; else an inverted axis cannot use these methods
@@ -137,7 +147,8 @@ struct DriveDescriptor {
   std::span<const AlarmSpec> alarms;
   std::span<const SettingSpec> settings;
   Capabilities capabilities;
-  RtuIdentification identification{};
+  RtuIdentification identification{};                     ///< of modbus_rtu models
+  std::optional<CanIdentification> can_identification{};  ///< of canopen models; nothing: it cannot be told
   std::unique_ptr<Drive> (*make)(DriveContext context) = nullptr;
 };
 

@@ -121,7 +121,7 @@ std::vector<DeviceSnapshotPtr> BusAccessService::devices() const {
 
 void BusAccessService::write_device(std::string device, std::string name, double value,
                                     std::function<void(Result<double>)> callback) {
-  auto run = [](ModbusDevice& found, std::string register_name, double wanted, auto done) -> Task<> {
+  auto run = [](Device& found, std::string register_name, double wanted, auto done) -> Task<> {
     done(co_await found.write(std::move(register_name), wanted));
   };
   post(executor_, [this, run, device = std::move(device), name = std::move(name), value,

@@ -8,6 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "devices/generic/canopen_device.hpp"
+#include "devices/generic/modbus_device.hpp"
+
 namespace axisd::core {
 
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
@@ -62,9 +65,15 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
       spdlog::warn("{}: load: vertical, but no output has the function brake", settings.name);  // M2
   }
   for (const auto& settings : configuration.devices) {
-    auto* bus = find_line(settings.bus);
-    if (bus == nullptr) throw std::invalid_argument(fmt::format("device {}: unknown bus", settings.name));
-    devices_.push_back(std::make_unique<ModbusDevice>(parts_.executor, *parts_.clock, *bus, settings));
+    auto* line = find_line(settings.bus);
+    auto* network = find_network(settings.bus);
+    if (settings.kind == BusKind::modbus_rtu && line != nullptr) {
+      devices_.push_back(std::make_unique<ModbusDevice>(parts_.executor, *parts_.clock, *line, settings));
+    } else if (settings.kind == BusKind::canopen && network != nullptr) {
+      devices_.push_back(std::make_unique<CanopenDevice>(parts_.executor, *parts_.clock, *network, settings));
+    } else {
+      throw std::invalid_argument(fmt::format("device {}: no bus for it", settings.name));
+    }
   }
 }
 

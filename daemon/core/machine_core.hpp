@@ -13,7 +13,7 @@
 #include "daemon/core/event_log.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
-#include "devices/generic/modbus_device.hpp"
+#include "devices/generic/device.hpp"
 #include "devices/machine.hpp"
 #include "devices/persistence.hpp"
 
@@ -56,7 +56,7 @@ class MachineCore {
   /// The same, if it is a CAN network.
   [[nodiscard]] canopen::CanopenBus* find_network(std::string_view bus) const;
   /// Nodes that are not axes, in the order of the file.
-  [[nodiscard]] const std::vector<std::unique_ptr<ModbusDevice>>& devices() const { return devices_; }
+  [[nodiscard]] const std::vector<std::unique_ptr<Device>>& devices() const { return devices_; }
   [[nodiscard]] CommandBook& book() { return book_; }
   [[nodiscard]] EventLog& events() { return events_; }
 
@@ -92,7 +92,7 @@ class MachineCore {
   std::vector<std::unique_ptr<canopen::CanopenBus>> networks_;
   std::vector<Bus*> buses_;
   std::vector<std::unique_ptr<Axis>> axes_;
-  std::vector<std::unique_ptr<ModbusDevice>> devices_;
+  std::vector<std::unique_ptr<Device>> devices_;
   int sequences_ = 0;  ///< launched ones that still run
   std::map<std::string, Axis*, std::less<>> by_name_;
 };

@@ -1,97 +1,66 @@
 #include "devices/generic/modbus_device.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <boost/smart_ptr/make_shared.hpp>
+#include <span>
 #include <utility>
 
 namespace axisd {
 
 namespace {
 
-TransactionOptions in(TransactionClass transaction_class) { return {.transaction_class = transaction_class}; }
+const TransactionOptions parameters{.transaction_class = TransactionClass::parameters};
+
+std::uint16_t register_of(const ValueSettings& value) { return static_cast<std::uint16_t>(value.address); }
 
 }  // namespace
 
 ModbusDevice::ModbusDevice(Executor executor, Clock& clock, modbus_rtu::RtuBus& bus, DeviceSettings settings)
-    : executor_(std::move(executor)),
-      clock_(&clock),
-      node_(bus, settings.node),
-      settings_(std::move(settings)),
-      blocks_(blocks_of(settings_.registers)),
-      wake_(executor_, clock),
-      values_(settings_.registers.size()) {
-  publish();
-}
+    : Device(std::move(executor), clock, bus, std::move(settings)),
+      node_(bus, this->settings().node),
+      blocks_(blocks_of(this->settings().values)) {}
 
-void ModbusDevice::start() {
-  polling_ = true;
-  spawn(executor_, run(), fmt::format("{} poll", settings_.name));
-}
-
-void ModbusDevice::close() {
-  closing_ = true;
-  wake_.notify_all();
-}
-
-Task<Result<double>> ModbusDevice::write(std::string name, double value) {
-  const auto found = std::ranges::find(settings_.registers, name, &RegisterSettings::name);
-  if (found == settings_.registers.end()) co_return fail(unknown_register(name));
-  if (!found->writable)
-    co_return fail(Reason::invalid_argument, fmt::format("{}.{} is not writable", settings_.name, name),
-                   "say `access: rw` for it in the configuration if the device permits it");
-  const auto raw = encode(*found, value);
-  if (!raw) co_return fail(with_name(raw.error()));
-  auto sending = raw->size() == 1
-                     ? node_.write(found->address, raw->front(), in(TransactionClass::parameters))
-                     : node_.write_block(found->address, *raw, in(TransactionClass::parameters));
-  const auto written = co_await std::move(sending);
-  if (!written) co_return fail(with_name(written.error()));
-  const auto back = co_await node_.read_patiently(found->address, register_count(found->type),
-                                                  in(TransactionClass::parameters));
-  if (!back) co_return fail(with_name(back.error()));
-  const auto actual = decode(*found, back->registers);
-  values_[static_cast<std::size_t>(found - settings_.registers.begin())] = actual;
-  measured_at_ = back->answered_at;
-  publish();
-  if (back->registers == *raw) co_return actual;
-  co_return fail(with_name(
-      {.reason = Reason::misconfigured,
-       .message = fmt::format("{} reads {} after {} was written", name, actual, decode(*found, *raw)),
-       .remedy = "check the range that the device permits, and whether something else writes to it",
-       .outcome = Outcome::not_executed,
-       .where = {.bus = settings_.bus, .node = settings_.node, .object = found->address}}));
-}
-
-Error ModbusDevice::with_name(Error error) const {
-  const auto prefix = settings_.name + ": ";
-  if (!error.message.starts_with(prefix)) error.message.insert(0, prefix);
-  return error;
-}
-
-Error ModbusDevice::unknown_register(std::string_view name) const {
-  std::string known;
-  for (const auto& one : settings_.registers) known += (known.empty() ? "" : ", ") + one.name;
-  return {.reason = Reason::invalid_argument,
-          .message = fmt::format("{} has no register '{}'", settings_.name, name),
-          .remedy = fmt::format("it has: {}", known)};
-}
-
-void ModbusDevice::publish() {
-  auto next = boost::make_shared<DeviceSnapshot>();
-  next->name = settings_.name;
-  next->bus = settings_.bus;
-  next->node = settings_.node;
-  next->link = link_;
-  next->error = error_;
-  for (std::size_t i = 0; i < values_.size(); ++i) {
-    const auto& one = settings_.registers[i];
-    next->values.push_back(
-        {.name = one.name, .unit = one.unit, .value = values_[i], .writable = one.writable});
+Task<Result<void>> ModbusDevice::poll_once() {
+  Result<void> first;
+  for (const auto& block : blocks_) {
+    auto result = co_await read_block(block);
+    if (closing()) co_return first;
+    if (!result && !is_answer(result.error())) co_return result;
+    if (!result && first) first = std::move(result);
   }
-  if (measured_at_ != TimePoint{}) next->measured_at = clock_->wall(measured_at_);
-  snapshot_.store(std::move(next));
+  co_return first;
+}
+
+Task<Result<void>> ModbusDevice::read_block(const RegisterBlock& block) {
+  const auto answer = co_await node_.read(block.address, block.count, {.transaction_class = poll_class()});
+  if (!answer) {
+    if (is_answer(answer.error()))
+      for (const auto i : block.values) forget(i);
+    co_return fail(with_name(answer.error()));
+  }
+  const std::span<const std::uint16_t> registers = answer->registers;
+  for (const auto i : block.values) {
+    const auto& one = settings().values[i];
+    const auto raw = registers.subspan(register_of(one) - block.address, register_count(one.type));
+    keep(i, {.raw = from_registers(raw), .at = answer->answered_at});
+  }
+  co_return Result<void>{};
+}
+
+Task<Result<void>> ModbusDevice::write_raw(std::size_t index, std::uint32_t raw) {
+  const auto& value = settings().values[index];
+  const auto words = to_registers(raw, value.type);
+  auto sending = words.size() == 1 ? node_.write(register_of(value), words.front(), parameters)
+                                   : node_.write_block(register_of(value), words, parameters);
+  const auto written = co_await std::move(sending);
+  if (!written) co_return fail(written.error());
+  co_return Result<void>{};
+}
+
+Task<Result<Device::Reading>> ModbusDevice::read_raw(std::size_t index) {
+  const auto& value = settings().values[index];
+  const auto answer =
+      co_await node_.read_patiently(register_of(value), register_count(value.type), parameters);
+  if (!answer) co_return fail(answer.error());
+  co_return Reading{.raw = from_registers(answer->registers), .at = answer->answered_at};
 }
 
 }  // namespace axisd

@@ -96,10 +96,11 @@ void dump_segments(Dump& dump, const SegmentSettings& segments) {
 void dump_device(Dump& dump, const DeviceSettings& device) {
   dump.enter(fmt::format("devices.{}", device.name));
   dump.field("bus", device.bus);
+  dump.field("kind", device.kind);
   dump.field("node", device.node);
   dump.field("poll", device.poll);
-  for (const auto& entry : device.registers) {
-    const auto path = fmt::format("registers.{}.", entry.name);
+  for (const auto& entry : device.values) {
+    const auto path = fmt::format("values.{}.", entry.name);
     dump.field(path + "address", entry.address);
     dump.field(path + "type", entry.type);
     dump.field(path + "scale", entry.scale);
@@ -152,6 +153,13 @@ std::string dump(const Configuration& configuration) {
     dump.field("parity", bus.format.parity);
     dump.field("stop_bits", bus.format.stop_bits);
     dump.field("turnaround_max", bus.turnaround_max);
+  }
+  for (const auto& bus : configuration.networks) {
+    dump.enter(fmt::format("buses.{}", bus.name));
+    dump.field("interface", bus.interface);
+    dump.field("bitrate", bus.bitrate);
+    dump.field("sync_period", bus.sync_period);
+    dump.field("sdo_timeout", bus.sdo_timeout);
   }
   for (const auto& [axis, simulation] : configuration.axes) {
     dump_axis(dump, axis);

@@ -226,17 +226,73 @@ devices:
   EXPECT_EQ(oven.bus, "a");
   EXPECT_EQ(oven.node, 247);
   EXPECT_EQ(oven.poll, 500ms);
-  ASSERT_EQ(oven.registers.size(), 3U);
-  EXPECT_EQ(oven.registers[0].address, 0xFFFE);
-  EXPECT_EQ(oven.registers[0].type, RegisterType::f32);
-  EXPECT_EQ(oven.registers[0].unit, "%");
-  EXPECT_FALSE(oven.registers[0].writable);
-  EXPECT_EQ(oven.registers[1].address, 16);
-  EXPECT_EQ(oven.registers[1].type, RegisterType::i16);
-  EXPECT_EQ(oven.registers[1].scale, -0.25);
-  EXPECT_TRUE(oven.registers[1].writable);
-  EXPECT_EQ(oven.registers[2].type, RegisterType::u32);
-  EXPECT_EQ(oven.registers[2].scale, 1);
+  ASSERT_EQ(oven.values.size(), 3U);
+  EXPECT_EQ(oven.values[0].address, 0xFFFE);
+  EXPECT_EQ(oven.values[0].type, ValueType::f32);
+  EXPECT_EQ(oven.values[0].unit, "%");
+  EXPECT_FALSE(oven.values[0].writable);
+  EXPECT_EQ(oven.values[1].address, 16);
+  EXPECT_EQ(oven.values[1].type, ValueType::i16);
+  EXPECT_EQ(oven.values[1].scale, -0.25);
+  EXPECT_TRUE(oven.values[1].writable);
+  EXPECT_EQ(oven.values[2].type, ValueType::u32);
+  EXPECT_EQ(oven.values[2].scale, 1);
+}
+
+TEST(Loader, NetworksStandBesideLines) {
+  const auto result = load_text(R"(machine: m
+buses:
+  can1: { canopen: { interface: sim } }
+  line-a: { modbus_rtu: { port: sim } }
+  can0: { canopen: { interface: can0.1, bitrate: 500000, sync_period: 10ms, sdo_timeout: 50 ms } }
+)",
+                                "m.yaml");
+  ASSERT_TRUE(result.configuration) << findings(result);
+  EXPECT_EQ(result.configuration->lines.size(), 1U);
+  const auto& networks = result.configuration->networks;
+  ASSERT_EQ(networks.size(), 2U);
+  EXPECT_EQ(networks[0].name, "can1");
+  EXPECT_TRUE(networks[0].simulated());
+  EXPECT_EQ(networks[0].bitrate, 1'000'000U);
+  EXPECT_EQ(networks[0].sync_period, Duration{}) << "none is sent";
+  EXPECT_EQ(networks[0].sdo_timeout, 100ms);
+  EXPECT_EQ(networks[1].name, "can0");
+  EXPECT_EQ(networks[1].interface, "can0.1");
+  EXPECT_FALSE(networks[1].simulated());
+  EXPECT_EQ(networks[1].bitrate, 500'000U);
+  EXPECT_EQ(networks[1].sync_period, 10ms);
+  EXPECT_EQ(networks[1].sdo_timeout, 50ms);
+}
+
+TEST(Loader, DevicesHaveObjectsByName) {
+  const auto result = load_text(R"(machine: m
+buses: { can0: { canopen: { interface: sim } } }
+devices:
+  valves:
+    bus: can0
+    node: 127
+    model: canopen-generic
+    poll: 50 ms
+    objects:
+      open: { object: 62fFh:0A, type: u8, access: rw }
+      pressure: { object: 6401h:02, type: i16, scale: 0.01, unit: bar }
+)",
+                                "m.yaml");
+  ASSERT_TRUE(result.configuration) << findings(result);
+  ASSERT_EQ(result.configuration->devices.size(), 1U);
+  const auto& valves = result.configuration->devices[0];
+  EXPECT_EQ(valves.kind, BusKind::canopen);
+  EXPECT_EQ(valves.node, 127);
+  EXPECT_EQ(valves.poll, 50ms);
+  ASSERT_EQ(valves.values.size(), 2U);
+  EXPECT_EQ(valves.values[0].address, 0x62FF0AU);
+  EXPECT_EQ(valves.values[0].type, ValueType::u8);
+  EXPECT_TRUE(valves.values[0].writable);
+  EXPECT_EQ(valves.values[1].address, 0x640102U);
+  EXPECT_EQ(valves.values[1].type, ValueType::i16);
+  EXPECT_EQ(valves.values[1].scale, 0.01);
+  EXPECT_EQ(valves.values[1].unit, "bar");
+  EXPECT_FALSE(valves.values[1].writable);
 }
 
 TEST(Loader, ReferenceLoads) {

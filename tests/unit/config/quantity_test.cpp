@@ -127,5 +127,20 @@ TEST(Quantity, Formats) {
   EXPECT_EQ(format_duration(3ns), "3 ns");
 }
 
+TEST(Quantity, ObjectAddresses) {
+  EXPECT_EQ(parse_object_address("6041h:00").value(), 0x604100U);
+  EXPECT_EQ(parse_object_address("1a0Fh:fE").value(), 0x1A0FFEU);
+  EXPECT_EQ(parse_object_address("0x604100").value(), 0x604100U);
+  EXPECT_EQ(parse_object_address("0xFFFFFF").value(), 0xFFFFFFU);
+  EXPECT_EQ(format_object_address(0x604100), "6041h:00");
+  EXPECT_EQ(format_object_address(0x1A0FFE), "1A0Fh:FE");
+  for (const auto* text : {"", "6041", "6041:00", "6041h", "6041h:0", "6041h:000", "h:", "60g1h:00",
+                           "6041h:-1", "+041h:00", "0x", "0x1000000", "0x6041h:00", "24641"}) {
+    const auto address = parse_object_address(text);
+    ASSERT_FALSE(address) << text;
+    EXPECT_EQ(address.error().suggestion, "write index and sub-index, both hexadecimal, such as 6041h:00");
+  }
+}
+
 }  // namespace
 }  // namespace axisd::config

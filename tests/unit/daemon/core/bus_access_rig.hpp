@@ -37,7 +37,7 @@ class BusAccessRig : public testing::Test {
                                       .bus = "line-a",
                                       .node = 9,
                                       .poll = 500ms,
-                                      .registers = {{.name = "level", .address = 1, .writable = true}}});
+                                      .values = {{.name = "level", .address = 1, .writable = true}}});
     machine_ = std::make_unique<MachineCore>(
         MachineParts{.executor = world_.executor(),
                      .clock = &world_.clock(),

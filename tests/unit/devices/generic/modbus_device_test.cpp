@@ -28,10 +28,9 @@ class ModbusDeviceTest : public testing::Test {
         .bus = "a",
         .node = 9,
         .poll = 100ms,
-        .registers = {
-            {.name = "offset", .address = 1, .type = RegisterType::i16},
-            {.name = "count", .address = 2, .type = RegisterType::u32, .writable = true},
-            {.name = "temperature", .address = 20, .scale = 0.5, .unit = "degC", .writable = true}}};
+        .values = {{.name = "offset", .address = 1, .type = ValueType::i16},
+                   {.name = "count", .address = 2, .type = ValueType::u32, .writable = true},
+                   {.name = "temperature", .address = 20, .scale = 0.5, .unit = "degC", .writable = true}}};
   }
   ~ModbusDeviceTest() override {
     if (!device_) return;
@@ -129,7 +128,7 @@ TEST_F(ModbusDeviceTest, OneLostReplyIsNoOutage) {
 }
 
 TEST_F(ModbusDeviceTest, ARefusedRegisterIsNamedAndTheOthersAreReadOn) {
-  device_settings_.registers.push_back({.name = "missing", .address = 50});
+  device_settings_.values.push_back({.name = "missing", .address = 50});
   start();
   const auto snapshot = device_->snapshot();
   EXPECT_EQ(snapshot->link, LinkState::online);
@@ -197,7 +196,7 @@ TEST_F(ModbusDeviceTest, AnUnpluggedAdapterIsSaidAndItComesBack) {
 
 /// Registers apart are read one by one: a late reply of one must never be taken for the other's value.
 TEST_F(ModbusDeviceTest, ALateReplyIsNeverAnotherRegistersValue) {
-  device_settings_.registers = {{.name = "one", .address = 1}, {.name = "other", .address = 20}};
+  device_settings_.values = {{.name = "one", .address = 1}, {.name = "other", .address = 20}};
   node_->registers[21] = 0;
   start();
   for (int delay = 25; delay < 60; ++delay) {
