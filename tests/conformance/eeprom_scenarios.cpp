@@ -22,9 +22,9 @@ std::string restarts(const Setup& setup) {
     bench.pass(2s);
     const auto after_start = bench.eeprom_writes();
     if (persist == "false")
-      EXPECT_LE(after_start, 1U) << "only 0x0016 itself may be saved, if the drive does so";
+      EXPECT_LE(after_start, 1U) << "only the switch of the EEPROM itself may be saved, if the drive does so";
     if (persist != "false") EXPECT_GT(after_start, 0U) << "nothing was saved";
-    // Whether writing 0x0016 is itself saved is not said: the count takes it so.
+    // Whether writing the switch of the EEPROM is itself saved is not said: the count takes it so.
     const auto counted = bench.state().eeprom_writes();
     EXPECT_TRUE(counted >= after_start && counted <= after_start + 2) << counted << " for " << after_start;
     for (int i = 0; i < 2; ++i) {

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "devices/descriptor.hpp"
+
 namespace axisd::conformance {
 
 namespace {
@@ -19,45 +21,85 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
-/// The rows below the heading.
-std::vector<std::vector<std::string>> read(const std::string& name, std::size_t columns) {
+using Row = std::map<std::string, std::string>;
+
+/// The rows below the heading, by its names.
+std::vector<Row> read(const std::string& name) {
   std::ifstream file(std::string(AXISD_SOURCE_DIR "/tests/conformance/manual/") + name);
   if (!file)
     throw std::runtime_error("tests/conformance/manual/" + name + " is missing: read the manual, write it");
-  std::vector<std::vector<std::string>> rows;
+  std::vector<Row> rows;
   std::string line;
   std::getline(file, line);
+  const auto heading = split(line, ',');
   while (std::getline(file, line)) {
-    rows.push_back(split(line, ','));
-    if (rows.back().size() != columns) throw std::runtime_error(name + ": " + line);
+    const auto fields = split(line, ',');
+    if (fields.size() != heading.size()) throw std::runtime_error(name + ": " + line);
+    auto& row = rows.emplace_back();
+    for (std::size_t i = 0; i < fields.size(); ++i) row.emplace(heading[i], fields[i]);
   }
   return rows;
+}
+
+std::uint32_t address_of(const Row& row) {
+  const auto number = [&](const std::string& column) {
+    return static_cast<std::uint32_t>(std::stoul(row.at(column), nullptr, 0));
+  };
+  return row.contains("index") ? number("index") << 8U | number("sub") : number("address");
+}
+
+/// A register's type is not printed: its range tells (manual/README.md).
+std::string type_of(const Row& row, const ManualParameter& of) {
+  if (row.contains("type")) return row.at("type");
+  return of.minimum < 0 && of.maximum <= 32767 ? "I16" : "U16";
 }
 
 }  // namespace
 
 Manual::Manual(std::string model) : model_(std::move(model)) {
-  for (const auto& row : read(model_ + ".csv", 9)) {
-    ManualRegister one{.address = static_cast<std::uint32_t>(std::stoul(row[0], nullptr, 0)),
-                       .access = row[1],
-                       .minimum = std::stoll(row[2]),
-                       .maximum = std::stoll(row[3]),
-                       .default_value = {},
-                       .unit = row[5],
-                       .title = row[6],
-                       .note = row[8]};
-    if (!row[4].empty()) one.default_value = std::stoll(row[4]);
-    registers_.push_back(std::move(one));
+  for (const auto& row : read(model_ + ".csv")) {
+    ManualParameter one{.address = address_of(row),
+                        .type = {},
+                        .access = row.at("access"),
+                        .minimum = std::stoll(row.at("minimum")),
+                        .maximum = std::stoll(row.at("maximum")),
+                        .default_value = {},
+                        .unit = row.at("unit"),
+                        .title = row.at("title"),
+                        .note = row.at("note")};
+    one.type = type_of(row, one);
+    if (!row.at("default").empty()) one.default_value = std::stoll(row.at("default"));
+    parameters_.push_back(std::move(one));
   }
-  for (const auto& row : read(model_ + ".abilities.csv", 3)) abilities_.emplace(row[0], row[1]);
+  for (const auto& row : read(model_ + ".abilities.csv"))
+    abilities_.emplace(row.at("ability"), row.at("value"));
 }
 
-const ManualRegister* Manual::find(std::uint32_t address) const {
-  const auto found = std::ranges::find(registers_, address, &ManualRegister::address);
-  return found == registers_.end() ? nullptr : &*found;
+const ManualParameter* Manual::find(std::uint32_t address) const {
+  const auto found = std::ranges::find(parameters_, address, &ManualParameter::address);
+  return found == parameters_.end() ? nullptr : &*found;
+}
+
+const ManualParameter* Manual::find_title(std::string_view title) const {
+  const auto found = std::ranges::find(parameters_, title, &ManualParameter::title);
+  return found == parameters_.end() ? nullptr : &*found;
 }
 
 std::vector<std::string> Manual::list(const std::string& ability) const { return split(text(ability), ' '); }
+
+std::pair<std::int64_t, std::int64_t> Manual::range(const std::string& ability) const {
+  const auto& ends = text(ability);
+  const auto dots = ends.find("..");
+  return {std::stoll(ends.substr(0, dots), nullptr, 0), std::stoll(ends.substr(dots + 2), nullptr, 0)};
+}
+
+int Manual::highest_baud() const {
+  int highest = 0;
+  const auto switched = list("bauds_dip");
+  for (const auto& one : switched.empty() ? list("bauds_custom") : switched)
+    highest = std::max(highest, std::stoi(one));
+  return highest;
+}
 
 std::map<int, std::string> Manual::alarms() const { return functions("alarm"); }
 
@@ -66,6 +108,13 @@ std::map<int, std::string> Manual::functions(const std::string& prefix) const {
   for (const auto& [key, value] : abilities_)
     if (key.starts_with(prefix + ".")) named.emplace(std::stoi(key.substr(prefix.size() + 1)), value);
   return named;
+}
+
+std::vector<Manual> same_bus(const Manual& manual) {
+  std::vector<Manual> all;
+  for (const auto* model : drive_models())
+    if (Manual one{std::string(model->model)}; one.bus() == manual.bus()) all.push_back(std::move(one));
+  return all;
 }
 
 }  // namespace axisd::conformance

@@ -10,13 +10,17 @@
 
 namespace axisd::conformance {
 
-/// A register of chapter 6.1.
-struct ManualRegister {
-  std::uint32_t address = 0;
-  std::string access;  ///< RO, RW, RW/S, WO
+/// A register of chapter 6.1, or an object of chapter 7.
+struct ManualParameter {
+  std::uint32_t address = 0;  ///< register, or index << 8 | sub-index
+  std::string type;           ///< U8, I8, U16, I16, U32, I32
+  std::string access;         ///< RO, RW, RW/S, WO
   std::int64_t minimum = 0, maximum = 0;
   std::optional<std::int64_t> default_value;
   std::string unit, title, note;
+
+  /// Bits that it has in the drive.
+  [[nodiscard]] std::int64_t mask() const { return (std::int64_t{1} << std::stoi(type.substr(1))) - 1; }
 };
 
 class Manual {
@@ -25,22 +29,36 @@ class Manual {
   explicit Manual(std::string model);
 
   [[nodiscard]] const std::string& model() const { return model_; }
-  [[nodiscard]] const std::vector<ManualRegister>& registers() const { return registers_; }
-  [[nodiscard]] const ManualRegister* find(std::uint32_t address) const;
+  [[nodiscard]] const std::vector<ManualParameter>& parameters() const { return parameters_; }
+  /// nullptr: the manual has none.
+  [[nodiscard]] const ManualParameter* find(std::uint32_t address) const;
+  [[nodiscard]] const ManualParameter* find_title(std::string_view title) const;
   /// Throws std::out_of_range for an ability without a row.
   [[nodiscard]] const std::string& text(const std::string& ability) const { return abilities_.at(ability); }
   [[nodiscard]] std::vector<std::string> list(const std::string& ability) const;
-  [[nodiscard]] std::int64_t number(const std::string& ability) const { return std::stoll(text(ability)); }
+  [[nodiscard]] std::int64_t number(const std::string& ability) const {
+    return std::stoll(text(ability), nullptr, 0);
+  }
   [[nodiscard]] bool says_yes(const std::string& ability) const { return text(ability) == "yes"; }
+  /// Of an ability like "16..127": both ends are within.
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> range(const std::string& ability) const;
   /// Keys after "alarm.": code -> reset rule.
   [[nodiscard]] std::map<int, std::string> alarms() const;
   /// Names by code, of `input_function` or `output_function`.
   [[nodiscard]] std::map<int, std::string> functions(const std::string& prefix) const;
+  /// What is spoken on its wire, as the YAML names it: "modbus_rtu", "canopen".
+  [[nodiscard]] const std::string& bus() const { return text("bus"); }
+  /// bit/s that its switches can be set to, or all that there are where there are no switches for it: the
+  /// highest.
+  [[nodiscard]] int highest_baud() const;
 
  private:
   std::string model_;
-  std::vector<ManualRegister> registers_;
+  std::vector<ManualParameter> parameters_;
   std::map<std::string, std::string> abilities_;
 };
+
+/// Manuals of all models of drive_models() that are on the same kind of bus as `manual`, itself among them.
+std::vector<Manual> same_bus(const Manual& manual);
 
 }  // namespace axisd::conformance

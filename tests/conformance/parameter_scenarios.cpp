@@ -56,10 +56,32 @@ Answer<v1::WriteParametersResponse> write(Bench& bench, const Values& values) {
   return bench.client.call(&v1::DriveService::Stub::WriteParameters, request);
 }
 
-/// The block that each start writes (M6): what it holds at rest is the daemon's canary.
-bool is_motion_block(std::uint32_t address) { return address >= 0x0020 && address <= 0x0025; }
+std::string type_name(v1::ParameterType type) {
+  switch (type) {
+    case v1::PARAMETER_TYPE_UINT8:
+      return "U8";
+    case v1::PARAMETER_TYPE_INT8:
+      return "I8";
+    case v1::PARAMETER_TYPE_UINT16:
+      return "U16";
+    case v1::PARAMETER_TYPE_INT16:
+      return "I16";
+    case v1::PARAMETER_TYPE_UINT32:
+      return "U32";
+    case v1::PARAMETER_TYPE_INT32:
+      return "I32";
+    default:
+      return "?";
+  }
+}
 
-void compare(const v1::Parameter& parameter, const ManualRegister& manual) {
+/// What starts write (M6): what it holds at rest is the daemon's canary.
+bool is_for_motion(const Manual& manual, std::uint32_t address) {
+  const auto all = manual.list("motion_parameters");
+  return std::ranges::find(all, fmt::format("0x{:04X}", address)) != all.end();
+}
+
+void compare(const v1::Parameter& parameter, const ManualParameter& manual) {
   SCOPED_TRACE(fmt::format("0x{:04X} {} ({})", manual.address, parameter.name(), manual.title));
   EXPECT_EQ(access_name(parameter.access()), manual.access);
   if (manual.note.starts_with("no range printed")) {
@@ -68,8 +90,7 @@ void compare(const v1::Parameter& parameter, const ManualRegister& manual) {
     EXPECT_EQ(parameter.minimum(), manual.minimum);
     EXPECT_EQ(parameter.maximum(), manual.maximum);
   }
-  EXPECT_EQ(parameter.type(), manual.minimum < 0 && manual.maximum <= 32767 ? v1::PARAMETER_TYPE_INT16
-                                                                            : v1::PARAMETER_TYPE_UINT16);
+  EXPECT_EQ(type_name(parameter.type()), manual.type);
   EXPECT_EQ(parameter.has_default_value(), manual.default_value.has_value());
   if (manual.default_value) EXPECT_EQ(parameter.default_value(), *manual.default_value);
   EXPECT_EQ(parameter.unit(), manual.unit);
@@ -90,7 +111,7 @@ std::string every_parameter(const Setup& setup) {
     else
       ADD_FAILURE() << parameter.name() << " is not in the manual";
   }
-  EXPECT_EQ(addresses.size(), setup.manual.registers().size());
+  EXPECT_EQ(addresses.size(), setup.manual.parameters().size());
 
   const auto answer = read(bench, {});
   if (!answer.ok()) throw Broken("ReadParameters: " + answer.status.error_message());
@@ -99,34 +120,37 @@ std::string every_parameter(const Setup& setup) {
     found.insert(value.address());
     const auto parameter =
         std::ranges::find(all.parameters(), value.address(), [](const auto& one) { return one.address(); });
-    if (parameter == all.parameters().end())
+    const auto* manual = setup.manual.find(value.address());
+    if (parameter == all.parameters().end() || manual == nullptr)
       throw Broken("read, but not listed: " + value.ShortDebugString());
     // Some defaults of the manual cannot be written back (YKD2405PR 0x00C0: 30 to 2000, default 0).
     if (!parameter->has_default_value() || value.value() != parameter->default_value()) {
       EXPECT_GE(value.value(), parameter->minimum()) << parameter->name();
       EXPECT_LE(value.value(), parameter->maximum()) << parameter->name();
     }
-    EXPECT_EQ(value.value() & 0xFFFF, std::stoll(bench.outside(fmt::format("peek @1 {}", value.address()))))
+    EXPECT_EQ(value.value() & manual->mask(),
+              std::stoll(bench.outside(fmt::format("peek @1 {}", value.address()))))
         << parameter->name();
-    const bool free = parameter->configured_by().empty() && !is_motion_block(value.address()) &&
+    const bool free = parameter->configured_by().empty() && !is_for_motion(setup.manual, value.address()) &&
                       parameter->access() != v1::PARAMETER_ACCESS_READ_ONLY;
     if (free && parameter->has_default_value())
       EXPECT_EQ(value.value(), parameter->default_value()) << parameter->name() << ": nobody has changed it";
   }
-  for (const auto& manual : setup.manual.registers())
+  for (const auto& manual : setup.manual.parameters())
     EXPECT_EQ(found.contains(manual.address), manual.access != "WO")
         << fmt::format("0x{:04X}", manual.address);
   bench.finish(0);
   return std::to_string(addresses.size());
 }
 
-/// Free parameters with another value than they have, not of the segments (there are too many alike).
-Values some_changes(const v1::ListParametersResponse& all) {
+/// Settings that neither move nor address anything, with another value than they have.
+Values some_changes(const Manual& manual, const v1::ListParametersResponse& all) {
+  const auto [first, last] = manual.range("free_settings");
   Values values;
   for (const auto& one : all.parameters())
     if ((one.access() == v1::PARAMETER_ACCESS_READ_WRITE ||
          one.access() == v1::PARAMETER_ACCESS_READ_WRITE_SAVED) &&
-        one.configured_by().empty() && !is_motion_block(one.address()) && one.address() > 0x0030 &&
+        one.configured_by().empty() && one.address() >= first && one.address() <= last &&
         one.has_default_value() && one.maximum() - one.minimum() > 100 && values.size() < 12)
       values.emplace_back(one.name(), one.default_value() < one.maximum() ? one.default_value() + 1
                                                                           : one.default_value() - 1);
@@ -136,7 +160,7 @@ Values some_changes(const v1::ListParametersResponse& all) {
 std::string writing(const Setup& setup) {
   Bench bench(setup);
   bench.ready();
-  const auto values = some_changes(list(bench));
+  const auto values = some_changes(setup.manual, list(bench));
   if (values.size() < 3) throw Broken("nothing to write");
   EXPECT_FALSE(write(bench, values).ok()) << "written while enabled";
   expect_done(bench.client.disable());
@@ -157,7 +181,7 @@ std::string refusals(const Setup& setup) {
   Bench bench(setup);
   expect_done(bench.client.disable());
   const auto all = list(bench);
-  const auto free = some_changes(all).front();
+  const auto free = some_changes(setup.manual, all).front();
   const auto untouched = read(bench, {free.first})->values(0).value();
   for (const auto& one : all.parameters()) {
     SCOPED_TRACE(one.name());
@@ -207,7 +231,7 @@ std::string save_and_restore(const Setup& setup) {
   EXPECT_FALSE(bench.client.call(&v1::DriveService::Stub::RestoreFactory, restore).ok()) << "while enabled";
   expect_done(bench.client.disable());
 
-  const auto change = some_changes(list(bench)).front();
+  const auto change = some_changes(setup.manual, list(bench)).front();
   if (const auto written = write(bench, {change}); !written.ok())
     throw Broken("WriteParameters: " + written.status.error_message());
   const auto before = bench.eeprom_writes();

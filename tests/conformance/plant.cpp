@@ -82,14 +82,23 @@ std::map<std::string, std::string> terminals_of(const Manual& manual, const Reci
   return terminals;
 }
 
+std::string bus_lines(const Manual& manual, int baud, Duration sync_period) {
+  const auto rate = baud == 0 ? manual.highest_baud() : baud;
+  const auto settings = manual.bus() == "canopen"
+                            ? fmt::format("interface: sim, bitrate: {}, sync_period: {} ms", rate,
+                                          std::chrono::round<std::chrono::milliseconds>(sync_period).count())
+                            : fmt::format("port: sim, baud: {}", rate);
+  return fmt::format("machine: conformance\nbuses:\n  line: {{ {}: {{ {} }} }}\naxes:\n", manual.bus(),
+                     settings);
+}
+
 Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& recipe) {
-  std::string yaml = fmt::format(
-      "machine: conformance\n"
-      "buses:\n  line: {{ modbus_rtu: {{ port: sim, baud: {} }} }}\n"
-      "axes:\n  axis:\n    bus: line\n    node: {}\n    model: {}\n    unit: mm\n"
+  auto yaml = bus_lines(manual, recipe.baud);
+  yaml += fmt::format(
+      "  axis:\n    bus: line\n    node: {}\n    model: {}\n    unit: mm\n"
       "    scale: {{ microstep: 1000 pulses/rev, travel: 10 mm/rev, invert: {} }}\n"
       "    limits: {{ {}velocity: 100 mm/s }}\n",
-      recipe.baud, recipe.node, manual.model(), variant.invert, recipe.limits ? "position: [0, 400], " : "");
+      recipe.node, manual.model(), variant.invert, recipe.limits ? "position: [0, 400], " : "");
   if (recipe.limits) yaml += "    jog_travel: 10 mm\n";
   if (!recipe.homing.empty())
     yaml += fmt::format("    homing: {{ method: {}, {} }}\n",

@@ -25,7 +25,8 @@ struct Wanted {
   bool active_low = false;
 };
 
-/// One axis of a model, as a scenario wants it. The axis is "axis", its drive the first of the line (@1).
+/// One axis of a model, as a scenario wants it. The axis is "axis", its drive the first (@1) of the bus
+/// "line".
 ///
 /// 1000 pulses/rev and 10 mm/rev: 100 pulses per mm; 0..400 mm, 100 mm/s. Relative to where the load stands
 /// at power-up, in axis direction: home switch from -52 to -50 mm, limit switches at -60 and 410 mm.
@@ -34,7 +35,7 @@ inline constexpr double pulses_per_mm = 100, home_from = -52, home_to = -50, pos
 
 struct Recipe {
   int node = 1;
-  int baud = 115200;
+  int baud = 0;                  ///< bit/s of the bus; 0: the highest that its switches have
   bool limits = true;            ///< software limits
   bool home_switch = true;       ///< an input for it, and the switch
   bool limit_switches = true;    ///< likewise
@@ -59,6 +60,9 @@ struct Recipe {
 /// Terminals of a recipe: function -> terminal, in the order in which they are given away.
 std::map<std::string, std::string> terminals_of(const Manual& manual, const Recipe& recipe);
 
+/// What a plant's YAML begins with: the bus "line", of the kind that the model is made for; `baud` as in a
+/// recipe, `sync_period` where the bus has SYNC.
+std::string bus_lines(const Manual& manual, int baud, Duration sync_period = std::chrono::milliseconds(10));
 Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& recipe);
 
 }  // namespace axisd::conformance

@@ -30,6 +30,24 @@ Recipe table_recipe(const std::string& enable, const std::vector<std::string>& p
   return recipe;
 }
 
+bool has_table(const Manual& manual) { return manual.number("pt_segments") > 0; }
+
+/// A model whose manual has no table: what would be for one is refused, the YAML when it is loaded, with the
+/// reason.
+std::string no_table(const Setup& setup) {
+  try {
+    const Bench bench(
+        setup, {.keys = "    segments: { positions: { 1: { target: 60 mm, velocity: 50 mm/s } } }\n"}, false);
+    ADD_FAILURE() << "segments in the YAML are accepted";
+  } catch (const std::invalid_argument& refused) {
+    EXPECT_NE(std::string_view(refused.what()).find("has no table of segments"), std::string_view::npos)
+        << refused.what();
+  }
+  EXPECT_THROW(Bench(setup, table_recipe("pt_enable", {"pin0"}), false), std::invalid_argument);
+  EXPECT_THROW(Bench(setup, table_recipe("pv_enable", {"pin0"}), false), std::invalid_argument);
+  return "no";
+}
+
 void select(Bench& bench, std::int64_t number) {
   const auto wanted = pins_of(number);
   for (const auto& input : bench.recipe.inputs)
@@ -53,6 +71,7 @@ void run_position(Bench& bench) {
 }
 
 std::string positions(const Setup& setup) {
+  if (!has_table(setup.manual)) return no_table(setup);
   const auto highest = setup.manual.number("pt_segments");
   for (const bool absolute : {true, false}) {
     SCOPED_TRACE(absolute ? "absolute" : "relative");
@@ -105,6 +124,7 @@ void run_highest_velocity(const Setup& setup) {
 }
 
 std::string velocities(const Setup& setup) {
+  if (!has_table(setup.manual)) return no_table(setup);
   if (!setup.variant.invert) run_highest_velocity(setup);
   auto recipe =
       table_recipe("pv_enable", {"pv_direction", "pin0", "pin1"},
@@ -142,16 +162,22 @@ std::string velocities(const Setup& setup) {
   return setup.manual.text("pv_segments");
 }
 
-/// A stop of the API ends a motion that a terminal started, with the terminal held active.
+/// A stop of the API ends a motion that a terminal started, with the terminal held active. Without a table it
+/// is a jog.
 std::string stopped_from_outside(const Setup& setup) {
-  Bench bench(setup,
-              table_recipe("pt_enable", {"pin0"},
-                           "    segments: { positions: { 1: { target: 300 mm, velocity: 50 mm/s } } }\n"));
+  const bool table = has_table(setup.manual);
+  const std::string starter = table ? "pt_enable" : "jog_positive";
+  Bench bench(
+      setup, table
+                 ? table_recipe(starter, {"pin0"},
+                                "    segments: { positions: { 1: { target: 300 mm, velocity: 50 mm/s } } }\n")
+                 : table_recipe(starter, {}));
   bench.ready();
-  select(bench, 1);
-  bench.set_input("pt_enable", true);
+  if (table) select(bench, 1);
+  bench.set_input(starter, true);
   bench.pass(1s);
   EXPECT_TRUE(bench.shaft().moving);
+  EXPECT_EQ(v1::MotionCause_Name(bench.state().motion_cause()), "MOTION_CAUSE_TERMINAL");
   expect_done(bench.client.stop());
   bench.pass(1s);
   EXPECT_FALSE(bench.shaft().moving);
@@ -198,7 +224,19 @@ void expect_table(const v1::SegmentTable& table, const v1::SegmentTable& expecte
   }
 }
 
+std::string no_table_by_api(const Setup& setup) {
+  Bench bench(setup);
+  expect_done(bench.client.disable());
+  v1::ReadSegmentsRequest request;
+  request.set_axis("axis");
+  expect_refused(bench.client.call(&v1::DriveService::Stub::ReadSegments, request), v1::REASON_NOT_SUPPORTED);
+  expect_refused(write(bench, table_of(1)), v1::REASON_NOT_SUPPORTED);
+  bench.finish(0);
+  return "no";
+}
+
 std::string by_api(const Setup& setup) {
+  if (!has_table(setup.manual)) return no_table_by_api(setup);
   const auto highest = setup.manual.number("pt_segments");
   Bench bench(setup, table_recipe("pt_enable", pins_of(highest)));
   bench.ready();

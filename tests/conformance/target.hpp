@@ -12,7 +12,7 @@
 
 namespace axisd::conformance {
 
-/// A machine with one line: the daemon's configuration, and the drives as axisd-sim's --drive takes them.
+/// A machine with one bus: the daemon's configuration, and the drives as axisd-sim's --drive takes them.
 /// Other nodes than drives may be among them (model=modbus-generic, where the simulators have it).
 struct Plant {
   std::string yaml;

@@ -119,10 +119,9 @@ std::string outputs(const Setup& setup) {
 std::string drift(const Setup& setup) {
   Bench bench(setup, {.keys = "    drift_check: 2 s\n"});
   expect_done(bench.client.disable());
-  const auto& registers = setup.manual.registers();
   const auto title = fmt::format("Input terminal {} function", bench.terminal("positive_limit"));
-  const auto found = std::ranges::find(registers, title, &ManualRegister::title);
-  if (found == registers.end()) throw Broken("the manual has no register \"" + title + "\"");
+  const auto* found = setup.manual.find_title(title);
+  if (found == nullptr) throw Broken("the manual has no parameter \"" + title + "\"");
   const auto address = found->address + (setup.on("input_functions_at_0043") ? 2 : 0);
   const auto held = bench.outside(fmt::format("peek @1 {}", address));
   bench.outside(fmt::format("poke @1 {} 0", address));

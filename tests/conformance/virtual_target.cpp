@@ -12,14 +12,10 @@
 #include "config/configuration.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
-#include "devices/simulation/control.hpp"
-#include "devices/simulation/drive_option.hpp"
-#include "devices/simulation/simulator.hpp"
 #include "tests/conformance/counted_machine.hpp"
 #include "tests/conformance/target.hpp"
-#include "tests/support/borrowed_node.hpp"
+#include "tests/conformance/virtual_wire.hpp"
 #include "tests/support/fake_persistence.hpp"
-#include "tests/support/virtual_line.hpp"
 #include "tests/support/virtual_world.hpp"
 
 namespace axisd::conformance {
@@ -60,14 +56,6 @@ config::Configuration load(const std::string& yaml) {
   throw std::invalid_argument(findings + yaml);
 }
 
-std::unique_ptr<simulation::SimulatedRtuNode> make_drive(const std::string& text) {
-  auto option = simulation::parse_drive(text);
-  if (!option) throw std::invalid_argument(option.error().message);
-  auto node = simulation::make_node(option->model, std::move(option->settings));
-  if (!node) throw std::invalid_argument(node.error().message);
-  return std::move(*node);
-}
-
 /// The daemon's core, as long as it runs. Thread: core.
 struct Daemon {
   std::unique_ptr<core::MachineCore> machine;
@@ -77,14 +65,8 @@ struct Daemon {
 
 class VirtualTarget final : public Target {
  public:
-  explicit VirtualTarget(const Plant& plant) : configuration_(load(plant.yaml)) {
-    if (configuration_.lines.size() != 1) throw std::invalid_argument("a plant has one line");
-    const auto serial = configuration_.lines.front().serial();
-    for (const auto& drive : plant.drives) {
-      drives_.push_back(make_drive(drive));
-      drives_.back()->advance(world_.now());
-      drives_.back()->join({.baud = serial.baud, .format = serial.format});
-    }
+  explicit VirtualTarget(const Plant& plant)
+      : configuration_(load(plant.yaml)), wire_(make_virtual_wire(world_, configuration_, plant)) {
     thread_ = std::thread([this] { run(); });
     try {
       start();
@@ -103,10 +85,7 @@ class VirtualTarget final : public Target {
   std::shared_ptr<grpc::Channel> channel() override { return channel_; }
   std::string control(std::string_view line) override {
     std::string answer;
-    on_core([&] {
-      line_->network().advance(world_.now());
-      answer = simulation::execute_control(line_->network(), line);
-    });
+    on_core([&] { answer = wire_->control(line); });
     return answer;
   }
   void pass(Duration duration) override {
@@ -154,13 +133,12 @@ class VirtualTarget final : public Target {
     std::promise<void>* done;
   };
 
+  test::VirtualWorld world_;  // first: what follows uses it
   config::Configuration configuration_;
+  std::unique_ptr<VirtualWire> wire_;
   TemporaryDirectory directory_;
-  test::VirtualWorld world_;
   test::FakePersistence store_{world_.executor()};
   CallLedger ledger_{world_.executor()};
-  std::vector<std::unique_ptr<simulation::SimulatedRtuNode>> drives_;
-  test::VirtualLine* line_ = nullptr;
   Daemon daemon_;
   int starts_ = 0;
   // Thread: core.
@@ -209,27 +187,19 @@ void VirtualTarget::start() {
   on_core([this] {
     store_.restart();
     const auto instance = fmt::format("c{}", ++starts_);
-    daemon_.machine = std::make_unique<core::MachineCore>(
-        core::MachineParts{.executor = world_.executor(),
-                           .clock = &world_.clock(),
-                           .persistence = &store_,
-                           .instance_id = instance,
-                           .make_line =
-                               [this](const modbus_rtu::LineSettings& settings) {
-                                 auto made = std::make_unique<test::VirtualLine>(world_, settings);
-                                 line_ = made.get();
-                                 return made;
-                               },
-                           .published =
-                               [this] {
-                                 if (daemon_.service) daemon_.service->published();
-                               }},
-        configuration_);
+    core::MachineParts parts{.executor = world_.executor(),
+                             .clock = &world_.clock(),
+                             .persistence = &store_,
+                             .instance_id = instance,
+                             .published = [this] {
+                               if (daemon_.service) daemon_.service->published();
+                             }};
+    wire_->connect(parts);
+    daemon_.machine = std::make_unique<core::MachineCore>(std::move(parts), configuration_);
     daemon_.service = std::make_unique<core::MachineService>(world_.loop(), *daemon_.machine,
                                                              configuration_.machine, instance);
     daemon_.counted = count_calls(*daemon_.service, ledger_);
-    line_->network().advance(world_.now());
-    for (const auto& drive : drives_) line_->network().add(std::make_unique<test::BorrowedNode>(*drive));
+    wire_->attach_drives();
   });
   const auto address = "unix:" + (directory_ / fmt::format("{}.sock", starts_));
   server_ = std::make_unique<server::Server>(*daemon_.counted, server::ServerOptions{.listen = {address}});
@@ -255,8 +225,8 @@ void VirtualTarget::stop() {
   pass(100ms);  // what the line still had to deliver
   on_core([this] {
     if (!daemon_.machine->closed()) std::terminate();  // sequences that are left would use what is gone
+    wire_->detach();
     daemon_ = {};
-    line_ = nullptr;
   });
 }
 
