@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include "buses/canopen/object.hpp"
 #include "buses/canopen/remote_node.hpp"
@@ -37,7 +38,7 @@ struct VendorObjects {
   std::optional<canopen::Object> inputs{};          ///< levels, bit per terminal in the descriptor's order
   std::optional<canopen::Object> outputs{};         ///< likewise
   std::optional<canopen::Object> start_speed{};     ///< of each ramp, r/min
-  std::optional<canopen::Object> microstep{};       ///< index into Capabilities::pulses_per_revolution
+  std::optional<canopen::Object> microstep{};       ///< index into Model::microsteps
   std::optional<canopen::Object> loop_mode{};       ///< 0 closed loop, 1 open loop
   std::optional<canopen::Object> eeprom_switch{};   ///< 0: writes are saved, 1: they are not
   std::optional<canopen::Object> memory{};          ///< 1 restores the factory settings, 2 saves everything
@@ -63,6 +64,19 @@ struct Meaning {
   std::int16_t halt_on_ramp = 1, halt_at_once = 2;
 };
 
+/// How a drive's node-ID and bit rate are set by objects. They count from its next power-up.
+struct Addressing {
+  canopen::Object node{};                           ///< node-ID in use, by switches or custom_node
+  canopen::Object custom_node{};                    ///< node-ID beyond those that the switches can set
+  canopen::Object custom_bitrate{};                 ///< index into custom_bitrates
+  std::span<const std::int32_t> custom_bitrates{};  ///< bit/s
+  std::uint8_t minimum_custom_node = 1, maximum_custom_node = 127;
+  std::string_view node_switches{};      ///< how they must stand for custom_node to count
+  std::string_view bitrate_switches{};   ///< likewise for custom_bitrate
+  std::string_view factory_bitrate{};    ///< what applies after the factory settings were restored
+  std::uint8_t factory_custom_node = 0;  ///< of a drive as the factory left it; 0: undefined
+};
+
 struct Model {
   const DriveDescriptor* descriptor = nullptr;
   canopen::ExpectedIdentity identity{.profile = 402};
@@ -70,6 +84,8 @@ struct Model {
   StatusBits status{};
   VendorObjects objects{};
   Meaning meaning{};
+  std::span<const std::int32_t> microsteps{};  ///< pulses per revolution in the order of the codes
+  std::optional<Addressing> addressing{};      ///< nothing: only the drive's switches or tools can
   /// The manual prints an EMCY identifier that is another service's: 1014h is set to 80h + node first (M24).
   bool sets_emergency_id = true;
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "devices/setup_codes.hpp"
 #include "devices/yako_rtu/codec.hpp"
 #include "devices/yako_rtu/registers.hpp"
 
@@ -11,47 +12,8 @@ namespace axisd::yako_rtu {
 
 namespace {
 
-template <class Range, class Projection>
-std::optional<std::size_t> index_of(const Range& range, std::string_view name, Projection projection) {
-  const auto found = std::ranges::find(range, name, projection);
-  if (found == std::ranges::end(range)) return std::nullopt;
-  return static_cast<std::size_t>(found - std::ranges::begin(range));
-}
-
-/// Function and active level of each terminal of one side.
-struct Assignment {
-  std::vector<const TerminalFunctionSpec*> functions;  ///< nullptr: not named
-  std::uint16_t levels = 0, named = 0;                 ///< bit per terminal
-};
-
-Result<Assignment> assign(const std::vector<TerminalSettings>& terminals, std::span<const TerminalSpec> known,
-                          std::span<const TerminalFunctionSpec> functions) {
-  Assignment assignment{.functions = std::vector<const TerminalFunctionSpec*>(known.size(), nullptr)};
-  for (const auto& terminal : terminals) {
-    const auto index = index_of(known, terminal.terminal, &TerminalSpec::name);
-    const auto* function = find_function(functions, terminal.function);
-    if (!index || function == nullptr)
-      return fail(Reason::misconfigured, fmt::format("terminal {} cannot have the function {}",
-                                                     terminal.terminal, terminal.function));
-    if (!function->unusable.empty())
-      return fail(Reason::misconfigured,
-                  fmt::format("terminal {} must not have the function {}: {}", terminal.terminal,
-                              terminal.function, function->unusable));
-    const auto bit = static_cast<std::uint16_t>(1U << *index);
-    assignment.functions[*index] = function;
-    assignment.named |= bit;
-    if (terminal.active_low) assignment.levels |= bit;
-  }
-  return assignment;
-}
-
-bool is_limit_or_stop(const TerminalFunctionSpec* function) {
-  static constexpr std::string_view names[] = {"positive_limit", "negative_limit", "stop", "quick_stop"};
-  return function != nullptr && std::ranges::find(names, function->name) != std::end(names);
-}
-
-void add_inputs(const Assignment& inputs, std::span<const TerminalSpec> terminals, std::uint16_t first,
-                bool limits_and_stops, bool saved, std::vector<RegisterSetting>& all) {
+void add_inputs(const TerminalAssignment& inputs, std::span<const TerminalSpec> terminals,
+                std::uint16_t first, bool limits_and_stops, bool saved, std::vector<RegisterSetting>& all) {
   for (std::size_t i = 0; i < inputs.functions.size(); ++i) {
     const auto* function = inputs.functions[i];
     if (is_limit_or_stop(function) != limits_and_stops) continue;
@@ -64,7 +26,7 @@ void add_inputs(const Assignment& inputs, std::span<const TerminalSpec> terminal
   }
 }
 
-void add_outputs(const Assignment& outputs, std::span<const TerminalSpec> terminals, bool saved,
+void add_outputs(const TerminalAssignment& outputs, std::span<const TerminalSpec> terminals, bool saved,
                  std::vector<RegisterSetting>& all) {
   for (std::size_t i = 0; i < outputs.functions.size(); ++i)
     if (const auto* function = outputs.functions[i])
@@ -77,18 +39,9 @@ void add_outputs(const Assignment& outputs, std::span<const TerminalSpec> termin
 /// Settings that the model's descriptor ties to a register: a choice's index, a number, or 0 and 1.
 void add_settings(const DriveDescriptor& model, const DriveSetup& setup, std::vector<RegisterSetting>& all) {
   for (const auto& spec : model.settings) {
-    if (!spec.object) continue;
     const auto found = setup.model_settings.find(std::string(spec.key));
     if (found == setup.model_settings.end()) continue;
-    std::optional<std::int64_t> code;
-    if (const auto* text = std::get_if<std::string>(&found->second)) {
-      if (const auto index = index_of(spec.choices, *text, std::identity{}))
-        code = static_cast<std::int64_t>(*index);
-    } else if (const auto* number = std::get_if<std::int64_t>(&found->second)) {
-      code = *number;
-    } else if (const auto* flag = std::get_if<bool>(&found->second)) {
-      code = *flag ? 1 : 0;
-    }
+    const auto code = code_of(spec, found->second);
     if (code)
       all.push_back({.address = static_cast<std::uint16_t>(*spec.object),
                      .value = static_cast<std::uint16_t>(*code),
@@ -118,17 +71,11 @@ std::uint16_t first_input_function(const Model& model, const DriveSetup& setup) 
   return wiring ? model.first_input_function_of_wiring : model.first_input_function;
 }
 
-bool starts_motion(const Model& model, std::uint16_t function_code) {
-  const auto functions = model.descriptor->input_functions;
-  const auto found = std::ranges::find(functions, function_code, &TerminalFunctionSpec::code);
-  return found != functions.end() && found->starts_motion;
-}
-
 std::uint32_t segment_enables(const Model& model, const DriveSetup& setup) {
   std::uint32_t bits = 0;
   for (const auto& input : setup.inputs)
     if (input.function == "pt_enable" || input.function == "pv_enable")
-      bits |= 1U << index_of(model.descriptor->inputs, input.terminal, &TerminalSpec::name).value_or(31);
+      bits |= terminal_bit(model.descriptor->inputs, input.terminal).value_or(1U << 31U);
   return bits;
 }
 
@@ -160,9 +107,9 @@ std::vector<RegisterSetting> segment_registers(const DriveSegments& segments, st
 
 Result<std::vector<RegisterSetting>> required_registers(const Model& model, const DriveSetup& setup) {
   const auto& descriptor = *model.descriptor;
-  const auto inputs = assign(setup.inputs, descriptor.inputs, descriptor.input_functions);
+  const auto inputs = assign_terminals(setup.inputs, descriptor.inputs, descriptor.input_functions);
   if (!inputs) return fail(inputs.error());
-  const auto outputs = assign(setup.outputs, descriptor.outputs, descriptor.output_functions);
+  const auto outputs = assign_terminals(setup.outputs, descriptor.outputs, descriptor.output_functions);
   if (!outputs) return fail(outputs.error());
   const auto codes = descriptor.identification.microstep_codes;
   const auto microstep = std::ranges::find(codes, setup.pulses_per_revolution);
@@ -173,13 +120,15 @@ Result<std::vector<RegisterSetting>> required_registers(const Model& model, cons
   const auto first = first_input_function(model, setup);
   const bool terminals_saved = setup.persist.terminals;
   std::vector<RegisterSetting> all;
-  all.push_back(
-      {.address = reg::input_levels, .value = inputs->levels, .key = "inputs", .saved = terminals_saved});
+  all.push_back({.address = reg::input_levels,
+                 .value = static_cast<std::uint16_t>(inputs->levels),
+                 .key = "inputs",
+                 .saved = terminals_saved});
   if (!setup.outputs.empty())
     all.push_back({.address = reg::output_levels,
-                   .value = outputs->levels,
+                   .value = static_cast<std::uint16_t>(outputs->levels),
                    .key = "outputs",
-                   .mask = outputs->named,
+                   .mask = static_cast<std::uint16_t>(outputs->named),
                    .saved = terminals_saved});
   add_inputs(*inputs, descriptor.inputs, first, true, terminals_saved, all);
   all.push_back({.address = reg::microstep,

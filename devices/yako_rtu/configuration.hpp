@@ -28,9 +28,6 @@ struct RegisterSetting {
 
 /// Register of the first input's function, by the model or the reading of the manual that the setup names.
 std::uint16_t first_input_function(const Model& model, const DriveSetup& setup);
-/// An input with this function code can start a motion.
-bool starts_motion(const Model& model, std::uint16_t function_code);
-
 /// Everything but the EEPROM switch (0x0016), whose state follows `persist`. Inputs that the setup does not
 /// name are set to "none": a function left in the EEPROM (JOG, start) could move the axis behind its owner's
 /// back. Outputs that it does not name are left alone: one may hold a brake.

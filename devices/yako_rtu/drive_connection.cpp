@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "devices/rtu_identification.hpp"
+#include "devices/setup_codes.hpp"
 #include "devices/yako_rtu/drive.hpp"
 #include "devices/yako_rtu/register_blocks.hpp"
 #include "devices/yako_rtu/registers.hpp"
@@ -293,7 +294,7 @@ Task<Result<void>> YakoRtuDrive::neutralise_inputs(const std::vector<RegisterSet
     if (!is_input_function(input)) continue;
     auto& function = present.at(input.address);
     const bool changes = function != input.value || (turned & input.input_bits) != 0;
-    if (!changes || !starts_motion(*model_, function)) continue;
+    if (!changes || !starts_motion(model_->descriptor->input_functions, function)) continue;
     if (const auto switched = co_await save_writes(input.saved); !switched) co_return switched;
     if (const auto written = co_await write_run(input.address, {0}); !written) co_return written;
     function = 0;

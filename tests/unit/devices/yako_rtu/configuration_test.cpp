@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "devices/setup_codes.hpp"
 #include "devices/yako_rtu/registers.hpp"
 
 namespace axisd::yako_rtu {
@@ -149,9 +150,9 @@ TEST(Configuration, SegmentsAreOwnedWholeButForTimesThatCannotBeWrittenBack) {
 TEST(Configuration, FunctionsThatCanStartMotion) {
   for (std::uint16_t code = 0; code <= 20; ++code) {
     const bool expected = code == 6 || (code >= 10 && code <= 15);
-    EXPECT_EQ(starts_motion(ykd, code), expected) << code;
+    EXPECT_EQ(starts_motion(ykd.descriptor->input_functions, code), expected) << code;
   }
-  EXPECT_FALSE(starts_motion(ykd, 99));
+  EXPECT_FALSE(starts_motion(ykd.descriptor->input_functions, 99));
 }
 
 }  // namespace
