@@ -1,10 +1,12 @@
 # What deploy/install.sh installs, below the prefix /usr. Configuration and state are the administrator's.
 if(AXISD_GRPC)
   install(TARGETS axisd axisctl axisd-sim RUNTIME DESTINATION bin)
-  install(FILES deploy/axisd.service DESTINATION lib/systemd/system)
+  install(TARGETS axisd-link RUNTIME DESTINATION lib/axisd)
+  install(FILES deploy/axisd.service deploy/axisd-link.service deploy/axisd-link.socket DESTINATION lib/systemd/system)
   install(FILES deploy/axisd.sysusers DESTINATION lib/sysusers.d RENAME axisd.conf)
   install(FILES deploy/99-axisd.rules DESTINATION lib/udev/rules.d)
   install(FILES deploy/README.md DESTINATION share/doc/axisd)
   install(DIRECTORY config/examples DESTINATION share/doc/axisd)
+  install(FILES deploy/80-axisd-can.network deploy/80-axisd-can.link DESTINATION share/doc/axisd/examples)
   install(DIRECTORY proto/axisd DESTINATION share/axisd/proto FILES_MATCHING PATTERN "*.proto")
 endif()

@@ -15,13 +15,12 @@
 #include <thread>
 
 #include "api/server/server.hpp"
-#include "buses/modbus_rtu/rtu_worker.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
 #include "daemon/core/quiesce.hpp"
 #include "daemon/logging.hpp"
-#include "daemon/simulated_lines.hpp"
+#include "daemon/ports.hpp"
 #include "daemon/store/file_store.hpp"
 
 namespace axisd {
@@ -70,16 +69,6 @@ bool wait_until(Condition condition, Duration limit) {
     block_until(monotonic_now() + milliseconds(10));
   }
   return true;
-}
-
-std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> line_maker(
-    core::CoreLoop& loop, const SimulatedLines& simulated) {
-  return [&loop, &simulated](const modbus_rtu::LineSettings& settings) -> std::unique_ptr<modbus_rtu::Line> {
-    modbus_rtu::RtuWorker::PortPath path;
-    if (settings.simulated())
-      path = [&simulated, name = settings.name]() -> Result<std::string> { return simulated.path(name); };
-    return std::make_unique<modbus_rtu::RtuWorker>(loop.executor(), settings, std::move(path));
-  };
 }
 
 /// Tells systemd that core and workers make progress, until a signal asks for the end.
@@ -139,14 +128,14 @@ int run_daemon(const Options& options, config::Configuration configuration) {
   auto store = store::FileStore::open(configuration.state_directory, loop.executor());
   if (!store) return give_up(store.error());
   if ((*store)->damage()) spdlog::error("{}", to_string(*(*store)->damage()));
-  auto simulated = SimulatedLines::open(configuration);
-  if (!simulated) return give_up(simulated.error());
-  modbus_rtu::ExchangeObserver wire_log;
+  WireLog wire_log;
   if (!options.wire_log.empty()) {
     auto opened = open_wire_log(options.wire_log);
     if (!opened) return give_up(opened.error());
     wire_log = std::move(*opened);
   }
+  auto ports = Ports::open(loop, configuration, options.link_helper, std::move(wire_log.frames));
+  if (!ports) return give_up(ports.error());
 
   const auto instance_id = make_instance_id((*store)->loaded().start_count);
   core::MachineService* published_to = nullptr;
@@ -154,8 +143,10 @@ int run_daemon(const Options& options, config::Configuration configuration) {
                              .clock = &loop.clock(),
                              .persistence = store->get(),
                              .instance_id = instance_id,
-                             .make_line = line_maker(loop, **simulated),
-                             .observer = std::move(wire_log),
+                             .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
+                             .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
+                             .request_link_cycle = (*ports)->request_link_cycle(),
+                             .observer = std::move(wire_log.exchanges),
                              .published =
                                  [&published_to] {
                                    if (published_to != nullptr) published_to->published();
@@ -165,6 +156,7 @@ int run_daemon(const Options& options, config::Configuration configuration) {
   published_to = &service;
   server::Server server(service, server_options(configuration.server));
   machine.start();
+  (*ports)->check_link_helper(configuration);
   std::thread core_thread([&loop] {
     pthread_setname_np(pthread_self(), "axisd-core");
     loop.run();
@@ -224,23 +216,25 @@ int run_quiesce(const Options& options) {
   }
   spdlog::set_level(spdlog::level::off);
   const auto& configuration = *loaded.configuration;
-  auto simulated = SimulatedLines::open(configuration);
-  if (!simulated) {
-    std::cerr << "axisd: " << to_string(simulated.error()) << '\n';
+  core::CoreLoop loop;
+  auto ports = Ports::open(loop, configuration, options.link_helper);
+  if (!ports) {
+    std::cerr << "axisd: " << to_string(ports.error()) << '\n';
     return 1;
   }
   std::vector<core::QuiesceReport> reports;
-  {
-    core::CoreLoop loop;
-    auto all = [](core::CoreLoop& core, const config::Configuration& machine, const SimulatedLines& lines,
-                  std::vector<core::QuiesceReport>& out) -> Task<> {
-      out = co_await core::quiesce(core.executor(), core.clock(), machine, line_maker(core, lines),
-                                   quiesce_limit);
-      core.stop();
-    };
-    spawn(loop.executor(), all(loop, configuration, **simulated, reports), "quiesce");
-    loop.run();
-  }
+  core::QuiesceParts parts{.executor = loop.executor(),
+                           .clock = &loop.clock(),
+                           .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
+                           .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
+                           .request_link_cycle = (*ports)->request_link_cycle()};
+  auto all = [](core::CoreLoop& core, core::QuiesceParts of, const config::Configuration& machine,
+                std::vector<core::QuiesceReport>& out) -> Task<> {
+    out = co_await core::quiesce(std::move(of), machine, quiesce_limit);
+    core.stop();
+  };
+  spawn(loop.executor(), all(loop, std::move(parts), configuration, reports), "quiesce");
+  loop.run();
   bool confirmed = true;
   for (const auto& report : reports) {
     std::cout << report.axis << ": " << report.detail << '\n';

@@ -41,6 +41,40 @@ const char* why(const modbus_rtu::ExchangeResult& result) {
   return "?";
 }
 
+long long ns(TimePoint t) { return t.time_since_epoch().count(); }
+
+modbus_rtu::ExchangeObserver log_exchanges(std::shared_ptr<spdlog::logger> log) {
+  return [log = std::move(log)](const std::string& bus, const modbus_rtu::Exchange& exchange,
+                                const modbus_rtu::ExchangeResult& result) {
+    if (result.status != modbus_rtu::ExchangeStatus::not_sent &&
+        result.status != modbus_rtu::ExchangeStatus::unsupported)
+      log->info("{} {} tx {}", ns(result.request_begin), bus, modbus_rtu::to_hex(exchange.frame.bytes()));
+    if (result.reply_frame.size() > 0)
+      log->info("{} {} rx {}", ns(result.reply_begin), bus, modbus_rtu::to_hex(result.reply_frame.bytes()));
+    if (result.status != modbus_rtu::ExchangeStatus::replied)
+      log->info("{} {} -- {}", ns(result.reply_end), bus, why(result));
+  };
+}
+
+core::NetworkObserver log_frames(std::shared_ptr<spdlog::logger> log) {
+  return {
+      .received =
+          [log](const std::string& bus, const can::ReceivedFrame& received) {
+            log->info("{} {} rx {}", ns(received.at), bus, can::to_string(received.frame));
+          },
+      .ended =
+          [log](const std::string& bus, const can::Frame& frame, const can::SendResult& result,
+                TimePoint at) {
+            const bool sent = result.status == can::SendStatus::sent;
+            const auto text = can::to_string(frame);
+            if (sent || result.status == can::SendStatus::unknown)
+              log->info("{} {} tx {}", ns(result.handed_over), bus, text);
+            if (!sent) log->info("{} {} -- {} {}", ns(at), bus, text, can::to_string(result.status));
+          },
+      .state = [log](const std::string& bus, const can::PortState& state,
+                     TimePoint at) { log->info("{} {} link {}", ns(at), bus, can::to_string(state.link)); }};
+}
+
 }  // namespace
 
 void start_logging(const std::string& level) {
@@ -60,7 +94,7 @@ void start_logging(const std::string& level) {
 
 void end_logging() { spdlog::shutdown(); }
 
-Result<modbus_rtu::ExchangeObserver> open_wire_log(const std::string& path) {
+Result<WireLog> open_wire_log(const std::string& path) {
   std::shared_ptr<spdlog::logger> log;
   try {
     log = make_async("wire", std::make_shared<spdlog::sinks::basic_file_sink_mt>(path));
@@ -70,17 +104,7 @@ Result<modbus_rtu::ExchangeObserver> open_wire_log(const std::string& path) {
   log->set_pattern("%v");
   log->set_level(spdlog::level::trace);
   log->flush_on(spdlog::level::trace);
-  return [log](const std::string& bus, const modbus_rtu::Exchange& exchange,
-               const modbus_rtu::ExchangeResult& result) {
-    const auto ns = [](TimePoint t) { return t.time_since_epoch().count(); };
-    if (result.status != modbus_rtu::ExchangeStatus::not_sent &&
-        result.status != modbus_rtu::ExchangeStatus::unsupported)
-      log->info("{} {} tx {}", ns(result.request_begin), bus, modbus_rtu::to_hex(exchange.frame.bytes()));
-    if (result.reply_frame.size() > 0)
-      log->info("{} {} rx {}", ns(result.reply_begin), bus, modbus_rtu::to_hex(result.reply_frame.bytes()));
-    if (result.status != modbus_rtu::ExchangeStatus::replied)
-      log->info("{} {} -- {}", ns(result.reply_end), bus, why(result));
-  };
+  return WireLog{.exchanges = log_exchanges(log), .frames = log_frames(log)};
 }
 
 }  // namespace axisd

@@ -19,6 +19,9 @@ Options parse_options(int argc, char** argv) {
                  "overrides state_directory of the configuration");
   app.add_option("--listen", options.listen, "overrides server: { listen } of the configuration");
   app.add_option("--wire-log", options.wire_log, "append every frame with its time to this file");
+  app.add_option("--link-helper", options.link_helper,
+                 "unix socket of axisd-link, which takes CAN links down and up")
+      ->capture_default_str();
   app.add_option("--log-level", options.log_level, "trace, debug, info, warn, error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}))
       ->capture_default_str();

@@ -7,12 +7,13 @@ namespace axisd {
 
 struct Options {
   std::string config = "/etc/axisd/axisd.yaml";
-  bool check = false;                  ///< load, report, exit
-  bool schema = false;                 ///< print the JSON Schema, exit
-  std::optional<std::string> quiesce;  ///< configuration whose axes are stopped; then exit
-  std::string state_directory;         ///< overrides the configuration's
-  std::string listen;                  ///< likewise
-  std::string wire_log;                ///< file that gets every frame; empty: none
+  bool check = false;                                ///< load, report, exit
+  bool schema = false;                               ///< print the JSON Schema, exit
+  std::optional<std::string> quiesce;                ///< configuration whose axes are stopped; then exit
+  std::string state_directory;                       ///< overrides the configuration's
+  std::string listen;                                ///< likewise
+  std::string wire_log;                              ///< file that gets every frame; empty: none
+  std::string link_helper = "/run/axisd-link.sock";  ///< unix socket of axisd-link (M26)
   std::string log_level = "info";
 };
 

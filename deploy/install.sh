@@ -13,7 +13,7 @@ staged=${DESTDIR:-}
 deploy/install-packages.sh build
 deploy/install-packages.sh run
 cmake --preset release
-cmake --build --preset release --target axisd axisctl axisd-sim
+cmake --build --preset release --target axisd axisctl axisd-sim axisd-link
 cmake --install build/release --prefix /usr --strip
 [ -z "$staged" ] || exit 0
 
@@ -31,4 +31,5 @@ echo
 [ -f /etc/axisd/axisd.yaml ] ||
   echo "1. Write /etc/axisd/axisd.yaml; start from /usr/share/doc/axisd/examples/reference.yaml"
 echo "2. axisctl check /etc/axisd/axisd.yaml"
-echo "3. systemctl enable axisd && systemctl restart axisd    (a restart stops the axes of a running daemon)"
+echo "3. For CAN: deploy/README.md, section CAN links"
+echo "4. systemctl enable axisd && systemctl restart axisd    (a restart stops the axes of a running daemon)"

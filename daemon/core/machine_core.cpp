@@ -28,6 +28,8 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
     networks_.push_back(std::make_unique<canopen::CanopenBus>(parts_.executor, *parts_.clock, network,
                                                               parts_.make_port(network)));
     buses_.push_back(networks_.back().get());
+    cyclers_.push_back(std::make_unique<LinkCycler>(parts_.executor, *parts_.clock, *networks_.back(),
+                                                    parts_.request_link_cycle));
   }
   const auto record = [this](const std::string& axis, EventContent content) {
     events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
@@ -111,6 +113,7 @@ void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
 void MachineCore::start() {
   for (const auto& line : lines_) line->start(parts_.observer);
   for (const auto& network : networks_) network->start();
+  for (const auto& cycler : cyclers_) launch(cycler->run(), "link cycler");
   for (const auto& axis : axes_) axis->start();
   for (const auto& device : devices_) device->start();
 }
@@ -182,6 +185,7 @@ bool MachineCore::at_rest() const {
 void MachineCore::close() {
   for (const auto& axis : axes_) axis->close();
   for (const auto& device : devices_) device->close();
+  for (const auto& cycler : cyclers_) cycler->close();
   for (auto* bus : buses_) bus->close();
 }
 

@@ -11,6 +11,7 @@
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "config/configuration.hpp"
 #include "daemon/core/event_log.hpp"
+#include "daemon/core/link_cycler.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
 #include "devices/generic/device.hpp"
@@ -28,6 +29,7 @@ struct MachineParts {
   std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line;
   /// May be empty where the configuration has no CAN network.
   std::function<std::unique_ptr<can::Port>(const canopen::NetworkSettings&)> make_port{};
+  RequestLinkCycle request_link_cycle{};  ///< empty: links stay as they are after bus-off and stalls (M26)
   modbus_rtu::ExchangeObserver observer;
   std::function<void()> published;
 };
@@ -90,6 +92,7 @@ class MachineCore {
   boost::atomic_shared_ptr<const std::string> inhibited_by_;
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> lines_;
   std::vector<std::unique_ptr<canopen::CanopenBus>> networks_;
+  std::vector<std::unique_ptr<LinkCycler>> cyclers_;  ///< one per network
   std::vector<Bus*> buses_;
   std::vector<std::unique_ptr<Axis>> axes_;
   std::vector<std::unique_ptr<Device>> devices_;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "buses/canopen/canopen_bus.hpp"
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "buses/signal.hpp"
 #include "devices/axis/planner.hpp"
@@ -69,41 +70,98 @@ Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, 
   co_return report;
 }
 
+/// The buses of the configuration, and a drive for each axis.
+class Machine {
+ public:
+  Machine(const QuiesceParts& parts, const config::Configuration& configuration)
+      : executor_(parts.executor), ended_(parts.executor, *parts.clock) {
+    for (const auto& line : configuration.lines)
+      lines_.push_back(
+          std::make_unique<modbus_rtu::RtuBus>(executor_, *parts.clock, line, parts.make_line(line)));
+    for (const auto& network : configuration.networks) {
+      networks_.push_back(
+          std::make_unique<canopen::CanopenBus>(executor_, *parts.clock, network, parts.make_port(network)));
+      cyclers_.push_back(
+          std::make_unique<LinkCycler>(executor_, *parts.clock, *networks_.back(), parts.request_link_cycle));
+    }
+    for (const auto& entry : configuration.axes) {
+      const auto* line = find(lines_, entry.axis.bus);
+      const auto* network = find(networks_, entry.axis.bus);
+      drives_.push_back(find_drive_model(entry.axis.model)
+                            ->make({.executor = executor_,
+                                    .clock = parts.clock,
+                                    .rtu = line == nullptr ? nullptr : line->get(),
+                                    .canopen = network == nullptr ? nullptr : network->get(),
+                                    .node = entry.axis.node,
+                                    .setup = {}}));
+      buses_.push_back(line != nullptr ? static_cast<Bus*>(line->get()) : network->get());
+    }
+    // After the drives, which are attached to their network before it starts.
+    for (const auto& line : lines_) line->start();
+    for (const auto& network : networks_) network->start();
+    for (const auto& cycler : cyclers_) spawn(executor_, counted(cycler->run(), cycling_), "link cycler");
+  }
+
+  [[nodiscard]] Drive& drive(std::size_t axis) const { return *drives_[axis]; }
+  [[nodiscard]] Bus& bus(std::size_t axis) const { return *buses_[axis]; }
+
+  /// Runs a sequence that uses what this owns.
+  void launch(Task<> sequence, std::string name) {
+    spawn(executor_, counted(std::move(sequence), stopping_), std::move(name));
+  }
+  /// Waits for what was launched, then ends the rest.
+  Task<> finish() {
+    while (stopping_ > 0) co_await ended_.wait();
+    for (const auto& cycler : cyclers_) cycler->close();
+    for (const auto& network : networks_) network->close();
+    while (cycling_ > 0) co_await ended_.wait();
+  }
+
+ private:
+  template <class T>
+  static const std::unique_ptr<T>* find(const std::vector<std::unique_ptr<T>>& buses,
+                                        const std::string& name) {
+    const auto found = std::ranges::find_if(buses, [&](const auto& bus) { return bus->name() == name; });
+    return found == buses.end() ? nullptr : &*found;
+  }
+  Task<> counted(Task<> sequence, int& running) {
+    ++running;
+    auto run = [](Task<> inner, int& count, Signal& ended) -> Task<> {
+      co_await std::move(inner);
+      --count;
+      ended.notify_all();
+    };
+    return run(std::move(sequence), running, ended_);
+  }
+
+  Executor executor_;
+  Signal ended_;
+  std::vector<std::unique_ptr<modbus_rtu::RtuBus>> lines_;
+  std::vector<std::unique_ptr<canopen::CanopenBus>> networks_;
+  std::vector<std::unique_ptr<LinkCycler>> cyclers_;
+  std::vector<std::unique_ptr<Drive>> drives_;  ///< one per axis
+  std::vector<Bus*> buses_;                     ///< likewise
+  int stopping_ = 0, cycling_ = 0;              ///< sequences that run
+};
+
 }  // namespace
 
-Task<std::vector<QuiesceReport>> quiesce(
-    Executor executor, Clock& clock, const config::Configuration& configuration,
-    std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line,
-    Duration limit) {
-  std::vector<std::unique_ptr<modbus_rtu::RtuBus>> buses;
-  for (const auto& line : configuration.lines) {
-    buses.push_back(std::make_unique<modbus_rtu::RtuBus>(executor, clock, line, make_line(line)));
-    buses.back()->start();
-  }
-  const Times times{.harder = clock.now() + limit / 2, .end = clock.now() + limit};
+Task<std::vector<QuiesceReport>> quiesce(QuiesceParts parts, const config::Configuration& configuration,
+                                         Duration limit) {
+  const auto now = parts.clock->now();
+  const Times times{.harder = now + limit / 2, .end = now + limit};
+  Machine machine(parts, configuration);
   std::vector<QuiesceReport> reports(configuration.axes.size());
-  std::vector<std::unique_ptr<Drive>> drives;
-  std::size_t running = configuration.axes.size();
-  Signal ended(executor, clock);
-  for (std::size_t i = 0; i < configuration.axes.size(); ++i) {
-    const auto& settings = configuration.axes[i].axis;
-    const auto bus =
-        std::ranges::find_if(buses, [&](const auto& b) { return b->settings().name == settings.bus; });
-    const auto* descriptor = find_drive_model(settings.model);
-    drives.push_back(descriptor->make(
-        {.executor = executor, .clock = &clock, .rtu = bus->get(), .node = settings.node, .setup = {}}));
-    auto one = [](Task<QuiesceReport> stopping, QuiesceReport& report, std::size_t& left,
-                  Signal& done) -> Task<> {
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    const auto& name = configuration.axes[i].axis.name;
+    auto one = [](Task<QuiesceReport> stopping, QuiesceReport& report) -> Task<> {
       report = co_await std::move(stopping);
-      --left;
-      done.notify_all();
     };
-    spawn(executor,
-          one(stop_one(executor, clock, settings.name, *drives.back(), **bus, times), reports[i], running,
-              ended),
-          "quiesce " + settings.name);
+    machine.launch(one(stop_one(parts.executor, *parts.clock, name, machine.drive(i), machine.bus(i), times),
+                       reports[i]),
+                   "quiesce " + name);
   }
-  while (running > 0) co_await ended.wait();
+  co_await machine.finish();
   co_return reports;
 }
 

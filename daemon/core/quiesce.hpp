@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "buses/can/port.hpp"
 #include "buses/clock.hpp"
 #include "buses/modbus_rtu/line.hpp"
 #include "buses/task.hpp"
 #include "config/configuration.hpp"
+#include "daemon/core/link_cycler.hpp"
 
 namespace axisd::core {
 
@@ -18,12 +20,19 @@ struct QuiesceReport {
   std::string detail;      ///< for people
 };
 
+/// What its buses are made from; as in MachineParts.
+struct QuiesceParts {
+  Executor executor;
+  Clock* clock = nullptr;
+  std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line;
+  std::function<std::unique_ptr<can::Port>(const canopen::NetworkSettings&)> make_port{};
+  RequestLinkCycle request_link_cycle{};
+};
+
 /// Last resort (M17): stops every drive of a configuration without axes, leases or server. Each gets stops
 /// until its standstill is read back or `limit` has passed; one that goes on gets quick stops after half of
-/// it. Thread: core.
-Task<std::vector<QuiesceReport>> quiesce(
-    Executor executor, Clock& clock, const config::Configuration& configuration,
-    std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line,
-    Duration limit);
+/// it. A CAN link that does not send is cycled, which flushes its queue (M26). Thread: core.
+Task<std::vector<QuiesceReport>> quiesce(QuiesceParts parts, const config::Configuration& configuration,
+                                         Duration limit);
 
 }  // namespace axisd::core

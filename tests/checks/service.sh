@@ -13,14 +13,20 @@ for program in axisd axisctl axisd-sim; do
   [ -x "$stage/usr/bin/$program" ] || { echo "service.sh: $program is not installed" >&2; exit 1; }
 done
 
-# The unit names /usr/bin; this computer has the programs elsewhere.
+[ -x "$stage/usr/lib/axisd/axisd-link" ] || { echo "service.sh: axisd-link is not installed" >&2; exit 1; }
+
+# The units name /usr; this computer has the programs elsewhere.
 mkdir "$stage/unit"
-sed "s#/usr/bin/axisd#$stage/usr/bin/axisd#" "$stage/usr/lib/systemd/system/axisd.service" >"$stage/unit/axisd.service"
-complaints=$(systemd-analyze verify --man=no "$stage/unit/axisd.service" 2>&1) || { echo "$complaints"; exit 1; }
-if grep -F axisd.service <<<"$complaints"; then exit 1; fi
+for unit in axisd.service axisd-link.service axisd-link.socket; do
+  sed "s#/usr/\(bin\|lib/axisd\)/axisd#$stage/usr/\1/axisd#" "$stage/usr/lib/systemd/system/$unit" >"$stage/unit/$unit"
+done
+complaints=$(systemd-analyze verify --man=no "$stage"/unit/axisd* 2>&1) || { echo "$complaints"; exit 1; }
+if grep -E 'axisd(-link)?\.(service|socket)' <<<"$complaints"; then exit 1; fi
 
 # 10 is without any protection; beyond 2.0 somebody has opened something.
-systemd-analyze security --offline=true --threshold=20 "$stage/unit/axisd.service" >"$stage/exposure" ||
-  { cat "$stage/exposure"; exit 1; }
-tail -n 1 "$stage/exposure"
+for unit in axisd.service axisd-link.service; do
+  systemd-analyze security --offline=true --threshold=20 "$stage/unit/$unit" >"$stage/exposure" ||
+    { cat "$stage/exposure"; exit 1; }
+  tail -n 1 "$stage/exposure"
+done
 systemd-sysusers --dry-run "$stage/usr/lib/sysusers.d/axisd.conf"

@@ -162,8 +162,9 @@ core::QuiesceReport quiesce(Rig& rig, Duration limit) {
     return std::unique_ptr<modbus_rtu::Line>(std::move(made));
   };
   auto all = [&]() -> Task<> {
-    reports =
-        co_await core::quiesce(rig.world.executor(), rig.world.clock(), rig.configuration, make_line, limit);
+    core::QuiesceParts parts{
+        .executor = rig.world.executor(), .clock = &rig.world.clock(), .make_line = make_line};
+    reports = co_await core::quiesce(std::move(parts), rig.configuration, limit);
   };
   spawn(rig.world.executor(), all(), "quiesce");
   EXPECT_TRUE(rig.run_until([&] { return reports.has_value(); }, limit + 2s));

@@ -1,0 +1,58 @@
+#include "daemon/ports.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "buses/can/socketcan_port.hpp"
+#include "buses/modbus_rtu/rtu_worker.hpp"
+
+namespace axisd {
+
+Ports::Ports(core::CoreLoop& loop, const std::string& link_helper, core::NetworkObserver observer)
+    : loop_(&loop),
+      link_helper_(loop.executor(), loop.clock(), link_helper),
+      observer_(std::move(observer)) {}
+
+Result<std::unique_ptr<Ports>> Ports::open(core::CoreLoop& loop, const config::Configuration& configuration,
+                                           const std::string& link_helper, core::NetworkObserver observer) {
+  std::unique_ptr<Ports> ports(new Ports(loop, link_helper, std::move(observer)));
+  auto lines = SimulatedLines::open(configuration);
+  if (!lines) return fail(lines.error());
+  ports->lines_ = std::move(*lines);
+  return ports;
+}
+
+std::unique_ptr<modbus_rtu::Line> Ports::make_line(const modbus_rtu::LineSettings& settings) {
+  modbus_rtu::RtuWorker::PortPath path;
+  if (settings.simulated())
+    path = [this, name = settings.name]() -> Result<std::string> { return lines_->path(name); };
+  return std::make_unique<modbus_rtu::RtuWorker>(loop_->executor(), settings, std::move(path));
+}
+
+std::unique_ptr<can::Port> Ports::make_port(const canopen::NetworkSettings& settings) {
+  can::PortSettings port{.bus = settings.name, .interface = settings.interface, .bitrate = settings.bitrate};
+  std::unique_ptr<can::Port> made =
+      std::make_unique<can::SocketCanPort>(loop_->executor(), loop_->clock(), std::move(port));
+  if (!observer_.wanted()) return made;
+  return std::make_unique<core::ObservedPort>(std::move(made), loop_->clock(), observer_);
+}
+
+core::RequestLinkCycle Ports::request_link_cycle() {
+  return [this](const std::string& interface, core::LinkClient::Done done) {
+    link_helper_.cycle(interface, std::move(done));
+  };
+}
+
+void Ports::check_link_helper(const config::Configuration& configuration) {
+  for (const auto& network : configuration.networks) {
+    if (network.simulated()) continue;
+    link_helper_.check(network.interface, [bus = network.name](const Result<void>& answer) {
+      if (!answer)
+        spdlog::warn("{}: its link would not be cycled after bus-off or a stall: {}", bus,
+                     to_string(answer.error()));
+    });
+  }
+}
+
+}  // namespace axisd

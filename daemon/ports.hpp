@@ -1,0 +1,44 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "buses/can/port.hpp"
+#include "buses/canopen/settings.hpp"
+#include "buses/modbus_rtu/line.hpp"
+#include "config/configuration.hpp"
+#include "daemon/core/core_loop.hpp"
+#include "daemon/core/link_client.hpp"
+#include "daemon/core/link_cycler.hpp"
+#include "daemon/core/observed_port.hpp"
+#include "daemon/simulated_lines.hpp"
+
+namespace axisd {
+
+/// Makes what carries the frames of each bus: the operating system's ports and interfaces, or simulated
+/// drives. Outlives the buses, and is outlived by the loop. Thread: its makers are called on the core thread,
+/// or before that runs.
+class Ports {
+ public:
+  /// `observer`: of CAN frames, may be empty. Errors: as of SimulatedLines.
+  static Result<std::unique_ptr<Ports>> open(core::CoreLoop& loop, const config::Configuration& configuration,
+                                             const std::string& link_helper,
+                                             core::NetworkObserver observer = {});
+  Ports(const Ports&) = delete;
+
+  std::unique_ptr<modbus_rtu::Line> make_line(const modbus_rtu::LineSettings& settings);
+  std::unique_ptr<can::Port> make_port(const canopen::NetworkSettings& settings);
+  [[nodiscard]] core::RequestLinkCycle request_link_cycle();
+  /// Logs for which CAN links nobody would do it. Thread: core.
+  void check_link_helper(const config::Configuration& configuration);
+
+ private:
+  Ports(core::CoreLoop& loop, const std::string& link_helper, core::NetworkObserver observer);
+
+  core::CoreLoop* loop_;
+  core::LinkClient link_helper_;
+  core::NetworkObserver observer_;
+  std::unique_ptr<SimulatedLines> lines_;
+};
+
+}  // namespace axisd

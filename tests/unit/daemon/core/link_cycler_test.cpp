@@ -1,0 +1,175 @@
+#include "daemon/core/link_cycler.hpp"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+#include "buses/can/network.hpp"
+#include "daemon/core/machine_core.hpp"
+#include "tests/support/virtual_world.hpp"
+
+namespace axisd::core {
+namespace {
+
+using namespace std::chrono_literals;
+using can::Controller;
+using can::LinkState;
+
+/// A machine with one CAN network, and somebody who is asked for cycles of its link.
+class Links : public testing::Test {
+ protected:
+  enum class Helper { cycles, refuses, silent };
+
+  Links() {
+    configuration_.machine = "m";
+    configuration_.networks.push_back({.name = "cell", .interface = "can7", .bitrate = 1'000'000});
+    machine_ = std::make_unique<MachineCore>(
+        MachineParts{.executor = world_.executor(),
+                     .clock = &world_.clock(),
+                     .instance_id = "t",
+                     .make_port =
+                         [this](const canopen::NetworkSettings& settings) {
+                           can::PortSettings port{.bus = settings.name, .interface = settings.interface};
+                           auto made = std::make_unique<can::NetworkPort>(world_.clock(), port, network_);
+                           port_ = made.get();
+                           return made;
+                         },
+                     .request_link_cycle =
+                         [this](const std::string& interface, std::function<void(Result<void>)> done) {
+                           asked(interface, std::move(done));
+                         }},
+        configuration_);
+    machine_->start();
+    world_.run_for(10ms);
+  }
+  ~Links() override {
+    machine_->close();
+    // At once: also while an answer is owed.
+    EXPECT_TRUE(world_.run_until([this] { return machine_->closed(); }, 0ms));
+  }
+
+  void asked(const std::string& interface, std::function<void(Result<void>)> done) {
+    EXPECT_EQ(interface, "can7");
+    asked_at_.push_back(std::chrono::duration_cast<milliseconds>(world_.now() - broken_at_).count());
+    if (helper_ == Helper::silent) return;
+    post(world_.executor(), [this, done = std::move(done)] {
+      if (helper_ == Helper::refuses)
+        return done(fail(Reason::misconfigured, "can7 is not among the links", "add it"));
+      port_->cycle();
+      done({});
+    });
+  }
+  void go_bus_off() {
+    broken_at_ = world_.now();
+    asked_at_.clear();
+    port_->report(Controller::bus_off);
+  }
+  [[nodiscard]] LinkState link() const { return port_->state().link; }
+
+  test::VirtualWorld world_;
+  can::Network network_{world_.clock(), 1'000'000};
+  config::Configuration configuration_;
+  can::NetworkPort* port_ = nullptr;
+  std::unique_ptr<MachineCore> machine_;
+  Helper helper_ = Helper::cycles;
+  TimePoint broken_at_{};
+  std::vector<long> asked_at_;  ///< ms since go_bus_off()
+};
+
+using Times = std::vector<long>;
+
+TEST_F(Links, ASoundLinkIsLeftAlone) {
+  world_.run_for(1min);
+  port_->set_up(false);  // somebody's will
+  world_.run_for(1min);
+  EXPECT_TRUE(asked_at_.empty());
+}
+
+TEST_F(Links, BusOffIsCycledAtOnce) {
+  go_bus_off();
+  world_.run_for(200ms);
+  EXPECT_EQ(asked_at_, Times{0});
+  EXPECT_EQ(link(), LinkState::up);
+  EXPECT_TRUE(machine_->find_bus("cell")->port().open);
+}
+
+TEST_F(Links, AStallIsCycledAndNothingOfBeforeIsSent) {
+  std::vector<can::Frame> received;
+  network_.join([&](const can::Frame& frame, TimePoint, bool) { received.push_back(frame); });
+  network_.set_stalled(true);
+  broken_at_ = world_.now();
+  std::vector<can::SendStatus> endings;
+  port_->send(can::make_frame(0x205, {}), {},
+              [&](const can::SendResult& result) { endings.push_back(result.status); });
+  world_.run_for(200ms);
+  EXPECT_EQ(asked_at_, Times{100});  // the stall's own time-out
+  EXPECT_EQ(endings, std::vector{can::SendStatus::unknown});
+  network_.set_stalled(false);
+  world_.run_for(1s);
+  EXPECT_TRUE(received.empty());
+  EXPECT_EQ(link(), LinkState::up);
+}
+
+TEST_F(Links, WhoeverRefusesIsAskedAgainLessAndLess) {
+  helper_ = Helper::refuses;
+  go_bus_off();
+  world_.run_for(30s);
+  EXPECT_EQ(asked_at_, (Times{0, 100, 300, 700, 1500, 3100, 6300, 12700, 22700}));
+  helper_ = Helper::cycles;
+  world_.run_for(10s);
+  EXPECT_EQ(link(), LinkState::up);
+}
+
+TEST_F(Links, ALinkThatBreaksAgainAtOnceIsGivenTimeAndOneThatWasSoundIsNot) {
+  for (int i = 0; i < 4; ++i) {
+    port_->report(Controller::bus_off);
+    world_.run_for(10ms);
+  }
+  // The causes came 10 ms apart, and only the first was served at once.
+  EXPECT_EQ(link(), LinkState::bus_off);
+  world_.run_for(1s);
+  EXPECT_EQ(link(), LinkState::up);
+  world_.run_for(LinkCycler::sound_after);
+  go_bus_off();
+  world_.run_for(50ms);
+  EXPECT_EQ(asked_at_, Times{0});
+  EXPECT_EQ(link(), LinkState::up);
+}
+
+TEST_F(Links, TheMachineClosesWhileAnAnswerIsOwed) {
+  helper_ = Helper::silent;
+  go_bus_off();
+  world_.run_for(1min);
+  EXPECT_EQ(asked_at_, Times{0});  // one request at a time: whoever asks ends it in its own time
+}
+
+TEST(LinkCycler, SaysWhyALinkIsNotCycled) {
+  test::VirtualWorld world;
+  can::Network network(world.clock(), 1'000'000);
+  auto port = std::make_unique<can::NetworkPort>(
+      world.clock(), can::PortSettings{.bus = "cell", .interface = "can7"}, network);
+  auto* const link = port.get();
+  canopen::CanopenBus bus(world.executor(), world.clock(), {.name = "cell", .interface = "can7"},
+                          std::move(port));
+  LinkCycler cycler(world.executor(), world.clock(), bus, {});
+  bus.start();
+  spawn(world.executor(), cycler.run(), "cycler");
+  world.run_for(1s);
+  EXPECT_FALSE(cycler.trouble());
+  link->report(Controller::bus_off);
+  world.run_for(1s);
+  ASSERT_TRUE(cycler.trouble());
+  EXPECT_EQ(cycler.trouble()->reason, Reason::not_supported);
+  EXPECT_EQ(cycler.trouble()->where.bus, "cell");
+  EXPECT_FALSE(cycler.trouble()->remedy.empty());
+  link->cycle();  // by hand
+  world.run_for(20s);
+  EXPECT_FALSE(cycler.trouble());
+  cycler.close();
+  bus.close();
+  world.run_for(1ms);
+}
+
+}  // namespace
+}  // namespace axisd::core
