@@ -89,19 +89,9 @@ constexpr NodeCommand node_commands[] = {{"power", &power}, {"input", &input}, {
                                          {"block", &block}, {"push", &push},   {"shaft", &shaft},
                                          {"peek", &peek},   {"poke", &poke},   {"eeprom", &eeprom}};
 
-std::string fault(RtuNetwork& network, std::string_view text) {
-  if (text == "clear") {
-    network.faults().clear();
-    return "ok";
-  }
-  auto parsed = parse_fault(text);
-  if (!parsed) return fmt::format("error {}; {}", parsed.error().message, parsed.error().remedy);
-  network.faults().add(std::move(*parsed));
-  return "ok";
-}
-
 /// "5": address; "@2": the second drive of the line. nullptr: there is none.
-SimulatedRtuNode* find_node(RtuNetwork& network, std::string_view name) {
+template <class Network>
+SimulatedNode* find_node(Network& network, std::string_view name) {
   if (name.starts_with('@')) {
     const auto place = parse_number<std::size_t>(name.substr(1));
     const auto nodes = network.nodes();
@@ -111,7 +101,8 @@ SimulatedRtuNode* find_node(RtuNetwork& network, std::string_view name) {
   return address ? network.node(*address) : nullptr;
 }
 
-std::string node_command(RtuNetwork& network, Words words) {
+template <class Network>
+std::string node_command(Network& network, Words words) {
   for (const auto& command : node_commands) {
     if (command.name != words[0]) continue;
     if (words.size() < 2) return fmt::format("error {} needs a node", words[0]);
@@ -121,20 +112,53 @@ std::string node_command(RtuNetwork& network, Words words) {
   return fmt::format("error \"{}\" is no command; use: {}", words[0], usage);
 }
 
-}  // namespace
-
-std::string execute_control(RtuNetwork& network, std::string_view command) {
+/// `take_fault` gets the words after "fault".
+template <class Network, class TakeFault>
+std::string execute(Network& network, std::string_view command, TakeFault take_fault) {
   const auto words = split(command, ' ');
   if (words.empty()) return fmt::format("error empty; use: {}", usage);
   if (words[0] == "fault") {
     const auto rest = command.find("fault") + 5;
-    return fault(network, command.substr(std::min(command.find_first_not_of(' ', rest), command.size())));
+    const Result<void> taken =
+        take_fault(command.substr(std::min(command.find_first_not_of(' ', rest), command.size())));
+    return taken ? "ok" : fmt::format("error {}; {}", taken.error().message, taken.error().remedy);
   }
   if (words.size() > 1) return node_command(network, words);
   if (words[0] == "help") return fmt::format("ok {}", usage);
   if (words[0] != "cut" && words[0] != "join") return node_command(network, words);
   network.set_connected(words[0] == "join");
   return "ok";
+}
+
+}  // namespace
+
+std::string execute_control(RtuNetwork& network, std::string_view command) {
+  return execute(network, command, [&](std::string_view text) -> Result<void> {
+    if (text == "clear") {
+      network.faults().clear();
+      return {};
+    }
+    auto parsed = parse_fault(text);
+    if (!parsed) return fail(parsed.error());
+    network.faults().add(std::move(*parsed));
+    return {};
+  });
+}
+
+std::string execute_control(CanNodes& nodes, std::string_view command) {
+  nodes.advance();
+  auto reply = execute(nodes, command, [&](std::string_view text) -> Result<void> {
+    if (text == "clear") {
+      nodes.clear_faults();
+      return {};
+    }
+    const auto parsed = parse_can_fault(text);
+    if (!parsed) return fail(parsed.error());
+    nodes.add_fault(*parsed);
+    return {};
+  });
+  nodes.advance();  // what the command changed may be something to send, or to wait for
+  return reply;
 }
 
 std::string execute_control(PtyLine& line, std::string_view command) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "devices/simulation/can_nodes.hpp"
 #include "devices/simulation/pty_line.hpp"
 #include "devices/simulation/rtu_network.hpp"
 
@@ -17,7 +18,11 @@ namespace axisd::simulation {
 /// "ok ..." or "error ...". Thread: the network's.
 std::string execute_control(RtuNetwork& network, std::string_view command);
 
-/// The same, and `hangup` and `replug` of the adapter. Thread: any.
+/// The same on a CAN network, at the clock's present time; REGISTER is an object, index << 8 | sub-index.
+/// Faults as parse_can_fault() has them. Thread: the clock's.
+std::string execute_control(CanNodes& nodes, std::string_view command);
+
+/// Those of RtuNetwork, and `hangup` and `replug` of the adapter. Thread: any.
 std::string execute_control(PtyLine& line, std::string_view command);
 
 }  // namespace axisd::simulation

@@ -90,6 +90,8 @@ class SimulatedCanNode : public SimulatedNode {
   virtual void join(std::uint32_t /*bitrate*/) {}
   /// A frame of another participant, ending at the time of the last advance().
   virtual void on_frame(const can::Frame& frame) = 0;
+  /// False: on_frame() would do nothing now. A node among many need not be woken for it.
+  [[nodiscard]] virtual bool hears(const can::Frame& /*frame*/) const { return true; }
   /// What it sends, oldest first, after each advance() and on_frame().
   virtual std::optional<can::Frame> take_frame() = 0;
   /// When advance() has something to do next (boot-up, reply, heartbeat, PDO, motion that changes an event

@@ -10,14 +10,17 @@
 #include <string_view>
 #include <vector>
 
+#include "devices/simulation/motor.hpp"
 #include "devices/simulation/simulated_node.hpp"
 #include "devices/simulation/simulator.hpp"
 #include "devices/yako_rtu/simulator_memory.hpp"
-#include "devices/yako_rtu/simulator_motor.hpp"
 #include "devices/yako_rtu/simulator_switches.hpp"
 #include "devices/yako_rtu/simulator_terminals.hpp"
 
 namespace axisd::yako_rtu {
+
+using simulation::Motor;
+using simulation::Rates;
 
 /// Pure, in the time given to advance(); events within it happen at their exact times. `model` must outlive
 /// it. Throws std::invalid_argument for a switch that the model does not have.

@@ -10,8 +10,8 @@ namespace axisd::yako_rtu {
 Rates SimulatedDrive::rates(double rpm, double acceleration_ms, double deceleration_ms) const {
   const double pulses = memory_.pulses_per_revolution();
   const double fastest = std::min(3000.0, 12e6 / pulses);  // 0x0023: 200 kHz of pulses
-  return rates_from(memory_.get(reg::start_speed), std::min(rpm, fastest), acceleration_ms, deceleration_ms,
-                    pulses);
+  return simulation::rates_from(memory_.get(reg::start_speed), std::min(rpm, fastest), acceleration_ms,
+                                deceleration_ms, pulses);
 }
 
 SimulatedDrive::Plan SimulatedDrive::position_plan(bool absolute) const {

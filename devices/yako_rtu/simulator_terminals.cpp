@@ -42,41 +42,16 @@ void Terminals::drive(std::string_view terminal, std::optional<bool> high) {
     terminals_.at(static_cast<std::size_t>(found - model_->inputs.begin())).driven = high;
 }
 
-bool Terminals::switch_active(SwitchKind kind, std::int64_t shaft) const {
-  const auto& m = mechanics_;
-  if (kind == SwitchKind::home)
-    return m.home_switch_from && m.home_switch_to && shaft >= *m.home_switch_from &&
-           shaft <= *m.home_switch_to;
-  if (kind == SwitchKind::positive_limit) return m.positive_limit_from && shaft >= *m.positive_limit_from;
-  return m.negative_limit_from && shaft <= *m.negative_limit_from;
-}
-
-std::optional<std::int64_t> Terminals::next_switch(std::int64_t shaft, int direction) const {
-  const auto& m = mechanics_;
-  std::optional<std::int64_t> nearest;
-  // `first` is the first position of the other state when going forwards; backwards it is the one before.
-  const auto consider = [&](std::optional<std::int64_t> first, std::int64_t further) {
-    if (!first) return;
-    const auto at = *first + further - (direction > 0 ? 0 : 1);
-    if ((at - shaft) * direction <= 0) return;
-    if (!nearest || (at - *nearest) * direction < 0) nearest = at;
-  };
-  consider(m.home_switch_from, 0);
-  consider(m.home_switch_to, 1);
-  consider(m.positive_limit_from, 0);
-  consider(m.negative_limit_from, 1);
-  return nearest;
-}
-
 bool Terminals::raw(std::size_t index, std::int64_t shaft, const Memory& memory) const {
   const auto& terminal = terminals_.at(index);
   const bool inverted = (memory.get(reg::input_levels) >> index & 1U) != 0;
   if (terminal.driven) return *terminal.driven != inverted;
   if (terminal.wire)
-    return switch_active(terminal.wire->kind, shaft) != (terminal.wire->normally_closed != inverted);
+    return switch_active(mechanics_, terminal.wire->kind, shaft) !=
+           (terminal.wire->normally_closed != inverted);
   // A switch without a terminal of its own is wired to its function, in the polarity that the drive expects.
   const auto kind = switch_of(function_of(index, memory));
-  if (kind) return !wired_.at(static_cast<std::size_t>(*kind)) && switch_active(*kind, shaft);
+  if (kind) return !wired_.at(static_cast<std::size_t>(*kind)) && switch_active(mechanics_, *kind, shaft);
   return inverted;  // nothing connected: low level
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "buses/clock.hpp"
+#include "devices/simulation/mechanics.hpp"
 #include "devices/simulation/simulated_node.hpp"
 #include "devices/yako_rtu/simulator_memory.hpp"
 
@@ -62,7 +63,9 @@ class Terminals {
   /// When a filter lets a level through; TimePoint::max() if all are stable.
   [[nodiscard]] TimePoint next_event() const;
   /// Next position of the shaft in `direction` at which a switch changes.
-  [[nodiscard]] std::optional<std::int64_t> next_switch(std::int64_t shaft, int direction) const;
+  [[nodiscard]] std::optional<std::int64_t> next_switch(std::int64_t shaft, int direction) const {
+    return simulation::next_switch(mechanics_, shaft, direction);
+  }
 
   [[nodiscard]] bool active(Input function) const {
     return functions_.at(static_cast<std::size_t>(function));
@@ -80,7 +83,6 @@ class Terminals {
 
     TimePoint due = TimePoint::max();  ///< when the other level gets through the filter
   };
-  [[nodiscard]] bool switch_active(simulation::SwitchKind kind, std::int64_t shaft) const;
   [[nodiscard]] bool raw(std::size_t index, std::int64_t shaft, const Memory& memory) const;
   [[nodiscard]] Duration filter(std::size_t index, const Memory& memory) const;
   [[nodiscard]] std::array<bool, input_functions> evaluate(const Memory& memory) const;

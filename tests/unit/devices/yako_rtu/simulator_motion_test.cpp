@@ -5,6 +5,9 @@
 namespace axisd::yako_rtu {
 namespace {
 
+using simulation::Profile;
+using simulation::rates_from;
+
 /// Time until the drive stands still, in steps of 1 ms.
 Duration run_out(Bench& bench, Duration at_most = 60s) {
   Duration passed{};

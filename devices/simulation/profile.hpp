@@ -1,10 +1,11 @@
-// Speed against time of one motion, manual 7.1 and 7.2: trapezoids and triangles, closed form.
+// Speed against time of one motion, as the drives with "start speed" make it (RS-485 manuals 7.1, 7.2;
+// YSS-C 6.2.4): trapezoids and triangles, closed form.
 #pragma once
 
 #include <array>
 #include <cstddef>
 
-namespace axisd::yako_rtu {
+namespace axisd::simulation {
 
 /// Speeds in pulses/s, accelerations in pulses/s^2. The sign of a motion is kept elsewhere.
 struct Rates {
@@ -50,4 +51,4 @@ class Profile {
   double duration_ = 0, total_ = 0;
 };
 
-}  // namespace axisd::yako_rtu
+}  // namespace axisd::simulation

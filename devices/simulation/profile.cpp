@@ -1,10 +1,10 @@
-#include "devices/yako_rtu/simulator_profile.hpp"
+#include "devices/simulation/profile.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace axisd::yako_rtu {
+namespace axisd::simulation {
 
 namespace {
 
@@ -111,4 +111,4 @@ double Profile::time_at(double distance) const {
   return duration_;
 }
 
-}  // namespace axisd::yako_rtu
+}  // namespace axisd::simulation

@@ -4,9 +4,9 @@
 #include <cstdint>
 
 #include "buses/clock.hpp"
-#include "devices/yako_rtu/simulator_profile.hpp"
+#include "devices/simulation/profile.hpp"
 
-namespace axisd::yako_rtu {
+namespace axisd::simulation {
 
 /// Positions in pulses. `commanded` is where the pulses sent so far would have brought the shaft, `shaft`
 /// where it really is; motions are planned in the former. The counters are both, from the drive's origin.
@@ -27,6 +27,8 @@ class Motor {
   /// The supply is gone: the counter begins at 0 where the shaft stands.
   void power_up();
   void clear_counter() { offset_ = -commanded_; }
+  /// Both counters read so many pulses here and now, as long as nothing lags.
+  void set_counter(std::int32_t pulses) { offset_ = pulses - commanded_; }
   /// While blocked the shaft stays where it is, and pulses do not turn it.
   void block(bool blocked) { blocked_ = blocked; }
   /// The load turns the shaft. `seen`: the counters follow (an encoder); else the origin moves along.
@@ -36,6 +38,8 @@ class Motor {
   [[nodiscard]] bool braking() const { return moving_ && braking_; }
   [[nodiscard]] int direction() const { return direction_; }  ///< of the last motion, 1 or -1
   [[nodiscard]] double speed() const;                         ///< pulses/s, not signed
+  /// At the speed that the motion is for.
+  [[nodiscard]] bool cruising() const;
   [[nodiscard]] bool blocked() const { return blocked_; }
   [[nodiscard]] std::int64_t shaft() const { return commanded_ - lag_; }
   [[nodiscard]] std::int64_t commanded() const { return commanded_; }
@@ -66,4 +70,4 @@ class Motor {
   std::int64_t commanded_ = 0, lag_ = 0, from_ = 0, offset_ = 0;
 };
 
-}  // namespace axisd::yako_rtu
+}  // namespace axisd::simulation

@@ -1,8 +1,8 @@
-#include "devices/yako_rtu/simulator_motor.hpp"
+#include "devices/simulation/motor.hpp"
 
 #include <cmath>
 
-namespace axisd::yako_rtu {
+namespace axisd::simulation {
 
 namespace {
 /// A pulse counts when it is reached, whatever the last bit of the arithmetic says.
@@ -74,6 +74,10 @@ void Motor::stop(bool slips) {
 
 double Motor::speed() const { return moving_ ? profile_.speed_at(elapsed()) : 0; }
 
+bool Motor::cruising() const {
+  return moving_ && !braking_ && std::abs(speed() - rates_.cruise) <= rates_.cruise * 1e-9;
+}
+
 double Motor::stopping_distance(const Rates& rates) const {
   return moving_ ? Profile::stopping_distance(speed(), rates) : 0;
 }
@@ -100,4 +104,4 @@ TimePoint Motor::lags(std::int64_t lag) const {
   return blocked_ ? commands(shaft() + direction_ * lag) : TimePoint::max();
 }
 
-}  // namespace axisd::yako_rtu
+}  // namespace axisd::simulation
