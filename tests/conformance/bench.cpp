@@ -28,7 +28,7 @@ Bench::Bench(const Setup& setup_of, const Recipe& recipe_of, bool connect)
 Bench::Bench(const Setup& setup_of, const Plant& plant, const Recipe& recipe_of, bool connect)
     : setup(setup_of),
       recipe(recipe_of),
-      target(make_virtual_target(plant)),
+      target(setup_of.make_target(plant)),
       client(*target, "axis"),
       terminals_(terminals_of(setup_of.manual, recipe_of)) {
   if (!connect) return;

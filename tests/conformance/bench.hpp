@@ -23,6 +23,7 @@ struct Broken : std::runtime_error {
 struct Setup {
   const Manual& manual;
   const Variant& variant;
+  TargetMaker make_target = &make_virtual_target;
   /// How the simulator stands at an open point of the manual; false for one that this model does not have.
   [[nodiscard]] bool on(std::string_view switch_name) const;
 };

@@ -18,6 +18,7 @@ struct Reading {
 constexpr Reading other_readings[] = {
     {"input_functions_at_0043", "terminal_registers", "wiring"},
     {"homing_mode_1_final_approach_same", "home_approach", "as_searched"},
+    {"homing_29_ends_backwards", "home_approach", "as_searched"},
 };
 
 std::vector<Wanted> inputs_of(const Recipe& recipe) {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <map>
 #include <random>
 
 #include "devices/descriptor.hpp"
@@ -26,6 +27,37 @@ std::span<const Subject> subjects() {
   return all;
 }
 
+namespace {
+
+/// Two switches of a simulator of which one at most is off or on: a drive that does neither or both cannot
+/// be.
+struct Either {
+  std::string_view first, second;
+  bool on;  ///< the position that they cannot both have
+};
+constexpr Either exclusive[] = {
+    {"homing_codes_cia", "homing_codes_0_to_3", false},
+    {"homed_only_bit8", "homed_only_bit12", true},
+    {"reached_only_bit10", "reached_only_bit15", true},
+};
+
+/// Of two exclusive switches the one that stands at its default gives way to the one that was flipped.
+void make_possible(std::map<std::string, bool>& flipped, std::span<const simulation::SwitchSpec> specs) {
+  const auto position = [&](std::string_view name) {
+    const auto found = flipped.find(std::string(name));
+    return found != flipped.end()
+               ? found->second
+               : std::ranges::find(specs, name, &simulation::SwitchSpec::name)->default_value;
+  };
+  for (const auto& [first, second, on] : exclusive) {
+    const auto known = std::ranges::find(specs, first, &simulation::SwitchSpec::name) != specs.end();
+    if (known && position(first) == on && position(second) == on)
+      flipped[std::string(flipped.contains(std::string(first)) ? second : first)] = !on;
+  }
+}
+
+}  // namespace
+
 std::vector<Variant> variants_of(const std::string& model, const Subject& subject, bool sampled) {
   constexpr std::size_t pairs = 12, part = 5;
   std::vector<Variant> all{{.invert = false}, {.invert = true}};
@@ -45,6 +77,7 @@ std::vector<Variant> variants_of(const std::string& model, const Subject& subjec
     const auto& second = switches[random() % switches.size()];
     all.push_back({.invert = random() % 2 == 0, .switches = {flipped(first), flipped(second)}});
   }
+  for (auto& variant : all) make_possible(variant.switches, switches);
   return all;
 }
 
@@ -70,7 +103,8 @@ std::string capability_matrix(std::vector<std::string>& failures) {
   return text;
 }
 
-Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant) {
+Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant,
+                     const TargetMaker& make_target) {
   Finding finding;
   ::testing::TestPartResultArray parts;
   std::string broken;
@@ -78,7 +112,7 @@ Finding run_scenario(const Scenario& scenario, const Manual& manual, const Varia
     const ::testing::ScopedFakeTestPartResultReporter reporter(
         ::testing::ScopedFakeTestPartResultReporter::INTERCEPT_ONLY_CURRENT_THREAD, &parts);
     try {
-      finding.shown = scenario.run({.manual = manual, .variant = variant});
+      finding.shown = scenario.run({.manual = manual, .variant = variant, .make_target = make_target});
     } catch (const std::exception& error) {
       broken = error.what();
     }

@@ -55,6 +55,7 @@ struct Finding {
 /// `failures`.
 std::string capability_matrix(std::vector<std::string>& failures);
 
-Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant);
+Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant,
+                     const TargetMaker& make_target = &make_virtual_target);
 
 }  // namespace axisd::conformance

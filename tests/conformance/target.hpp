@@ -3,6 +3,7 @@
 
 #include <grpcpp/channel.h>
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -38,5 +39,7 @@ class Target {
 /// Everything in this process and in virtual time, but the API over a real gRPC server. Throws
 /// std::invalid_argument if the plant's YAML or drives are not accepted; the message has all findings.
 std::unique_ptr<Target> make_virtual_target(const Plant& plant);
+/// Likewise, of any kind.
+using TargetMaker = std::function<std::unique_ptr<Target>(const Plant& plant)>;
 
 }  // namespace axisd::conformance

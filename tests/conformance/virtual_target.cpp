@@ -1,9 +1,7 @@
 // A whole machine in one process and in virtual time, behind a real gRPC server.
 #include <fmt/format.h>
 #include <grpcpp/grpcpp.h>
-#include <stdlib.h>
 
-#include <filesystem>
 #include <future>
 #include <stdexcept>
 #include <thread>
@@ -16,6 +14,7 @@
 #include "tests/conformance/target.hpp"
 #include "tests/conformance/virtual_wire.hpp"
 #include "tests/support/fake_persistence.hpp"
+#include "tests/support/temporary_directory.hpp"
 #include "tests/support/virtual_world.hpp"
 
 namespace axisd::conformance {
@@ -28,25 +27,6 @@ using namespace std::chrono_literals;
 /// deadline.
 constexpr Duration longest_call = std::chrono::hours(2);
 constexpr Duration daemon_end = 30s;
-
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "axisd-conformance-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary directory");
-    path_ = pattern;
-  }
-  ~TemporaryDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-  [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 config::Configuration load(const std::string& yaml) {
   auto loaded = config::load_text(yaml, "conformance.yaml");
@@ -136,7 +116,7 @@ class VirtualTarget final : public Target {
   test::VirtualWorld world_;  // first: what follows uses it
   config::Configuration configuration_;
   std::unique_ptr<VirtualWire> wire_;
-  TemporaryDirectory directory_;
+  test::TemporaryDirectory directory_;
   test::FakePersistence store_{world_.executor()};
   CallLedger ledger_{world_.executor()};
   Daemon daemon_;

@@ -9,7 +9,7 @@
 #include <csignal>
 #include <random>
 
-#include "tests/unit/daemon/store/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace axisd::store {
 namespace {
@@ -45,7 +45,7 @@ class FileStoreTest : public testing::Test {
   void break_disk() { std::filesystem::create_directory(temporary_.path() / "state.v1.new"); }
   void repair_disk() { std::filesystem::remove(temporary_.path() / "state.v1.new"); }
 
-  TemporaryDirectory temporary_;
+  test::TemporaryDirectory temporary_;
   boost::asio::io_context core_;
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> running_ =
       boost::asio::make_work_guard(core_);

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/unit/daemon/store/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace axisd::store {
 namespace {
@@ -35,7 +35,7 @@ class StateDirectoryTest : public testing::Test {
     EXPECT_EQ(loaded->generation, generation(number));
     EXPECT_EQ(loaded->damage.has_value(), damaged);
   }
-  TemporaryDirectory temporary_;
+  test::TemporaryDirectory temporary_;
 };
 
 TEST_F(StateDirectoryTest, AnEmptyDirectoryIsAFreshStart) {

@@ -7,13 +7,13 @@
 #include <stdexcept>
 #include <string>
 
-namespace axisd::store {
+namespace axisd::test {
 
 /// A directory of this test's own, removed at its end.
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "axisd-store-XXXXXX").string();
+    std::string pattern = (std::filesystem::temp_directory_path() / "axisd-test-XXXXXX").string();
     if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
     path_ = pattern;
   }
@@ -24,6 +24,8 @@ class TemporaryDirectory {
     std::filesystem::remove_all(path_, ignored);
   }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Path of a file in it.
+  [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
   [[nodiscard]] std::string read(const std::string& name) const {
     std::ifstream file(path_ / name, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
@@ -36,4 +38,4 @@ class TemporaryDirectory {
   std::filesystem::path path_;
 };
 
-}  // namespace axisd::store
+}  // namespace axisd::test
