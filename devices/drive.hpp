@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -89,6 +90,7 @@ struct DriveSetup {
   PersistSettings persist{};
   Duration reboot_guard{};
   std::map<std::string, SettingValue> model_settings;
+  std::shared_ptr<const DriveDescriptor> own_descriptor{};  ///< AxisSettings has it, too
   std::optional<DriveSegments> segments{};
 };
 
@@ -125,11 +127,18 @@ class Drive {
   /// refused, no_reply, moving, ...
   virtual Task<Result<void>> configure() = 0;
 
-  /// One block read of the whole state.
+  /// The whole state, coherent as far as the bus allows. Error `rebooted`: as of check_continuity(), where
+  /// the node itself said so.
   virtual Task<Result<DriveSample>> read_state(TransactionClass transaction_class) = 0;
 
   /// Reads the canary (M7). Error `rebooted` if the drive lost its memory since configure().
   virtual Task<Result<void>> check_continuity(TransactionClass transaction_class) = 0;
+
+  /// What is not as it should be about the way the state comes ("state by SDO polling: ..."); empty: nothing.
+  [[nodiscard]] virtual std::string link_note() const { return {}; }
+  /// Called on the core thread when the drive has something to tell that should not wait for the next poll:
+  /// it booted, fell silent, or reported an alarm. read_state() then tells what.
+  virtual void on_attention(std::function<void()> /*handler*/) {}
 
   /// The drive follows its position by an encoder, as it is configured.
   [[nodiscard]] virtual bool closed_loop() const = 0;
@@ -139,7 +148,8 @@ class Drive {
   [[nodiscard]] virtual std::optional<ContinuityMark> continuity_mark() const = 0;
   virtual void expect_mark(const ContinuityMark& mark) = 0;
 
-  /// Power stage. enable() includes a canary check. Errors as above.
+  /// Power stage. enable() includes a canary check. Errors as above; here and in the starts `terminal` means
+  /// that the shaft turned though nothing was started (M23): ErrorStop.
   virtual Task<Result<void>> enable(MotionGuard guard) = 0;
   /// An empty guard for the escalation of a stop: that one is always sent.
   virtual Task<Result<void>> disable(MotionGuard guard) = 0;

@@ -27,6 +27,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
     if (const auto found = axes.find(settings_.name); found != axes.end())
       eeprom_writes_ = found->second.eeprom_writes;
   }
+  drive_->on_attention([this] { wake_.notify_all(); });
   publish();
 }
 
@@ -120,8 +121,8 @@ void Axis::on_sample(const DriveSample& sample) {
 
 void Axis::on_alarm(const DriveSample& sample) {
   if (fault_ && fault_->reason == Reason::alarm && fault_->where.native_code == sample.alarm_code) return;
-  const auto spec = std::ranges::find(descriptor_->alarms, sample.alarm_code, &AlarmSpec::code);
-  const bool known = spec != descriptor_->alarms.end();
+  const auto* spec = find_alarm(*descriptor_, sample.alarm_code);
+  const bool known = spec != nullptr;
   auto cause =
       error(Reason::alarm,
             fmt::format("the drive reports alarm {} ({})", sample.alarm_code, known ? spec->name : "unknown"),

@@ -226,6 +226,7 @@ class Axis {
   void enter_error_stop(Error cause);
 
   // axis_power.cpp: sequences that move nothing
+  void on_turned_by_power(Error cause);
   Task<> run_enable(ActivityPtr activity);
   Task<> run_disable(ActivityPtr activity);
   Task<> run_reset(ActivityPtr activity);

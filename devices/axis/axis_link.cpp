@@ -272,6 +272,10 @@ Task<bool> Axis::poll_once(int& failures) {
       on_sample(*sample);
     else
       result = fail(sample.error());
+    if (!result && result.error().reason == Reason::rebooted) {
+      if (link_ == LinkState::online) on_reboot(result.error());
+      co_return false;
+    }
   }
   if (link_ != LinkState::online) co_return false;  // a sequence found the reboot first
   if (result) {

@@ -18,9 +18,6 @@ constexpr auto start_window = milliseconds(500);
 /// Beyond the predicted time: the prediction is exact for the profile, the drive's own latency is unknown.
 constexpr auto overrun_margin = std::chrono::seconds(1);
 
-/// Drives hold the position in 32 bit; before half of that is used up the counter is zeroed at standstill.
-constexpr std::int64_t rezero_beyond = std::int64_t{1} << 30U;
-
 }  // namespace
 
 bool Axis::current(const Activity& activity) const {
@@ -90,9 +87,9 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
   co_return true;
 }
 
-/// Zeroes the drive's counter before a target could leave its 32 bit (M19).
+/// Zeroes the drive's counter before a target could leave its 32 bit, or what the drive takes (M19).
 Task<Result<void>> Axis::make_room(ActivityPtr activity) {
-  if (std::abs(activity->plan.target_counter) < rezero_beyond) co_return Result<void>{};
+  if (planner_.reachable(activity->plan.target_counter)) co_return Result<void>{};
   // A sample that was asked for meanwhile may show either counter: none is taken for a motion.
   rezeroing_ = true;
   auto cleared = co_await drive_->clear_position(guard(*activity));
@@ -228,6 +225,10 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   auto cause = result.error();
   if (cause.reason == Reason::rebooted) {
     on_reboot(cause);
+    co_return false;
+  }
+  if (cause.reason == Reason::terminal) {
+    on_turned_by_power(cause);
     co_return false;
   }
   if (cause.outcome != Outcome::unknown) {

@@ -15,6 +15,13 @@ constexpr auto sample_patience = std::chrono::seconds(5);
 
 }  // namespace
 
+/// M1, M23: power, or the end of a halt, never moves. Whatever this is, it ends here.
+void Axis::on_turned_by_power(Error cause) {
+  enter_error_stop(std::move(cause));
+  begin_stop(StopKind::stop, false, nullptr);
+  publish();
+}
+
 Task<> Axis::run_enable(ActivityPtr activity) {
   Result<void> result;
   {
@@ -24,6 +31,10 @@ Task<> Axis::run_enable(ActivityPtr activity) {
   if (!current(*activity)) co_return;
   if (!result && result.error().reason == Reason::rebooted) {
     on_reboot(result.error());
+    co_return;
+  }
+  if (!result && result.error().reason == Reason::terminal) {
+    on_turned_by_power(result.error());
     co_return;
   }
   // Whether an enable without a reply was executed shows in the next samples.
@@ -41,11 +52,8 @@ Task<> Axis::run_enable(ActivityPtr activity) {
     if (!current(*activity)) co_return;
     if (!sample) break;
     if (sample->moving || tracker_.counter() != before) {
-      // M1: power never moves. Whatever this is, it ends here.
-      enter_error_stop(error(Reason::terminal, "the drive moved when it was enabled",
-                             "check terminals that start motion; then reset the axis"));
-      begin_stop(StopKind::stop, false, nullptr);
-      publish();
+      on_turned_by_power(error(Reason::terminal, "the drive moved when it was enabled",
+                               "check terminals that start motion; then reset the axis"));
       co_return;
     }
     if (sample->enabled) {

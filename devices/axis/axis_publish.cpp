@@ -82,11 +82,13 @@ void Axis::publish() {
   next->bus = settings_.bus;
   next->node = settings_.node;
   next->model = settings_.model;
+  next->own_descriptor = settings_.own_descriptor;
   next->unit = settings_.scale.unit;
   next->simulated = simulated_;
   next->state = state();
   next->link = link_;
   next->link_error = link_error_;
+  next->link_note = drive_->link_note();
   next->fault = fault_;
   next->stop_held = stopping_.hold;
   next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
@@ -121,8 +123,8 @@ void Axis::publish() {
     next->in_position = bits.in_position;
     next->homed = bits.homed;
     next->alarm_code = bits.alarm_code;
-    const auto alarm = std::ranges::find(descriptor_->alarms, bits.alarm_code, &AlarmSpec::code);
-    if (alarm != descriptor_->alarms.end()) next->alarm_name = alarm->name;
+    const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*descriptor_, bits.alarm_code);
+    if (alarm != nullptr) next->alarm_name = alarm->name;
     next->sampled_after = bits.asked_at;
     next->sampled_before = bits.measured_at;
     next->measured_at = env_.clock->wall(bits.measured_at);

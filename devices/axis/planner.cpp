@@ -34,6 +34,14 @@ int Planner::maximum_rpm() const {
   return static_cast<int>(std::min<std::int64_t>(capabilities_->maximum_rpm, by_pulse_rate));
 }
 
+std::int64_t Planner::longest_move() const {
+  constexpr std::int64_t half_counter = std::int64_t{1} << 30U;
+  return std::min({half_counter, std::int64_t{capabilities_->maximum_target_pulses},
+                   -std::int64_t{capabilities_->minimum_target_pulses}});
+}
+
+bool Planner::reachable(std::int64_t counter) const { return std::abs(counter) <= longest_move(); }
+
 double Planner::maximum_velocity() const {
   return std::min(settings_->limits.velocity, std::abs(scale_->velocity_to_units(maximum_rpm())));
 }
@@ -114,11 +122,9 @@ Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
   if (tracker.trust() != PositionTrust::unknown || !settings_->require_trust)
     if (const auto allowed = check_soft_limits(target.position, tracker.position()); !allowed)
       return fail(allowed.error());
-  // One move spans at most half the 32-bit counter; the counter itself is re-zeroed before it could overflow.
-  constexpr std::int64_t longest = std::int64_t{1} << 30U;
   const auto distance = static_cast<double>(target.counter) - static_cast<double>(tracker.counter());
-  if (std::abs(distance) > static_cast<double>(longest)) {
-    const auto reach = static_cast<double>(longest) / std::abs(scale_->pulses_per_unit());
+  if (std::abs(distance) > static_cast<double>(longest_move())) {
+    const auto reach = static_cast<double>(longest_move()) / std::abs(scale_->pulses_per_unit());
     return out_of_range(fmt::format("target {:.6g} {}", target.position, settings_->scale.unit),
                         tracker.position() - reach, tracker.position() + reach, settings_->scale.unit);
   }
@@ -239,6 +245,7 @@ Result<DriveSetup> drive_setup(const AxisSettings& settings, const DriveDescript
                    .persist = settings.persist,
                    .reboot_guard = settings.reboot_guard,
                    .model_settings = settings.model_settings,
+                   .own_descriptor = settings.own_descriptor,
                    .segments = segments};
   if (settings.scale.invert) {
     const auto mirror = [](std::vector<TerminalSettings>& terminals,

@@ -45,6 +45,11 @@ class Planner {
   /// Highest motor speed at this microstep setting: min(3000, 12,000,000 / pulses per revolution) r/min
   /// (M11).
   [[nodiscard]] int maximum_rpm() const;
+  /// Pulses. One move spans at most half the 32-bit counter, and what the drive takes as a target: the
+  /// counter is zeroed at standstill before a target leaves that.
+  [[nodiscard]] std::int64_t longest_move() const;
+  /// The drive takes this as a target without its counter being zeroed first.
+  [[nodiscard]] bool reachable(std::int64_t counter) const;
   /// Homing in drive direction and drive units; nullopt without `homing:`. Errors: out_of_range.
   [[nodiscard]] Result<std::optional<HomingProfile>> homing() const;
 

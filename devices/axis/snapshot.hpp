@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/smart_ptr/shared_ptr.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,12 +54,14 @@ struct AxisSnapshot {
   std::string bus;
   std::uint8_t node = 0;
   std::string model;
+  std::shared_ptr<const DriveDescriptor> own_descriptor{};  ///< as in AxisSettings
   std::string unit;
   bool simulated = false;
 
   AxisState state = AxisState::disabled;
   LinkState link = LinkState::offline;
   std::optional<Error> link_error{};  ///< why it is not online
+  std::string link_note{};            ///< what is not as it should be about the way the state comes
   std::optional<Error> fault{};       ///< why it is in ErrorStop
   std::string drift{};                ///< what the drive no longer holds as configured; empty: nothing
   bool enabled = false;               ///< the drive's power stage
