@@ -1,7 +1,6 @@
 // One CiA 402 drive on its CANopen network.
 #pragma once
 
-#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -14,8 +13,13 @@
 #include "buses/canopen/canopen_bus.hpp"
 #include "buses/canopen/pdo_configuration.hpp"
 #include "buses/signal.hpp"
+#include "devices/cia402/encoding.hpp"
+#include "devices/cia402/homing_watch.hpp"
 #include "devices/cia402/model.hpp"
 #include "devices/cia402/object_setting.hpp"
+#include "devices/cia402/objects.hpp"
+#include "devices/cia402/state_pdos.hpp"
+#include "devices/cia402/status_word.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
 
@@ -26,6 +30,10 @@ namespace axisd::cia402 {
 /// The canary: 607Ah, 6081h, 6083h, 6084h and the start speed live in RAM. What stands there after a power-up
 /// is never what this class last wrote, so reading them proves that the drive has not been restarted since
 /// (M6, M7), beside boot-up message and heartbeat.
+///
+/// Power never moves (M23). In Operation Enabled a drive of this family rests in one of two ways: ready
+/// (control word 0Fh, no motion under way), or halted (10Fh) after a stop. A halt is only ever released with
+/// nothing behind it: see make_ready().
 class Cia402Drive final : public Drive {
  public:
   Cia402Drive(const Model& model, DriveContext context);
@@ -40,25 +48,31 @@ class Cia402Drive final : public Drive {
 
   // drive_state.cpp
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
+  [[nodiscard]] std::string link_note() const override { return link_note_; }
+  void on_attention(std::function<void()> handler) override { attention_ = std::move(handler); }
 
   // drive_canary.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override;
   void expect_mark(const ContinuityMark& mark) override;
 
-  // drive_power.cpp, drive_motion.cpp, drive_stop.cpp
+  // drive_power.cpp
   Task<Result<void>> enable(MotionGuard guard) override;
   Task<Result<void>> disable(MotionGuard guard) override;
+  Task<Result<void>> stop(StopKind kind) override;
+  Task<Result<void>> clear_alarm() override;
+
+  // drive_motion.cpp
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
-  Task<Result<void>> stop(StopKind kind) override;
-  Task<Result<void>> clear_alarm() override;
   Task<Result<void>> clear_position(MotionGuard guard) override;
+
+  // drive_configuration.cpp
+  Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
 
   // drive_parameters.cpp
   std::uint64_t take_eeprom_writes() override { return std::exchange(eeprom_writes_, 0); }
-  Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
   [[nodiscard]] std::string configured_by(std::uint32_t address) const override;
   Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t> addresses) override;
   Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values) override;
@@ -71,18 +85,57 @@ class Cia402Drive final : public Drive {
  private:
   using Object = canopen::Object;
   using SdoOptions = canopen::SdoOptions;
-  /// What the canary's objects hold, in the order of canary_objects().
-  using MotionBlock = std::array<std::int32_t, 5>;
+  struct Trigger {
+    Object object;
+    std::int64_t value = 0;
+  };
+  /// A motion that was triggered and has not been seen to end.
+  struct Live {
+    TimePoint since;
+    bool moved = false;
+  };
 
   // drive_access.cpp
   /// The object's value, with its sign where its type has one. Learns the object's size.
   Task<Result<std::int64_t>> read_object(Object object, SdoOptions options);
-  /// Writes the object in the size that this drive takes: `bytes` at first, after an abort 0607001xh the size
-  /// that the drive reports or another one, which is remembered.
+  /// Writes the object in the size that this drive takes: as it was seen to take it, else `bytes`, or the
+  /// dictionary's if that is 0; after an abort 0607001xh in the size that the drive reports, or another one.
   Task<Result<void>> write_object(Object object, std::int64_t value, std::uint8_t bytes, SdoOptions options);
+  /// The same, and reads it back. misconfigured: it holds something else.
+  Task<Result<void>> write_verified(Object object, std::int64_t value, SdoOptions options);
+  /// Reads `object` until `fits`, or `limit` is over: the last value.
+  Task<Result<std::int64_t>> read_until(Object object, std::function<bool(std::int64_t)> fits, Duration limit,
+                                        SdoOptions options);
   [[nodiscard]] std::unexpected<Error> failed(Error error) const;
   [[nodiscard]] Error error_at(Reason reason, Object object, std::string message, std::string remedy) const;
   [[nodiscard]] Error lost_memory() const;
+  /// The drive was switched off and on, or may have been.
+  void forget_power_cycle();
+
+  // drive_connection.cpp
+  Task<Result<void>> set_emergency_id();
+  Task<Result<void>> set_heartbeat();
+  Task<Result<void>> set_pdos();
+  Task<Result<std::string>> set_state_pdos();
+  void listen(const std::vector<canopen::PdoOutcome>& outcomes);
+  void unsubscribe();
+  /// Nothing waits for a SYNC in this drive (M24).
+  Task<Result<void>> settle(SdoOptions options);
+  Task<Result<void>> start_node();
+
+  // drive_state.cpp
+  void on_event(const canopen::NodeEvent& event);
+  void on_emergency(const canopen::Emergency& emergency);
+  void on_pdo(std::size_t index, const can::ReceivedFrame& received);
+  [[nodiscard]] bool pdos_usable() const;
+  [[nodiscard]] Duration pdo_patience() const;
+  Task<std::optional<Reading>> next_pdos();
+  Task<Result<Reading>> poll_objects(SdoOptions options);
+  DriveSample judge(const Reading& reading);
+  Task<> leave_homing(SdoOptions options);
+  void note_knowledge(const Reading& reading);
+  [[nodiscard]] DriveMode mode_of(const DriveSample& sample, const Reading& reading);
+  [[nodiscard]] std::optional<DriveMode> terminal_motion(const DriveSample& sample) const;
 
   // drive_canary.cpp
   [[nodiscard]] MotionBlock fresh_neutral_block() const;
@@ -90,18 +143,61 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
   /// A content that a power-up may leave: never a canary.
   void note_power_up_block(const MotionBlock& block);
+  [[nodiscard]] bool is_expected(const MotionBlock& block) const;
+  Task<Result<MotionBlock>> read_block(SdoOptions options);
+  /// Writes what differs from what is known to stand there, and verifies it.
   Task<Result<void>> write_canary(MotionBlock block, SdoOptions options);
-  /// Reads the block and compares it. The time: when the first of it was asked for.
+  /// Reads the block and compares it. The time: before the first of it was asked for.
   Task<Result<TimePoint>> read_canary(SdoOptions options);
 
-  // drive_parameters.cpp
+  // drive_power.cpp
+  /// The control word as the drive holds it.
+  Task<Result<std::uint16_t>> held_control(SdoOptions options);
+  Task<Result<void>> write_control(std::uint16_t word, SdoOptions options);
+  Task<Result<State>> read_status(SdoOptions options);
+  Task<Result<void>> change_mode(OperationMode mode, SdoOptions options);
+  Task<Result<void>> neutralise(State state, SdoOptions options);
+  Task<Result<void>> make_ready(State state, OperationMode mode, SdoOptions options);
+  Task<Result<void>> step_to_enabled(State state, SdoOptions options);
+  Task<Result<void>> confirm_nothing_pending(SdoOptions options);
+  Task<Result<void>> watch_standstill(std::int64_t position, SdoOptions options);
+  Task<Result<void>> reset_fault(SdoOptions options);
+  Task<bool> released(SdoOptions options);
+
+  // drive_motion.cpp
+  Task<Result<void>> start(MotionBlock block, OperationMode mode, std::optional<HomingProfile> homing,
+                           Trigger trigger, MotionGuard guard);
+  Task<Result<void>> start_once(MotionBlock block, OperationMode mode, std::optional<HomingProfile> homing,
+                                Trigger trigger, MotionGuard guard, bool& triggered);
+  Task<Result<void>> pull_trigger(OperationMode mode, Trigger trigger, SdoOptions options, bool& triggered);
+  Task<> acknowledge_set_point(SdoOptions options);
+  Task<Result<void>> prepare_homing(HomingProfile profile, SdoOptions options);
+  Task<Result<void>> write_homing_method(HomingMethod method, SdoOptions options);
+
+  // drive_configuration.cpp
+  Task<Result<Values>> read_values(std::vector<std::uint32_t> addresses, SdoOptions options);
   /// Writes what differs, each part saved or not as it says, and verifies all of it.
   Task<Result<void>> bring_to(std::vector<ObjectSetting> required);
+  Task<Result<void>> write_all(const std::vector<ObjectSetting>& required, Values& present);
+  Task<Result<void>> neutralise_inputs(const std::vector<ObjectSetting>& required, Values& present);
+  Task<Result<void>> check_inactive(const ObjectSetting& setting);
+  Task<Result<void>> verify(const std::vector<ObjectSetting>& required);
+  /// Writes one object of the configuration and counts it if it goes to the EEPROM.
+  Task<Result<void>> write_counted(std::uint32_t address, std::int64_t value, std::uint8_t bytes);
   /// Sets the EEPROM switch (200Ch of the YSS-C), if it is not so already.
   Task<Result<void>> save_writes(bool saved);
   [[nodiscard]] bool saves_at_rest() const;
+  [[nodiscard]] Error not_held(const ObjectSetting& setting, std::int64_t actual) const;
+
+  // drive_parameters.cpp
+  /// Nothing in the drive's memory that a terminal or a power-up could turn into a motion.
+  Task<Result<void>> quieten();
+  Task<Result<std::string>> factory_address(const std::vector<std::uint8_t>& taken);
+  [[nodiscard]] Error not_supported(std::string message, std::string remedy) const;
+  [[nodiscard]] Result<std::vector<ParameterValue>> addressing_objects(const SerialChange& change) const;
 
   const Model* model_;
+  Executor executor_;
   Clock* clock_;
   canopen::CanopenBus* bus_;
   canopen::RemoteNode node_;
@@ -109,10 +205,43 @@ class Cia402Drive final : public Drive {
   std::vector<ObjectSetting> required_;  ///< by the setup; empty if it cannot be had (configure() says why)
   std::optional<Error> setup_error_;
   std::map<std::uint32_t, std::uint8_t> sizes_;  ///< of objects, as this drive was seen to have them
+  bool other_homing_codes_ = false;              ///< it refused the first of HomingCode, and took the other
+
+  // The way to the drive.
+  Signal news_;  ///< a PDO came, or something happened to the node
+  std::function<void()> attention_;
+  bool rebooted_ = false;        ///< since configure(), and nobody was told yet
+  bool heartbeat_lost_ = false;  ///< its PDOs are not waited for
+  bool settled_ = false;
+  bool node_started_ = false;  ///< it was told to, since the last contact began
+  StatePdos pdos_;
+  std::vector<std::uint32_t> subscribed_;
+  std::shared_ptr<void> sync_;
+  int missed_pdos_ = 0;                         ///< readings in a row for which none came in time
+  std::optional<std::uint32_t> command_pdo_{};  ///< takes the control word at once
+  std::string link_note_;
+
+  // What the drive is known to hold; nothing: unknown.
+  std::optional<std::uint16_t> control_;
+  std::uint64_t control_writes_ = 0;
+  TimePoint control_at_{};  ///< when it was last written
+  std::optional<OperationMode> mode_;
+  std::optional<std::int16_t> halt_option_;
+  std::uint64_t stops_ = 0;
+
+  // What the drive does.
+  HomingWatch homing_;
+  bool leave_homing_ = false;  ///< it has ended, and the drive is to go back to position mode
+  bool homed_ = false;         ///< by us, in this power cycle
+  std::optional<Live> live_;
+  std::optional<std::int32_t> last_position_;
+  bool negative_ = false;
+  std::uint16_t pending_alarm_ = 0;  ///< told by EMCY, and not reported yet: it may be gone already (M5)
 
   /// What the motion block may hold: one entry, two after a write whose reply was lost.
   std::vector<MotionBlock> expected_;
-  std::vector<MotionBlock> power_up_blocks_;  ///< what a power-up may leave; the newest last
+  std::optional<ContinuityMark> expected_mark_;  ///< of an earlier run of the daemon
+  std::vector<MotionBlock> power_up_blocks_;     ///< what a power-up may leave; the newest last
 
   std::optional<bool> saving_;        ///< the EEPROM switch, if it is known
   std::optional<bool> found_closed_;  ///< loop mode as it was before this power cycle's first write

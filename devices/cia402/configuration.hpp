@@ -1,0 +1,20 @@
+// Which objects' contents a DriveSetup means, in the order in which they are written (M3). Pure.
+#pragma once
+
+#include <vector>
+
+#include "buses/error.hpp"
+#include "devices/cia402/model.hpp"
+#include "devices/cia402/object_setting.hpp"
+#include "devices/drive.hpp"
+
+namespace axisd::cia402 {
+
+/// Everything but the EEPROM switch, whose state follows `persist` and which the driver sets before each of
+/// these, and the homing method, whose code is negotiated (6098h). Inputs that the setup does not name are
+/// set to "none": a function left in the EEPROM (JOG, start) could move the axis behind its owner's back.
+/// Outputs that it does not name are left alone. Errors: misconfigured (the model has no such terminal,
+/// function or microstep).
+Result<std::vector<ObjectSetting>> required_objects(const Model& model, const DriveSetup& setup);
+
+}  // namespace axisd::cia402

@@ -1,0 +1,140 @@
+// The canary that every start depends on (M6, M7).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/cia402/drive.hpp"
+
+namespace axisd::cia402 {
+
+namespace {
+
+/// In as many words as a mark has; of wider values the low half, which is enough to tell blocks apart.
+ContinuityMark mark_of(const MotionBlock& block) {
+  const auto low = [](std::int32_t value) { return static_cast<std::uint16_t>(value); };
+  const auto target_bits = static_cast<std::uint32_t>(block[target]);
+  return {static_cast<std::uint16_t>(target_bits >> 16U),
+          static_cast<std::uint16_t>(target_bits),
+          low(block[speed]),
+          low(block[acceleration]),
+          low(block[deceleration]),
+          low(block[start_speed])};
+}
+
+}  // namespace
+
+std::optional<ContinuityMark> Cia402Drive::continuity_mark() const {
+  if (expected_.size() == 1) return mark_of(expected_.front());
+  return expected_mark_;
+}
+
+void Cia402Drive::expect_mark(const ContinuityMark& mark) {
+  expected_.clear();
+  expected_mark_ = mark;
+}
+
+MotionBlock Cia402Drive::fresh_neutral_block() const {
+  constexpr int neutral_rpm = 60, neutral_time = 100, lowest_start = 5;
+  // The deceleration differs a little each time: a record of an earlier power cycle then never fits this one.
+  const auto moment = clock_->now().time_since_epoch() / std::chrono::milliseconds(1);
+  // Target 0: should a terminal start a relative move, it goes nowhere.
+  return {0, encode_velocity(*model_, setup_.pulses_per_revolution, neutral_rpm), neutral_time,
+          static_cast<std::int32_t>(neutral_time + 1 + moment % 61),
+          model_->objects.start_speed ? lowest_start : 0};
+}
+
+MotionBlock Cia402Drive::distinct(MotionBlock block) const {
+  constexpr std::int32_t high = 2000;
+  while (std::ranges::find(power_up_blocks_, block) != power_up_blocks_.end())
+    block[acceleration] += block[acceleration] < high ? 1 : -2;
+  return block;
+}
+
+void Cia402Drive::note_power_up_block(const MotionBlock& block) {
+  constexpr std::size_t most = 8;
+  if (!power_up_blocks_.empty() && block == power_up_blocks_.front()) return;  // the factory's, for ever
+  std::erase(power_up_blocks_, block);
+  power_up_blocks_.push_back(block);
+  if (power_up_blocks_.size() > most) power_up_blocks_.erase(std::next(power_up_blocks_.begin()));
+}
+
+bool Cia402Drive::is_expected(const MotionBlock& block) const {
+  return std::ranges::find(expected_, block) != expected_.end() ||
+         (expected_mark_ && mark_of(block) == *expected_mark_);
+}
+
+Task<Result<MotionBlock>> Cia402Drive::read_block(SdoOptions options) {
+  MotionBlock block{};
+  std::size_t field = 0;
+  for (const auto object : motion_objects(*model_)) {
+    const auto value = co_await read_object(object, options);
+    if (!value) co_return fail(value.error());
+    block.at(field++) = static_cast<std::int32_t>(*value);
+  }
+  co_return block;
+}
+
+Task<Result<TimePoint>> Cia402Drive::read_canary(SdoOptions options) {
+  if (rebooted_) co_return fail(lost_memory());
+  const auto asked = clock_->now();
+  const auto block = co_await read_block(std::move(options));
+  if (!block) co_return fail(block.error());
+  if (rebooted_) co_return fail(lost_memory());
+  if (!is_expected(*block)) {
+    forget_power_cycle();
+    note_power_up_block(*block);
+    co_return fail(lost_memory());
+  }
+  expected_ = {*block};
+  expected_mark_.reset();
+  co_return asked;
+}
+
+Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions options) {
+  const auto objects = motion_objects(*model_);
+  const bool known = expected_.size() == 1;
+  auto present = known ? expected_.front() : MotionBlock{};
+  std::vector<std::size_t> written;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (known && present.at(i) == block.at(i)) continue;
+    const auto done = co_await write_object(objects[i], block.at(i), 0, options);
+    if (rebooted_) co_return fail(lost_memory());
+    const bool uncertain = !done && done.error().outcome == Outcome::unknown;
+    auto after = present;
+    after.at(i) = block.at(i);
+    if (known) {
+      expected_ = {present};
+      if (uncertain) expected_.push_back(after);  // without a reply either content may stand there now
+      if (done) expected_ = {after};
+      // Halfway it may look like after a power-up: then it proves nothing.
+      for (const auto& power_up : power_up_blocks_) std::erase(expected_, power_up);
+    }
+    if (!done) co_return done;
+    present = after;
+    written.push_back(i);
+  }
+  expected_ = {block};
+  expected_mark_.reset();
+  for (const auto i : written) {
+    const auto value = co_await read_object(objects[i], options);
+    if (!value) co_return fail(value.error());
+    if (*value != block.at(i))
+      co_return fail(error_at(
+          Reason::misconfigured, objects[i],
+          fmt::format("object {} reads {} after {} was written", to_string(objects[i]), *value, block.at(i)),
+          "check whether another master writes to this drive"));
+  }
+  co_return Result<void>{};
+}
+
+Task<Result<void>> Cia402Drive::check_continuity(TransactionClass transaction_class) {
+  const SdoOptions options{.transaction_class = transaction_class};
+  if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
+  // The link, or the node's state, may have been lost in between.
+  if (!settled_)
+    if (const auto settled = co_await settle(options); !settled) co_return settled;
+  co_return co_await start_node();
+}
+
+}  // namespace axisd::cia402

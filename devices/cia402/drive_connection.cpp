@@ -1,0 +1,297 @@
+// Identity, and what bring-up does beside the configuration of the drive itself: identifiers, heartbeat,
+// PDOs.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "buses/canopen/cob.hpp"
+#include "buses/canopen/sdo_abort.hpp"
+#include "devices/cia402/configuration.hpp"
+#include "devices/cia402/drive.hpp"
+
+namespace axisd::cia402 {
+
+namespace {
+
+using canopen::CanopenBus;
+using canopen::PdoDirection;
+using std::chrono::milliseconds;
+
+constexpr auto heartbeat_period = milliseconds(250);
+constexpr auto heartbeat_patience = milliseconds(1000);
+/// Of event PDOs at 1 Mbit/s: a node sends them at least, and at most, this often.
+constexpr auto event_period = milliseconds(20), inhibit_period = milliseconds(10);
+constexpr std::uint32_t full_speed = 1'000'000;
+constexpr std::uint16_t command_number = 1;
+
+canopen::SdoOptions in(TransactionClass transaction_class) {
+  return {.transaction_class = transaction_class};
+}
+/// Writes of bring-up may happen twice.
+canopen::SdoOptions patiently() { return {.transaction_class = TransactionClass::parameters, .attempts = 3}; }
+
+/// On a slower network PDOs come less often, so that they take the same share of it.
+milliseconds scaled(milliseconds period, std::uint32_t bitrate) {
+  return period * (full_speed / std::clamp<std::uint32_t>(bitrate, 10'000, full_speed));
+}
+
+std::string version_text(std::int64_t number) {
+  return fmt::format("V{}.{}", number >> 8U, (number >> 4U) & 0xFU);
+}
+
+/// Why the node cannot have this PDO; empty: it has it.
+std::string objection(const canopen::PdoOutcome& outcome, const canopen::PdoSettings& wanted) {
+  const auto name = canopen::name_of(wanted.direction, wanted.number);
+  const bool synchronous = wanted.transmission_type < canopen::event_driven_of_manufacturer;
+  const bool timely = outcome.state.transmission_type == wanted.transmission_type &&
+                      (synchronous || !wanted.event_timer || outcome.state.event_timer.value_or(0) > 0);
+  if (outcome.carries(wanted.mapping) && timely) return {};
+  std::string why =
+      outcome.error ? outcome.error->message : fmt::format("{}", fmt::join(outcome.remarks, ", "));
+  if (!outcome.read_only.empty())
+    why += fmt::format("{}{} is read-only", why.empty() ? "" : "; ", to_string(outcome.read_only.front()));
+  return fmt::format("{}: {}", name, why);
+}
+
+}  // namespace
+
+Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
+    : model_(&model),
+      executor_(context.executor),
+      clock_(context.clock),
+      bus_(context.canopen),
+      node_(context.canopen->master().node(context.node)),
+      setup_(std::move(context.setup)),
+      news_(context.executor, *context.clock),
+      power_up_blocks_{default_block(model)} {
+  auto required = required_objects(model, setup_);
+  if (required)
+    required_ = std::move(*required);
+  else
+    setup_error_ = required.error();
+  const auto attached = bus_->attach(
+      node_.id(), {.on_event = [this](const canopen::NodeEvent& event) { on_event(event); },
+                   .on_emergency = [this](const canopen::Emergency& one) { on_emergency(one); }});
+  if (!attached) setup_error_ = attached.error();
+}
+
+Cia402Drive::~Cia402Drive() {
+  unsubscribe();
+  bus_->detach(node_.id());
+}
+
+Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_class) {
+  rebooted_ = false;  // what is known of the power cycle before is forgotten already
+  settled_ = false;
+  node_started_ = false;
+  // A stopped node answers no SDO (CiA 301 table 38); operational alone it does nothing.
+  if (bus_->master().nmt().status(node_.id()).state == canopen::NmtState::stopped)
+    if (const auto started = co_await start_node(); !started) co_return fail(started.error());
+  const auto found = co_await canopen::read_identity(node_, in(transaction_class));
+  if (!found) {
+    if (found.error().reason == Reason::no_reply)
+      bus_->set_readiness(node_.id(), CanopenBus::Readiness::absent);
+    co_return failed(found.error());
+  }
+  if (const auto fits = canopen::check_identity(*found, model_->identity); !fits) {
+    bus_->set_readiness(node_.id(), CanopenBus::Readiness::absent);  // somebody else's
+    co_return fail(error_at(Reason::wrong_model, {0x1018, 0},
+                            fmt::format("not a {}: {}", model_->descriptor->model, fits.error().message),
+                            fits.error().remedy));
+  }
+  DriveIdentity identity{.model_code = static_cast<std::uint16_t>(found->product.value_or(0))};
+  if (model_->objects.software_version) {
+    const auto version =
+        co_await node_.read_if_there(*model_->objects.software_version, in(transaction_class));
+    if (!version) co_return failed(version.error());
+    if (*version) identity.version = version_text(static_cast<std::int64_t>(**version));
+  }
+  co_return identity;
+}
+
+bool Cia402Drive::closed_loop() const {
+  const auto mode = setup_.model_settings.find("loop_mode");
+  const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
+  // From when the loop mode counts is not said: a drive that came up open is open.
+  const bool found = !model_->objects.loop_mode || found_closed_.value_or(false);
+  return model_->descriptor->capabilities.closed_loop && !open && found;
+}
+
+Task<Result<void>> Cia402Drive::configure() {
+  if (setup_error_) co_return failed(*setup_error_);
+  // Before anything else: an EMCY with the identifier 80h would be a SYNC to the others (M24).
+  if (const auto set = co_await set_emergency_id(); !set) co_return set;
+  // The canary goes first and is read last: a restart in between would undo what was found or written.
+  const auto block = co_await read_block(patiently());
+  if (!block) co_return fail(block.error());
+  const bool known = is_expected(*block);
+  const bool restarted = !known && (!expected_.empty() || expected_mark_);
+  if (!known) {
+    forget_power_cycle();
+    note_power_up_block(*block);
+  }
+  // Whatever asked for this: a restart that nobody had noticed must not be overwritten here.
+  if (restarted) co_return fail(lost_memory());
+  expected_.clear();
+  if (const auto marked = co_await write_canary(distinct(fresh_neutral_block()), patiently()); !marked)
+    co_return marked;
+  if (model_->objects.loop_mode && !found_closed_) {
+    const auto mode = co_await read_object(*model_->objects.loop_mode, patiently());
+    if (!mode) co_return fail(mode.error());
+    found_closed_ = *mode == 0;
+  }
+  if (const auto done = co_await bring_to(required_); !done) co_return done;
+  if (const auto halting =
+          co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());
+      halting)
+    halt_option_ = model_->meaning.halt_on_ramp;
+  // None of this belongs into the EEPROM.
+  auto switched = co_await save_writes(false);
+  if (switched) switched = co_await set_heartbeat();
+  if (switched) switched = co_await set_pdos();
+  const auto restored = co_await save_writes(saves_at_rest());
+  if (!switched) co_return switched;
+  if (!restored) co_return restored;
+  co_return co_await check_continuity(TransactionClass::parameters);
+}
+
+Task<Result<void>> Cia402Drive::set_emergency_id() {
+  if (!model_->sets_emergency_id) co_return Result<void>{};
+  const auto wanted = canopen::emergency_id(node_.id());
+  const auto present = co_await node_.read_if_there(object::emergency_id, patiently());
+  if (!present) co_return failed(present.error());
+  if (!*present || **present == wanted) co_return Result<void>{};
+  const auto written = co_await write_object(object::emergency_id, wanted, 4, patiently());
+  if (written) co_return Result<void>{};
+  const bool looks_like_sync = (**present & canopen::PdoState::id_mask) == canopen::sync_id;
+  if (written.error().outcome == Outcome::refused && !looks_like_sync) co_return Result<void>{};
+  co_return written;
+}
+
+Task<Result<void>> Cia402Drive::set_heartbeat() {
+  const auto present = co_await node_.read_if_there(object::heartbeat_time, patiently());
+  if (!present) co_return failed(present.error());
+  if (!*present) co_return Result<void>{};  // then only its silence tells
+  const auto wanted = static_cast<std::uint64_t>(heartbeat_period / milliseconds(1));
+  if (**present == 0 || **present > wanted)
+    if (const auto written =
+            co_await write_object(object::heartbeat_time, static_cast<std::int64_t>(wanted), 2, patiently());
+        !written)
+      co_return written;
+  bus_->watch_heartbeat(node_.id(), heartbeat_patience);
+  co_return Result<void>{};
+}
+
+void Cia402Drive::unsubscribe() {
+  for (const auto id : subscribed_) (void)bus_->master().subscribe_pdo(id, {});
+  subscribed_.clear();
+  sync_.reset();
+  command_pdo_.reset();
+}
+
+Task<Result<void>> Cia402Drive::set_pdos() {
+  unsubscribe();
+  pdos_.begin(*model_, {}, false);
+  const auto why = co_await set_state_pdos();
+  if (!why) co_return fail(why.error());
+  link_note_ = why->empty() ? std::string() : "state by SDO polling: " + *why;
+  // Stops go out by this one at once (M12). The drive may have it so by default (chapter 7, 1600h).
+  const auto command =
+      co_await canopen::configure_pdo(node_,
+                                      {.direction = PdoDirection::receive,
+                                       .number = command_number,
+                                       .cob_id = canopen::rpdo_id(command_number, node_.id()),
+                                       .transmission_type = canopen::event_driven_of_profile,
+                                       .mapping = {{.object = object::control_word, .bits = 16}}},
+                                      patiently());
+  const bool at_once = command.state.transmission_type.value_or(0) >= canopen::event_driven_of_manufacturer;
+  if (command.carries({{.object = object::control_word, .bits = 16}}) && at_once)
+    command_pdo_ = command.state.cob_id();
+  eeprom_writes_ += saving_.value_or(true) ? static_cast<std::uint64_t>(command.writes) : 0;
+  co_return Result<void>{};
+}
+
+/// The text: why there are none. Errors: the node is gone.
+Task<Result<std::string>> Cia402Drive::set_state_pdos() {
+  const bool synchronous = bus_->settings().sync_period > Duration{};
+  const auto bitrate = bus_->settings().bitrate;
+  constexpr auto inhibit_unit = std::chrono::microseconds(100);  // 6.1.2 gives none; CiA 301 does
+  auto layout = state_layout(*model_);
+  std::vector<canopen::PdoOutcome> outcomes;
+  for (std::size_t i = 0; i < layout.size(); ++i) {
+    canopen::PdoSettings wanted{
+        .direction = PdoDirection::transmit,
+        .number = static_cast<std::uint16_t>(i + 1),
+        .cob_id = canopen::tpdo_id(static_cast<unsigned>(i + 1), node_.id()),
+        .transmission_type = synchronous ? std::uint8_t{1} : canopen::event_driven_of_profile,
+        .mapping = layout[i]};
+    if (!synchronous) {
+      // A drive whose position changes all the time must not flood the network (M24).
+      wanted.inhibit_time = static_cast<std::uint16_t>(scaled(inhibit_period, bitrate) / inhibit_unit);
+      wanted.event_timer = static_cast<std::uint16_t>(scaled(event_period, bitrate) / milliseconds(1));
+    }
+    auto outcome = co_await canopen::configure_pdo(node_, wanted, patiently());
+    if (saving_.value_or(true)) eeprom_writes_ += static_cast<std::uint64_t>(outcome.writes);
+    const bool gone = outcome.error && outcome.error->outcome != Outcome::refused &&
+                      outcome.error->reason != Reason::invalid_argument;
+    if (gone) co_return failed(*outcome.error);
+    if (auto why = objection(outcome, wanted); !why.empty()) co_return why;
+    outcomes.push_back(std::move(outcome));
+  }
+  pdos_.begin(*model_, std::move(layout), synchronous);
+  listen(outcomes);
+  co_return subscribed_.size() == outcomes.size()
+      ? std::string()
+      : std::string("a TPDO has the identifier of another node's");
+}
+
+void Cia402Drive::listen(const std::vector<canopen::PdoOutcome>& outcomes) {
+  missed_pdos_ = 0;
+  for (std::size_t i = 0; i < outcomes.size(); ++i) {
+    const auto id = outcomes[i].state.cob_id();
+    const auto taken = bus_->master().subscribe_pdo(
+        id, [this, i](const can::ReceivedFrame& received) { on_pdo(i, received); });
+    if (!taken) {
+      pdos_.begin(*model_, {}, false);
+      return unsubscribe();
+    }
+    subscribed_.push_back(id);
+  }
+  if (pdos_.synchronous()) sync_ = bus_->on_sync([this](TimePoint at) { pdos_.on_sync(at); });
+}
+
+/// axisd arms no set-point for a SYNC, but another master, or an earlier program, may have: an RPDO that
+/// waits for a SYNC no longer does.
+Task<Result<void>> Cia402Drive::settle(SdoOptions options) {
+  constexpr std::uint8_t sub_type = 2;
+  constexpr std::uint16_t pdos = 4;
+  for (std::uint16_t number = 1; number <= pdos; ++number) {
+    const auto object = canopen::communication_object(PdoDirection::receive, number, sub_type);
+    const auto type = co_await node_.read_if_there(object, options);
+    if (!type) co_return failed(type.error());
+    if (!*type || **type >= canopen::event_driven_of_manufacturer) continue;
+    if (const auto written = co_await write_object(object, canopen::event_driven_of_profile, 1, options);
+        !written)
+      co_return written;
+  }
+  settled_ = true;
+  bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
+  co_return Result<void>{};
+}
+
+Task<Result<void>> Cia402Drive::start_node() {
+  // A node without heartbeat does not say what it is: then it is started once.
+  const auto state = bus_->master().nmt().status(node_.id()).state;
+  const bool unsaid = state == canopen::NmtState::unknown;
+  if (state == canopen::NmtState::operational || (unsaid && node_started_)) co_return Result<void>{};
+  const auto started = co_await bus_->master().command(node_.id(), canopen::NmtCommand::start);
+  node_started_ = started.has_value();
+  co_return started;
+}
+
+std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context) {
+  return std::make_unique<Cia402Drive>(model, std::move(context));
+}
+
+}  // namespace axisd::cia402

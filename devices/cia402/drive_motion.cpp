@@ -1,0 +1,163 @@
+// Starts: the canary, the block, the trigger (M6 to M8), and what each mode of operation needs.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "buses/canopen/sdo_abort.hpp"
+#include "devices/cia402/drive.hpp"
+
+namespace axisd::cia402 {
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int chain_attempts = 3;
+constexpr auto acknowledge_limit = milliseconds(100);
+
+/// The set-point or homing begins with the rise of bit 4 (6.2.2).
+constexpr std::uint16_t start_word = 0x000F | control::start;
+
+}  // namespace
+
+Task<Result<void>> Cia402Drive::start_move(MoveProfile profile, MotionGuard guard) {
+  const auto block = encode(*model_, setup_.pulses_per_revolution, profile);
+  co_return co_await start(block, OperationMode::profile_position, std::nullopt,
+                           {object::control_word, start_word}, std::move(guard));
+}
+
+Task<Result<void>> Cia402Drive::start_velocity(VelocityProfile profile, MotionGuard guard) {
+  if (expected_.empty())
+    co_return fail(
+        error_at(Reason::configuring, object::target_position, "the drive is not configured yet", "wait"));
+  const auto block = encode(*model_, setup_.pulses_per_revolution, profile, expected_.back());
+  const auto velocity = encode_velocity(*model_, setup_.pulses_per_revolution, profile.velocity_rpm);
+  co_return co_await start(block, OperationMode::profile_velocity, std::nullopt,
+                           {object::target_velocity, velocity}, std::move(guard));
+}
+
+Task<Result<void>> Cia402Drive::start_homing(HomingProfile profile, MotionGuard guard) {
+  // Homing uses objects of its own; the motion block is only the canary, and keeps what it holds.
+  if (expected_.empty())
+    co_return fail(
+        error_at(Reason::configuring, object::target_position, "the drive is not configured yet", "wait"));
+  co_return co_await start(expected_.back(), OperationMode::homing, profile,
+                           {object::control_word, start_word}, std::move(guard));
+}
+
+Task<Result<void>> Cia402Drive::start(MotionBlock block, OperationMode mode,
+                                      std::optional<HomingProfile> homing, Trigger trigger,
+                                      MotionGuard guard) {
+  Result<void> result;
+  bool triggered = false;
+  for (int attempt = 0; attempt < chain_attempts; ++attempt) {
+    result = co_await start_once(block, mode, homing, trigger, guard, triggered);
+    if (result || triggered) break;
+    const auto& error = result.error();
+    // The canary had grown too old for the trigger, or a reply was lost before it: the chain begins anew.
+    const bool canary_expired = error.reason == Reason::expired && clock_->now() < guard.not_after;
+    if (!canary_expired && error.reason != Reason::no_reply) break;
+  }
+  if (!result && !triggered && result.error().outcome == Outcome::unknown)
+    result.error().outcome = Outcome::not_executed;  // only parameters were written
+  co_return result;
+}
+
+Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode,
+                                           std::optional<HomingProfile> homing, Trigger trigger,
+                                           MotionGuard guard, bool& triggered) {
+  const SdoOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
+  if (rebooted_) co_return fail(lost_memory());
+  const auto state = co_await read_status(motion);
+  if (!state) co_return fail(state.error());
+  if (*state != State::operation_enabled)
+    co_return fail(error_at(Reason::disabled, object::status_word,
+                            fmt::format("the drive is in {}", to_string(*state)), "enable the axis first"));
+  if (const auto ready = co_await make_ready(*state, mode, motion); !ready) co_return ready;
+  if (homing)
+    if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
+
+  const auto canary = co_await read_canary(motion);
+  if (!canary) co_return fail(canary.error());
+  if (!homing)
+    if (const auto written = co_await write_canary(distinct(block), motion); !written) co_return written;
+  // A drive that restarts after the canary was read is silent for longer than reboot_guard: a trigger bound
+  // within it never meets default parameters.
+  auto fresh = motion;
+  fresh.guard.not_after = std::min(guard.not_after, *canary + setup_.reboot_guard);
+  if (const auto pulled = co_await pull_trigger(mode, trigger, fresh, triggered); !pulled) co_return pulled;
+  if (mode == OperationMode::profile_position) co_await acknowledge_set_point(motion);
+  co_return Result<void>{};
+}
+
+Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger, SdoOptions options,
+                                             bool& triggered) {
+  const auto began = clock_->now();
+  const auto stops = stops_;
+  const bool by_control = trigger.object == object::control_word;
+  auto pulled = by_control ? co_await write_control(static_cast<std::uint16_t>(trigger.value), options)
+                           : co_await write_object(trigger.object, trigger.value, 0, options);
+  triggered = pulled || pulled.error().outcome == Outcome::unknown;
+  if (!triggered || stops != stops_) co_return pulled;
+  live_ = Live{.since = began};
+  if (mode == OperationMode::profile_velocity) negative_ = trigger.value < 0;
+  if (mode == OperationMode::profile_position && last_position_)
+    negative_ = expected_.front()[target] < *last_position_;
+  if (mode == OperationMode::homing) {
+    homed_ = false;
+    homing_.begin(began);
+  }
+  co_return pulled;
+}
+
+/// The drive has taken the set-point: bit 4 goes back, so that nothing is left to take. What fails here does
+/// not matter to the motion, which has begun; the next start finds bit 4 as it is. The guard keeps all of it
+/// behind a stop, which it would undo.
+Task<> Cia402Drive::acknowledge_set_point(SdoOptions options) {
+  const auto taken = [](std::int64_t word) { return (word & status::mode_specific) != 0; };
+  (void)co_await read_until(object::status_word, taken, acknowledge_limit, options);
+  (void)co_await write_control(control_word(Command::enable_operation), std::move(options));
+}
+
+/// Compared and not just written: some drives save these.
+Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions options) {
+  for (const auto& [object, value] : encode(*model_, setup_.pulses_per_revolution, profile)) {
+    const auto present = co_await read_object(object, options);
+    if (!present) co_return fail(present.error());
+    if (*present == value) continue;
+    if (const auto written = co_await write_verified(object, value, options); !written) co_return written;
+  }
+  co_return co_await write_homing_method(profile.method, std::move(options));
+}
+
+/// The manual has two lists of codes (6.2.6: 17 ... 29, chapter 7: 0 ... 3): the drive says which it knows.
+Task<Result<void>> Cia402Drive::write_homing_method(HomingMethod method, SdoOptions options) {
+  const auto code = std::ranges::find(model_->homing_codes, method, &HomingCode::method);
+  if (code == model_->homing_codes.end())
+    co_return fail(error_at(Reason::not_supported, object::homing_method,
+                            "the drive has no such homing method", "choose another homing: { method: }"));
+  const auto take = [](Cia402Drive& drive, std::int64_t value, SdoOptions how) -> Task<Result<void>> {
+    const auto present = co_await drive.read_object(object::homing_method, how);
+    if (present && *present == value) co_return Result<void>{};
+    co_return co_await drive.write_verified(object::homing_method, value, std::move(how));
+  };
+  if (!other_homing_codes_) {
+    auto taken = co_await take(*this, code->code, options);
+    const bool unknown = !taken && taken.error().reason == Reason::out_of_range;
+    if (!unknown || !code->alternative) co_return taken;
+  }
+  auto taken = co_await take(*this, code->alternative.value_or(code->code), std::move(options));
+  if (taken) other_homing_codes_ = true;
+  co_return taken;
+}
+
+Task<Result<void>> Cia402Drive::clear_position(MotionGuard guard) {
+  if (!model_->objects.position_clear)
+    co_return fail(error_at(Reason::not_supported, object::position,
+                            "the drive cannot zero its position counter", "home the axis"));
+  co_return co_await write_object(*model_->objects.position_clear, 1, 0,
+                                  {.transaction_class = TransactionClass::motion, .guard = std::move(guard)});
+}
+
+}  // namespace axisd::cia402

@@ -1,0 +1,330 @@
+// The power stage, and stops. Power never moves (M23).
+//
+// What could turn the shaft when 0Fh is sent or halt is released: 60FFh in velocity mode (there 0Fh is the
+// start command, 6.2.2), bit 4, and a set-point that a halt suspended. What releasing halt does with the last
+// is not said (6.2.4 "ends the present position", CiA 402 goes on with it), so it is released in velocity
+// mode with 60FFh = 0, where a set-point means nothing, and position mode is chosen after that.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "devices/cia402/drive.hpp"
+
+namespace axisd::cia402 {
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr auto transition_limit = milliseconds(1000);
+constexpr auto mode_limit = milliseconds(500);
+constexpr auto watch_time = milliseconds(30), watch_pause = milliseconds(5);
+constexpr std::int64_t jitter = 2;  // pulses; an encoder at rest
+
+/// The control word that keeps a state and asks for nothing.
+std::uint16_t quiet_word(State state) {
+  if (state == State::operation_enabled) return control_word(Command::enable_operation);
+  return state == State::switched_on ? control_word(Command::switch_on)
+                                     : control_word(Command::disable_voltage);
+}
+
+constexpr std::int64_t number_of(OperationMode mode) { return std::to_underlying(mode); }
+
+}  // namespace
+
+Task<Result<std::uint16_t>> Cia402Drive::held_control(SdoOptions options) {
+  if (control_) co_return *control_;
+  const auto writes = control_writes_;
+  const auto word = co_await read_object(object::control_word, std::move(options));
+  if (!word) co_return fail(word.error());
+  const auto held = static_cast<std::uint16_t>(*word);
+  if (writes == control_writes_) control_ = held;
+  co_return held;
+}
+
+Task<Result<void>> Cia402Drive::write_control(std::uint16_t word, SdoOptions options) {
+  // Whoever asks meanwhile (a stop) must not go by what stood there before.
+  control_.reset();
+  const auto write = ++control_writes_;
+  constexpr std::size_t bytes = 2;
+  const auto answer = co_await node_.sdo().download(node_.id(), object::control_word,
+                                                    canopen::number_bytes(word, bytes), options);
+  if (!answer) co_return failed(answer.error());
+  if (write != control_writes_) co_return Result<void>{};  // overtaken by a later one
+  if (answer->ambiguous) {
+    const auto held = co_await held_control(std::move(options));
+    if (!held) co_return fail(held.error());
+    if (*held != word)
+      co_return fail(
+          error_at(Reason::no_reply, object::control_word,
+                   fmt::format("the control word reads {:04X}h after {:04X}h was written", *held, word),
+                   "it is tried again"));
+    co_return Result<void>{};
+  }
+  control_ = word;
+  control_at_ = clock_->now();
+  co_return Result<void>{};
+}
+
+Task<Result<State>> Cia402Drive::read_status(SdoOptions options) {
+  const auto word = co_await read_object(object::status_word, std::move(options));
+  if (!word) co_return fail(word.error());
+  co_return state_of(static_cast<std::uint16_t>(*word));
+}
+
+Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions options) {
+  const auto present = co_await read_object(object::mode_display, options);
+  if (!present) co_return fail(present.error());
+  if (*present != number_of(mode)) {
+    mode_.reset();
+    if (const auto written = co_await write_object(object::mode, number_of(mode), 1, options); !written)
+      co_return written;
+  }
+  const auto fits = [wanted = number_of(mode)](std::int64_t shown) { return shown == wanted; };
+  const auto shown = co_await read_until(object::mode_display, fits, mode_limit, std::move(options));
+  if (!shown) co_return fail(shown.error());
+  if (!fits(*shown))
+    co_return fail(error_at(Reason::refused, object::mode_display,
+                            fmt::format("the drive stays in mode {} instead of {}", *shown, number_of(mode)),
+                            "check whether another master writes to this drive, and its alarm"));
+  mode_ = mode;
+  if (mode != OperationMode::homing) leave_homing_ = false;
+  co_return Result<void>{};
+}
+
+/// Leaves nothing that the end of a halt, or 0Fh, could start; in Operation Enabled halted. Everything is
+/// read back.
+Task<Result<void>> Cia402Drive::neutralise(State state, SdoOptions options) {
+  const auto held = co_await held_control(options);
+  if (!held) co_return fail(held.error());
+  const bool halted = state == State::operation_enabled || (*held & control::halt) != 0;
+  const auto word = static_cast<std::uint16_t>(quiet_word(state) | (halted ? control::halt : 0U));
+  if (*held != word)
+    if (const auto written = co_await write_control(word, options); !written) co_return written;
+  if (const auto zero = co_await write_verified(object::target_velocity, 0, options); !zero) co_return zero;
+  if (halt_option_ != model_->meaning.halt_on_ramp) {
+    // After a quick stop; drives without the object have one way to halt.
+    halt_option_.reset();
+    const auto ramp = co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, options);
+    if (!ramp && ramp.error().outcome != Outcome::refused) co_return ramp;
+    halt_option_ = model_->meaning.halt_on_ramp;
+  }
+  if (const auto mode = co_await change_mode(OperationMode::profile_velocity, options); !mode) co_return mode;
+  control_.reset();
+  const auto now = co_await held_control(options);
+  if (!now) co_return fail(now.error());
+  const auto speed = co_await read_object(object::target_velocity, std::move(options));
+  if (!speed) co_return fail(speed.error());
+  if (*now == word && *speed == 0) co_return Result<void>{};
+  co_return fail(
+      error_at(Reason::misconfigured, object::control_word,
+               fmt::format("control word {:04X}h instead of {:04X}h, target velocity {} instead of 0", *now,
+                           word, *speed),
+               "check whether another master writes to this drive"));
+}
+
+/// Makes the drive wait in `mode` with nothing under way. In Operation Enabled it is ready for a start then.
+Task<Result<void>> Cia402Drive::make_ready(State state, OperationMode mode, SdoOptions options) {
+  const auto held = co_await held_control(options);
+  if (!held) co_return fail(held.error());
+  const auto quiet = quiet_word(state);
+  const bool enabled = state == State::operation_enabled;
+  const bool halted = (*held & control::halt) != 0;
+  std::optional<std::int64_t> position;
+  if (!enabled || halted) {
+    if (const auto neutral = co_await neutralise(state, options); !neutral) co_return neutral;
+    const auto base = co_await read_object(object::position, options);
+    if (!base) co_return fail(base.error());
+    if (enabled) position = *base;
+  }
+  if (!control_ || *control_ != quiet)
+    if (const auto written = co_await write_control(quiet, options); !written) co_return written;
+  if (position)
+    if (const auto rests = co_await watch_standstill(*position, options); !rests) co_return rests;
+  // 0Fh in velocity mode is a start (6.2.2): there is nothing that it could start.
+  if (mode == OperationMode::profile_velocity)
+    if (const auto zero = co_await write_verified(object::target_velocity, 0, options); !zero) co_return zero;
+  if (const auto changed = co_await change_mode(mode, options); !changed) co_return changed;
+  if (position) co_return co_await watch_standstill(*position, std::move(options));
+  co_return Result<void>{};
+}
+
+/// Power is on, or a halt is released, and nothing was started: the shaft stays where it is, or is stopped.
+Task<Result<void>> Cia402Drive::watch_standstill(std::int64_t position, SdoOptions options) {
+  const auto until = clock_->now() + watch_time;
+  for (;;) {
+    std::int64_t moving = 0;
+    if (model_->objects.moving) {
+      const auto shown = co_await read_object(*model_->objects.moving, options);
+      if (!shown) co_return fail(shown.error());
+      moving = *shown;
+    }
+    const auto now = co_await read_object(object::position, options);
+    if (!now) co_return fail(now.error());
+    if (moving != 0 || std::abs(*now - position) > jitter) {
+      (void)co_await stop(StopKind::quick_stop);  // the caller stops it again, and watches it
+      co_return fail(error_at(Reason::terminal, object::position,
+                              "the shaft turned although nothing was started; stopped",
+                              "check terminals that start motion and other masters; then reset the axis"));
+    }
+    if (clock_->now() >= until) co_return Result<void>{};
+    co_await sleep_until(executor_, *clock_, clock_->now() + watch_pause);
+  }
+}
+
+/// Just before 0Fh: what make_ready() left is what stands there.
+Task<Result<void>> Cia402Drive::confirm_nothing_pending(SdoOptions options) {
+  const auto word = co_await read_object(object::control_word, options);
+  if (!word) co_return fail(word.error());
+  const auto speed = co_await read_object(object::target_velocity, options);
+  if (!speed) co_return fail(speed.error());
+  const auto mode = co_await read_object(object::mode_display, std::move(options));
+  if (!mode) co_return fail(mode.error());
+  const bool asks = (static_cast<std::uint16_t>(*word) & ~control::state_bits) != 0;
+  if (!asks && *speed == 0 && *mode == number_of(OperationMode::profile_position)) co_return Result<void>{};
+  co_return fail(error_at(
+      Reason::misconfigured, object::control_word,
+      fmt::format("not enabled: something could start (control word {:04X}h, target velocity {}, mode {})",
+                  *word, *speed, *mode),
+      "check whether another master writes to this drive"));
+}
+
+Task<Result<void>> Cia402Drive::step_to_enabled(State state, SdoOptions options) {
+  std::optional<std::int64_t> position;
+  while (const auto step = next_to_enabled(state)) {
+    if (step->to == State::operation_enabled) {
+      // 07h has energised the motor already (6.2.2 bit 13): from here on it stands.
+      if (const auto clear = co_await confirm_nothing_pending(options); !clear) co_return clear;
+      const auto base = co_await read_object(object::position, options);
+      if (!base) co_return fail(base.error());
+      position = *base;
+    }
+    if (const auto written = co_await write_control(control_word(*step->command), options); !written)
+      co_return written;
+    const auto word = co_await read_until(
+        object::status_word,
+        [to = step->to](std::int64_t shown) { return state_of(static_cast<std::uint16_t>(shown)) == to; },
+        transition_limit, options);
+    if (!word) co_return fail(word.error());
+    state = state_of(static_cast<std::uint16_t>(*word));
+    if (state != step->to)
+      co_return fail(error_at(Reason::not_confirmed, object::status_word,
+                              fmt::format("transition {}: the drive is in {} instead of {}", step->number,
+                                          to_string(state), to_string(step->to)),
+                              "check alarm, supply and terminals that release the motor"));
+  }
+  if (position) co_return co_await watch_standstill(*position, std::move(options));
+  co_return fail(error_at(
+      Reason::alarm, object::status_word,
+      fmt::format("the drive is in {}: it cannot be enabled", to_string(state)),
+      state == State::quick_stop_active ? "disable the axis first" : "clear the alarm and reset the axis"));
+}
+
+Task<Result<void>> Cia402Drive::enable(MotionGuard guard) {
+  const SdoOptions options{.transaction_class = TransactionClass::motion, .guard = std::move(guard)};
+  if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
+  const auto state = co_await read_status(options);
+  if (!state) co_return fail(state.error());
+  if (next_to_enabled(*state) || *state == State::operation_enabled) {
+    // In position mode, never in velocity mode.
+    const auto ready = co_await make_ready(*state, OperationMode::profile_position, options);
+    if (!ready || *state == State::operation_enabled) co_return ready;
+  }
+  // quiet_word() may have led from Ready To Switch On to Switch On Disabled (7).
+  const auto now = co_await read_status(options);
+  if (!now) co_return fail(now.error());
+  co_return co_await step_to_enabled(*now, options);
+}
+
+Task<bool> Cia402Drive::released(SdoOptions options) {
+  const auto enabled_bit = model_->status.enabled;
+  const auto is_released = [enabled_bit](std::int64_t shown) {
+    const auto word = static_cast<std::uint16_t>(shown);
+    return enabled_bit != 0 ? (word & enabled_bit) == 0 : !is_energised(state_of(word));
+  };
+  const auto word =
+      co_await read_until(object::status_word, is_released, transition_limit, std::move(options));
+  co_return word&& is_released(*word);
+}
+
+Task<Result<void>> Cia402Drive::disable(MotionGuard guard) {
+  const SdoOptions options{
+      .transaction_class = TransactionClass::stop, .guard = std::move(guard), .attempts = 3};
+  // 0Fh with a motion under way: that ends first, as far as it can.
+  if (!control_ || (*control_ & control::halt) == 0) (void)co_await stop(StopKind::stop);
+  // The halt stays until the next enable has found that nothing is behind it.
+  const auto shutdown = static_cast<std::uint16_t>(control_word(Command::shutdown) | control::halt);
+  if (const auto written = co_await write_control(shutdown, options); !written) co_return written;
+  if (!co_await released(options)) {
+    const auto off = static_cast<std::uint16_t>(control_word(Command::disable_voltage) | control::halt);
+    if (const auto written = co_await write_control(off, options); !written) co_return written;
+    if (!co_await released(options))
+      co_return fail(error_at(Reason::not_confirmed, object::status_word,
+                              "the drive still reports its power stage as on", "try again"));
+  }
+  co_return Result<void>{};
+}
+
+/// Works on a node of which nothing is known, and never changes the power stage: bits 0 to 3 stay as the
+/// drive has them. Never bit 2 (M12): without 605Ah and 6085h nobody knows how the drive would stop.
+Task<Result<void>> Cia402Drive::stop(StopKind kind) {
+  ++stops_;
+  leave_homing_ = leave_homing_ || homing_.active() || mode_ == OperationMode::homing;
+  homing_.end();
+  live_.reset();
+  const SdoOptions urgent{.transaction_class = TransactionClass::stop};
+  const auto held = co_await held_control(urgent);
+  if (!held) co_return fail(held.error());
+  const auto word = static_cast<std::uint16_t>((*held & control::state_bits) | control::halt);
+  const bool quick = kind == StopKind::quick_stop;
+  const auto option = quick ? model_->meaning.halt_at_once : model_->meaning.halt_on_ramp;
+  // At once where it can be; a quick stop first has to say how (605Dh may be read when bit 8 rises).
+  const auto at_once = [](Cia402Drive& drive, std::uint16_t bits) -> Task<> {
+    if (!drive.command_pdo_ || !drive.control_) co_return;
+    constexpr std::size_t bytes = 2;
+    (void)co_await drive.bus_->master().send_pdo(*drive.command_pdo_, canopen::number_bytes(bits, bytes),
+                                                 {.transaction_class = TransactionClass::stop});
+  };
+  if (!quick) co_await at_once(*this, word);
+  if (halt_option_ != option) {
+    halt_option_.reset();
+    if (co_await write_object(object::halt_option, option, 0, urgent)) halt_option_ = option;
+  }
+  if (quick) co_await at_once(*this, word);
+  // M12. In a mode that nobody knows it does no harm.
+  if (!mode_ || *mode_ == OperationMode::profile_velocity)
+    (void)co_await write_object(object::target_velocity, 0, 0, urgent);
+  co_return co_await write_control(word, urgent);
+}
+
+Task<Result<void>> Cia402Drive::reset_fault(SdoOptions options) {
+  // In Fault bits 0 to 3 mean nothing, and 15 leads to Switch On Disabled: nothing is released or enabled.
+  if (const auto low = co_await write_control(0, options); !low) co_return low;
+  if (const auto edge = co_await write_control(control::fault_reset, options); !edge) co_return edge;
+  const auto word = co_await read_until(
+      object::status_word,
+      [](std::int64_t shown) { return state_of(static_cast<std::uint16_t>(shown)) != State::fault; },
+      transition_limit, options);
+  if (!word) co_return fail(word.error());
+  co_return co_await write_control(0, std::move(options));
+}
+
+Task<Result<void>> Cia402Drive::clear_alarm() {
+  const SdoOptions options{.transaction_class = TransactionClass::parameters, .attempts = 3};
+  const auto state = co_await read_status(options);
+  if (!state) co_return fail(state.error());
+  if (const auto zero = co_await write_verified(object::target_velocity, 0, options); !zero) co_return zero;
+  if (*state == State::fault || *state == State::fault_reaction_active) {
+    if (const auto reset = co_await reset_fault(options); !reset) co_return reset;
+    const auto now = co_await read_status(options);
+    if (!now) co_return fail(now.error());
+    if (*now != State::fault) co_return Result<void>{};
+  }
+  // What is no fault to CiA 402, or was not reset by bit 7.
+  if (!model_->objects.alarm_clear) co_return Result<void>{};
+  co_return co_await write_object(*model_->objects.alarm_clear, 1, 0, options);
+}
+
+}  // namespace axisd::cia402

@@ -1,0 +1,206 @@
+// What the drive does: by PDO where it sends them, else by SDO; and what the node says of itself.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/cia402/drive.hpp"
+
+namespace axisd::cia402 {
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr auto longest_pdo_wait = milliseconds(60);
+constexpr int missed_in_a_row = 3;
+/// A motion that was triggered shows within this, or did not start.
+constexpr auto start_window = milliseconds(500);
+
+}  // namespace
+
+void Cia402Drive::on_event(const canopen::NodeEvent& event) {
+  using Kind = canopen::NodeEvent::Kind;
+  switch (event.kind) {
+    case Kind::booted:
+      rebooted_ = rebooted_ || !expected_.empty() || expected_mark_;
+      forget_power_cycle();
+      unsubscribe();
+      pending_alarm_ = 0;
+      heartbeat_lost_ = false;
+      break;
+    case Kind::heartbeat_lost:
+      heartbeat_lost_ = true;
+      break;
+    case Kind::heartbeat_again:
+      heartbeat_lost_ = false;
+      break;
+    case Kind::state_changed:
+      break;
+  }
+  news_.notify_all();
+  if (attention_) attention_();
+}
+
+void Cia402Drive::on_emergency(const canopen::Emergency& emergency) {
+  const auto group = emergency.code >> 8U;
+  const bool of_communication = group == 0x81 || group == 0x82;
+  if (!emergency.is_reset() && !of_communication) pending_alarm_ = alarm_of(*model_, emergency.code);
+  news_.notify_all();
+  if (attention_) attention_();
+}
+
+void Cia402Drive::on_pdo(std::size_t index, const can::ReceivedFrame& received) {
+  const auto bits = can::worst_case_bits(received.frame);
+  const auto on_wire = std::chrono::nanoseconds(std::chrono::seconds(1)) * bits /
+                       std::max<std::uint32_t>(bus_->settings().bitrate, 1);
+  pdos_.on_pdo(index, received.frame.bytes(), received.at - on_wire, received.at);
+  news_.notify_all();
+}
+
+bool Cia402Drive::pdos_usable() const {
+  if (subscribed_.empty() || heartbeat_lost_ || rebooted_) return false;
+  return !pdos_.synchronous() || bus_->sync_running();
+}
+
+Duration Cia402Drive::pdo_patience() const {
+  const auto period = pdos_.synchronous() ? 2 * bus_->settings().sync_period : longest_pdo_wait;
+  return std::min<Duration>(period + milliseconds(10), longest_pdo_wait);
+}
+
+/// The first complete reading that is no older than this call, if it comes soon.
+Task<std::optional<Reading>> Cia402Drive::next_pdos() {
+  const auto since = clock_->now();
+  // A drive that does not send them costs one short wait now and then, and not with every reading.
+  const bool hopeless = missed_pdos_ >= missed_in_a_row && !pdos_.since(since - std::chrono::seconds(1));
+  if (!pdos_usable() || hopeless) co_return std::nullopt;
+  const auto until = since + pdo_patience();
+  while (clock_->now() < until && pdos_usable()) {
+    if (auto reading = pdos_.since(since)) {
+      missed_pdos_ = 0;
+      co_return reading;
+    }
+    co_await news_.wait_until(until);
+  }
+  if (pdos_usable()) ++missed_pdos_;
+  co_return std::nullopt;
+}
+
+Task<Result<Reading>> Cia402Drive::poll_objects(SdoOptions options) {
+  Reading reading{.asked_at = clock_->now()};
+  auto objects = state_objects(*model_);
+  if (model_->objects.moving) objects.push_back(*model_->objects.moving);
+  for (const auto object : objects) {
+    const auto value = co_await read_object(object, options);
+    if (!value) co_return fail(value.error());
+    reading.values[object.key()] = *value;
+  }
+  reading.measured_at = clock_->now();
+  co_return reading;
+}
+
+Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class) {
+  const SdoOptions options{.transaction_class = transaction_class};
+  // A chain that starts something does not wait for a PDO.
+  if (transaction_class != TransactionClass::motion)
+    if (const auto reading = co_await next_pdos()) {
+      auto sample = judge(*reading);
+      if (!leave_homing_ || sample.moving) co_return sample;
+    }
+  if (leave_homing_ && !rebooted_) co_await leave_homing(options);
+  if (rebooted_) co_return fail(lost_memory());
+  const auto polled = co_await poll_objects(options);
+  if (!polled) co_return fail(polled.error());
+  if (rebooted_) co_return fail(lost_memory());
+  if (missed_pdos_ == missed_in_a_row && link_note_.empty())
+    link_note_ = "state by SDO polling: its TPDOs do not come";
+  else if (missed_pdos_ == 0 && !subscribed_.empty())
+    link_note_.clear();
+  co_return judge(*polled);
+}
+
+/// What the drive is known to hold is no longer known where the drive shows something else.
+void Cia402Drive::note_knowledge(const Reading& reading) {
+  const auto mode = reading.values.find(object::mode_display.key());
+  if (mode != reading.values.end()) mode_ = static_cast<OperationMode>(mode->second);
+  const auto status = reading.values.find(object::status_word.key());
+  if (status == reading.values.end() || !control_ || reading.asked_at <= control_at_) return;
+  const bool told_to_run = (*control_ & control::state_bits) == control_word(Command::enable_operation);
+  const bool runs = state_of(static_cast<std::uint16_t>(status->second)) == State::operation_enabled;
+  if (told_to_run != runs) control_.reset();
+}
+
+DriveSample Cia402Drive::judge(const Reading& reading) {
+  auto sample = decode_state(*model_, setup_.pulses_per_revolution, reading.values);
+  sample.asked_at = reading.asked_at;
+  sample.measured_at = reading.measured_at;
+  if (last_position_ && sample.position_pulses != *last_position_)
+    negative_ = sample.position_pulses < *last_position_;
+  else if (sample.velocity_rpm != 0)
+    negative_ = sample.negative_direction;
+  last_position_ = sample.position_pulses;
+  sample.negative_direction = negative_;
+  // An alarm that has gone already is told once, all the same (M5).
+  if (const auto told = std::exchange(pending_alarm_, 0); sample.alarm_code == 0) sample.alarm_code = told;
+  note_knowledge(reading);
+  if (live_ && sample.asked_at >= live_->since) {
+    if (sample.moving)
+      live_->moved = true;
+    else if (live_->moved || sample.asked_at - live_->since >= start_window)
+      live_.reset();
+  }
+  sample.mode = mode_of(sample, reading);
+  sample.homed = sample.homed || homed_;  // of CiA 402's bit 12 nothing is left in another mode
+  return sample;
+}
+
+/// Back to position mode, where bit 13 is the power stage alone, and bit 4 to 0. With the halt, which any
+/// start ends: whatever stop comes at the same time, this undoes nothing of it. What fails here is done by
+/// the next start.
+Task<> Cia402Drive::leave_homing(SdoOptions options) {
+  leave_homing_ = false;
+  const auto held = co_await held_control(options);
+  if (!held) co_return;
+  const auto word = static_cast<std::uint16_t>((*held & control::state_bits) | control::halt);
+  if (const auto written = co_await write_control(word, options); !written) co_return;
+  (void)co_await change_mode(OperationMode::profile_position, std::move(options));
+}
+
+/// 6061h stays as it is when a motion has ended; the contract wants `homing` only while it lasts.
+DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading) {
+  if (homing_.active()) {
+    if (homing_.goes_on(sample)) return DriveMode::homing;
+    homed_ = sample.homed;
+    leave_homing_ = true;
+  }
+  if (leave_homing_) return sample.moving ? DriveMode::homing : DriveMode::positioning;
+  if (live_) return DriveMode::positioning;
+  if (mode_ == OperationMode::homing && sample.enabled) {
+    // Found homing: between its phases the motor rests, but bit 4 stands (6.2.6).
+    const auto status = reading.values.find(object::status_word.key());
+    const bool told = expected_.empty() && status != reading.values.end() &&
+                      (static_cast<std::uint16_t>(status->second) & model_->status.set_point_mirror) != 0;
+    if (sample.moving || (told && !sample.homed)) return DriveMode::homing;
+  }
+  if (sample.moving)
+    if (const auto terminal = terminal_motion(sample)) return *terminal;
+  return DriveMode::positioning;
+}
+
+/// A terminal that can start motion is active: the drive moves by itself, and goes on when axisd does not.
+std::optional<DriveMode> Cia402Drive::terminal_motion(const DriveSample& sample) const {
+  for (const auto& input : setup_.inputs) {
+    const auto* function = find_function(model_->descriptor->input_functions, input.function);
+    const auto terminal = std::ranges::find(model_->descriptor->inputs, input.terminal, &TerminalSpec::name);
+    if (function == nullptr || !function->starts_motion || terminal == model_->descriptor->inputs.end())
+      continue;
+    const auto bit = static_cast<unsigned>(terminal - model_->descriptor->inputs.begin());
+    if (((sample.inputs >> bit) & 1U) == 0) continue;
+    if (input.function.starts_with("home") || input.function.starts_with("homing")) return DriveMode::homing;
+    return input.function.starts_with("position") ? DriveMode::multi_position : DriveMode::multi_velocity;
+  }
+  return std::nullopt;
+}
+
+}  // namespace axisd::cia402

@@ -1,0 +1,185 @@
+#include "devices/cia402/encoding.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "devices/cia402/status_word.hpp"
+
+namespace axisd::cia402 {
+
+namespace {
+
+struct StandardType {
+  canopen::Object object;
+  ObjectType type;
+};
+constexpr auto standard_types = std::to_array<StandardType>({
+    {object::emergency_id, {4, false}},
+    {object::heartbeat_time, {2, false}},
+    {object::error_code, {2, false}},
+    {object::control_word, {2, false}},
+    {object::status_word, {2, false}},
+    {object::halt_option, {2, true}},
+    {object::mode, {1, true}},
+    {object::mode_display, {1, true}},
+    {object::position, {4, true}},
+    {{0x606C, 0}, {4, true}},
+    {object::target_position, {4, true}},
+    {object::home_offset, {4, true}},
+    {object::profile_velocity, {4, false}},
+    {object::acceleration, {4, false}},
+    {object::deceleration, {4, false}},
+    {object::homing_method, {1, true}},
+    {object::homing_speed, {4, false}},
+    {object::homing_search_speed, {4, false}},
+    {object::homing_acceleration, {4, false}},
+    {{0x60FD, 0}, {4, false}},
+    {{0x60FE, 1}, {4, false}},
+    {object::target_velocity, {4, true}},
+});
+
+std::int32_t milliseconds_of(Duration time) {
+  return static_cast<std::int32_t>(std::chrono::duration_cast<std::chrono::milliseconds>(time).count());
+}
+
+std::int32_t clamped(double value) {
+  constexpr double most = std::numeric_limits<std::int32_t>::max();
+  return static_cast<std::int32_t>(std::clamp(std::round(value), -most, most));
+}
+
+/// A time from `from_rpm` to `rpm` as the drive wants its ramps.
+std::int32_t ramp(const Model& model, std::int64_t pulses_per_revolution, int rpm, Duration time) {
+  if (model.meaning.ramps_are_times) return milliseconds_of(time);
+  const double per_rpm =
+      model.meaning.velocity_in_rpm ? 1.0 : static_cast<double>(pulses_per_revolution) / 60.0;
+  const double seconds = std::max(std::chrono::duration<double>(time).count(), 0.001);
+  return std::max(1, clamped(std::abs(rpm) * per_rpm / seconds));
+}
+
+std::int64_t value_of(const Values& values, const std::optional<canopen::Object>& object) {
+  if (!object) return 0;
+  const auto found = values.find(object->key());
+  return found == values.end() ? 0 : found->second;
+}
+
+}  // namespace
+
+ObjectType type_of(const Model& model, canopen::Object object) {
+  if (const auto* known = find_parameter(model.descriptor->parameters, object.key()))
+    return {static_cast<std::uint8_t>(size_of(known->type)), is_signed(known->type)};
+  const auto standard = std::ranges::find(standard_types, object, &StandardType::object);
+  return standard == standard_types.end() ? ObjectType{} : standard->type;
+}
+
+std::vector<canopen::Object> state_objects(const Model& model) {
+  std::vector<canopen::Object> objects{object::status_word, object::position};
+  const auto& vendor = model.objects;
+  if (vendor.velocity) objects.push_back(*vendor.velocity);
+  objects.push_back(object::error_code);
+  if (vendor.inputs) objects.push_back(*vendor.inputs);
+  if (vendor.outputs) objects.push_back(*vendor.outputs);
+  objects.push_back(object::mode_display);
+  return objects;
+}
+
+std::vector<canopen::PdoMapping> state_layout(const Model& model) {
+  constexpr std::size_t most_entries = 4, most_bytes = 8;
+  std::vector<canopen::PdoMapping> layout;
+  for (const auto object : state_objects(model)) {
+    const auto bytes = type_of(model, object).bytes;
+    if (layout.empty() || layout.back().size() == most_entries ||
+        canopen::pdo_size(layout.back()) + bytes > most_bytes)
+      layout.emplace_back();
+    layout.back().push_back({.object = object, .bits = static_cast<std::uint8_t>(8U * bytes)});
+  }
+  return layout;
+}
+
+std::uint16_t alarm_of(const Model& model, std::uint16_t error_code) {
+  const auto& meaning = model.meaning;
+  const auto own = static_cast<std::uint16_t>(error_code & meaning.alarm_mask);
+  const auto prefix = static_cast<std::uint16_t>(error_code & ~meaning.alarm_mask);
+  return prefix == meaning.alarm_prefix ? own : error_code;
+}
+
+DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values) {
+  constexpr std::uint16_t without_code = 0xFFFF;
+  const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
+  const auto is = [word](std::uint16_t bits) { return (word & bits) != 0; };
+  const auto& bits = model.status;
+  const auto state = state_of(word);
+  DriveSample sample;
+  sample.position_pulses = static_cast<std::int32_t>(value_of(values, object::position));
+  const auto velocity = value_of(values, model.objects.velocity);
+  sample.velocity_rpm = model.meaning.velocity_in_rpm
+                            ? static_cast<std::int32_t>(velocity)
+                            : clamped(static_cast<double>(velocity) * 60 /
+                                      static_cast<double>(std::max<std::int64_t>(1, pulses_per_revolution)));
+  sample.negative_direction = velocity < 0;
+  // The manual shows motion in three places (6.2.2 bit 14, 2001h, 2002h): any one is enough to be careful.
+  sample.moving = is(bits.moving) || velocity != 0 || value_of(values, model.objects.moving) != 0;
+  const auto mode = static_cast<OperationMode>(value_of(values, object::mode_display));
+  // In homing the appendix (MC_HOME) reads the maker's bit as "homing failed": there the state tells.
+  const bool by_state = bits.enabled == 0 || mode == OperationMode::homing;
+  sample.enabled = by_state ? is_energised(state) : is(bits.enabled);
+  sample.homed = is(bits.homed) ||
+                 (mode == OperationMode::homing && is(status::mode_specific) && is(status::target_reached));
+  sample.in_position = bits.in_position != 0 ? is(bits.in_position) : is(status::target_reached);
+  sample.alarm_code = alarm_of(model, static_cast<std::uint16_t>(value_of(values, object::error_code)));
+  const bool faulty = state == State::fault || state == State::fault_reaction_active || is(bits.alarm);
+  if (sample.alarm_code == 0 && faulty) sample.alarm_code = without_code;
+  sample.inputs = static_cast<std::uint32_t>(value_of(values, model.objects.inputs));
+  sample.outputs = static_cast<std::uint32_t>(value_of(values, model.objects.outputs));
+  return sample;
+}
+
+std::vector<canopen::Object> motion_objects(const Model& model) {
+  std::vector<canopen::Object> objects{object::target_position, object::profile_velocity,
+                                       object::acceleration, object::deceleration};
+  if (model.objects.start_speed) objects.push_back(*model.objects.start_speed);
+  return objects;
+}
+
+std::int32_t encode_velocity(const Model& model, std::int64_t pulses_per_revolution, int rpm) {
+  if (model.meaning.velocity_in_rpm) return rpm;
+  return clamped(rpm * static_cast<double>(pulses_per_revolution) / 60.0);
+}
+
+MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const MoveProfile& profile) {
+  return {profile.target_pulses, encode_velocity(model, pulses_per_revolution, profile.velocity_rpm),
+          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
+          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
+          model.objects.start_speed ? profile.start_rpm : 0};
+}
+
+MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const VelocityProfile& profile,
+                   const MotionBlock& present) {
+  return {present[target], present[speed],
+          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
+          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
+          model.objects.start_speed ? profile.start_rpm : 0};
+}
+
+std::vector<std::pair<canopen::Object, std::int64_t>> encode(const Model& model,
+                                                             std::int64_t pulses_per_revolution,
+                                                             const HomingProfile& profile) {
+  return {{object::homing_speed, encode_velocity(model, pulses_per_revolution, profile.velocity_rpm)},
+          {object::homing_search_speed,
+           encode_velocity(model, pulses_per_revolution, profile.search_velocity_rpm)},
+          {object::homing_acceleration,
+           ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time)},
+          {object::home_offset, profile.offset_pulses}};
+}
+
+MotionBlock default_block(const Model& model) {
+  MotionBlock block{};
+  std::size_t field = 0;
+  for (const auto object : motion_objects(model)) {
+    const auto* known = find_parameter(model.descriptor->parameters, object.key());
+    block.at(field++) = known == nullptr ? 0 : static_cast<std::int32_t>(known->default_value.value_or(0));
+  }
+  return block;
+}
+
+}  // namespace axisd::cia402

@@ -1,0 +1,58 @@
+// Between the numbers of a CiA 402 drive and those of the drive contract. Pure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "buses/canopen/pdo.hpp"
+#include "devices/cia402/model.hpp"
+#include "devices/cia402/objects.hpp"
+#include "devices/drive.hpp"
+
+namespace axisd::cia402 {
+
+/// Size and sign of an object by the model's dictionary, else by CiA 402.
+struct ObjectType {
+  std::uint8_t bytes = 2;
+  bool is_signed = false;
+};
+ObjectType type_of(const Model& model, canopen::Object object);
+
+/// Values of objects by Object::key(), with their signs.
+using Values = std::map<std::uint32_t, std::int64_t>;
+
+/// The objects that tell a drive's state, in the order in which PDOs carry them.
+std::vector<canopen::Object> state_objects(const Model& model);
+/// The same in as few PDOs as hold them: at most four objects and 64 bits each (YSS-C manual 6.1.2,
+/// chapter 7).
+std::vector<canopen::PdoMapping> state_layout(const Model& model);
+
+/// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's.
+DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values);
+/// Alarm code of a 603Fh or EMCY error code; 0: none, or none of the drive's own.
+std::uint16_t alarm_of(const Model& model, std::uint16_t error_code);
+
+/// Objects that a start uses and that stand in RAM; where the model has no start speed, one less.
+std::vector<canopen::Object> motion_objects(const Model& model);
+/// What they hold: 607Ah, 6081h, 6083h, 6084h, start speed (0 where there is none).
+using MotionBlock = std::array<std::int32_t, 5>;
+enum MotionField : std::uint8_t { target, speed, acceleration, deceleration, start_speed };
+
+MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const MoveProfile& profile);
+/// `present`: what a velocity motion leaves as it is.
+MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const VelocityProfile& profile,
+                   const MotionBlock& present);
+/// 60FFh.
+std::int32_t encode_velocity(const Model& model, std::int64_t pulses_per_revolution, int rpm);
+/// 6099h:01, 6099h:02, 609Ah, 607Ch, in this order. The method (6098h) is negotiated.
+std::vector<std::pair<canopen::Object, std::int64_t>> encode(const Model& model,
+                                                             std::int64_t pulses_per_revolution,
+                                                             const HomingProfile& profile);
+/// The block after a power-up, by the model's dictionary.
+MotionBlock default_block(const Model& model);
+
+}  // namespace axisd::cia402

@@ -1,0 +1,65 @@
+#include "devices/cia402/state_pdos.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace axisd::cia402 {
+
+void StatePdos::begin(const Model& model, std::vector<canopen::PdoMapping> layout, bool synchronous) {
+  *this = {};
+  model_ = &model;
+  layout_ = std::move(layout);
+  synchronous_ = synchronous;
+  parts_.resize(layout_.size());
+}
+
+void StatePdos::forget() {
+  for (auto& part : parts_) part.there = false;
+  sync_.reset();
+  previous_sync_.reset();
+  newest_.reset();
+}
+
+bool StatePdos::complete() const {
+  return !parts_.empty() && std::ranges::all_of(parts_, [](const Part& part) { return part.there; });
+}
+
+void StatePdos::on_sync(TimePoint at) {
+  if (!synchronous_) return;
+  previous_complete_ = !sync_ || complete();
+  previous_sync_ = std::exchange(sync_, at);
+  for (auto& part : parts_) part.there = false;
+}
+
+void StatePdos::on_pdo(std::size_t index, std::span<const std::uint8_t> bytes, TimePoint begin,
+                       TimePoint end) {
+  auto values = canopen::unpack_pdo(layout_.at(index), bytes);
+  if (!values || (synchronous_ && !sync_)) return;
+  parts_.at(index) = {.values = std::move(*values), .begin = begin, .end = end, .there = true};
+  if (!complete()) return;
+  if (!synchronous_) return assemble(std::ranges::min(parts_, {}, &Part::begin).begin);
+  // What was missing in the cycle before may be what comes late in this one.
+  assemble(previous_complete_ ? *sync_ : previous_sync_.value_or(*sync_));
+}
+
+void StatePdos::assemble(TimePoint asked_at) {
+  Reading reading{.asked_at = asked_at};
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    reading.measured_at = std::max(reading.measured_at, parts_[i].end);
+    for (std::size_t entry = 0; entry < layout_[i].size(); ++entry) {
+      const auto& mapped = layout_[i][entry];
+      const auto raw = parts_[i].values[entry];
+      reading.values[mapped.object.key()] = type_of(*model_, mapped.object).is_signed
+                                                ? canopen::sign_extended(raw, mapped.bits)
+                                                : static_cast<std::int64_t>(raw);
+    }
+  }
+  newest_ = std::move(reading);
+}
+
+std::optional<Reading> StatePdos::since(TimePoint since) const {
+  if (!newest_ || newest_->asked_at < since) return std::nullopt;
+  return newest_;
+}
+
+}  // namespace axisd::cia402

@@ -1,0 +1,57 @@
+// Puts together the TPDOs that tell a drive's state.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "buses/canopen/pdo.hpp"
+#include "buses/clock.hpp"
+#include "devices/cia402/encoding.hpp"
+
+namespace axisd::cia402 {
+
+/// One coherent look at the drive.
+struct Reading {
+  Values values;
+  TimePoint asked_at{};     ///< everything is at least this fresh
+  TimePoint measured_at{};  ///< the last of it had come
+};
+
+/// Pure. With SYNC a reading is what came between two SYNCs, and as old as the first of them; by event it is
+/// the newest PDO of each, and as old as the oldest of them.
+class StatePdos {
+ public:
+  /// Signs are those of `model`'s dictionary, which outlives this.
+  void begin(const Model& model, std::vector<canopen::PdoMapping> layout, bool synchronous);
+  /// Nothing that came counts any more.
+  void forget();
+  void on_sync(TimePoint at);
+  /// `begin`: of its frame on the wire, `end` likewise. PDOs that are too short are ignored.
+  void on_pdo(std::size_t index, std::span<const std::uint8_t> bytes, TimePoint begin, TimePoint end);
+  /// The newest reading, if it is no older than `since`.
+  [[nodiscard]] std::optional<Reading> since(TimePoint since) const;
+
+  [[nodiscard]] bool synchronous() const { return synchronous_; }
+  [[nodiscard]] const std::vector<canopen::PdoMapping>& layout() const { return layout_; }
+
+ private:
+  struct Part {
+    std::vector<std::uint64_t> values;
+    TimePoint begin{}, end{};
+    bool there = false;
+  };
+  [[nodiscard]] bool complete() const;
+  void assemble(TimePoint asked_at);
+
+  const Model* model_ = nullptr;
+  std::vector<canopen::PdoMapping> layout_;
+  bool synchronous_ = false;
+  std::vector<Part> parts_;
+  std::optional<TimePoint> sync_, previous_sync_;
+  bool previous_complete_ = true;
+  std::optional<Reading> newest_;
+};
+
+}  // namespace axisd::cia402
