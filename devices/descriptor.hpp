@@ -98,7 +98,9 @@ struct RtuIdentification {
 /// How a CANopen model is told from others: its device type (1000h) and identity (1018h).
 struct CanIdentification {
   std::uint32_t vendor = 0, product = 0;
-  std::uint32_t device_type = 0;  ///< low 16 bits: profile (402)
+  std::uint32_t device_type = 0;                    ///< low 16 bits: profile (402)
+  std::uint32_t microstep_object = 0;               ///< index << 8 | sub-index; 0: none
+  std::span<const std::int32_t> microstep_codes{};  ///< pulses per revolution in the order of the codes
   [[nodiscard]] constexpr std::uint16_t profile() const { return static_cast<std::uint16_t>(device_type); }
 };
 

@@ -22,6 +22,9 @@ struct Object {
   std::uint8_t sub = 0;
   /// As Address::object holds it: index << 8 | sub-index.
   [[nodiscard]] constexpr std::uint32_t key() const { return std::uint32_t{index} << 8U | sub; }
+  [[nodiscard]] static constexpr Object of(std::uint32_t key) {
+    return {static_cast<std::uint16_t>(key >> 8U), static_cast<std::uint8_t>(key & 0xFFU)};
+  }
   friend constexpr auto operator<=>(const Object&, const Object&) = default;
 };
 /// "6040h:00"

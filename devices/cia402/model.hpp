@@ -38,7 +38,7 @@ struct VendorObjects {
   std::optional<canopen::Object> inputs{};          ///< levels, bit per terminal in the descriptor's order
   std::optional<canopen::Object> outputs{};         ///< likewise
   std::optional<canopen::Object> start_speed{};     ///< of each ramp, r/min
-  std::optional<canopen::Object> microstep{};       ///< index into Model::microsteps
+  std::optional<canopen::Object> microstep{};       ///< index into CanIdentification::microstep_codes
   std::optional<canopen::Object> loop_mode{};       ///< 0 closed loop, 1 open loop
   std::optional<canopen::Object> eeprom_switch{};   ///< 0: writes are saved, 1: they are not
   std::optional<canopen::Object> memory{};          ///< 1 restores the factory settings, 2 saves everything
@@ -84,8 +84,7 @@ struct Model {
   StatusBits status{};
   VendorObjects objects{};
   Meaning meaning{};
-  std::span<const std::int32_t> microsteps{};  ///< pulses per revolution in the order of the codes
-  std::optional<Addressing> addressing{};      ///< nothing: only the drive's switches or tools can
+  std::optional<Addressing> addressing{};  ///< nothing: only the drive's switches or tools can
   /// The manual prints an EMCY identifier that is another service's: 1014h is set to 80h + node first (M24).
   bool sets_emergency_id = true;
 };

@@ -174,6 +174,10 @@ void CanopenServer::on_nmt(std::uint8_t command, TimePoint now) {
 }
 
 void CanopenServer::send_heartbeat(TimePoint now) {
+  if (heartbeat_time() == Duration{}) {  // the factory settings were restored meanwhile
+    heartbeat_ = TimePoint::max();
+    return;
+  }
   const std::uint8_t code = state_ == NmtState::operational ? 0x05
                             : state_ == NmtState::stopped   ? 0x04
                                                             : 0x7F;

@@ -74,7 +74,7 @@ inline constexpr SettingSpec overtravel_setting = {
     .object = reg::overtravel_stop};
 
 /// An integer register of the performance group, left as the drive has it when not given.
-constexpr SettingSpec tuning(std::string_view key, std::uint16_t address, std::int64_t minimum,
+constexpr SettingSpec tuning(std::string_view key, std::uint32_t address, std::int64_t minimum,
                              std::int64_t maximum, std::string_view description) {
   return {.key = key,
           .kind = "integer",
