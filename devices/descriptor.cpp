@@ -10,6 +10,15 @@ const DriveDescriptor* find_drive_model(std::string_view model) {
   return nullptr;
 }
 
+const DriveDescriptor* descriptor_of(const AxisSettings& axis) {
+  return axis.own_descriptor ? axis.own_descriptor.get() : find_drive_model(axis.model);
+}
+
+const AlarmSpec* find_alarm(const DriveDescriptor& drive, std::uint16_t code) {
+  const auto found = std::ranges::find(drive.alarms, code, &AlarmSpec::code);
+  return found == drive.alarms.end() ? drive.other_alarms : &*found;
+}
+
 const ParameterSpec* find_parameter(std::span<const ParameterSpec> catalogue, std::uint32_t address) {
   const auto found = std::ranges::lower_bound(catalogue, address, {}, &ParameterSpec::address);
   return found == catalogue.end() || found->address != address ? nullptr : &*found;

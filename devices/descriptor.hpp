@@ -5,9 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -28,6 +30,8 @@ class CanopenBus;
 
 struct TerminalSpec {
   std::string_view name;  ///< "X0"; its index in the list is its bit in DriveSample
+  /// The only function that it can have, in drive direction, and active high only. Empty: any.
+  std::string_view function{};
 };
 
 /// A function that a terminal can have. `mirror` names the function that an inverted axis needs instead
@@ -77,13 +81,14 @@ struct AlarmSpec {
 /// A key that this model adds to the YAML's `drive:` section.
 struct SettingSpec {
   std::string_view key;
-  std::string_view kind;                      ///< "enum", "integer", "boolean"
+  std::string_view kind;                      ///< "enum", "integer", "boolean", "path"
   std::span<const std::string_view> choices;  ///< of an enum
   std::int64_t minimum = 0, maximum = 0;
   std::string_view default_value;  ///< empty: the drive's value is left alone
   std::string_view description;
   /// Register that holds it: the index of a choice, the integer, or 0/1. Nothing: the driver knows.
   std::optional<std::uint32_t> object = std::nullopt;
+  bool required = false;
 };
 
 /// How a Modbus RTU model is told from others, and how it is set (for identification and the bus scan).
@@ -117,6 +122,7 @@ struct Capabilities {
   /// Of targets and distances of single motions, as the drive counts them.
   std::int32_t minimum_target_pulses = std::numeric_limits<std::int32_t>::min();
   std::int32_t maximum_target_pulses = std::numeric_limits<std::int32_t>::max();
+  bool homing = true;
   int maximum_segments = 16;  ///< of positions and velocities that the inputs can select
   int minimum_segment_time_ms = 30;
   /// The last approach to a home switch follows the search; else an inverted axis cannot use these methods
@@ -147,17 +153,27 @@ struct DriveDescriptor {
   std::span<const TerminalFunctionSpec> input_functions, output_functions;
   std::span<const ParameterSpec> parameters;
   std::span<const AlarmSpec> alarms;
+  const AlarmSpec* other_alarms = nullptr;  ///< what holds for codes without a row; nullptr: nothing is known
   std::span<const SettingSpec> settings;
   Capabilities capabilities;
   RtuIdentification identification{};                     ///< of modbus_rtu models
   std::optional<CanIdentification> can_identification{};  ///< of canopen models; nothing: it cannot be told
   std::unique_ptr<Drive> (*make)(DriveContext context) = nullptr;
+  /// Of a model that a file of the machine builder describes: the descriptor of one drive, made from this one
+  /// and its settings. It reads the file: not on the core thread. Then `make` needs it in DriveSetup. nullptr:
+  /// this descriptor is every drive's. Errors (invalid_argument): one finding per line.
+  Result<std::shared_ptr<const DriveDescriptor>> (*specialise)(
+      const DriveDescriptor& model, const std::map<std::string, SettingValue>& settings) = nullptr;
 };
 
 /// All models, generated from the folders. The pointers live as long as the program.
 std::span<const DriveDescriptor* const> drive_models();
 /// nullptr if there is none of that name.
 const DriveDescriptor* find_drive_model(std::string_view model);
+/// The axis's own descriptor, or that of its model; nullptr if there is none of that name.
+const DriveDescriptor* descriptor_of(const AxisSettings& axis);
+/// nullptr if nothing is known of this alarm.
+const AlarmSpec* find_alarm(const DriveDescriptor& drive, std::uint16_t code);
 /// nullptr if the model has no such function.
 const TerminalFunctionSpec* find_function(std::span<const TerminalFunctionSpec> functions,
                                           std::string_view name);

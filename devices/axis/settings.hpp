@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -14,6 +15,8 @@
 namespace axisd {
 
 using std::chrono::milliseconds;
+
+struct DriveDescriptor;
 
 /// Homing methods, in axis direction. Further ones may follow with further families.
 enum class HomingMethod : std::uint8_t { home_positive, home_negative, positive_limit, negative_limit };
@@ -110,6 +113,8 @@ struct AxisSettings {
   BrakeSettings brake{};
   std::optional<SegmentSettings> segments{};             ///< nothing: the drive's table is left alone
   std::map<std::string, SettingValue> model_settings{};  ///< by the descriptor's schema
+  /// Of a model that is described by a file (DriveDescriptor::specialise); nothing: the model's.
+  std::shared_ptr<const DriveDescriptor> own_descriptor{};
 };
 
 }  // namespace axisd
