@@ -226,6 +226,9 @@ Result<void> check_confirmed(std::string_view axis, std::string_view confirm) {
 
 Result<SegmentSettings> segments_to_write(const v1::SegmentTable& from, const KnownDrive& drive) {
   const auto& model = *drive.model;
+  if (model.capabilities.maximum_segments == 0)
+    return fail(Reason::not_supported, fmt::format("{} has no table of segments", model.model),
+                "give each motion as a command");
   RowCheck<v1::PositionSegment> check_position(model, "position");
   RowCheck<v1::VelocitySegment> check_velocity(model, "velocity");
   Times times(model);
