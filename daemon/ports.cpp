@@ -20,6 +20,9 @@ Result<std::unique_ptr<Ports>> Ports::open(core::CoreLoop& loop, const config::C
   auto lines = SimulatedLines::open(configuration);
   if (!lines) return fail(lines.error());
   ports->lines_ = std::move(*lines);
+  auto networks = SimulatedNetworks::open(loop.clock(), configuration);
+  if (!networks) return fail(networks.error());
+  ports->networks_ = std::move(*networks);
   return ports;
 }
 
@@ -32,8 +35,11 @@ std::unique_ptr<modbus_rtu::Line> Ports::make_line(const modbus_rtu::LineSetting
 
 std::unique_ptr<can::Port> Ports::make_port(const canopen::NetworkSettings& settings) {
   can::PortSettings port{.bus = settings.name, .interface = settings.interface, .bitrate = settings.bitrate};
-  std::unique_ptr<can::Port> made =
-      std::make_unique<can::SocketCanPort>(loop_->executor(), loop_->clock(), std::move(port));
+  std::unique_ptr<can::Port> made;
+  if (auto* network = networks_->find(settings.name); network != nullptr)
+    made = std::make_unique<can::NetworkPort>(loop_->clock(), std::move(port), *network);
+  else
+    made = std::make_unique<can::SocketCanPort>(loop_->executor(), loop_->clock(), std::move(port));
   if (!observer_.wanted()) return made;
   return std::make_unique<core::ObservedPort>(std::move(made), loop_->clock(), observer_);
 }

@@ -12,6 +12,7 @@
 #include "daemon/core/link_cycler.hpp"
 #include "daemon/core/observed_port.hpp"
 #include "daemon/simulated_lines.hpp"
+#include "daemon/simulated_networks.hpp"
 
 namespace axisd {
 
@@ -20,7 +21,7 @@ namespace axisd {
 /// or before that runs.
 class Ports {
  public:
-  /// `observer`: of CAN frames, may be empty. Errors: as of SimulatedLines.
+  /// `observer`: of CAN frames, may be empty. Errors: as of SimulatedLines and SimulatedNetworks.
   static Result<std::unique_ptr<Ports>> open(core::CoreLoop& loop, const config::Configuration& configuration,
                                              const std::string& link_helper,
                                              core::NetworkObserver observer = {});
@@ -39,6 +40,7 @@ class Ports {
   core::LinkClient link_helper_;
   core::NetworkObserver observer_;
   std::unique_ptr<SimulatedLines> lines_;
+  std::unique_ptr<SimulatedNetworks> networks_;
 };
 
 }  // namespace axisd
