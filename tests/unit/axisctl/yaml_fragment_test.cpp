@@ -25,10 +25,10 @@ v1::FoundNode found(std::uint32_t node, const std::string& model, std::uint32_t 
 const FragmentContext context{.bus = "line-a", .baud = 115200, .taken = {"feeder", "axis-4"}};
 
 /// A whole file with the fragment as its axes.
-config::LoadResult load(const std::string& fragment) {
-  return config::load_text(
-      "machine: press-1\nbuses:\n  line-a:\n    modbus_rtu: { port: sim, baud: 115200 }\naxes:\n" + fragment,
-      "scanned.yaml");
+config::LoadResult load(const std::string& fragment,
+                        const std::string& bus = "modbus_rtu: { port: sim, baud: 115200 }") {
+  return config::load_text("machine: press-1\nbuses:\n  line-a:\n    " + bus + "\naxes:\n" + fragment,
+                           "scanned.yaml");
 }
 
 TEST(YamlFragment, LoadsAsItIs) {
@@ -50,9 +50,12 @@ TEST(YamlFragment, LoadsAsItIs) {
 TEST(YamlFragment, LoadsForEveryModelAndMicrostep) {
   for (const auto* model : drive_models())
     for (const auto pulses : model->capabilities.pulses_per_revolution) {
+      const bool can = model->bus == BusKind::canopen;
+      auto there = context;
+      there.baud = can ? 1'000'000 : 115'200;
       const auto fragment = yaml_fragment(
-          {found(1, std::string(model->model), 115200, static_cast<std::uint32_t>(pulses))}, context);
-      const auto result = load(fragment);
+          {found(1, std::string(model->model), there.baud, static_cast<std::uint32_t>(pulses))}, there);
+      const auto result = can ? load(fragment, "canopen: { interface: sim }") : load(fragment);
       EXPECT_TRUE(result.configuration) << fragment << to_string(result.diagnostics.at(0));
     }
 }
