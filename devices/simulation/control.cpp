@@ -71,7 +71,8 @@ std::string peek(SimulatedNode& node, Words words) {
 std::string poke(SimulatedNode& node, Words words) {
   const auto address = words.size() == 2 ? parse_number<std::uint32_t>(words[0]) : std::nullopt;
   const auto value = words.size() == 2 ? parse_number<std::uint32_t>(words[1]) : std::nullopt;
-  if (!address || !value) return "error use: poke N ADDRESS VALUE";
+  const bool fits = value <= 0xFFFF || dynamic_cast<SimulatedRtuNode*>(&node) == nullptr;
+  if (!address || !value || !fits) return "error use: poke N ADDRESS VALUE";  // a register has 16 bits
   node.poke(*address, *value);
   return "ok";
 }

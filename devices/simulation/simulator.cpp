@@ -53,6 +53,13 @@ Result<void> check(const Simulator& simulator, const SimulatedNodeSettings& sett
     return fail(Reason::out_of_range,
                 fmt::format("{} has no register 0x{:04X}", simulator.model, settings.eeprom.rbegin()->first),
                 fmt::format("its last is 0x{:04X}", simulator.last_register));
+  for (const auto& [address, value] : settings.eeprom)
+    // A signed value of 16 bits came with the bits of 32.
+    if (simulator.make != nullptr && value > 0xFFFF && value < 0xFFFF8000)
+      return fail(
+          Reason::out_of_range,
+          fmt::format("{} does not fit into register 0x{:04X} of {}", value, address, simulator.model),
+          "use -32768 to 65535");
   for (const auto& [terminal, wire] : settings.wires)
     if (!contains(simulator.inputs, terminal))
       return fail(Reason::invalid_argument, fmt::format("{} has no input \"{}\"", simulator.model, terminal),

@@ -2,14 +2,13 @@
 // (manual 4.3, 6.1).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "buses/clock.hpp"
-#include "devices/simulation/mechanics.hpp"
+#include "devices/simulation/input_bank.hpp"
 #include "devices/simulation/simulated_node.hpp"
 #include "devices/yako_rtu/simulator_memory.hpp"
 
@@ -52,47 +51,36 @@ class Terminals {
             const simulation::SimulatedNodeSettings& settings);
 
   /// Over any switch; nothing gives the terminal back to its switch.
-  void drive(std::string_view terminal, std::optional<bool> high);
+  void drive(std::string_view terminal, std::optional<bool> high) { bank_.drive(terminal, high); }
 
   /// Takes the levels at `now` with the shaft at `shaft`; returns the edges of functions that filters let
   /// through.
   std::vector<InputEdge> sample(TimePoint now, std::int64_t shaft, const Memory& memory);
   /// Takes over levels as they are, without edges: at power-up, and after a change of functions or active
   /// levels.
-  void settle(std::int64_t shaft, const Memory& memory);
+  void settle(std::int64_t shaft, const Memory& memory) { bank_.settle(shaft, settings(memory)); }
   /// When a filter lets a level through; TimePoint::max() if all are stable.
-  [[nodiscard]] TimePoint next_event() const;
+  [[nodiscard]] TimePoint next_event() const { return bank_.next_event(); }
   /// Next position of the shaft in `direction` at which a switch changes.
   [[nodiscard]] std::optional<std::int64_t> next_switch(std::int64_t shaft, int direction) const {
-    return simulation::next_switch(mechanics_, shaft, direction);
+    return bank_.next_switch(shaft, direction);
   }
 
   [[nodiscard]] bool active(Input function) const {
-    return functions_.at(static_cast<std::size_t>(function));
+    return bank_.active(static_cast<std::uint8_t>(function));
   }
   /// Bits as in 0x0008.
-  [[nodiscard]] std::uint16_t bits() const;
+  [[nodiscard]] std::uint16_t bits() const { return bank_.bits(); }
   /// 1..16 as PIN0..PIN4 select, 0 for none.
   [[nodiscard]] int segment() const;
 
  private:
-  struct Terminal {
-    std::optional<bool> driven;
-    std::optional<simulation::Wire> wire;
-    bool active = false;  ///< after the filter
-
-    TimePoint due = TimePoint::max();  ///< when the other level gets through the filter
-  };
-  [[nodiscard]] bool raw(std::size_t index, std::int64_t shaft, const Memory& memory) const;
   [[nodiscard]] Duration filter(std::size_t index, const Memory& memory) const;
-  [[nodiscard]] std::array<bool, input_functions> evaluate(const Memory& memory) const;
+  [[nodiscard]] simulation::InputSettings settings(const Memory& memory) const;
 
   const SimulatedModel* model_;
   const Behaviour* behaviour_;
-  simulation::Mechanics mechanics_;
-  std::vector<Terminal> terminals_;  ///< in the order of the model's inputs
-  std::array<bool, 3> wired_{};      ///< by SwitchKind: has a terminal of its own
-  std::array<bool, input_functions> functions_{};
+  simulation::InputBank bank_;
 };
 
 }  // namespace axisd::yako_rtu

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "devices/simulation/simulator.hpp"
+
 namespace axisd::simulation {
 namespace {
 
@@ -33,12 +35,16 @@ TEST(DriveOption, ReadsEveryPart) {
 TEST(DriveOption, NamesThePartThatIsWrong) {
   for (const std::string wrong :
        {"node=0x1FF", "home=5", "home=6:5", "positive_limit=far", "switch.a=maybe", "eeprom.1=x",
-        "eeprom.1=70000", "wire.X0=somewhere", "boot_ms=-1", "dip=x", "dip=256", "dip_baud=0",
+        "eeprom.1=5000000000", "wire.X0=somewhere", "boot_ms=-1", "dip=x", "dip=256", "dip_baud=0",
         "dip_baud=fast", "powered=1", "color=red", "model="}) {
     const auto option = parse_drive("node=1,model=ykd2405pr," + wrong);
     ASSERT_FALSE(option) << wrong;
     EXPECT_NE(std::string::npos, option.error().message.find(wrong));
   }
+  const auto wide = parse_drive("node=1,model=ykd2405pr,eeprom.1=70000");
+  const auto node = make_node(wide->model, wide->settings);
+  ASSERT_FALSE(node) << "a register has 16 bits";
+  EXPECT_NE(std::string::npos, node.error().message.find("70000 does not fit into register 0x0001"));
   EXPECT_FALSE(parse_drive("node=1"));
   EXPECT_FALSE(parse_drive("model=ykd2405pr"));
 }

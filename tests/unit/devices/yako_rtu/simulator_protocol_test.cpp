@@ -131,7 +131,7 @@ TEST(SimulatorSwitches, AreDocumentedUniqueAndUnknownOnesRefused) {
       EXPECT_FALSE(one.meaning.empty()) << one.name;
       names.push_back(one.name);
     }
-    EXPECT_GT(names.size(), 30U) << simulator->model;
+    if (simulator->make != nullptr) EXPECT_GT(names.size(), 30U) << simulator->model;  // those of the family
     std::ranges::sort(names);
     EXPECT_EQ(names.end(), std::ranges::adjacent_find(names)) << simulator->model;
   }
