@@ -9,13 +9,14 @@
 #include <string>
 #include <vector>
 
+#include "buses/canopen/remote_node.hpp"
 #include "buses/error.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/axis/snapshot.hpp"
 
 namespace axisd {
 
-/// One exchange through the bus's queue, class `parameters` (M28).
+/// One exchange on an RS-485 line, through its queue, class `parameters` (M28).
 struct TransactRequest {
   std::string bus;
   std::uint8_t node = 0;
@@ -24,28 +25,38 @@ struct TransactRequest {
   std::vector<std::uint16_t> values{};  ///< not empty: written, with FC06 if it is one
 };
 
+/// One SDO transfer on a CAN network, through the queue of its node, class `parameters` (M28).
+struct ObjectRequest {
+  std::string bus;
+  std::uint8_t node = 0;
+  std::uint32_t object = 0;           ///< index << 8 | sub-index
+  std::vector<std::uint8_t> bytes{};  ///< not empty: written, low byte first
+};
+
 struct ScanRequest {
   std::string bus;
   std::uint8_t first_node = 1, last_node = 127;
-  std::vector<int> bauds{};                   ///< empty: the bus's own
-  std::vector<modbus_rtu::Format> formats{};  ///< empty: the bus's own
-  Duration reply_timeout{};                   ///< 0: the bus's turnaround_max
+  std::vector<int> bauds{};                   ///< empty: the bus's own, and the only one of a CAN network
+  std::vector<modbus_rtu::Format> formats{};  ///< likewise
+  Duration reply_timeout{};                   ///< 0: the bus's turnaround_max or sdo_timeout
 };
 
 struct FoundNode {
   std::uint8_t node = 0;
-  int baud = 0;
-  modbus_rtu::Format format{};
-  std::string model;  ///< empty: answers, but is no drive that is known here
+  bool on_network = false;      ///< of a CAN network
+  int baud = 0;                 ///< or bit rate
+  modbus_rtu::Format format{};  ///< on RS-485
+  std::string model;            ///< empty: answers, but is no drive that is known here
   std::uint16_t model_code = 0;
   std::string version;
   std::int32_t pulses_per_revolution = 0;  ///< as the drive is set; 0: unknown
   std::string configured_as;  ///< axis or device that has this address in the configuration; empty: none
   std::string note;           ///< "garbled replies: two nodes on one address?"
+  std::optional<canopen::Identity> identity{};  ///< on CAN, if it told
 };
 
 struct ScanProgress {
-  int probed = 0, total = 0;       ///< probes: node x baud x format
+  int probed = 0, total = 0;       ///< probes: node x baud x format; on CAN: nodes
   std::vector<FoundNode> found{};  ///< since the last report
   bool finished = false;
 };
@@ -76,6 +87,12 @@ class BusAccess {
   /// node that an axis owns), refused, no_reply (a write: outcome unknown), bus_down.
   virtual void transact(TransactRequest request,
                         std::function<void(Result<std::vector<std::uint16_t>>)> callback) = 0;
+
+  /// Calls back once, with the bytes read, as the node sent them. Errors: invalid_argument (unknown bus, no
+  /// node-ID, a write to a node that an axis owns), those of an SDO abort, no_reply (a write: outcome
+  /// unknown), bus_down.
+  virtual void transact_object(ObjectRequest request,
+                               std::function<void(Result<std::vector<std::uint8_t>>)> callback) = 0;
 
   /// Looks for nodes in class `scan`. Calls back with progress, last with `finished` or an error. Other
   /// serial settings than the bus's own are tried only while every axis of the bus is released or offline

@@ -9,10 +9,12 @@
 #include <string_view>
 #include <vector>
 
+#include "buses/canopen/master.hpp"
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "devices/axis/command.hpp"
 #include "devices/axis/snapshot.hpp"
 #include "devices/bus_access.hpp"
+#include "devices/bus_kind.hpp"
 #include "devices/drive_access.hpp"
 #include "devices/event.hpp"
 
@@ -21,13 +23,29 @@ namespace axisd {
 /// How far a caller wants to follow a command before it gets its answer.
 enum class WaitUntil : std::uint8_t { accepted, started, done };
 
+/// What is known of a CAN network beside whether it is open. Counters since start.
+struct NetworkStatus {
+  can::LinkState link = can::LinkState::removed;
+  can::PortCounters frames{};
+  canopen::SdoCounters sdo{};
+  Duration sync_period{};  ///< 0: none is sent
+  bool sync_running = false;
+  canopen::SyncCounters sync{};
+  std::uint64_t emergencies = 0;
+  canopen::MasterCounters others{};
+  std::vector<std::uint8_t> foreign_nodes{};  ///< heard, but not configured
+};
+
 struct BusStatus {
-  std::string name, port;
-  int baud = 0;
+  std::string name;
+  BusKind kind = BusKind::modbus_rtu;
+  std::string port;  ///< serial device or network interface
+  int baud = 0;      ///< or bit rate
   bool open = false;
   bool simulated = false;
-  std::optional<Error> error;
-  modbus_rtu::BusCounters counters;
+  std::optional<Error> error{};
+  modbus_rtu::BusCounters counters{};      ///< of an RS-485 line
+  std::optional<NetworkStatus> network{};  ///< of a CAN network
 };
 
 struct MachineInfo {

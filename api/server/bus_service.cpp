@@ -20,6 +20,7 @@ namespace axisd::server {
 
 using Call = std::shared_ptr<PendingCall>;
 using Words = std::vector<std::uint16_t>;
+using Bytes = std::vector<std::uint8_t>;
 
 BusServiceImpl::Reactor* BusServiceImpl::ListBuses(Context* context, const v1::ListBusesRequest*,
                                                    v1::ListBusesResponse* response) {
@@ -59,8 +60,30 @@ BusServiceImpl::Reactor* BusServiceImpl::WriteDevice(Context* context, const v1:
   });
 }
 
+BusServiceImpl::Reactor* BusServiceImpl::transact_object(Context* context, const v1::TransactRequest* request,
+                                                         v1::TransactResponse* response) {
+  auto transfer = to_object_request(*request);
+  if (!transfer) return answer(context, to_status(transfer.error()));
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
+    std::string what;
+    if (!transfer->bytes.empty())
+      what = fmt::format("{}: writes {} bytes to object {:06X}h of {} node {}", client,
+                         transfer->bytes.size(), transfer->object, transfer->bus, transfer->node);
+    auto reply = [response, reads = request->has_read_object(),
+                  type = request->read_object().type()](const Bytes& bytes) {
+      if (reads) to_proto(bytes, type, *response);
+    };
+    services_.machine.bus_access().transact_object(
+        *std::move(transfer), reply_with_value<Bytes>(call, std::move(reply), std::move(what)));
+  });
+}
+
 BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::TransactRequest* request,
                                                   v1::TransactResponse* response) {
+  if (names_object(*request)) return transact_object(context, request, response);
   auto transaction = to_transact(*request);
   if (!transaction) return answer(context, to_status(transaction.error()));
   const auto client = client_of(*context);

@@ -23,6 +23,9 @@ class BusServiceImpl final : public v1::BusService::CallbackService {
   grpc::ServerWriteReactor<v1::ScanResponse>* Scan(Context* context, const v1::ScanRequest* request) override;
 
  private:
+  Reactor* transact_object(Context* context, const v1::TransactRequest* request,
+                           v1::TransactResponse* response);
+
   const Services services_;
 };
 

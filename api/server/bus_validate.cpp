@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/server/convert.hpp"
+#include "api/server/parameter_type.hpp"
 #include "api/server/serial_format.hpp"
 #include "devices/nearest.hpp"
 
@@ -19,6 +20,8 @@ using namespace std::chrono_literals;
 // Modbus over serial line 2.2 (addresses), application protocol 6.3 and 6.12 (counts).
 constexpr std::uint32_t last_unit = 247;
 constexpr std::uint32_t last_register = 65535;
+constexpr std::uint32_t last_object = 0xFFFFFF;  // index << 8 | sub-index
+constexpr std::size_t longest_object = 256;      // bytes written at once
 constexpr std::uint32_t most_read = 125, most_written = 123;
 constexpr std::uint32_t lowest_baud = 300, highest_baud = 4'000'000;
 constexpr int most_bauds = 16;
@@ -62,6 +65,20 @@ Result<void> check_span(std::uint32_t address, std::uint32_t count, std::uint32_
   return {};
 }
 
+/// The bytes of a number, in the size of its type.
+Result<std::vector<std::uint8_t>> bytes_of(const v1::ObjectNumber& number) {
+  const auto type = from_proto(number.type());
+  if (!type)
+    return fail(Reason::invalid_argument, "type is missing",
+                "give the object's own type: it decides how many bytes are written");
+  const auto bits = static_cast<int>(8 * size_of(*type));
+  const auto lowest = is_signed(*type) ? -(std::int64_t{1} << (bits - 1)) : 0;
+  const auto highest = (std::int64_t{1} << (is_signed(*type) ? bits - 1 : bits)) - 1;
+  if (number.value() < lowest || number.value() > highest)
+    return outside(fmt::format("value {} is out of range", number.value()), double(lowest), double(highest));
+  return canopen::number_bytes(static_cast<std::uint64_t>(number.value()), size_of(*type));
+}
+
 Result<void> read_serial(const v1::ScanRequest& from, ScanRequest& to) {
   if (from.bauds_size() > most_bauds || has_repetition(from.bauds()) || has_repetition(from.formats()))
     return fail(Reason::invalid_argument, "bauds or formats name one twice, or too many",
@@ -98,6 +115,33 @@ Result<TransactRequest> to_transact(const v1::TransactRequest& from) {
       return outside(fmt::format("value {} is out of range", value), 0, last_register);
     to.values.push_back(static_cast<std::uint16_t>(value));
   }
+  return to;
+}
+
+bool names_object(const v1::TransactRequest& from) {
+  return from.has_read_object() || from.has_write_object();
+}
+
+Result<ObjectRequest> to_object_request(const v1::TransactRequest& from) {
+  if (auto named = check_bus_named(from.bus()); !named) return fail(std::move(named).error());
+  if (!canopen::valid_node(from.node()))
+    return outside(fmt::format("node {} is out of range", from.node()), 1, canopen::highest_node);
+  if (from.address() > last_object)
+    return outside(fmt::format("address {} is out of range", from.address()), 0, last_object);
+  ObjectRequest to{
+      .bus = from.bus(), .node = static_cast<std::uint8_t>(from.node()), .object = from.address()};
+  if (from.has_read_object()) return to;
+  const auto& content = from.write_object();
+  if (content.has_number()) {
+    auto bytes = bytes_of(content.number());
+    if (!bytes) return fail(std::move(bytes).error());
+    to.bytes = *std::move(bytes);
+    return to;
+  }
+  const auto& data = content.data();
+  if (data.empty() || data.size() > longest_object)
+    return outside(fmt::format("{} bytes in one transfer", data.size()), 1, double(longest_object));
+  to.bytes.assign(data.begin(), data.end());
   return to;
 }
 
@@ -141,7 +185,7 @@ Result<void> check_device_write(const v1::WriteDeviceRequest& from, const BusAcc
   const auto value = std::ranges::find(values, from.register_(), &DeviceValue::name);
   if (value == values.end()) {
     for (const auto& known : values) names.push_back(known.name);
-    return unknown(fmt::format("{} has no register {:?}", from.device(), from.register_().substr(0, 64)),
+    return unknown(fmt::format("{} has no value {:?}", from.device(), from.register_().substr(0, 64)),
                    from.register_(), names);
   }
   if (!value->writable)

@@ -139,24 +139,8 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   to.set_drive_reboots(static_cast<std::uint32_t>(from.reboots));
   to.set_drift(from.drift);
   to.set_eeprom_writes(from.eeprom_writes);
+  to.set_link_note(from.link_note);
   to.set_revision(from.revision);
-}
-
-void to_proto(const BusStatus& from, v1::Bus& to) {
-  to.set_name(from.name);
-  to.set_port(from.port);
-  to.set_baud(static_cast<std::uint32_t>(from.baud));
-  to.set_open(from.open);
-  if (from.error) to_proto(*from.error, *to.mutable_error());
-  to.set_simulated(from.simulated);
-  to.set_transactions(from.counters.transactions);
-  to.set_timeouts(from.counters.timeouts);
-  to.set_corrupt_replies(from.counters.corrupt);
-  to.set_exceptions(from.counters.exceptions);
-  to.set_foreign_frames(from.counters.foreign_frames);
-  to.set_dropped_expired(from.counters.dropped_expired);
-  to.set_dropped_superseded(from.counters.dropped_superseded);
-  to.set_io_errors(from.counters.io_errors);
 }
 
 std::optional<Duration> from_proto(const google::protobuf::Duration& from) {

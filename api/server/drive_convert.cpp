@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "api/server/convert.hpp"
+#include "api/server/parameter_type.hpp"
 
 namespace axisd::server {
 namespace {
@@ -47,23 +48,6 @@ void to_proto(const Capabilities& from, v1::GetDriveResponse& to) {
 
 v1::ParameterAccess to_proto(Access access) {
   return static_cast<v1::ParameterAccess>(std::to_underlying(access) + 1);
-}
-v1::ParameterType to_proto(ParameterType type) {
-  switch (type) {  // the contract grew: its numbers are not in order of size
-    case ParameterType::u8:
-      return v1::PARAMETER_TYPE_UINT8;
-    case ParameterType::i8:
-      return v1::PARAMETER_TYPE_INT8;
-    case ParameterType::u16:
-      return v1::PARAMETER_TYPE_UINT16;
-    case ParameterType::i16:
-      return v1::PARAMETER_TYPE_INT16;
-    case ParameterType::u32:
-      return v1::PARAMETER_TYPE_UINT32;
-    case ParameterType::i32:
-      return v1::PARAMETER_TYPE_INT32;
-  }
-  return v1::PARAMETER_TYPE_UNSPECIFIED;
 }
 v1::AlarmReset to_proto(AlarmReset reset) {
   return static_cast<v1::AlarmReset>(std::to_underlying(reset) + 1);

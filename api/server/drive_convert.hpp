@@ -10,7 +10,6 @@
 namespace axisd::server {
 
 [[nodiscard]] v1::ParameterAccess to_proto(Access access);
-[[nodiscard]] v1::ParameterType to_proto(ParameterType type);
 [[nodiscard]] v1::AlarmReset to_proto(AlarmReset reset);
 [[nodiscard]] v1::SerialPhase to_proto(SerialProgress::Phase phase);
 

@@ -273,6 +273,8 @@ Result<SerialChange> serial_change(const v1::SetSerialRequest& from, const Known
   if (auto confirmed = check_confirmed(from.axis(), from.confirm()); !confirmed)
     return fail(std::move(confirmed).error());
   SerialChange change;
+  if (model.bus == BusKind::canopen && !from.format().empty())
+    return fail(Reason::not_supported, "a drive on a CAN network has no serial format", "leave format out");
   if (!from.has_baud() && from.format().empty())
     return fail(Reason::invalid_argument, "neither baud nor format is given", "give what is to be changed");
   if (from.has_baud()) {

@@ -65,6 +65,7 @@ class Master {
 
   [[nodiscard]] RemoteNode node(std::uint8_t id) { return {sdo_, id}; }
   [[nodiscard]] SdoClient& sdo() { return sdo_; }
+  [[nodiscard]] const SdoClient& sdo() const { return sdo_; }
   /// Stops by itself when the link is lost, and stays so (M24).
   [[nodiscard]] SyncProducer& sync() { return sync_; }
   [[nodiscard]] const SyncProducer& sync() const { return sync_; }

@@ -126,7 +126,7 @@ Task<Result<std::optional<FoundNode>>> BusScan::look(Probe probe) {
   FoundNode found{.node = probe.node,
                   .baud = probe.serial.baud,
                   .format = probe.serial.format,
-                  .configured_as = configured_as(probe.node)};
+                  .configured_as = configured_as(*machine_, bus_->settings().name, probe.node)};
   if (heard->garbled)
     found.note = "garbled replies: two nodes on one address? Else check wiring and termination";
   if (!heard->registers.empty()) {
@@ -191,14 +191,14 @@ Task<Result<void>> BusScan::identify(Probe probe, FoundNode& found) {
   co_return Result<void>{};
 }
 
-std::string BusScan::configured_as(std::uint8_t node) const {
+std::string configured_as(const MachineCore& machine, const std::string& bus, std::uint8_t node) {
   const auto is_it = [&](const auto& one) {
-    return one->settings().bus == bus_->settings().name && one->settings().node == node;
+    return one->settings().bus == bus && one->settings().node == node;
   };
-  if (const auto axis = std::ranges::find_if(machine_->axes(), is_it); axis != machine_->axes().end())
+  if (const auto axis = std::ranges::find_if(machine.axes(), is_it); axis != machine.axes().end())
     return (*axis)->settings().name;
-  const auto device = std::ranges::find_if(machine_->devices(), is_it);
-  return device == machine_->devices().end() ? std::string() : (*device)->settings().name;
+  const auto device = std::ranges::find_if(machine.devices(), is_it);
+  return device == machine.devices().end() ? std::string() : (*device)->settings().name;
 }
 
 }  // namespace axisd::core

@@ -13,10 +13,22 @@
 
 namespace axisd::core {
 
-/// Looks for nodes: one read of 0x0000..0x0001 per node, baud and format, in class `scan`, and a few reads
-/// more of what answers. Never writes. Takes at most probes x (reply timeout + margin of the bus + wire
-/// time), and what other transactions take meanwhile. Thread: core.
-class BusScan {
+/// A search for the nodes of one bus. Thread: core.
+class NodeScan {
+ public:
+  virtual ~NodeScan() = default;
+  /// Asks until there is something to report: found nodes, some that are silent, or the end. Errors end it.
+  virtual Task<Result<ScanProgress>> next() = 0;
+};
+
+/// Axis or device with this address; empty: none.
+[[nodiscard]] std::string configured_as(const MachineCore& machine, const std::string& bus,
+                                        std::uint8_t node);
+
+/// Looks for nodes of an RS-485 line: one read of 0x0000..0x0001 per node, baud and format, in class `scan`,
+/// and a few reads more of what answers. Never writes. Takes at most probes x (reply timeout + margin of the
+/// bus + wire time), and what other transactions take meanwhile. Thread: core.
+class BusScan final : public NodeScan {
  public:
   /// `machine` and `bus` outlive it. Nothing more is sent once `wanted` has expired.
   BusScan(const MachineCore& machine, modbus_rtu::RtuBus& bus, ScanRequest request,
@@ -25,7 +37,7 @@ class BusScan {
   /// Probes until there is something to report: found nodes, 16 probes without, or the end. Errors end the
   /// scan: invalid_argument (the request), moving or fault (an axis of the bus came to life: other settings
   /// would disturb it), bus_down, not_supported (the port cannot do the settings).
-  Task<Result<ScanProgress>> next();
+  Task<Result<ScanProgress>> next() override;
 
  private:
   struct Probe {
@@ -44,7 +56,6 @@ class BusScan {
   Task<Result<std::optional<FoundNode>>> look(Probe probe);
   Task<Result<Heard>> ask(Probe probe, std::uint16_t address, std::uint16_t count);
   Task<Result<void>> identify(Probe probe, FoundNode& found);
-  [[nodiscard]] std::string configured_as(std::uint8_t node) const;
 
   const MachineCore* machine_;
   modbus_rtu::RtuBus* bus_;

@@ -8,6 +8,7 @@
 
 #include "buses/clock.hpp"
 #include "buses/task.hpp"
+#include "daemon/core/bus_access_scan.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/bus_access.hpp"
 
@@ -17,11 +18,13 @@ namespace axisd::core {
 /// machine ends them. Thread: any, from construction (before the core runs) to destruction (after it ended).
 class BusAccessService final : public BusAccess {
  public:
-  /// `machine` outlives it.
-  BusAccessService(Executor executor, MachineCore& machine);
+  /// `machine` and `clock` outlive it.
+  BusAccessService(Executor executor, Clock& clock, MachineCore& machine);
 
   void transact(TransactRequest request,
                 std::function<void(Result<std::vector<std::uint16_t>>)> callback) override;
+  void transact_object(ObjectRequest request,
+                       std::function<void(Result<std::vector<std::uint8_t>>)> callback) override;
   std::shared_ptr<void> scan(ScanRequest request,
                              std::function<void(Result<ScanProgress>)> callback) override;
   [[nodiscard]] std::vector<DeviceSnapshotPtr> devices() const override;
@@ -31,10 +34,14 @@ class BusAccessService final : public BusAccess {
  private:
   using ScanCallback = std::function<void(Result<ScanProgress>)>;
   Task<Result<std::vector<std::uint16_t>>> run_transact(TransactRequest request);
+  Task<Result<std::vector<std::uint8_t>>> run_transact(ObjectRequest request);
   Task<> run_scan(ScanRequest request, std::weak_ptr<void> alive, ScanCallback callback);
-  [[nodiscard]] Result<modbus_rtu::RtuBus*> bus_named(const std::string& name) const;
+  [[nodiscard]] Result<std::unique_ptr<NodeScan>> scan_of(ScanRequest request,
+                                                          std::weak_ptr<void> alive) const;
+  [[nodiscard]] Error no_such_bus(const std::string& name) const;
 
   Executor executor_;
+  Clock* clock_;
   MachineCore* machine_;
   std::set<std::string> scanning_;  ///< buses with a scan under way. Thread: core
 };

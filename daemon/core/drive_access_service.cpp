@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "buses/signal.hpp"
-#include "daemon/core/bus_access_scan.hpp"
+#include "daemon/core/bus_access_network_scan.hpp"
 
 namespace axisd::core {
 
@@ -54,6 +54,7 @@ void DriveAccessService::run_at_rest(std::string axis,
 }
 
 Result<void> DriveAccessService::check_bus_rests(const Axis& axis) const {
+  if (machine_->find_network(axis.settings().bus) != nullptr) return {};  // each node has a queue of its own
   for (const auto& other : machine_->axes())
     if (other->settings().bus == axis.settings().bus && !other->at_rest())
       return fail(
@@ -148,6 +149,7 @@ Task<> DriveAccessService::run_serial_change(Axis& axis, SerialChange change, st
   const auto tell = [&](Result<SerialProgress> progress) {
     if (const auto held = alive.lock()) callback(std::move(progress));
   };
+  if (const auto possible = check_serial(axis, change); !possible) co_return tell(fail(possible.error()));
   const auto written = co_await DriveOperations(axis).change_serial(change, others_on_bus(axis));
   if (!written) co_return tell(fail(written.error()));
   tell(SerialProgress{.phase = SerialProgress::Phase::written, .text = *written});
@@ -159,17 +161,46 @@ Task<> DriveAccessService::run_serial_change(Axis& axis, SerialChange change, st
                       .text = "the drive answers there; change the configuration accordingly"});
 }
 
-Task<Result<void>> DriveAccessService::find_again(Axis& axis, SerialChange change,
-                                                  std::weak_ptr<void> alive) {
-  auto& bus = *machine_->find_line(axis.settings().bus);
+/// What a CAN network cannot do, before anything is written.
+Result<void> DriveAccessService::check_serial(const Axis& axis, const SerialChange& change) const {
+  const auto* network = machine_->find_network(axis.settings().bus);
+  if (network == nullptr) return {};
+  const Address where{.bus = axis.settings().bus, .node = axis.settings().node};
+  if (change.format)
+    return fail({.reason = Reason::not_supported,
+                 .message = "a drive on a CAN network has no serial format",
+                 .remedy = "leave the format out",
+                 .where = where});
+  const bool other_rate = change.baud && *change.baud != static_cast<int>(network->settings().bitrate);
+  if (other_rate && change.verify > Duration{})
+    return fail(
+        {.reason = Reason::not_supported,
+         .message = fmt::format("the drive cannot be looked for at {} bit/s: {} runs at {}, and axisd "
+                                "does not change that",
+                                *change.baud, network->name(), network->settings().bitrate),
+         .remedy = "leave verify out; then change the interface, all its nodes and the configuration",
+         .where = where});
+  return {};
+}
+
+std::unique_ptr<NodeScan> DriveAccessService::look_for(const Axis& axis, const SerialChange& change,
+                                                       const std::weak_ptr<void>& alive) const {
+  const auto& bus = axis.settings().bus;
   const auto node = change.node.value_or(axis.settings().node);
-  ScanRequest request{.bus = axis.settings().bus, .first_node = node, .last_node = node};
+  ScanRequest request{.bus = bus, .first_node = node, .last_node = node};
   if (change.baud) request.bauds = {*change.baud};
   if (change.format) request.formats = {*change.format};
+  if (auto* network = machine_->find_network(bus))
+    return std::make_unique<NetworkScan>(executor_, *clock_, *machine_, *network, std::move(request), alive);
+  return std::make_unique<BusScan>(*machine_, *machine_->find_line(bus), std::move(request), alive);
+}
+
+Task<Result<void>> DriveAccessService::find_again(Axis& axis, SerialChange change,
+                                                  std::weak_ptr<void> alive) {
   const auto deadline = clock_->now() + change.verify;
   while (!alive.expired() && clock_->now() < deadline) {
-    BusScan scan(*machine_, bus, request, alive);
-    const auto progress = co_await scan.next();
+    const auto scan = look_for(axis, change, alive);
+    const auto progress = co_await scan->next();
     if (!progress) co_return fail(progress.error());
     if (!progress->found.empty() && !progress->found.front().model.empty()) {
       if (progress->found.front().model == axis.descriptor().model) co_return Result<void>{};
@@ -178,12 +209,11 @@ Task<Result<void>> DriveAccessService::find_again(Axis& axis, SerialChange chang
     }
     co_await sleep_until(executor_, *clock_, clock_->now() + look_again);
   }
-  co_return fail({.reason = Reason::no_reply,
-                  .message = "the drive does not answer with its new address or serial settings",
-                  .remedy =
-                      "check its switches, and that it was switched off and on; look for it with axisctl "
-                      "bus scan",
-                  .where = {.bus = request.bus, .node = node}});
+  co_return fail(
+      {.reason = Reason::no_reply,
+       .message = "the drive does not answer with its new address or settings",
+       .remedy = "check its switches, and that it was switched off and on; look for it with axisctl bus scan",
+       .where = {.bus = axis.settings().bus, .node = change.node.value_or(axis.settings().node)}});
 }
 
 std::vector<std::uint8_t> DriveAccessService::others_on_bus(const Axis& axis) const {

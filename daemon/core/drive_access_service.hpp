@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "buses/task.hpp"
+#include "daemon/core/bus_access_scan.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/axis/drive_operations.hpp"
 #include "devices/drive_access.hpp"
@@ -48,7 +49,11 @@ class DriveAccessService final : public DriveAccess {
            std::function<void(Result<T>)> callback, const char* name);
   Task<> run_serial_change(Axis& axis, SerialChange change, std::weak_ptr<void> alive,
                            SerialCallback callback);
-  /// Looks for the drive where it will be after its power cycle.
+  [[nodiscard]] Result<void> check_serial(const Axis& axis, const SerialChange& change) const;
+  /// A search for the drive where it will be after its power cycle.
+  [[nodiscard]] std::unique_ptr<NodeScan> look_for(const Axis& axis, const SerialChange& change,
+                                                   const std::weak_ptr<void>& alive) const;
+  /// Searches until it is there.
   Task<Result<void>> find_again(Axis& axis, SerialChange change, std::weak_ptr<void> alive);
   /// A drive that saves may be silent for seconds, and its line with it.
   [[nodiscard]] Result<void> check_bus_rests(const Axis& axis) const;

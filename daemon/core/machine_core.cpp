@@ -13,6 +13,25 @@
 
 namespace axisd::core {
 
+namespace {
+
+NetworkStatus network_status(const canopen::CanopenBus& bus) {
+  const auto& master = bus.master();
+  NetworkStatus status{.link = bus.link().link,
+                       .frames = master.port().counters(),
+                       .sdo = master.sdo().counters(),
+                       .sync_period = bus.settings().sync_period,
+                       .sync_running = bus.sync_running(),
+                       .sync = master.sync().counters(),
+                       .others = master.counters(),
+                       .foreign_nodes = {master.foreign_nodes().begin(), master.foreign_nodes().end()}};
+  for (std::uint8_t node = 1; node <= canopen::highest_node; ++node)
+    status.emergencies += master.emergencies().total(node);
+  return status;
+}
+
+}  // namespace
+
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
     : parts_(std::move(parts)), book_(*parts_.clock, parts_.instance_id) {
   if (parts_.persistence != nullptr) {
@@ -205,6 +224,15 @@ std::vector<BusStatus> MachineCore::bus_status() const {
                    .simulated = bus->settings().simulated(),
                    .error = bus->port().error,
                    .counters = bus->counters()});
+  for (const auto& bus : networks_)
+    all.push_back({.name = bus->settings().name,
+                   .kind = BusKind::canopen,
+                   .port = bus->settings().interface,
+                   .baud = static_cast<int>(bus->settings().bitrate),
+                   .open = bus->port().open,
+                   .simulated = bus->settings().simulated(),
+                   .error = bus->port().error,
+                   .network = network_status(*bus)});
   return all;
 }
 

@@ -30,7 +30,7 @@ MachineService::MachineService(CoreLoop& loop, MachineCore& machine, std::string
     : loop_(&loop),
       machine_(&machine),
       drive_access_(loop.executor(), loop.clock(), machine),
-      bus_access_(loop.executor(), machine),
+      bus_access_(loop.executor(), loop.clock(), machine),
       name_(std::move(name)),
       instance_id_(std::move(instance_id)) {
   for (const auto& axis : machine.axes()) {

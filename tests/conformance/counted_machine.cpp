@@ -80,6 +80,11 @@ class CountedBuses final : public BusAccess {
                 std::function<void(Result<std::vector<std::uint16_t>>)> callback) override {
     ledger_->enter([=, this](auto ticket) { inner_->transact(request, ledger_->answer(ticket, callback)); });
   }
+  void transact_object(ObjectRequest request,
+                       std::function<void(Result<std::vector<std::uint8_t>>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->transact_object(request, ledger_->answer(ticket, callback)); });
+  }
   /// Counts until it is finished, or nobody listens any more.
   Token scan(ScanRequest request, std::function<void(Result<ScanProgress>)> callback) override {
     return deferred(*ledger_, [=, this](CallLedger::TicketPtr ticket) {

@@ -60,6 +60,46 @@ TEST(BusValidate, WritesNeedValuesThatFitARegister) {
   EXPECT_EQ(to_transact(request).error().permitted->maximum, 123);
 }
 
+TEST(BusValidate, ObjectsAreWrittenInTheSizeOfTheirType) {
+  v1::TransactRequest request;
+  request.set_bus("can0");
+  request.set_node(127);
+  request.set_address(0xFFFFFF);
+  EXPECT_FALSE(names_object(request));
+  request.mutable_read_object();
+  ASSERT_TRUE(names_object(request));
+  EXPECT_EQ(to_object_request(request)->object, 0xFFFFFFU);
+  EXPECT_TRUE(to_object_request(request)->bytes.empty());
+  request.set_address(0x1000000);
+  EXPECT_EQ(to_object_request(request).error().reason, Reason::out_of_range);
+  request.set_address(0x607A00);
+  for (const auto node : {0U, 128U, 256U + 5U}) {
+    request.set_node(node);
+    EXPECT_EQ(to_object_request(request).error().permitted->maximum, 127) << node;
+  }
+  request.set_node(5);
+  auto& content = *request.mutable_write_object();
+  EXPECT_EQ(to_object_request(request).error().reason, Reason::out_of_range) << "nothing to write";
+  auto& number = *content.mutable_number();
+  number.set_value(-1000);
+  EXPECT_THAT(to_object_request(request).error().message, HasSubstr("type is missing"));
+  number.set_type(v1::PARAMETER_TYPE_INT32);
+  EXPECT_THAT(to_object_request(request)->bytes, ElementsAre(0x18, 0xFC, 0xFF, 0xFF));
+  number.set_type(v1::PARAMETER_TYPE_INT8);
+  EXPECT_EQ(to_object_request(request).error().permitted->minimum, -128);
+  number.set_type(v1::PARAMETER_TYPE_UINT16);
+  EXPECT_EQ(to_object_request(request).error().permitted->maximum, 65535);
+  number.set_type(v1::PARAMETER_TYPE_UINT32);
+  number.set_value(0xFFFFFFFF);
+  EXPECT_THAT(to_object_request(request)->bytes, ElementsAre(0xFF, 0xFF, 0xFF, 0xFF));
+  content.set_data("abcde");
+  EXPECT_EQ(to_object_request(request)->bytes.size(), 5U);
+  content.set_data(std::string(257, 'x'));
+  EXPECT_EQ(to_object_request(request).error().permitted->maximum, 256);
+  request.clear_bus();
+  EXPECT_THAT(to_object_request(request).error().message, HasSubstr("bus"));
+}
+
 TEST(BusValidate, ScansHaveDefaultsAndBounds) {
   v1::ScanRequest request;
   EXPECT_THAT(to_scan(request).error().message, HasSubstr("bus"));

@@ -214,8 +214,21 @@ TEST_F(Calls, SystemAndBuses) {
   EXPECT_THAT(machine_.log(), ElementsAre("stop_all local:unix done", "release_inhibit local:unix"));
   v1::ListBusesResponse buses;
   EXPECT_TRUE(v1::BusService::NewStub(channel_)->ListBuses(&c4, {}, &buses).ok());
-  ASSERT_EQ(buses.buses_size(), 1);
+  ASSERT_EQ(buses.buses_size(), 2);
   EXPECT_EQ(buses.buses(0).timeouts(), 7U);
+  EXPECT_EQ(buses.buses(0).kind(), v1::BUS_KIND_MODBUS_RTU);
+  EXPECT_FALSE(buses.buses(0).has_network());
+  EXPECT_EQ(buses.buses(1).kind(), v1::BUS_KIND_CANOPEN);
+  EXPECT_EQ(buses.buses(1).port(), "can0");
+  EXPECT_EQ(buses.buses(1).baud(), 500'000U);
+  EXPECT_EQ(buses.buses(1).error().reason(), v1::REASON_BUS_DOWN);
+  EXPECT_EQ(buses.buses(1).network().ShortDebugString(),
+            "link: NETWORK_LINK_BUS_OFF frames_received: 11 frames_sent: 12 frames_not_sent: 13 "
+            "frames_unknown: 14 error_frames: 15 receive_overflows: 16 no_buffer: 17 bus_offs: 18 stalls: 19 "
+            "sdo_transfers: 21 sdo_aborts: 22 sdo_timeouts: 23 sdo_protocol_errors: 24 "
+            "sync_period { nanos: 10000000 } sync_running: true sync_sent: 31 sync_missed: 32 "
+            "sync_latest { nanos: 2000000 } emergencies: 3 foreign_nodes: 22 foreign_nodes: 23 "
+            "foreign_frames: 42 unknown_frames: 41 malformed_frames: 43");
 }
 
 TEST_F(Calls, CommandsAsResources) {

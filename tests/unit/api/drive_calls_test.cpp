@@ -189,5 +189,34 @@ TEST_F(DriveCalls, DevicesAndSingleExchanges) {
                           "transact line-a 9 0x0 count 1 writes 5"));
 }
 
+TEST_F(DriveCalls, SingleTransfersOfObjects) {
+  v1::TransactRequest transact;
+  transact.set_bus("can0");
+  transact.set_node(9);
+  transact.set_address(0x604100);
+  transact.mutable_read_object();
+  v1::TransactResponse read;
+  ASSERT_TRUE(call(*buses_, &Buses::Transact, transact, read).ok());
+  EXPECT_EQ(read.data(), "\xFE\xFF");
+  EXPECT_EQ(read.value(), 0xFFFE);
+  transact.mutable_read_object()->set_type(v1::PARAMETER_TYPE_INT16);
+  ASSERT_TRUE(call(*buses_, &Buses::Transact, transact, read).ok());
+  EXPECT_EQ(read.value(), -2);
+  transact.mutable_read_object()->set_type(v1::PARAMETER_TYPE_UINT32);
+  ASSERT_TRUE(call(*buses_, &Buses::Transact, transact, read).ok());
+  EXPECT_FALSE(read.has_value()) << "it has two bytes";
+  transact.mutable_write_object()->mutable_number()->set_value(-2);
+  transact.mutable_write_object()->mutable_number()->set_type(v1::PARAMETER_TYPE_INT16);
+  v1::TransactResponse written;
+  ASSERT_TRUE(call(*buses_, &Buses::Transact, transact, written).ok());
+  EXPECT_EQ(written.data() + std::to_string(written.has_value()), "0");
+  transact.set_node(128);
+  EXPECT_FALSE(call(*buses_, &Buses::Transact, transact, written).ok());
+  EXPECT_THAT(machine_.nodes().log(), ElementsAre("transact_object can0 9 0x604100 writes ",
+                                                  "transact_object can0 9 0x604100 writes ",
+                                                  "transact_object can0 9 0x604100 writes ",
+                                                  "transact_object can0 9 0x604100 writes 0xfe,0xff"));
+}
+
 }  // namespace
 }  // namespace axisd::testing

@@ -124,6 +124,14 @@ void FakeBuses::transact(TransactRequest request,
   answer<std::vector<std::uint16_t>>(callback, std::move(words));
 }
 
+void FakeBuses::transact_object(ObjectRequest request,
+                                std::function<void(Result<std::vector<std::uint8_t>>)> callback) {
+  note(fmt::format("transact_object {} {} {:#x} writes {:#x}", request.bus, request.node, request.object,
+                   fmt::join(request.bytes, ",")));
+  answer<std::vector<std::uint8_t>>(
+      callback, request.bytes.empty() ? std::vector<std::uint8_t>{0xFE, 0xFF} : std::vector<std::uint8_t>());
+}
+
 std::shared_ptr<void> FakeBuses::scan(ScanRequest request,
                                       std::function<void(Result<ScanProgress>)> callback) {
   note(fmt::format("scan {} {}-{} bauds {} formats {}", request.bus, request.first_node, request.last_node,

@@ -82,6 +82,8 @@ class FakeBuses final : public FakeAccess, public BusAccess {
 
   void transact(TransactRequest request,
                 std::function<void(Result<std::vector<std::uint16_t>>)> callback) override;
+  void transact_object(ObjectRequest request,
+                       std::function<void(Result<std::vector<std::uint8_t>>)> callback) override;
   std::shared_ptr<void> scan(ScanRequest request,
                              std::function<void(Result<ScanProgress>)> callback) override;
   [[nodiscard]] std::vector<DeviceSnapshotPtr> devices() const override;

@@ -194,7 +194,26 @@ void FakeMachine::buses(std::function<void(std::vector<BusStatus>)> callback) {
   BusStatus status{
       .name = "line-a", .port = "sim", .baud = 115200, .open = true, .simulated = true, .error = {}};
   status.counters.timeouts = 7;
-  post([callback = std::move(callback), status] { callback({status}); });
+  NetworkStatus network{.link = can::LinkState::bus_off,
+                        .sync_period = 10ms,
+                        .sync_running = true,
+                        .emergencies = 3,
+                        .foreign_nodes = {22, 23}};
+  network.frames = {.received = 11, .sent = 12, .not_sent = 13, .unknown = 14, .error_frames = 15};
+  network.frames.receive_overflows = 16;
+  network.frames.no_buffer = 17;
+  network.frames.bus_offs = 18;
+  network.frames.stalls = 19;
+  network.sdo = {.transfers = 21, .aborted_by_node = 22, .timeouts = 23, .protocol_errors = 24};
+  network.sync = {.sent = 31, .missed = 32, .latest = 2ms};
+  network.others = {.unknown_cob = 41, .foreign_node = 42, .malformed = 43};
+  const BusStatus can{.name = "can0",
+                      .kind = BusKind::canopen,
+                      .port = "can0",
+                      .baud = 500'000,
+                      .error = Error{.reason = Reason::bus_down, .message = "bus-off"},
+                      .network = network};
+  post([callback = std::move(callback), status, can] { callback({status, can}); });
 }
 
 void FakeMachine::on_published(std::function<void()> notify) {

@@ -85,6 +85,7 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   snapshot.motion_cause = MotionCause::terminal;
   snapshot.drift = "X1 has no function";
   snapshot.eeprom_writes = 5;
+  snapshot.link_note = "state by SDO polling";
 
   v1::AxisState state;
   to_proto(snapshot, TimePoint(10s + 20ms), state);

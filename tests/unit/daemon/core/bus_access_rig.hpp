@@ -49,7 +49,7 @@ class BusAccessRig : public testing::Test {
                            return made;
                          }},
         configuration_);
-    access_ = std::make_unique<BusAccessService>(world_.executor(), *machine_);
+    access_ = std::make_unique<BusAccessService>(world_.executor(), world_.clock(), *machine_);
     line_->network().advance(world_.now());
     for (const std::uint8_t node : {1, 2}) add_drive("ykd2405pr", {.address = node});
     io_ = &add(9, {{0, 0x4242}, {1, 77}});
