@@ -5,6 +5,8 @@
 
 namespace axisd::axisctl {
 
+/// bus list, buses: one table for each kind of bus.
+void list_buses(Invocation& invocation);
 void add_scan_command(CLI::App& bus, Invocation& invocation);
 
 }  // namespace axisd::axisctl

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 
 #include "api/axisctl/drive_commands.hpp"
 #include "api/axisctl/drive_view.hpp"
@@ -26,6 +27,26 @@ v1::ListParametersResponse catalogue_of(Invocation& invocation, const std::strin
   request.set_axis(axis);
   return invocation.client().call(&Stub::ListParameters, request, axis);
 }
+
+/// Names as they are; addresses ("6041h:00", "0x0010") as the catalogue names them.
+class Names {
+ public:
+  Names(Invocation& invocation, const std::string& axis) : invocation_(invocation), axis_(axis) {}
+  std::string of(const std::string& text) {
+    const auto address = parse_address(text);
+    if (!address) return text;
+    if (!catalogue_) catalogue_ = catalogue_of(invocation_, axis_);
+    for (const auto& parameter : catalogue_->parameters())
+      if (parameter.address() == *address) return parameter.name();
+    throw Failure(ExitCode::usage,
+                  fmt::format("{}: {} has no parameter at {}", axis_, catalogue_->model(), text));
+  }
+
+ private:
+  Invocation& invocation_;
+  const std::string& axis_;
+  std::optional<v1::ListParametersResponse> catalogue_;
+};
 
 void parameters(Invocation& invocation, const Arguments& arguments) {
   auto catalogue = catalogue_of(invocation, arguments.axis);
@@ -62,7 +83,8 @@ void show(Invocation& invocation, const std::string& axis, const google::protobu
 void read(Invocation& invocation, const Arguments& arguments) {
   v1::ReadParametersRequest request;
   request.set_axis(arguments.axis);
-  for (const auto& name : arguments.names) request.add_names(name);
+  Names names(invocation, arguments.axis);
+  for (const auto& name : arguments.names) request.add_names(names.of(name));
   const auto response = invocation.client().call(&Stub::ReadParameters, request, arguments.axis);
   show(invocation, arguments.axis, response, response.values());
 }
@@ -70,7 +92,11 @@ void read(Invocation& invocation, const Arguments& arguments) {
 void write(Invocation& invocation, const Arguments& arguments) {
   v1::WriteParametersRequest request;
   request.set_axis(arguments.axis);
-  for (const auto& text : arguments.names) *request.add_values() = parse_assignment(text);
+  Names names(invocation, arguments.axis);
+  for (const auto& text : arguments.names) {
+    auto& value = *request.add_values() = parse_assignment(text);
+    value.set_name(names.of(value.name()));
+  }
   const auto response = invocation.client().call(&Stub::WriteParameters, request, arguments.axis);
   show(invocation, arguments.axis, response, response.values());
 }
@@ -92,11 +118,12 @@ void add_parameter_commands(CLI::App& drive, Invocation& invocation) {
   list_command->add_flag("--describe", listed->describe, "With what they mean");
 
   const auto [read_command, wanted] = add("read", "What the drive holds", read);
-  read_command->add_option("NAME", wanted->names, "Names of parameters; none: all that can be read");
+  read_command->add_option("NAME", wanted->names,
+                           "Names or addresses (6041h:00, 0x0010); none: all that can be read");
 
   const auto [write_command, written] = add(
       "write", "Write parameters, all or none, and read them back; at standstill, power stage off", write);
-  write_command->add_option("NAME=VALUE", written->names, "Decimal or hexadecimal: current=6, filter=0x10")
+  write_command->add_option("NAME=VALUE", written->names, "Decimal or hexadecimal: current=6, 2006h:00=0x8")
       ->required();
   write_command->footer("\nExample: axisctl drive write feeder lock_current=1 current=0x6");
 }

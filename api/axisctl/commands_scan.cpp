@@ -112,6 +112,29 @@ Table found_table(const Found& found) {
   return table;
 }
 
+Table network_found_table(const Found& found) {
+  const auto code = [](bool given, std::uint32_t value) {
+    return given ? fmt::format("0x{:08X}", value) : std::string();
+  };
+  Table table(
+      {"NODE", "BIT/S", "MODEL", "PROFILE", "VENDOR", "PRODUCT", "PULSES/REV", "CONFIGURED AS", "REMARKS"},
+      {0, 1, 3, 6});
+  for (const auto& node : found) {
+    const auto pulses = node.pulses_per_revolution();
+    constexpr std::uint32_t profile = 0xFFFF;
+    table.add({std::to_string(node.node()),
+               std::to_string(node.baud()),
+               node.model().empty() ? Cell{"unknown", Colour::yellow} : Cell{node.model()},
+               node.has_device_type() ? std::to_string(node.device_type() & profile) : "",
+               code(node.has_vendor(), node.vendor()),
+               code(node.has_product(), node.product()),
+               pulses > 0 ? std::to_string(pulses) : "",
+               node.configured_as(),
+               {node.note(), Colour::yellow}});
+  }
+  return table;
+}
+
 FragmentContext context_of(Invocation& invocation, const std::string& bus) {
   FragmentContext context{.bus = bus};
   for (const auto& known :
@@ -134,7 +157,8 @@ void scan(Invocation& invocation, const Arguments& arguments) {
       nodes.empty() ? std::string() : yaml_fragment(nodes, context_of(invocation, arguments.bus));
   if (arguments.yaml) return print(fragment);
   if (nodes.empty()) return print_line(fmt::format("{}: no node answered", arguments.bus));
-  found_table(found).print(use_colour());
+  // Only nodes of an RS-485 line have a format.
+  (nodes.front().format().empty() ? network_found_table(found) : found_table(found)).print(use_colour());
   if (!fragment.empty())
     print(fmt::format("\nNot configured yet; lines for 'axes:' of the configuration:\n\n{}", fragment));
 }
@@ -157,12 +181,14 @@ void add_scan_command(CLI::App& bus, Invocation& invocation) {
       ->type_name("TIME");
   command->add_flag("--yaml", arguments->yaml, "Only the lines for the configuration");
   command->footer(R"(
-Other rates and formats than the bus's own are refused while any of its axes is enabled.
+Other rates and formats than the bus's own are refused while any of its axes is enabled. On a CAN network only its own
+bit rate is tried: that of the interface is not axisd's to change.
 
 Examples:
   axisctl bus scan line-a --nodes 1-32
   axisctl bus scan line-a --baud 9600,115200 --format 8N1,8E1
-  axisctl bus scan line-a --yaml >> axes.yaml)");
+  axisctl bus scan line-a --yaml >> axes.yaml
+  axisctl bus scan can0)");
   command->callback([&invocation, arguments] { scan(invocation, *arguments); });
 }
 

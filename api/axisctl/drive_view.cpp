@@ -7,6 +7,7 @@
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/quantity.hpp"
+#include "config/quantity.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -148,6 +149,16 @@ Table value_table(const v1::ListParametersResponse& catalogue,
     table.add({value.name(), address_text(value.address()), std::to_string(value.value()), unit});
   }
   return table;
+}
+
+std::optional<std::uint32_t> parse_address(std::string_view text) {
+  // No name of a parameter begins with a digit or has a colon.
+  if (text.find("h:") == std::string_view::npos && !text.starts_with("0x")) return std::nullopt;
+  const auto address = config::parse_object_address(text);
+  if (!address)
+    throw Failure(ExitCode::usage,
+                  fmt::format("{}; {}", address.error().message, address.error().suggestion));
+  return *address;
 }
 
 v1::ParameterValue parse_assignment(std::string_view text) {

@@ -1,6 +1,8 @@
 // Drives and their parameters as tables and text. Pure.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -27,6 +29,9 @@ Table parameter_table(const v1::ListParametersResponse& catalogue,
 Table value_table(const v1::ListParametersResponse& catalogue,
                   const google::protobuf::RepeatedPtrField<v1::ParameterValue>& values);
 
+/// "6041h:00" or "0x604100", an object, or "0x0010", a register; nullopt: it is a name. Throws Failure
+/// (usage) for what begins like an address and is none.
+std::optional<std::uint32_t> parse_address(std::string_view text);
 /// "NAME=VALUE", the value decimal or 0x. Throws Failure (usage).
 v1::ParameterValue parse_assignment(std::string_view text);
 

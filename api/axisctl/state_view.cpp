@@ -84,6 +84,7 @@ std::string remarks(const v1::AxisState& state) {
   if (state.enabled() && !state.enabled_by_daemon()) append(text, "not enabled by us");
   if (state.has_fault() && state.alarm_code() == 0) append(text, state.fault().message());
   if (state.has_link_error()) append(text, state.link_error().message());
+  if (!state.link_note().empty()) append(text, state.link_note());
   return text;
 }
 

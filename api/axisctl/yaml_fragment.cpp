@@ -31,8 +31,8 @@ std::string yaml_fragment(const std::vector<v1::FoundNode>& found, const Fragmen
   std::set<std::uint32_t> used;
   for (const auto& node : found) {
     if (node.model().empty() || !node.configured_as().empty()) continue;
-    const auto which =
-        fmt::format("node {} ({}, {} bit/s, {})", node.node(), node.model(), node.baud(), node.format());
+    const auto which = fmt::format("node {} ({}, {} bit/s{}{})", node.node(), node.model(), node.baud(),
+                                   node.format().empty() ? "" : ", ", node.format());
     if (node.baud() != context.baud) {
       text += fmt::format("  # {}: set its switches to the bus's {} bit/s\n", which, context.baud);
     } else if (!used.insert(node.node()).second) {

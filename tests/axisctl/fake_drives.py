@@ -129,6 +129,8 @@ class FakeNodes:
         self.note("Transact", request, context)
         if request.HasField("write") and request.node == 1:
             await refuse(context, grpc.StatusCode.INVALID_ARGUMENT, invalid("node 1 is the axis feeder"))
+        if request.HasField("read_object"):
+            return bus_pb.TransactResponse(data=b"\x37\x02", value=0x237)
         return bus_pb.TransactResponse(values=[0xFFFF - i for i in range(request.read)])
 
     async def Scan(self, request, context):
@@ -136,6 +138,13 @@ class FakeNodes:
         if request.bus == "endless":
             yield bus_pb.ScanResponse(probed=1, total=127, found=[bus_pb.FoundNode(node=9, baud=9600, format="8N1")])
             await asyncio.sleep(3600)
+        if request.bus == "can0":
+            yield bus_pb.ScanResponse(probed=127, total=127, found=[
+                bus_pb.FoundNode(node=5, baud=500000, model="ykd2405pr", device_type=0x40192, vendor=0x100, product=3,
+                                 pulses_per_revolution=4000),
+                bus_pb.FoundNode(node=9, baud=500000, device_type=0x191, configured_as="valves"),
+                bus_pb.FoundNode(node=22, baud=500000, note="it sends, but answers no SDO")])
+            return
         first, last = request.first_node or 1, request.last_node or 127
         known = {1: bus_pb.FoundNode(node=1, baud=115200, format="8N1", model="ykd2405pr", version="V1.0",
                                      pulses_per_revolution=10000, configured_as="feeder"),

@@ -10,6 +10,7 @@ import time
 
 import grpc
 import grpc.aio
+from google.protobuf import duration_pb2
 from fake_axis import ENDS, STEP, FakeAxis, offline_detail, refuse  # makes axisd importable
 from fake_drives import SERVICES, FakeDrives, FakeEvents, FakeNodes
 from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes_rpc,
@@ -291,7 +292,13 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, axes_rpc.AxisServiceService
             bus_pb.Bus(name="line-a", port="sim", baud=115200, open=True, simulated=True, transactions=1234),
             bus_pb.Bus(name="line-b", port="/dev/ttyUSB7", baud=9600, error=error_pb2.ErrorDetail(
                 reason=error_pb2.REASON_BUS_DOWN, message="/dev/ttyUSB7: No such file or directory",
-                remedy="check the adapter"))])
+                remedy="check the adapter")),
+            bus_pb.Bus(name="can0", port="can0", baud=500000, kind=bus_pb.BUS_KIND_CANOPEN, open=True,
+                       network=bus_pb.NetworkStatus(
+                           link=bus_pb.NETWORK_LINK_ERROR_PASSIVE, frames_sent=1001, frames_received=2002,
+                           frames_not_sent=3, frames_unknown=4, sdo_transfers=505, sdo_aborts=6, sdo_timeouts=7,
+                           sync_period=duration_pb2.Duration(nanos=10000000), sync_running=True, sync_sent=808,
+                           sync_missed=9, emergencies=10, foreign_nodes=[22, 23], foreign_frames=11))])
 
     async def GetInfo(self, request, context):
         self.note("GetInfo", request, context)

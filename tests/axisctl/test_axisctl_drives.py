@@ -5,7 +5,8 @@ import signal
 import tempfile
 import unittest
 
-from support import AxisctlTest
+from support import AxisctlTest  # makes axisd importable
+from axisd.v1 import drive_service_pb2
 
 
 class Drives(AxisctlTest):
@@ -17,6 +18,13 @@ class Drives(AxisctlTest):
         self.assertRegex(text, r"EEPROM: +3 registers")
         self.assertEqual(self.json("drive", "info", "feeder")[0]["model_code"], 0x301)
         self.assertIn("no axis 'nobody'", self.fails(4, "drive", "info", "nobody"))
+
+    def test_parameters_may_be_named_by_address(self):
+        self.assertRegex(self.ok("drive", "read", "feeder", "0x0010"), r"current +0x0010 +6")
+        self.ok("drive", "write", "feeder", "0x10=7")
+        self.assertEqual(self.server.calls("WriteParameters")[0].values[0].name, "current")
+        self.assertIn("no parameter at 2006h:00", self.fails(2, "drive", "read", "feeder", "2006h:00"))
+        self.assertIn("write index", self.fails(2, "drive", "read", "feeder", "206h:00"))
 
     def test_parameters_are_a_table_without_touching_the_bus(self):
         lines = self.ok("drive", "parameters", "feeder").splitlines()
@@ -159,6 +167,44 @@ class Buses(AxisctlTest):
         self.assertEqual(list(self.server.calls("Transact")[1].write.values), [65531, 255, 7])
         self.assertIn("node 1 is the axis feeder", self.fails(4, "bus", "write", "line-a", "1", "0", "1"))
         self.assertIn("permitted: -32768 to 65535", self.fails(2, "bus", "write", "line-a", "9", "0", "65536"))
+
+    def test_objects_of_a_can_network(self):
+        for command in (("read", "can0", "5", "6041h:00"), ("transact", "can0", "5", "read", "6041h:00")):
+            self.assertRegex(self.ok("bus", *command), r"6041h:00 +37 02 +567\n")
+        self.assertEqual(self.server.calls("Transact")[0].address, 0x604100)
+        self.ok("bus", "read", "can0", "5", "6041h:00", "--type", "i16")
+        self.assertEqual(self.server.calls("Transact")[2].read_object.type, drive_service_pb2.ParameterType.Value("PARAMETER_TYPE_INT16"))
+        self.assertEqual(self.ok("bus", "write", "can0", "9", "6200h:01", "-3", "--type", "i8"),
+                         "can0 node 9: 6200h:01 written\n")
+        number = self.server.calls("Transact")[3].write_object.number
+        self.assertEqual((number.value, number.type), (-3, drive_service_pb2.ParameterType.Value("PARAMETER_TYPE_INT8")))
+        self.ok("bus", "transact", "can0", "9", "write", "6200h:01", "0x10", "--type", "u8")
+        self.assertIn("give --type", self.fails(2, "bus", "write", "can0", "9", "6200h:01", "1"))
+        self.assertIn("6041h:00", self.fails(2, "bus", "read", "can0", "9", "620h:01"))
+        self.assertIn("permitted: u8", self.fails(2, "bus", "read", "can0", "9", "6200h:01", "--type", "u9"))
+        self.assertIn("2 registers written", self.ok("bus", "transact", "line-a", "9", "write", "16", "1", "2"))
+        self.assertRegex(self.ok("bus", "transact", "line-a", "9", "read", "0x10"), r"0x0010 +0xFFFF")
+
+    def test_a_scan_of_a_can_network_shows_identities(self):
+        text = self.ok("bus", "scan", "can0")
+        self.assertRegex(text, r"NODE +BIT/S +MODEL +PROFILE +VENDOR +PRODUCT")
+        self.assertRegex(text, r"5 +500000 +ykd2405pr +402 +0x00000100 +0x00000003 +4000\n")
+        self.assertRegex(text, r"9 +500000 +unknown +401 +valves\n")
+        self.assertRegex(text, r"22 +500000 +unknown +it sends, but answers no SDO\n")
+        self.assertIn("  axis-5:\n    bus: can0\n    node: 5\n", text)
+
+    def test_list_and_status(self):
+        text = self.ok("bus", "list")
+        self.assertEqual(text, self.ok("buses"))
+        self.assertRegex(text, r"line-a +sim +115200 +1234 .*open, simulated\n")
+        self.assertRegex(text, r"can0 +can0 +500000 +1001 +2002 +7 +505 +6 +7 +808 +9 +10 +22 23 +error passive\n")
+        details = self.ok("bus", "status", "can0")
+        self.assertIn("SYNC:          every 10 ms, running; 808 sent, 9 missed", details)
+        self.assertIn("foreign nodes: 22 23\n", details)
+        self.assertNotIn("line-a", details)
+        self.assertIn("RS-485 line", self.ok("bus", "status"))
+        self.assertIn("there is no bus 'can7'", self.fails(2, "bus", "status", "can7"))
+        self.assertEqual([bus["name"] for bus in self.json("bus", "status", "can0")[0]["buses"]], ["can0"])
 
     def test_devices(self):
         self.assertRegex(self.ok("device", "list"), r"valves +line-a +40 +pressure +2\.5 +bar +read/write +online\n")

@@ -140,7 +140,11 @@ class WholeMachine(ClientTest):
         self.assertEqual(list(axes), ["feeder", "turntable", "ghost", "sticky"])
         self.assertTrue(axes["feeder"].simulated)
         self.assertEqual((axes["ghost"].link, axes["ghost"].link_error.node), (axisd.Link.OFFLINE, 9))
-        self.assertEqual([bus.open for bus in await self.machine.buses()], [True, False])
+        self.assertEqual([bus.open for bus in await self.machine.buses()], [True, False, True])
+        network = (await self.machine.buses())[2]
+        self.assertEqual((network.kind, network.baud), (axisd.BusKind.CANOPEN, 500000))
+        self.assertEqual((network.network.link, network.network.sdo_timeouts, network.network.foreign_nodes),
+                         (axisd.NetworkLink.ERROR_PASSIVE, 7, (22, 23)))
         self.assertEqual((await self.machine.info()).machine, "press-1")
 
     async def test_watch(self):
@@ -208,6 +212,15 @@ class Drives(ClientTest):
         self.assertEqual(await self.machine.read_registers("line-a", 9, 16, 2), [65535, 65534])
         await self.machine.write_registers("line-a", 9, 16, [5])
         self.assertEqual(list(self.calls("Transact")[1].write.values), [5])
+
+    async def test_objects_and_a_scan_of_a_can_network(self):
+        found = [node async for progress in self.machine.scan("can0") for node in progress.found]
+        self.assertEqual([(node.node, node.vendor, node.product, node.revision) for node in found],
+                         [(5, 0x100, 3, None), (9, None, None, None), (22, None, None, None)])
+        self.assertEqual(await self.machine.read_object("can0", 5, 0x6041), b"\x37\x02")
+        await self.machine.write_object("can0", 9, 0x6200, 1, b"\x05")
+        written = self.calls("Transact")[1]
+        self.assertEqual((written.address, written.write_object.data), (0x620001, b"\x05"))
 
     async def test_devices(self):
         self.assertEqual((await self.machine.devices())["valves"].values, {"pressure": 2.5, "flow": None})

@@ -12,13 +12,13 @@ from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event
                      TerminalEdge, VelocitySegment)
 from .errors import AxisdError, MotionError, RefusedError, UnreachableError
 from .machine import Axis, Jog, Machine, connect
-from .types import (AxisState, Bus, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
-                    PermittedRange, State, StopResult, Terminal, Tick, Trust)
+from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
+                    Network, NetworkLink, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
-    "Alarm", "Axis", "AxisState", "AxisdError", "Bus", "Command", "CommandState", "ConfigurationDrift", "Cursor",
-    "Device", "Drive", "DriveInfo", "ErrorDetail", "Event", "FoundNode", "Info", "Jog", "Link", "LinkChange",
-    "Machine", "MotionCause", "MotionError", "MotionValues", "Parameter", "PermittedRange", "PositionSegment",
-    "RefusedError", "ScanProgress", "Segments", "SerialProgress", "State", "StateChange", "StopResult", "Terminal",
+    "Alarm", "Axis", "AxisState", "AxisdError", "Bus", "BusKind", "Command", "CommandState", "ConfigurationDrift",
+    "Cursor", "Device", "Drive", "DriveInfo", "ErrorDetail", "Event", "FoundNode", "Info", "Jog", "Link", "LinkChange",
+    "Machine", "MotionCause", "MotionError", "MotionValues", "Network", "NetworkLink", "Parameter", "PermittedRange",
+    "PositionSegment", "RefusedError", "ScanProgress", "Segments", "SerialProgress", "State", "StateChange", "StopResult", "Terminal",
     "TerminalCapability", "TerminalEdge", "Tick", "Trust", "UnreachableError", "VelocitySegment", "connect",
 ]

@@ -139,7 +139,7 @@ class SerialProgress:
 @dataclasses.dataclass(frozen=True)
 class FoundNode:
     """A node that a scan found. `model` is empty if it is no known drive; `configured_as` is empty if nothing in the
-    configuration has its address."""
+    configuration has its address. What follows `note` is of nodes on CAN networks, which have no `format`."""
     node: int
     baud: int
     format: str
@@ -148,11 +148,17 @@ class FoundNode:
     pulses_per_revolution: int
     configured_as: str
     note: str
+    device_type: int | None = None
+    vendor: int | None = None
+    product: int | None = None
+    revision: int | None = None
+    serial_number: int | None = None
 
     @classmethod
     def of(cls, raw: bus_service_pb2.FoundNode) -> FoundNode:
         return cls(raw.node, raw.baud, raw.format, raw.model, raw.version, raw.pulses_per_revolution,
-                   raw.configured_as, raw.note)
+                   raw.configured_as, raw.note, *(_optional(raw, field) for field in (
+                       "device_type", "vendor", "product", "revision", "serial_number")))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,7 +175,7 @@ class ScanProgress:
 
 @dataclasses.dataclass(frozen=True)
 class Device:
-    """A node that is not an axis, with its registers as last read (None: not read yet)."""
+    """A node that is not an axis, with its registers or objects as last read (None: not read yet)."""
     name: str
     bus: str
     node: int

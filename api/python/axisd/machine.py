@@ -201,13 +201,26 @@ class Machine:
                                                   write=bus_service_pb2.RegisterValues(values=list(values)))
         await self._call(self._buses.Transact, request, bus)
 
+    async def read_object(self, bus: str, node: int, index: int, sub: int = 0) -> bytes:
+        """Reads an object of any node of a CAN network, low byte first; a node that does not say how long it is sends
+        4 bytes."""
+        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=index << 8 | sub,
+                                                  read_object=bus_service_pb2.ObjectRead())
+        return (await self._call(self._buses.Transact, request, bus)).data
+
+    async def write_object(self, bus: str, node: int, index: int, sub: int, data: bytes) -> None:
+        """Writes an object of a node that no axis owns; `data` has the object's size, low byte first."""
+        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=index << 8 | sub,
+                                                  write_object=bus_service_pb2.ObjectWrite(data=data))
+        await self._call(self._buses.Transact, request, bus)
+
     async def devices(self) -> dict[str, Device]:
         """The nodes that are not axes, as they were last read."""
         response = await self._call(self._buses.ListDevices, bus_service_pb2.ListDevicesRequest(), "")
         return {device.name: Device.of(device) for device in response.devices}
 
     async def write_device(self, device: str, register: str, value: float) -> float:
-        """Writes one named register; returns the value as written."""
+        """Writes one named register or object; returns the value as written."""
         request = bus_service_pb2.WriteDeviceRequest(device=device, register=register, value=value)
         return (await self._call(self._buses.WriteDevice, request, device)).value
 

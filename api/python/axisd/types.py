@@ -179,6 +179,7 @@ class AxisState:
     motion_cause: MotionCause
     drift: str
     eeprom_writes: int
+    link_note: str
     raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -197,7 +198,7 @@ class AxisState:
             measured_at=_optional_time(raw, "measured_at"), age=_optional_seconds(raw, "age"),
             simulated=raw.simulated, command_id=raw.command_id, model=raw.model, bus=raw.bus, node=raw.node,
             motion_cause=_member(MotionCause, types_pb2.MotionCause.DESCRIPTOR, "MOTION_CAUSE_", raw.motion_cause),
-            drift=raw.drift, eeprom_writes=raw.eeprom_writes, raw=raw)
+            drift=raw.drift, eeprom_writes=raw.eeprom_writes, link_note=raw.link_note, raw=raw)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -284,10 +285,52 @@ class StopResult:
                    _optional_error(raw, "error"))
 
 
+class BusKind(enum.Enum):
+    UNSPECIFIED = "Unspecified"
+    MODBUS_RTU = "ModbusRtu"
+    CANOPEN = "Canopen"
+
+
+class NetworkLink(enum.Enum):
+    """State of a CAN network's link; BUS_OFF and STALLED need it to go down and up."""
+    UNSPECIFIED = "Unspecified"
+    REMOVED = "Removed"
+    DOWN = "Down"
+    UP = "Up"
+    ERROR_PASSIVE = "ErrorPassive"
+    BUS_OFF = "BusOff"
+    STALLED = "Stalled"
+
+
+@dataclasses.dataclass(frozen=True)
+class Network:
+    """What is known of a CAN network (all counters are in `raw`). `foreign_nodes` are heard, but not configured."""
+    link: NetworkLink
+    frames_sent: int
+    frames_received: int
+    sdo_transfers: int
+    sdo_aborts: int
+    sdo_timeouts: int
+    sync_running: bool
+    sync_sent: int
+    sync_missed: int
+    emergencies: int
+    foreign_nodes: tuple[int, ...]
+    raw: bus_service_pb2.NetworkStatus = dataclasses.field(repr=False, compare=False)
+
+    @classmethod
+    def of(cls, raw: bus_service_pb2.NetworkStatus) -> Network:
+        return cls(_member(NetworkLink, bus_service_pb2.NetworkLink.DESCRIPTOR, "NETWORK_LINK_", raw.link),
+                   raw.frames_sent, raw.frames_received, raw.sdo_transfers, raw.sdo_aborts, raw.sdo_timeouts,
+                   raw.sync_running, raw.sync_sent, raw.sync_missed, raw.emergencies, tuple(raw.foreign_nodes), raw)
+
+
 @dataclasses.dataclass(frozen=True)
 class Bus:
-    """One line and its counters (all counters are in `raw`)."""
+    """One bus. `port` is a serial device or a network interface, `baud` also the bit rate of a network; `transactions`
+    and `timeouts` are those of a line (all counters are in `raw`), `network` is None for one."""
     name: str
+    kind: BusKind
     port: str
     baud: int
     open: bool
@@ -295,9 +338,11 @@ class Bus:
     simulated: bool
     transactions: int
     timeouts: int
+    network: Network | None
     raw: bus_service_pb2.Bus = dataclasses.field(repr=False, compare=False)
 
     @classmethod
     def of(cls, raw: bus_service_pb2.Bus) -> Bus:
-        return cls(raw.name, raw.port, raw.baud, raw.open, _optional_error(raw, "error"), raw.simulated,
-                   raw.transactions, raw.timeouts, raw)
+        return cls(raw.name, _member(BusKind, bus_service_pb2.BusKind.DESCRIPTOR, "BUS_KIND_", raw.kind), raw.port,
+                   raw.baud, raw.open, _optional_error(raw, "error"), raw.simulated, raw.transactions, raw.timeouts,
+                   Network.of(raw.network) if raw.HasField("network") else None, raw)

@@ -60,6 +60,13 @@ TEST(YamlFragment, LoadsForEveryModelAndMicrostep) {
     }
 }
 
+TEST(YamlFragment, ANodeOfACanNetworkHasNoFormat) {
+  auto node = found(5, "yss-c", 500'000, 0);
+  node.clear_format();
+  EXPECT_EQ(yaml_fragment({node}, {.bus = "can0", .baud = 500'000}),
+            "  # node 5 (yss-c, 500000 bit/s): its microstep could not be read, scan again\n");
+}
+
 TEST(YamlFragment, LeavesOutWhatIsConfiguredOrUnknown) {
   auto known = found(3, "ykd2405pr");
   known.set_configured_as("feeder");
