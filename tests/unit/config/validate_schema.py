@@ -9,6 +9,7 @@ import yaml
 # Only the loader can tell these: relations between keys, arithmetic, and what the YAML parser drops silently.
 LOADER_ONLY = {
     "baud_of_model",
+    "canopen_models",
     "device_nodes",
     "device_same_address",
     "function_twice",
@@ -41,6 +42,7 @@ LOADER_ONLY = {
     "start_speed",
     "tag",
     "times",
+    "too_many_can_drives",
     "too_many_drives",
     "unknown_bus",
     "velocity_too_high",
