@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "daemon/core/bus_access_service.hpp"
+#include "daemon/core/drive_access_service.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/simulation/can_nodes.hpp"
 #include "devices/simulation/simulator.hpp"
@@ -21,13 +22,13 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using Bytes = std::vector<std::uint8_t>;
 
-/// Axis a1 (YSS-C, node 5) and device io (node 9, one object) on can0, and whatever else a test puts there.
+/// Axis a1 (YSS-C, node 40) and device io (node 9, one object) on can0, and whatever else a test puts there.
 class NetworkAccess : public testing::Test {
  protected:
   NetworkAccess() {
     config::Configuration configuration{.machine = "m"};
     configuration.networks.push_back({.name = "can0", .interface = "sim", .sync_period = 10ms});
-    AxisSettings axis{.name = "a1", .bus = "can0", .node = 5, .model = "yss-c"};
+    AxisSettings axis{.name = "a1", .bus = "can0", .node = 40, .model = "yss-c"};
     axis.scale = {.pulses_per_revolution = 4000, .travel_numerator = 10, .unit = "mm"};
     axis.limits.velocity = 100;
     configuration.axes.push_back({.axis = axis});
@@ -51,6 +52,7 @@ class NetworkAccess : public testing::Test {
                            return port;
                          }},
         configuration);
+    drive_access_ = std::make_unique<DriveAccessService>(world_.executor(), world_.clock(), *machine_);
     access_ = std::make_unique<BusAccessService>(world_.executor(), world_.clock(), *machine_);
     io_ = &add(9, {{0x100000, {.value = 0x00000191}},
                    {0x640101, {.value = 77, .size = 2, .writable = true}},
@@ -59,7 +61,7 @@ class NetworkAccess : public testing::Test {
     wire_ = network_.join([this](const can::Frame& frame, TimePoint at, bool own) {
       if (!own) drives_.on_frame(frame, at);
     });
-    drives_.add(*simulation::make_can_node("yss-c", {.address = 5}));
+    drives_.add(*simulation::make_can_node("yss-c", {.address = 40}));
     drives_.advance();
     machine_->start();
     world_.run_for(1s);
@@ -114,6 +116,7 @@ class NetworkAccess : public testing::Test {
   std::vector<std::unique_ptr<ObjectNode>> nodes_;
   std::unique_ptr<MachineCore> machine_;
   std::unique_ptr<BusAccessService> access_;
+  std::unique_ptr<DriveAccessService> drive_access_;
   ObjectNode* io_ = nullptr;
 };
 
@@ -143,8 +146,8 @@ TEST_F(NetworkAccess, TransactReadsAndWritesObjects) {
 }
 
 TEST_F(NetworkAccess, TransactReadsADriveButWritesToNoneThatAnAxisOwns) {
-  EXPECT_THAT(*transact({.bus = "can0", .node = 5, .object = 0x101801}), ElementsAre(0, 1, 0, 0));
-  const auto owned = transact({.bus = "can0", .node = 5, .object = 0x604000, .bytes = {0x0F, 0}});
+  EXPECT_THAT(*transact({.bus = "can0", .node = 40, .object = 0x101801}), ElementsAre(0, 1, 0, 0));
+  const auto owned = transact({.bus = "can0", .node = 40, .object = 0x604000, .bytes = {0x0F, 0}});
   EXPECT_EQ(owned.error().reason, Reason::invalid_argument);
   EXPECT_EQ(owned.error().outcome, Outcome::not_sent);
   EXPECT_THAT(owned.error().message, HasSubstr("'a1'"));
@@ -158,6 +161,53 @@ TEST_F(NetworkAccess, TransactWantsTheRightKindOfBus) {
   ASSERT_TRUE(world_.run_until([&] { return answer.has_value(); }, 1s));
   EXPECT_EQ(answer->error().reason, Reason::invalid_argument);
   EXPECT_THAT(answer->error().message, HasSubstr("CAN network"));
+}
+
+TEST_F(NetworkAccess, ADriveWithANewNodeIdIsLookedForThere) {
+  world_.run_for(5s);
+  ASSERT_EQ(machine_->find("a1")->snapshot()->link, LinkState::online);
+  std::vector<SerialProgress::Phase> phases;
+  std::optional<Error> error;
+  const auto token = drive_access_->change_serial("a1", {.node = 41, .baud = {}, .format = {}, .verify = 60s},
+                                                  "t", [&](Result<SerialProgress> progress) {
+                                                    if (progress)
+                                                      phases.push_back(progress->phase);
+                                                    else
+                                                      error = progress.error();
+                                                  });
+  using enum SerialProgress::Phase;
+  ASSERT_TRUE(world_.run_until([&] { return phases.size() == 2 || error; }, 30s));
+  ASSERT_FALSE(error) << to_string(*error);
+  auto& drive = *drives_.node(40);
+  drive.set_power(false);
+  drives_.advance();
+  world_.run_for(2s);
+  EXPECT_EQ(phases.size(), 2U) << "it is looked for";
+  drive.set_power(true);
+  drives_.advance();
+  ASSERT_TRUE(world_.run_until([&] { return phases.size() == 3 || error; }, 30s));
+  ASSERT_FALSE(error) << to_string(*error);
+  EXPECT_THAT(phases, ElementsAre(written, waiting, verified));
+  EXPECT_EQ(drive.address(), 41);
+}
+
+TEST_F(NetworkAccess, WhatACanNetworkCannotDoIsRefusedBeforeAnythingIsWritten) {
+  world_.run_for(5s);
+  const auto refused = [this](SerialChange change) {
+    std::optional<Result<SerialProgress>> answer;
+    const auto token = drive_access_->change_serial("a1", change, "t", [&](auto result) { answer = result; });
+    EXPECT_TRUE(world_.run_until([&] { return answer.has_value(); }, 10s));
+    return answer->error();
+  };
+  const auto before = drives_.node(40)->eeprom_writes();
+  const auto format = refused({.node = {}, .baud = {}, .format = modbus_rtu::Format{}, .verify = {}});
+  EXPECT_EQ(format.reason, Reason::not_supported);
+  const auto rate = refused({.node = {}, .baud = 500'000, .format = {}, .verify = 10s});
+  EXPECT_EQ(rate.reason, Reason::not_supported);
+  EXPECT_THAT(rate.message, HasSubstr("cannot be looked for at 500000 bit/s"));
+  EXPECT_EQ(refused({.node = 9, .baud = {}, .format = {}, .verify = {}}).reason, Reason::invalid_argument)
+      << "another node's";
+  EXPECT_EQ(drives_.node(40)->eeprom_writes(), before);
 }
 
 TEST_F(NetworkAccess, AScanAsksManyAtOnceAndNamesWhatItFinds) {
@@ -180,27 +230,27 @@ TEST_F(NetworkAccess, AScanAsksManyAtOnceAndNamesWhatItFinds) {
   EXPECT_EQ(log.reports.back().total, 127);
   EXPECT_EQ(log.reports.front().probed, 16) << "progress";
   ASSERT_EQ(log.found.size(), 5U);
-  EXPECT_EQ(log.found[0].node, 5);
-  EXPECT_EQ(log.found[0].model, "yss-c");
-  EXPECT_EQ(log.found[0].configured_as, "a1");
-  EXPECT_EQ(log.found[0].pulses_per_revolution, 4000);
-  EXPECT_EQ(log.found[1].node, 9);
-  EXPECT_EQ(log.found[1].configured_as, "io");
-  EXPECT_TRUE(log.found[1].on_network);
-  EXPECT_EQ(log.found[1].baud, 1'000'000);
-  EXPECT_EQ(log.found[1].identity->profile(), 401);
-  EXPECT_FALSE(log.found[1].identity->vendor);
-  EXPECT_EQ(log.found[1].model, "");
-  EXPECT_EQ(log.found[2].node, 20);
-  EXPECT_EQ(log.found[2].configured_as, "");
-  EXPECT_EQ(log.found[2].identity->vendor, 0x1234U);
-  EXPECT_EQ(log.found[2].identity->product, 0x5678U);
-  EXPECT_EQ(log.found[2].identity->revision, 0x00010002U);
-  EXPECT_EQ(log.found[2].identity->serial, 99U);
-  EXPECT_EQ(log.found[3].node, 21);
-  EXPECT_THAT(log.found[3].note, HasSubstr("no device type"));
-  EXPECT_EQ(log.found[4].node, 22);
-  EXPECT_THAT(log.found[4].note, HasSubstr("answers no SDO"));
+  EXPECT_EQ(log.found[0].node, 9);
+  EXPECT_EQ(log.found[0].configured_as, "io");
+  EXPECT_TRUE(log.found[0].on_network);
+  EXPECT_EQ(log.found[0].baud, 1'000'000);
+  EXPECT_EQ(log.found[0].identity->profile(), 401);
+  EXPECT_FALSE(log.found[0].identity->vendor);
+  EXPECT_EQ(log.found[0].model, "");
+  EXPECT_EQ(log.found[1].node, 20);
+  EXPECT_EQ(log.found[1].configured_as, "");
+  EXPECT_EQ(log.found[1].identity->vendor, 0x1234U);
+  EXPECT_EQ(log.found[1].identity->product, 0x5678U);
+  EXPECT_EQ(log.found[1].identity->revision, 0x00010002U);
+  EXPECT_EQ(log.found[1].identity->serial, 99U);
+  EXPECT_EQ(log.found[2].node, 21);
+  EXPECT_THAT(log.found[2].note, HasSubstr("no device type"));
+  EXPECT_EQ(log.found[3].node, 22);
+  EXPECT_THAT(log.found[3].note, HasSubstr("answers no SDO"));
+  EXPECT_EQ(log.found[4].node, 40);
+  EXPECT_EQ(log.found[4].model, "yss-c");
+  EXPECT_EQ(log.found[4].configured_as, "a1");
+  EXPECT_EQ(log.found[4].pulses_per_revolution, 4000);
   for (const auto& node : nodes_) EXPECT_EQ(node->writes, 0);
 }
 
