@@ -202,16 +202,15 @@ class Machine:
         await self._call(self._buses.Transact, request, bus)
 
     async def read_object(self, bus: str, node: int, index: int, sub: int = 0) -> bytes:
-        """Reads an object of any node of a CAN network, low byte first; a node that does not say how long it is sends
-        4 bytes."""
-        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=index << 8 | sub,
-                                                  read_object=bus_service_pb2.ObjectRead())
+        """Reads an object of any node of a CAN network, low byte first (4 bytes if the node does not say how many)."""
+        read = bus_service_pb2.ObjectRead()
+        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=index << 8 | sub, read_object=read)
         return (await self._call(self._buses.Transact, request, bus)).data
 
     async def write_object(self, bus: str, node: int, index: int, sub: int, data: bytes) -> None:
         """Writes an object of a node that no axis owns; `data` has the object's size, low byte first."""
-        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=index << 8 | sub,
-                                                  write_object=bus_service_pb2.ObjectWrite(data=data))
+        write = bus_service_pb2.ObjectWrite(data=data)
+        request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=index << 8 | sub, write_object=write)
         await self._call(self._buses.Transact, request, bus)
 
     async def devices(self) -> dict[str, Device]:
