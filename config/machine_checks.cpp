@@ -63,6 +63,7 @@ struct BusEntry {
 
 std::vector<BusEntry> buses(const Configuration& configuration) {
   std::vector<BusEntry> all;
+  all.reserve(configuration.lines.size() + configuration.networks.size());
   for (const auto& line : configuration.lines)
     all.push_back({line.name, BusKind::modbus_rtu, line.simulated(), line.baud, line.port, "port", "baud"});
   for (const auto& network : configuration.networks)

@@ -87,7 +87,8 @@ void set_serial(Invocation& invocation, const Arguments& arguments) {
   follow<v1::SetSerialResponse>(
       invocation, arguments,
       [&](Stub& stub, grpc::ClientContext& context) { return stub.SetSerial(&context, request); },
-      fmt::format("'{}' of its bus, and every other node of the line the same", yaml));
+      fmt::format("'{}' of its bus{}, and every other node of it the same", yaml,
+                  arguments.format.empty() ? " ('bitrate' of a CAN network)" : ""));
 }
 
 }  // namespace
