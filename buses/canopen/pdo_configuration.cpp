@@ -87,7 +87,7 @@ class Configuration {
   Task<bool> write(Object object, std::uint64_t value, std::size_t size) {
     auto written = co_await node_.write(object, value, size, options_);
     if (written) {
-      ++outcome_.writes;
+      outcome_.written.push_back(object);
       co_return true;
     }
     if (is_read_only(written.error())) {

@@ -19,8 +19,8 @@ struct PdoOutcome {
   PdoDirection direction = PdoDirection::transmit;
   std::uint16_t number = 1;
   Kind kind = Kind::failed;
-  PdoState state{};                 ///< as read back at the end
-  int writes = 0;                   ///< accepted ones; entries may be saved to the node's EEPROM (RW/S)
+  PdoState state{};               ///< as read back at the end
+  std::vector<Object> written{};  ///< accepted ones, in order; some may be saved to the node's EEPROM (RW/S)
   std::vector<Object> read_only{};  ///< entries that the node refused to change
   std::vector<std::string> remarks{};
   std::optional<Error> error{};  ///< also where the node refused an entry, though it could be read back

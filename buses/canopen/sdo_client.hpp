@@ -85,6 +85,8 @@ class SdoClient {
   void close();
 
   [[nodiscard]] const SdoCounters& counters() const { return counters_; }
+  /// Each of the last requests to this node was answered twice: two nodes have this node-ID.
+  [[nodiscard]] bool answers_twice(std::uint8_t node) const;
   [[nodiscard]] const SdoSettings& settings() const { return settings_; }
 
  private:
@@ -95,6 +97,7 @@ class SdoClient {
 
   Task<Result<SdoAnswer>> transact(std::uint8_t node, RequestPtr request);
   Node& node(std::uint8_t id);
+  void on_unexpected(Node& node);
   void pump(Node& node);
   void reap(Node& node);
   void begin(Node& node, RequestPtr request);

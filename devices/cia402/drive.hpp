@@ -184,6 +184,10 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> verify(const std::vector<ObjectSetting>& required);
   /// Writes one object of the configuration and counts it if it goes to the EEPROM.
   Task<Result<void>> write_counted(std::uint32_t address, std::int64_t value, std::uint8_t bytes);
+  /// A write to it goes to the EEPROM while the drive saves.
+  [[nodiscard]] bool can_be_saved(std::uint32_t address) const;
+  /// It was written: counted if it went to the EEPROM.
+  void count_write(std::uint32_t address);
   /// Sets the EEPROM switch (200Ch of the YSS-C), if it is not so already.
   Task<Result<void>> save_writes(bool saved);
   [[nodiscard]] bool saves_at_rest() const;

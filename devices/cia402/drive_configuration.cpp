@@ -68,7 +68,9 @@ Task<Result<void>> Cia402Drive::write_all(const std::vector<ObjectSetting>& requ
     if (setting.holds(held)) continue;  // spares the EEPROM
     // Again and again it would only wear the EEPROM.
     if (setting.saved && unsaved_.contains(setting.address)) co_return fail(not_held(setting, held));
-    if (const auto switched = co_await save_writes(setting.saved); !switched) co_return switched;
+    // Of what no write saves the switch says nothing, and to turn it is a write itself.
+    if (can_be_saved(setting.address))
+      if (const auto switched = co_await save_writes(setting.saved); !switched) co_return switched;
     if (setting.starts_motion)
       if (const auto inactive = co_await check_inactive(setting); !inactive) co_return inactive;
     const auto written = co_await write_counted(setting.address, setting.applied_to(held), setting.bytes);
@@ -118,11 +120,17 @@ Task<Result<void>> Cia402Drive::check_inactive(const ObjectSetting& setting) {
 
 Task<Result<void>> Cia402Drive::write_counted(std::uint32_t address, std::int64_t value, std::uint8_t bytes) {
   const auto written = co_await write_object(Object::of(address), value, bytes, patiently());
-  const bool executed = written || written.error().outcome == Outcome::unknown;
-  const auto* parameter = find_parameter(model_->descriptor->parameters, address);
-  const bool can_be_saved = parameter != nullptr && parameter->access == Access::rw_saved;
-  if (executed && can_be_saved && saving_.value_or(true)) ++eeprom_writes_;
+  if (written || written.error().outcome == Outcome::unknown) count_write(address);
   co_return written;
+}
+
+bool Cia402Drive::can_be_saved(std::uint32_t address) const {
+  const auto* parameter = find_parameter(model_->descriptor->parameters, address);
+  return parameter != nullptr && parameter->access == Access::rw_saved;
+}
+
+void Cia402Drive::count_write(std::uint32_t address) {
+  if (can_be_saved(address) && saving_.value_or(true)) ++eeprom_writes_;
 }
 
 Error Cia402Drive::not_held(const ObjectSetting& setting, std::int64_t actual) const {

@@ -107,6 +107,10 @@ Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_c
     if (!version) co_return failed(version.error());
     if (*version) identity.version = version_text(static_cast<std::int64_t>(**version));
   }
+  if (bus_->master().sdo().answers_twice(node_.id()))
+    co_return fail(error_at(Reason::misconfigured, {0x1018, 0},
+                            "each request is answered twice (two nodes with this node-ID?)",
+                            "give each node of the network a node-ID of its own"));
   co_return identity;
 }
 
@@ -146,13 +150,12 @@ Task<Result<void>> Cia402Drive::configure() {
           co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());
       halting)
     halt_option_ = model_->meaning.halt_on_ramp;
-  // None of this belongs into the EEPROM.
-  auto switched = co_await save_writes(false);
+  // Saved only where everything is: what is in the EEPROM is not written again after the next power-up, and
+  // to switch saving off for it would itself be a write to the EEPROM at each start.
+  auto switched = co_await save_writes(saves_at_rest());
   if (switched) switched = co_await set_heartbeat();
   if (switched) switched = co_await set_pdos();
-  const auto restored = co_await save_writes(saves_at_rest());
   if (!switched) co_return switched;
-  if (!restored) co_return restored;
   co_return co_await check_continuity(TransactionClass::parameters);
 }
 
@@ -176,7 +179,7 @@ Task<Result<void>> Cia402Drive::set_heartbeat() {
   const auto wanted = static_cast<std::uint64_t>(heartbeat_period / milliseconds(1));
   if (**present == 0 || **present > wanted)
     if (const auto written =
-            co_await write_object(object::heartbeat_time, static_cast<std::int64_t>(wanted), 2, patiently());
+            co_await write_counted(object::heartbeat_time.key(), static_cast<std::int64_t>(wanted), 2);
         !written)
       co_return written;
   bus_->watch_heartbeat(node_.id(), heartbeat_patience);
@@ -208,7 +211,7 @@ Task<Result<void>> Cia402Drive::set_pdos() {
   const bool at_once = command.state.transmission_type.value_or(0) >= canopen::event_driven_of_manufacturer;
   if (command.carries({{.object = object::control_word, .bits = 16}}) && at_once)
     command_pdo_ = command.state.cob_id();
-  eeprom_writes_ += saving_.value_or(true) ? static_cast<std::uint64_t>(command.writes) : 0;
+  for (const auto object : command.written) count_write(object.key());
   co_return Result<void>{};
 }
 
@@ -232,7 +235,7 @@ Task<Result<std::string>> Cia402Drive::set_state_pdos() {
       wanted.event_timer = static_cast<std::uint16_t>(scaled(event_period, bitrate) / milliseconds(1));
     }
     auto outcome = co_await canopen::configure_pdo(node_, wanted, patiently());
-    if (saving_.value_or(true)) eeprom_writes_ += static_cast<std::uint64_t>(outcome.writes);
+    for (const auto object : outcome.written) count_write(object.key());
     const bool gone = outcome.error && outcome.error->outcome != Outcome::refused &&
                       outcome.error->reason != Reason::invalid_argument;
     if (gone) co_return failed(*outcome.error);

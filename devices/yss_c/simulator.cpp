@@ -255,13 +255,14 @@ simulation::InputSettings SimulatedDrive::input_settings() const {
   return settings;
 }
 
-/// 2004h: functions 2030h:0D..0F, inverted by 2030h:0C.
+/// 2004h: functions 2030h:0D..0F. What is active, whatever the level that 2030h:0C makes of it: as 2003h shows
+/// inputs, and as the maker's other drives do.
 std::uint16_t SimulatedDrive::outputs() const {
   const std::array<bool, 5> functions{false, alarm_ != 0, motor_.moving(), homed_, reached_};
-  auto bits = static_cast<unsigned>(dictionary_.get(0x2030, 0x0C)) & 7U;
+  unsigned bits = 0;
   for (unsigned i = 0; i < 3; ++i)
     if (functions.at(static_cast<std::size_t>(dictionary_.get(0x2030, static_cast<std::uint8_t>(0x0D + i)))))
-      bits ^= 1U << i;
+      bits |= 1U << i;
   return static_cast<std::uint16_t>(bits);
 }
 

@@ -70,11 +70,11 @@ TEST(PdoConfiguration, FollowsTheProcedureAndWritesNothingTheSecondTime) {
   EXPECT_THAT(net.servers[1].writes,
               ElementsAre("1800h:01=80000181", "1A00h:00=0", "1A00h:01=60410010", "1A00h:02=60640020",
                           "1A00h:03=20020010", "1A00h:00=3", "1800h:02=1", "1800h:03=32", "1800h:01=181"));
-  EXPECT_EQ(outcome.writes, 9);
+  EXPECT_EQ(outcome.written.size(), 9U);
   EXPECT_TRUE(outcome.carries(state_pdo().mapping));
   outcome = net.run(configure_pdo(net.master->node(1), state_pdo()));
   EXPECT_EQ(outcome.kind, Kind::as_found);
-  EXPECT_EQ(outcome.writes, 0);
+  EXPECT_TRUE(outcome.written.empty());
   EXPECT_EQ(net.servers[1].writes.size(), 9U);
 }
 

@@ -310,5 +310,41 @@ TEST(LateReplies, AlwaysFindAnotherObjectUntilAllAreTried) {
   EXPECT_FALSE(late.may_come(device_type, now));
 }
 
+TEST(SdoClient, TwoNodesWithOneNodeIdAnswerEachRequestTwice) {
+  Network net;
+  net.servers[1].objects[status] = {0x0237, 2};
+  net.servers[1].objects[device_type] = {0x00040192, 4};
+  const auto read = [&](bool twice) {
+    net.port->on_sent = [&net, twice](const can::Frame& frame) {
+      for (int i = 0; i < (twice ? 2 : 1); ++i) net.serve(frame);
+    };
+    for (const auto object : {status, device_type}) {
+      net.upload("read", 1, object);
+      net.world.run_for(10ms);
+    }
+  };
+  read(false);
+  EXPECT_FALSE(net.master->sdo().answers_twice(1));
+  read(true);
+  EXPECT_FALSE(net.master->sdo().answers_twice(1)) << "twice is no habit";
+  read(true);
+  EXPECT_TRUE(net.master->sdo().answers_twice(1));
+  EXPECT_EQ(net.master->sdo().counters().unexpected_replies, 4U);
+  read(false);
+  EXPECT_FALSE(net.master->sdo().answers_twice(1)) << "one of them is gone";
+}
+
+TEST(SdoClient, LateRepliesAreNoSecondNode) {
+  Network net;
+  net.servers[1].objects[status] = {0x0237, 2};
+  net.turnaround = 150ms;  // each comes after its request was given up
+  for (int i = 0; i < 6; ++i) {
+    net.upload("read", 1, status, {.attempts = 1});
+    net.world.run_for(400ms);
+  }
+  EXPECT_GE(net.master->sdo().counters().timeouts, 4U);
+  EXPECT_FALSE(net.master->sdo().answers_twice(1));
+}
+
 }  // namespace
 }  // namespace axisd::canopen
