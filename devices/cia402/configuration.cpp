@@ -98,10 +98,15 @@ void Collector::add_model_settings() {
 }
 
 void Collector::add_homing() {
-  static constexpr std::string_view keys[] = {"velocity", "search_velocity", "acceleration_time", "offset"};
-  const auto objects = encode(*model_, setup_->pulses_per_revolution, *setup_->homing);
-  for (std::size_t i = 0; i < objects.size(); ++i)
-    add(objects[i].first, objects[i].second, fmt::format("homing.{}", keys[i]), setup_->persist.homing);
+  static constexpr std::pair<canopen::Object, std::string_view> keys[] = {
+      {object::homing_speed, "velocity"},
+      {object::homing_search_speed, "search_velocity"},
+      {object::homing_acceleration, "acceleration_time"},
+      {object::home_offset, "offset"}};
+  for (const auto& [object, value] : encode(*model_, setup_->pulses_per_revolution, *setup_->homing)) {
+    const auto* key = std::ranges::find(keys, object, &std::pair<canopen::Object, std::string_view>::first);
+    add(object, value, fmt::format("homing.{}", key->second), setup_->persist.homing);
+  }
 }
 
 }  // namespace

@@ -173,6 +173,7 @@ class Cia402Drive final : public Drive {
   Task<> acknowledge_set_point(SdoOptions options);
   Task<Result<void>> prepare_homing(HomingProfile profile, SdoOptions options);
   Task<Result<void>> write_homing_method(HomingMethod method, SdoOptions options);
+  Task<Result<void>> home_here(SdoOptions options);
 
   // drive_configuration.cpp
   Task<Result<Values>> read_values(std::vector<std::uint32_t> addresses, SdoOptions options);

@@ -153,11 +153,38 @@ Task<Result<void>> Cia402Drive::write_homing_method(HomingMethod method, SdoOpti
 }
 
 Task<Result<void>> Cia402Drive::clear_position(MotionGuard guard) {
-  if (!model_->objects.position_clear)
-    co_return fail(error_at(Reason::not_supported, object::position,
-                            "the drive cannot zero its position counter", "home the axis"));
-  co_return co_await write_object(*model_->objects.position_clear, 1, 0,
-                                  {.transaction_class = TransactionClass::motion, .guard = std::move(guard)});
+  const SdoOptions options{.transaction_class = TransactionClass::motion, .guard = std::move(guard)};
+  if (model_->objects.position_clear)
+    co_return co_await write_object(*model_->objects.position_clear, 1, 0, options);
+  if (!model_->homing_codes.empty()) co_return co_await home_here(options);
+  co_return fail(error_at(Reason::not_supported, object::position,
+                          "the drive cannot zero its position counter", "home the axis"));
+}
+
+/// Homing method 35 (CiA 402): the present position is home, without a motion.
+Task<Result<void>> Cia402Drive::home_here(SdoOptions options) {
+  constexpr std::int64_t present_position = 35;
+  const auto state = co_await read_status(options);
+  if (!state) co_return fail(state.error());
+  if (*state != State::operation_enabled)
+    co_return fail(error_at(Reason::disabled, object::status_word,
+                            fmt::format("the drive is in {}", to_string(*state)), "enable the axis first"));
+  if (const auto ready = co_await make_ready(*state, OperationMode::homing, options); !ready) co_return ready;
+  if (has(*model_, object::home_offset))
+    if (const auto zero = co_await write_verified(object::home_offset, 0, options); !zero) co_return zero;
+  const auto chosen = co_await write_verified(object::homing_method, present_position, options);
+  if (!chosen) co_return chosen;
+  if (const auto told = co_await write_control(start_word, options); !told) co_return told;
+  const auto attained = [](std::int64_t word) {
+    return (word & status::mode_specific) != 0 && (word & status::target_reached) != 0;
+  };
+  const auto word = co_await read_until(object::status_word, attained, acknowledge_limit, options);
+  const auto ended = co_await write_control(control_word(Command::enable_operation), std::move(options));
+  if (!word) co_return fail(word.error());
+  if (!attained(*word))
+    co_return fail(error_at(Reason::not_confirmed, object::status_word,
+                            "the drive does not report the present position as home", "home the axis"));
+  co_return ended;
 }
 
 }  // namespace axisd::cia402

@@ -17,7 +17,6 @@ namespace {
 constexpr auto eeprom_patience = std::chrono::seconds(3);
 constexpr int canary_attempts = 3;
 constexpr std::uint32_t first_own_object = 0x200000;  ///< before it: communication (CiA 301)
-constexpr std::int64_t restore = 1, save = 2;
 
 canopen::SdoOptions parameters() { return {.transaction_class = TransactionClass::parameters}; }
 canopen::SdoOptions eeprom() {
@@ -132,14 +131,15 @@ Task<Result<void>> Cia402Drive::quieten() {
 }
 
 Task<Result<void>> Cia402Drive::save_parameters() {
-  if (!model_->objects.memory)
+  if (!model_->objects.save)
     co_return fail(not_supported("the drive cannot save its parameters",
                                  "the configuration is applied after each power-up"));
   // What is saved now stands there after the next power-up: nothing that moves or enables (M27).
   if (const auto quiet = co_await quieten(); !quiet) co_return quiet;
   const auto neutral = distinct(fresh_neutral_block());
   if (const auto written = co_await write_canary(neutral, parameters()); !written) co_return written;
-  const auto saved = co_await write_object(*model_->objects.memory, save, 0, eeprom());
+  const auto saved =
+      co_await write_object(model_->objects.save->object, model_->objects.save->value, 0, eeprom());
   if (saved || saved.error().outcome == Outcome::unknown) {
     eeprom_writes_ +=
         static_cast<std::uint64_t>(std::ranges::count_if(model_->descriptor->parameters, is_writable));
@@ -179,11 +179,12 @@ Task<Result<std::string>> Cia402Drive::factory_address(const std::vector<std::ui
 }
 
 Task<Result<std::string>> Cia402Drive::restore_factory(std::vector<std::uint8_t> taken) {
-  if (!model_->objects.memory)
+  if (!model_->objects.restore)
     co_return fail(not_supported("the drive cannot restore its factory settings", "use its maker's tool"));
   auto address = co_await factory_address(taken);
   if (!address) co_return address;
-  const auto restored = co_await write_object(*model_->objects.memory, restore, 0, eeprom());
+  const auto& command = *model_->objects.restore;
+  const auto restored = co_await write_object(command.object, command.value, 0, eeprom());
   if (restored || restored.error().outcome == Outcome::unknown) {
     eeprom_writes_ += static_cast<std::uint64_t>(
         std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access));

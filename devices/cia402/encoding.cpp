@@ -72,11 +72,15 @@ ObjectType type_of(const Model& model, canopen::Object object) {
   return standard == standard_types.end() ? ObjectType{} : standard->type;
 }
 
+bool has(const Model& model, canopen::Object object) {
+  return find_parameter(model.descriptor->parameters, object.key()) != nullptr;
+}
+
 std::vector<canopen::Object> state_objects(const Model& model) {
   std::vector<canopen::Object> objects{object::status_word, object::position};
   const auto& vendor = model.objects;
   if (vendor.velocity) objects.push_back(*vendor.velocity);
-  objects.push_back(object::error_code);
+  if (has(model, object::error_code)) objects.push_back(object::error_code);
   if (vendor.inputs) objects.push_back(*vendor.inputs);
   if (vendor.outputs) objects.push_back(*vendor.outputs);
   objects.push_back(object::mode_display);
@@ -129,7 +133,10 @@ DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution,
   sample.alarm_code = alarm_of(model, static_cast<std::uint16_t>(value_of(values, object::error_code)));
   const bool faulty = state == State::fault || state == State::fault_reaction_active || is(bits.alarm);
   if (sample.alarm_code == 0 && faulty) sample.alarm_code = without_code;
-  sample.inputs = static_cast<std::uint32_t>(value_of(values, model.objects.inputs));
+  // 60FDh has inputs of the maker's beyond those that CiA 402 names.
+  const auto known = (std::uint64_t{1} << model.descriptor->inputs.size()) - 1;
+  sample.inputs =
+      static_cast<std::uint32_t>(known & static_cast<std::uint64_t>(value_of(values, model.objects.inputs)));
   sample.outputs = static_cast<std::uint32_t>(value_of(values, model.objects.outputs));
   return sample;
 }
@@ -164,12 +171,15 @@ MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const
 std::vector<std::pair<canopen::Object, std::int64_t>> encode(const Model& model,
                                                              std::int64_t pulses_per_revolution,
                                                              const HomingProfile& profile) {
-  return {{object::homing_speed, encode_velocity(model, pulses_per_revolution, profile.velocity_rpm)},
-          {object::homing_search_speed,
-           encode_velocity(model, pulses_per_revolution, profile.search_velocity_rpm)},
-          {object::homing_acceleration,
-           ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time)},
-          {object::home_offset, profile.offset_pulses}};
+  std::vector<std::pair<canopen::Object, std::int64_t>> values{
+      {object::homing_speed, encode_velocity(model, pulses_per_revolution, profile.velocity_rpm)},
+      {object::homing_search_speed,
+       encode_velocity(model, pulses_per_revolution, profile.search_velocity_rpm)},
+      {object::homing_acceleration,
+       ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time)},
+      {object::home_offset, profile.offset_pulses}};
+  std::erase_if(values, [&](const auto& value) { return !has(model, value.first); });
+  return values;
 }
 
 MotionBlock default_block(const Model& model) {

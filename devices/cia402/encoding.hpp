@@ -22,6 +22,9 @@ struct ObjectType {
 };
 ObjectType type_of(const Model& model, canopen::Object object);
 
+/// The model's dictionary has the object.
+bool has(const Model& model, canopen::Object object);
+
 /// Values of objects by Object::key(), with their signs.
 using Values = std::map<std::uint32_t, std::int64_t>;
 
@@ -48,7 +51,8 @@ MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const
                    const MotionBlock& present);
 /// 60FFh.
 std::int32_t encode_velocity(const Model& model, std::int64_t pulses_per_revolution, int rpm);
-/// 6099h:01, 6099h:02, 609Ah, 607Ch, in this order. The method (6098h) is negotiated.
+/// 6099h:01, 6099h:02, 609Ah, 607Ch, those that the drive has, in this order. The method (6098h) is
+/// negotiated.
 std::vector<std::pair<canopen::Object, std::int64_t>> encode(const Model& model,
                                                              std::int64_t pulses_per_revolution,
                                                              const HomingProfile& profile);

@@ -31,19 +31,27 @@ struct StatusBits {
   std::uint16_t in_position = 0;
 };
 
+/// What is written where, to make the drive do something once.
+struct MemoryCommand {
+  canopen::Object object;
+  std::int64_t value = 0;
+};
+
 /// Objects that CiA 402 does not have, or not always. Absent: the drive has no such object.
 struct VendorObjects {
-  std::optional<canopen::Object> moving{};          ///< not 0: the motor turns
-  std::optional<canopen::Object> velocity{};        ///< present velocity (606Ch, or the maker's)
-  std::optional<canopen::Object> inputs{};          ///< levels, bit per terminal in the descriptor's order
-  std::optional<canopen::Object> outputs{};         ///< likewise
-  std::optional<canopen::Object> start_speed{};     ///< of each ramp, r/min
-  std::optional<canopen::Object> microstep{};       ///< index into CanIdentification::microstep_codes
-  std::optional<canopen::Object> loop_mode{};       ///< 0 closed loop, 1 open loop
-  std::optional<canopen::Object> eeprom_switch{};   ///< 0: writes are saved, 1: they are not
-  std::optional<canopen::Object> memory{};          ///< 1 restores the factory settings, 2 saves everything
-  std::optional<canopen::Object> alarm_clear{};     ///< 1 clears the alarm
-  std::optional<canopen::Object> position_clear{};  ///< 1 zeroes the position
+  std::optional<canopen::Object> moving{};         ///< not 0: the motor turns
+  std::optional<canopen::Object> velocity{};       ///< present velocity (606Ch, or the maker's)
+  std::optional<canopen::Object> inputs{};         ///< levels, bit per terminal in the descriptor's order
+  std::optional<canopen::Object> outputs{};        ///< likewise
+  std::optional<canopen::Object> start_speed{};    ///< of each ramp, r/min
+  std::optional<canopen::Object> microstep{};      ///< index into CanIdentification::microstep_codes
+  std::optional<canopen::Object> loop_mode{};      ///< 0 closed loop, 1 open loop
+  std::optional<canopen::Object> eeprom_switch{};  ///< 0: writes are saved, 1: they are not
+  std::optional<MemoryCommand> save{};             ///< everything, to the EEPROM
+  std::optional<MemoryCommand> restore{};          ///< the factory settings
+  std::optional<canopen::Object> alarm_clear{};    ///< 1 clears the alarm
+  /// 1 zeroes the position. Absent: homing method 35 does, where the drive has it.
+  std::optional<canopen::Object> position_clear{};
   std::optional<canopen::Object> hardware_version{}, software_version{};  ///< numbers
   // Terminals: one object for all levels, then one object per terminal's function.
   std::optional<canopen::Object> input_levels{}, first_input_function{};
