@@ -78,6 +78,10 @@ void CanopenBus::on_node(const NodeEvent& event) {
 }
 
 void CanopenBus::on_port(const can::PortState& state) {
+  if (port_.open && !state.can_send()) {
+    ++losses_;
+    last_loss_ = state.error;
+  }
   port_ = {.open = state.can_send(), .error = state.error};
   if (!port_.open)
     for (auto& [id, node] : nodes_) node.readiness = Readiness::unknown;

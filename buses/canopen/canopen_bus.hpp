@@ -56,6 +56,10 @@ class CanopenBus final : public Bus {
   [[nodiscard]] const NetworkSettings& settings() const { return settings_; }
   /// Of the port, more precise than port(): bus-off and stall need a cycle of the link (M26).
   [[nodiscard]] const can::PortState& link() const { return master_.port().state(); }
+  /// How often the port ceased to be able to send: an outage may be over before somebody looks at the port.
+  [[nodiscard]] std::uint64_t losses() const { return losses_; }
+  /// Why it did so the last time.
+  [[nodiscard]] const std::optional<Error>& last_loss() const { return last_loss_; }
 
   [[nodiscard]] const std::string& name() const override { return settings_.name; }
   [[nodiscard]] bool simulated() const override { return settings_.simulated(); }
@@ -86,6 +90,8 @@ class CanopenBus final : public Bus {
   std::map<std::uint8_t, Node> nodes_;
   std::map<int, std::weak_ptr<std::function<void(TimePoint)>>> sync_handlers_;
   int last_sync_handler_ = 0;
+  std::uint64_t losses_ = 0;
+  std::optional<Error> last_loss_;
   bool closed_ = false;
 };
 

@@ -133,8 +133,22 @@ void MachineCore::start() {
   for (const auto& line : lines_) line->start(parts_.observer);
   for (const auto& network : networks_) network->start();
   for (const auto& cycler : cyclers_) launch(cycler->run(), "link cycler");
+  for (const auto& network : networks_) launch(watch(*network), "network watch");
   for (const auto& axis : axes_) axis->start();
   for (const auto& device : devices_) device->start();
+}
+
+/// A link that was cycled may be up again before any axis polls, and each drive may have gone on meanwhile.
+Task<> MachineCore::watch(canopen::CanopenBus& network) {
+  auto seen = network.losses();
+  while (!closing_) {
+    co_await network.port_changed().wait();
+    if (closing_ || std::exchange(seen, network.losses()) == network.losses()) continue;
+    for (const auto& axis : axes_)
+      if (axis->settings().bus == network.name())
+        axis->bus_lost(
+            network.last_loss().value_or(Error{.reason = Reason::bus_down, .message = "the bus was lost"}));
+  }
 }
 
 Axis* MachineCore::find(std::string_view axis) const {
@@ -202,6 +216,7 @@ bool MachineCore::at_rest() const {
 }
 
 void MachineCore::close() {
+  closing_ = true;
   for (const auto& axis : axes_) axis->close();
   for (const auto& device : devices_) device->close();
   for (const auto& cycler : cyclers_) cycler->close();

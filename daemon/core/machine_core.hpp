@@ -82,6 +82,7 @@ class MachineCore {
   [[nodiscard]] bool buses_reported() const;
 
  private:
+  Task<> watch(canopen::CanopenBus& network);
   void set_inhibit(bool inhibited, const std::string& by);
 
   MachineParts parts_;
@@ -97,6 +98,7 @@ class MachineCore {
   std::vector<std::unique_ptr<Axis>> axes_;
   std::vector<std::unique_ptr<Device>> devices_;
   int sequences_ = 0;  ///< launched ones that still run
+  bool closing_ = false;
   std::map<std::string, Axis*, std::less<>> by_name_;
 };
 

@@ -76,6 +76,9 @@ class Axis {
   Result<CommandPtr> cancel(const CommandPtr& command);
   /// A flag outside changed (inhibit): publish again.
   void refresh() { publish(); }
+  /// The bus could not send for a while, however short: what the axis was doing ends, and a drive that may
+  /// move gets a stop first (M4, M26).
+  void bus_lost(Error cause);
 
   // For work on the drive beside motion: parameters, segments, memory (drive_operations.hpp).
   [[nodiscard]] Drive& drive() { return *drive_; }
@@ -282,7 +285,8 @@ class Axis {
 
   ActivityPtr activity_;
   Stopping stopping_;
-  bool stop_owed_ = false;  ///< M4: to a silent node, until standstill is confirmed
+  std::optional<Error> bus_loss_;  ///< not yet acted upon
+  bool stop_owed_ = false;         ///< M4: to a silent node, until standstill is confirmed
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed

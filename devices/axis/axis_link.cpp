@@ -181,6 +181,7 @@ Task<> Axis::poll() {
       co_await wake_.wait();
       continue;
     }
+    if (bus_loss_) co_return go_offline(Error(*bus_loss_));
     const auto began = env_.clock->now();
     if (!co_await poll_once(failures)) co_return;
     if (failures > 0) continue;  // the bus's own timeouts pace the repetition
@@ -289,7 +290,14 @@ Task<bool> Axis::poll_once(int& failures) {
   co_return true;
 }
 
+void Axis::bus_lost(Error cause) {
+  if (link_ != LinkState::online) return;  // whatever is under way fails by itself, and is repeated
+  bus_loss_ = std::move(cause);
+  wake_.notify_all();
+}
+
 void Axis::go_offline(const Error& cause) {
+  bus_loss_.reset();
   // Homing that a terminal starts meanwhile would zero the counter, and nobody would have seen it.
   if (has_input("homing_start")) lose_trust();
   spdlog::warn("{}: offline: {}", settings_.name, to_string(cause));

@@ -98,6 +98,9 @@ class Client:
     def state(self, axis):
         return self.call(self.axis.GetAxis, axis_pb.GetAxisRequest(axis=axis)).state
 
+    def states(self):
+        return self.call(self.axis.ListAxes, axis_pb.ListAxesRequest()).axes
+
     def info(self):
         return self.call(self.system.GetInfo, system_pb.GetInfoRequest())
 

@@ -4,6 +4,7 @@ import pathlib
 import shutil
 import tempfile
 
+from .can import CanLog, CanSimulator
 from .client import Client
 from .notify import NotifySocket
 from .programs import AXISCTL, AXISD, Program, run
@@ -29,7 +30,9 @@ class Axis:
 
     def option(self):
         model = self.keys.get("model", "ykd2405pr")
-        words = f"node={self.node},model={model},switch.enabled_at_power_up=off"
+        words = f"node={self.node},model={model}"
+        if model != "yss-c":  # which is always released then
+            words += ",switch.enabled_at_power_up=off"
         return words + (f",{self.simulated}" if self.simulated else "")
 
 
@@ -50,11 +53,20 @@ def spinner(node=1, bus="line", simulated="", **keys):
     return Axis(node, bus, simulated, **keys)
 
 
-class Machine:
-    """Not started by itself: start_lines() and start_daemon(), or start()."""
+def turntable(node=5, bus="can0", simulated="", **keys):
+    """A round table on a CAN network, 4000 pulses/rev before its gear of 10."""
+    keys = {"model": "yss-c", "unit": "deg", "scale": "{ microstep: 4000 pulses/rev, gear: 10/1 }",
+            "limits": "{ velocity: 360 deg/s, acceleration_time: 150 ms }"} | keys
+    return Axis(node, bus, simulated, **keys)
 
-    def __init__(self, axes, baud=115200, serial_format="8N1", server=None):
+
+class Machine:
+    """Not started by itself: start_lines() and start_daemon(), or start(). `networks`: the buses that are CAN
+    networks, with their YAML keys; `link_helper`: the socket of axisd-link."""
+
+    def __init__(self, axes, baud=115200, serial_format="8N1", server=None, networks=None, link_helper=None):
         self.axes = axes
+        self.networks = networks or {}
         self.baud, self.serial_format = baud, serial_format
         # In memory where possible, so that a busy disk does not hold up simulators, which log.
         memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
@@ -63,7 +75,9 @@ class Machine:
         self.server = server or f"{{ listen: \"unix:{self.socket}\" }}"
         self.state_directory = os.path.join(self.directory, "state")
         self.config = os.path.join(self.directory, "axisd.yaml")
+        self.link_helper = link_helper or self.path("no-helper.sock")
         self.wire = WireLog(os.path.join(self.directory, "wire.log"))
+        self.frames = CanLog(self.wire.path)
         self.notify = NotifySocket(self.directory)
         self.lines = {}
         self.daemons = []
@@ -76,9 +90,14 @@ class Machine:
     def buses(self):
         return sorted({axis.bus for axis in self.axes.values()})
 
+    def lines_used(self):
+        return [bus for bus in self.buses() if bus not in self.networks]
+
     def write_config(self):
         text = f"machine: e2e\nstate_directory: {self.state_directory}\nserver: {self.server}\nbuses:\n"
-        for bus in self.buses():
+        for bus, keys in self.networks.items():
+            text += f"  {bus}:\n    canopen: {{ {', '.join(f'{key}: {value}' for key, value in keys.items())} }}\n"
+        for bus in self.lines_used():
             text += (f"  {bus}:\n    modbus_rtu: {{ port: {self.path(bus)}, baud: {self.baud}, "
                      f"format: {self.serial_format}, turnaround_max: 1 s }}\n")
         text += "axes:\n"
@@ -86,8 +105,14 @@ class Machine:
             text += f"  {name}:\n{axis.yaml()}"
         pathlib.Path(self.config).write_text(text)
 
-    def start_line(self, bus):
+    def start_line(self, bus, interface=None, bitrate=None):
+        """On CAN: `interface`: where the drives are, if it is another one than the daemon's; `bitrate`: theirs."""
         drives = [axis.option() for axis in self.axes.values() if axis.bus == bus]
+        if bus in self.networks:
+            self.lines[bus] = CanSimulator(bus, self.directory, drives,
+                                           interface or self.networks[bus]["interface"],
+                                           ["--bitrate", str(bitrate)] if bitrate else [])
+            return self.lines[bus]
         self.lines[bus] = Simulator(bus, self.directory, drives,
                                     ["--baud", str(self.baud), "--format", self.serial_format])
         return self.lines[bus]
@@ -100,7 +125,8 @@ class Machine:
         """Starts axisd; returns once it reports READY."""
         self.notify.forget()
         daemon = Program(f"axisd-{len(self.daemons)}",
-                         [AXISD, "--config", self.config, "--wire-log", str(self.wire.path), *options], self.directory,
+                         [AXISD, "--config", self.config, "--wire-log", str(self.wire.path), "--link-helper",
+                          self.link_helper, *options], self.directory,
                          {"NOTIFY_SOCKET": self.notify.path} | (environment or {}))
         self.daemons.append(daemon)
         for client in self._clients:
@@ -143,7 +169,7 @@ class Machine:
         return run([AXISCTL, "--server", f"unix:{self.socket}", *words], limit=120)
 
     def quiesce(self):
-        return run([AXISD, "--quiesce", self.config], limit=60)
+        return run([AXISD, "--quiesce", self.config, "--link-helper", self.link_helper], limit=60)
 
     def logs(self):
         """Everything that was written, the long logs by their ends."""

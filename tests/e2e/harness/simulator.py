@@ -16,14 +16,14 @@ class Shaft(typing.NamedTuple):
 
 
 class Simulator:
-    """One line. Commands: see `help` of its control socket."""
+    """One line, or (`where`) another kind of wire. Commands: see `help` of its control socket."""
 
-    def __init__(self, name, directory, drives, options=()):
+    def __init__(self, name, directory, drives, options=(), where=None):
         self.name = name
         self.port = os.path.join(directory, name)
         self.wire = WireLog(os.path.join(directory, f"{name}.sim.log"))
         self._control = os.path.join(directory, f"{name}.ctl")
-        words = [AXISD_SIM, "--link", self.port, "--log", str(self.wire.path), "--control", self._control, *options]
+        words = [AXISD_SIM, *(where or ["--link", self.port]), "--log", str(self.wire.path), "--control", self._control, *options]
         for drive in drives:
             words += ["--drive", drive]
         self.program = Program(f"sim-{name}", words, directory)

@@ -67,8 +67,8 @@ class WireLog:
         frames = []
         for line in self.text().splitlines(keepends=True):
             words = line.split()
-            if not line.endswith("\n") or len(words) < 3:
-                continue  # being written
+            if not line.endswith("\n") or len(words) < 3 or "#" in line:
+                continue  # being written, or of a CAN network
             if words[1] == "rx":
                 data = bytes.fromhex("".join(words[2:]))
             elif words[2] == "tx" and bus in (None, words[1]):
