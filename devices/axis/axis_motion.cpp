@@ -192,7 +192,14 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
     remember_position();
     tracker_.forget_target();
     const bool jog = activity->command->value().kind == CommandKind::jog;
-    auto cause = error(Reason::soft_limit, "reached the software limit", "move the other way");
+    const auto& limits = settings_.limits;
+    const auto left = activity->plan.positive ? *limits.position_maximum - tracker_.position()
+                                              : tracker_.position() - *limits.position_minimum;
+    const bool short_of_it =
+        scale_.to_pulses(left) * (scale_.pulses_per_unit() < 0 ? -1 : 1) > target_tolerance() + 1;
+    auto cause = short_of_it ? error(Reason::out_of_range,
+                                     "reached the end of the drive's longest single motion", "start it again")
+                             : error(Reason::soft_limit, "reached the software limit", "move the other way");
     finish(*activity,
            [&](CommandRecord& command) { jog ? command.done() : command.abort(std::move(cause)); });
     co_return;

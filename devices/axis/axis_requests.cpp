@@ -258,6 +258,11 @@ Result<Plan> Axis::plan_velocity(double velocity, const MotionValues& with, bool
     return fail(error(Reason::not_trusted, "the position is unknown, so limits cannot be kept",
                       jog ? "configure jog_travel to jog an axis that is not homed" : "home the axis first"));
   }
+  // The limit may be further away than the drive takes as a target: then the motion ends before it.
+  const auto way = static_cast<double>(target.counter - tracker_.counter());
+  if (const auto longest = static_cast<double>(planner_.longest_move()); std::abs(way) > longest)
+    target = tracker_.plan_absolute(tracker_.position() + (target.position - tracker_.position()) *
+                                                              (longest / std::abs(way)) * 0.999);
   auto plan = planner_.move(*profile, target, tracker_);
   if (plan) plan->granted.velocity = velocity_granted;
   if (plan) plan->trusted = tracker_.trust() != PositionTrust::unknown;
@@ -327,11 +332,10 @@ Result<CommandPtr> Axis::accept(const ResetRequest& request, const CommandOption
   if (stopping_.running) return fail(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
   if (sample_ && sample_->alarm_code != 0) {
-    const auto spec = std::ranges::find(descriptor_->alarms, sample_->alarm_code, &AlarmSpec::code);
-    if (spec == descriptor_->alarms.end() || spec->reset != AlarmReset::by_command) {
-      auto cause =
-          error(Reason::alarm, fmt::format("alarm {} is still present", sample_->alarm_code),
-                spec == descriptor_->alarms.end() ? "see the drive's manual" : std::string(spec->remedy));
+    const auto* spec = find_alarm(*descriptor_, sample_->alarm_code);
+    if (spec == nullptr || spec->reset != AlarmReset::by_command) {
+      auto cause = error(Reason::alarm, fmt::format("alarm {} is still present", sample_->alarm_code),
+                         spec == nullptr ? "see the drive's manual" : std::string(spec->remedy));
       cause.where.native_code = sample_->alarm_code;
       return fail(std::move(cause));
     }

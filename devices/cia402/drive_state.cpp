@@ -79,6 +79,7 @@ Task<std::optional<Reading>> Cia402Drive::next_pdos() {
   while (clock_->now() < until && pdos_usable()) {
     if (auto reading = pdos_.since(since)) {
       missed_pdos_ = 0;
+      link_note_.clear();
       co_return reading;
     }
     co_await news_.wait_until(until);
@@ -113,10 +114,8 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
   const auto polled = co_await poll_objects(options);
   if (!polled) co_return fail(polled.error());
   if (rebooted_) co_return fail(lost_memory());
-  if (missed_pdos_ == missed_in_a_row && link_note_.empty())
+  if (missed_pdos_ >= missed_in_a_row && link_note_.empty())
     link_note_ = "state by SDO polling: its TPDOs do not come";
-  else if (missed_pdos_ == 0 && !subscribed_.empty())
-    link_note_.clear();
   co_return judge(*polled);
 }
 
@@ -188,17 +187,17 @@ DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading
   return DriveMode::positioning;
 }
 
-/// A terminal that can start motion is active: the drive moves by itself, and goes on when axisd does not.
+/// A terminal that starts motions is active: the drive moves by itself, and goes on when axisd does not.
 std::optional<DriveMode> Cia402Drive::terminal_motion(const DriveSample& sample) const {
   for (const auto& input : setup_.inputs) {
-    const auto* function = find_function(model_->descriptor->input_functions, input.function);
     const auto terminal = std::ranges::find(model_->descriptor->inputs, input.terminal, &TerminalSpec::name);
-    if (function == nullptr || !function->starts_motion || terminal == model_->descriptor->inputs.end())
-      continue;
+    if (terminal == model_->descriptor->inputs.end()) continue;
     const auto bit = static_cast<unsigned>(terminal - model_->descriptor->inputs.begin());
     if (((sample.inputs >> bit) & 1U) == 0) continue;
-    if (input.function.starts_with("home") || input.function.starts_with("homing")) return DriveMode::homing;
-    return input.function.starts_with("position") ? DriveMode::multi_position : DriveMode::multi_velocity;
+    if (input.function == "homing_start") return DriveMode::homing;
+    if (input.function == "position_start") return DriveMode::multi_position;
+    if (input.function == "speed_start" || input.function.starts_with("jog_"))
+      return DriveMode::multi_velocity;
   }
   return std::nullopt;
 }

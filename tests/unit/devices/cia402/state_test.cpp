@@ -1,0 +1,163 @@
+// Readings put together from PDOs, and the end of a homing.
+#include <gtest/gtest.h>
+
+#include "devices/cia402/homing_watch.hpp"
+#include "devices/cia402/state_pdos.hpp"
+#include "devices/yss_c/model.hpp"
+
+namespace axisd::cia402 {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr TimePoint start{std::chrono::hours(1)};
+
+const Model& model() { return yss_c::model(); }
+
+TEST(StateLayout, OfTheYssCIsTwoPdos) {
+  const auto layout = state_layout(model());
+  ASSERT_EQ(layout.size(), 2U);
+  EXPECT_EQ(layout[0], (canopen::PdoMapping{{{0x6041, 0}, 16}, {{0x6064, 0}, 32}, {{0x2002, 0}, 16}}));
+  EXPECT_EQ(layout[1],
+            (canopen::PdoMapping{{{0x603F, 0}, 16}, {{0x2003, 0}, 16}, {{0x2004, 0}, 16}, {{0x6061, 0}, 8}}));
+}
+
+StatePdos pdos(bool synchronous) {
+  StatePdos all;
+  all.begin(model(), state_layout(model()), synchronous);
+  return all;
+}
+
+/// Status word 0x2027, the position, -100 r/min.
+std::vector<std::uint8_t> first(std::int32_t position) {
+  const auto bits = static_cast<std::uint32_t>(position);
+  return {0x27,
+          0x20,
+          static_cast<std::uint8_t>(bits),
+          static_cast<std::uint8_t>(bits >> 8U),
+          static_cast<std::uint8_t>(bits >> 16U),
+          static_cast<std::uint8_t>(bits >> 24U),
+          0x9C,
+          0xFF};
+}
+const std::vector<std::uint8_t> second{0x02, 0xFF, 0x05, 0x00, 0x01, 0x00, 0x03};
+
+TEST(StatePdos, ByEventAReadingIsAsOldAsItsOldestPart) {
+  auto all = pdos(false);
+  all.on_pdo(0, first(-7), start, start + 1ms);
+  EXPECT_FALSE(all.since(start));
+  all.on_pdo(1, second, start + 5ms, start + 6ms);
+  ASSERT_TRUE(all.since(start));
+  EXPECT_EQ(all.since(start)->asked_at, start);
+  EXPECT_EQ(all.since(start)->measured_at, start + 6ms);
+  EXPECT_FALSE(all.since(start + 1ms));
+  all.on_pdo(0, first(-8), start + 9ms, start + 10ms);
+  EXPECT_TRUE(all.since(start + 5ms));
+  const auto sample = decode_state(model(), 1000, all.since(start + 5ms)->values);
+  EXPECT_EQ(sample.position_pulses, -8);
+  EXPECT_EQ(sample.velocity_rpm, -100);
+  EXPECT_TRUE(sample.moving);
+  EXPECT_TRUE(sample.enabled);
+  EXPECT_EQ(sample.alarm_code, 2);
+  EXPECT_EQ(sample.inputs, 5U);
+  EXPECT_EQ(sample.outputs, 1U);
+}
+
+TEST(StatePdos, WithSyncAReadingIsAsOldAsItsSync) {
+  auto all = pdos(true);
+  all.on_pdo(0, first(1), start, start);
+  all.on_pdo(1, second, start, start);
+  EXPECT_FALSE(all.since(start - 1s)) << "of no SYNC";
+  all.on_sync(start + 10ms);
+  all.on_pdo(1, second, start + 11ms, start + 12ms);
+  EXPECT_FALSE(all.since(start));
+  all.on_pdo(0, first(2), start + 12ms, start + 13ms);
+  ASSERT_TRUE(all.since(start + 10ms));
+  EXPECT_EQ(all.since(start)->asked_at, start + 10ms);
+  // One that is missing may come in the next cycle: then it is that old.
+  all.on_sync(start + 20ms);
+  all.on_pdo(0, first(3), start + 21ms, start + 21ms);
+  all.on_sync(start + 30ms);
+  all.on_pdo(0, first(4), start + 31ms, start + 31ms);
+  all.on_pdo(1, second, start + 32ms, start + 32ms);
+  EXPECT_EQ(all.since(start)->asked_at, start + 20ms);
+  all.forget();
+  EXPECT_FALSE(all.since(start));
+}
+
+TEST(StatePdos, ShortOnesAreNoReading) {
+  auto all = pdos(false);
+  all.on_pdo(0, std::vector<std::uint8_t>{1, 2, 3}, start, start);
+  all.on_pdo(1, second, start, start);
+  EXPECT_FALSE(all.since(start));
+}
+
+DriveSample at(Duration after, bool moving, bool homed, std::int32_t position = 0) {
+  DriveSample sample;
+  sample.asked_at = start + after;
+  sample.moving = moving;
+  sample.homed = homed;
+  sample.enabled = true;
+  sample.position_pulses = position;
+  return sample;
+}
+
+TEST(HomingWatch, EndsWithTheRiseOfTheBit) {
+  HomingWatch watch;
+  watch.begin(start);
+  EXPECT_TRUE(watch.goes_on(at(-1ms, false, true))) << "from before";
+  EXPECT_TRUE(watch.goes_on(at(10ms, true, false)));
+  EXPECT_TRUE(watch.goes_on(at(20ms, false, false))) << "a pause between two phases";
+  EXPECT_TRUE(watch.goes_on(at(30ms, true, false)));
+  EXPECT_TRUE(watch.goes_on(at(40ms, true, true))) << "still moving";
+  EXPECT_FALSE(watch.goes_on(at(50ms, false, true)));
+  EXPECT_FALSE(watch.active());
+}
+
+TEST(HomingWatch, ABitOfTheLastTimeIsNoEnd) {
+  HomingWatch watch;
+  watch.begin(start);
+  EXPECT_TRUE(watch.goes_on(at(10ms, false, true)));
+  EXPECT_TRUE(watch.goes_on(at(20ms, true, true, 50)));
+  EXPECT_TRUE(watch.goes_on(at(30ms, false, true, 60)));
+  EXPECT_TRUE(watch.goes_on(at(400ms, false, true, 61))) << "within the jitter of an encoder";
+  EXPECT_FALSE(watch.goes_on(at(530ms, false, true, 60))) << "it rests for good";
+}
+
+TEST(HomingWatch, EndsWhenThePowerStageIsReleased) {
+  HomingWatch watch;
+  watch.begin(start);
+  auto sample = at(10ms, true, false);
+  sample.enabled = false;
+  EXPECT_FALSE(watch.goes_on(sample));
+}
+
+TEST(Decoding, InHomingTheStateTellsWhetherPowerIsOn) {
+  Values values{{0x604100, 0x0027}, {0x606100, 6}};
+  EXPECT_TRUE(decode_state(model(), 1000, values).enabled);
+  values[0x606100] = 1;
+  EXPECT_FALSE(decode_state(model(), 1000, values).enabled);
+  values[0x604100] = 0x2023;
+  EXPECT_TRUE(decode_state(model(), 1000, values).enabled) << "07h energises already (6.2.2)";
+}
+
+TEST(Decoding, AlarmsAreTheLowByteOfTheMakersCodes) {
+  EXPECT_EQ(alarm_of(model(), 0xFF05), 5);
+  EXPECT_EQ(alarm_of(model(), 0x0000), 0);
+  EXPECT_EQ(alarm_of(model(), 0x2310), 0x2310);
+  const Values fault{{0x604100, 0x0008}};
+  EXPECT_EQ(decode_state(model(), 1000, fault).alarm_code, 0xFFFF) << "a fault without a code";
+}
+
+TEST(Encoding, ForDrivesWithRatesAndPulsesPerSecond) {
+  auto other = model();
+  other.meaning.ramps_are_times = other.meaning.velocity_in_rpm = false;
+  other.objects.start_speed.reset();
+  const MoveProfile profile{
+      .target_pulses = -5, .velocity_rpm = 60, .acceleration_time = 100ms, .deceleration_time = 0ms};
+  EXPECT_EQ(encode(other, 4000, profile), (MotionBlock{-5, 4000, 40'000, 4'000'000, 0}));
+  EXPECT_EQ(encode(model(), 4000, profile), (MotionBlock{-5, 60, 100, 0, 5}));
+  EXPECT_EQ(default_block(model()), (MotionBlock{5000, 120, 100, 100, 5}));
+}
+
+}  // namespace
+}  // namespace axisd::cia402
