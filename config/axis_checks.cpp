@@ -22,11 +22,13 @@ constexpr double slack = 1e-9;
 }  // namespace
 
 void AxisChecks::run() {
+  specialise();
   check_node();
   check_microstep();
   complete_scale();
   check_policies();
   check_poll();
+  check_persist();
   if (axis_.scale.modulo && given("limits.position")) {
     add("scale.modulo", "'modulo' and limits.position exclude each other",
         "an axis that wraps has no software limits; leave one of them out");
@@ -49,6 +51,33 @@ void AxisChecks::add(std::string_view key, std::string message, std::string sugg
 
 std::string AxisChecks::velocity_text(double value) const {
   return fmt::format("{} {}/s", format_number(value), axis_.scale.unit);
+}
+
+void AxisChecks::specialise() {
+  if (model_ == nullptr || model_->specialise == nullptr || !usable("drive")) return;
+  for (const auto& setting : model_->settings) {
+    const auto key = fmt::format("drive.{}", setting.key);
+    if (!usable(key)) return;
+    if (!setting.required || axis_.model_settings.contains(std::string(setting.key))) continue;
+    add("drive", fmt::format("missing key '{}' in {}drive", setting.key, path_),
+        fmt::format("model {} needs it: {}", axis_.model, setting.description));
+    return;
+  }
+  add_default_settings(axis_, *model_);
+  const auto made = model_->specialise(*model_, axis_.model_settings);
+  if (made) {
+    axis_.own_descriptor = *made;
+    model_ = made->get();
+    return;
+  }
+  const auto file = std::ranges::find(model_->settings, "path", &SettingSpec::kind);
+  const auto mark = places_.mark(fmt::format("{}drive.{}", path_, file->key));
+  std::string_view lines = made.error().message;
+  while (!lines.empty()) {
+    const auto end = std::min(lines.find('\n'), lines.size());
+    diagnostics_.add(mark, std::string(lines.substr(0, end)), made.error().remedy);
+    lines.remove_prefix(std::min(end + 1, lines.size()));
+  }
 }
 
 void AxisChecks::check_node() {
@@ -98,6 +127,15 @@ void AxisChecks::check_policies() {
   if (axis_.stop_escalation_release) {
     add("stop_escalation", "'stop_escalation: release' would release a vertical load", "use none");
   }
+}
+
+void AxisChecks::check_persist() {
+  if (model_ == nullptr || !given("persist") || !axis_.persist.any() || !usable("persist")) return;
+  if (std::ranges::find(model_->parameters, Access::rw_saved, &ParameterSpec::access) !=
+      model_->parameters.end())
+    return;
+  add("persist", fmt::format("'persist' has no effect: model {} saves on command only", axis_.model),
+      "leave it out; DriveService.SaveParameters saves everything");
 }
 
 void AxisChecks::check_poll() {
@@ -209,6 +247,12 @@ void AxisChecks::check_start_speed() {
   const auto& capabilities = model_->capabilities;
   const int start = axis_.limits.start_speed_rpm;
   if (!usable("limits.start_speed")) return;
+  if (capabilities.maximum_start_rpm == 0) {
+    if (given("limits.start_speed"))
+      add("limits.start_speed", fmt::format("'start_speed' has no effect: model {} has none", axis_.model),
+          "leave it out");
+    return;
+  }
   if (start < capabilities.minimum_start_rpm || start > capabilities.maximum_start_rpm) {
     add("limits.start_speed", fmt::format("'start_speed' {} r/min is out of range", start),
         fmt::format("model {} takes {} to {} r/min", axis_.model, capabilities.minimum_start_rpm,
@@ -253,6 +297,9 @@ void AxisChecks::check_below(std::string_view key, double velocity, std::string_
 
 void AxisChecks::check_homing() {
   const auto& homing = *axis_.homing;
+  if (model_ != nullptr && !model_->capabilities.homing)
+    add("homing", fmt::format("this drive of model {} does not home", axis_.model),
+        "leave it out; SetPosition tells the axis where it stands");
   check_below("homing.velocity", homing.velocity, "limits.velocity", axis_.limits.velocity);
   check_below("homing.search_velocity", homing.search_velocity, "homing.velocity", homing.velocity);
 }

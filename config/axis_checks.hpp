@@ -36,11 +36,14 @@ class AxisChecks {
   void add(std::string_view key, std::string message, std::string suggestion);
   [[nodiscard]] std::string velocity_text(double value) const;
 
+  /// A model that a file describes: from here on `model_` is that drive.
+  void specialise();
   void check_node();
   void check_microstep();
   void complete_scale();
   void check_policies();
   void check_poll();
+  void check_persist();
   void check_times();
   void check_distances();
   void check_speeds();
@@ -59,6 +62,8 @@ class AxisChecks {
   // Terminals and what hangs on them (terminal_checks.cpp).
   void check_terminals();
   void check_functions(const std::vector<TerminalSettings>& terminals, std::string_view section);
+  void check_fixed_function(const TerminalSettings& terminal, const TerminalFunctionSpec& function,
+                            std::string_view section);
   void check_pv_direction();
   void check_brake();
   void check_homing_switch();

@@ -65,7 +65,8 @@ struct LoadResult {
 };
 
 /// Reads and checks a file completely. Never throws.
-LoadResult load_file(const std::string& path);
+/// `original`: the file is a copy of that one, whose folder relative paths count from.
+LoadResult load_file(const std::string& path, const std::string& original = {});
 LoadResult load_text(std::string_view text, const std::string& file_name);
 
 /// JSON Schema (draft 2020-12) of the file, generated from the definitions that the loader uses.

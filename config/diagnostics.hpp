@@ -13,6 +13,7 @@ class Diagnostics {
  public:
   explicit Diagnostics(std::string file) : file_(std::move(file)) {}
   void add(Mark mark, std::string message, std::string suggestion = {});
+  [[nodiscard]] const std::string& file() const { return file_; }
   [[nodiscard]] bool empty() const { return found_.empty(); }
   /// In the order of the file, each once: a value that several axes use through an alias is wrong once.
   [[nodiscard]] std::vector<Diagnostic> sorted() const;

@@ -248,6 +248,20 @@ Object section(std::span<const KeySpec> keys) {
   return result;
 }
 
+/// It has one function, or on an inverted axis the mirrored one, and one level.
+std::string fixed_terminal(const TerminalSpec& terminal, std::span<const TerminalFunctionSpec> functions) {
+  std::vector<std::string_view> names{terminal.function};
+  if (const auto* function = find_function(functions, terminal.function); !function->mirror.empty())
+    names.push_back(function->mirror);
+  const auto function = Object().raw("enum", strings(names));
+  Object properties;
+  properties.raw("function", function.json());
+  properties.raw("active", Object().text("const", "high").json());
+  const auto long_form =
+      closed(properties).raw("required", strings(std::vector<std::string_view>{"function"}));
+  return Object().raw("anyOf", array({function.json(), long_form.json()})).json();
+}
+
 /// The short form (a function) or the long one ({function, active}).
 std::string terminals(std::span<const TerminalSpec> list, std::span<const TerminalFunctionSpec> functions) {
   std::vector<std::string_view> names;
@@ -262,7 +276,9 @@ std::string terminals(std::span<const TerminalSpec> list, std::span<const Termin
       closed(properties).raw("required", strings(std::vector<std::string_view>{"function"}));
   Object all;
   for (const auto& terminal : list) {
-    all.raw(terminal.name, Object().raw("anyOf", array({function.json(), long_form.json()})).json());
+    all.raw(terminal.name, terminal.function.empty()
+                               ? Object().raw("anyOf", array({function.json(), long_form.json()})).json()
+                               : fixed_terminal(terminal, functions));
   }
   return closed(all).json();
 }
@@ -279,35 +295,44 @@ std::string segments_to(int last) {
 
 std::string if_model(const DriveDescriptor& model) {
   Object settings;
-  for (const auto& setting : model.settings)
+  std::vector<std::string_view> required;
+  for (const auto& setting : model.settings) {
     settings.raw(setting.key, documented(setting_schema(setting)).json());
+    if (setting.required) required.push_back(setting.key);
+  }
   std::vector<std::string> microsteps;
   for (const auto value : model.capabilities.pulses_per_revolution) {
     microsteps.push_back(std::to_string(value));
   }
   Object scale, node, then;
-  scale.raw(
-      "microstep",
-      Object().text("pattern", fmt::format("^(?:{}) *pulses */ *rev$", fmt::join(microsteps, "|"))).json());
+  if (!microsteps.empty())
+    scale.raw(
+        "microstep",
+        Object().text("pattern", fmt::format("^(?:{}) *pulses */ *rev$", fmt::join(microsteps, "|"))).json());
   node.raw("minimum", std::to_string(model.minimum_node)).raw("maximum", std::to_string(model.maximum_node));
   then.raw("node", node.json());
   then.raw("scale", Object().raw("properties", scale.json()).json());
   then.raw("inputs", terminals(model.inputs, model.input_functions));
   then.raw("outputs", terminals(model.outputs, model.output_functions));
-  then.raw("drive", closed(settings).json());
+  auto drive = closed(settings);
+  if (!required.empty()) drive.raw("required", strings(required));
+  then.raw("drive", drive.json());
+  if (model.capabilities.maximum_start_rpm == 0)
+    then.raw("limits", Object().raw("properties", Object().raw("start_speed", "false").json()).json());
   const int last_segment_of_model = model.capabilities.maximum_segments;
   then.raw("segments", last_segment_of_model == 0
                            ? "false"
                            : Object().raw("properties", segments_to(last_segment_of_model)).json());
   if (find_function(model.output_functions, "brake") == nullptr) then.raw("brake", "false");
 
+  Object consequence;
+  consequence.raw("properties", then.json());
+  if (!required.empty()) consequence.raw("required", strings(std::vector<std::string_view>{"drive"}));
   Object is_model, condition, result;
   is_model.raw("model", Object().text("const", model.model).json());
   condition.raw("properties", is_model.json())
       .raw("required", strings(std::vector<std::string_view>{"model"}));
-  return result.raw("if", condition.json())
-      .raw("then", Object().raw("properties", then.json()).json())
-      .json();
+  return result.raw("if", condition.json()).raw("then", consequence.json()).json();
 }
 
 /// Two spaces per level; for people who read it.

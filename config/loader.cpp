@@ -61,14 +61,14 @@ LoadResult load_text(std::string_view text, const std::string& file_name) try {
   return {{}, {{file_name, 0, 0, fmt::format("cannot be loaded: {}", printable(error.what())), ""}}};
 }
 
-LoadResult load_file(const std::string& path) try {
+LoadResult load_file(const std::string& path, const std::string& original) try {
   const auto text = read_file(path);
   if (!text) {
     return {{},
             {{path, 0, 0, fmt::format("cannot be read: {}", text.error().message()),
               "check path and permissions"}}};
   }
-  return load_text(*text, path);
+  return load_text(*text, original.empty() ? path : original);
 } catch (const std::exception& error) {
   return {{}, {{path, 0, 0, fmt::format("cannot be read: {}", printable(error.what())), ""}}};
 }

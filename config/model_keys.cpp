@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "config/reader.hpp"
 #include "config/text.hpp"
@@ -39,9 +40,11 @@ bool other_model_has(std::string_view function, bool inputs) {
   });
 }
 
-SettingValue to_setting(const SettingSpec& setting, const Value& value) {
+/// `folder`: of the file; relative paths count from there.
+SettingValue to_setting(const SettingSpec& setting, const Value& value, const std::filesystem::path& folder) {
   if (setting.kind == "integer") return value.integer;
   if (setting.kind == "boolean") return value.boolean;
+  if (setting.kind == "path") return (folder / value.text).lexically_normal().string();
   return value.text;
 }
 
@@ -58,6 +61,12 @@ KeySpec setting_schema(const SettingSpec& setting) {
   if (setting.kind == "boolean") {
     spec.kind = Kind::boolean;
     spec.example = "true";
+  } else if (setting.kind == "path") {
+    spec.kind = Kind::text;
+    spec.required = setting.required;
+    spec.example = "standard-drive.eds";
+    spec.pattern = "[^\\n]+";
+    spec.pattern_hint = "write the path of a file";
   } else if (setting.kind == "integer") {
     spec.kind = Kind::integer;
     spec.example = "1";
@@ -80,8 +89,8 @@ void Reader::read_terminals(const Node& value, const std::string& path, bool inp
     if (std::ranges::find(names, key.text) == names.end()) {
       report(here, key.mark,
              fmt::format("model {} has no {} terminal {}", model->model, inputs ? "input" : "output",
-                         quoted(key.text)),
-             "it has " + alternatives(names));
+                         config::quoted(key.text)),
+             names.empty() ? "it has none" : "it has " + alternatives(names));
       continue;
     }
     target_.terminal = &terminals.emplace_back();
@@ -108,7 +117,7 @@ void Reader::read_terminal(const Node& value, const std::string& path, bool inpu
     const auto names = names_of(functions, [](const TerminalFunctionSpec& f) { return f.name; });
     report(function_path, places_.mark(function_path),
            fmt::format("model {} has no {} function {}", model->model, inputs ? "input" : "output",
-                       quoted(terminal.function)),
+                       config::quoted(terminal.function)),
            other_model_has(terminal.function, inputs) ? "permitted: " + alternatives(names)
                                                       : suggest(terminal.function, names));
   }
@@ -119,12 +128,14 @@ void Reader::read_model_settings(const Node& value, const std::string& path) {
   const auto* model = find_drive_model(target_.axis->axis.model);
   if (model == nullptr) return;  // reported
   const auto names = names_of(model->settings, [](const SettingSpec& s) { return s.key; });
+  const auto folder = std::filesystem::path(diagnostics_.file()).parent_path();
   for (const auto& [key, node] : unique_entries(value)) {
     const auto here = fmt::format("{}.{}", path, printable(key.text));
     places_.add(here, node.kind == Node::Kind::scalar ? node.mark : key.mark);
     const auto setting = std::ranges::find(model->settings, key.text, &SettingSpec::key);
     if (setting == model->settings.end()) {
-      report(here, key.mark, fmt::format("model {} has no setting {}", model->model, quoted(key.text)),
+      report(here, key.mark,
+             fmt::format("model {} has no setting {}", model->model, config::quoted(key.text)),
              suggest(key.text, names));
       continue;
     }
@@ -134,7 +145,7 @@ void Reader::read_model_settings(const Node& value, const std::string& path) {
       continue;
     }
     target_.axis->axis.model_settings.insert_or_assign(std::string(setting->key),
-                                                       to_setting(*setting, *parsed));
+                                                       to_setting(*setting, *parsed, folder));
   }
 }
 
@@ -146,7 +157,7 @@ void add_default_settings(AxisSettings& axis, const DriveDescriptor& model) {
     node.text = setting.default_value;
     const auto value = parse_value(setting_schema(setting), node, "");
     // A default that its own model refuses is a bug there; the tests of this folder go through all models.
-    if (value) axis.model_settings.try_emplace(std::string(setting.key), to_setting(setting, *value));
+    if (value) axis.model_settings.try_emplace(std::string(setting.key), to_setting(setting, *value, {}));
   }
 }
 

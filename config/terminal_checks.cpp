@@ -91,10 +91,29 @@ void AxisChecks::check_functions(const std::vector<TerminalSettings>& terminals,
     if (!function->unusable.empty())
       add(key, fmt::format("function '{}' is never assigned", terminal.function),
           std::string(function->unusable));
+    check_fixed_function(terminal, *function, section);
     const auto [owner, is_first] = owners.try_emplace(terminal.function, terminal.terminal);
     if (is_first) continue;
     add(key, fmt::format("function '{}' is assigned to {} already", terminal.function, owner->second),
         "one terminal per function");
+  }
+}
+
+void AxisChecks::check_fixed_function(const TerminalSettings& terminal, const TerminalFunctionSpec& function,
+                                      std::string_view section) {
+  const auto all = section == "inputs" ? model_->inputs : model_->outputs;
+  const auto spec = std::ranges::find(all, terminal.terminal, &TerminalSpec::name);
+  if (spec == all.end() || spec->function.empty()) return;
+  const bool mirrored = axis_.scale.invert && !function.mirror.empty();
+  if ((mirrored ? function.mirror : function.name) != spec->function) {
+    add(fmt::format("{}.{}.function", section, terminal.terminal),
+        fmt::format("terminal {} of model {} is always the drive's {}", terminal.terminal, axis_.model,
+                    spec->function),
+        axis_.scale.invert ? "on an inverted axis it has the mirrored function" : "give it that function");
+  } else if (terminal.active_low) {
+    add(fmt::format("{}.{}.active", section, terminal.terminal),
+        fmt::format("the level of terminal {} cannot be set on model {}", terminal.terminal, axis_.model),
+        "leave 'active' out; set the level with the drive's own tool");
   }
 }
 

@@ -208,7 +208,7 @@ int run_quiesce(const Options& options) {
         options.state_directory.empty() ? config::Configuration{}.state_directory : options.state_directory;
     std::cerr << "axisd: using the last configuration that was served: " << last_good(directory).string()
               << '\n';
-    loaded = config::load_file(last_good(directory).string());
+    loaded = config::load_file(last_good(directory).string(), *options.quiesce);
   }
   if (!loaded.configuration) {
     std::cerr << "axisd: no usable configuration: nothing was stopped\n";

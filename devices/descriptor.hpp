@@ -160,8 +160,8 @@ struct DriveDescriptor {
   std::optional<CanIdentification> can_identification{};  ///< of canopen models; nothing: it cannot be told
   std::unique_ptr<Drive> (*make)(DriveContext context) = nullptr;
   /// Of a model that a file of the machine builder describes: the descriptor of one drive, made from this one
-  /// and its settings. It reads the file: not on the core thread. Then `make` needs it in DriveSetup. nullptr:
-  /// this descriptor is every drive's. Errors (invalid_argument): one finding per line.
+  /// and its settings. It reads the file: not on the core thread. Then `make` needs it in DriveSetup.
+  /// nullptr: this descriptor is every drive's. Errors (invalid_argument): one finding per line.
   Result<std::shared_ptr<const DriveDescriptor>> (*specialise)(
       const DriveDescriptor& model, const std::map<std::string, SettingValue>& settings) = nullptr;
 };

@@ -22,7 +22,10 @@ void add_terminals(std::span<const TerminalSpec> terminals, std::span<const Term
   for (const auto& terminal : terminals) {
     auto& capability = *to.Add();
     capability.set_name(std::string(terminal.name));
-    for (const auto& function : ordered) capability.add_functions(std::string(function.name));
+    for (const auto& function : ordered)
+      if (terminal.function.empty() || function.name == terminal.function ||
+          function.mirror == terminal.function)  // on an inverted axis
+        capability.add_functions(std::string(function.name));
   }
 }
 

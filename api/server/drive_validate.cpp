@@ -173,7 +173,8 @@ class Times {
 Result<KnownDrive> find_drive(const Machine& machine, const std::string& axis) {
   auto snapshot = find_axis(machine, axis);
   if (!snapshot) return fail(std::move(snapshot).error());
-  const auto* model = find_drive_model((*snapshot)->model);
+  const auto* own = (*snapshot)->own_descriptor.get();
+  const auto* model = own != nullptr ? own : find_drive_model((*snapshot)->model);
   if (model == nullptr)
     return fail(Reason::internal, fmt::format("{}: no data about model {}", axis, (*snapshot)->model),
                 "report this");

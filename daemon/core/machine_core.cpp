@@ -56,7 +56,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
   for (const auto& entry : configuration.axes) {
     const auto& settings = entry.axis;
     auto* bus = find_bus(settings.bus);
-    const auto* descriptor = find_drive_model(settings.model);
+    const auto* descriptor = descriptor_of(settings);
     auto setup =
         descriptor == nullptr ? fail(Reason::internal, "unknown model") : drive_setup(settings, *descriptor);
     // The loader has refused all of this with its position in the file.

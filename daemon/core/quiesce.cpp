@@ -87,13 +87,13 @@ class Machine {
     for (const auto& entry : configuration.axes) {
       const auto* line = find(lines_, entry.axis.bus);
       const auto* network = find(networks_, entry.axis.bus);
-      drives_.push_back(find_drive_model(entry.axis.model)
+      drives_.push_back(descriptor_of(entry.axis)
                             ->make({.executor = executor_,
                                     .clock = parts.clock,
                                     .rtu = line == nullptr ? nullptr : line->get(),
                                     .canopen = network == nullptr ? nullptr : network->get(),
                                     .node = entry.axis.node,
-                                    .setup = {}}));
+                                    .setup = {.own_descriptor = entry.axis.own_descriptor}}));
       buses_.push_back(line != nullptr ? static_cast<Bus*>(line->get()) : network->get());
     }
     // After the drives, which are attached to their network before it starts.

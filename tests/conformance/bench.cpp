@@ -30,7 +30,7 @@ Bench::Bench(const Setup& setup_of, const Plant& plant, const Recipe& recipe_of,
       recipe(recipe_of),
       target(setup_of.make_target(plant)),
       client(*target, "axis"),
-      terminals_(terminals_of(setup_of.manual, recipe_of)) {
+      terminals_(terminals_of(setup_of.manual, setup_of.variant, recipe_of)) {
   if (!connect) return;
   await([](const auto& s) { return s.link() != v1::LINK_STATE_OFFLINE; }, "reached");
   pass(1s);

@@ -10,13 +10,17 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr const char* persist_keys[] = {"false", "true", "[terminals]"};
+/// What `persist:` can be; a drive that saves on command only has no use for it.
+std::vector<std::string> persist_keys(const Setup& setup) {
+  if (setup.manual.has("saves_on_command_only")) return {"false"};
+  return {"false", "true", "[terminals]"};
+}
 
 Recipe persisting(const std::string& persist) { return {.keys = fmt::format("    persist: {}\n", persist)}; }
 
 /// Two restarts in a row, and a power cycle, write nothing: what is there already is not written again.
 std::string restarts(const Setup& setup) {
-  for (const std::string persist : persist_keys) {
+  for (const auto& persist : persist_keys(setup)) {
     SCOPED_TRACE("persist: " + persist);
     Bench bench(setup, persisting(persist));
     bench.pass(2s);
@@ -46,7 +50,7 @@ std::string restarts(const Setup& setup) {
 std::string thousand_moves(const Setup& setup) {
   // The wear does not depend on the direction of the axis.
   const int moves = setup.variant.invert ? 50 : 1000;
-  for (const std::string persist : persist_keys) {
+  for (const auto& persist : persist_keys(setup)) {
     SCOPED_TRACE("persist: " + persist);
     Bench bench(setup, persisting(persist));
     bench.ready();

@@ -110,10 +110,30 @@ std::map<int, std::string> Manual::functions(const std::string& prefix) const {
   return named;
 }
 
+bool Manual::lacks(std::string_view scenario) const {
+  if (!has("lacks")) return false;
+  const auto all = list("lacks");
+  return std::ranges::find(all, scenario) != all.end();
+}
+
+std::string Manual::terminal_of(const std::string& function) const {
+  const std::string prefix = "only_function.";
+  for (const auto& [key, value] : abilities_)
+    if (key.starts_with(prefix) && value == function) return key.substr(prefix.size());
+  return {};
+}
+
+std::vector<std::string> models() {
+  std::vector<std::string> all;
+  for (const auto* model : drive_models()) all.emplace_back(model->model);
+  return all;
+}
+
 std::vector<Manual> same_bus(const Manual& manual) {
+  if (manual.has("data_sheet")) return {manual};
   std::vector<Manual> all;
-  for (const auto* model : drive_models())
-    if (Manual one{std::string(model->model)}; one.bus() == manual.bus()) all.push_back(std::move(one));
+  for (const auto& model : models())
+    if (Manual one(model); one.bus() == manual.bus() && !one.has("data_sheet")) all.push_back(std::move(one));
   return all;
 }
 

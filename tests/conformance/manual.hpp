@@ -39,6 +39,11 @@ class Manual {
   [[nodiscard]] std::int64_t number(const std::string& ability) const {
     return std::stoll(text(ability), nullptr, 0);
   }
+  [[nodiscard]] bool has(const std::string& ability) const { return abilities_.contains(ability); }
+  /// The model has nothing that the scenario could be about; its abilities name such scenarios.
+  [[nodiscard]] bool lacks(std::string_view scenario) const;
+  /// The only terminal that can have this function of the drive; empty: any can.
+  [[nodiscard]] std::string terminal_of(const std::string& function) const;
   [[nodiscard]] bool says_yes(const std::string& ability) const { return text(ability) == "yes"; }
   /// Of an ability like "16..127": both ends are within.
   [[nodiscard]] std::pair<std::int64_t, std::int64_t> range(const std::string& ability) const;
@@ -58,7 +63,10 @@ class Manual {
   std::map<std::string, std::string> abilities_;
 };
 
-/// Manuals of all models of drive_models() that are on the same kind of bus as `manual`, itself among them.
+/// All models of drive_models(), in that order.
+std::vector<std::string> models();
+/// Manuals of all of them that are on the same kind of bus as `manual`, itself among them. A
+/// drive that only its data sheet describes does not say which model it is: it stands alone.
 std::vector<Manual> same_bus(const Manual& manual);
 
 }  // namespace axisd::conformance

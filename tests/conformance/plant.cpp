@@ -32,12 +32,23 @@ std::vector<Wanted> inputs_of(const Recipe& recipe) {
   return inputs;
 }
 
-std::string terminal_lines(const std::vector<std::string>& names, const std::vector<Wanted>& wanted) {
+/// A terminal for each function: the one that has it for good, else one after the other.
+std::vector<std::string> chosen(const Manual& manual, const std::vector<std::string>& names,
+                                const std::vector<Wanted>& wanted, bool invert) {
   if (wanted.size() > names.size())
     throw std::invalid_argument("the model has too few terminals for this recipe");
+  std::vector<std::string> terminals;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const auto only = manual.terminal_of(function_of_drive(wanted[i].function, invert));
+    terminals.push_back(only.empty() ? names[i] : only);
+  }
+  return terminals;
+}
+
+std::string terminal_lines(const std::vector<std::string>& terminals, const std::vector<Wanted>& wanted) {
   std::string text;
   for (std::size_t i = 0; i < wanted.size(); ++i)
-    text += fmt::format("      {}: {{ function: {}, active: {} }}\n", names[i], wanted[i].function,
+    text += fmt::format("      {}: {{ function: {}, active: {} }}\n", terminals[i], wanted[i].function,
                         wanted[i].active_low ? "low" : "high");
   return text;
 }
@@ -58,6 +69,11 @@ std::string mechanics_of(const Variant& variant, const Recipe& recipe) {
 
 }  // namespace
 
+std::string function_of_drive(const std::string& function, bool invert) {
+  if (invert && function == "positive_limit") return "negative_limit";
+  return invert && function == "negative_limit" ? "positive_limit" : function;
+}
+
 bool can_home_on_the_home_switch(const Manual& manual, const Variant& variant) {
   const bool as_searched = std::ranges::any_of(other_readings, [&](const Reading& one) {
     return one.key == "home_approach" && variant.switches.contains(std::string(one.switch_name));
@@ -75,11 +91,12 @@ std::string Variant::name() const {
   return text;
 }
 
-std::map<std::string, std::string> terminals_of(const Manual& manual, const Recipe& recipe) {
+std::map<std::string, std::string> terminals_of(const Manual& manual, const Variant& variant,
+                                                const Recipe& recipe) {
   std::map<std::string, std::string> terminals;
-  const auto names = manual.list("inputs");
   const auto inputs = inputs_of(recipe);
-  for (std::size_t i = 0; i < inputs.size(); ++i) terminals[inputs[i].function] = names.at(i);
+  const auto names = chosen(manual, manual.list("inputs"), inputs, variant.invert);
+  for (std::size_t i = 0; i < inputs.size(); ++i) terminals[inputs[i].function] = names[i];
   return terminals;
 }
 
@@ -105,11 +122,17 @@ Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& rec
     yaml += fmt::format("    homing: {{ method: {}, {} }}\n",
                         recipe.homing == "any" ? any_homing_method(manual, variant) : recipe.homing,
                         recipe.homing_keys);
-  if (const auto lines = terminal_lines(manual.list("inputs"), inputs_of(recipe)); !lines.empty())
-    yaml += "    inputs:\n" + lines;
+  const auto inputs = inputs_of(recipe);
+  if (!inputs.empty())
+    yaml += "    inputs:\n" +
+            terminal_lines(chosen(manual, manual.list("inputs"), inputs, variant.invert), inputs);
   if (!recipe.outputs.empty())
-    yaml += "    outputs:\n" + terminal_lines(manual.list("outputs"), recipe.outputs);
+    yaml += "    outputs:\n" +
+            terminal_lines(chosen(manual, manual.list("outputs"), recipe.outputs, false), recipe.outputs);
   std::string settings = recipe.settings;
+  if (manual.has("data_sheet"))
+    settings += fmt::format("{}eds: {}/{}", settings.empty() ? "" : ", ", AXISD_SOURCE_DIR,
+                            manual.text("data_sheet"));
   for (const auto& one : other_readings)
     if (variant.switches.contains(std::string(one.switch_name)))
       settings += fmt::format("{}{}: {}", settings.empty() ? "" : ", ", one.key, one.value);

@@ -51,6 +51,8 @@ struct Recipe {
   std::string drive{};     ///< further parts of --drive
 };
 
+/// A limit of an inverted axis is the drive's other one.
+[[nodiscard]] std::string function_of_drive(const std::string& function, bool invert);
 /// M18: where the last approach of the home methods has a direction of its own, an inverted axis cannot
 /// mirror it.
 [[nodiscard]] bool can_home_on_the_home_switch(const Manual& manual, const Variant& variant);
@@ -58,7 +60,8 @@ struct Recipe {
 [[nodiscard]] std::string any_homing_method(const Manual& manual, const Variant& variant);
 
 /// Terminals of a recipe: function -> terminal, in the order in which they are given away.
-std::map<std::string, std::string> terminals_of(const Manual& manual, const Recipe& recipe);
+std::map<std::string, std::string> terminals_of(const Manual& manual, const Variant& variant,
+                                                const Recipe& recipe);
 
 /// What a plant's YAML begins with: the bus "line", of the kind that the model is made for; `baud` as in a
 /// recipe, `sync_period` where the bus has SYNC.

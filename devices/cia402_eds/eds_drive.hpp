@@ -1,0 +1,51 @@
+// One CiA 402 drive as its EDS describes it: what a model folder has as tables, made from a file.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "buses/canopen/eds.hpp"
+#include "devices/cia402/model.hpp"
+#include "devices/cia402_eds/catalogue.hpp"
+#include "devices/descriptor.hpp"
+
+namespace axisd::cia402_eds {
+
+/// What an EDS does not say.
+struct Conventions {
+  bool velocity_in_rpm = false;  ///< else in position increments per second
+  bool ramps_are_times = false;  ///< 6083h, 6084h, 609Ah in ms; else in velocity units per second
+  bool closed_loop = true;       ///< 6064h is measured
+};
+Conventions conventions_of(const std::map<std::string, SettingValue>& settings);
+
+/// Lives as long as an axis refers to it; everything that it points to is its own or lives as long as the
+/// program.
+class EdsDrive final : public DriveDescriptor {
+ public:
+  /// Precondition: check_eds() found nothing.
+  EdsDrive(const DriveDescriptor& base, const canopen::Eds& eds, const Conventions& conventions);
+  EdsDrive(const EdsDrive&) = delete;
+  EdsDrive& operator=(const EdsDrive&) = delete;
+
+  [[nodiscard]] const cia402::Model& model() const { return model_; }
+
+ private:
+  Catalogue catalogue_;
+  std::vector<cia402::HomingCode> homing_codes_;
+  cia402::Model model_;
+};
+
+/// What of the EDS keeps the driver from running such a drive, one text each: objects that are missing, of
+/// the wrong kind, or not writable.
+std::vector<std::string> check_eds(const canopen::Eds& eds);
+
+/// Reads the file of the setting `eds`. Errors (invalid_argument): none is named, it cannot be read, it has
+/// errors
+/// ("FILE:LINE: ..." one per line), or check_eds() found something.
+Result<std::shared_ptr<const DriveDescriptor>> specialise(
+    const DriveDescriptor& base, const std::map<std::string, SettingValue>& settings);
+
+}  // namespace axisd::cia402_eds

@@ -1,0 +1,184 @@
+// Power, time and inputs of the simulated standard drive.
+#include "devices/cia402_eds/simulator.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <utility>
+
+#include "devices/cia402_eds/simulator_dictionary.hpp"
+
+namespace axisd::cia402_eds {
+
+namespace {
+
+using simulation::SimulatedNodeSettings;
+
+constexpr TerminalSpec inputs[] = {{"NEG"}, {"POS"}, {"HOME"}};
+/// Error codes of CiA 402-2 that it can report.
+constexpr int codes[] = {0x1000, 0x2110, 0x2120, 0x2220, 0x2230, 0x2310, 0x2320, 0x2330, 0x2340,
+                         0x2350, 0x3110, 0x3120, 0x3130, 0x3210, 0x3220, 0x4110, 0x4210, 0x4310,
+                         0x5113, 0x5441, 0x5530, 0x6100, 0x6320, 0x7110, 0x7121, 0x7300, 0x7305,
+                         0x7310, 0x7500, 0x8130, 0x8400, 0x8500, 0x8611, 0x8612};
+constexpr Duration communication_reset_time = std::chrono::milliseconds(10);
+
+std::unique_ptr<simulation::SimulatedCanNode> make(SimulatedNodeSettings settings) {
+  return std::make_unique<StandardDrive>(std::move(settings));
+}
+
+}  // namespace
+
+std::span<const simulation::Simulator> simulators() {
+  static const std::array<simulation::Simulator, 1> all{{{.model = "cia402",
+                                                          .make_can = &make,
+                                                          .switches = switch_specs(),
+                                                          .inputs = inputs,
+                                                          .last_register = 0x6502FF,
+                                                          .maximum_dip_address = 127}}};
+  return all;
+}
+
+StandardDrive::StandardDrive(SimulatedNodeSettings settings)
+    : behaviour_(behaviour_from(settings.switches)),
+      settings_(std::move(settings)),
+      server_({.pdos = pdo_settings, .sdo = {.segmented_uploads = behaviour_.segmented_uploads}}, dictionary_,
+              hooks(), [this](bool communication_only) { nmt_reset(communication_only); }),
+      inputs_(cia402_eds::inputs, {home_switch, positive_limit, negative_limit}, settings_) {
+  add_rows(dictionary_);
+  for (const auto& [key, value] : settings_.eeprom) dictionary_.preset(key, value);
+  if (!settings_.powered) return;
+  powered_ = true;
+  restart(true);
+  boot_end_.reset();
+  server_.boot_quietly(settings_.address, now_);
+}
+
+/// Everything as after a power-up: nothing runs and nothing waits.
+void StandardDrive::restart(bool counter_lost) {
+  cut();
+  boot_end_ = now_ + settings_.boot_time;
+  if (std::exchange(load_defaults_, false)) dictionary_.restore_factory();
+  dictionary_.power_up();
+  for (const auto index : volatile_objects())
+    dictionary_.set(index, 0, dictionary_.find(index, 0)->default_value);
+  if (counter_lost) motor_.power_up();
+  state_ = State::disabled;
+  control_ = 0;
+  mode_ = fault_ = 0;
+  reached_ = acknowledged_ = limited_ = attained_ = homing_error_ = homing_interrupted_ = false;
+  activity_ = Activity::none;
+  stopping_ = velocity_held_ = false;
+  inputs_.settle(motor_.shaft(), {.functions = {negative_limit, positive_limit, home_switch}});
+  server_.boot(settings_.address, *boot_end_);
+}
+
+void StandardDrive::nmt_reset(bool communication_only) {
+  if (!communication_only) {
+    restart(true);
+    return;
+  }
+  dictionary_.power_up(0x1000, 0x1FFF);
+  server_.boot(server_.node(), now_ + communication_reset_time);
+}
+
+void StandardDrive::set_power(bool on) {
+  if (on == powered_) return;
+  powered_ = on;
+  if (on) {
+    restart(true);
+    return;
+  }
+  cut();
+  state_ = State::disabled;
+  boot_end_.reset();
+  server_.switch_off();
+}
+
+void StandardDrive::advance(TimePoint now) {
+  now = std::max(now, now_);
+  for (auto next = next_event(); next <= now; next = next_event()) step(std::max(next, now_));
+  step(now);
+}
+
+TimePoint StandardDrive::next_event() const {
+  if (!powered_) return TimePoint::max();
+  return std::min(motion_event(), server_.next_event());
+}
+
+TimePoint StandardDrive::motion_event() const {
+  if (boot_end_) return *boot_end_;
+  if (!motor_.moving()) return TimePoint::max();
+  auto next = std::min(motor_.ends(), motor_.lags(dictionary_.get(0x6065) + 1));
+  const auto change = inputs_.next_switch(motor_.shaft(), motor_.direction());
+  return change ? std::min(next, motor_.reaches(*change)) : next;
+}
+
+void StandardDrive::step(TimePoint now) {
+  constexpr int following_error = 0x8611;
+  now_ = now;
+  const bool ended = motor_.advance(now, energised());
+  if (boot_end_ && now >= *boot_end_) boot_end_.reset();
+  if (alive()) {
+    for (const auto& edge :
+         inputs_.sample(now, motor_.shaft(), {.functions = {negative_limit, positive_limit, home_switch}}))
+      homing_edge(edge);
+    if (energised() && std::llabs(motor_.lag()) > dictionary_.get(0x6065)) fail_with(following_error);
+    enforce_limits();
+    if (ended && !motor_.moving()) on_stopped();
+    follow_velocity();
+    // Event PDOs look when something changed; what changes with time alone they look at by themselves.
+    if (const auto present = appearance(); std::exchange(appearance_, present) != present) server_.touch(now);
+  }
+  server_.advance(now);
+}
+
+/// All that can change by itself and shows in mappable objects, but the position.
+std::uint64_t StandardDrive::appearance() const {
+  return std::uint64_t{status()} | std::uint64_t{inputs_.bits()} << 16U |
+         (motor_.moving() ? std::uint64_t{1} << 32U : 0U) | static_cast<std::uint64_t>(starts_) << 33U;
+}
+
+void StandardDrive::on_frame(const can::Frame& frame) {
+  if (!powered_) return;
+  server_.on_frame(frame, now_);
+  step(now_);
+}
+
+void StandardDrive::set_input(std::string_view terminal, std::optional<bool> active) {
+  inputs_.drive(terminal, active);
+  step(now_);
+}
+
+std::span<const int> StandardDrive::alarms() const { return codes; }
+
+void StandardDrive::raise_alarm(int code) {
+  if (code != 0 && alive()) fail_with(code);
+  step(now_);
+}
+
+void StandardDrive::block_shaft(bool blocked) {
+  motor_.block(blocked);
+  step(now_);
+}
+
+bool StandardDrive::push_shaft(std::int64_t pulses) {
+  if (motor_.blocked() || energised()) return false;
+  motor_.push(pulses, powered_);
+  server_.touch(now_);
+  step(now_);
+  return true;
+}
+
+std::uint32_t StandardDrive::peek(std::uint32_t address) const {
+  const auto* row =
+      dictionary_.find(static_cast<std::uint16_t>(address >> 8U), static_cast<std::uint8_t>(address));
+  return row == nullptr ? 0 : static_cast<std::uint32_t>(server_.objects().value(*row));
+}
+
+void StandardDrive::poke(std::uint32_t address, std::uint32_t value) {
+  dictionary_.set(static_cast<std::uint16_t>(address >> 8U), static_cast<std::uint8_t>(address), value);
+  server_.touch(now_);
+  step(now_);
+}
+
+}  // namespace axisd::cia402_eds

@@ -1,0 +1,150 @@
+// A model that a file describes: errors of the file stand at its key, and nothing else is lost.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "devices/descriptor.hpp"
+#include "tests/unit/config/support.hpp"
+
+namespace axisd::config {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::string_view template_text = R"(machine: press-1
+buses:
+  can0:
+    canopen: {{ interface: sim }}
+axes:
+  feeder:
+    bus: can0
+    node: 1
+    model: cia402
+    unit: mm
+    scale: {{ microstep: {} pulses/rev, travel: 5 mm/rev, invert: {} }}
+    limits: {{ position: [0, 300], velocity: {} }}
+    inputs: {{ {} }}
+    drive:
+      eds: {}
+{})";
+
+struct Axis {
+  std::string pulses = "65536", invert = "false", velocity = "100 mm/s";
+  std::string inputs = "NEG: negative_limit, POS: positive_limit, HOME: home";
+  std::string eds = "standard-drive.eds", more{};
+};
+
+LoadResult load(const Axis& axis) {
+  const auto text = fmt::format(fmt::runtime(template_text), axis.pulses, axis.invert, axis.velocity,
+                                axis.inputs, axis.eds, axis.more);
+  return load_text(text, source_path("config/examples/test.yaml").string());
+}
+
+/// A file of its own for each test, beside which nothing else stands.
+class EdsFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = std::filesystem::path(::testing::TempDir()) /
+            fmt::format("axisd-{}-{}.eds", ::testing::UnitTest::GetInstance()->current_test_info()->name(),
+                        ::testing::UnitTest::GetInstance()->random_seed());
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+  void write(std::string_view text) const { std::ofstream(path_, std::ios::binary) << text; }
+  /// The example with one text replaced by another.
+  void write_changed(std::string_view from, std::string_view to) const {
+    auto text = read_text(source_path("config/examples/standard-drive.eds"));
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write(text.replace(at, from.size(), to));
+  }
+  [[nodiscard]] std::string found(Axis axis = {}) const {
+    axis.eds = path_.string();
+    return findings(load(axis));
+  }
+
+  std::filesystem::path path_;
+};
+
+TEST(Eds, MakesTheModelThatDrive) {
+  const auto result = load({});
+  ASSERT_TRUE(result.configuration) << findings(result);
+  const auto& axis = result.configuration->axes[0].axis;
+  ASSERT_NE(axis.own_descriptor, nullptr);
+  EXPECT_EQ(descriptor_of(axis), axis.own_descriptor.get());
+  EXPECT_NE(find_parameter(axis.own_descriptor->parameters, 0x608100), nullptr);
+  EXPECT_EQ(axis.model_settings.at("eds"),
+            SettingValue(source_path("config/examples/standard-drive.eds").string()));
+  EXPECT_EQ(axis.model_settings.at("ramps"), SettingValue(std::string("rate")));
+}
+
+TEST(Eds, TakesAnyNumberOfPulses) {
+  EXPECT_TRUE(load({.pulses = "12345"}).configuration);
+  // 2,000,000 increments/s: 30 r/s at 65536 pulses/rev.
+  EXPECT_THAT(findings(load({.velocity = "200 mm/s"})), HasSubstr("at most 1831 r/min at 65536 pulses/rev"));
+}
+
+TEST(Eds, TerminalsHaveOneFunctionEach) {
+  EXPECT_THAT(
+      findings(load({.inputs = "NEG: home"})),
+      HasSubstr("test.yaml:13:20: terminal NEG of model cia402 is always the drive's negative_limit"));
+  EXPECT_THAT(findings(load({.inputs = "NEG: { function: negative_limit, active: low }"})),
+              HasSubstr("the level of terminal NEG cannot be set"));
+  EXPECT_TRUE(load({.inputs = "NEG: { function: negative_limit, active: high }"}).configuration);
+  // On an inverted axis the drive's negative limit is the axis's positive one.
+  EXPECT_TRUE(load({.invert = "true", .inputs = "NEG: positive_limit, HOME: home"}).configuration);
+  EXPECT_THAT(findings(load({.invert = "true"})),
+              HasSubstr("on an inverted axis it has the mirrored function"));
+}
+
+TEST(Eds, WhatTheDriveLacksIsRefused) {
+  EXPECT_THAT(findings(load({.more = "    outputs: { Y0: alarm }\n"})),
+              HasSubstr("model cia402 has no output terminal 'Y0'; it has none"));
+  EXPECT_THAT(
+      findings(load({.more = "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 "
+                             "mm/s, offset: 1 mm }\n"})),
+      HasSubstr("'offset' 1 mm is out of range; model cia402 takes up to 0 mm either way"));
+}
+
+TEST(Eds, NothingIsSavedByTheWay) {
+  EXPECT_THAT(findings(load({.more = "    persist: true\n"})), HasSubstr("saves on command only"));
+  EXPECT_TRUE(load({.more = "    persist: false\n"}).configuration);
+}
+
+TEST_F(EdsFile, ErrorsAreNamedWithTheirLines) {
+  write_changed("DefaultValue=0x00020192", "DefaultValue=many");
+  const auto line = [&] {
+    const auto text = read_text(path_);
+    return 1 + std::ranges::count(text.substr(0, text.find("DefaultValue=many")), '\n');
+  }();
+  const auto text = found({.velocity = "1 mm/min"});
+  EXPECT_THAT(text, HasSubstr(fmt::format("test.yaml:15:12: {}:{}: ", path_.string(), line)));
+  EXPECT_THAT(text, HasSubstr("test.yaml:12:")) << "the rest is judged all the same";
+}
+
+TEST_F(EdsFile, EachMissingObjectIsNamed) {
+  write(
+      "[DeviceInfo]\nVendorNumber=1\n[6041]\nParameterName=Statusword\nObjectType=7\nDataType=6\nAccessType="
+      "ro\n");
+  const auto text = found();
+  for (const auto object : {"6040h:00", "6060h:00", "6064h:00", "607Ah:00", "60FFh:00"})
+    EXPECT_THAT(text, HasSubstr(fmt::format("test.yaml:15:12: {}: object {}", path_.string(), object)));
+  EXPECT_EQ(text.find("6041h"), std::string::npos);
+}
+
+TEST_F(EdsFile, ADriveWithoutHomingModeHasNoHoming) {
+  write_changed("DefaultValue=0x00000025", "DefaultValue=0x00000005");
+  EXPECT_EQ(found(), "");
+  EXPECT_THAT(
+      found({.more = "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 mm/s }\n"}),
+      HasSubstr("this drive of model cia402 does not home"));
+}
+
+TEST_F(EdsFile, WhatIsNoEdsIsRefusedInTime) {
+  write(std::string(5U << 20U, 'x'));
+  EXPECT_THAT(found(), HasSubstr("test.yaml:15:12: "));
+  write("");
+  EXPECT_THAT(found(), HasSubstr("no object is described"));
+}
+
+}  // namespace
+}  // namespace axisd::config

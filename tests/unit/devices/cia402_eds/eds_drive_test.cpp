@@ -1,0 +1,186 @@
+#include "devices/cia402_eds/eds_drive.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "devices/cia402/objects.hpp"
+#include "devices/cia402_eds/simulator_dictionary.hpp"
+
+namespace axisd::cia402_eds {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+const std::string path = AXISD_SOURCE_DIR "/config/examples/standard-drive.eds";
+
+std::string example() {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// The example without an object: its section is renamed to one that is none.
+std::string without(std::string text, const std::string& section) {
+  const auto at = text.find("\n[" + section + "]");
+  EXPECT_NE(at, std::string::npos) << section;
+  text.replace(at, section.size() + 3, "\n[Unused" + section + "]");
+  const auto listed = text.find("=0x" + section);
+  if (listed != std::string::npos) text.replace(listed, section.size() + 3, "=0x1000");
+  return text;
+}
+
+canopen::Eds parsed(const std::string& text) {
+  auto eds = canopen::parse_eds(text);
+  if (!eds) throw std::runtime_error(eds.error().front().message);
+  return *eds;
+}
+
+const DriveDescriptor& base() { return *find_drive_model("cia402"); }
+
+EdsDrive drive_of(const std::string& text, const Conventions& conventions = {}) {
+  return EdsDrive(base(), parsed(text), conventions);
+}
+
+std::uint8_t bytes_of(canopen::DataType type) {
+  return static_cast<std::uint8_t>(canopen::info(type).bits / 8);
+}
+
+TEST(StandardEds, DescribesTheSimulatedDrive) {
+  simulation::CanopenDictionary dictionary;
+  add_rows(dictionary);
+  const auto eds = parsed(example());
+  for (const auto& [object, entry] : eds.objects) {
+    SCOPED_TRACE(to_string(object));
+    const auto* row = dictionary.find(object.index, object.sub);
+    ASSERT_NE(row, nullptr);
+    if (entry.type == canopen::DataType::visible_string) {
+      EXPECT_EQ(entry.text_initial, row->text);
+      continue;
+    }
+    EXPECT_EQ(bytes_of(entry.type), row->size);
+    EXPECT_EQ(canopen::info(entry.type).kind == canopen::TypeInfo::Kind::integer, row->is_signed);
+    EXPECT_EQ(canopen::writable(entry.access), row->access != Access::ro);
+    if (object.index >= 0x6000) EXPECT_EQ(entry.mappable, row->mappable);
+    if (entry.low) EXPECT_EQ(entry.low->value, row->minimum);
+    if (entry.high) EXPECT_EQ(entry.high->value, row->maximum);
+    if (entry.initial && !entry.initial->plus_node_id)
+      EXPECT_EQ(entry.initial->value, dictionary.get(object.index, object.sub));
+  }
+  std::size_t rows = 0;
+  for (unsigned index = 0x1000; index < 0x7000; ++index)
+    for (unsigned sub = 0; sub <= 8; ++sub)
+      rows += dictionary.find(static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)) != nullptr
+                  ? 1
+                  : 0;
+  EXPECT_EQ(rows, eds.objects.size());
+}
+
+TEST(EdsDrive, HasTheParametersOfItsEds) {
+  const auto drive = drive_of(example());
+  const auto* velocity = find_parameter(drive.parameters, 0x608100);
+  ASSERT_NE(velocity, nullptr);
+  EXPECT_EQ(velocity->name, "profile_velocity");
+  EXPECT_EQ(velocity->access, Access::rw);
+  EXPECT_EQ(velocity->maximum, 2'000'000);
+  EXPECT_EQ(velocity->default_value, 10'000);
+  EXPECT_EQ(velocity->type, ParameterType::u32);
+  EXPECT_EQ(find_parameter(drive.parameters, 0x140001)->name, "cob_id_1400_01");
+  EXPECT_FALSE(find_parameter(drive.parameters, 0x140001)->default_value) << "it depends on the node-ID";
+  EXPECT_EQ(find_parameter(drive.parameters, 0x606C00)->minimum, -2147483648LL);
+  EXPECT_EQ(find_parameter(drive.parameters, 0x100800), nullptr) << "a text";
+  std::set<std::string_view> names;
+  for (const auto& row : drive.parameters) EXPECT_TRUE(names.insert(row.name).second) << row.name;
+}
+
+TEST(EdsDrive, IsToldByItsIdentity) {
+  const auto& identity = drive_of(example()).model().identity;
+  EXPECT_EQ(identity.profile, 402);
+  EXPECT_EQ(identity.vendor, 0x0A5AU);
+  EXPECT_EQ(identity.product, 0x00402001U);
+  EXPECT_FALSE(identity.revision) << "a later one is the same drive";
+  // Without 1018h the head of the file tells, and where that is 0, too, nothing is compared.
+  auto text = without(without(example(), "1018sub1"), "1018sub2");
+  EXPECT_EQ(drive_of(text).model().identity.product, 0x00402001U);
+  text.replace(text.find("ProductNumber=0x00402001"), 24, "ProductNumber=0");
+  EXPECT_FALSE(drive_of(text).model().identity.product);
+}
+
+TEST(EdsDrive, ConvertsAsItsConventionsSay) {
+  const auto by_pulses = drive_of(example());
+  EXPECT_EQ(by_pulses.capabilities.maximum_pulse_rate_hz, 2'000'000);
+  EXPECT_FALSE(by_pulses.model().meaning.velocity_in_rpm);
+  EXPECT_FALSE(by_pulses.model().meaning.ramps_are_times);
+  EXPECT_TRUE(by_pulses.capabilities.closed_loop);
+  const auto by_rpm =
+      drive_of(example(), {.velocity_in_rpm = true, .ramps_are_times = true, .closed_loop = false});
+  EXPECT_EQ(by_rpm.capabilities.maximum_rpm, 2'000'000);
+  EXPECT_EQ(by_rpm.capabilities.minimum_time_ms, 1);
+  EXPECT_TRUE(by_rpm.model().meaning.velocity_in_rpm);
+  EXPECT_FALSE(by_rpm.capabilities.closed_loop);
+  EXPECT_EQ(by_rpm.capabilities.position_source, PositionSource::commanded);
+  const auto conventions =
+      conventions_of({{"velocity_unit", "rpm"}, {"ramps", "time"}, {"loop_mode", "open"}});
+  EXPECT_TRUE(conventions.velocity_in_rpm && conventions.ramps_are_times && !conventions.closed_loop);
+}
+
+TEST(EdsDrive, LacksWhatItsEdsLacks) {
+  EXPECT_TRUE(drive_of(example()).capabilities.homing);
+  EXPECT_EQ(drive_of(example()).model().homing_codes.size(), 4U);
+  const auto no_homing = drive_of(without(example(), "6098"));
+  EXPECT_FALSE(no_homing.capabilities.homing);
+  EXPECT_TRUE(no_homing.model().homing_codes.empty());
+  auto text = example();
+  text.replace(text.find("DefaultValue=0x00000025"), 23, "DefaultValue=0x00000005");
+  EXPECT_FALSE(drive_of(text).capabilities.homing) << "6502h";
+  const auto no_inputs = drive_of(without(example(), "60FD"));
+  EXPECT_TRUE(no_inputs.inputs.empty());
+  EXPECT_FALSE(no_inputs.model().objects.inputs);
+  EXPECT_TRUE(drive_of(example()).model().objects.save);
+  const auto no_memory = drive_of(without(without(example(), "1010sub1"), "1011sub1"));
+  EXPECT_FALSE(no_memory.model().objects.save || no_memory.model().objects.restore);
+}
+
+TEST(EdsDrive, NeedsWhatTheDriverUses) {
+  EXPECT_TRUE(check_eds(parsed(example())).empty());
+  auto text = without(without(example(), "6040"), "607A");
+  EXPECT_THAT(check_eds(parsed(text)), ElementsAre("object 6040h:00 (control word) is missing",
+                                                   "object 607Ah:00 (target position) is missing"));
+  text = example();
+  const auto at = text.find("[60FF]");
+  text.replace(text.find("AccessType=rww", at), 14, "AccessType=ro");
+  text.replace(text.find("DataType=0x0004", text.find("[6064]")), 15, "DataType=0x0015");
+  EXPECT_THAT(check_eds(parsed(text)),
+              ElementsAre("object 6064h:00 (position actual value) is no whole number of 8, 16 or 32 bits",
+                          "object 60FFh:00 (target velocity) cannot be written"));
+}
+
+TEST(EdsDrive, IsMadeFromItsFile) {
+  const auto made = base().specialise(base(), {{"eds", path}});
+  ASSERT_TRUE(made) << to_string(made.error());
+  EXPECT_EQ((*made)->model, "cia402");
+  EXPECT_EQ((*made)->specialise, nullptr);
+  EXPECT_FALSE((*made)->parameters.empty());
+  const auto none = base().specialise(base(), {});
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().remedy, HasSubstr("eds"));
+  const auto missing = base().specialise(base(), {{"eds", "/no/such.eds"}});
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().message, "/no/such.eds: cannot be read");
+  EXPECT_THROW((void)base().make({}), std::invalid_argument);
+}
+
+TEST(EdsDrive, KnowsEveryAlarm) {
+  EXPECT_EQ(find_alarm(base(), 0x8611)->name, "following_error");
+  EXPECT_EQ(find_alarm(base(), 0xFF17)->reset, AlarmReset::by_command);
+  EXPECT_EQ(find_alarm(*find_drive_model("ykd2405pr"), 77), nullptr);
+  EXPECT_TRUE(std::ranges::is_sorted(base().alarms, {}, &AlarmSpec::code));
+}
+
+}  // namespace
+}  // namespace axisd::cia402_eds
