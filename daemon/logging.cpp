@@ -56,7 +56,7 @@ modbus_rtu::ExchangeObserver log_exchanges(std::shared_ptr<spdlog::logger> log) 
   };
 }
 
-core::NetworkObserver log_frames(std::shared_ptr<spdlog::logger> log) {
+core::NetworkObserver log_frames(const std::shared_ptr<spdlog::logger>& log) {
   return {
       .received =
           [log](const std::string& bus, const can::ReceivedFrame& received) {

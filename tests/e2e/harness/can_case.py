@@ -90,6 +90,7 @@ class CanScenario(Scenario):
     def usable_again(self, machine, *axes):
         """After a reset each axis moves when it is told to, and by no other means."""
         for axis in axes or machine.axes:
+            machine.client.wait_online(axis)
             if machine.client.state(axis).state == pb.STATE_ERROR_STOP:
                 machine.client.to_done("Reset", axis)
             if not machine.client.state(axis).enabled:
