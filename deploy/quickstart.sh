@@ -1,6 +1,6 @@
 #!/bin/bash
-# From a fresh clone to moving axes: installs what is missing, builds, starts axisd with three simulated drives
-# (config/examples/demo.yaml) and moves them with axisctl. No hardware, nothing outside build/ and a temporary
+# From a fresh clone to moving axes: installs what is missing, builds, starts axisd with simulated drives on RS-485 and CAN
+# (config/examples/demo.yaml) and moves four of them with axisctl. No hardware, nothing outside build/ and a temporary
 # directory is written (packages apart).
 #   deploy/quickstart.sh          keeps the axes moving and shows them until Ctrl-C
 #   deploy/quickstart.sh --once   shows each thing once and ends: status 0, no process left
@@ -60,7 +60,7 @@ port=7443
 while taken "$port"; do port=$((20000 + RANDOM % 10000)); done
 export AXISD_SERVER=localhost:$port
 
-say "axisd with three simulated drives on $AXISD_SERVER"
+say "axisd with simulated drives on RS-485 and CAN, on $AXISD_SERVER"
 # Background jobs get process groups of their own (set -m): Ctrl-C ends the demonstration in order, and end_group
 # leaves nothing behind.
 set -m
@@ -84,7 +84,7 @@ step() {  # shows a command as it would be typed, and runs it
   "$axisctl" "${@:2}" || die "failed: $*"
 }
 eventually "$axisctl" list
-for axis in feeder lifter turntable; do
+for axis in feeder lifter turntable carousel; do
   eventually "$axisctl" enable "$axis" --wait  # refused until the drive's identity and configuration are verified
 done
 step axisctl list
@@ -99,9 +99,11 @@ set +m
 step axisctl home feeder --wait
 step axisctl home lifter --wait
 step axisctl home turntable --wait
+step axisctl home carousel --wait
 step axisctl move feeder 120mm --velocity 50mm/s --wait
 step axisctl move lifter 100mm --velocity 100mm/s --wait
 step axisctl move turntable 90deg --relative --velocity 90deg/s --wait
+step axisctl move carousel 90deg --relative --velocity 90deg/s --wait
 [ -s "$scratch/watch" ] || die "axisctl watch showed nothing"
 end_group "$watcher"
 watcher=''
@@ -132,7 +134,7 @@ fi
 say "Stopping and switching off"
 step axisctl stop --all
 step axisctl release-stop --all
-for axis in feeder lifter turntable; do step axisctl disable "$axis" --wait; done
+for axis in feeder lifter turntable carousel; do step axisctl disable "$axis" --wait; done
 kill -TERM "$daemon"
 wait "$daemon" || die "axisd ended with status $?"
 daemon=''

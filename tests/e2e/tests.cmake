@@ -10,3 +10,22 @@ if(AXISD_GRPC)
       ENVIRONMENT "AXISD=$<TARGET_FILE:axisd>;AXISD_SIM=$<TARGET_FILE:axisd-sim>;AXISCTL=$<TARGET_FILE:axisctl>")
   endforeach()
 endif()
+
+# On SocketCAN, in guests whose kernel has it. AddressSanitizer programs do not start there, so these run the programs of
+# a build without: tests/run.sh builds can_scenarios in preset dev whatever else it runs.
+if(AXISD_GRPC AND NOT AXISD_SANITIZE)
+  add_custom_target(can_scenarios DEPENDS axisd axisd-sim axisctl axisd-link)
+  file(GLOB scenarios CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/can/test_*.py)
+  set(include_file ${CMAKE_CURRENT_BINARY_DIR}/can_scenarios_include.cmake)
+  set(text "")
+  foreach(scenario IN LISTS scenarios)
+    get_filename_component(name ${scenario} NAME_WE)
+    string(REGEX REPLACE "^test_" "can.e2e." name ${name})
+    string(APPEND text "add_test(${name} ${CMAKE_SOURCE_DIR}/tests/guest/run.sh -t 200 ${AXISD_PYTHON} -B ${scenario})\n"
+      "set_tests_properties(${name} PROPERTIES LABELS e2e TIMEOUT 300 ENVIRONMENT \"PYTHONPATH=${CMAKE_CURRENT_LIST_DIR};"
+      "AXISD=$<TARGET_FILE:axisd>;AXISD_SIM=$<TARGET_FILE:axisd-sim>;AXISCTL=$<TARGET_FILE:axisctl>;"
+      "AXISD_LINK=$<TARGET_FILE:axisd-link>\")\n")
+  endforeach()
+  file(GENERATE OUTPUT ${include_file} CONTENT "${text}")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${include_file})
+endif()

@@ -34,7 +34,7 @@ TEST(Loader, SaysExactlyWhatIsBroken) {
   }
 }
 
-TEST(Loader, DemoIsFiveSimulatedAxesOfThreeModels) {
+TEST(Loader, DemoIsSixSimulatedAxesOfFourModels) {
   const auto result = load_file(source_path("config/examples/demo.yaml"));
   ASSERT_TRUE(result.configuration) << findings(result);
   const auto& configuration = *result.configuration;
@@ -42,7 +42,9 @@ TEST(Loader, DemoIsFiveSimulatedAxesOfThreeModels) {
   EXPECT_EQ(configuration.server.listen, "localhost:7443");
   ASSERT_EQ(configuration.lines.size(), 1U);
   EXPECT_TRUE(configuration.lines[0].simulated());
-  ASSERT_EQ(configuration.axes.size(), 5U);
+  ASSERT_EQ(configuration.networks.size(), 1U);
+  EXPECT_TRUE(configuration.networks[0].simulated());
+  ASSERT_EQ(configuration.axes.size(), 6U);
 
   const auto& [feeder, mechanics] = configuration.axes[0];
   EXPECT_EQ(feeder.name, "feeder");

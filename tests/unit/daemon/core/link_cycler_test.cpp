@@ -7,6 +7,8 @@
 
 #include "buses/can/network.hpp"
 #include "daemon/core/machine_core.hpp"
+#include "devices/simulation/can_nodes.hpp"
+#include "devices/simulation/simulator.hpp"
 #include "tests/support/virtual_world.hpp"
 
 namespace axisd::core {
@@ -21,9 +23,15 @@ class Links : public testing::Test {
  protected:
   enum class Helper { cycles, refuses, silent };
 
-  Links() {
+  explicit Links(bool with_axis = false) {
     configuration_.machine = "m";
     configuration_.networks.push_back({.name = "cell", .interface = "can7", .bitrate = 1'000'000});
+    if (with_axis) {
+      AxisSettings axis{.name = "table", .bus = "cell", .node = 5, .model = "yss-c"};
+      axis.scale = {.pulses_per_revolution = 4000, .travel_numerator = 360, .unit = "deg"};
+      axis.limits.velocity = 3600;
+      configuration_.axes.push_back({.axis = axis});
+    }
     machine_ = std::make_unique<MachineCore>(
         MachineParts{.executor = world_.executor(),
                      .clock = &world_.clock(),
@@ -142,6 +150,42 @@ TEST_F(Links, TheMachineClosesWhileAnAnswerIsOwed) {
   go_bus_off();
   world_.run_for(1min);
   EXPECT_EQ(asked_at_, Times{0});  // one request at a time: whoever asks ends it in its own time
+}
+
+/// The same with a drive, which moves.
+class MovingDrive : public Links {
+ protected:
+  MovingDrive() : Links(true) {
+    drives_.nodes().add(std::move(*simulation::make_can_node("yss-c", {.address = 5})));
+    EXPECT_TRUE(world_.run_until([this] { return state()->link == axisd::LinkState::online; }, 10s));
+    EXPECT_TRUE(machine_->submit("table", EnableRequest{}, {}));
+    world_.run_for(1s);
+    EXPECT_TRUE(machine_->submit("table", MoveVelocityRequest{.velocity = 360}, {}));
+    world_.run_for(1s);
+    EXPECT_TRUE(drives_.nodes().node(5)->shaft_moving());
+  }
+  [[nodiscard]] AxisSnapshotPtr state() const { return machine_->find("table")->snapshot(); }
+
+  simulation::NetworkNodes drives_{world_.clock(), network_};
+};
+
+TEST_F(MovingDrive, IsStoppedAfterAnOutageThatIsOverBeforeAnybodyPolls) {
+  const auto starts = drives_.nodes().node(5)->starts();
+  go_bus_off();
+  world_.run_for(200ms);
+  EXPECT_EQ(asked_at_, Times{0});
+  world_.run_for(3s);
+  EXPECT_FALSE(drives_.nodes().node(5)->shaft_moving());
+  EXPECT_EQ(drives_.nodes().node(5)->starts(), starts);
+  EXPECT_EQ(state()->state, AxisState::error_stop);
+  EXPECT_EQ(state()->link, axisd::LinkState::online);
+}
+
+TEST_F(MovingDrive, IsStoppedWhenTheLinkWasDownForAMoment) {
+  port_->cycle();  // by hand: nobody sees it down
+  world_.run_for(3s);
+  EXPECT_FALSE(drives_.nodes().node(5)->shaft_moving());
+  EXPECT_EQ(state()->state, AxisState::error_stop);
 }
 
 TEST(LinkCycler, SaysWhyALinkIsNotCycled) {
