@@ -1,5 +1,7 @@
 #include "devices/cia402_eds/alarms.hpp"
 
+#include <array>
+
 namespace axisd::cia402_eds {
 
 namespace {
@@ -12,7 +14,7 @@ constexpr std::string_view feedback = "check the encoder's wiring, then reset th
 constexpr std::string_view inside = "reset the axis; if it comes back, ask the maker of the drive";
 
 // CiA 402-2 (IEC 61800-7-201), error codes.
-constexpr AlarmSpec table[] = {
+constexpr auto table = std::to_array<AlarmSpec>({
     {0x1000, "generic_error", reset, inside},
     {0x2110, "short_circuit_input", reset, wiring},
     {0x2120, "earth_fault_input", reset, wiring},
@@ -47,7 +49,7 @@ constexpr AlarmSpec table[] = {
     {0x8500, "position_controller", reset, "check load and tuning, then reset the axis"},
     {0x8611, "following_error", reset, "check load, acceleration and tuning, then reset the axis"},
     {0x8612, "reference_limit", reset, "reset the axis and move away from the limit"},
-};
+});
 
 }  // namespace
 

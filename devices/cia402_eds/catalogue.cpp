@@ -10,7 +10,6 @@ namespace axisd::cia402_eds {
 namespace {
 
 using canopen::DataType;
-using canopen::EdsObject;
 
 std::optional<ParameterType> type_of(DataType type) {
   switch (type) {

@@ -15,8 +15,8 @@ struct Catalogue {
   Catalogue() = default;
   Catalogue(const Catalogue&) = delete;
   Catalogue& operator=(const Catalogue&) = delete;
-  Catalogue(Catalogue&&) = default;
-  Catalogue& operator=(Catalogue&&) = default;
+  Catalogue(Catalogue&&) noexcept = default;
+  Catalogue& operator=(Catalogue&&) noexcept = default;
 
   std::vector<ParameterSpec> rows;  ///< in order of address
   std::deque<std::string> texts;

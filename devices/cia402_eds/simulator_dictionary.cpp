@@ -22,7 +22,7 @@ constexpr std::int64_t modes = 1U << 0U | 1U << 2U | 1U << 5U;  // 6502h: pp, pv
 
 // Index, sub, bytes, signed, access, minimum, maximum, default, may be mapped.
 // clang-format off
-constexpr ObjectRow rows[] = {
+constexpr auto rows = std::to_array<ObjectRow>({
     {0x603F, 0, 2, plain, ro, 0, 0xFFFF, 0, maps},
     {0x6040, 0, 2, plain, rw, 0, 0xFFFF, 0, maps},
     {0x6041, 0, 2, plain, ro, 0, 0xFFFF, 0, maps},
@@ -51,7 +51,7 @@ constexpr ObjectRow rows[] = {
     {0x60FD, 0, 4, plain, ro, 0, u32_high, 0, maps},
     {0x60FF, 0, 4, sign, rw, -fastest, fastest, 0, maps},
     {0x6502, 0, 4, plain, ro, 0, u32_high, modes, stays},
-};
+});
 // clang-format on
 
 constexpr std::array<std::uint16_t, 4> not_stored{0x6040, 0x6060, 0x607A, 0x60FF};
