@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 #include <fnmatch.h>
 
+#include <algorithm>
+
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/quantity.hpp"
@@ -22,10 +24,19 @@ std::string names_of(const google::protobuf::RepeatedPtrField<v1::TerminalCapabi
   return text;
 }
 
-/// "X0 X1 X2: none, home, ..."; all terminals of a side can have the same functions.
+/// "X0 X1 X2: none, home, ..."; where terminals have functions of their own, one after the other.
 std::string terminals(const google::protobuf::RepeatedPtrField<v1::TerminalCapability>& all) {
   if (all.empty()) return "";
-  return fmt::format("{}: {}", names_of(all), fmt::join(all[0].functions(), ", "));
+  const auto functions = [](const auto& terminal) {
+    return fmt::format("{}", fmt::join(terminal.functions(), ", "));
+  };
+  const auto first = functions(all[0]);
+  if (std::ranges::all_of(all, [&](const auto& one) { return functions(one) == first; }))
+    return fmt::format("{}: {}", names_of(all), first);
+  std::string text;
+  for (const auto& one : all)
+    text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", one.name(), functions(one));
+  return text;
 }
 
 std::string remedy_of(v1::AlarmReset reset) {

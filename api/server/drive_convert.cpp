@@ -94,7 +94,8 @@ void to_proto(std::string_view axis, const DriveInfo& from, v1::GetDriveResponse
     to.set_version(from.identity->version);
   }
   to_proto(model.capabilities, to);
-  for (const auto* method : homing_methods) to.add_homing_methods(method);
+  if (model.capabilities.homing)
+    for (const auto* method : homing_methods) to.add_homing_methods(method);
   add_terminals(model.inputs, model.input_functions, *to.mutable_inputs());
   add_terminals(model.outputs, model.output_functions, *to.mutable_outputs());
   for (const auto& alarm : model.alarms) to_proto(alarm, *to.add_alarms());

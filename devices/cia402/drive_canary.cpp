@@ -38,9 +38,16 @@ MotionBlock Cia402Drive::fresh_neutral_block() const {
   constexpr int neutral_rpm = 60, neutral_time = 100, lowest_start = 5;
   // The deceleration differs a little each time: a record of an earlier power cycle then never fits this one.
   const auto moment = clock_->now().time_since_epoch() / std::chrono::milliseconds(1);
+  // The data sheet of a drive may not allow as little.
+  const auto at_least = [this](Object object, std::int32_t value) {
+    const auto* known = find_parameter(model_->descriptor->parameters, object.key());
+    return known == nullptr ? value
+                            : static_cast<std::int32_t>(std::max<std::int64_t>(value, known->minimum));
+  };
+  const auto velocity = encode_velocity(*model_, setup_.pulses_per_revolution, neutral_rpm);
   // Target 0: should a terminal start a relative move, it goes nowhere.
-  return {0, encode_velocity(*model_, setup_.pulses_per_revolution, neutral_rpm), neutral_time,
-          static_cast<std::int32_t>(neutral_time + 1 + moment % 61),
+  return {0, at_least(object::profile_velocity, velocity), at_least(object::acceleration, neutral_time),
+          at_least(object::deceleration, neutral_time) + 1 + static_cast<std::int32_t>(moment % 61),
           model_->objects.start_speed ? lowest_start : 0};
 }
 

@@ -52,17 +52,22 @@ std::optional<std::uint32_t> identity_of(const Eds& eds, Object object, std::opt
   return device.value_or(0) == 0 ? std::nullopt : device;
 }
 
-/// 24 and 28 mirror each other: the rising edge of the home switch in the direction of the search.
+/// 6502h; without it, or without its value, a drive is taken to have every mode.
+bool supports(const Eds& eds, unsigned mode_bit) {
+  const auto* modes = eds.find(drive_modes);
+  return modes == nullptr || !modes->initial || modes->initial->value == 0 ||
+         (static_cast<std::uint64_t>(modes->initial->value) >> mode_bit & 1U) != 0;
+}
+
 bool can_home(const Eds& eds) {
   constexpr unsigned homing_bit = 5;
   for (const auto object :
        {cia402::object::homing_method, cia402::object::homing_speed, cia402::object::homing_search_speed})
     if (eds.find(object) == nullptr || !canopen::writable(eds.find(object)->access)) return false;
-  const auto* modes = eds.find(drive_modes);
-  return modes == nullptr || !modes->initial || modes->initial->value == 0 ||
-         (static_cast<std::uint64_t>(modes->initial->value) >> homing_bit & 1U) != 0;
+  return supports(eds, homing_bit);
 }
 
+/// 24 and 28 mirror each other: the rising edge of the home switch in the direction of the search.
 std::vector<cia402::HomingCode> homing_codes_of(const Eds& eds) {
   if (!can_home(eds)) return {};
   return {{.method = HomingMethod::home_positive, .code = 24},
@@ -110,6 +115,11 @@ Conventions conventions_of(const std::map<std::string, SettingValue>& settings) 
 
 std::vector<std::string> check_eds(const Eds& eds) {
   std::vector<std::string> found;
+  constexpr unsigned position_bit = 0, velocity_bit = 2;
+  for (const auto& [bit, name] : {std::pair(position_bit, "position"), std::pair(velocity_bit, "velocity")})
+    if (!supports(eds, bit))
+      found.push_back(
+          fmt::format("by object {} the drive has no profile {} mode", to_string(drive_modes), name));
   for (const auto& [object, name, written] : needed) {
     const auto* entry = eds.find(object);
     if (entry == nullptr)

@@ -40,6 +40,19 @@ TEST(Assignments, AreNameAndValue) {
   EXPECT_THAT(failure([] { parse_assignment("current=six"); }), HasSubstr("current: 'six'"));
 }
 
+TEST(DriveDetails, TerminalsHaveTheSameFunctionsOrTheirOwn) {
+  v1::GetDriveResponse drive;
+  for (const auto* name : {"X0", "X1"}) {
+    auto& input = *drive.add_inputs();
+    input.set_name(name);
+    input.add_functions("home");
+    input.add_functions("stop");
+  }
+  EXPECT_THAT(drive_details(drive), HasSubstr("X0 X1: home, stop\n"));
+  drive.mutable_inputs(1)->set_functions(0, "positive_limit");
+  EXPECT_THAT(drive_details(drive), HasSubstr("X0: home, stop; X1: positive_limit, stop\n"));
+}
+
 TEST(Patterns, ArePartsOfNamesOrShellPatterns) {
   EXPECT_TRUE(fits("start_speed", ""));
   EXPECT_TRUE(fits("start_speed", "speed"));

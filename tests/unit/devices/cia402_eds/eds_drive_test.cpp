@@ -152,6 +152,10 @@ TEST(EdsDrive, NeedsWhatTheDriverUses) {
   EXPECT_THAT(check_eds(parsed(text)), ElementsAre("object 6040h:00 (control word) is missing",
                                                    "object 607Ah:00 (target position) is missing"));
   text = example();
+  text.replace(text.find("DefaultValue=0x00000025"), 23, "DefaultValue=0x00000021");
+  EXPECT_THAT(check_eds(parsed(text)),
+              ElementsAre("by object 6502h:00 the drive has no profile velocity mode"));
+  text = example();
   const auto at = text.find("[60FF]");
   text.replace(text.find("AccessType=rww", at), 14, "AccessType=ro");
   text.replace(text.find("DataType=0x0004", text.find("[6064]")), 15, "DataType=0x0015");
