@@ -23,26 +23,20 @@ class Adapter(CanScenario):
                                   helper=[adapter.interface])
 
     def test_bus_off_in_mid_move(self):
-        """The bound: the helper is asked within 200 ms, and the bus takes what it takes. A busy computer makes
-        it late, so that the best of a few counts."""
+        """How long it may take is asserted in virtual time (link_cycler_test.cpp); here, that it happens so."""
         adapter, machine = self.wired_cell()
-        delays = []
-        for attempt in range(1, 6):
-            move = self.mid_move(machine, position=7000.0 * (attempt % 2))
-            starts = machine.sim.shaft(5).starts
-            broken = time.monotonic_ns()
-            adapter.say("sb000256")
-            self.ended(machine, move)
-            off = wait_for(lambda: self.link_times(machine, "bus_off", broken), "the bus-off is seen")[0]
-            up = wait_for(lambda: self.link_times(machine, "up", off), "the link is up again")[0]
-            delays.append((self.stop_is_first(machine, up) - off) / 1e6)
-            # Nothing was handed over in between, and nothing comes out later.
-            self.assertEqual(machine.frames.frames("tx", since=off, until=up), [])
-            self.stopped(machine, starts=starts)
-            machine.client.to_done("Reset", "table")
-            if delays[-1] <= 250:
-                break
-        self.assertLessEqual(min(delays), 250, f"ms from bus-off to the stop frame: {delays}")
+        move = self.mid_move(machine)
+        starts = machine.sim.shaft(5).starts
+        broken = time.monotonic_ns()
+        adapter.say("sb000256")
+        self.ended(machine, move)
+        off = wait_for(lambda: self.link_times(machine, "bus_off", broken), "the bus-off is seen")[0]
+        up = wait_for(lambda: self.link_times(machine, "up", off), "the link is up again")[0]
+        stopped = self.stop_is_first(machine, up)
+        print(f"bus-off to the stop frame: {(stopped - off) / 1e6:.0f} ms")
+        # Nothing was handed over in between, and nothing comes out later.
+        self.assertEqual(machine.frames.frames("tx", since=off, until=up), [])
+        self.stopped(machine, starts=starts)
         self.usable_again(machine)
 
     def test_what_a_stalled_adapter_did_not_take_is_never_sent(self):
