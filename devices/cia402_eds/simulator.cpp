@@ -107,7 +107,7 @@ TimePoint StandardDrive::next_event() const {
 
 TimePoint StandardDrive::motion_event() const {
   if (boot_end_) return *boot_end_;
-  if (!motor_.moving()) return TimePoint::max();
+  if (!motor_.moving()) return phase_due_;
   auto next = std::min(motor_.ends(), motor_.lags(dictionary_.get(0x6065) + 1));
   const auto change = inputs_.next_switch(motor_.shaft(), motor_.direction());
   return change ? std::min(next, motor_.reaches(*change)) : next;
@@ -125,6 +125,7 @@ void StandardDrive::step(TimePoint now) {
     if (energised() && std::llabs(motor_.lag()) > dictionary_.get(0x6065)) fail_with(following_error);
     enforce_limits();
     if (ended && !motor_.moving()) on_stopped();
+    if (phase_due_ <= now) next_phase();
     follow_velocity();
     // Event PDOs look when something changed; what changes with time alone they look at by themselves.
     if (const auto present = appearance(); std::exchange(appearance_, present) != present) server_.touch(now);

@@ -121,6 +121,8 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   void homing_edge(const simulation::FunctionEdge& edge);
   void homing_limit();
   void homing_stopped();
+  void end_pause();
+  void next_phase();
   void homing_done();
   void homing_failed();
 
@@ -157,6 +159,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   std::int64_t velocity_ = 0;      ///< that velocity mode runs at
 
   Phase phase_ = Phase::ending;
+  TimePoint phase_due_ = TimePoint::max();  ///< of homing, after a pause
   const Method* method_ = nullptr;
   int search_direction_ = 1, turns_ = 0;
 };

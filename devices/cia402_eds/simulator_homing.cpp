@@ -79,6 +79,23 @@ void StandardDrive::homing_limit() {
 }
 
 void StandardDrive::homing_stopped() {
+  constexpr Duration pause = std::chrono::milliseconds(100);
+  if (behaviour_.homing_pauses && phase_ != Phase::ending)
+    phase_due_ = now_ + pause;
+  else
+    next_phase();
+}
+
+/// Stopped while it rested between two phases.
+void StandardDrive::end_pause() {
+  if (phase_due_ == TimePoint::max()) return;
+  phase_due_ = TimePoint::max();
+  phase_ = Phase::ending;
+  activity_ = Activity::none;
+}
+
+void StandardDrive::next_phase() {
+  phase_due_ = TimePoint::max();
   switch (phase_) {
     case Phase::turn:
       if (++turns_ > 1 || method_->approach == 0) {

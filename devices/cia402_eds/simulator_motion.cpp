@@ -80,7 +80,7 @@ void StandardDrive::begin(Plan plan) {
   reached_ = false;
   limited_ = plan.shortened && plan.activity == Activity::position;
   if (plan.rates.cruise <= 0 || limit_active(plan.direction)) {
-    velocity_held_ = true;
+    velocity_held_ = !behaviour_.velocity_resumes_after_limit;
     return;
   }
   ++starts_;
@@ -110,6 +110,7 @@ void StandardDrive::launch(const Plan& plan) {
 
 void StandardDrive::stop_motion(double deceleration) {
   pending_.reset();
+  end_pause();
   if (!motor_.moving()) return;
   stopping_ = true;
   phase_ = Phase::ending;
@@ -119,6 +120,7 @@ void StandardDrive::stop_motion(double deceleration) {
 /// The current is gone, or there is no distance left to brake.
 void StandardDrive::cut() {
   pending_.reset();
+  end_pause();
   if (!motor_.moving()) return;
   stopping_ = true;
   phase_ = Phase::ending;
@@ -188,7 +190,7 @@ void StandardDrive::enforce_limits() {
     return;
   }
   if (stopping_) return;
-  velocity_held_ = true;
+  velocity_held_ = !behaviour_.velocity_resumes_after_limit;
   suspended_.reset();
   buffered_.reset();
   stop_motion(number(behaviour_.limit_stops_on_ramp ? 0x6084 : 0x6085));

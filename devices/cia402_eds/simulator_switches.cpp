@@ -1,19 +1,12 @@
 #include "devices/cia402_eds/simulator_switches.hpp"
 
-#include <algorithm>
-#include <array>
-#include <iterator>
-#include <stdexcept>
-#include <string>
+#include "devices/simulation/switch_table.hpp"
 
 namespace axisd::cia402_eds {
 
 namespace {
 
-struct Entry {
-  simulation::SwitchSpec spec;
-  bool Behaviour::* member;
-};
+using Entry = simulation::SwitchEntry<Behaviour>;
 
 // clang-format off
 constexpr Entry entries[] = {
@@ -32,6 +25,12 @@ constexpr Entry entries[] = {
     {{"homing_goes_on_without_start_bit", false,
       "clearing control bit 4 does not end homing, halt does; off: it ends it"},
      &Behaviour::homing_goes_on_without_start_bit},
+    {{"homing_pauses", false,
+      "the motor rests for 100 ms between the phases of homing; off: it turns at once"},
+     &Behaviour::homing_pauses},
+    {{"velocity_resumes_after_limit", false,
+      "60FFh is followed again as soon as a limit switch opens; off: only after it was written"},
+     &Behaviour::velocity_resumes_after_limit},
     {{"limit_stops_on_ramp", false,
       "at a limit switch the drive brakes with 6084h; off: with 6085h"},
      &Behaviour::limit_stops_on_ramp},
@@ -41,26 +40,14 @@ constexpr Entry entries[] = {
 };
 // clang-format on
 
-constexpr auto specs = [] {
-  std::array<simulation::SwitchSpec, std::size(entries)> all{};
-  for (std::size_t i = 0; i < all.size(); ++i) all.at(i) = entries[i].spec;
-  return all;
-}();
+constexpr auto specs = simulation::specs_of(entries);
 
 }  // namespace
 
 std::span<const simulation::SwitchSpec> switch_specs() { return specs; }
 
 Behaviour behaviour_from(const simulation::Switches& switches) {
-  Behaviour behaviour{};
-  for (const auto& entry : entries) behaviour.*entry.member = entry.spec.default_value;
-  for (const auto& [name, on] : switches) {
-    const auto* found =
-        std::ranges::find_if(entries, [&](const Entry& entry) { return entry.spec.name == name; });
-    if (found == std::end(entries)) throw std::invalid_argument("cia402 has no switch \"" + name + "\"");
-    behaviour.*found->member = on;
-  }
-  return behaviour;
+  return simulation::behaviour_of("cia402", entries, switches);
 }
 
 }  // namespace axisd::cia402_eds

@@ -10,8 +10,8 @@ namespace axisd::cia402_eds {
 /// One member per switch; what each means stands in the table of simulator_switches.cpp.
 struct Behaviour {
   bool halt_release_drops, halt_release_keeps_velocity_at_0, set_point_in_halt_refused;
-  bool homing_attained_forgotten, homing_goes_on_without_start_bit;
-  bool limit_stops_on_ramp, segmented_uploads;
+  bool homing_attained_forgotten, homing_goes_on_without_start_bit, homing_pauses;
+  bool velocity_resumes_after_limit, limit_stops_on_ramp, segmented_uploads;
 };
 
 /// All switches with their defaults: what most drives do.

@@ -30,6 +30,29 @@ TEST(StandardDrive, HomesByEachMethod) {
   }
 }
 
+TEST(StandardDrive, RestsBetweenItsPhasesAndCanBeStoppedThere) {
+  auto settings = with_switches();
+  settings.switches["homing_pauses"] = true;
+  Bench bench(settings);
+  bench.home(24);
+  int rests = 0;
+  for (bool rested = true; !bench.bit(12); bench.run(20ms)) {
+    const bool rests_now = bench.velocity() == 0;
+    rests += rests_now && !rested ? 1 : 0;
+    rested = rests_now;
+  }
+  EXPECT_EQ(rests, 2) << "after the search, and after the switch was left";
+  EXPECT_EQ(bench.drive().shaft_pulses(), 20'000);
+  Bench stopped(settings);
+  stopped.home(24);
+  stopped.run(500ms);
+  while (stopped.velocity() != 0) stopped.run(10ms);
+  stopped.control(0x10F);
+  stopped.run(10s);
+  EXPECT_FALSE(stopped.bit(12));
+  EXPECT_EQ(stopped.velocity(), 0);
+}
+
 TEST(StandardDrive, HomesWhereItStandsWithoutMoving) {
   Bench bench;
   bench.enable(1);

@@ -181,6 +181,24 @@ TEST(StandardDrive, LimitSwitchesBrakeAndBlockOneDirection) {
   }
 }
 
+TEST(StandardDrive, AfterALimitVelocityWaitsForTheSwitchOrForANewValue) {
+  for (const bool resumes : {false, true}) {
+    Bench bench({.switches = {{"velocity_resumes_after_limit", resumes}}});
+    bench.enable(3);
+    EXPECT_EQ(bench.write(0x60FF, 4, 5'000), 0U);
+    bench.run(500ms);
+    bench.drive().set_input("POS", true);
+    bench.run(500ms);
+    EXPECT_EQ(bench.velocity(), 0);
+    bench.drive().set_input("POS", false);
+    bench.run(500ms);
+    EXPECT_EQ(bench.velocity(), resumes ? 5'000 : 0);
+    EXPECT_EQ(bench.write(0x60FF, 4, 4'000), 0U);
+    bench.run(500ms);
+    EXPECT_EQ(bench.velocity(), 4'000);
+  }
+}
+
 TEST(StandardDrive, ASetPointInHaltWaitsOrIsRefused) {
   for (const bool refused : {false, true}) {
     Bench bench({.switches = {{"set_point_in_halt_refused", refused}}});
