@@ -39,8 +39,9 @@ std::string wrong_model(const Setup& setup) {
     expect_wrong_model(bench, other.model());
   }
   if (models.size() == 1) {
-    Bench bench(setup, {}, false);
+    Bench bench(setup);
     bench.outside(fmt::format("poke @1 {} 0x1BAD", manual.number("model_code_parameter")));
+    bench.target->restart();
     expect_wrong_model(bench, "1BAD");
   }
   return "both named";
@@ -109,7 +110,8 @@ std::string scan(const Setup& setup) {
     for (const auto& one : response.found()) {
       found[static_cast<int>(one.node())] = {one.model(), one.baud()};
       EXPECT_EQ(one.format(), serial ? formats.front() : "");
-      EXPECT_FALSE(one.version().empty());
+      EXPECT_NE(serial, one.version().empty()) << "a CAN node has an identity instead";
+      EXPECT_NE(serial, one.has_product());
       EXPECT_EQ(one.configured_as(), one.node() == 1 ? "axis" : "") << one.node();
       EXPECT_GT(one.pulses_per_revolution(), 0U);
     }
@@ -124,17 +126,39 @@ std::string scan(const Setup& setup) {
   return "all models";
 }
 
-Answer<v1::TransactResponse> transact(Bench& bench, std::uint32_t node, std::int64_t address,
+/// One exchange past all axes: a register, or an object with its type.
+Answer<v1::TransactResponse> transact(Bench& bench, std::uint32_t node, std::uint32_t address,
                                       std::optional<std::uint32_t> write = {}) {
+  const auto& manual = bench.setup.manual;
   v1::TransactRequest request;
   request.set_bus("line");
   request.set_node(node);
-  request.set_address(static_cast<std::uint32_t>(address));
-  if (write)
+  request.set_address(address);
+  if (manual.bus() == "canopen") {
+    const auto* object = manual.find(address);
+    const auto type =
+        object != nullptr && object->type == "U32" ? v1::PARAMETER_TYPE_UINT32 : v1::PARAMETER_TYPE_UINT16;
+    if (write) {
+      auto& number = *request.mutable_write_object()->mutable_number();
+      number.set_type(type);
+      number.set_value(*write);
+    } else {
+      request.mutable_read_object()->set_type(type);
+    }
+  } else if (write) {
     request.mutable_write()->add_values(*write);
-  else
+  } else {
     request.set_read(1);
+  }
   return bench.client.call(&v1::BusService::Stub::Transact, request);
+}
+
+std::int64_t number_read(Bench& bench, std::uint32_t node, std::uint32_t address) {
+  const auto read = transact(bench, node, address);
+  if (!read.ok()) throw Broken("Transact: " + read.status.error_message());
+  if (read->has_value()) return read->value();
+  if (read->values_size() != 1) throw Broken("Transact: " + read->ShortDebugString());
+  return read->values(0);
 }
 
 /// Two 16-bit values of the model, as a node that is no axis.
@@ -182,19 +206,21 @@ std::string other_nodes(const Setup& setup) {
   plant.yaml += device_lines(manual);
   Bench bench(setup, plant);
   bench.pass(1s);
-  const auto read = transact(bench, 1, manual.number("model_code_parameter"));
-  if (!read.ok() || read->values_size() != 1) throw Broken("Transact: " + read.status.error_message());
+  const auto at = [&](const std::string& ability) {
+    return static_cast<std::uint32_t>(manual.number(ability));
+  };
+  const auto code = number_read(bench, 1, at("model_code_parameter"));
   const auto codes = manual.list("model_codes");
-  EXPECT_TRUE(std::ranges::any_of(codes, [&](const auto& code) {
-    return std::stoul(code, nullptr, 0) == read->values(0);
-  })) << read->values(0);
-  EXPECT_FALSE(transact(bench, 1, manual.number("start_parameter"), 2).ok())
+  EXPECT_TRUE(std::ranges::any_of(codes, [&](const auto& one) {
+    return std::stoll(one, nullptr, 0) == code;
+  })) << code;
+  EXPECT_FALSE(transact(bench, 1, at("start_parameter"), 2).ok())
       << "a start command for an axis, past the axis";
   const auto time = manual.find_title("Acceleration time")->address;
   EXPECT_TRUE(transact(bench, 9, time, 321).ok());
-  EXPECT_EQ(transact(bench, 9, time)->values(0), 321U);
-  const auto hole = transact(bench, 9, manual.number("hole"));
-  EXPECT_EQ(hole.error.reason(), v1::REASON_REFUSED) << hole.status.error_message();
+  EXPECT_EQ(number_read(bench, 9, time), 321);
+  const auto hole = transact(bench, 9, at("hole"));
+  EXPECT_FALSE(hole.ok());
   EXPECT_EQ(hole.error.native_code(), manual.number("hole_error"));
   expect_named_values(bench);
   bench.finish(0);

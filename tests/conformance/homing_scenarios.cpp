@@ -90,12 +90,13 @@ void go_onto_the_switch(Bench& bench) {
 }
 
 std::string on_the_switch(const Setup& setup) {
-  Bench backing(setup);
-  go_onto_the_switch(backing);
-  expect_done(backing.client.home());
-  expect_homed(backing, any_homing_method(setup.manual, setup.variant), (home_from + home_to) / 2);
-  backing.finish(4);  // onto the switch, off it, home, and the move of expect_homed()
-
+  {
+    Bench backing(setup);
+    go_onto_the_switch(backing);
+    expect_done(backing.client.home());
+    expect_homed(backing, any_homing_method(setup.manual, setup.variant), (home_from + home_to) / 2);
+    backing.finish(4);  // onto the switch, off it, home, and the move of expect_homed()
+  }
   Bench refusing(setup,
                  {.homing_keys = "velocity: 100 mm/s, search_velocity: 20 mm/s, position: 3, timeout: 40 s"});
   go_onto_the_switch(refusing);

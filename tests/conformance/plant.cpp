@@ -10,6 +10,8 @@ namespace axisd::conformance {
 
 namespace {
 
+using namespace std::chrono_literals;
+
 /// Where a manual contradicts itself, the other reading is one key of the configuration (drive:).
 struct Reading {
   std::string_view switch_name;  ///< not in its default position
@@ -111,7 +113,8 @@ std::string bus_lines(const Manual& manual, int baud, Duration sync_period) {
 }
 
 Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& recipe) {
-  auto yaml = bus_lines(manual, recipe.baud);
+  // Flipped switches are many, and each SYNC takes the processor's time.
+  auto yaml = bus_lines(manual, recipe.baud, variant.switches.empty() ? 10ms : 40ms);
   yaml += fmt::format(
       "  axis:\n    bus: line\n    node: {}\n    model: {}\n    unit: mm\n"
       "    scale: {{ microstep: 1000 pulses/rev, travel: 10 mm/rev, invert: {} }}\n"

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <iterator>
 
-#include "devices/descriptor.hpp"
 #include "devices/simulation/simulator.hpp"
 #include "tests/conformance/scenario.hpp"
 
@@ -41,11 +40,10 @@ void PrintTo(const Case& one, std::ostream* out) {
 
 std::vector<Case> cases() {
   std::vector<Case> all;
-  for (const auto* model : drive_models())
+  for (const auto& model : models())
     for (const auto& subject : subjects()) {
       const int of = subject.varied ? shards : 1;
-      for (int shard = 0; shard < of; ++shard)
-        all.push_back({std::string(model->model), &subject, shard, of});
+      for (int shard = 0; shard < of; ++shard) all.push_back({model, &subject, shard, of});
     }
   return all;
 }
@@ -83,23 +81,23 @@ TEST_P(Suite, Behaves) {
 INSTANTIATE_TEST_SUITE_P(Conformance, Suite, ::testing::ValuesIn(cases()), name_of);
 
 TEST(Conformance, EveryModelHasASimulatorAndItsManual) {
-  ASSERT_FALSE(drive_models().empty());
-  for (const auto* model : drive_models()) {
-    EXPECT_NO_THROW(Manual(std::string(model->model)));
-    EXPECT_NE(simulation::find_simulator(model->model), nullptr) << model->model;
+  ASSERT_FALSE(models().empty());
+  for (const auto& model : models()) {
+    EXPECT_NO_THROW(Manual{model});
+    EXPECT_NE(simulation::find_simulator(model), nullptr) << model;
   }
 }
 
 /// Each switch is flipped in some subject, also in a sampled run, plain and inverted ones among them.
 TEST(Conformance, EverySwitchIsFlippedSomewhere) {
-  for (const auto* model : drive_models())
-    for (const auto& one : simulation::find_simulator(model->model)->switches) {
+  for (const auto& model : models())
+    for (const auto& one : simulation::find_simulator(model)->switches) {
       int subjects_with_it = 0;
       for (const auto& subject : subjects())
         subjects_with_it += std::ranges::any_of(
-            variants_of(std::string(model->model), subject, sampled),
+            variants_of(model, subject, sampled),
             [&](const Variant& variant) { return variant.switches.contains(std::string(one.name)); });
-      EXPECT_GT(subjects_with_it, 0) << model->model << ' ' << one.name;
+      EXPECT_GT(subjects_with_it, 0) << model << ' ' << one.name;
     }
 }
 
