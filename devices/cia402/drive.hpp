@@ -2,11 +2,13 @@
 #pragma once
 
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -59,8 +61,10 @@ class Cia402Drive final : public Drive {
   // drive_power.cpp
   Task<Result<void>> enable(MotionGuard guard) override;
   Task<Result<void>> disable(MotionGuard guard) override;
-  Task<Result<void>> stop(StopKind kind) override;
   Task<Result<void>> clear_alarm() override;
+
+  // drive_stop.cpp
+  Task<Result<void>> stop(StopKind kind) override;
 
   // drive_motion.cpp
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
@@ -88,6 +92,12 @@ class Cia402Drive final : public Drive {
   struct Trigger {
     Object object;
     std::int64_t value = 0;
+  };
+  /// The halt that stands in the drive, by its last edge.
+  struct Halt {
+    TimePoint since;
+    bool quick = false;   ///< without a ramp
+    bool rested = false;  ///< the motor was seen at rest under it
   };
   /// A motion that was triggered and has not been seen to end.
   struct Live {
@@ -121,6 +131,9 @@ class Cia402Drive final : public Drive {
   void unsubscribe();
   /// Nothing waits for a SYNC in this drive (M24).
   Task<Result<void>> settle(SdoOptions options);
+  Task<Result<void>> disarm(SdoOptions options);
+  Task<Result<void>> leave_operational();
+  [[nodiscard]] bool is_silent();
   Task<Result<void>> start_node();
 
   // drive_state.cpp
@@ -131,10 +144,14 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] Duration pdo_patience() const;
   Task<std::optional<Reading>> next_pdos();
   Task<Result<Reading>> poll_objects(SdoOptions options);
+  Task<Result<DriveSample>> look(bool by_pdo, SdoOptions options);
   DriveSample judge(const Reading& reading);
   Task<> leave_homing(SdoOptions options);
-  void note_knowledge(const Reading& reading);
+  void give_up_leaving();
   [[nodiscard]] DriveMode mode_of(const DriveSample& sample, const Reading& reading);
+  /// A terminal with one of these functions is active.
+  [[nodiscard]] bool input_active(const DriveSample& sample,
+                                  std::initializer_list<std::string_view> functions) const;
   [[nodiscard]] std::optional<DriveMode> terminal_motion(const DriveSample& sample) const;
 
   // drive_canary.cpp
@@ -150,14 +167,32 @@ class Cia402Drive final : public Drive {
   /// Reads the block and compares it. The time: before the first of it was asked for.
   Task<Result<TimePoint>> read_canary(SdoOptions options);
 
-  // drive_power.cpp
+  // drive_stop.cpp
+  /// What is known of the drive's words is forgotten where nothing has proven it lately.
+  void drop_stale_knowledge();
+  void forget_words();
+  void prove_words(TimePoint at);
+  void note_knowledge(const Reading& reading);
   /// The control word as the drive holds it.
   Task<Result<std::uint16_t>> held_control(SdoOptions options);
   Task<Result<void>> write_control(std::uint16_t word, SdoOptions options);
+  Task<> wake_if_stopped();
+  Task<> wake_unheard();
+  Task<> send_control_pdo(std::uint16_t word);
+  Task<> zero_velocity(SdoOptions options);
+  Task<Result<void>> send_stop(bool quick);
+  Task<bool> turns(SdoOptions options);
+  Task<Result<void>> halt_again(std::uint16_t bits, SdoOptions options);
+
+  // drive_power.cpp
   Task<Result<State>> read_status(SdoOptions options);
   Task<Result<void>> change_mode(OperationMode mode, SdoOptions options);
   Task<Result<void>> neutralise(State state, SdoOptions options);
   Task<Result<void>> make_ready(State state, OperationMode mode, SdoOptions options);
+  Task<Result<void>> leave_halt(State state, OperationMode mode, std::optional<std::int64_t> position,
+                                SdoOptions options);
+  Task<Result<void>> stopped_unless(Result<void> watched);
+  Task<Result<State>> make_step(Transition step, SdoOptions options);
   Task<Result<void>> step_to_enabled(State state, SdoOptions options);
   Task<Result<void>> confirm_nothing_pending(SdoOptions options);
   Task<Result<void>> watch_standstill(std::int64_t position, SdoOptions options);
@@ -218,7 +253,8 @@ class Cia402Drive final : public Drive {
   bool rebooted_ = false;        ///< since configure(), and nobody was told yet
   bool heartbeat_lost_ = false;  ///< its PDOs are not waited for
   bool settled_ = false;
-  bool node_started_ = false;  ///< it was told to, since the last contact began
+  std::optional<TimePoint> silent_since_;  ///< it did not answer to identify()
+  bool node_started_ = false;              ///< it was told to, since the last contact began
   StatePdos pdos_;
   std::vector<std::uint32_t> subscribed_;
   std::shared_ptr<void> sync_;
@@ -228,18 +264,30 @@ class Cia402Drive final : public Drive {
 
   // What the drive is known to hold; nothing: unknown.
   std::optional<std::uint16_t> control_;
+  /// Bits 0 to 3 of it: known for longer, as most words do not change them.
+  std::optional<std::uint16_t> state_bits_;
   std::uint64_t control_writes_ = 0;
-  TimePoint control_at_{};  ///< when it was last written
+  int control_writing_ = 0;
+  TimePoint control_at_{};           ///< when a write of it ended last
+  TimePoint proven_at_{};            ///< the drive held what is known here
+  std::uint64_t proven_losses_ = 0;  ///< of the port, until then
   std::optional<OperationMode> mode_;
+  TimePoint mode_at_ = TimePoint::min();  ///< likewise
   std::optional<std::int16_t> halt_option_;
+  std::optional<Halt> halt_;
   std::uint64_t stops_ = 0;
+  int stopping_ = 0;        ///< stops being sent
+  TimePoint stopped_at_{};  ///< the last one was sent
 
   // What the drive does.
   HomingWatch homing_;
   bool leave_homing_ = false;  ///< it has ended, and the drive is to go back to position mode
-  bool homed_ = false;         ///< by us, in this power cycle
+  std::shared_ptr<AxisGate> leave_gate_ = std::make_shared<AxisGate>();
+  std::int32_t homing_offset_ = 0;
+  std::optional<bool> homed_;  ///< how our last homing of this power cycle ended; nothing: as the drive says
   std::optional<Live> live_;
   std::optional<std::int32_t> last_position_;
+  bool last_moving_ = false;
   bool negative_ = false;
   std::uint16_t pending_alarm_ = 0;  ///< told by EMCY, and not reported yet: it may be gone already (M5)
 

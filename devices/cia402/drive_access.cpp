@@ -40,14 +40,14 @@ Error Cia402Drive::lost_memory() const {
 void Cia402Drive::forget_power_cycle() {
   expected_.clear();
   expected_mark_.reset();
-  control_.reset();
-  mode_.reset();
-  halt_option_.reset();
+  forget_words();
+  halt_.reset();
   saving_.reset();
   found_closed_.reset();
   unsaved_.clear();
   homing_.end();
-  homed_ = leave_homing_ = false;
+  homed_.reset();
+  leave_homing_ = last_moving_ = false;
   live_.reset();
   last_position_.reset();
   pdos_.forget();

@@ -22,6 +22,10 @@ constexpr auto heartbeat_period = milliseconds(250);
 constexpr auto heartbeat_patience = milliseconds(1000);
 /// Of event PDOs at 1 Mbit/s: a node sends them at least, and at most, this often.
 constexpr auto event_period = milliseconds(20), inhibit_period = milliseconds(10);
+/// Nobody who takes part in the network is silent for so long.
+constexpr auto silence_of_absent = milliseconds(1000);
+/// For a node to follow an NMT command that it does not confirm (it may have no heartbeat).
+constexpr auto nmt_patience = milliseconds(50);
 constexpr std::uint32_t full_speed = 1'000'000;
 constexpr std::uint16_t command_number = 1;
 
@@ -90,10 +94,11 @@ Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_c
     if (const auto started = co_await start_node(); !started) co_return fail(started.error());
   const auto found = co_await canopen::read_identity(node_, in(transaction_class));
   if (!found) {
-    if (found.error().reason == Reason::no_reply)
+    if (found.error().reason == Reason::no_reply && is_silent())
       bus_->set_readiness(node_.id(), CanopenBus::Readiness::absent);
     co_return failed(found.error());
   }
+  silent_since_.reset();
   if (const auto fits = canopen::check_identity(*found, model_->identity); !fits) {
     bus_->set_readiness(node_.id(), CanopenBus::Readiness::absent);  // somebody else's
     co_return fail(error_at(Reason::wrong_model, {0x1018, 0},
@@ -115,6 +120,14 @@ Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_c
                             "each request is answered twice (two nodes with this node-ID?)",
                             "give each node of the network a node-ID of its own"));
   co_return identity;
+}
+
+/// A node that is heard, or was a moment ago, is there, and may hold something for the next SYNC (M24): it is
+/// busy, or answers late.
+bool Cia402Drive::is_silent() {
+  if (!silent_since_) silent_since_ = clock_->now();
+  const auto heard = bus_->master().nmt().status(node_.id()).last_heard;
+  return clock_->now() - std::max(*silent_since_, heard.value_or(*silent_since_)) >= silence_of_absent;
 }
 
 bool Cia402Drive::closed_loop() const {
@@ -157,6 +170,7 @@ Task<Result<void>> Cia402Drive::configure() {
   // to switch saving off for it would itself be a write to the EEPROM at each start.
   auto switched = co_await save_writes(saves_at_rest());
   if (switched) switched = co_await set_heartbeat();
+  if (switched) switched = co_await disarm(patiently());
   if (switched) switched = co_await set_pdos();
   if (!switched) co_return switched;
   co_return co_await check_continuity(TransactionClass::parameters);
@@ -270,19 +284,42 @@ void Cia402Drive::listen(const std::vector<canopen::PdoOutcome>& outcomes) {
 /// axisd arms no set-point for a SYNC, but another master, or an earlier program, may have: an RPDO that
 /// waits for a SYNC no longer does.
 Task<Result<void>> Cia402Drive::settle(SdoOptions options) {
+  if (const auto disarmed = co_await disarm(std::move(options)); !disarmed) co_return disarmed;
+  settled_ = true;
+  bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
+  co_return Result<void>{};
+}
+
+/// What an RPDO has received already waits in the drive whatever its type becomes, or is applied by the very
+/// change: it is gone only where there are no PDOs, in Pre-Operational.
+Task<Result<void>> Cia402Drive::disarm(SdoOptions options) {
   constexpr std::uint8_t sub_type = 2;
   constexpr std::uint16_t pdos = 4;
+  std::vector<Object> armed;
   for (std::uint16_t number = 1; number <= pdos; ++number) {
     const auto object = canopen::communication_object(PdoDirection::receive, number, sub_type);
     const auto type = co_await node_.read_if_there(object, options);
     if (!type) co_return failed(type.error());
-    if (!*type || **type >= canopen::event_driven_of_manufacturer) continue;
-    if (const auto written = co_await write_object(object, canopen::event_driven_of_profile, 1, options);
-        !written)
-      co_return written;
+    if (*type && **type < canopen::event_driven_of_manufacturer) armed.push_back(object);
   }
-  settled_ = true;
-  bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
+  if (armed.empty()) co_return Result<void>{};
+  if (const auto left = co_await leave_operational(); !left) co_return left;
+  Result<void> written;
+  for (const auto object : armed)
+    if (written) written = co_await write_object(object, canopen::event_driven_of_profile, 1, options);
+  // Whatever came of it: its state comes by PDO.
+  const auto started = co_await bus_->master().command(node_.id(), canopen::NmtCommand::start);
+  node_started_ = started.has_value();
+  co_return written ? started : written;
+}
+
+Task<Result<void>> Cia402Drive::leave_operational() {
+  const auto told = co_await bus_->master().command(node_.id(), canopen::NmtCommand::enter_pre_operational);
+  if (!told) co_return told;
+  const auto until = clock_->now() + nmt_patience;
+  while (clock_->now() < until &&
+         bus_->master().nmt().status(node_.id()).state != canopen::NmtState::pre_operational)
+    co_await news_.wait_until(until);
   co_return Result<void>{};
 }
 

@@ -69,6 +69,7 @@ Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode
                                            MotionGuard guard, bool& triggered) {
   const SdoOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
   if (rebooted_) co_return fail(lost_memory());
+  give_up_leaving();
   const auto state = co_await read_status(motion);
   if (!state) co_return fail(state.error());
   if (*state != State::operation_enabled)
@@ -106,7 +107,7 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
     negative_ = expected_.front()[target] < *last_position_;
   if (mode == OperationMode::homing) {
     homed_ = false;
-    homing_.begin(began);
+    homing_.begin(began, last_position_, homing_offset_);
   }
   co_return pulled;
 }
@@ -122,6 +123,7 @@ Task<> Cia402Drive::acknowledge_set_point(SdoOptions options) {
 
 /// Compared and not just written: some drives save these.
 Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions options) {
+  homing_offset_ = profile.offset_pulses;
   for (const auto& [object, value] : encode(*model_, setup_.pulses_per_revolution, profile)) {
     const auto present = co_await read_object(object, options);
     if (!present) co_return fail(present.error());
@@ -164,6 +166,7 @@ Task<Result<void>> Cia402Drive::clear_position(MotionGuard guard) {
 /// Homing method 35 (CiA 402): the present position is home, without a motion.
 Task<Result<void>> Cia402Drive::home_here(SdoOptions options) {
   constexpr std::int64_t present_position = 35;
+  give_up_leaving();
   const auto state = co_await read_status(options);
   if (!state) co_return fail(state.error());
   if (*state != State::operation_enabled)

@@ -1,4 +1,4 @@
-// The power stage, and stops. Power never moves (M23).
+// The power stage. Power never moves (M23).
 //
 // What could turn the shaft when 0Fh is sent or halt is released: 60FFh in velocity mode (there 0Fh is the
 // start command, 6.2.2), bit 4, and a set-point that a halt suspended. What releasing halt does with the last
@@ -19,6 +19,8 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr auto transition_limit = milliseconds(1000);
+/// After a word whose reply was lost, before it is sent again.
+constexpr auto lost_transition_limit = milliseconds(100);
 constexpr auto mode_limit = milliseconds(500);
 constexpr auto watch_time = milliseconds(30), watch_pause = milliseconds(5);
 constexpr std::int64_t jitter = 2;  // pulses; an encoder at rest
@@ -34,40 +36,6 @@ constexpr std::int64_t number_of(OperationMode mode) { return std::to_underlying
 
 }  // namespace
 
-Task<Result<std::uint16_t>> Cia402Drive::held_control(SdoOptions options) {
-  if (control_) co_return *control_;
-  const auto writes = control_writes_;
-  const auto word = co_await read_object(object::control_word, std::move(options));
-  if (!word) co_return fail(word.error());
-  const auto held = static_cast<std::uint16_t>(*word);
-  if (writes == control_writes_) control_ = held;
-  co_return held;
-}
-
-Task<Result<void>> Cia402Drive::write_control(std::uint16_t word, SdoOptions options) {
-  // Whoever asks meanwhile (a stop) must not go by what stood there before.
-  control_.reset();
-  const auto write = ++control_writes_;
-  constexpr std::size_t bytes = 2;
-  const auto answer = co_await node_.sdo().download(node_.id(), object::control_word,
-                                                    canopen::number_bytes(word, bytes), options);
-  if (!answer) co_return failed(answer.error());
-  if (write != control_writes_) co_return Result<void>{};  // overtaken by a later one
-  if (answer->ambiguous) {
-    const auto held = co_await held_control(std::move(options));
-    if (!held) co_return fail(held.error());
-    if (*held != word)
-      co_return fail(
-          error_at(Reason::no_reply, object::control_word,
-                   fmt::format("the control word reads {:04X}h after {:04X}h was written", *held, word),
-                   "it is tried again"));
-    co_return Result<void>{};
-  }
-  control_ = word;
-  control_at_ = clock_->now();
-  co_return Result<void>{};
-}
-
 Task<Result<State>> Cia402Drive::read_status(SdoOptions options) {
   const auto word = co_await read_object(object::status_word, std::move(options));
   if (!word) co_return fail(word.error());
@@ -79,8 +47,9 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
   if (!present) co_return fail(present.error());
   if (*present != number_of(mode)) {
     mode_.reset();
-    if (const auto written = co_await write_object(object::mode, number_of(mode), 1, options); !written)
-      co_return written;
+    const auto written = co_await write_object(object::mode, number_of(mode), 1, options);
+    mode_at_ = clock_->now();
+    if (!written) co_return written;
   }
   const auto fits = [wanted = number_of(mode)](std::int64_t shown) { return shown == wanted; };
   const auto shown = co_await read_until(object::mode_display, fits, mode_limit, std::move(options));
@@ -90,6 +59,7 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
                             fmt::format("the drive stays in mode {} instead of {}", *shown, number_of(mode)),
                             "check whether another master writes to this drive, and its alarm"));
   mode_ = mode;
+  mode_at_ = clock_->now();
   if (mode != OperationMode::homing) leave_homing_ = false;
   co_return Result<void>{};
 }
@@ -129,16 +99,20 @@ Task<Result<void>> Cia402Drive::neutralise(State state, SdoOptions options) {
 Task<Result<void>> Cia402Drive::make_ready(State state, OperationMode mode, SdoOptions options) {
   const auto held = co_await held_control(options);
   if (!held) co_return fail(held.error());
-  const auto quiet = quiet_word(state);
   const bool enabled = state == State::operation_enabled;
   const bool halted = (*held & control::halt) != 0;
-  std::optional<std::int64_t> position;
-  if (!enabled || halted) {
-    if (const auto neutral = co_await neutralise(state, options); !neutral) co_return neutral;
-    const auto base = co_await read_object(object::position, options);
-    if (!base) co_return fail(base.error());
-    if (enabled) position = *base;
-  }
+  if (enabled && !halted) co_return co_await leave_halt(state, mode, std::nullopt, std::move(options));
+  if (const auto neutral = co_await neutralise(state, options); !neutral) co_return neutral;
+  const auto base = co_await read_object(object::position, options);
+  if (!base) co_return fail(base.error());
+  if (!enabled) co_return co_await leave_halt(state, mode, std::nullopt, std::move(options));
+  co_return co_await stopped_unless(co_await leave_halt(state, mode, *base, std::move(options)));
+}
+
+/// Writes the control word without halt, and the mode. From `position` the shaft must not turn meanwhile.
+Task<Result<void>> Cia402Drive::leave_halt(State state, OperationMode mode,
+                                           std::optional<std::int64_t> position, SdoOptions options) {
+  const auto quiet = quiet_word(state);
   if (!control_ || *control_ != quiet)
     if (const auto written = co_await write_control(quiet, options); !written) co_return written;
   if (position)
@@ -149,6 +123,13 @@ Task<Result<void>> Cia402Drive::make_ready(State state, OperationMode mode, SdoO
   if (const auto changed = co_await change_mode(mode, options); !changed) co_return changed;
   if (position) co_return co_await watch_standstill(*position, std::move(options));
   co_return Result<void>{};
+}
+
+/// Where power or the end of a halt could not be watched to its end (a reply was lost), the drive is halted
+/// again: the next attempt begins from there, and has it watched.
+Task<Result<void>> Cia402Drive::stopped_unless(Result<void> watched) {
+  if (!watched && watched.error().reason != Reason::terminal) (void)co_await stop(StopKind::stop);
+  co_return watched;
 }
 
 /// Power is on, or a halt is released, and nothing was started: the shaft stays where it is, or is stopped.
@@ -191,6 +172,24 @@ Task<Result<void>> Cia402Drive::confirm_nothing_pending(SdoOptions options) {
       "check whether another master writes to this drive"));
 }
 
+/// One transition. Its word may be sent twice: it asks for a state, and not for a motion.
+Task<Result<State>> Cia402Drive::make_step(Transition step, SdoOptions options) {
+  constexpr int attempts = 2;
+  const auto arrived = [to = step.to](std::int64_t shown) {
+    return state_of(static_cast<std::uint16_t>(shown)) == to;
+  };
+  for (int attempt = 1;; ++attempt) {
+    // Without a reply the state tells whether it was executed.
+    const auto written = co_await write_control(control_word(*step.command), options);
+    if (!written && written.error().outcome != Outcome::unknown) co_return fail(written.error());
+    const auto limit = written ? transition_limit : lost_transition_limit;
+    const auto word = co_await read_until(object::status_word, arrived, limit, options);
+    if (!word) co_return fail(word.error());
+    if (arrived(*word) || written || attempt == attempts)
+      co_return state_of(static_cast<std::uint16_t>(*word));
+  }
+}
+
 Task<Result<void>> Cia402Drive::step_to_enabled(State state, SdoOptions options) {
   std::optional<std::int64_t> position;
   while (const auto step = next_to_enabled(state)) {
@@ -201,21 +200,17 @@ Task<Result<void>> Cia402Drive::step_to_enabled(State state, SdoOptions options)
       if (!base) co_return fail(base.error());
       position = *base;
     }
-    if (const auto written = co_await write_control(control_word(*step->command), options); !written)
-      co_return written;
-    const auto word = co_await read_until(
-        object::status_word,
-        [to = step->to](std::int64_t shown) { return state_of(static_cast<std::uint16_t>(shown)) == to; },
-        transition_limit, options);
-    if (!word) co_return fail(word.error());
-    state = state_of(static_cast<std::uint16_t>(*word));
+    const auto made = co_await make_step(*step, options);
+    if (!made && !position) co_return fail(made.error());
+    if (!made) co_return co_await stopped_unless(fail(made.error()));
+    state = *made;
     if (state != step->to)
       co_return fail(error_at(Reason::not_confirmed, object::status_word,
                               fmt::format("transition {}: the drive is in {} instead of {}", step->number,
                                           to_string(state), to_string(step->to)),
                               "check alarm, supply and terminals that release the motor"));
   }
-  if (position) co_return co_await watch_standstill(*position, std::move(options));
+  if (position) co_return co_await stopped_unless(co_await watch_standstill(*position, std::move(options)));
   co_return fail(error_at(
       Reason::alarm, object::status_word,
       fmt::format("the drive is in {}: it cannot be enabled", to_string(state)),
@@ -224,6 +219,7 @@ Task<Result<void>> Cia402Drive::step_to_enabled(State state, SdoOptions options)
 
 Task<Result<void>> Cia402Drive::enable(MotionGuard guard) {
   const SdoOptions options{.transaction_class = TransactionClass::motion, .guard = std::move(guard)};
+  give_up_leaving();
   if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
   const auto state = co_await read_status(options);
   if (!state) co_return fail(state.error());
@@ -252,6 +248,8 @@ Task<bool> Cia402Drive::released(SdoOptions options) {
 Task<Result<void>> Cia402Drive::disable(MotionGuard guard) {
   const SdoOptions options{
       .transaction_class = TransactionClass::stop, .guard = std::move(guard), .attempts = 3};
+  co_await wake_if_stopped();
+  drop_stale_knowledge();
   // 0Fh with a motion under way: that ends first, as far as it can.
   if (!control_ || (*control_ & control::halt) == 0) (void)co_await stop(StopKind::stop);
   // The halt stays until the next enable has found that nothing is behind it.
@@ -265,38 +263,6 @@ Task<Result<void>> Cia402Drive::disable(MotionGuard guard) {
                               "the drive still reports its power stage as on", "try again"));
   }
   co_return Result<void>{};
-}
-
-/// Works on a node of which nothing is known, and never changes the power stage: bits 0 to 3 stay as the
-/// drive has them. Never bit 2 (M12): without 605Ah and 6085h nobody knows how the drive would stop.
-Task<Result<void>> Cia402Drive::stop(StopKind kind) {
-  ++stops_;
-  leave_homing_ = leave_homing_ || homing_.active() || mode_ == OperationMode::homing;
-  homing_.end();
-  live_.reset();
-  const SdoOptions urgent{.transaction_class = TransactionClass::stop};
-  const auto held = co_await held_control(urgent);
-  if (!held) co_return fail(held.error());
-  const auto word = static_cast<std::uint16_t>((*held & control::state_bits) | control::halt);
-  const bool quick = kind == StopKind::quick_stop;
-  const auto option = quick ? model_->meaning.halt_at_once : model_->meaning.halt_on_ramp;
-  // At once where it can be; a quick stop first has to say how (605Dh may be read when bit 8 rises).
-  const auto at_once = [](Cia402Drive& drive, std::uint16_t bits) -> Task<> {
-    if (!drive.command_pdo_ || !drive.control_) co_return;
-    constexpr std::size_t bytes = 2;
-    (void)co_await drive.bus_->master().send_pdo(*drive.command_pdo_, canopen::number_bytes(bits, bytes),
-                                                 {.transaction_class = TransactionClass::stop});
-  };
-  if (!quick) co_await at_once(*this, word);
-  if (halt_option_ != option) {
-    halt_option_.reset();
-    if (co_await write_object(object::halt_option, option, 0, urgent)) halt_option_ = option;
-  }
-  if (quick) co_await at_once(*this, word);
-  // M12. In a mode that nobody knows it does no harm.
-  if (!mode_ || *mode_ == OperationMode::profile_velocity)
-    (void)co_await write_object(object::target_velocity, 0, 0, urgent);
-  co_return co_await write_control(word, urgent);
 }
 
 Task<Result<void>> Cia402Drive::reset_fault(SdoOptions options) {

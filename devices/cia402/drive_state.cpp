@@ -32,6 +32,7 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
       break;
     case Kind::heartbeat_lost:
       heartbeat_lost_ = true;
+      forget_words();
       break;
     case Kind::heartbeat_again:
       heartbeat_lost_ = false;
@@ -65,8 +66,11 @@ bool Cia402Drive::pdos_usable() const {
 }
 
 Duration Cia402Drive::pdo_patience() const {
-  const auto period = pdos_.synchronous() ? 2 * bus_->settings().sync_period : longest_pdo_wait;
-  return std::min<Duration>(period + milliseconds(10), longest_pdo_wait);
+  constexpr auto reply = milliseconds(10);
+  const auto period = bus_->settings().sync_period;
+  if (!pdos_.synchronous()) return longest_pdo_wait;
+  if (!pdos_.late()) return std::min<Duration>(2 * period + reply, longest_pdo_wait);
+  return std::max<Duration>(3 * period + reply, longest_pdo_wait);
 }
 
 /// The first complete reading that is no older than this call, if it comes soon.
@@ -101,15 +105,10 @@ Task<Result<Reading>> Cia402Drive::poll_objects(SdoOptions options) {
   co_return reading;
 }
 
-Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class) {
-  const SdoOptions options{.transaction_class = transaction_class};
-  // A chain that starts something does not wait for a PDO.
-  if (transaction_class != TransactionClass::motion)
-    if (const auto reading = co_await next_pdos()) {
-      auto sample = judge(*reading);
-      if (!leave_homing_ || sample.moving) co_return sample;
-    }
-  if (leave_homing_ && !rebooted_) co_await leave_homing(options);
+/// By PDO, where they come and are wanted, else by SDO.
+Task<Result<DriveSample>> Cia402Drive::look(bool by_pdo, SdoOptions options) {
+  if (by_pdo)
+    if (const auto reading = co_await next_pdos()) co_return judge(*reading);
   if (rebooted_) co_return fail(lost_memory());
   const auto polled = co_await poll_objects(options);
   if (!polled) co_return fail(polled.error());
@@ -119,15 +118,21 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
   co_return judge(*polled);
 }
 
-/// What the drive is known to hold is no longer known where the drive shows something else.
-void Cia402Drive::note_knowledge(const Reading& reading) {
-  const auto mode = reading.values.find(object::mode_display.key());
-  if (mode != reading.values.end()) mode_ = static_cast<OperationMode>(mode->second);
-  const auto status = reading.values.find(object::status_word.key());
-  if (status == reading.values.end() || !control_ || reading.asked_at <= control_at_) return;
-  const bool told_to_run = (*control_ & control::state_bits) == control_word(Command::enable_operation);
-  const bool runs = state_of(static_cast<std::uint16_t>(status->second)) == State::operation_enabled;
-  if (told_to_run != runs) control_.reset();
+Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class) {
+  const SdoOptions options{.transaction_class = transaction_class};
+  // A chain that starts something does not wait for a PDO.
+  auto sample = co_await look(transaction_class != TransactionClass::motion, options);
+  // What a drive does with a change of its mode in motion is not said.
+  const bool rests = sample && !sample->moving && stopping_ == 0 && sample->asked_at >= stopped_at_;
+  if (leave_homing_ && rests && !rebooted_) {
+    co_await leave_homing(options);
+    sample = co_await look(false, options);
+  }
+  // An alarm that has gone already is told once, all the same (M5): with a sample that somebody gets.
+  if (sample)
+    if (const auto told = std::exchange(pending_alarm_, 0); sample->alarm_code == 0)
+      sample->alarm_code = told;
+  co_return sample;
 }
 
 DriveSample Cia402Drive::judge(const Reading& reading) {
@@ -139,10 +144,10 @@ DriveSample Cia402Drive::judge(const Reading& reading) {
   else if (sample.velocity_rpm != 0)
     negative_ = sample.negative_direction;
   last_position_ = sample.position_pulses;
+  last_moving_ = sample.moving;
   sample.negative_direction = negative_;
-  // An alarm that has gone already is told once, all the same (M5).
-  if (const auto told = std::exchange(pending_alarm_, 0); sample.alarm_code == 0) sample.alarm_code = told;
   note_knowledge(reading);
+  if (halt_ && sample.asked_at >= halt_->since && !sample.moving) halt_->rested = true;
   if (live_ && sample.asked_at >= live_->since) {
     if (sample.moving)
       live_->moved = true;
@@ -150,15 +155,26 @@ DriveSample Cia402Drive::judge(const Reading& reading) {
       live_.reset();
   }
   sample.mode = mode_of(sample, reading);
-  sample.homed = sample.homed || homed_;  // of CiA 402's bit 12 nothing is left in another mode
+  // A bit that is left from an earlier homing says nothing about the last one; of CiA 402's bit 12 nothing is
+  // left in another mode.
+  const bool bit_fell = !sample.moving && !home_bit(*model_, reading.values).value_or(false);
+  if (homed_ == false && !homing_.active() && bit_fell) homed_.reset();
+  sample.homed = homed_.value_or(sample.homed);
   return sample;
 }
 
-/// Back to position mode, where bit 13 is the power stage alone, and bit 4 to 0. With the halt, which any
-/// start ends: whatever stop comes at the same time, this undoes nothing of it. What fails here is done by
-/// the next start.
+/// Whatever else is begun, or stopped, ends this: nothing of it goes out after that.
+void Cia402Drive::give_up_leaving() {
+  leave_gate_->raise();
+  bus_->purge_superseded();
+  leave_homing_ = false;
+}
+
+/// Back to position mode, where bit 13 is the power stage alone, and bit 4 to 0; with the halt, which any
+/// start ends. What fails here is done by the next start.
 Task<> Cia402Drive::leave_homing(SdoOptions options) {
   leave_homing_ = false;
+  options.guard = {.gate = leave_gate_, .epoch = leave_gate_->epoch()};
   const auto held = co_await held_control(options);
   if (!held) co_return;
   const auto word = static_cast<std::uint16_t>((*held & control::state_bits) | control::halt);
@@ -169,8 +185,10 @@ Task<> Cia402Drive::leave_homing(SdoOptions options) {
 /// 6061h stays as it is when a motion has ended; the contract wants `homing` only while it lasts.
 DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading) {
   if (homing_.active()) {
-    if (homing_.goes_on(sample)) return DriveMode::homing;
-    homed_ = sample.homed;
+    const auto bit = home_bit(*model_, reading.values);
+    const bool held_up = input_active(sample, {"stop", "quick_stop"});
+    if (homing_.goes_on(sample, {.low = bit == false, .held_up = held_up})) return DriveMode::homing;
+    homed_ = homing_.reached();
     leave_homing_ = true;
   }
   if (leave_homing_) return sample.moving ? DriveMode::homing : DriveMode::positioning;
@@ -187,18 +205,21 @@ DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading
   return DriveMode::positioning;
 }
 
+bool Cia402Drive::input_active(const DriveSample& sample,
+                               std::initializer_list<std::string_view> functions) const {
+  const auto& terminals = model_->descriptor->inputs;
+  return std::ranges::any_of(setup_.inputs, [&](const TerminalSettings& input) {
+    const auto terminal = std::ranges::find(terminals, input.terminal, &TerminalSpec::name);
+    return terminal != terminals.end() && std::ranges::find(functions, input.function) != functions.end() &&
+           ((sample.inputs >> static_cast<unsigned>(terminal - terminals.begin())) & 1U) != 0;
+  });
+}
+
 /// A terminal that starts motions is active: the drive moves by itself, and goes on when axisd does not.
 std::optional<DriveMode> Cia402Drive::terminal_motion(const DriveSample& sample) const {
-  for (const auto& input : setup_.inputs) {
-    const auto terminal = std::ranges::find(model_->descriptor->inputs, input.terminal, &TerminalSpec::name);
-    if (terminal == model_->descriptor->inputs.end()) continue;
-    const auto bit = static_cast<unsigned>(terminal - model_->descriptor->inputs.begin());
-    if (((sample.inputs >> bit) & 1U) == 0) continue;
-    if (input.function == "homing_start") return DriveMode::homing;
-    if (input.function == "position_start") return DriveMode::multi_position;
-    if (input.function == "speed_start" || input.function.starts_with("jog_"))
-      return DriveMode::multi_velocity;
-  }
+  if (input_active(sample, {"homing_start"})) return DriveMode::homing;
+  if (input_active(sample, {"position_start"})) return DriveMode::multi_position;
+  if (input_active(sample, {"speed_start", "jog_positive", "jog_negative"})) return DriveMode::multi_velocity;
   return std::nullopt;
 }
 

@@ -141,6 +141,14 @@ DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution,
   return sample;
 }
 
+std::optional<bool> home_bit(const Model& model, const Values& values) {
+  const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
+  if ((word & model.status.homed) != 0) return true;
+  const auto mode = static_cast<OperationMode>(value_of(values, object::mode_display));
+  if (mode == OperationMode::homing) return (word & status::mode_specific) != 0;
+  return model.status.homed != 0 ? std::optional(false) : std::nullopt;
+}
+
 std::vector<canopen::Object> motion_objects(const Model& model) {
   std::vector<canopen::Object> objects{object::target_position, object::profile_velocity,
                                        object::acceleration, object::deceleration};

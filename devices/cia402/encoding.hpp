@@ -36,6 +36,9 @@ std::vector<canopen::PdoMapping> state_layout(const Model& model);
 
 /// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's.
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values);
+/// The bit that says "homed", alone: CiA 402's bit 12 means that in homing mode only. Nothing: neither bit
+/// tells now.
+std::optional<bool> home_bit(const Model& model, const Values& values);
 /// Alarm code of a 603Fh or EMCY error code; 0: none, or none of the drive's own.
 std::uint16_t alarm_of(const Model& model, std::uint16_t error_code);
 

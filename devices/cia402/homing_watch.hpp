@@ -1,4 +1,5 @@
-// Tells when a homing that was started has ended: 6061h stays at 6, so only the motion and the bits tell.
+// Tells when a homing that was started has ended, and whether at home: 6061h stays at 6, so only the motion
+// and the bits tell.
 #pragma once
 
 #include <optional>
@@ -9,22 +10,39 @@ namespace axisd::cia402 {
 
 /// Pure.
 ///
-///   idle --begin()--> homing --home reported after it had not been, at rest--> idle
-///                     homing --at rest at one place for `longest_rest`, or released--> idle
+///   idle --begin()--> homing --at rest with the bit, where a homing leaves the counter--> idle, reached
+///                     homing --at rest at one place for `longest_rest`, or released--> idle, reached or not
+///
+/// The bit may be left from an earlier homing, by a drive that ignored this start, or that was stopped on its
+/// way: it counts once it was seen low, or the motor has moved to where only a homing leads. And with a stop
+/// terminal in the way nothing is home.
 class HomingWatch {
  public:
   /// Between its phases the motor rests for less than this.
   static constexpr Duration longest_rest = std::chrono::milliseconds(500);
 
-  void begin(TimePoint at);
+  /// What a sample does not say.
+  struct Signs {
+    bool low = false;      ///< the bit itself is 0, whatever the motor does
+    bool held_up = false;  ///< a stop terminal is active
+  };
+
+  /// `from`: where the motor stood; `offset`: 607Ch.
+  void begin(TimePoint at, std::optional<std::int32_t> from, std::int32_t offset);
   void end() { began_.reset(); }
   /// Takes a sample, and says whether homing goes on.
-  bool goes_on(const DriveSample& sample);
+  bool goes_on(const DriveSample& sample, Signs signs);
   [[nodiscard]] bool active() const { return began_.has_value(); }
+  /// It has ended at home.
+  [[nodiscard]] bool reached() const { return reached_; }
 
  private:
+  [[nodiscard]] bool at_home(std::int32_t position) const;
+
   std::optional<TimePoint> began_;
-  bool was_not_home_ = false;  ///< the bit may be left from the last time: only its rise counts
+  std::optional<std::int32_t> from_;
+  std::int64_t offset_ = 0;
+  bool was_low_ = false, moved_ = false, held_up_ = false, reached_ = false;
   TimePoint resting_since_{};
   std::int32_t resting_at_ = 0;
   bool rests_ = false;

@@ -18,6 +18,7 @@ void StatePdos::forget() {
   sync_.reset();
   previous_sync_.reset();
   newest_.reset();
+  late_ = false;
 }
 
 bool StatePdos::complete() const {
@@ -26,7 +27,7 @@ bool StatePdos::complete() const {
 
 void StatePdos::on_sync(TimePoint at) {
   if (!synchronous_) return;
-  previous_complete_ = !sync_ || complete();
+  if (sync_ && !complete()) late_ = true;
   previous_sync_ = std::exchange(sync_, at);
   for (auto& part : parts_) part.there = false;
 }
@@ -35,11 +36,11 @@ void StatePdos::on_pdo(std::size_t index, std::span<const std::uint8_t> bytes, T
                        TimePoint end) {
   auto values = canopen::unpack_pdo(layout_.at(index), bytes);
   if (!values || (synchronous_ && !sync_)) return;
+  if (parts_.at(index).there) late_ = false;
   parts_.at(index) = {.values = std::move(*values), .begin = begin, .end = end, .there = true};
   if (!complete()) return;
   if (!synchronous_) return assemble(std::ranges::min(parts_, {}, &Part::begin).begin);
-  // What was missing in the cycle before may be what comes late in this one.
-  assemble(previous_complete_ ? *sync_ : previous_sync_.value_or(*sync_));
+  assemble(late_ ? previous_sync_.value_or(*sync_) : *sync_);
 }
 
 void StatePdos::assemble(TimePoint asked_at) {

@@ -21,6 +21,10 @@ struct Reading {
 
 /// Pure. With SYNC a reading is what came between two SYNCs, and as old as the first of them; by event it is
 /// the newest PDO of each, and as old as the oldest of them.
+///
+/// A drive may need longer than a period. It then completes each cycle with what the SYNC before asked for,
+/// which shows only once: the first cycle that is so ends incomplete. From then on all readings count as one
+/// period older, until it sends twice within a cycle, because it has caught up.
 class StatePdos {
  public:
   /// Signs are those of `model`'s dictionary, which outlives this.
@@ -34,6 +38,8 @@ class StatePdos {
   [[nodiscard]] std::optional<Reading> since(TimePoint since) const;
 
   [[nodiscard]] bool synchronous() const { return synchronous_; }
+  /// Its PDOs answer the SYNC before the last.
+  [[nodiscard]] bool late() const { return late_; }
   [[nodiscard]] const std::vector<canopen::PdoMapping>& layout() const { return layout_; }
 
  private:
@@ -50,7 +56,7 @@ class StatePdos {
   bool synchronous_ = false;
   std::vector<Part> parts_;
   std::optional<TimePoint> sync_, previous_sync_;
-  bool previous_complete_ = true;
+  bool late_ = false;
   std::optional<Reading> newest_;
 };
 

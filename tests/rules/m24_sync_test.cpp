@@ -1,0 +1,77 @@
+// SYNC: what an earlier master armed, and nodes that may hold something.
+#include <gtest/gtest.h>
+
+#include "tests/rules/m23_can_rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Whatever sends PDOs and SDOs beside axisd.
+void put(simulation::SimulatedCanNode& node, std::uint32_t id, std::vector<std::uint8_t> bytes) {
+  node.on_frame(can::make_frame(id, bytes));
+}
+
+void write(simulation::SimulatedCanNode& node, std::uint16_t index, std::uint8_t sub, std::uint8_t size,
+           std::uint32_t value) {
+  put(node, 0x600U + CanRig::node_id,
+      {static_cast<std::uint8_t>(0x23U | (4U - size) << 2U), static_cast<std::uint8_t>(index),
+       static_cast<std::uint8_t>(index >> 8U), sub, static_cast<std::uint8_t>(value),
+       static_cast<std::uint8_t>(value >> 8U), static_cast<std::uint8_t>(value >> 16U),
+       static_cast<std::uint8_t>(value >> 24U)});
+}
+
+TEST(M24, WhatAnEarlierMasterArmedNeverStarts) {
+  for (const std::uint16_t number : {0, 1}) {
+    SCOPED_TRACE(number);
+    CanRig rig({.sync_period = 10ms, .limits = false});
+    rig.ready();
+    rig.stop_daemon();
+    rig.touch([&](auto& node) {
+      const auto parameters = static_cast<std::uint16_t>(0x1400 + number);
+      const auto mapping = static_cast<std::uint16_t>(0x1600 + number);
+      const auto id = 0x200U + 0x100U * number + CanRig::node_id;
+      put(node, 0, {0x80, CanRig::node_id});
+      write(node, parameters, 1, 4, 0x80000000U | id);
+      write(node, mapping, 0, 1, 0);
+      write(node, mapping, 1, 4, 0x60400010);
+      write(node, mapping, 2, 4, 0x607A0020);
+      write(node, mapping, 0, 1, 2);
+      write(node, parameters, 2, 1, 1);
+      write(node, parameters, 1, 4, id);
+      write(node, 0x6060, 0, 1, 1);
+      write(node, 0x6040, 0, 2, 0x0F);
+      put(node, 0, {0x01, CanRig::node_id});
+      put(node, id, {0x1F, 0, 0x10, 0x27, 0, 0});
+    });
+    const auto at = rig.shaft();
+    rig.start_daemon();
+    rig.run(1s);
+    EXPECT_GT(rig.count_of(0x80), 10);
+    EXPECT_EQ(rig.shaft(), at);
+    rig.ready();
+    rig.done(MoveAbsoluteRequest{.position = 3});
+    EXPECT_EQ(rig.state()->link_note, "");
+  }
+}
+
+TEST(M24, ANodeThatIsHeardButDoesNotAnswerKeepsSyncFromStarting) {
+  CanRig rig({.sync_period = 10ms, .limits = false, .connect = false});
+  rig.reconnect();
+  rig.stop_daemon();
+  rig.network.set_fault([](const can::Frame& frame) {
+    return can::Network::Fault{.drop = frame.id == 0x580U + CanRig::node_id};
+  });
+  rig.touch([](auto& node) { write(node, 0x1017, 0, 2, 250); });
+  rig.start_daemon();
+  rig.run(3s);
+  EXPECT_EQ(rig.count_of(0x80), 0);
+  rig.network.set_fault({});
+  rig.reconnect();
+  rig.run(1s);
+  EXPECT_GT(rig.count_of(0x80), 10);
+}
+
+}  // namespace
+}  // namespace axisd::test
