@@ -103,14 +103,16 @@ void SimulatedDrive::on_halt(bool halted) {
     }
     return;
   }
-  if (activity_ == Activity::none || (stopping_ && !pending_)) return;
-  if (activity_ == Activity::position && behaviour_.halt_release_resumes)
+  const bool at_once = dictionary_.get(0x605D) == 1;
+  const bool cuts = at_once && behaviour_.halt_edge_cuts_ramp;
+  if (activity_ == Activity::none || (stopping_ && !pending_ && !cuts)) return;
+  if (activity_ == Activity::position && !stopping_ && behaviour_.halt_release_resumes)
     suspended_ =
         pending_
             ? *pending_
             : Plan{.activity = Activity::position, .target = last_target_, .rates = set_point(false).rates};
   if (activity_ == Activity::homing) homing_error_ = true;
-  stop_motion(dictionary_.get(0x605D) == 1);
+  stop_motion(at_once);
 }
 
 /// 6.2.4, 6.2.6: control bit 4.

@@ -16,6 +16,10 @@ struct Entry {
 
 // clang-format off
 constexpr Entry entries[] = {
+    {{"halt_edge_cuts_ramp", true,
+      "bit 8 that rises with 605Dh = 1 ends a ramp at once that another stop began; off: the "
+      "ramp goes on"},
+     &Behaviour::halt_edge_cuts_ramp},
     {{"halt_release_resumes", true,
       "releasing halt goes on with the interrupted move or homing (CiA 402); off: it is dropped "
       "(6.2.4: \"ends the present position\")"},

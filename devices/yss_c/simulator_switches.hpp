@@ -9,7 +9,7 @@ namespace axisd::yss_c {
 
 /// One member per switch; what each means stands in the table of simulator_switches.cpp.
 struct Behaviour {
-  bool halt_release_resumes, halt_release_restarts_velocity, velocity_cleared_on_disable,
+  bool halt_edge_cuts_ramp, halt_release_resumes, halt_release_restarts_velocity, velocity_cleared_on_disable,
       mode_change_keeps_setpoint, setpoint_in_motion_ignored, start_of_enabled_edge;
   bool homing_codes_cia, homing_codes_0_to_3, homing_29_ends_backwards, homing_accepts_active_switch,
       homing_goes_on_after_start_bit, offset_without_move, homed_stays_during_homing;

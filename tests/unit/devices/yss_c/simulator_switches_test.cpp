@@ -65,6 +65,25 @@ std::int64_t halt_and_release(Bench& bench) {
   bench.control(0x0F);
   return moving(bench);
 }
+/// Still moving 20 ms after a quick stop that came into the ramp of a stop.
+std::int64_t quick_stop_in_ramp(Bench& bench) {
+  bench.enable(1);
+  bench.write(0x6084, 4, 2000);
+  bench.move(50000);
+  bench.run(1s);
+  bench.control(0x10F);
+  bench.run(100ms);
+  EXPECT_EQ(1, moving(bench));
+  bench.write(0x605D, 2, 1);
+  bench.control(0x10F);
+  bench.run(20ms);
+  EXPECT_EQ(1, moving(bench)) << "bit 8 has no edge";
+  bench.write(0x6060, 1, 3);
+  bench.control(0x0F);
+  bench.control(0x10F);
+  bench.run(20ms);
+  return moving(bench);
+}
 std::int64_t limit_bit(Bench& bench, int bit) {
   bench.assign(0, 2);
   bench.drive().set_input("X0", true);
@@ -77,6 +96,7 @@ void start_by_terminal(Bench& bench, int function) {
 }
 
 const Reading readings[] = {
+    {"halt_edge_cuts_ramp", &quick_stop_in_ramp, 1, 0},
     {"halt_release_resumes", &halt_and_release, 0, 1},
     {"halt_release_restarts_velocity",
      [](Bench& b) {

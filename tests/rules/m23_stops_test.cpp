@@ -1,0 +1,222 @@
+// Stops on CANopen where the halt bit stands already, where little is known of the drive, and where the node
+// is stopped itself.
+#include <gtest/gtest.h>
+
+#include "tests/rules/m23_can_rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::uint16_t control_rpdo = 0x200;
+
+/// A slow ramp: what a quick stop shortens shows.
+void slow_ramps(AxisSettings& axis) {
+  axis.limits.acceleration_time = 200ms;
+  axis.limits.deceleration_time = 2000ms;
+}
+
+/// Halt words on the wire, by RPDO or SDO.
+long halts(const CanRig& rig) {
+  const auto sdo = rig.writes_of(0x604000);
+  const auto has_halt = [](std::uint32_t word) { return (word & 0x100U) != 0; };
+  return std::ranges::count_if(sdo, has_halt) + std::ranges::count_if(rig.frames, [&](const auto& entry) {
+           const auto& frame = entry.second;
+           return frame.id == control_rpdo + CanRig::node_id && has_halt(frame.data[0] | frame.data[1] << 8U);
+         });
+}
+
+/// Drops what the drive answers to SDO.
+void make_mute(CanRig& rig) {
+  rig.network.set_fault([](const can::Frame& frame) {
+    return can::Network::Fault{.drop = frame.id == 0x580U + CanRig::node_id};
+  });
+}
+
+TEST(M12, AQuickStopEndsTheRampOfAStop) {
+  for_each_reading({.limits = false, .adjust = slow_ramps},
+                   {{"halt_release_resumes"},
+                    {"mode_change_keeps_setpoint"},
+                    {"pdo_parameters_read_only"},
+                    {"halt_release_restarts_velocity"}},
+                   [](const CanRigOptions& options) {
+                     for (const bool velocity : {true, false}) {
+                       CanRig rig(options);
+                       rig.ready();
+                       (void)rig.submit(velocity ? Action(MoveVelocityRequest{.velocity = 50})
+                                                 : Action(MoveRelativeRequest{.distance = 900}));
+                       rig.run(1s);
+                       ASSERT_TRUE(rig.drive->shaft_moving());
+                       (void)rig.submit(StopRequest{.kind = StopKind::stop});
+                       rig.run(300ms);
+                       ASSERT_TRUE(rig.drive->shaft_moving()) << "the ramp lasts";
+                       (void)rig.submit(StopRequest{.kind = StopKind::quick_stop});
+                       rig.run(60ms);
+                       EXPECT_FALSE(rig.drive->shaft_moving());
+                       EXPECT_EQ(rig.drive->peek(0x604000), 0x010FU);
+                       rig.run(1s);
+                       EXPECT_EQ(rig.state()->state, AxisState::standstill);
+                     }
+                   });
+}
+
+TEST(M12, WhereNoEdgeEndsARampTheStopIsStillConfirmed) {
+  CanRig rig({.switches = {{"halt_edge_cuts_ramp", false}}, .limits = false, .adjust = slow_ramps});
+  rig.ready();
+  (void)rig.submit(MoveRelativeRequest{.distance = 900});
+  rig.run(1s);
+  (void)rig.submit(StopRequest{.kind = StopKind::stop});
+  rig.run(300ms);
+  (void)rig.submit(StopRequest{.kind = StopKind::quick_stop});
+  rig.run(4s);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  EXPECT_EQ(rig.drive->peek(0x604000), 0x010FU);
+}
+
+TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
+  for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
+    for_each_reading({.limits = false,
+                      .adjust =
+                          [](AxisSettings& axis) {
+                            axis.inputs.push_back({.terminal = "X3", .function = "jog_positive"});
+                          }},
+                     {{"halt_release_resumes"}, {"pdo_parameters_read_only"}, {"mode_change_keeps_setpoint"}},
+                     [kind](const CanRigOptions& options) {
+                       CanRig rig(options);
+                       rig.ready();
+                       (void)rig.submit(MoveRelativeRequest{.distance = 900});
+                       rig.run(500ms);
+                       rig.done(StopRequest{.kind = StopKind::stop});
+                       rig.touch([](auto& node) { node.set_input("X3", true); });
+                       rig.run(500ms);
+                       ASSERT_TRUE(rig.drive->shaft_moving());
+                       (void)rig.submit(StopRequest{.kind = kind});
+                       rig.run(1s);
+                       EXPECT_FALSE(rig.drive->shaft_moving());
+                       EXPECT_EQ(rig.drive->peek(0x604000), 0x010FU);
+                     });
+  }
+}
+
+TEST(M13, AStopNeedsNoAnswer) {
+  for (const bool velocity : {true, false}) {
+    CanRig rig({.limits = false});
+    rig.ready();
+    // The reply to the trigger is lost, and nothing is heard by SDO any more.
+    const auto command = rig.submit(velocity ? Action(MoveVelocityRequest{.velocity = 50})
+                                             : Action(MoveRelativeRequest{.distance = 900}));
+    ASSERT_TRUE(rig.run_until([&] { return rig.drive->starts() > 0; }, 2s));
+    make_mute(rig);
+    rig.run(50ms);
+    ASSERT_TRUE(rig.drive->shaft_moving());
+    rig.frames.clear();
+    (void)rig.submit(StopRequest{.kind = StopKind::stop});
+    rig.run(20ms);
+    EXPECT_GT(halts(rig), 0);
+    rig.run(1s);
+    EXPECT_FALSE(rig.drive->shaft_moving());
+    rig.network.set_fault({});
+  }
+}
+
+TEST(M12, AVelocityIsZeroedEvenWhereTheControlWordCannotBeRead) {
+  CanRig rig({.limits = false});
+  rig.ready();
+  (void)rig.submit(MoveVelocityRequest{.velocity = 50});
+  rig.run(600ms);
+  rig.nodes().set_connected(false);
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 3s));
+  rig.run(2s);
+  rig.nodes().add_fault({.kind = simulation::FaultKind::drop_reply, .count = -1, .object = 0x6040});
+  rig.frames.clear();
+  rig.nodes().set_connected(true);
+  rig.run(2s);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  EXPECT_EQ(rig.drive->peek(0x60FF00), 0U);
+  rig.nodes().clear_faults();
+}
+
+TEST(M01, AStopNeverEnergisesADriveThatSomebodyReleased) {
+  CanRig rig({.limits = false});
+  rig.ready();
+  (void)rig.submit(MoveRelativeRequest{.distance = 900});
+  rig.run(600ms);
+  rig.nodes().set_connected(false);
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 3s));
+  rig.run(2s);
+  // As another master does it: Ready To Switch On.
+  auto shutdown = can::make_frame(0x600U + CanRig::node_id,
+                                  std::array<std::uint8_t, 8>{0x2B, 0x40, 0x60, 0, 0x06, 0, 0, 0});
+  rig.touch([&](auto& node) { node.on_frame(shutdown); });
+  rig.run(100ms);
+  rig.nodes().set_connected(true);
+  rig.reconnect();
+  rig.run(1s);
+  EXPECT_EQ(rig.drive->peek(0x604100) & 0x2000U, 0U) << "bit 13: energised";
+  EXPECT_FALSE(rig.state()->enabled);
+}
+
+TEST(M04, ANodeStoppedByNmtGetsItsStop) {
+  CanRig rig({.limits = false});
+  rig.ready();
+  (void)rig.submit(MoveVelocityRequest{.velocity = 50});
+  rig.run(600ms);
+  ASSERT_TRUE(rig.drive->shaft_moving());
+  const auto stop = can::make_frame(0, std::array<std::uint8_t, 2>{0x02, CanRig::node_id});
+  rig.touch([&](auto& node) { node.on_frame(stop); });
+  rig.run(4s);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+}
+
+TEST(M23, ALostReplyAfterTheEndOfAHaltLeavesTheDriveWatched) {
+  // Each reply of the chain in turn.
+  for (int lost = 1; lost <= 40; lost += 3) {
+    SCOPED_TRACE(lost);
+    CanRig rig({.limits = false});
+    rig.ready();
+    (void)rig.submit(MoveRelativeRequest{.distance = 900});
+    rig.run(500ms);
+    rig.done(StopRequest{.kind = StopKind::stop});
+    int replies = 0;
+    rig.network.set_fault([&replies, lost](const can::Frame& frame) {
+      const bool reply = frame.id == 0x580U + CanRig::node_id;
+      return can::Network::Fault{.drop = reply && (++replies == lost || replies == lost + 1)};
+    });
+    const auto before = rig.shaft();
+    (void)rig.submit(EnableRequest{});
+    rig.run(2s);
+    EXPECT_EQ(rig.shaft(), before);
+    rig.network.set_fault({});
+    rig.run(1s);
+    const auto moved = rig.complete(MoveRelativeRequest{.distance = -2});
+    EXPECT_EQ(moved.state, CommandState::done) << describe(moved);
+    EXPECT_NEAR(static_cast<double>(rig.shaft()), static_cast<double>(before - 200), 1);
+  }
+}
+
+TEST(M08, EnablingSurvivesALostReply) {
+  for (const auto fault : {simulation::FaultKind::drop_reply, simulation::FaultKind::drop_request}) {
+    for (int which = 1; which <= 4; ++which) {
+      SCOPED_TRACE(which);
+      CanRig rig({.limits = false});
+      int words = 0;
+      rig.network.set_fault([&words, which, fault](const can::Frame& frame) {
+        const bool word =
+            frame.id == (fault == simulation::FaultKind::drop_reply ? 0x580U : 0x600U) + CanRig::node_id &&
+            frame.data[1] == 0x40 && frame.data[2] == 0x60 &&
+            (frame.data[0] == 0x60 || (frame.data[0] & 0xE0U) == 0x20U);
+        return can::Network::Fault{.drop = word && ++words == which};
+      });
+      const auto enabled = rig.complete(EnableRequest{});
+      rig.network.set_fault({});
+      EXPECT_EQ(enabled.state, CommandState::done) << describe(enabled);
+      EXPECT_EQ(rig.drive->peek(0x604100) & 0x6FU, 0x27U) << "Operation Enabled";
+      rig.done(SetPositionRequest{.position = 0});
+      rig.done(MoveAbsoluteRequest{.position = 3});
+    }
+  }
+}
+
+}  // namespace
+}  // namespace axisd::test
