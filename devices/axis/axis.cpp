@@ -77,14 +77,26 @@ std::int64_t Axis::home_offset() const {
 }
 
 bool Axis::input_active(std::string_view function) const {
-  if (!sample_) return false;
-  for (const auto& input : settings_.inputs) {
-    if (input.function != function) continue;
-    const auto terminal = std::ranges::find(descriptor_->inputs, input.terminal, &TerminalSpec::name);
-    const auto bit = static_cast<unsigned>(terminal - descriptor_->inputs.begin());
-    if (terminal != descriptor_->inputs.end() && ((sample_->inputs >> bit) & 1U) != 0) return true;
-  }
-  return false;
+  return sample_ && std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
+           return input.function == function && active_in(*sample_, input);
+         });
+}
+
+bool Axis::active_in(const DriveSample& sample, const TerminalSettings& input) const {
+  const auto terminal = std::ranges::find(descriptor_->inputs, input.terminal, &TerminalSpec::name);
+  const auto bit = static_cast<unsigned>(terminal - descriptor_->inputs.begin());
+  return terminal != descriptor_->inputs.end() && ((sample.inputs >> bit) & 1U) != 0;
+}
+
+bool Axis::starts_motion(const TerminalSettings& input) const {
+  const auto* function = find_function(descriptor_->input_functions, input.function);
+  return function != nullptr && function->starts_motion;
+}
+
+bool Axis::start_terminal_active(const DriveSample& sample) const {
+  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
+    return starts_motion(input) && active_in(sample, input);
+  });
 }
 
 bool Axis::limit_active(bool positive) const {
@@ -100,7 +112,9 @@ void Axis::on_sample(const DriveSample& sample) {
   // Open loop: the overtravel stop at a limit has no ramp (M20). Homing runs onto limits by design.
   const bool homing = activity_ && activity_->state == AxisState::homing;
   // Homing that is not ours zeroes the counter; so does one that came and went between two samples (M20).
-  const bool homed_by_others = !homing && !stopping_.running && before && !before->homed && sample.homed;
+  // Where a drive zeroes its counter by homing on the spot, that is ours.
+  const bool homed_by_others =
+      !homing && !rezeroing_ && !stopping_.running && before && !before->homed && sample.homed;
   if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
@@ -114,7 +128,7 @@ void Axis::on_sample(const DriveSample& sample) {
     tracker_.forget_target();
   }
   if (sample.moving && !activity_ && !stopping_.running && link_ == LinkState::online)
-    on_unexplained_motion(sample);
+    on_unexplained_motion(sample, before);
   publish();
   sampled_.notify_all();
 }
@@ -141,24 +155,34 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
   const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
   enabled_by_us_ = false;
   if (releasing || fault_) return;
-  if (activity_ && activity_->state != AxisState::standstill && limit_active(last_positive_)) {
+  const bool moved = activity_ && activity_->state != AxisState::standstill;
+  if (moved && limit_active(last_positive_)) {
     supersede(error(Reason::limit_switch, "a limit switch ended the motion, and the drive released the motor",
                     "move away from it by hand; home the axis"));
-    return;
+  } else {
+    supersede(error(Reason::terminal, "the power stage was released, and not by a command",
+                    "check terminals with the function motor_free and other masters on the bus"));
   }
-  supersede(error(Reason::terminal, "the power stage was released, and not by a command",
-                  "check terminals with the function motor_free and other masters on the bus"));
+  // As abort_at_rest(): the terminal may let go of the drive again.
+  if (moved) begin_stop(StopKind::halt, false, nullptr);
 }
 
-void Axis::on_unexplained_motion(const DriveSample& sample) {
+void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before) {
   if (terminal_motion_) return;
+  // The drive says so itself, or a terminal that starts motions is, or was just now, active.
   const bool segments = sample.mode == DriveMode::multi_position || sample.mode == DriveMode::multi_velocity;
-  const bool possible = std::ranges::any_of(settings_.inputs, [this](const TerminalSettings& input) {
-    const auto* function = find_function(descriptor_->input_functions, input.function);
-    return function != nullptr && function->starts_motion;
-  });
+  const bool homing = sample.mode == DriveMode::homing && has_input("homing_start");
+  const bool started = start_terminal_active(sample) || (before && start_terminal_active(*before));
+  // Motion and terminals may come in different frames: the terminal shows one sample later at most.
+  const bool possible = std::ranges::any_of(
+      settings_.inputs, [this](const TerminalSettings& input) { return starts_motion(input); });
+  const bool just_began = before && !before->moving;
+  if (!stop_owed_ && !fault_ && possible && just_began && !segments && !homing && !started) {
+    wake_.notify_all();
+    return;
+  }
   // A motor that was told to stop, and has not confirmed it, is never a terminal's.
-  if (!stop_owed_ && !fault_ && (segments || possible || drive_->moves_by_itself())) {
+  if (!stop_owed_ && !fault_ && (segments || homing || started || drive_->moves_by_itself())) {
     terminal_motion_ = true;
     return;
   }

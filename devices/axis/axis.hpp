@@ -155,6 +155,8 @@ class Axis {
   Task<> connect();
   Task<Result<void>> try_connect(TransactionClass contact);
   Task<Result<void>> settle_found_motion();
+  [[nodiscard]] bool found_in_motion() const;
+  [[nodiscard]] bool found_by_terminal() const;
   Task<Result<void>> prove_or_configure();
   Task<> poll();
   Task<bool> poll_once(int& failures);
@@ -169,7 +171,7 @@ class Axis {
   void on_sample(const DriveSample& sample);
   void on_alarm(const DriveSample& sample);
   void on_released(const DriveSample& sample, bool enabled_before);
-  void on_unexplained_motion(const DriveSample& sample);
+  void on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before);
   void publish();
   void tell_edges(const DriveSample& before, const DriveSample& now);
   void tell_changes(const AxisSnapshot& before, const AxisSnapshot& now);
@@ -181,6 +183,9 @@ class Axis {
   [[nodiscard]] std::int64_t home_offset() const;
   [[nodiscard]] bool has_input(std::string_view function) const;
   [[nodiscard]] bool input_active(std::string_view function) const;
+  [[nodiscard]] bool active_in(const DriveSample& sample, const TerminalSettings& input) const;
+  [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;
+  [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
   void lose_trust();
   void remember_position();
@@ -215,6 +220,7 @@ class Axis {
   Task<> run_move(ActivityPtr activity);
   Task<> run_velocity(ActivityPtr activity);
   Task<Result<void>> make_room(ActivityPtr activity);
+  Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
@@ -226,6 +232,7 @@ class Axis {
   [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;
   void finish(Activity& activity, const std::function<void(CommandRecord&)>& how);
   void fail_with_stop(Activity& activity, Error cause);
+  void abort_at_rest(Activity& activity, Error cause);
   void enter_error_stop(Error cause);
 
   // axis_power.cpp: sequences that move nothing

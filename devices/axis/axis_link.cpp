@@ -16,7 +16,6 @@ constexpr int attempts_before_offline = 3;
 /// The canary is read at least every second (M7), whatever the polling period; the rest is for the wire.
 constexpr auto continuity_period = milliseconds(800);
 constexpr auto continuity_latest = milliseconds(950);
-constexpr auto found_motion_poll = milliseconds(30);
 
 }  // namespace
 
@@ -93,27 +92,33 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact) {
   co_return co_await prove_or_configure();
 }
 
+/// Within homing the motor rests between its phases, and goes on.
+bool Axis::found_in_motion() const { return sample_->moving || sample_->mode == DriveMode::homing; }
+
+bool Axis::found_by_terminal() const {
+  return !stop_owed_ && (sample_->mode >= DriveMode::multi_position || drive_->moves_by_itself() ||
+                         (sample_->mode == DriveMode::homing && input_active("homing_start")));
+}
+
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
-  const auto by_terminal = [this] {
-    return !stop_owed_ && (sample_->mode >= DriveMode::multi_position || drive_->moves_by_itself());
-  };
-  const auto began = env_.clock->now();
-  const auto patience = deceleration_bound() + settings_.stop_margin;
-  auto kind = StopKind::stop;
-  while (sample_->moving && !by_terminal() && !closing_) {
+  if (found_in_motion() && !found_by_terminal()) {
     if (!stop_owed_) spdlog::warn("{}: found moving; stopping it", settings_.name);
     stop_owed_ = true;
-    const auto sent = co_await drive_->stop(kind);
-    if (!sent) co_return sent;
-    if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
-    co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + found_motion_poll);
-    const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
-    if (!sample) co_return fail(sample.error());
-    on_sample(*sample);
-    if (env_.clock->now() - began > patience) kind = StopKind::quick_stop;
-    if (env_.clock->now() - began > 2 * patience) {
-      if (settings_.stop_escalation_release) co_await drive_->disable({});
+    bool rests = false;
+    for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
+      const auto sent = co_await drive_->stop(kind);
+      if (!sent) co_return sent;
+      if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
+      const auto deadline = env_.clock->now() + deceleration_bound() + settings_.stop_margin;
+      rests = co_await standstill_unpolled(deadline);
+      if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
+        co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",
+                             "check power and wiring"));
+      if (rests || closing_) break;
+    }
+    if (!rests) {
+      if (settings_.stop_escalation_release && !closing_) co_await drive_->disable({});
       co_return fail(error(Reason::not_confirmed, "found moving, and it does not stop",
                            "look at the machine; cut its power if it moves"));
     }
@@ -152,7 +157,7 @@ Task<Result<void>> Axis::prove_or_configure() {
   }
   if (!configured_) {
     // A terminal's motion is not disturbed by writing parameters under it.
-    if (sample_->moving)
+    if (sample_->moving || (found_in_motion() && found_by_terminal()))
       co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
     const auto configured = co_await drive_->configure();
     if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());

@@ -17,6 +17,9 @@ namespace {
 constexpr auto start_window = milliseconds(500);
 /// Beyond the predicted time: the prediction is exact for the profile, the drive's own latency is unknown.
 constexpr auto overrun_margin = std::chrono::seconds(1);
+/// A counter that was told to become zero shows it within this.
+constexpr auto zeroing_window = milliseconds(200);
+constexpr auto zeroing_poll = milliseconds(5);
 
 }  // namespace
 
@@ -48,6 +51,17 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
   stopping_.shown = activity.state;
   begin_stop(StopKind::stop, false, nullptr);
   finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+}
+
+/// A terminal brought the drive to rest, and may let go of it again: what the drive was told would still
+/// stand then (in velocity mode 60FFh is followed as a level), so it is taken back (M1).
+void Axis::abort_at_rest(Activity& activity, Error cause) {
+  if (activity_.get() != &activity) return;
+  gate_->raise();
+  env_.bus->purge_superseded();
+  keep_deceleration(activity);
+  begin_stop(StopKind::halt, false, nullptr);
+  finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
 
 void Axis::enter_error_stop(Error cause) {
@@ -98,19 +112,36 @@ Task<Result<void>> Axis::make_room(ActivityPtr activity) {
     rezeroing_ = false;
     co_return cleared;
   }
-  const auto sample = co_await drive_->read_state(TransactionClass::motion);
+  const bool zero = co_await counter_shows_zero();
   rezeroing_ = false;
-  const auto shift = tracker_.counter();
-  if (sample && sample->position_pulses == 0 && !sample->moving) {
+  if (zero) {
+    activity->plan.target_counter -= tracker_.counter();
     tracker_.rezero(0);
-    activity->plan.target_counter -= shift;
     co_return Result<void>{};
   }
-  if (!sample || sample->position_pulses != static_cast<std::int32_t>(shift)) lose_trust();
+  // It may become zero at any time, which would look like a motion.
+  lose_trust();
+  tracker_.forget_target();
   auto cause =
       error(Reason::not_confirmed, "the drive's position counter could not be zeroed", "repeat the move");
   cause.outcome = Outcome::not_executed;
   co_return fail(std::move(cause));
+}
+
+/// When an acknowledged zeroing shows is not said. The poll rests meanwhile, so what these samples tell is
+/// heard here. Goes on when superseded: what the counter means has to be known all the same.
+Task<bool> Axis::counter_shows_zero() {
+  const auto latest = env_.clock->now() + zeroing_window;
+  for (;;) {
+    const auto sample = co_await drive_->read_state(TransactionClass::motion);
+    if (sample) {
+      on_sample(*sample);
+      if (sample->moving) co_return false;
+      if (sample->position_pulses == 0) co_return true;
+    }
+    if (env_.clock->now() >= latest) co_return false;
+    co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + zeroing_poll);
+  }
 }
 
 Task<> Axis::run_move(ActivityPtr activity) {
@@ -322,12 +353,10 @@ bool Axis::judge_rest(Activity& activity) {
   const auto positive = activity.plan.positive;
   if (limit_active(positive)) {
     lose_trust();  // open loop: the overtravel stop has no ramp (M20)
-    finish(activity, [&](CommandRecord& command) {
-      command.abort(
-          error(Reason::limit_switch,
-                fmt::format("the {} limit switch ended the motion", positive ? "positive" : "negative"),
-                "move away from it; home the axis"));
-    });
+    abort_at_rest(activity, error(Reason::limit_switch,
+                                  fmt::format("the {} limit switch ended the motion",
+                                              positive ? "positive" : "negative"),
+                                  "move away from it; home the axis"));
     return true;
   }
   const bool terminal = input_active("stop") || input_active("quick_stop");
@@ -342,7 +371,7 @@ bool Axis::judge_rest(Activity& activity) {
                 fmt::format("the drive came to rest at {:.6g} {}", tracker_.position(), settings_.scale.unit),
                 "check terminals, and other masters on the bus");
   if (terminal) {
-    finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
+    abort_at_rest(activity, std::move(cause));
   } else {
     fail_with_stop(activity, std::move(cause));
   }

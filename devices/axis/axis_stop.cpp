@@ -110,6 +110,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const bool rests =
         polled ? co_await standstill_by(since, since + patience, requests)
                : (sent || link_ != LinkState::offline) && co_await standstill_unpolled(since + patience);
+    if (rests && requests != stopping_.requests) continue;
     if (rests) co_return Result<void>{};
     if (link_ == LinkState::offline) {
       auto cause = error(Reason::not_confirmed, "the drive fell silent before its standstill was confirmed",
@@ -160,7 +161,8 @@ Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests
   co_return false;
 }
 
-/// The same for a node that nobody polls, because it is not (or not yet) online.
+/// The same for a node that nobody polls, because it is not (or not yet) online. What its samples tell beside
+/// the standstill is heard nowhere else (M5).
 Task<bool> Axis::standstill_unpolled(TimePoint deadline) {
   constexpr auto pause = milliseconds(30);
   constexpr int resting_in_homing = 6;  // samples; between its phases the motor rests, too
@@ -171,6 +173,7 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline) {
     if (!sample && ++silent == stop_attempts) co_return false;
     if (sample) {
       silent = 0;
+      on_sample(*sample);
       const bool rests = !sample->moving && (resting == 0 || sample->position_pulses == resting_at);
       resting = rests ? resting + 1 : 0;
       resting_at = sample->position_pulses;
