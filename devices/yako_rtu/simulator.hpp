@@ -143,6 +143,8 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   int multi_speed_rpm_ = 0;       ///< signed, what PV runs at
   TimePoint pins_changed_{};
   TimePoint segment_due_ = TimePoint::max();  ///< PT start, 5 ms after its edge
+  TimePoint clear_due_ = TimePoint::max();    ///< 0x002C takes effect
+  TimePoint homing_due_ = TimePoint::max();   ///< the next phase of homing begins
   int segment_ = 0;
 
   Phase phase_ = Phase::ending;

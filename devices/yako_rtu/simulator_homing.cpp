@@ -33,6 +33,7 @@ Fail SimulatedDrive::start_homing() {
     return Fail::none;
   ++starts_;
   activity_ = Activity::homing;
+  homing_due_ = TimePoint::max();
   in_position_ = stopping_ = false;
   if (!behaviour_.homed_stays_during_homing) homed_ = false;
   homing_direction_ = memory_.get(reg::homing_mode) % 2 == 0 ? 1 : -1;
@@ -82,6 +83,12 @@ void SimulatedDrive::approach() {
 }
 
 void SimulatedDrive::homing_stopped() {
+  const bool turns = phase_ == Phase::turn || phase_ == Phase::found || phase_ == Phase::left;
+  if (behaviour_.homing_pauses && turns && homing_due_ == TimePoint::max()) {
+    homing_due_ = now_ + std::chrono::milliseconds(100);
+    return;
+  }
+  homing_due_ = TimePoint::max();
   switch (phase_) {
     case Phase::turn:
       if (++homing_turns_ > 1 && !behaviour_.homing_never_gives_up) {

@@ -74,6 +74,7 @@ Fail SimulatedDrive::begin(const Plan& plan) {
 
 void SimulatedDrive::launch(const Plan& plan) {
   activity_ = plan.activity;
+  homing_due_ = TimePoint::max();
   in_position_ = stopping_ = false;
   pending_.reset();
   const auto distance = plan.target.value_or(0) - motor_.commanded();
@@ -101,6 +102,7 @@ void SimulatedDrive::stop_motion(bool emergency) {
   pending_.reset();
   multi_speed_on_ = false;
   segment_due_ = TimePoint::max();
+  if (homing_due_ != TimePoint::max()) finish();
   if (!motor_.moving()) return;
   if (emergency) {
     cut();
@@ -119,6 +121,7 @@ void SimulatedDrive::cut() {
   pending_.reset();
   multi_speed_on_ = false;
   segment_due_ = TimePoint::max();
+  if (homing_due_ != TimePoint::max()) finish();
   if (!motor_.moving()) return;
   stopping_ = true;
   phase_ = Phase::ending;
@@ -146,6 +149,7 @@ void SimulatedDrive::on_stopped() {
 void SimulatedDrive::finish() {
   activity_ = Activity::none;
   stopping_ = false;
+  homing_due_ = TimePoint::max();
   if (behaviour_.in_position_after_stop) in_position_ = true;
 }
 

@@ -109,7 +109,11 @@ Fail SimulatedDrive::execute(std::uint16_t address, std::uint16_t value) {
       configuration_changed();
       return Fail::none;
     case reg::position_clear:
-      if (value == 1 && (!motor_.moving() || behaviour_.position_clear_in_motion)) motor_.clear_counter();
+      if (value != 1 || (motor_.moving() && !behaviour_.position_clear_in_motion)) return Fail::none;
+      if (behaviour_.position_clear_late)
+        clear_due_ = now_ + std::chrono::milliseconds(20);
+      else
+        motor_.clear_counter();
       return Fail::none;
     case reg::homing_start:
       return value == 1 ? start_homing() : Fail::none;

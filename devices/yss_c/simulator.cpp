@@ -123,6 +123,7 @@ void SimulatedDrive::rest() {
   suspended_.reset();
   buffered_.reset();
   velocity_held_ = false;
+  clear_due_ = homing_due_ = TimePoint::max();
 }
 
 void SimulatedDrive::nmt_reset(bool communication_only) {
@@ -165,7 +166,7 @@ TimePoint SimulatedDrive::next_event() const {
 
 TimePoint SimulatedDrive::motion_event() const {
   if (boot_end_) return *boot_end_;
-  auto next = std::min(motor_.ends(), inputs_.next_event());
+  auto next = std::min({motor_.ends(), inputs_.next_event(), clear_due_, homing_due_});
   if (motor_.moving()) {
     const auto change = inputs_.next_switch(motor_.shaft(), motor_.direction());
     if (change) next = std::min(next, motor_.reaches(*change));
@@ -189,6 +190,11 @@ void SimulatedDrive::step(TimePoint now) {
     if (in_control() && std::llabs(motor_.lag()) >= deviation_limit()) show_alarm(5);
     enforce_limits();
     if (ended && !motor_.moving()) on_stopped();
+    if (homing_due_ <= now) homing_stopped();
+    if (clear_due_ <= now) {
+      clear_due_ = TimePoint::max();
+      motor_.clear_counter();
+    }
     update_velocity();
     // Event PDOs look when something changed; what changes with time alone they look at by themselves.
     if (const auto now_appears = appearance(); std::exchange(appearance_, now_appears) != now_appears)
@@ -255,8 +261,8 @@ simulation::InputSettings SimulatedDrive::input_settings() const {
   return settings;
 }
 
-/// 2004h: functions 2030h:0D..0F. What is active, whatever the level that 2030h:0C makes of it: as 2003h shows
-/// inputs, and as the maker's other drives do.
+/// 2004h: functions 2030h:0D..0F. What is active, whatever the level that 2030h:0C makes of it: as 2003h
+/// shows inputs, and as the maker's other drives do.
 std::uint16_t SimulatedDrive::outputs() const {
   const std::array<bool, 5> functions{false, alarm_ != 0, motor_.moving(), homed_, reached_};
   unsigned bits = 0;

@@ -159,7 +159,9 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   std::optional<std::uint32_t> bitrate_;  ///< since the last power-up; nothing: never joined a network
   bool powered_ = false;
   std::optional<TimePoint> boot_end_;
-  std::uint64_t appearance_ = 0;  ///< as it was when event PDOs were last told to look
+  TimePoint clear_due_ = TimePoint::max();   ///< 2012h takes effect
+  TimePoint homing_due_ = TimePoint::max();  ///< the next phase of homing begins
+  std::uint64_t appearance_ = 0;             ///< as it was when event PDOs were last told to look
 
   State state_ = State::disabled;
   std::uint16_t control_ = 0;

@@ -40,6 +40,7 @@ void SimulatedDrive::start_homing() {
   if (method == nullptr || dictionary_.get(0x6099, 1) == 0 || dictionary_.get(0x6099, 2) == 0) return;
   ++starts_;
   activity_ = Activity::homing;
+  homing_due_ = TimePoint::max();
   reached_ = stopping_ = homing_error_ = false;
   if (!behaviour_.homed_stays_during_homing) homed_ = false;
   homing_direction_ = method->direction;
@@ -84,6 +85,12 @@ void SimulatedDrive::homing_limits() {
 }
 
 void SimulatedDrive::homing_stopped() {
+  const bool turns = phase_ == Phase::turn || phase_ == Phase::found || phase_ == Phase::left;
+  if (behaviour_.homing_pauses && turns && homing_due_ == TimePoint::max()) {
+    homing_due_ = now_ + std::chrono::milliseconds(100);
+    return;
+  }
+  homing_due_ = TimePoint::max();
   switch (phase_) {
     case Phase::turn:
       if (++homing_turns_ > 1) {  // between both limits there is no switch

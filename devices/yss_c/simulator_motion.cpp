@@ -68,6 +68,7 @@ bool SimulatedDrive::begin(const Plan& plan) {
 
 void SimulatedDrive::launch(const Plan& plan) {
   activity_ = plan.activity;
+  homing_due_ = TimePoint::max();
   reached_ = stopping_ = false;
   pending_.reset();
   const auto distance = plan.target.value_or(0) - motor_.commanded();
@@ -87,6 +88,7 @@ void SimulatedDrive::launch(const Plan& plan) {
 
 void SimulatedDrive::stop_motion(bool at_once) {
   pending_.reset();
+  if (homing_due_ != TimePoint::max()) finish();
   if (!motor_.moving()) return;
   if (at_once) {
     cut();
@@ -101,6 +103,7 @@ void SimulatedDrive::stop_motion(bool at_once) {
 void SimulatedDrive::cut() {
   pending_.reset();
   buffered_.reset();
+  if (homing_due_ != TimePoint::max()) finish();
   if (!motor_.moving()) return;
   stopping_ = true;
   phase_ = Phase::ending;
@@ -130,6 +133,7 @@ void SimulatedDrive::on_stopped() {
 void SimulatedDrive::finish() {
   activity_ = Activity::none;
   stopping_ = false;
+  homing_due_ = TimePoint::max();
 }
 
 /// The buffer is free again as soon as its set-point is under way.
@@ -150,7 +154,7 @@ void SimulatedDrive::update_velocity() {
     velocity_ = wanted;
     if (!begin(
             endless_plan(Activity::velocity, static_cast<double>(std::llabs(wanted)), wanted < 0 ? -1 : 1)))
-      velocity_held_ = true;
+      velocity_held_ = !behaviour_.velocity_resumes_after_terminal;
     return;
   }
   if (stopping_ || wanted == velocity_) return;
@@ -186,7 +190,7 @@ void SimulatedDrive::enforce_limits() {
     return;
   }
   if (!limit_active(motor_.direction())) return;
-  velocity_held_ = true;
+  velocity_held_ = !behaviour_.velocity_resumes_after_terminal;
   suspended_.reset();
   cut();
   if (dictionary_.get(0x200A) == 0 && behaviour_.free_stop_releases) energised_ = false;
@@ -208,7 +212,7 @@ void SimulatedDrive::on_edge(const simulation::FunctionEdge& edge) {
   };
   const auto stop = [&](bool at_once) {
     if (!edge.rising) return;
-    velocity_held_ = true;
+    velocity_held_ = !behaviour_.velocity_resumes_after_terminal;
     suspended_.reset();
     buffered_.reset();
     if (activity_ == Activity::homing) homing_error_ = true;

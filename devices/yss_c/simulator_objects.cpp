@@ -80,7 +80,12 @@ std::uint32_t SimulatedDrive::command(std::uint16_t index, std::int64_t value) {
       reset_fault();
       break;
     default:  // 2012h
-      if (!motor_.moving() || behaviour_.position_clear_in_motion) motor_.clear_counter();
+      if (!motor_.moving() || behaviour_.position_clear_in_motion) {
+        if (behaviour_.position_clear_late)
+          clear_due_ = now_ + std::chrono::milliseconds(20);
+        else
+          motor_.clear_counter();
+      }
       break;
   }
   return abort_code::none;

@@ -242,6 +242,42 @@ const Reading readings[] = {
        return std::int64_t{b.position() < 100};
      },
      0, 1},
+    {"position_clear_late",
+     [](Bench& b) {
+       b.enable(1);
+       b.move(500);
+       b.run(2s);
+       b.write(0x2012, 2, 1);
+       const auto at_once = std::int64_t{b.position()};
+       b.run(30ms);
+       EXPECT_EQ(b.position(), 0);
+       return at_once;
+     },
+     0, 500},
+    {"homing_pauses",
+     [](Bench& b) {
+       home_with(b, 24);
+       std::int64_t rests = 0;
+       for (int i = 0; i < 400 && !b.bit(8); ++i) {
+         b.run(50ms);
+         if (!b.drive().shaft_moving() && !b.bit(8)) rests = 1;
+       }
+       EXPECT_TRUE(b.bit(8));
+       return rests;
+     },
+     0, 1, with(home)},
+    {"velocity_resumes_after_terminal",
+     [](Bench& b) {
+       b.assign(1, 8);
+       run_velocity(b, 60);
+       b.drive().set_input("X1", true);
+       b.run(3s);
+       EXPECT_FALSE(b.drive().shaft_moving());
+       b.drive().set_input("X1", false);
+       b.run(500ms);
+       return moving(b);
+     },
+     0, 1},
     {"bit6_always",
      [](Bench& b) {
        b.enable(1);
