@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -171,9 +172,19 @@ class MovingDrive : public Links {
 
 TEST_F(MovingDrive, IsStoppedAfterAnOutageThatIsOverBeforeAnybodyPolls) {
   const auto starts = drives_.nodes().node(5)->starts();
+  std::optional<Duration> halted;  // since the bus-off: bit 8 of the control word, by PDO or SDO
+  network_.join([&](const can::Frame& frame, TimePoint at, bool) {
+    const bool by_pdo = frame.id == 0x205 && (frame.data[1] & 1U) != 0;
+    const bool by_sdo = frame.id == 0x605 && frame.data[1] == 0x40 && frame.data[2] == 0x60 &&
+                        frame.data[0] == 0x2B && (frame.data[5] & 1U) != 0;
+    if (!halted && (by_pdo || by_sdo)) halted = at - broken_at_;
+  });
   go_bus_off();
   world_.run_for(200ms);
   EXPECT_EQ(asked_at_, Times{0});
+  // M26: 200 ms for the cycle (this helper takes none), and what the bus takes.
+  ASSERT_TRUE(halted);
+  EXPECT_LT(*halted, 10ms);
   world_.run_for(3s);
   EXPECT_FALSE(drives_.nodes().node(5)->shaft_moving());
   EXPECT_EQ(drives_.nodes().node(5)->starts(), starts);
