@@ -80,6 +80,15 @@ TEST(StatePdos, WithSyncAReadingIsAsOldAsItsSync) {
   all.on_pdo(0, first(4), start + 31ms, start + 31ms);
   all.on_pdo(1, second, start + 32ms, start + 32ms);
   EXPECT_EQ(all.since(start)->asked_at, start + 20ms);
+  // A drive that needs longer than a period stays that late, though each cycle is complete.
+  all.on_sync(start + 40ms);
+  all.on_pdo(0, first(5), start + 41ms, start + 41ms);
+  all.on_pdo(1, second, start + 42ms, start + 42ms);
+  EXPECT_EQ(all.since(start)->asked_at, start + 30ms);
+  // Until it sends twice in one cycle.
+  all.on_pdo(0, first(6), start + 48ms, start + 48ms);
+  all.on_pdo(1, second, start + 49ms, start + 49ms);
+  EXPECT_EQ(all.since(start)->asked_at, start + 40ms);
   all.forget();
   EXPECT_FALSE(all.since(start));
 }
@@ -101,34 +110,76 @@ DriveSample at(Duration after, bool moving, bool homed, std::int32_t position = 
   return sample;
 }
 
+constexpr std::int32_t away = 5000;  ///< where the motor stood
+constexpr std::int32_t offset = 100;
+
+/// With the bit's own level, as drives have it that report it at all times.
+bool goes_on(HomingWatch& watch, const DriveSample& sample) {
+  return watch.goes_on(sample, {.low = !sample.homed});
+}
+
 TEST(HomingWatch, EndsWithTheRiseOfTheBit) {
   HomingWatch watch;
-  watch.begin(start);
-  EXPECT_TRUE(watch.goes_on(at(-1ms, false, true))) << "from before";
-  EXPECT_TRUE(watch.goes_on(at(10ms, true, false)));
-  EXPECT_TRUE(watch.goes_on(at(20ms, false, false))) << "a pause between two phases";
-  EXPECT_TRUE(watch.goes_on(at(30ms, true, false)));
-  EXPECT_TRUE(watch.goes_on(at(40ms, true, true))) << "still moving";
-  EXPECT_FALSE(watch.goes_on(at(50ms, false, true)));
+  watch.begin(start, away, offset);
+  EXPECT_TRUE(goes_on(watch, at(-1ms, false, true))) << "from before";
+  EXPECT_TRUE(goes_on(watch, at(10ms, true, false)));
+  EXPECT_TRUE(goes_on(watch, at(20ms, false, false))) << "a pause between two phases";
+  EXPECT_TRUE(goes_on(watch, at(30ms, true, false)));
+  EXPECT_TRUE(goes_on(watch, at(40ms, true, true))) << "still moving";
+  EXPECT_FALSE(goes_on(watch, at(50ms, false, true)));
   EXPECT_FALSE(watch.active());
+  EXPECT_TRUE(watch.reached());
 }
 
 TEST(HomingWatch, ABitOfTheLastTimeIsNoEnd) {
+  for (const std::int32_t end : {0, offset, -offset, 60}) {
+    HomingWatch watch;
+    watch.begin(start, away, offset);
+    EXPECT_TRUE(goes_on(watch, at(10ms, false, true, away)));
+    EXPECT_TRUE(goes_on(watch, at(20ms, true, true, 50)));
+    EXPECT_TRUE(goes_on(watch, at(30ms, false, true, end)));
+    EXPECT_TRUE(goes_on(watch, at(400ms, false, true, end + 1))) << "within the jitter of an encoder";
+    EXPECT_FALSE(goes_on(watch, at(530ms, false, true, end))) << "it rests for good";
+    EXPECT_EQ(watch.reached(), end != 60) << end << ": home is only where a homing leaves the counter";
+  }
+}
+
+TEST(HomingWatch, AStartThatTheDriveIgnoredReachesNothing) {
+  for (const std::int32_t where : {0, away}) {
+    HomingWatch watch;
+    watch.begin(start, where, offset);
+    EXPECT_TRUE(goes_on(watch, at(10ms, false, true, where)));
+    EXPECT_FALSE(goes_on(watch, at(520ms, false, true, where)));
+    EXPECT_FALSE(watch.reached());
+  }
+}
+
+TEST(HomingWatch, AwayFromHomeABitThatRoseIsWaitedFor) {
   HomingWatch watch;
-  watch.begin(start);
-  EXPECT_TRUE(watch.goes_on(at(10ms, false, true)));
-  EXPECT_TRUE(watch.goes_on(at(20ms, true, true, 50)));
-  EXPECT_TRUE(watch.goes_on(at(30ms, false, true, 60)));
-  EXPECT_TRUE(watch.goes_on(at(400ms, false, true, 61))) << "within the jitter of an encoder";
-  EXPECT_FALSE(watch.goes_on(at(530ms, false, true, 60))) << "it rests for good";
+  watch.begin(start, away, offset);
+  EXPECT_TRUE(goes_on(watch, at(10ms, true, false, 4000)));
+  EXPECT_TRUE(goes_on(watch, at(20ms, false, true, 3000))) << "it may be a pause";
+  EXPECT_FALSE(goes_on(watch, at(530ms, false, true, 3000)));
+  EXPECT_TRUE(watch.reached());
+}
+
+TEST(HomingWatch, NothingIsHomeWhereAStopTerminalWasActive) {
+  HomingWatch watch;
+  watch.begin(start, away, offset);
+  EXPECT_TRUE(goes_on(watch, at(10ms, true, false, 4000)));
+  EXPECT_TRUE(watch.goes_on(at(20ms, true, false, 3000), {.low = true, .held_up = true}));
+  EXPECT_TRUE(goes_on(watch, at(30ms, false, true, 2990)));
+  EXPECT_FALSE(goes_on(watch, at(540ms, false, true, 2990)));
+  EXPECT_FALSE(watch.reached());
 }
 
 TEST(HomingWatch, EndsWhenThePowerStageIsReleased) {
   HomingWatch watch;
-  watch.begin(start);
+  watch.begin(start, {}, offset);
   auto sample = at(10ms, true, false);
   sample.enabled = false;
-  EXPECT_FALSE(watch.goes_on(sample));
+  EXPECT_FALSE(goes_on(watch, sample));
+  EXPECT_FALSE(watch.reached());
 }
 
 TEST(Decoding, InHomingTheStateTellsWhetherPowerIsOn) {

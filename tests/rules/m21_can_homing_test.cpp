@@ -1,0 +1,110 @@
+// Homing on CANopen: a bit that is left from an earlier homing, and what happens while homing is being left.
+#include <gtest/gtest.h>
+
+#include "tests/rules/m23_can_rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const std::vector<std::vector<const char*>> bits = {{"homed_only_bit8"},
+                                                    {"homed_only_bit12"},
+                                                    {"homed_stays_during_homing"},
+                                                    {"homed_only_bit12", "homed_stays_during_homing"},
+                                                    {"homed_only_bit8", "homed_stays_during_homing"},
+                                                    {"offset_without_move"}};
+
+void with_stop_input(AxisSettings& axis) { axis.inputs.push_back({.terminal = "X3", .function = "stop"}); }
+
+TEST(M21, AHomingThatTheDriveIgnoresDoesNotReachHome) {
+  for_each_reading({.adjust = with_stop_input}, bits, [](const CanRigOptions& options) {
+    for (const bool restart : {false, true}) {
+      CanRig rig(options);
+      rig.done(EnableRequest{});
+      rig.done(HomeRequest{});
+      rig.done(MoveAbsoluteRequest{.position = 7});
+      if (restart) {
+        rig.stop_daemon();
+        rig.start_daemon();
+        rig.done(EnableRequest{});
+      }
+      rig.touch([](auto& node) { node.set_input("X3", true); });
+      rig.run(300ms);
+      const auto homed = rig.complete(HomeRequest{});
+      EXPECT_NE(homed.state, CommandState::done) << "restarted " << restart;
+      EXPECT_NE(rig.state()->trust, PositionTrust::homed);
+      rig.touch([](auto& node) { node.set_input("X3", false); });
+      rig.run(1s);
+      rig.done(ResetRequest{});
+      rig.done(EnableRequest{});
+      rig.done(HomeRequest{});
+      EXPECT_EQ(rig.state()->trust, PositionTrust::homed);
+    }
+  });
+}
+
+TEST(M21, AHomingThatAStopTerminalEndsOnItsWayIsNotHome) {
+  for_each_reading({.adjust = with_stop_input}, bits, [](const CanRigOptions& options) {
+    CanRig rig(options);
+    rig.done(EnableRequest{});
+    rig.done(HomeRequest{});
+    rig.done(MoveAbsoluteRequest{.position = 40});
+    const auto command = rig.submit(HomeRequest{});
+    rig.run(800ms);
+    ASSERT_TRUE(rig.drive->shaft_moving());
+    rig.touch([](auto& node) { node.set_input("X3", true); });
+    rig.run(5s);
+    EXPECT_TRUE(command->has_ended());
+    EXPECT_NE(command->value().state, CommandState::done);
+    EXPECT_NE(rig.state()->trust, PositionTrust::homed);
+  });
+}
+
+TEST(M21, AMotionThatFollowsHomingAtOnceIsNotHalted) {
+  for (const bool polled : {false, true}) {
+    CanRig rig({.limits = false, .connect = false});
+    if (polled)
+      rig.nodes().add_fault(
+          {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
+    rig.reconnect();
+    rig.done(EnableRequest{});
+    for (int time = 0; time < 4; ++time) {
+      rig.done(HomeRequest{});
+      const auto command = rig.submit(MoveVelocityRequest{.velocity = 20});
+      rig.run(std::chrono::milliseconds(500 + time));
+      EXPECT_TRUE(rig.drive->shaft_moving()) << describe(command->value());
+      rig.done(StopRequest{.kind = StopKind::stop});
+      EXPECT_FALSE(rig.drive->shaft_moving());
+    }
+  }
+}
+
+TEST(M12, TheModeStaysWhileAStoppedHomingRunsOut) {
+  for (const bool polled : {false, true}) {
+    CanRig rig({.connect = false, .adjust = [](AxisSettings& axis) {
+                  axis.homing->velocity = 50;
+                  axis.homing->acceleration_time = 1000ms;
+                }});
+    if (polled)
+      rig.nodes().add_fault(
+          {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
+    rig.reconnect();
+    rig.done(EnableRequest{});
+    (void)rig.submit(HomeRequest{});
+    rig.run(700ms);
+    ASSERT_TRUE(rig.drive->shaft_moving());
+    (void)rig.submit(StopRequest{.kind = StopKind::stop});
+    bool moved = true;
+    for (int i = 0; i < 200 && moved; ++i) {
+      rig.run(5ms);
+      moved = rig.drive->shaft_moving();
+      if (moved) EXPECT_EQ(rig.drive->peek(0x606100), 6U) << "in its ramp";
+    }
+    rig.run(1s);
+    EXPECT_EQ(rig.drive->peek(0x606100), 1U);
+  }
+}
+
+}  // namespace
+}  // namespace axisd::test
