@@ -184,7 +184,7 @@ TEST_F(MovingDrive, IsStoppedAfterAnOutageThatIsOverBeforeAnybodyPolls) {
   EXPECT_EQ(asked_at_, Times{0});
   // M26: 200 ms for the cycle (this helper takes none), and what the bus takes.
   ASSERT_TRUE(halted);
-  EXPECT_LT(*halted, 10ms);
+  EXPECT_LT(*halted, 20ms);  // a transfer that was under way is cut after 10 ms
   world_.run_for(3s);
   EXPECT_FALSE(drives_.nodes().node(5)->shaft_moving());
   EXPECT_EQ(drives_.nodes().node(5)->starts(), starts);
