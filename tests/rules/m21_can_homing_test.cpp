@@ -106,5 +106,26 @@ TEST(M12, TheModeStaysWhileAStoppedHomingRunsOut) {
   }
 }
 
+TEST(M05, AnAlarmThatEndsAHomingIsToldThoughItIsGone) {
+  for (const bool polled : {false, true}) {
+    CanRig rig({.connect = false});
+    if (polled)
+      rig.nodes().add_fault(
+          {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
+    rig.reconnect();
+    rig.done(EnableRequest{});
+    (void)rig.submit(HomeRequest{});
+    rig.run(500ms);
+    ASSERT_TRUE(rig.drive->shaft_moving());
+    rig.touch([](auto& node) { node.raise_alarm(2); });
+    rig.run(500us);
+    rig.touch([](auto& node) { node.raise_alarm(0); });
+    rig.run(1s);
+    EXPECT_EQ(rig.state()->state, AxisState::error_stop);
+    ASSERT_TRUE(rig.state()->fault);
+    EXPECT_EQ(rig.state()->fault->where.native_code, 2U) << to_string(*rig.state()->fault);
+  }
+}
+
 }  // namespace
 }  // namespace axisd::test
