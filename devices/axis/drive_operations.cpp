@@ -94,8 +94,8 @@ Task<Result<SegmentSettings>> DriveOperations::read_segments() const {
 
 Task<Result<SegmentSettings>> DriveOperations::write_segments(SegmentSettings segments) const {
   if (axis_->descriptor().capabilities.maximum_segments == 0)
-    co_return fail(error(Reason::not_supported, "the drive has no table of segments",
-                         "give each motion as a command"));
+    co_return fail(
+        error(Reason::not_supported, "the drive has no table of segments", "give each motion as a command"));
   if (axis_->settings().segments)
     co_return fail(error(Reason::invalid_argument, "the segments are decided by the configuration",
                          "change them there"));
