@@ -99,7 +99,8 @@ TEST(EdsDrive, HasTheParametersOfItsEds) {
 }
 
 TEST(EdsDrive, IsToldByItsIdentity) {
-  const auto& identity = drive_of(example()).model().identity;
+  const auto drive = drive_of(example());
+  const auto& identity = drive.model().identity;
   EXPECT_EQ(identity.profile, 402);
   EXPECT_EQ(identity.vendor, 0x0A5AU);
   EXPECT_EQ(identity.product, 0x00402001U);
