@@ -145,7 +145,7 @@ int run_daemon(const Options& options, config::Configuration configuration) {
                              .instance_id = instance_id,
                              .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
                              .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
-                             .request_link_cycle = (*ports)->request_link_cycle(),
+                             .link_helper = (*ports)->link_helper(),
                              .observer = std::move(wire_log.exchanges),
                              .published =
                                  [&published_to] {
@@ -156,7 +156,6 @@ int run_daemon(const Options& options, config::Configuration configuration) {
   published_to = &service;
   server::Server server(service, server_options(configuration.server));
   machine.start();
-  (*ports)->check_link_helper(configuration);
   std::thread core_thread([&loop] {
     pthread_setname_np(pthread_self(), "axisd-core");
     loop.run();
@@ -227,7 +226,7 @@ int run_quiesce(const Options& options) {
                            .clock = &loop.clock(),
                            .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
                            .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
-                           .request_link_cycle = (*ports)->request_link_cycle()};
+                           .link_helper = (*ports)->link_helper()};
   auto all = [](core::CoreLoop& core, core::QuiesceParts of, const config::Configuration& machine,
                 std::vector<core::QuiesceReport>& out) -> Task<> {
     out = co_await core::quiesce(std::move(of), machine, quiesce_limit);

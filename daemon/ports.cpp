@@ -1,7 +1,5 @@
 #include "daemon/ports.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <utility>
 
 #include "buses/can/socketcan_port.hpp"
@@ -11,7 +9,7 @@ namespace axisd {
 
 Ports::Ports(core::CoreLoop& loop, const std::string& link_helper, core::NetworkObserver observer)
     : loop_(&loop),
-      link_helper_(loop.executor(), loop.clock(), link_helper),
+      link_client_(loop.executor(), loop.clock(), link_helper),
       observer_(std::move(observer)) {}
 
 Result<std::unique_ptr<Ports>> Ports::open(core::CoreLoop& loop, const config::Configuration& configuration,
@@ -44,21 +42,11 @@ std::unique_ptr<can::Port> Ports::make_port(const canopen::NetworkSettings& sett
   return std::make_unique<core::ObservedPort>(std::move(made), loop_->clock(), observer_);
 }
 
-core::RequestLinkCycle Ports::request_link_cycle() {
-  return [this](const std::string& interface, core::LinkClient::Done done) {
-    link_helper_.cycle(interface, std::move(done));
-  };
-}
-
-void Ports::check_link_helper(const config::Configuration& configuration) {
-  for (const auto& network : configuration.networks) {
-    if (network.simulated()) continue;
-    link_helper_.check(network.interface, [bus = network.name](const Result<void>& answer) {
-      if (!answer)
-        spdlog::warn("{}: its link would not be cycled after bus-off or a stall: {}", bus,
-                     to_string(answer.error()));
-    });
-  }
+core::LinkHelper Ports::link_helper() {
+  return {.cycle = [this](const std::string& interface,
+                          core::LinkClient::Done done) { link_client_.cycle(interface, std::move(done)); },
+          .check = [this](const std::string& interface,
+                          core::LinkClient::Done done) { link_client_.check(interface, std::move(done)); }};
 }
 
 }  // namespace axisd

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 
 #include "buses/can/port.hpp"
@@ -29,15 +28,13 @@ class Ports {
 
   std::unique_ptr<modbus_rtu::Line> make_line(const modbus_rtu::LineSettings& settings);
   std::unique_ptr<can::Port> make_port(const canopen::NetworkSettings& settings);
-  [[nodiscard]] core::RequestLinkCycle request_link_cycle();
-  /// Logs for which CAN links nobody would do it. Thread: core.
-  void check_link_helper(const config::Configuration& configuration);
+  [[nodiscard]] core::LinkHelper link_helper();
 
  private:
   Ports(core::CoreLoop& loop, const std::string& link_helper, core::NetworkObserver observer);
 
   core::CoreLoop* loop_;
-  core::LinkClient link_helper_;
+  core::LinkClient link_client_;
   core::NetworkObserver observer_;
   std::unique_ptr<SimulatedLines> lines_;
   std::unique_ptr<SimulatedNetworks> networks_;

@@ -34,6 +34,7 @@ struct NetworkStatus {
   std::uint64_t emergencies = 0;
   canopen::MasterCounters others{};
   std::vector<std::uint8_t> foreign_nodes{};  ///< heard, but not configured
+  std::optional<Error> link_helper_error{};   ///< why the link would not be cycled when it has to be (M26)
 };
 
 struct BusStatus {

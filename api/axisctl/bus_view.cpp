@@ -13,7 +13,13 @@ namespace {
 
 Colour state_colour(const v1::Bus& bus) {
   if (!bus.open()) return Colour::red;
-  return bus.has_error() ? Colour::yellow : Colour::none;
+  return bus.has_error() || bus.network().has_link_helper_error() ? Colour::yellow : Colour::none;
+}
+
+/// Why, without the bus's own name.
+std::string cause(v1::ErrorDetail error) {
+  error.clear_bus();
+  return describe(error);
 }
 
 std::string foreign_nodes(const v1::NetworkStatus& network) {
@@ -68,8 +74,10 @@ bool is_network(const v1::Bus& bus) { return bus.kind() == v1::BUS_KIND_CANOPEN;
 std::string bus_state(const v1::Bus& bus) {
   std::string text = bus.open() ? "open" : "closed";
   if (bus.has_network()) text = lower_word(v1::NetworkLink_Name(bus.network().link()), "NETWORK_LINK_");
-  if (bus.has_error()) text += ": " + describe(bus.error());
+  if (bus.has_error()) text += ": " + cause(bus.error());
   if (bus.simulated()) text += ", simulated";
+  if (bus.network().has_link_helper_error())
+    text += ", not cycled after bus-off: " + cause(bus.network().link_helper_error());
   return text;
 }
 

@@ -39,6 +39,7 @@ void to_proto(const NetworkStatus& from, v1::NetworkStatus& to) {
   to.set_foreign_frames(from.others.foreign_node);
   to.set_unknown_frames(from.others.unknown_cob);
   to.set_malformed_frames(from.others.malformed);
+  if (from.link_helper_error) to_proto(*from.link_helper_error, *to.mutable_link_helper_error());
 }
 
 void to_proto(const BusStatus& from, v1::Bus& to) {

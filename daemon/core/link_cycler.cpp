@@ -8,8 +8,8 @@
 
 namespace axisd::core {
 
-LinkCycler::LinkCycler(Executor executor, Clock& clock, canopen::CanopenBus& bus, RequestLinkCycle request)
-    : executor_(std::move(executor)), clock_(&clock), bus_(&bus), request_(std::move(request)) {}
+LinkCycler::LinkCycler(Executor executor, Clock& clock, canopen::CanopenBus& bus, LinkHelper helper)
+    : executor_(std::move(executor)), clock_(&clock), bus_(&bus), helper_(std::move(helper)) {}
 
 void LinkCycler::close() {
   closing_ = true;
@@ -21,8 +21,13 @@ Task<> LinkCycler::run() {
     if (bus_->link().needs_cycle()) {
       co_await cycle();
     } else {
-      trouble_.reset();
-      co_await bus_->port_changed().wait();
+      refused_.reset();
+      if (!helper_.check || bus_->settings().simulated()) {
+        co_await bus_->port_changed().wait();
+        continue;
+      }
+      if (clock_->now() >= check_at_) check();
+      co_await bus_->port_changed().wait_until(check_at_);
     }
   }
 }
@@ -50,12 +55,12 @@ Task<> LinkCycler::cycle() {
 }
 
 Task<std::optional<Result<void>>> LinkCycler::ask() {
-  if (!request_)
+  if (!helper_.cycle)
     co_return fail(Reason::not_supported, "nobody here can take a CAN link down and up",
                    "set it down and up by hand");
   const auto reply = std::make_shared<Reply>(Reply{.value = {}, .came = Signal(executor_, *clock_)});
   reply_ = reply;
-  request_(bus_->settings().interface, [weak = std::weak_ptr(reply)](Result<void> answer) {
+  helper_.cycle(bus_->settings().interface, [weak = std::weak_ptr(reply)](Result<void> answer) {
     const auto waiting = weak.lock();
     if (!waiting) return;
     waiting->value = std::move(answer);
@@ -66,16 +71,39 @@ Task<std::optional<Result<void>>> LinkCycler::ask() {
   co_return std::move(reply->value);
 }
 
-/// Each trouble once, not with every attempt.
+void LinkCycler::check() {
+  check_at_ = clock_->now() + check_period;
+  if (checking_) return;
+  checking_ = std::make_shared<int>();
+  helper_.check(bus_->settings().interface,
+                [this, weak = std::weak_ptr(checking_)](const Result<void>& answer) {
+                  if (!weak.expired()) checked(answer);
+                });
+}
+
+void LinkCycler::checked(const Result<void>& answer) {
+  checking_.reset();
+  if (!note(unready_, answer)) return;
+  if (unready_)
+    spdlog::warn("{}: its link would not be cycled after bus-off or a stall: {}", bus_->name(),
+                 to_string(*unready_));
+  else
+    spdlog::info("{}: its link would be cycled after bus-off or a stall", bus_->name());
+}
+
 void LinkCycler::report(const Result<void>& answer) {
-  if (answer) {
-    trouble_.reset();
-    return;
+  if (note(refused_, answer) && refused_) spdlog::error("{}", to_string(*refused_));
+}
+
+/// Whether that is news: each trouble is told once, not with every attempt.
+bool LinkCycler::note(std::optional<Error>& trouble, const Result<void>& answer) const {
+  const auto before = trouble ? trouble->message : std::string();
+  trouble.reset();
+  if (!answer) {
+    trouble = answer.error();
+    trouble->where.bus = bus_->name();
   }
-  const bool known = trouble_ && trouble_->message == answer.error().message;
-  trouble_ = answer.error();
-  trouble_->where.bus = bus_->name();
-  if (!known) spdlog::error("{}", to_string(*trouble_));
+  return before != (trouble ? trouble->message : std::string());
 }
 
 }  // namespace axisd::core

@@ -13,10 +13,15 @@
 
 namespace axisd::core {
 
-/// Asks somebody with the privileges for it to take a CAN interface down and up, and calls back exactly once,
-/// on the core thread and never from within the call. Success: it is up again.
-using RequestLinkCycle =
-    std::function<void(const std::string& interface, std::function<void(Result<void>)> done)>;
+/// Asks somebody with privileges about a CAN interface, and calls back exactly once, on the core thread and
+/// never from within the call.
+using LinkRequest = std::function<void(const std::string& interface, std::function<void(Result<void>)> done)>;
+
+/// Somebody who can take CAN interfaces down and up.
+struct LinkHelper {
+  LinkRequest cycle{};  ///< does it: success is that it is up again. Empty: nobody can
+  LinkRequest check{};  ///< says whether it would, and changes nothing. Empty: nobody knows
+};
 
 /// Has the link of one CAN network cycled when it is bus-off or stalled, because nothing else empties the
 /// kernel's queue of frames that would go out when the network comes back (M26). What follows, stops first,
@@ -29,15 +34,19 @@ class LinkCycler {
   /// A link that did without for so long is sound again: the next pause is the first one.
   static constexpr Duration sound_after = std::chrono::seconds(30);
 
-  /// `bus` outlives run(). Without `request` nobody can do it; then this only says so.
-  LinkCycler(Executor executor, Clock& clock, canopen::CanopenBus& bus, RequestLinkCycle request);
+  /// The helper is checked at the start and this often: it may be missing long before it is needed.
+  static constexpr Duration check_period = std::chrono::seconds(30);
+
+  /// `bus` outlives run(). What `helper` lacks is not asked for; without `cycle` this only says so.
+  LinkCycler(Executor executor, Clock& clock, canopen::CanopenBus& bus, LinkHelper helper);
 
   /// Serves the network until close() and the bus's own close().
   Task<> run();
   /// Asks for nothing any more. Closing the bus afterwards makes run() notice it.
   void close();
-  /// Why the link that needs a cycle did not get it, the last time that it was asked for.
-  [[nodiscard]] const std::optional<Error>& trouble() const { return trouble_; }
+  /// Why the link that needs a cycle did not get it, the last time that it was asked for; of a link that
+  /// needs none, why it would not get it.
+  [[nodiscard]] const std::optional<Error>& trouble() const { return refused_ ? refused_ : unready_; }
 
  private:
   struct Reply {
@@ -48,13 +57,19 @@ class LinkCycler {
   /// Nothing: closed meanwhile.
   Task<std::optional<Result<void>>> ask();
   void report(const Result<void>& answer);
+  /// Asks the helper whether it would, without waiting for the answer: a bus-off must not wait for it.
+  void check();
+  void checked(const Result<void>& answer);
+  bool note(std::optional<Error>& trouble, const Result<void>& answer) const;
 
   Executor executor_;
   Clock* clock_;
   canopen::CanopenBus* bus_;
-  RequestLinkCycle request_;
-  std::shared_ptr<Reply> reply_;  ///< while one is awaited
-  std::optional<Error> trouble_;
+  LinkHelper helper_;
+  std::shared_ptr<Reply> reply_;            ///< while one is awaited
+  std::optional<Error> refused_, unready_;  ///< of the cycle that is needed; of the last check
+  std::shared_ptr<int> checking_;           ///< while an answer is awaited: whoever holds it may report
+  TimePoint check_at_{};
   Duration pause_{};
   TimePoint asked_at_{};
   bool asked_ = false;  ///< ever

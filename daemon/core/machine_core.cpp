@@ -15,7 +15,7 @@ namespace axisd::core {
 
 namespace {
 
-NetworkStatus network_status(const canopen::CanopenBus& bus) {
+NetworkStatus network_status(const canopen::CanopenBus& bus, const LinkCycler& cycler) {
   const auto& master = bus.master();
   NetworkStatus status{.link = bus.link().link,
                        .frames = master.port().counters(),
@@ -24,7 +24,8 @@ NetworkStatus network_status(const canopen::CanopenBus& bus) {
                        .sync_running = bus.sync_running(),
                        .sync = master.sync().counters(),
                        .others = master.counters(),
-                       .foreign_nodes = {master.foreign_nodes().begin(), master.foreign_nodes().end()}};
+                       .foreign_nodes = {master.foreign_nodes().begin(), master.foreign_nodes().end()},
+                       .link_helper_error = cycler.trouble()};
   for (std::uint8_t node = 1; node <= canopen::highest_node; ++node)
     status.emergencies += master.emergencies().total(node);
   return status;
@@ -47,8 +48,8 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
     networks_.push_back(std::make_unique<canopen::CanopenBus>(parts_.executor, *parts_.clock, network,
                                                               parts_.make_port(network)));
     buses_.push_back(networks_.back().get());
-    cyclers_.push_back(std::make_unique<LinkCycler>(parts_.executor, *parts_.clock, *networks_.back(),
-                                                    parts_.request_link_cycle));
+    cyclers_.push_back(
+        std::make_unique<LinkCycler>(parts_.executor, *parts_.clock, *networks_.back(), parts_.link_helper));
   }
   const auto record = [this](const std::string& axis, EventContent content) {
     events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
@@ -239,7 +240,8 @@ std::vector<BusStatus> MachineCore::bus_status() const {
                    .simulated = bus->settings().simulated(),
                    .error = bus->port().error,
                    .counters = bus->counters()});
-  for (const auto& bus : networks_)
+  for (std::size_t i = 0; i < networks_.size(); ++i) {
+    const auto& bus = networks_[i];
     all.push_back({.name = bus->settings().name,
                    .kind = BusKind::canopen,
                    .port = bus->settings().interface,
@@ -247,7 +249,8 @@ std::vector<BusStatus> MachineCore::bus_status() const {
                    .open = bus->port().open,
                    .simulated = bus->settings().simulated(),
                    .error = bus->port().error,
-                   .network = network_status(*bus)});
+                   .network = network_status(*bus, *cyclers_[i])});
+  }
   return all;
 }
 

@@ -29,7 +29,7 @@ struct MachineParts {
   std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line;
   /// May be empty where the configuration has no CAN network.
   std::function<std::unique_ptr<can::Port>(const canopen::NetworkSettings&)> make_port{};
-  RequestLinkCycle request_link_cycle{};  ///< empty: links stay as they are after bus-off and stalls (M26)
+  LinkHelper link_helper{};  ///< without: links stay as they are after bus-off and stalls (M26)
   modbus_rtu::ExchangeObserver observer;
   std::function<void()> published;
 };

@@ -82,7 +82,7 @@ class Machine {
       networks_.push_back(
           std::make_unique<canopen::CanopenBus>(executor_, *parts.clock, network, parts.make_port(network)));
       cyclers_.push_back(
-          std::make_unique<LinkCycler>(executor_, *parts.clock, *networks_.back(), parts.request_link_cycle));
+          std::make_unique<LinkCycler>(executor_, *parts.clock, *networks_.back(), parts.link_helper));
     }
     for (const auto& entry : configuration.axes) {
       const auto* line = find(lines_, entry.axis.bus);

@@ -26,7 +26,7 @@ struct QuiesceParts {
   Clock* clock = nullptr;
   std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line;
   std::function<std::unique_ptr<can::Port>(const canopen::NetworkSettings&)> make_port{};
-  RequestLinkCycle request_link_cycle{};
+  LinkHelper link_helper{};
 };
 
 /// Last resort (M17): stops every drive of a configuration without axes, leases or server. Each gets stops

@@ -298,7 +298,10 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, axes_rpc.AxisServiceService
                            link=bus_pb.NETWORK_LINK_ERROR_PASSIVE, frames_sent=1001, frames_received=2002,
                            frames_not_sent=3, frames_unknown=4, sdo_transfers=505, sdo_aborts=6, sdo_timeouts=7,
                            sync_period=duration_pb2.Duration(nanos=10000000), sync_running=True, sync_sent=808,
-                           sync_missed=9, emergencies=10, foreign_nodes=[22, 23], foreign_frames=11))])
+                           sync_missed=9, emergencies=10, foreign_nodes=[22, 23], foreign_frames=11,
+                           link_helper_error=error_pb2.ErrorDetail(
+                               reason=error_pb2.REASON_BUS_DOWN, message="there is no link helper",
+                               remedy="enable axisd-link.socket")))])
 
     async def GetInfo(self, request, context):
         self.note("GetInfo", request, context)

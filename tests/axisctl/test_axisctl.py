@@ -59,6 +59,7 @@ class Reading(AxisctlTest):
         text = self.ok("buses")
         self.assertRegex(text, r"line-a +sim +115200 +1234 .*open, simulated")
         self.assertIn("closed: /dev/ttyUSB7: No such file or directory; check the adapter", text)
+        self.assertIn("not cycled after bus-off: there is no link helper; enable axisd-link.socket", text)
         self.assertEqual(self.json("buses")[0]["buses"][0]["transactions"], "1234")
 
     def test_info(self):

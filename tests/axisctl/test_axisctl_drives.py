@@ -197,7 +197,7 @@ class Buses(AxisctlTest):
         text = self.ok("bus", "list")
         self.assertEqual(text, self.ok("buses"))
         self.assertRegex(text, r"line-a +sim +115200 +1234 .*open, simulated\n")
-        self.assertRegex(text, r"can0 +can0 +500000 +1001 +2002 +7 +505 +6 +7 +808 +9 +10 +22 23 +error passive\n")
+        self.assertRegex(text, r"can0 +can0 +500000 +1001 +2002 +7 +505 +6 +7 +808 +9 +10 +22 23 +error passive, ")
         details = self.ok("bus", "status", "can0")
         self.assertIn("SYNC:          every 10 ms, running; 808 sent, 9 missed", details)
         self.assertIn("foreign nodes: 22 23\n", details)

@@ -145,6 +145,7 @@ class WholeMachine(ClientTest):
         self.assertEqual((network.kind, network.baud), (axisd.BusKind.CANOPEN, 500000))
         self.assertEqual((network.network.link, network.network.sdo_timeouts, network.network.foreign_nodes),
                          (axisd.NetworkLink.ERROR_PASSIVE, 7, (22, 23)))
+        self.assertEqual(network.network.link_helper_error.remedy, "enable axisd-link.socket")
         self.assertEqual((await self.machine.info()).machine, "press-1")
 
     async def test_watch(self):

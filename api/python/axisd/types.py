@@ -304,7 +304,8 @@ class NetworkLink(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class Network:
-    """What is known of a CAN network (all counters are in `raw`). `foreign_nodes` are heard, but not configured."""
+    """What is known of a CAN network (all counters are in `raw`). `foreign_nodes` are heard, but not configured;
+    `link_helper_error` says why nobody takes the link down and up after bus-off or a stall."""
     link: NetworkLink
     frames_sent: int
     frames_received: int
@@ -316,13 +317,15 @@ class Network:
     sync_missed: int
     emergencies: int
     foreign_nodes: tuple[int, ...]
+    link_helper_error: ErrorDetail | None
     raw: bus_service_pb2.NetworkStatus = dataclasses.field(repr=False, compare=False)
 
     @classmethod
     def of(cls, raw: bus_service_pb2.NetworkStatus) -> Network:
         return cls(_member(NetworkLink, bus_service_pb2.NetworkLink.DESCRIPTOR, "NETWORK_LINK_", raw.link),
                    raw.frames_sent, raw.frames_received, raw.sdo_transfers, raw.sdo_aborts, raw.sdo_timeouts,
-                   raw.sync_running, raw.sync_sent, raw.sync_missed, raw.emergencies, tuple(raw.foreign_nodes), raw)
+                   raw.sync_running, raw.sync_sent, raw.sync_missed, raw.emergencies, tuple(raw.foreign_nodes),
+                   _optional_error(raw, "link_helper_error"), raw)
 
 
 @dataclasses.dataclass(frozen=True)

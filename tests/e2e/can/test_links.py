@@ -55,7 +55,10 @@ class Links(CanScenario):
 
     def test_without_a_helper_the_cause_is_clear(self):
         machine = self.cell()
-        self.assertIn("there is no link helper", machine.daemon.log())  # said at the start
+        helper = machine.client.buses()[0].network.link_helper_error  # told while the link is sound
+        self.assertIn("there is no link helper", helper.message)
+        self.assertIn("axisd-link.socket", helper.remedy)
+        self.assertIn("there is no link helper", machine.daemon.log())
         peer = self.peer()
         table = self.mid_move(machine)
         broken = time.monotonic_ns()

@@ -228,7 +228,9 @@ TEST_F(Calls, SystemAndBuses) {
             "sdo_transfers: 21 sdo_aborts: 22 sdo_timeouts: 23 sdo_protocol_errors: 24 "
             "sync_period { nanos: 10000000 } sync_running: true sync_sent: 31 sync_missed: 32 "
             "sync_latest { nanos: 2000000 } emergencies: 3 foreign_nodes: 22 foreign_nodes: 23 "
-            "foreign_frames: 42 unknown_frames: 41 malformed_frames: 43");
+            "foreign_frames: 42 unknown_frames: 41 malformed_frames: 43 "
+            "link_helper_error { reason: REASON_BUS_DOWN message: \"no helper\" remedy: \"enable it\" "
+            "outcome: OUTCOME_NOT_SENT bus: \"can0\" }");
 }
 
 TEST_F(Calls, CommandsAsResources) {

@@ -198,7 +198,11 @@ void FakeMachine::buses(std::function<void(std::vector<BusStatus>)> callback) {
                         .sync_period = 10ms,
                         .sync_running = true,
                         .emergencies = 3,
-                        .foreign_nodes = {22, 23}};
+                        .foreign_nodes = {22, 23},
+                        .link_helper_error = Error{.reason = Reason::bus_down,
+                                                   .message = "no helper",
+                                                   .remedy = "enable it",
+                                                   .where = {.bus = "can0"}}};
   network.frames = {.received = 11, .sent = 12, .not_sent = 13, .unknown = 14, .error_frames = 15};
   network.frames.receive_overflows = 16;
   network.frames.no_buffer = 17;

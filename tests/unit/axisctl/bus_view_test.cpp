@@ -42,6 +42,22 @@ TEST(BusView, TheStateSaysTheLinkAndWhy) {
   EXPECT_EQ(bus_state(bus), "up, simulated");
 }
 
+TEST(BusView, ASoundLinkThatNobodyWouldCycleIsTold) {
+  auto bus = network();
+  bus.set_open(true);
+  bus.mutable_network()->set_link(v1::NETWORK_LINK_UP);
+  auto& error = *bus.mutable_network()->mutable_link_helper_error();
+  error.set_bus("can0");
+  error.set_message("there is no link helper at /run/axisd-link.sock: No such file or directory");
+  error.set_remedy("enable axisd-link.socket");
+  EXPECT_EQ(bus_state(bus),
+            "up, not cycled after bus-off: there is no link helper at /run/axisd-link.sock: No such file or "
+            "directory; enable axisd-link.socket");
+  v1::ListBusesResponse buses;
+  *buses.add_buses() = bus;
+  EXPECT_THAT(network_table(buses).lines(true).at(1), HasSubstr("\x1b[33mup, not cycled"));
+}
+
 TEST(BusView, DetailsSayWhetherThereIsASync) {
   auto bus = network();
   EXPECT_THAT(bus_details(bus), HasSubstr("SYNC:          none\n"));

@@ -23,6 +23,7 @@ using can::LinkState;
 class Links : public testing::Test {
  protected:
   enum class Helper { cycles, refuses, silent };
+  using LinkDone = std::function<void(Result<void>)>;
 
   explicit Links(bool with_axis = false) {
     configuration_.machine = "m";
@@ -34,20 +35,21 @@ class Links : public testing::Test {
       configuration_.axes.push_back({.axis = axis});
     }
     machine_ = std::make_unique<MachineCore>(
-        MachineParts{.executor = world_.executor(),
-                     .clock = &world_.clock(),
-                     .instance_id = "t",
-                     .make_port =
-                         [this](const canopen::NetworkSettings& settings) {
-                           can::PortSettings port{.bus = settings.name, .interface = settings.interface};
-                           auto made = std::make_unique<can::NetworkPort>(world_.clock(), port, network_);
-                           port_ = made.get();
-                           return made;
-                         },
-                     .request_link_cycle =
-                         [this](const std::string& interface, std::function<void(Result<void>)> done) {
-                           asked(interface, std::move(done));
-                         }},
+        MachineParts{
+            .executor = world_.executor(),
+            .clock = &world_.clock(),
+            .instance_id = "t",
+            .make_port =
+                [this](const canopen::NetworkSettings& settings) {
+                  can::PortSettings port{.bus = settings.name, .interface = settings.interface};
+                  auto made = std::make_unique<can::NetworkPort>(world_.clock(), port, network_);
+                  port_ = made.get();
+                  return made;
+                },
+            .link_helper = {.cycle = [this](const std::string& interface,
+                                            LinkDone done) { asked(interface, std::move(done)); },
+                            .check = [this](const std::string& interface,
+                                            LinkDone done) { checked(interface, std::move(done)); }}},
         configuration_);
     machine_->start();
     world_.run_for(10ms);
@@ -69,6 +71,21 @@ class Links : public testing::Test {
       done({});
     });
   }
+  void checked(const std::string& interface, LinkDone done) {
+    EXPECT_EQ(interface, "can7");
+    ++checks_;
+    if (helper_ == Helper::silent) return;
+    post(world_.executor(), [this, done = std::move(done)] {
+      if (helper_ == Helper::refuses)
+        return done(fail(Reason::misconfigured, "can7 is not among the links", "add it"));
+      done({});
+    });
+  }
+  /// What the API tells of the helper; empty: nothing.
+  [[nodiscard]] std::string told() const {
+    const auto error = machine_->bus_status().at(0).network->link_helper_error;
+    return error ? error->where.bus + ": " + error->message : "";
+  }
   void go_bus_off() {
     broken_at_ = world_.now();
     asked_at_.clear();
@@ -84,9 +101,39 @@ class Links : public testing::Test {
   Helper helper_ = Helper::cycles;
   TimePoint broken_at_{};
   std::vector<long> asked_at_;  ///< ms since go_bus_off()
+  int checks_ = 0;
 };
 
 using Times = std::vector<long>;
+
+TEST_F(Links, ThatNobodyWouldCycleIsToldAsLongAsItIsSo) {
+  EXPECT_EQ(checks_, 1);
+  EXPECT_EQ(told(), "");
+  helper_ = Helper::refuses;
+  world_.run_for(LinkCycler::check_period);
+  EXPECT_EQ(told(), "cell: can7 is not among the links");
+  go_bus_off();
+  world_.run_for(10ms);
+  EXPECT_EQ(told(), "cell: can7 is not among the links");
+  port_->cycle();  // by hand, which does not change who could
+  world_.run_for(1s);
+  EXPECT_EQ(told(), "cell: can7 is not among the links");
+  helper_ = Helper::cycles;
+  world_.run_for(LinkCycler::check_period);
+  EXPECT_EQ(told(), "");
+  EXPECT_EQ(machine_->bus_status().at(0).network->link, LinkState::up);
+}
+
+TEST_F(Links, BusOffDoesNotWaitForTheAnswerOfACheck) {
+  helper_ = Helper::silent;
+  world_.run_for(LinkCycler::check_period);
+  EXPECT_EQ(checks_, 2);
+  helper_ = Helper::cycles;
+  go_bus_off();
+  world_.run_for(200ms);
+  EXPECT_EQ(asked_at_, Times{0});
+  EXPECT_EQ(link(), LinkState::up);
+}
 
 TEST_F(Links, ASoundLinkIsLeftAlone) {
   world_.run_for(1min);
