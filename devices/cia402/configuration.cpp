@@ -128,4 +128,13 @@ Result<std::vector<ObjectSetting>> required_objects(const Model& model, const Dr
   return all.take();
 }
 
+ActiveLow active_low(const Model& model, const DriveSetup& setup) {
+  const auto states = setup.model_settings.find(std::string(terminal_states_key));
+  if (states == setup.model_settings.end() || states->second != SettingValue(std::string("level"))) return {};
+  const auto& descriptor = *model.descriptor;
+  const auto inputs = assign_terminals(setup.inputs, descriptor.inputs, descriptor.input_functions);
+  const auto outputs = assign_terminals(setup.outputs, descriptor.outputs, descriptor.output_functions);
+  return {.inputs = inputs ? inputs->levels : 0, .outputs = outputs ? outputs->levels : 0};
+}
+
 }  // namespace axisd::cia402

@@ -1,9 +1,12 @@
 // Which objects' contents a DriveSetup means, in the order in which they are written (M3). Pure.
 #pragma once
 
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include "buses/error.hpp"
+#include "devices/cia402/encoding.hpp"
 #include "devices/cia402/model.hpp"
 #include "devices/cia402/object_setting.hpp"
 #include "devices/drive.hpp"
@@ -16,5 +19,13 @@ namespace axisd::cia402 {
 /// Outputs that it does not name are left alone. Errors: misconfigured (the model has no such terminal,
 /// function or microstep).
 Result<std::vector<ObjectSetting>> required_objects(const Model& model, const DriveSetup& setup);
+
+/// The setting of a model whose manual leaves open what its terminal states show, and its choices.
+inline constexpr std::string_view terminal_states_key = "terminal_states";
+inline constexpr std::string_view terminal_states[] = {"active", "level"};
+
+/// What the states of terminals show that are active low by the setup. An output that it does not name is
+/// taken as it is shown.
+ActiveLow active_low(const Model& model, const DriveSetup& setup);
 
 }  // namespace axisd::cia402

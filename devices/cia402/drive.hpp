@@ -244,6 +244,7 @@ class Cia402Drive final : public Drive {
   DriveSetup setup_;
   std::vector<ObjectSetting> required_;  ///< by the setup; empty if it cannot be had (configure() says why)
   std::optional<Error> setup_error_;
+  ActiveLow active_low_;
   std::map<std::uint32_t, std::uint8_t> sizes_;  ///< of objects, as this drive was seen to have them
   bool other_homing_codes_ = false;              ///< it refused the first of HomingCode, and took the other
 

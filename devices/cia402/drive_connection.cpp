@@ -67,6 +67,7 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
       bus_(context.canopen),
       node_(context.canopen->master().node(context.node)),
       setup_(std::move(context.setup)),
+      active_low_(active_low(model, setup_)),
       news_(context.executor, *context.clock),
       power_up_blocks_{default_block(model)} {
   auto required = required_objects(model, setup_);

@@ -136,7 +136,7 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
 }
 
 DriveSample Cia402Drive::judge(const Reading& reading) {
-  auto sample = decode_state(*model_, setup_.pulses_per_revolution, reading.values);
+  auto sample = decode_state(*model_, setup_.pulses_per_revolution, reading.values, active_low_);
   sample.asked_at = reading.asked_at;
   sample.measured_at = reading.measured_at;
   if (last_position_ && sample.position_pulses != *last_position_)

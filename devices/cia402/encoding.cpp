@@ -107,7 +107,8 @@ std::uint16_t alarm_of(const Model& model, std::uint16_t error_code) {
   return prefix == meaning.alarm_prefix ? own : error_code;
 }
 
-DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values) {
+DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
+                         ActiveLow active_low) {
   constexpr std::uint16_t without_code = 0xFFFF;
   const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
   const auto is = [word](std::uint16_t bits) { return (word & bits) != 0; };
@@ -135,9 +136,9 @@ DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution,
   if (sample.alarm_code == 0 && faulty) sample.alarm_code = without_code;
   // 60FDh has inputs of the maker's beyond those that CiA 402 names.
   const auto known = (std::uint64_t{1} << model.descriptor->inputs.size()) - 1;
-  sample.inputs =
-      static_cast<std::uint32_t>(known & static_cast<std::uint64_t>(value_of(values, model.objects.inputs)));
-  sample.outputs = static_cast<std::uint32_t>(value_of(values, model.objects.outputs));
+  const auto inputs = known & static_cast<std::uint64_t>(value_of(values, model.objects.inputs));
+  sample.inputs = static_cast<std::uint32_t>(inputs) ^ active_low.inputs;
+  sample.outputs = static_cast<std::uint32_t>(value_of(values, model.objects.outputs)) ^ active_low.outputs;
   return sample;
 }
 

@@ -34,8 +34,14 @@ std::vector<canopen::Object> state_objects(const Model& model);
 /// chapter 7).
 std::vector<canopen::PdoMapping> state_layout(const Model& model);
 
+/// Terminals, by their bits in DriveSample, that the drive shows as 0 while they are active.
+struct ActiveLow {
+  std::uint32_t inputs = 0, outputs = 0;
+};
+
 /// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's.
-DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values);
+DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
+                         ActiveLow active_low = {});
 /// The bit that says "homed", alone: CiA 402's bit 12 means that in homing mode only. Nothing: neither bit
 /// tells now.
 std::optional<bool> home_bit(const Model& model, const Values& values);

@@ -2,6 +2,7 @@
 // five motors: nothing in their dictionary tells them apart.
 #include "devices/yss_c/model.hpp"
 
+#include "devices/cia402/configuration.hpp"
 #include "devices/cia402/drive.hpp"
 #include "devices/yako_rtu/tables.hpp"
 #include "devices/yss_c/objects.hpp"
@@ -76,6 +77,13 @@ constexpr SettingSpec settings[] = {
      .description =
          "Last approach of home_positive and home_negative: the manual says always forward (6.2.6), CiA 402 "
          "in the direction of the search. With forward they cannot be mirrored."},
+    {.key = cia402::terminal_states_key,
+     .kind = "enum",
+     .choices = cia402::terminal_states,
+     .default_value = "active",
+     .description =
+         "What 2003h and 2004h show: active terminals, as the maker's other drives, or the levels at "
+         "them, as the manual's words can be read. Seen at an input with `active: low`."},
     yako_rtu::tuning("closed_loop_current_percent", 0x204200, 0, 150,
                      "Current in closed loop (2042h), percent."),
     yako_rtu::tuning("open_loop_current_percent", 0x204300, 0, 100, "Current in open loop (2043h), percent."),

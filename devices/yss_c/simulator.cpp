@@ -261,8 +261,14 @@ simulation::InputSettings SimulatedDrive::input_settings() const {
   return settings;
 }
 
-/// 2004h: functions 2030h:0D..0F. What is active, whatever the level that 2030h:0C makes of it: as 2003h
-/// shows inputs, and as the maker's other drives do.
+/// 2003h or 2004h: `count` terminals of which some are active, inverted by 2030h:`inversion`. The maker's
+/// other drives show what is active.
+std::uint16_t SimulatedDrive::shown(std::uint16_t active, std::uint8_t inversion, std::size_t count) const {
+  const auto inverted = behaviour_.states_are_levels ? dictionary_.get(0x2030, inversion) : 0;
+  return static_cast<std::uint16_t>((active ^ inverted) & ((1 << count) - 1));
+}
+
+/// Functions 2030h:0D..0F that are active.
 std::uint16_t SimulatedDrive::outputs() const {
   const std::array<bool, 5> functions{false, alarm_ != 0, motor_.moving(), homed_, reached_};
   unsigned bits = 0;

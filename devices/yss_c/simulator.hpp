@@ -76,6 +76,7 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] int pulses_per_revolution() const;
   [[nodiscard]] simulation::InputSettings input_settings() const;
   [[nodiscard]] std::uint16_t outputs() const;
+  [[nodiscard]] std::uint16_t shown(std::uint16_t active, std::uint8_t inversion, std::size_t count) const;
   [[nodiscard]] std::uint64_t appearance() const;
   void set_up_from_eeprom();
   void power_up();

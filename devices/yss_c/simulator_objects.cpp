@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "devices/yss_c/objects.hpp"
 #include "devices/yss_c/simulator.hpp"
 
 namespace axisd::yss_c {
@@ -32,9 +33,9 @@ std::optional<std::int64_t> SimulatedDrive::read(const ObjectRow& row) const {
     case 0x2002:
       return std::lround(motor_.direction() * motor_.speed() * 60 / pulses_per_revolution());
     case 0x2003:
-      return inputs_.bits();
+      return shown(inputs_.bits(), 0x01, object::input_count);
     case 0x2004:
-      return outputs();
+      return shown(outputs(), 0x0C, object::output_count);
     case 0x603F:
       return alarm_ == 0 ? 0 : 0xFF00 + alarm_;
     case 0x6041:

@@ -184,6 +184,10 @@ constexpr Entry entries[] = {
     {{"inputs_undefined_at_power_up", false,
       "input functions are 0 after each power-up, as 4.3 says; off: as saved (chapter 7)"},
      &Behaviour::inputs_undefined_at_power_up},
+    {{"states_are_levels", false,
+      "2003h and 2004h show levels (\"输入电平状态\"), whatever 2030h:01 and 2030h:0C make of them; off: "
+      "what is active"},
+     &Behaviour::states_are_levels},
     {{"eeprom_switch_saves_itself", false,
       "200Ch = 1 is itself saved; off: it is back at 0 after a power cycle"},
      &Behaviour::eeprom_switch_saves_itself},

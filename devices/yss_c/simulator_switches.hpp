@@ -24,7 +24,7 @@ struct Behaviour {
   bool free_stop_releases, abrupt_stop_slips;
   bool terminals_need_operation, stop_terminal_only_edge, velocity_resumes_after_terminal,
       speed_terminal_is_level, configuration_makes_edges, filter_home_and_limits,
-      inputs_undefined_at_power_up;
+      inputs_undefined_at_power_up, states_are_levels;
   bool eeprom_switch_saves_itself, undefined_node_is_1;
 };
 

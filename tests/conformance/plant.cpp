@@ -21,6 +21,7 @@ constexpr Reading other_readings[] = {
     {"input_functions_at_0043", "terminal_registers", "wiring"},
     {"homing_mode_1_final_approach_same", "home_approach", "as_searched"},
     {"homing_29_ends_backwards", "home_approach", "as_searched"},
+    {"states_are_levels", "terminal_states", "level"},
 };
 
 std::vector<Wanted> inputs_of(const Recipe& recipe) {

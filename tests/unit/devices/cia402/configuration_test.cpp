@@ -170,5 +170,18 @@ TEST(Cia402Configuration, NeverAssignsWhatMovesOrForgetsBehindOnesBack) {
   }
 }
 
+TEST(Cia402Configuration, KnowsWhichTerminalsAreShownAsZeroWhileActive) {
+  auto one = setup();
+  EXPECT_EQ(active_low(model(), one).inputs, 0U) << "by default what is active is shown";
+  one.model_settings["terminal_states"] = SettingValue(std::string("level"));
+  const auto low = active_low(model(), one);
+  EXPECT_EQ(low.inputs, 1U << 1U) << "X1";
+  EXPECT_EQ(low.outputs, 1U << 1U) << "Y1";
+  const Values values{{object::inputs.key(), 0b1000010}, {object::outputs.key(), 0b011}};
+  const auto sample = decode_state(model(), 4000, values, low);
+  EXPECT_EQ(sample.inputs, 0b1000000U);
+  EXPECT_EQ(sample.outputs, 0b001U);
+}
+
 }  // namespace
 }  // namespace axisd::cia402

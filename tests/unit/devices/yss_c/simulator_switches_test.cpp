@@ -435,6 +435,15 @@ const Reading readings[] = {
        return after_power_cycle(b, 0x2030, 2);
      },
      2, 0},
+    {"states_are_levels",
+     [](Bench& b) {
+       b.write(0x2030, 0x01, 2, 0b1001);  // X0 and X3 active low
+       b.write(0x2030, 0x0C, 2, 0b10);    // Y1 likewise
+       b.drive().set_input("X0", true);   // high; X3 is open, low
+       b.run(100ms);
+       return b.read(0x2003) << 4 | b.read(0x2004);
+     },
+     0b1000 << 4 | 0b00, 0b0001 << 4 | 0b10},
     {"eeprom_switch_saves_itself",
      [](Bench& b) {
        b.write(0x200C, 2, 1);
