@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 
-#include "devices/yss_c/objects.hpp"
 #include "devices/yss_c/simulator.hpp"
 
 namespace axisd::yss_c {
@@ -33,9 +32,9 @@ std::optional<std::int64_t> SimulatedDrive::read(const ObjectRow& row) const {
     case 0x2002:
       return std::lround(motor_.direction() * motor_.speed() * 60 / pulses_per_revolution());
     case 0x2003:
-      return shown(inputs_.bits(), 0x01, object::input_count);
+      return shown(inputs_.bits(), 0x01, 7);
     case 0x2004:
-      return shown(outputs(), 0x0C, object::output_count);
+      return shown(outputs(), 0x0C, 3);
     case 0x603F:
       return alarm_ == 0 ? 0 : 0xFF00 + alarm_;
     case 0x6041:
