@@ -6,12 +6,13 @@
         await feeder.home()
         await feeder.move(120, velocity=50)
 """
+from .axis import Axis, Jog
 from .drive import Drive
 from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FoundNode, LinkChange, Parameter,
                      PositionSegment, ScanProgress, Segments, SerialProgress, StateChange, TerminalCapability,
                      TerminalEdge, VelocitySegment)
 from .errors import AxisdError, MotionError, RefusedError, UnreachableError
-from .machine import Axis, Jog, Machine, connect
+from .machine import Machine, connect
 from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
                     Network, NetworkLink, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 

@@ -1,28 +1,23 @@
 """A machine and its axes."""
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import datetime
 import pathlib
-import uuid
 from collections.abc import AsyncIterator, Iterable
 from types import TracebackType
 from typing import Any
 
 import grpc
 import grpc.aio
-from google.protobuf.duration_pb2 import Duration
 
-from .drive import Drive
+from .axis import Axis
+from .calls import Seconds, done, duration
 from .drives import Cursor, Device, Event, ScanProgress
-from .errors import AxisdError, MotionError, translate
-from .types import AxisState, Bus, Command, CommandState, Info, StopResult, Tick
+from .errors import AxisdError, translate
+from .types import AxisState, Bus, Command, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
                  command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
                  system_service_pb2, system_service_pb2_grpc, types_pb2)
-
-Seconds = float | datetime.timedelta
 
 _OPTIONS = (
     # The daemon permits one ping per second.
@@ -45,22 +40,6 @@ def connect(server: str = "localhost:7443", *, tls_ca: str | pathlib.Path | None
     """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Connects with the first call.
     `timeout` limits how long the daemon may take to answer, not how long a motion may take."""
     return Machine(server, tls_ca, tls_certificate, tls_key, timeout)
-
-
-def _duration(value: Seconds | None) -> Duration | None:
-    if value is None:
-        return None
-    delta = value if isinstance(value, datetime.timedelta) else datetime.timedelta(seconds=value)
-    message = Duration()
-    message.FromTimedelta(delta)
-    return message
-
-
-def _options(request_id: str | None, wait: bool, buffered: bool = False) -> types_pb2.CommandOptions:
-    return types_pb2.CommandOptions(
-        request_id=request_id or str(uuid.uuid4()),
-        wait_until=types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED,
-        buffer_mode=types_pb2.BUFFER_MODE_BUFFERED if buffered else types_pb2.BUFFER_MODE_UNSPECIFIED)
 
 
 class Machine:
@@ -134,7 +113,7 @@ class Machine:
 
     async def watch(self, axes: Iterable[str] = (), period: Seconds = 0.1) -> AsyncIterator[Tick]:
         """Latest states at a steady rate; a slow reader misses ticks, never gets old ones. None: all axes."""
-        request = axis_service_pb2.WatchAxesRequest(axes=list(axes), period=_duration(period))
+        request = axis_service_pb2.WatchAxesRequest(axes=list(axes), period=duration(period))
         async with contextlib.aclosing(self._stream(self._axes.WatchAxes, request, "watch")) as stream:
             async for batch in stream:
                 yield Tick.of(batch)
@@ -156,7 +135,7 @@ class Machine:
         async with contextlib.aclosing(self.watch_command(command.id)) as changes:
             async for latest in changes:
                 if latest.state.ended:
-                    return _done(latest)
+                    return done(latest)
         raise AxisdError(f"{command.axis}: the daemon ended the stream before command {command.id} had ended")
 
     async def cancel(self, command_id: str) -> Command:
@@ -185,7 +164,7 @@ class Machine:
         """Looks for nodes; leaving the loop ends it. Other rates and formats than the bus's own are refused while any of
         its axes is enabled."""
         request = bus_service_pb2.ScanRequest(bus=bus, first_node=first_node, last_node=last_node, bauds=list(bauds),
-                                              formats=list(formats), reply_timeout=_duration(reply_timeout))
+                                              formats=list(formats), reply_timeout=duration(reply_timeout))
         async with contextlib.aclosing(self._stream(self._buses.Scan, request, bus)) as stream:
             async for progress in stream:
                 yield ScanProgress.of(progress)
@@ -242,166 +221,3 @@ class Machine:
 
     async def info(self) -> Info:
         return Info.of(await self._call(self._system.GetInfo, system_service_pb2.GetInfoRequest(), ""))
-
-
-def _done(command: Command) -> Command:
-    if command.state.ended and command.state is not CommandState.DONE:
-        raise MotionError(command)
-    return command
-
-
-class Axis:
-    """One axis. Motion calls wait until the command is Done and raise MotionError if it ends otherwise; with
-    wait=False they return once it is accepted (then: Machine.wait). Cancelling such a call in Python does not end the
-    motion: halt() or stop() does. `request_id` repeats an earlier call without moving twice."""
-
-    def __init__(self, machine: Machine, name: str) -> None:
-        self._machine = machine
-        self.name = name
-        self.drive = Drive(machine, name)
-
-    def __repr__(self) -> str:
-        return f"Axis({self.name!r} at {self._machine.server})"
-
-    async def _command(self, method: Any, request: Any, wait: bool) -> Command:
-        return _done(Command.of((await self._machine._call(method, request, self.name, wait)).command))
-
-    async def state(self) -> AxisState:
-        """The latest state, without touching the bus."""
-        request = axis_service_pb2.GetAxisRequest(axis=self.name)
-        return AxisState.of((await self._machine._call(self._machine._axes.GetAxis, request, self.name)).state)
-
-    async def watch(self, period: Seconds = 0.1) -> AsyncIterator[AxisState]:
-        """The latest state at a steady rate."""
-        async with contextlib.aclosing(self._machine.watch([self.name], period)) as ticks:
-            async for tick in ticks:
-                yield tick.axes[self.name]
-
-    async def enable(self, *, wait: bool = True, request_id: str | None = None) -> Command:
-        """Switches the power stage on. Never moves."""
-        request = axis_service_pb2.EnableRequest(axis=self.name, options=_options(request_id, wait))
-        return await self._command(self._machine._axes.Enable, request, wait)
-
-    async def disable(self, *, wait: bool = True, request_id: str | None = None) -> Command:
-        """Stops, waits for standstill, switches the power stage off."""
-        request = axis_service_pb2.DisableRequest(axis=self.name, options=_options(request_id, wait))
-        return await self._command(self._machine._axes.Disable, request, wait)
-
-    async def home(self, *, wait: bool = True, buffered: bool = False, request_id: str | None = None) -> Command:
-        """Searches the home position as configured."""
-        request = axis_service_pb2.HomeRequest(axis=self.name, options=_options(request_id, wait, buffered))
-        return await self._command(self._machine._axes.Home, request, wait)
-
-    async def move(self, position: float, *, velocity: float | None = None, acceleration_time: Seconds | None = None,
-                   deceleration_time: Seconds | None = None, wait: bool = True, buffered: bool = False,
-                   request_id: str | None = None) -> Command:
-        """Moves to a position."""
-        request = axis_service_pb2.MoveAbsoluteRequest(
-            axis=self.name, position=position, velocity=velocity, acceleration_time=_duration(acceleration_time),
-            deceleration_time=_duration(deceleration_time), options=_options(request_id, wait, buffered))
-        return await self._command(self._machine._axes.MoveAbsolute, request, wait)
-
-    async def move_relative(self, distance: float, *, velocity: float | None = None,
-                            acceleration_time: Seconds | None = None, deceleration_time: Seconds | None = None,
-                            wait: bool = True, buffered: bool = False, request_id: str | None = None) -> Command:
-        """Moves by a distance from the last commanded target."""
-        request = axis_service_pb2.MoveRelativeRequest(
-            axis=self.name, distance=distance, velocity=velocity, acceleration_time=_duration(acceleration_time),
-            deceleration_time=_duration(deceleration_time), options=_options(request_id, wait, buffered))
-        return await self._command(self._machine._axes.MoveRelative, request, wait)
-
-    async def velocity(self, velocity: float, *, hold: Seconds | None = None,
-                       acceleration_time: Seconds | None = None, deceleration_time: Seconds | None = None,
-                       wait: bool = False, request_id: str | None = None) -> Command:
-        """Moves at a velocity until something ends it; with `hold`, until it is not repeated in time."""
-        request = axis_service_pb2.MoveVelocityRequest(
-            axis=self.name, velocity=velocity, hold=_duration(hold), acceleration_time=_duration(acceleration_time),
-            deceleration_time=_duration(deceleration_time), options=_options(request_id, wait))
-        return await self._command(self._machine._axes.MoveVelocity, request, wait)
-
-    def jog(self, velocity: float, *, hold: float = 0.3, acceleration_time: Seconds | None = None,
-            deceleration_time: Seconds | None = None) -> Jog:
-        """Moves inside an `async with` block and halts at its end. If this program dies or hangs, the axis halts by
-        itself after `hold` seconds (at most 2)."""
-        return Jog(self, velocity, hold, acceleration_time, deceleration_time)
-
-    async def halt(self, *, wait: bool = True) -> Command:
-        """Decelerates; a new move may take over."""
-        request = axis_service_pb2.HaltRequest(axis=self.name, options=_options(None, wait))
-        return await self._command(self._machine._stops.Halt, request, wait)
-
-    async def stop(self, *, hold: bool = False, wait: bool = True) -> Command:
-        """Decelerates; nothing takes over before standstill (with `hold`: before release_stop)."""
-        request = axis_service_pb2.StopRequest(axis=self.name, hold=hold, options=_options(None, wait))
-        return await self._command(self._machine._stops.Stop, request, wait)
-
-    async def quick_stop(self, *, hold: bool = False, wait: bool = True) -> Command:
-        """Stops at once, without deceleration. Open loop: the position is no longer trusted."""
-        request = axis_service_pb2.QuickStopRequest(axis=self.name, hold=hold, options=_options(None, wait))
-        return await self._command(self._machine._stops.QuickStop, request, wait)
-
-    async def release_stop(self) -> None:
-        """Ends a stop with `hold`."""
-        request = axis_service_pb2.ReleaseStopRequest(axis=self.name)
-        await self._machine._call(self._machine._axes.ReleaseStop, request, self.name)
-
-    async def reset(self, *, wait: bool = True, request_id: str | None = None) -> Command:
-        """Leaves ErrorStop if the cause is gone. Never moves."""
-        request = axis_service_pb2.ResetRequest(axis=self.name, options=_options(request_id, wait))
-        return await self._command(self._machine._axes.Reset, request, wait)
-
-    async def set_position(self, position: float, *, wait: bool = True, request_id: str | None = None) -> Command:
-        """Declares the present position; at standstill only."""
-        request = axis_service_pb2.SetPositionRequest(axis=self.name, position=position,
-                                                      options=_options(request_id, wait))
-        return await self._command(self._machine._axes.SetPosition, request, wait)
-
-
-class Jog:
-    """A jog in progress; made by Axis.jog(). `command` is the latest answer of the daemon."""
-
-    def __init__(self, axis: Axis, velocity: float, hold: float, acceleration_time: Seconds | None,
-                 deceleration_time: Seconds | None) -> None:
-        self._axis = axis
-        self._hold = hold
-        self._arguments = {"axis": axis.name, "velocity": velocity, "hold": _duration(hold),
-                           "acceleration_time": _duration(acceleration_time),
-                           "deceleration_time": _duration(deceleration_time)}
-        self._request_id = str(uuid.uuid4())
-        self._renewal: asyncio.Task[None] | None = None
-        self.command: Command | None = None
-
-    async def __aenter__(self) -> Jog:
-        self.command = await self._call()
-        self._renewal = asyncio.create_task(self._renew())
-        return self
-
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                        traceback: TracebackType | None) -> None:
-        """Halts. Raises what ended the jog early, unless the block itself raised."""
-        assert self._renewal is not None
-        failed = self._renewal.done()
-        self._renewal.cancel()
-        failure = (await asyncio.gather(self._renewal, return_exceptions=True))[0]
-        # A jog that ended by itself may have been followed by somebody else's motion: that is not ours to halt.
-        if not failed or isinstance(failure, AxisdError) and not isinstance(failure, MotionError):
-            try:
-                await self._axis.halt()
-            except AxisdError:
-                if not failed:
-                    raise
-        if failed and error is None and isinstance(failure, Exception):
-            raise failure
-
-    async def _call(self) -> Command:
-        # The same id each time: a repeat extends the hold, and never starts a jog anew that has ended.
-        request = axis_service_pb2.JogRequest(**self._arguments, options=_options(self._request_id, wait=False))
-        return await self._axis._command(self._axis._machine._axes.Jog, request, wait=False)
-
-    async def _renew(self) -> None:
-        # Three renewals per hold: two may be late or lost before the axis halts.
-        while True:
-            await asyncio.sleep(self._hold / 3)
-            self.command = _done(await self._call())
-            if self.command.state.ended:
-                return

@@ -1,0 +1,36 @@
+"""What the calls of a machine and of its axes have in common."""
+from __future__ import annotations
+
+import datetime
+import uuid
+
+from google.protobuf.duration_pb2 import Duration
+
+from .errors import MotionError
+from .types import Command, CommandState
+from .v1 import types_pb2
+
+Seconds = float | datetime.timedelta
+
+
+def duration(value: Seconds | None) -> Duration | None:
+    if value is None:
+        return None
+    delta = value if isinstance(value, datetime.timedelta) else datetime.timedelta(seconds=value)
+    message = Duration()
+    message.FromTimedelta(delta)
+    return message
+
+
+def command_options(request_id: str | None, wait: bool, buffered: bool = False) -> types_pb2.CommandOptions:
+    return types_pb2.CommandOptions(
+        request_id=request_id or str(uuid.uuid4()),
+        wait_until=types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED,
+        buffer_mode=types_pb2.BUFFER_MODE_BUFFERED if buffered else types_pb2.BUFFER_MODE_UNSPECIFIED)
+
+
+def done(command: Command) -> Command:
+    """The command, unless it ended otherwise than Done: then MotionError."""
+    if command.state.ended and command.state is not CommandState.DONE:
+        raise MotionError(command)
+    return command
