@@ -20,9 +20,17 @@ class LateReplies {
   /// So long after its time a reply may still come (drives that save to their EEPROM, slow gateways).
   static constexpr auto latest = std::chrono::seconds(5);
 
-  void expect(Object object, TimePoint now) { until_[object] = now + latest; }
+  void expect(Object object, TimePoint now) {
+    until_[object] = now + latest;
+    ++outstanding_;
+  }
   /// The answer to a request whose object was not expected late came, or the node booted.
-  void forget() { until_.clear(); }
+  void forget() {
+    until_.clear();
+    outstanding_ = 0;
+  }
+  /// A reply came that nobody waits for. False: none can be late; another node sent it.
+  [[nodiscard]] bool explain() { return outstanding_ > 0 && outstanding_-- > 0; }
   [[nodiscard]] bool may_come(Object object, TimePoint now) const {
     const auto found = until_.find(object);
     return found != until_.end() && found->second >= now;
@@ -33,6 +41,7 @@ class LateReplies {
 
  private:
   std::map<Object, TimePoint> until_;
+  int outstanding_ = 0;
 };
 
 }  // namespace axisd::canopen

@@ -213,7 +213,7 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
   auto step = active.transfer.on_reply(parse_sdo_reply(received.frame));
   using Kind = SdoTransfer::Step::Kind;
   if (step.kind == Kind::ignored) return on_unexpected(target);
-  if (std::exchange(target.answered, true)) target.doubled = 0;
+  target.surplus.on_answer();
   if (!active.ambiguous) target.late.forget();
   const bool over = step.kind != Kind::send;
   if (over && active.probe) {
@@ -245,13 +245,12 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
 /// Nobody waits for this reply: late, or of a second node with this node-ID.
 void SdoClient::on_unexpected(Node& node) {
   ++counters_.unexpected_replies;
-  if (std::exchange(node.answered, false)) ++node.doubled;
+  if (!node.late.explain()) node.surplus.on_surplus();
 }
 
 bool SdoClient::answers_twice(std::uint8_t node) const {
-  constexpr int often = 3;
   const auto found = nodes_.find(node);
-  return found != nodes_.end() && found->second->doubled >= often;
+  return found != nodes_.end() && found->second->surplus.habitual();
 }
 
 /// A reply or the whole transfer is overdue.
@@ -263,7 +262,6 @@ void SdoClient::on_due(Node& node) {
     const bool endless = now >= active.limit;
     if (endless || now >= *active.last_sent + timeout) {
       ++counters_.timeouts;
-      node.answered = false;  // its reply may still come: that is none too many
       auto error = no_reply_error(active.transfer);
       if (endless && active.limit > active.first_sent + timeout) {
         error.message = fmt::format("object {}: the transfer did not end in time, {} bytes so far",
@@ -282,7 +280,6 @@ void SdoClient::on_due(Node& node) {
 void SdoClient::cut(Node& node) {
   auto& active = *node.active;
   ++counters_.cut_by_stop;
-  node.answered = false;
   node.late.expect(active.transfer.object(), clock_->now());
   send_abort(node, active.transfer.abort(SdoAbort::general), TransactionClass::stop);
   if (active.probe) {

@@ -85,7 +85,7 @@ class SdoClient {
   void close();
 
   [[nodiscard]] const SdoCounters& counters() const { return counters_; }
-  /// Each of the last requests to this node was answered twice: two nodes have this node-ID.
+  /// More replies come from this node-ID than were asked for: two nodes have it.
   [[nodiscard]] bool answers_twice(std::uint8_t node) const;
   [[nodiscard]] const SdoSettings& settings() const { return settings_; }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "buses/canopen/sdo_client.hpp"
+#include "buses/canopen/surplus_replies.hpp"
 
 namespace axisd::canopen {
 
@@ -57,8 +58,7 @@ struct SdoClient::Node {
   std::array<std::deque<RequestPtr>, transaction_class_count> waiting;
   std::optional<Active> active;
   LateReplies late;
-  bool answered = false;  ///< the last that was heard of it answered a request
-  int doubled = 0;        ///< answered requests in a row after which another reply came
+  SurplusReplies surplus;
   /// Of so many requests one comes from a lower class than the highest, so that polling starves nobody.
   static constexpr unsigned reservation = 8;
   unsigned bound = 0;  ///< requests that overtook a lower class

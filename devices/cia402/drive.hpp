@@ -123,6 +123,8 @@ class Cia402Drive final : public Drive {
   void forget_power_cycle();
 
   // drive_connection.cpp
+  /// What one of two nodes with the same node-ID says is not what the other does.
+  [[nodiscard]] Result<void> check_alone() const;
   Task<Result<void>> set_emergency_id();
   Task<Result<void>> set_heartbeat();
   Task<Result<void>> set_pdos();

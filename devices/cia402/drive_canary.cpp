@@ -88,6 +88,7 @@ Task<Result<TimePoint>> Cia402Drive::read_canary(SdoOptions options) {
   const auto block = co_await read_block(std::move(options));
   if (!block) co_return fail(block.error());
   if (rebooted_) co_return fail(lost_memory());
+  if (const auto alone = check_alone(); !alone) co_return fail(alone.error());
   if (!is_expected(*block)) {
     forget_power_cycle();
     note_power_up_block(*block);

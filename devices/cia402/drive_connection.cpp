@@ -116,11 +116,15 @@ Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_c
     if (!version) co_return failed(version.error());
     if (*version) identity.version = version_text(static_cast<std::int64_t>(**version));
   }
-  if (bus_->master().sdo().answers_twice(node_.id()))
-    co_return fail(error_at(Reason::misconfigured, {0x1018, 0},
-                            "each request is answered twice (two nodes with this node-ID?)",
-                            "give each node of the network a node-ID of its own"));
+  if (const auto alone = check_alone(); !alone) co_return fail(alone.error());
   co_return identity;
+}
+
+Result<void> Cia402Drive::check_alone() const {
+  if (!bus_->master().sdo().answers_twice(node_.id())) return {};
+  return fail(error_at(Reason::misconfigured, {0x1018, 0},
+                       "requests are answered twice (two nodes with this node-ID?)",
+                       "give each node of the network a node-ID of its own"));
 }
 
 /// A node that is heard, or was a moment ago, is there, and may hold something for the next SYNC (M24): it is

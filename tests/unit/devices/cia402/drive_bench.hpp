@@ -76,6 +76,7 @@ class DriveBench {
   [[nodiscard]] Drive& drive() { return *drive_; }
   [[nodiscard]] simulation::SimulatedCanNode& simulated() { return *simulated_; }
   [[nodiscard]] simulation::CanNodes& nodes() { return nodes_.nodes(); }
+  [[nodiscard]] can::Network& network() { return network_; }
   [[nodiscard]] test::VirtualWorld& world() { return world_; }
 
  private:
