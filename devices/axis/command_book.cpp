@@ -1,6 +1,7 @@
 #include "devices/axis/command_book.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <utility>
 
@@ -93,6 +94,10 @@ void CommandRecord::end(CommandState state, std::optional<Error> cause) {
   command_.state = state;
   command_.cause = std::move(cause);
   command_.ended_at = clock_->wall(clock_->now());
+  // Whoever sent it may not have waited for its end.
+  if (state == CommandState::error || state == CommandState::unknown)
+    spdlog::warn("{}: {} ended as {} ({}){}", command_.axis, to_string(command_.kind), to_string(state),
+                 command_.id, command_.cause ? ": " + to_string(*command_.cause) : "");
   tell();
   observers_.clear();
 }
