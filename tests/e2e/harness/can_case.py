@@ -42,7 +42,10 @@ class CanScenario(Scenario):
 
     def mid_move(self, machine, axis="table", position=7000.0):
         command = machine.client.motion("MoveAbsolute", axis, position=position)
-        machine.client.wait_state(axis, lambda s: s.position > 10, f"{axis} is in mid-move")
+        machine.client.wait_state(axis, lambda s: s.position > 10 or machine.client.has_ended(command),
+                                  f"{axis} is in mid-move")
+        command = machine.client.get_command(command)
+        self.assert_command(command, "ACTIVE")
         return command
 
     def ended(self, machine, command):

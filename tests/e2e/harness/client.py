@@ -127,9 +127,11 @@ class Client:
     def wait_online(self, axis):
         return self.wait_state(axis, lambda s: s.link == pb.LINK_STATE_ONLINE, f"{axis} online")
 
+    def has_ended(self, command):
+        """The command, if it has ended, whichever way."""
+        now = self.get_command(command)
+        return now if now.state in ENDED else None
+
     def wait_ended(self, command):
         """Until the command has ended, whichever way; returns it."""
-        def end():
-            now = self.get_command(command)
-            return now if now.state in ENDED else None
-        return wait_for(end, f"{pb.CommandKind.Name(command.kind)} {command.id} ended")
+        return wait_for(lambda: self.has_ended(command), f"{pb.CommandKind.Name(command.kind)} {command.id} ended")

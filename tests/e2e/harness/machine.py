@@ -12,9 +12,11 @@ from .simulator import Simulator
 from .wire import WireLog
 
 
-#: On a busy computer the kernel's worker hands over the bytes of pseudo terminals late, by up to a second (observed). A
-#: simulated drive boots for 300 ms.
-PATIENT = {"reboot_guard": "250 ms", "stop_margin": "2 s"}
+#: On a busy computer the kernel's worker hands over the bytes of pseudo terminals late, by up to a second (observed),
+#: and a guest stands still for as long. Drives that boot slowly permit a guard that a motion's start fits into all the
+#: same.
+PATIENT = {"reboot_guard": "950 ms", "stop_margin": "2 s"}
+BOOT = "boot_ms=1000"
 
 
 class Axis:
@@ -31,6 +33,8 @@ class Axis:
     def option(self):
         model = self.keys.get("model", "ykd2405pr")
         words = f"node={self.node},model={model}"
+        if "boot_ms" not in self.simulated:
+            words += f",{BOOT}"
         if model != "yss-c":  # which is always released then
             words += ",switch.enabled_at_power_up=off"
         return words + (f",{self.simulated}" if self.simulated else "")
