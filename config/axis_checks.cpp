@@ -28,6 +28,7 @@ void AxisChecks::run() {
   complete_scale();
   check_policies();
   check_poll();
+  check_drift_check();
   check_persist();
   if (axis_.scale.modulo && given("limits.position")) {
     add("scale.modulo", "'modulo' and limits.position exclude each other",
@@ -131,11 +132,37 @@ void AxisChecks::check_policies() {
 
 void AxisChecks::check_persist() {
   if (model_ == nullptr || !given("persist") || !axis_.persist.any() || !usable("persist")) return;
-  if (std::ranges::find(model_->parameters, Access::rw_saved, &ParameterSpec::access) !=
-      model_->parameters.end())
+  constexpr std::string_view on_command = "DriveService.SaveParameters saves everything";
+  if (!model_->saves.any()) {
+    add("persist", fmt::format("'persist' has no effect: model {} saves on command only", axis_.model),
+        fmt::format("leave it out; {}", on_command));
     return;
-  add("persist", fmt::format("'persist' has no effect: model {} saves on command only", axis_.model),
-      "leave it out; DriveService.SaveParameters saves everything");
+  }
+  if (axis_.persist == PersistSettings::all()) return;  // `true`: what there is
+  static constexpr std::pair<std::string_view, bool PersistSettings::*> parts[] = {
+      {"terminals", &PersistSettings::terminals},
+      {"segments", &PersistSettings::segments},
+      {"homing", &PersistSettings::homing},
+      {"drive", &PersistSettings::drive}};
+  for (const auto& [name, part] : parts)
+    if (axis_.persist.*part && !(model_->saves.*part))
+      add("persist",
+          fmt::format("'{}' has no effect in 'persist': model {} does not save it as it is written", name,
+                      axis_.model),
+          fmt::format("leave it out of the list; {}", on_command));
+}
+
+void AxisChecks::check_drift_check() {
+  if (model_ == nullptr || !given("drift_check")) return;
+  const auto is_fixed = [](const TerminalSpec& terminal) { return !terminal.function.empty(); };
+  const bool configures =
+      !std::ranges::all_of(model_->inputs, is_fixed) || !std::ranges::all_of(model_->outputs, is_fixed) ||
+      std::ranges::any_of(model_->settings,
+                          [](const SettingSpec& setting) { return setting.object.has_value(); });
+  if (!configures)
+    add("drift_check",
+        fmt::format("'drift_check' has no effect: axisd sets no terminals on model {}", axis_.model),
+        "leave it out");
 }
 
 void AxisChecks::check_poll() {
@@ -280,7 +307,11 @@ void AxisChecks::check_speeds() {
               std::min<double>(capabilities.maximum_search_rpm, maximum_rpm()));
   const auto offset = scale_->checked_pulses(homing.offset);
   const std::int64_t largest = capabilities.maximum_homing_offset_pulses;
-  if (usable("homing.offset") && (!offset || std::abs(*offset) > largest)) {
+  if (largest == 0 && usable("homing.offset") && homing.offset != 0) {
+    add("homing.offset",
+        fmt::format("model {} stops at the switch: it goes no 'offset' further", axis_.model),
+        "leave it out; homing.position says where the axis is at the switch");
+  } else if (usable("homing.offset") && (!offset || std::abs(*offset) > largest)) {
     add("homing.offset",
         fmt::format("'offset' {} {} is out of range", format_number(homing.offset), axis_.scale.unit),
         fmt::format("model {} takes up to {} {} either way", axis_.model,
@@ -300,6 +331,11 @@ void AxisChecks::check_homing() {
   if (model_ != nullptr && !model_->capabilities.homing)
     add("homing", fmt::format("this drive of model {} does not home", axis_.model),
         "leave it out; SetPosition tells the axis where it stands");
+  if (model_ != nullptr && !model_->capabilities.homing_ramp && given("homing.acceleration_time"))
+    add("homing.acceleration_time",
+        fmt::format("'acceleration_time' has no effect: this drive of model {} has none for homing",
+                    axis_.model),
+        "leave it out");
   check_below("homing.velocity", homing.velocity, "limits.velocity", axis_.limits.velocity);
   check_below("homing.search_velocity", homing.search_velocity, "homing.velocity", homing.velocity);
 }

@@ -361,8 +361,8 @@ const KeySpec axis_keys[] = {
     {.key = "persist",
      .kind = Kind::parts,
      .description =
-         "What is saved in the drive's EEPROM: true (all), false (nothing), or a list of parts. drive: "
-         "microstep and the keys under drive.",
+         "What is saved in the drive's EEPROM as it is written: true (all that the model saves so), false "
+         "(nothing), or a list of parts. drive: microstep and the keys under drive.",
      .example = "[terminals, segments]",
      .default_value = "false",
      .choices = persist_parts,

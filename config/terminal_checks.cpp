@@ -83,9 +83,15 @@ void AxisChecks::check_homing_switch() {
 void AxisChecks::check_functions(const std::vector<TerminalSettings>& terminals, std::string_view section) {
   if (model_ == nullptr) return;
   const auto functions = section == "inputs" ? model_->input_functions : model_->output_functions;
+  const auto present = section == "inputs" ? model_->inputs : model_->outputs;
   std::map<std::string_view, std::string_view> owners;
   for (const auto& terminal : terminals) {
     const auto* function = find_function(functions, terminal.function);
+    if (std::ranges::find(present, terminal.terminal, &TerminalSpec::name) == present.end())
+      add(fmt::format("{}.{}", section, terminal.terminal),
+          fmt::format("this drive of model {} has no terminal {}: its data sheet has no object for it",
+                      axis_.model, terminal.terminal),
+          "leave it out");
     if (function == nullptr || function->code == 0) continue;  // code 0: no function
     const auto key = fmt::format("{}.{}.function", section, terminal.terminal);
     if (!function->unusable.empty())
@@ -121,7 +127,7 @@ void AxisChecks::need_input(std::string_view key, std::string_view function, con
   if (input_with(function) != nullptr || model_ == nullptr || !clean("inputs")) return;
   const auto free = free_terminal(model_->inputs, axis_.inputs);
   add(key, fmt::format("{} needs an input with function '{}'", message, function),
-      free.empty() ? "" : fmt::format("add inputs: {{ {}: {} }}", free, function));
+      free.empty() ? "no input is free for it" : fmt::format("add inputs: {{ {}: {} }}", free, function));
 }
 
 void AxisChecks::check_simulated_switches() {

@@ -123,6 +123,7 @@ struct Capabilities {
   std::int32_t minimum_target_pulses = std::numeric_limits<std::int32_t>::min();
   std::int32_t maximum_target_pulses = std::numeric_limits<std::int32_t>::max();
   bool homing = true;
+  bool homing_ramp = true;    ///< homing has an acceleration time of its own
   int maximum_segments = 16;  ///< of positions and velocities that the inputs can select
   int minimum_segment_time_ms = 30;
   /// The last approach to a home switch follows the search; else an inverted axis cannot use these methods
@@ -156,7 +157,8 @@ struct DriveDescriptor {
   const AlarmSpec* other_alarms = nullptr;  ///< what holds for codes without a row; nullptr: nothing is known
   std::span<const SettingSpec> settings;
   Capabilities capabilities;
-  RtuIdentification identification{};                     ///< of modbus_rtu models
+  PersistSettings saves = PersistSettings::all();  ///< parts of `persist:` that it saves as they are written
+  RtuIdentification identification{};              ///< of modbus_rtu models
   std::optional<CanIdentification> can_identification{};  ///< of canopen models; nothing: it cannot be told
   std::unique_ptr<Drive> (*make)(DriveContext context) = nullptr;
   /// Of a model that a file of the machine builder describes: the descriptor of one drive, made from this one

@@ -92,6 +92,7 @@ std::span<const DriveDescriptor> descriptors() {
                        .minimum_segment_time_ms = 0,
                        .position_source = PositionSource::encoder,
                        .closed_loop = true},
+      .saves = {},  // 1010h saves all, on command
       .make = &make,
       .specialise = &specialise,
   }};

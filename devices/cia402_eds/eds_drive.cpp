@@ -141,6 +141,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   parameters = catalogue_.rows;
   capabilities = capabilities_of(base.capabilities, parameters, conventions);
   capabilities.homing = !homing_codes_.empty();
+  capabilities.homing_ramp = eds.find(cia402::object::homing_acceleration) != nullptr;
   const bool has_inputs = eds.find(inputs_value) != nullptr;
   if (!has_inputs) inputs = {};
   specialise = nullptr;

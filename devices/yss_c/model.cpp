@@ -194,6 +194,8 @@ const DriveDescriptor& descriptor() {
                        .position_source = PositionSource::encoder,
                        .closed_loop = true,
                        .communication_watchdog = false},
+      // 7: 6098h..609Ah and 607Ch are RW without S, and there are no segments.
+      .saves = {.terminals = true, .drive = true},
       .can_identification = identification,
       .make = &make,
   };

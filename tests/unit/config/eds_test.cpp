@@ -102,7 +102,20 @@ TEST(Eds, WhatTheDriveLacksIsRefused) {
   EXPECT_THAT(
       findings(load({.more = "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 "
                              "mm/s, offset: 1 mm }\n"})),
-      HasSubstr("'offset' 1 mm is out of range; model cia402 takes up to 0 mm either way"));
+      HasSubstr("model cia402 stops at the switch: it goes no 'offset' further; leave it out"));
+}
+
+TEST(Eds, KeysOfOtherModelsAreRefused) {
+  const auto refused = [](const std::string& more) { return findings(load({.more = more})); };
+  EXPECT_THAT(refused("      overtravel_stop: free\n"),
+              HasSubstr("model cia402 has no setting 'overtravel_stop'"));
+  EXPECT_THAT(
+      refused("    drift_check: 20 s\n"),
+      HasSubstr("'drift_check' has no effect: axisd sets no terminals on model cia402; leave it out"));
+  EXPECT_THAT(refused("    brake: { release_time: 80 ms }\n"),
+              HasSubstr("'brake' has no effect: model cia402 has no output function 'brake'"));
+  EXPECT_THAT(refused("    segments: { velocities: { 1: { velocity: 20 mm/s } } }\n"),
+              HasSubstr("model cia402 has no table of segments"));
 }
 
 TEST(Eds, NothingIsSavedByTheWay) {
@@ -137,6 +150,25 @@ TEST_F(EdsFile, ADriveWithoutHomingModeHasNoHoming) {
   EXPECT_THAT(
       found({.more = "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 mm/s }\n"}),
       HasSubstr("this drive of model cia402 does not home"));
+}
+
+TEST_F(EdsFile, ADriveWithoutDigitalInputsHasNoTerminals) {
+  auto text = read_text(source_path("config/examples/standard-drive.eds"));
+  write(text.replace(text.find("48=0x60FD"), 9, "48=0x609B").replace(text.find("[60FD]"), 6, "[609B]"));
+  EXPECT_EQ(found({.inputs = ""}), "");
+  EXPECT_THAT(
+      found({.inputs = "NEG: negative_limit"}),
+      HasSubstr("this drive of model cia402 has no terminal NEG: its data sheet has no object for it"));
+}
+
+TEST_F(EdsFile, ADriveWithoutHomingAccelerationTakesNoTimeForIt) {
+  auto text = read_text(source_path("config/examples/standard-drive.eds"));
+  write(text.replace(text.find("47=0x609A"), 9, "47=0x609B").replace(text.find("[609A]"), 6, "[609B]"));
+  const std::string homing =
+      "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 mm/s";
+  EXPECT_EQ(found({.more = homing + " }\n"}), "");
+  EXPECT_THAT(found({.more = homing + ", acceleration_time: 200 ms }\n"}),
+              HasSubstr("'acceleration_time' has no effect: this drive of model cia402 has none for homing"));
 }
 
 TEST_F(EdsFile, WhatIsNoEdsIsRefusedInTime) {

@@ -77,7 +77,8 @@ Emitter with_model(const DriveDescriptor& model) {
   if (model.specialise == nullptr) {
     emitter.erase("axes.spindle");  // its file takes longer to read than all the rest
   } else {
-    for (const std::string key : {"inputs", "outputs", "homing"}) emitter.erase("axes.feeder." + key);
+    for (const std::string key : {"inputs", "outputs", "homing", "drift_check"})
+      emitter.erase("axes.feeder." + key);
   }
   return emitter;
 }
