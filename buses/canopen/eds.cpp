@@ -31,7 +31,9 @@ class Reader {
  public:
   std::expected<Eds, std::vector<EdsProblem>> read(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-    if (text.size() > eds_size_limit)
+    if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+      problem(0, "the file is UTF-16: save it as ASCII or UTF-8");
+    else if (text.size() > eds_size_limit)
       problem(0, fmt::format("the file has {} bytes, at most {} are read", text.size(), eds_size_limit));
     else if (text.find('\0') != std::string_view::npos)
       problem(0, "the file is not a text file");
@@ -43,8 +45,8 @@ class Reader {
   }
 
  private:
-  void problem(int line, std::string message) {
-    if (problems_.size() < eds_problem_limit) problems_.push_back({line, std::move(message)});
+  void problem(int line, std::string_view message) {
+    if (problems_.size() < eds_problem_limit) problems_.push_back({line, printable(message)});
   }
 
   bool read_sections(std::string_view text) {
@@ -152,7 +154,7 @@ class Reader {
       auto entry = parse_entry(object, name, section, std::nullopt);
       if (!entry) return;
       const auto own = names == sections_.end() ? std::string() : text_of(names->second, std::to_string(sub));
-      entry->name = own.empty() ? fmt::format("{}{}", entry->name, sub) : own;
+      entry->name = own.empty() ? fmt::format("{}{}", entry->name, sub) : printable(own);
       add(std::move(*entry), section.line);
     }
   }
@@ -174,7 +176,7 @@ class Reader {
 
   std::optional<EdsObject> parse_entry(Object object, const std::string& name, const Section& section,
                                        std::optional<DataType> type) {
-    EdsObject entry{.object = object, .name = text_of(section, "parametername")};
+    EdsObject entry{.object = object, .name = printable(text_of(section, "parametername"))};
     const auto before = problems_.size();
     if (entry.name.empty()) problem(section.line, fmt::format("[{}] has no ParameterName", name));
     const auto code = integer(section, "datatype", 0xFFFF);

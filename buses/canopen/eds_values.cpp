@@ -1,5 +1,6 @@
 #include "buses/canopen/eds_values.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -44,6 +45,13 @@ std::string lower_case(std::string_view text) {
   for (auto& letter : lower)
     if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
   return lower;
+}
+
+std::string printable(std::string_view text) {
+  constexpr std::size_t longest = 240;
+  std::string shown(text.substr(0, longest));
+  std::ranges::replace_if(shown, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return text.size() > longest ? shown + "..." : shown;
 }
 
 std::string_view trimmed(std::string_view text) {

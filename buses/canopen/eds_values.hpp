@@ -11,6 +11,9 @@ namespace axisd::canopen {
 
 std::string lower_case(std::string_view text);
 std::string_view trimmed(std::string_view text);
+/// What may be shown of a file's text: CiA 306 has ASCII, but files come with an editor's code page, or
+/// damaged. Anything else is a '?', and the end of a long text is left out.
+std::string printable(std::string_view text);
 
 /// Decimal, octal (0...) or hexadecimal (0x...), with a sign; nothing: not a number, or beyond 64 bits.
 /// Numbers above the largest signed one wrap.

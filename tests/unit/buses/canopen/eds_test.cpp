@@ -220,6 +220,20 @@ TEST(Eds, IsBounded) {
   EXPECT_EQ(parse_eds(many).error().size(), eds_problem_limit);
 }
 
+TEST(Eds, ShowsNothingButPrintableCharacters) {
+  // Latin-1, an escape sequence, and a line without end.
+  const auto named = parse_eds("[2000]\nParameterName=Kr\xFCmmung \x1B[31m\nDataType=6\nAccessType=rw\n");
+  ASSERT_TRUE(named);
+  EXPECT_EQ(named->find({0x2000, 0})->name, "Kr?mmung ?[31m");
+  const auto broken =
+      parse_eds("[2000]\nParameterName=a\nDataType=\xFC\x1B" + std::string(5000, '9') + "\nAccessType=rw\n");
+  ASSERT_FALSE(broken);
+  EXPECT_EQ(broken.error().at(0).line, 3);
+  EXPECT_EQ(broken.error().at(0).message.find("datatype=??999"), 0U);
+  EXPECT_LT(broken.error().at(0).message.size(), 300U);
+  EXPECT_THAT(parse_eds("\xFF\xFE[").error().at(0).message, HasSubstr("UTF-16"));
+}
+
 /// Broken in any way, a file is read or refused with a reason.
 TEST(Eds, SurvivesMutations) {
   std::mt19937 random(3);
