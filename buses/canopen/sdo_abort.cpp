@@ -77,11 +77,10 @@ const AbortMeaning& abort_meaning(std::uint32_t code) {
 
 Error abort_error(Object object, std::uint32_t code) {
   const auto& meaning = abort_meaning(code);
-  Error error{
-      .reason = meaning.reason,
-      .message = fmt::format("object {}: {} (SDO abort {:08X}h)", to_string(object), meaning.text, code),
-      .remedy = std::string(meaning.remedy),
-      .outcome = Outcome::refused};
+  Error error{.reason = meaning.reason,
+              .message = fmt::format("{} (SDO abort {:08X}h)", meaning.text, code),
+              .remedy = std::string(meaning.remedy),
+              .outcome = Outcome::refused};
   error.where.object = object.key();
   error.where.native_code = code;
   return error;

@@ -53,7 +53,7 @@ Task<Result<SdoAnswer>> SdoClient::transact(std::uint8_t id, RequestPtr request)
                 .remedy = "use 1 to 127"};
   else if (request->download && request->bytes.empty())
     why = Error{.reason = Reason::invalid_argument,
-                .message = fmt::format("object {}: nothing to write", to_string(request->object)),
+                .message = "nothing to write",
                 .remedy = "give at least one byte"};
   else if (closed_)
     why = Error{.reason = Reason::cancelled, .message = "the bus is being closed"};
@@ -264,8 +264,8 @@ void SdoClient::on_due(Node& node) {
       ++counters_.timeouts;
       auto error = no_reply_error(active.transfer);
       if (endless && active.limit > active.first_sent + timeout) {
-        error.message = fmt::format("object {}: the transfer did not end in time, {} bytes so far",
-                                    to_string(active.transfer.object()), active.transfer.bytes().size());
+        error.message =
+            fmt::format("the transfer did not end in time, {} bytes so far", active.transfer.bytes().size());
         error.remedy = "check that the drive's object dictionary is the expected one";
       }
       node.late.expect(active.transfer.object(), now);
@@ -288,18 +288,18 @@ void SdoClient::cut(Node& node) {
     node.lane(request->options.transaction_class).push_front(std::move(request));
     return;
   }
-  finish(
-      node,
-      fail({.reason = Reason::superseded,
-            .message = fmt::format("object {}: a stop took its place", to_string(active.transfer.object())),
-            .remedy = "read back before repeating it",
-            .outcome = active.transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed}));
+  finish(node,
+         fail({.reason = Reason::superseded,
+               .message = "a stop took its place",
+               .remedy = "read back before repeating it",
+               .outcome = active.transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed}));
 }
 
 /// Ends what is under way; with `may_retry`, and attempts left, it is asked again.
 void SdoClient::fail_active(Node& node, Error error, bool may_retry) {
   if (node.active->probe) {
-    error.message = "not sent: " + error.message;
+    error.message = fmt::format("not sent: the read of object {} before it: {}",
+                                to_string(node.active->transfer.object()), error.message);
     error.outcome = Outcome::not_sent;
   } else if (may_retry && --node.active->request->attempts > 0) {
     auto request = std::move(node.active->request);

@@ -14,7 +14,7 @@ namespace axisd::canopen {
 
 inline Error no_reply_error(const SdoTransfer& transfer) {
   return {.reason = Reason::no_reply,
-          .message = fmt::format("object {}: no reply", to_string(transfer.object())),
+          .message = "no reply",
           .remedy = "check power, wiring, node-ID and bit rate of the node",
           .outcome = transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed};
 }

@@ -119,7 +119,7 @@ Step SdoTransfer::on_segment_accepted(const DownloadSegmentAccepted& reply) {
 Step SdoTransfer::broken(SdoAbort code, std::string what) const {
   Error error{
       .reason = Reason::no_reply,
-      .message = fmt::format("object {}: {}", to_string(object_), what),
+      .message = std::move(what),
       .remedy =
           "repeat the request; if it comes again, look for other masters on the network, or check the "
           "drive's firmware version",
@@ -131,8 +131,7 @@ Step SdoTransfer::broken(SdoAbort code, std::string what) const {
 
 Step SdoTransfer::too_long(std::uint64_t size) const {
   Error error{.reason = Reason::out_of_range,
-              .message = fmt::format("object {}: {} bytes came or were announced, at most {} are taken",
-                                     to_string(object_), size, limit_),
+              .message = fmt::format("{} bytes came or were announced, at most {} are taken", size, limit_),
               .remedy = "check that it is the right object; raise the limit of the request if it is",
               .outcome = Outcome::not_executed};
   error.where.object = object_.key();

@@ -63,8 +63,7 @@ Task<Result<std::int64_t>> Cia402Drive::read_object(Object object, SdoOptions op
   if (!answer->size_indicated)
     bytes = std::min<std::size_t>(bytes, known == sizes_.end() ? type.bytes : known->second);
   if (bytes == 0)
-    co_return fail(error_at(Reason::refused, object,
-                            fmt::format("object {} came without data", to_string(object)),
+    co_return fail(error_at(Reason::refused, object, "it came without data",
                             "check the configured model against the drive's firmware"));
   if (answer->size_indicated) sizes_[object.key()] = static_cast<std::uint8_t>(bytes);
   const auto raw = canopen::number_of(std::span(answer->bytes).first(bytes));
@@ -94,8 +93,7 @@ Task<Result<void>> Cia402Drive::write_object(Object object, std::int64_t value, 
     if (present && present->size_indicated)
       sizes.insert(sizes.begin() + 1, static_cast<std::uint8_t>(present->bytes.size()));
   }
-  co_return fail(error_at(Reason::misconfigured, object,
-                          fmt::format("object {} takes no size", to_string(object)),
+  co_return fail(error_at(Reason::misconfigured, object, "the drive takes it in no size",
                           "check the configured model against the drive's firmware"));
 }
 
@@ -104,10 +102,9 @@ Task<Result<void>> Cia402Drive::write_verified(Object object, std::int64_t value
   const auto present = co_await read_object(object, std::move(options));
   if (!present) co_return fail(present.error());
   if (*present == value) co_return Result<void>{};
-  co_return fail(
-      error_at(Reason::misconfigured, object,
-               fmt::format("object {} reads {} after {} was written", to_string(object), *present, value),
-               "check whether another master writes to this drive"));
+  co_return fail(error_at(Reason::misconfigured, object,
+                          fmt::format("it reads {} after {} was written", *present, value),
+                          "check whether another master writes to this drive"));
 }
 
 Task<Result<std::int64_t>> Cia402Drive::read_until(Object object, std::function<bool(std::int64_t)> fits,

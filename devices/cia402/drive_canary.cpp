@@ -128,10 +128,9 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
     const auto value = co_await read_object(objects[i], options);
     if (!value) co_return fail(value.error());
     if (*value != block.at(i))
-      co_return fail(error_at(
-          Reason::misconfigured, objects[i],
-          fmt::format("object {} reads {} after {} was written", to_string(objects[i]), *value, block.at(i)),
-          "check whether another master writes to this drive"));
+      co_return fail(error_at(Reason::misconfigured, objects[i],
+                              fmt::format("it reads {} after {} was written", *value, block.at(i)),
+                              "check whether another master writes to this drive"));
   }
   co_return Result<void>{};
 }

@@ -134,11 +134,11 @@ void Cia402Drive::count_write(std::uint32_t address) {
 }
 
 Error Cia402Drive::not_held(const ObjectSetting& setting, std::int64_t actual) const {
-  return error_at(Reason::misconfigured, Object::of(setting.address),
-                  fmt::format("{} ({}) reads {} after {} was written", object_text(setting.address),
-                              setting.key, actual, setting.applied_to(actual)),
-                  "check whether another master writes to this drive, or its EEPROM fails; what is saved is "
-                  "written again after the drive's next power-up");
+  return error_at(
+      Reason::misconfigured, Object::of(setting.address),
+      fmt::format("{} reads {} after {} was written", setting.key, actual, setting.applied_to(actual)),
+      "check whether another master writes to this drive, or its EEPROM fails; what is saved is "
+      "written again after the drive's next power-up");
 }
 
 Task<Result<void>> Cia402Drive::verify(const std::vector<ObjectSetting>& required) {

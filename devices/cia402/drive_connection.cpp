@@ -51,8 +51,10 @@ std::string objection(const canopen::PdoOutcome& outcome, const canopen::PdoSett
   const bool timely = outcome.state.transmission_type == wanted.transmission_type &&
                       (synchronous || !wanted.event_timer || outcome.state.event_timer.value_or(0) > 0);
   if (outcome.carries(wanted.mapping) && timely) return {};
-  std::string why =
-      outcome.error ? outcome.error->message : fmt::format("{}", fmt::join(outcome.remarks, ", "));
+  std::string why = fmt::format("{}", fmt::join(outcome.remarks, ", "));
+  if (const auto& error = outcome.error)
+    why = error->where.object ? fmt::format("{}: {}", object_text(*error->where.object), error->message)
+                              : error->message;
   if (!outcome.read_only.empty())
     why += fmt::format("{}{} is read-only", why.empty() ? "" : "; ", to_string(outcome.read_only.front()));
   return fmt::format("{}: {}", name, why);

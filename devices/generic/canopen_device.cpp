@@ -60,7 +60,7 @@ Task<Result<Device::Reading>> CanopenDevice::read_in(std::size_t index, Transact
   const auto size = answer->bytes.size(), wanted = std::size_t{byte_count(value.type)};
   if (answer->size_indicated ? size != wanted : size < wanted) {
     Error error{.reason = Reason::misconfigured,
-                .message = fmt::format("object {} has {} bytes, not {}", to_string(object), size, wanted),
+                .message = fmt::format("{} bytes came, not {}", size, wanted),
                 .remedy = fmt::format("correct the type of {} in the configuration", value.name),
                 .outcome = Outcome::refused,
                 .where = {.bus = settings().bus, .node = settings().node, .object = object.key()}};

@@ -164,7 +164,8 @@ TEST(Cia402Parameters, RefusalsNameObjectAndAbortCode) {
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().where.object, 0x209900U);
   EXPECT_EQ(missing.error().where.native_code, 0x06020000U);
-  EXPECT_THAT(to_string(missing.error()), HasSubstr("object 2099h:00"));
+  EXPECT_EQ(to_string(missing.error()).find("2099h:00"), to_string(missing.error()).rfind("2099h:00"));
+  EXPECT_THAT(to_string(missing.error()), HasSubstr("object 2099h:00: "));
   const auto value = bench.run(bench.drive().write_parameters({{lock_current, 101}}));
   ASSERT_FALSE(value);
   EXPECT_EQ(value.error().where.object, lock_current);

@@ -111,7 +111,7 @@ TEST_F(CanopenDeviceTest, AnObjectThatIsMissingOrOfAnotherSizeIsNamedAndTheOther
   ASSERT_TRUE(snapshot->error);
   EXPECT_EQ(snapshot->error->reason, Reason::misconfigured) << "the first of both";
   EXPECT_EQ(snapshot->error->where.object, 0x620001U);
-  EXPECT_THAT(snapshot->error->message, HasSubstr("valves: object 6200h:01 has 1 bytes, not 2"));
+  EXPECT_THAT(snapshot->error->message, HasSubstr("valves: 1 bytes came, not 2"));
   EXPECT_FALSE(value("open"));
   EXPECT_FALSE(value("offset"));
   EXPECT_EQ(value("pressure"), -1.5);
