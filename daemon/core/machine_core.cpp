@@ -31,6 +31,18 @@ NetworkStatus network_status(const canopen::CanopenBus& bus, const LinkCycler& c
   return status;
 }
 
+/// Why the network cannot be used, or that it can again, where `told` is what was said before.
+void log_link(const canopen::CanopenBus& network, std::string& told) {
+  const auto& port = network.port();
+  const auto now = port.open || !port.error ? std::string() : to_string(*port.error);
+  if (now == told) return;
+  if (now.empty())
+    spdlog::info("{}: CAN interface {} is up", network.name(), network.settings().interface);
+  else
+    spdlog::warn("{}", now);
+  told = now;
+}
+
 }  // namespace
 
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
@@ -142,7 +154,9 @@ void MachineCore::start() {
 /// A link that was cycled may be up again before any axis polls, and each drive may have gone on meanwhile.
 Task<> MachineCore::watch(canopen::CanopenBus& network) {
   auto seen = network.losses();
+  std::string told;
   while (!closing_) {
+    log_link(network, told);
     co_await network.port_changed().wait();
     if (closing_ || std::exchange(seen, network.losses()) == network.losses()) continue;
     for (const auto& axis : axes_)

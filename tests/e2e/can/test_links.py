@@ -80,6 +80,7 @@ class Links(CanScenario):
         machine.start_daemon()  # is ready without it
         state = self.offline(machine)
         self.assertIn("cell7", state.link_error.message)
+        self.assertIn("there is no CAN interface cell7", machine.daemon.log())
         ip("link add cell7 type vcan")
         self.addCleanup(ip, "link del cell7")
         machine.client.wait_state("table", lambda s: "down" in s.link_error.message, "it is there, but down")

@@ -1,8 +1,13 @@
 #include "daemon/core/link_cycler.hpp"
 
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <optional>
+#include <sstream>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -122,6 +127,27 @@ TEST_F(Links, ThatNobodyWouldCycleIsToldAsLongAsItIsSo) {
   world_.run_for(LinkCycler::check_period);
   EXPECT_EQ(told(), "");
   EXPECT_EQ(machine_->bus_status().at(0).network->link, LinkState::up);
+}
+
+TEST_F(Links, WhatIsWrongWithALinkIsLoggedWhenItChanges) {
+  std::ostringstream log;
+  const auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(log);
+  auto& sinks = spdlog::default_logger()->sinks();
+  sinks.push_back(sink);
+  for (int i = 0; i < 2; ++i) {
+    port_->set_up(false);
+    world_.run_for(1min);
+    port_->set_up(true);
+    world_.run_for(1min);
+  }
+  std::erase(sinks, sink);
+  const auto count = [text = log.str()](std::string_view part) {
+    int found = 0;
+    for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("cell: CAN interface can7 is down"), 2) << log.str();
+  EXPECT_EQ(count("cell: CAN interface can7 is up"), 2) << log.str();
 }
 
 TEST_F(Links, BusOffDoesNotWaitForTheAnswerOfACheck) {
