@@ -1,4 +1,4 @@
-// The scenarios against the real axisd and axisd-sim on vcan interfaces, in real time.
+// The scenarios against the real axisd and axisd-sim on a vcan interface.
 #pragma once
 
 #include <string_view>
@@ -7,9 +7,14 @@
 
 namespace axisd::conformance {
 
-/// Every model on CAN, plain and inverted, several at once: they mostly wait. Prints a line for each. Makes
-/// the interfaces, which takes privileges: for the guest of tests/guest. `named`: only scenarios whose name
-/// has this in it. The number of those that failed; -1: there is none.
-int run_vcan_suite(const Programs& programs, std::string_view named);
+/// Of all that there is to run, every `of`-th, beginning with `part` (from 1): for guests side by side.
+struct Part {
+  std::size_t part = 1, of = 1;
+};
+
+/// Every model on CAN, plain and inverted, one after the other on the interface vcan0, in the time of a guest
+/// (tests/guest/run.sh -v). Prints a line for each. `named`: only scenarios whose name has this in it. True:
+/// there were some, and all passed.
+bool run_vcan_suite(const Programs& programs, const Part& part, std::string_view named);
 
 }  // namespace axisd::conformance

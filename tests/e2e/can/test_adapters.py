@@ -23,7 +23,7 @@ class Adapter(CanScenario):
                                   helper=[adapter.interface])
 
     def test_bus_off_in_mid_move(self):
-        """How long it may take is asserted in virtual time (link_cycler_test.cpp); here, that it happens so."""
+        """M26: stopped within 200 ms. The guest has a time of its own, which this computer's load does not take."""
         adapter, machine = self.wired_cell()
         move = self.mid_move(machine)
         starts = machine.sim.shaft(5).starts
@@ -33,7 +33,7 @@ class Adapter(CanScenario):
         off = wait_for(lambda: self.link_times(machine, "bus_off", broken), "the bus-off is seen")[0]
         up = wait_for(lambda: self.link_times(machine, "up", off), "the link is up again")[0]
         stopped = self.stop_is_first(machine, up)
-        print(f"bus-off to the stop frame: {(stopped - off) / 1e6:.0f} ms")
+        self.assertLess(stopped - off, 200_000_000)
         # Nothing was handed over in between, and nothing comes out later.
         self.assertEqual(machine.frames.frames("tx", since=off, until=up), [])
         self.stopped(machine, starts=starts)

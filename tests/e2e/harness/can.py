@@ -79,6 +79,26 @@ class Peer:
         self._socket.close()
 
 
+class Candump:
+    """candump of can-utils: what somebody else sees on an interface. Listens from its construction on."""
+
+    def __init__(self, interface):
+        self._trace = tempfile.NamedTemporaryFile("r", dir="/dev/shm")
+        with open(self._trace.name, "w") as out:
+            self._process = subprocess.Popen(["candump", "-L", interface], stdout=out, stderr=subprocess.DEVNULL)
+        wait_for(lambda: os.path.exists(f"/proc/{self._process.pid}/fd/3"), "candump listens")
+
+    def frames(self):
+        """All until now, as `601#2B40600000000000`."""
+        lines = pathlib.Path(self._trace.name).read_text().splitlines(keepends=True)
+        return [line.split()[2] for line in lines if line.endswith("\n")]  # else it is being written
+
+    def close(self):
+        self._process.terminate()
+        self._process.wait()
+        self._trace.close()
+
+
 @dataclasses.dataclass(frozen=True)
 class Frame:
     time: int  # CLOCK_MONOTONIC, ns

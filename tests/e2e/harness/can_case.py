@@ -1,5 +1,5 @@
 """The base of the scenarios on CAN."""
-from .can import LinkHelper, Peer
+from .can import Candump, LinkHelper, Peer
 from .case import Scenario
 from .client import pb
 from .machine import turntable
@@ -13,9 +13,8 @@ class CanScenario(Scenario):
 
     def idle_cell(self, axes=None, interface="vcan0", helper=None, **keys):
         """A machine of which nothing runs yet. `helper`: links that axisd-link may touch; `keys` of the network."""
-        # On a busy computer the guest's only processor stands still for a while, and everybody in it.
         return self.machine(axes or {"table": turntable(5), "second": turntable(6)},
-                            networks={"can0": {"interface": interface, "sdo_timeout": "1 s", **keys}},
+                            networks={"can0": {"interface": interface, **keys}},
                             link_helper=self.helper(*helper) if helper else None)
 
     def cell(self, simulator=(), **arguments):
@@ -34,6 +33,11 @@ class CanScenario(Scenario):
         helper = LinkHelper(*links)
         self.addCleanup(helper.close)
         return helper.socket
+
+    def candump(self, interface="vcan0"):
+        dump = Candump(interface)
+        self.addCleanup(dump.close)
+        return dump
 
     def peer(self, interface="vcan0"):
         peer = Peer(interface)
