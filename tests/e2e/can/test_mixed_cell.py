@@ -33,8 +33,9 @@ class MixedCell(CanScenario):
         result = machine.axisctl("stop", "--all")
         self.assertEqual(result.returncode, 0, result.stderr)
         for name in names:
-            state = client.wait_state(name, lambda s: not s.moving, f"{name} rests")
-            self.assertEqual(state.state, pb.STATE_STANDSTILL, state)
+            # The motor rests before the axis has confirmed it.
+            state = client.wait_state(name, lambda s: s.state == pb.STATE_STANDSTILL, f"{name} is stopped")
+            self.assertFalse(state.moving, state)
         self.assertEqual(machine.axisctl("release-stop", "--all").returncode, 0)
         for name in names:
             client.to_done("Disable", name)
