@@ -1,6 +1,7 @@
 #include "devices/simulation/canopen_pdo.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace axisd::simulation {
 
@@ -9,6 +10,7 @@ namespace {
 constexpr std::uint16_t receive_parameters = 0x1400, receive_mapping = 0x1600, transmit_parameters = 0x1800,
                         transmit_mapping = 0x1A00;
 constexpr std::uint32_t invalid = 0x80000000;
+constexpr std::int64_t last_synchronous = 240, first_event_driven = 254;  // transmission types
 /// A drive looks at its objects in its own cycle, not at each pulse; the manuals give no figure.
 constexpr Duration cycle = std::chrono::milliseconds(1);
 
@@ -93,7 +95,11 @@ std::uint32_t CanopenPdos::check_write(const ObjectRow& row, std::int64_t value)
     const bool changes = (now & 0x7FFU) != (wanted & 0x7FFU) && (wanted & invalid) == 0;
     return changes && (now & invalid) == 0 ? abort_code::value : abort_code::none;
   }
-  if (row.sub == 2 && value > 240 && value < 254) return abort_code::value;  // reserved, or by remote request
+  if (row.sub != 2) return abort_code::none;
+  if (value > last_synchronous && value < first_event_driven)
+    return abort_code::value;  // reserved, or by remote request
+  const bool receives = row.index < receive_mapping;
+  if (receives && settings_.reception.refused && value <= last_synchronous) return abort_code::value;
   return abort_code::none;
 }
 
@@ -134,6 +140,12 @@ void CanopenPdos::follow_entries(std::uint16_t index) {
 
 void CanopenPdos::written(const ObjectRow& row) {
   if (is_mapping(row.index) && row.sub != 0 && settings_.read_only) follow_entries(row.index);
+  if (row.index < receive_mapping && row.sub == 2 && settings_.reception.applied_by_type) {
+    const auto number = row.index & 0xFF;
+    if (!waits_for_sync(number))
+      if (const auto bytes = std::exchange(held_.at(static_cast<std::size_t>(number)), std::nullopt))
+        apply(number, *bytes);
+  }
   if (row.index < transmit_parameters || row.index >= 0x1C00) return;
   auto& pdo = tpdos_.at(row.index & 0xFFU);
   pdo.sent.reset();  // another PDO from now on
@@ -142,9 +154,11 @@ void CanopenPdos::written(const ObjectRow& row) {
   if (operational_) start_timer(row.index & 0xFF, looked_);
 }
 
+void CanopenPdos::forget_received() { held_.assign(held_.size(), std::nullopt); }
+
 void CanopenPdos::set_operational(bool operational, TimePoint now) {
   operational_ = operational;
-  for (auto& held : held_) held.reset();
+  if (!settings_.reception.kept) forget_received();
   tpdos_.assign(tpdos_.size(), {});
   look_due_ = TimePoint::max();
   if (!operational) return;
@@ -164,7 +178,7 @@ bool CanopenPdos::transmits(int number) const {
 }
 
 bool CanopenPdos::by_event(int number) const {
-  return transmits(number) && parameter(transmit_parameters, number, 2) >= 254;
+  return transmits(number) && parameter(transmit_parameters, number, 2) >= first_event_driven;
 }
 
 bool CanopenPdos::hears(std::uint32_t id) const {
@@ -182,13 +196,23 @@ bool CanopenPdos::on_frame(const can::Frame& frame) {
     if (static_cast<std::uint32_t>(parameter(receive_parameters, i, 1) & 0x7FF) != frame.id || !listens(i))
       continue;
     mine = true;
-    Bytes bytes(frame.bytes().begin(), frame.bytes().end());
-    if (parameter(receive_parameters, i, 2) <= 240)
-      held_.at(static_cast<std::size_t>(i)) = std::move(bytes);  // the last before the SYNC counts
-    else
-      apply(i, bytes);
+    receive(i, Bytes(frame.bytes().begin(), frame.bytes().end()));
   }
   return mine;
+}
+
+bool CanopenPdos::waits_for_sync(int number) const {
+  return parameter(receive_parameters, number, 2) <= last_synchronous && !settings_.reception.at_once;
+}
+
+/// Each RPDO has one place: what waits there is replaced, and gone when a later one is applied.
+void CanopenPdos::receive(int number, Bytes bytes) {
+  auto& held = held_.at(static_cast<std::size_t>(number));
+  if (!waits_for_sync(number)) {
+    held.reset();
+    return apply(number, bytes);
+  }
+  if (!held || !settings_.reception.first_counts) held = std::move(bytes);
 }
 
 void CanopenPdos::apply(int number, const Bytes& bytes) {
@@ -207,12 +231,14 @@ void CanopenPdos::apply(int number, const Bytes& bytes) {
 
 void CanopenPdos::on_sync(TimePoint now) {
   if (!operational_) return;
-  for (int i = 0; i < settings_.rpdos; ++i)
-    if (const auto bytes = std::exchange(held_.at(static_cast<std::size_t>(i)), std::nullopt))
-      apply(i, *bytes);
+  for (int i = 0; i < settings_.rpdos; ++i) {
+    auto& held = held_.at(static_cast<std::size_t>(i));
+    const auto bytes = settings_.reception.repeated ? held : std::exchange(held, std::nullopt);
+    if (bytes) apply(i, *bytes);
+  }
   for (int i = 0; i < settings_.tpdos; ++i) {
     const auto type = parameter(transmit_parameters, i, 2);
-    if (!transmits(i) || type > 240) continue;
+    if (!transmits(i) || type > last_synchronous) continue;
     auto& pdo = tpdos_.at(static_cast<std::size_t>(i));
     auto bytes = pack(i);
     if (type == 0 ? pdo.sent == bytes : ++pdo.syncs < type) continue;

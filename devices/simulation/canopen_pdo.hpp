@@ -12,12 +12,24 @@
 
 namespace axisd::simulation {
 
+/// RPDOs of the types 0 to 240: CiA 301 has them applied at the next SYNC, once, with what came last. What it
+/// leaves open, and what devices are known to do otherwise.
+struct SynchronousReception {
+  bool refused = false;          ///< RPDOs take event-driven types only
+  bool at_once = false;          ///< applied as soon as it comes, whatever the type
+  bool first_counts = false;     ///< what came first waits, later ones are lost
+  bool repeated = false;         ///< applied again with each later SYNC
+  bool kept = false;             ///< outlives leaving Operational; else it is dropped
+  bool applied_by_type = false;  ///< a change to an event-driven type applies what waits
+};
+
 struct PdoSettings {
   int rpdos = 4, tpdos = 4;  ///< at most 4 each: those of the predefined connection set
   int entries = 4;           ///< of each mapping
   /// COB-ID and number of entries cannot be written; the number follows the entries. Else as CiA 301 has it:
   /// entries are written while the number is 0.
   bool read_only = false;
+  SynchronousReception reception{};
 };
 
 /// Adds 14xxh, 16xxh, 18xxh and 1Axxh, all off the wire but with their identifiers, nothing mapped.
@@ -30,11 +42,13 @@ class CanopenPdos {
 
   /// Identifiers for `node`, and the numbers of entries that the EEPROM's entries make.
   void boot(std::uint8_t node);
+  /// What waited for a SYNC is gone.
+  void forget_received();
   /// Of 1400h..1BFFh, before it is stored: an abort code or none.
   [[nodiscard]] std::uint32_t check_write(const ObjectRow& row, std::int64_t value) const;
   void written(const ObjectRow& row);
 
-  /// PDOs are alive (NMT Operational), or not; what was held is gone.
+  /// PDOs are alive (NMT Operational), or not.
   void set_operational(bool operational, TimePoint now);
   /// True: the frame was an RPDO of this node.
   bool on_frame(const can::Frame& frame);
@@ -59,6 +73,8 @@ class CanopenPdos {
   void follow_entries(std::uint16_t index);
   [[nodiscard]] std::int64_t parameter(std::uint16_t first, int number, std::uint8_t sub) const;
   [[nodiscard]] bool listens(int number) const;
+  [[nodiscard]] bool waits_for_sync(int number) const;
+  void receive(int number, Bytes bytes);
   [[nodiscard]] bool transmits(int number) const;
   [[nodiscard]] bool by_event(int number) const;
   void apply(int number, const Bytes& bytes);

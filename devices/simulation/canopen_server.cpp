@@ -100,6 +100,7 @@ void CanopenServer::begin(std::uint8_t node) {
   out_.clear();
   heartbeat_ = TimePoint::max();
   pdos_.set_operational(false, now_);
+  pdos_.forget_received();
   dictionary_->set(sdo_index, 1, sdo_request + node);
   dictionary_->set(sdo_index, 2, sdo_reply + node);
   if (settings_.error_count_grows) dictionary_->set(error_history, 0, 0);

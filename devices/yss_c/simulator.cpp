@@ -33,7 +33,13 @@ SimulatedNodeSettings with_defaults(SimulatedNodeSettings settings) {
 }
 
 simulation::PdoSettings pdos_of(const Behaviour& behaviour) {
-  return {.read_only = behaviour.pdo_parameters_read_only};
+  return {.read_only = behaviour.pdo_parameters_read_only,
+          .reception = {.refused = behaviour.rpdo_sync_refused,
+                        .at_once = behaviour.rpdo_type_ignored,
+                        .first_counts = behaviour.rpdo_first_counts,
+                        .repeated = behaviour.rpdo_repeated,
+                        .kept = behaviour.rpdo_kept,
+                        .applied_by_type = behaviour.rpdo_applied_by_type}};
 }
 
 simulation::CanopenServerSettings server_settings(const Behaviour& behaviour) {

@@ -15,6 +15,8 @@ struct Behaviour {
       homing_goes_on_after_start_bit, homing_pauses, offset_without_move, homed_stays_during_homing;
   bool start_speed_u32, motion_objects_u16, shorter_writes, segmented_uploads, ranges_of_chapter_6;
   bool pdo_parameters_read_only, emergency_cob_is_sync, error_count_grows, mode_not_mappable;
+  bool rpdo_sync_refused, rpdo_type_ignored, rpdo_first_counts, rpdo_repeated, rpdo_kept,
+      rpdo_applied_by_type;
   bool nmt_reset_keeps_position, position_read_only, position_is_commanded, released_position_frozen,
       position_clear_in_motion, position_clear_late;
   bool bit6_always, bit7_is_warning, homed_only_bit8, homed_only_bit12, bit11_is_limit, bit13_is_homing_error,

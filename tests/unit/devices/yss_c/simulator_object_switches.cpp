@@ -6,6 +6,14 @@ namespace {
 
 Settings eeprom(std::map<std::uint32_t, std::uint32_t> values) { return {.eeprom = std::move(values)}; }
 
+/// The control word after these, its RPDO being one for SYNC.
+std::int64_t after_frames(Bench& bench, std::initializer_list<std::string_view> frames) {
+  bench.write(0x1400, 2, 1, 1);
+  bench.put("000 01 01");
+  for (const auto frame : frames) bench.put(frame);
+  return bench.read(0x6040);
+}
+
 const Reading readings[] = {
     {"start_speed_u32", [](Bench& b) { return std::int64_t{b.write(0x200E, 4, 7)}; }, 0x06070012, 0},
     {"motion_objects_u16", [](Bench& b) { return std::int64_t{b.write(0x6083, 2, 7)}; }, 0x06070013, 0},
@@ -22,6 +30,27 @@ const Reading readings[] = {
      0x06090030, 0},
     {"pdo_parameters_read_only", [](Bench& b) { return std::int64_t{b.write(0x1800, 1, 4, 0x80000181)}; }, 0,
      0x06010002},
+    {"rpdo_sync_refused", [](Bench& b) { return std::int64_t{b.write(0x1400, 2, 1, 1)}; }, 0, 0x06090030},
+    {"rpdo_type_ignored", [](Bench& b) { return after_frames(b, {"201 00 01"}); }, 0, 0x100},
+    {"rpdo_first_counts", [](Bench& b) { return after_frames(b, {"201 00 01", "201 40 00", "080"}); }, 0x40,
+     0x100},
+    {"rpdo_repeated",
+     [](Bench& b) {
+       after_frames(b, {"201 00 01", "080"});
+       b.control(0);
+       b.put("080");
+       return b.read(0x6040);
+     },
+     0, 0x100},
+    {"rpdo_kept",
+     [](Bench& b) { return after_frames(b, {"201 00 01", "000 80 01", "000 01 01", "080"}); }, 0, 0x100},
+    {"rpdo_applied_by_type",
+     [](Bench& b) {
+       after_frames(b, {"201 00 01"});
+       b.write(0x1400, 2, 1, 255);
+       return b.read(0x6040);
+     },
+     0, 0x100},
     {"emergency_cob_is_sync", [](Bench& b) { return b.read(0x1014); }, 0x81, 0x80},
     {"error_count_grows",
      [](Bench& b) {
