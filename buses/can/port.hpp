@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
@@ -47,8 +48,9 @@ struct ReceivedFrame {
 struct SendOptions {
   /// Strict order, first in first out within a class; a stop goes before everything that is queued here.
   TransactionClass transaction_class = TransactionClass::parameters;
-  TimePoint deadline = TimePoint::max();  ///< not handed to the kernel after this
-  MotionGuard guard{};                    ///< for motion frames: asked when the frame is handed over
+  TimePoint deadline = TimePoint::max();   ///< not handed to the kernel after this
+  MotionGuard guard{};                     ///< for motion frames: asked when the frame is handed over
+  std::vector<MotionGuard> more_guards{};  ///< all have to allow it: a frame that starts several axes
 };
 
 /// How a frame ended. All but `sent` and `unknown`: not a bit of it reached the network, nor ever will.

@@ -26,12 +26,20 @@ SendStatus status_of(Verdict verdict) {
   return SendStatus::sent;
 }
 
+/// Whether those that it concerns allow it still.
+SendStatus allowed(const SendOptions& options, TimePoint now) {
+  auto status = status_of(may_send(options.guard, now));
+  for (const auto& guard : options.more_guards)
+    if (status == SendStatus::sent) status = status_of(may_send(guard, now));
+  return status;
+}
+
 }  // namespace
 
 /// `sent`: it may go.
 SendStatus TxQueue::judge(const Waiting& waiting, TimePoint now) {
   if (now > waiting.options.deadline) return SendStatus::expired;
-  return status_of(may_send(waiting.options.guard, now));
+  return allowed(waiting.options, now);
 }
 
 void TxQueue::end(Completion completion, SendResult result) {
@@ -132,7 +140,7 @@ void TxQueue::reap(TimePoint now) {
 }
 
 void TxQueue::purge_superseded(TimePoint now) {
-  end_where([&](const Waiting& waiting) { return status_of(may_send(waiting.options.guard, now)); });
+  end_where([&](const Waiting& waiting) { return allowed(waiting.options, now); });
 }
 
 void TxQueue::end_all() {
@@ -160,7 +168,8 @@ TimePoint TxQueue::next_event() const {
   if (waits && unconfirmed_.size() < window_ && retry_at_ > TimePoint{}) at = std::min(at, retry_at_);
   for (const auto& lane : lanes_) {
     for (const auto& waiting : lane) {
-      const auto end = std::min(waiting.options.deadline, waiting.options.guard.not_after);
+      auto end = std::min(waiting.options.deadline, waiting.options.guard.not_after);
+      for (const auto& guard : waiting.options.more_guards) end = std::min(end, guard.not_after);
       if (end != TimePoint::max())
         at = std::min(at, end + Duration(1));  // the deadline itself is still in time
     }

@@ -9,9 +9,15 @@ namespace axisd::canopen {
 
 CanopenBus::CanopenBus(Executor executor, Clock& clock, NetworkSettings settings,
                        std::unique_ptr<can::Port> port)
-    : settings_(std::move(settings)),
-      port_changed_(executor, clock),
-      master_(std::move(executor), clock, std::move(port), {.timeout = settings_.sdo_timeout}) {}
+    : executor_(std::move(executor)),
+      clock_(&clock),
+      settings_(std::move(settings)),
+      port_changed_(executor_, clock),
+      master_(executor_, clock, std::move(port), {.timeout = settings_.sdo_timeout}),
+      sync_released_(executor_, clock),
+      sync_idle_(executor_, clock) {
+  master_.sync().on_idle([this] { sync_idle_.notify_all(); });
+}
 
 CanopenBus::~CanopenBus() = default;
 
@@ -47,12 +53,14 @@ void CanopenBus::set_readiness(std::uint8_t node, Readiness readiness) {
   const auto found = nodes_.find(node);
   if (found == nodes_.end()) return;
   found->second.readiness = readiness;
+  if (readiness == Readiness::settled) found->second.armed = false;
+  if (readiness == Readiness::unknown) master_.sync().stop();
   consider_sync();
 }
 
 void CanopenBus::consider_sync() {
-  if (settings_.sync_period == Duration{} || closed_ || !port_.open || sync_running()) return;
-  const auto blocks = [](const auto& node) { return node.second.readiness == Readiness::unknown; };
+  if (settings_.sync_period == Duration{} || closed_ || !port_.open || master_.sync().running()) return;
+  const auto blocks = [](const auto& node) { return !node.second.may_hear_sync(); };
   const auto settled = [](const auto& node) { return node.second.readiness == Readiness::settled; };
   if (std::ranges::any_of(nodes_, blocks) || std::ranges::none_of(nodes_, settled)) return;
   // The loader has checked the period.
@@ -66,15 +74,100 @@ std::shared_ptr<void> CanopenBus::on_sync(std::function<void(TimePoint)> handler
 }
 
 void CanopenBus::tell_sync(TimePoint at) {
+  // Completions come in the order of the wire: what is still on its way comes after this SYNC.
+  for (auto& [id, node] : nodes_) node.waits = false;
   std::erase_if(sync_handlers_, [](const auto& handler) { return handler.second.expired(); });
   const auto handlers = sync_handlers_;  // a handler may add or end others
   for (const auto& [id, weak] : handlers)
     if (const auto handler = weak.lock()) (*handler)(at);
 }
 
+Task<std::shared_ptr<void>> CanopenBus::hold_sync() {
+  while (!holder_.expired()) co_await sync_released_.wait();
+  std::shared_ptr<void> token(this, [alive = std::weak_ptr(alive_)](void* bus) {
+    if (!alive.expired()) static_cast<CanopenBus*>(bus)->release_sync();
+  });
+  holder_ = token;
+  master_.sync().hold();
+  while (master_.sync().on_its_way()) co_await sync_idle_.wait();
+  co_return token;
+}
+
+/// No cycle goes to a node that may still hold what was to start it.
+void CanopenBus::release_sync() {
+  for (auto& [id, node] : nodes_)
+    if (node.armed) set_readiness(id, Readiness::unknown);
+  master_.sync().resume();
+  consider_sync();
+  sync_released_.notify_all();
+}
+
+std::optional<Error> CanopenBus::objection_to_sync() const {
+  constexpr auto foreign_lasts = std::chrono::seconds(1);
+  const auto objection = [this](Reason reason, std::string message, std::string remedy) {
+    return Error{.reason = reason,
+                 .message = std::move(message),
+                 .remedy = std::move(remedy),
+                 .outcome = Outcome::not_executed,
+                 .where = {.bus = settings_.name}};
+  };
+  if (closed_ || !port_.open)
+    return objection(Reason::bus_down, "the CAN interface cannot send", "see the state of the bus");
+  if (const auto foreign = master_.foreign_sync_at(); foreign && clock_->now() - *foreign < foreign_lasts)
+    return objection(Reason::misconfigured, "something else on the network sends SYNC",
+                     "switch the other SYNC producer off");
+  for (const auto& [id, node] : nodes_)
+    if (node.readiness == Readiness::unknown)
+      return objection(Reason::busy, fmt::format("node {} may hold something for the next SYNC", id),
+                       "wait until it is online, or found to be absent");
+  return std::nullopt;
+}
+
+Task<Result<TimePoint>> CanopenBus::send_sync(can::SendOptions options) {
+  if (auto objection = objection_to_sync()) co_return fail(std::move(*objection));
+  auto sent = std::make_shared<std::optional<can::SendResult>>();
+  master_.sync().send_once(options, [this, sent](const can::SendResult& result) {
+    *sent = result;
+    if (result.status == can::SendStatus::sent) tell_sync(result.sent_at);
+  });
+  while (!*sent) co_await sync_idle_.wait();
+  if ((*sent)->status == can::SendStatus::sent) co_return (*sent)->sent_at;
+  co_return fail(can::error_of(**sent, settings_.name, sync_frame(sync_id, 0)));
+}
+
+Task<Result<can::SendResult>> CanopenBus::send_waiting(std::uint8_t node, std::uint32_t cob_id, Bytes bytes,
+                                                       can::SendOptions options) {
+  if (const auto found = nodes_.find(node); found != nodes_.end()) ++found->second.on_its_way;
+  auto sent = co_await master_.send_pdo(cob_id, std::move(bytes), std::move(options));
+  if (const auto found = nodes_.find(node); found != nodes_.end()) {
+    --found->second.on_its_way;
+    found->second.waits = found->second.waits || sent || sent.error().outcome == Outcome::unknown;
+  }
+  co_return sent;
+}
+
+bool CanopenBus::waits(std::uint8_t node) const {
+  const auto found = nodes_.find(node);
+  return found != nodes_.end() && (found->second.waits || found->second.on_its_way > 0);
+}
+
+void CanopenBus::set_armed(std::uint8_t node, bool armed) {
+  if (const auto found = nodes_.find(node); found != nodes_.end()) found->second.armed = armed;
+}
+
+bool CanopenBus::armed(std::uint8_t node) const {
+  const auto found = nodes_.find(node);
+  return found != nodes_.end() && found->second.armed;
+}
+
 void CanopenBus::on_node(const NodeEvent& event) {
   const auto node = nodes_.find(event.node);
-  if (node != nodes_.end() && node->second.handlers.on_event) node->second.handlers.on_event(event);
+  if (node == nodes_.end()) return;
+  if (event.kind == NodeEvent::Kind::booted) {
+    node->second.armed = node->second.waits = false;
+    consider_sync();
+  }
+  if (node->second.handlers.on_event) node->second.handlers.on_event(event);
 }
 
 void CanopenBus::on_port(const can::PortState& state) {

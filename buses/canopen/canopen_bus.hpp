@@ -6,8 +6,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "buses/bus.hpp"
+#include "buses/canopen/common_start.hpp"
 #include "buses/canopen/master.hpp"
 #include "buses/canopen/settings.hpp"
 
@@ -23,7 +26,8 @@ struct NodeHandlers {
 ///
 /// SYNC (M24): it runs only while the port can send and no attached node may hold a set-point that the next
 /// SYNC would start. So it starts when each attached node was either settled by its drive (nothing is armed)
-/// or found absent; it stops with the port, and every node has to be settled again.
+/// or found absent; it stops with the port, and every node has to be settled again. A node that was armed
+/// for a common start is settled by nothing but its drive, or a boot-up message.
 class CanopenBus final : public Bus {
  public:
   CanopenBus(Executor executor, Clock& clock, NetworkSettings settings, std::unique_ptr<can::Port> port);
@@ -45,12 +49,39 @@ class CanopenBus final : public Bus {
     absent,   ///< it does not answer
     settled,  ///< its drive knows that nothing waits for a SYNC
   };
+  /// `unknown` stops SYNC.
   void set_readiness(std::uint8_t node, Readiness readiness);
   /// Called when a SYNC is on the network, with its time, in the order of subscription; dropping the token
   /// ends it.
   [[nodiscard]] std::shared_ptr<void> on_sync(std::function<void(TimePoint)> handler);
-  [[nodiscard]] bool sync_running() const { return master_.sync().running(); }
+  /// Its cycles go out.
+  [[nodiscard]] bool sync_running() const { return master_.sync().running() && !master_.sync().held(); }
 
+  /// Starts nodes with one SYNC: all of them, or none. The time of the SYNC: its end on the wire. Cycles of
+  /// SYNC are held meanwhile, and go on afterwards at the times of before, if there are any. Errors with an
+  /// outcome other than `unknown`: no SYNC was sent, and none is before each member that was armed is
+  /// settled. `unknown`: members may have started, all of them or some.
+  Task<Result<TimePoint>> start_together(std::vector<SyncStart> members) {
+    return common_start(*this, std::move(members));
+  }
+  /// Until the token is dropped no cycle of SYNC goes out, and nobody else holds them. Waits for whoever
+  /// does, and for what is on its way.
+  Task<std::shared_ptr<void>> hold_sync();
+  /// Why no SYNC may be sent for a common start; nothing: it may.
+  [[nodiscard]] std::optional<Error> objection_to_sync() const;
+  /// One SYNC now. Precondition: held. Errors: objection_to_sync(), and as the port's.
+  Task<Result<TimePoint>> send_sync(can::SendOptions options);
+  /// Sends a PDO that waits in `node` for the next SYNC. Errors: as the port's.
+  Task<Result<can::SendResult>> send_waiting(std::uint8_t node, std::uint32_t cob_id, Bytes bytes,
+                                             can::SendOptions options);
+  /// Something that send_waiting() sent may wait there still.
+  [[nodiscard]] bool waits(std::uint8_t node) const;
+  /// What waits in `node` for the next SYNC starts something: until it is settled no cycle goes out.
+  void set_armed(std::uint8_t node, bool armed);
+  [[nodiscard]] bool armed(std::uint8_t node) const;
+
+  [[nodiscard]] const Executor& executor() const { return executor_; }
+  [[nodiscard]] Clock& clock() const { return *clock_; }
   [[nodiscard]] Master& master() { return master_; }
   [[nodiscard]] const Master& master() const { return master_; }
   [[nodiscard]] const NetworkSettings& settings() const { return settings_; }
@@ -77,12 +108,19 @@ class CanopenBus final : public Bus {
   struct Node {
     NodeHandlers handlers;
     Readiness readiness = Readiness::unknown;
+    bool armed = false;  ///< what waits there starts something
+    bool waits = false;
+    int on_its_way = 0;  ///< of what will wait there
+    [[nodiscard]] bool may_hear_sync() const { return !armed && readiness != Readiness::unknown; }
   };
   void on_port(const can::PortState& state);
   void on_node(const NodeEvent& event);
   void consider_sync();
+  void release_sync();
   void tell_sync(TimePoint at);
 
+  Executor executor_;
+  Clock* clock_;
   NetworkSettings settings_;
   PortStatus port_;
   Signal port_changed_;
@@ -90,6 +128,9 @@ class CanopenBus final : public Bus {
   std::map<std::uint8_t, Node> nodes_;
   std::map<int, std::weak_ptr<std::function<void(TimePoint)>>> sync_handlers_;
   int last_sync_handler_ = 0;
+  std::weak_ptr<void> holder_;  ///< of SYNC
+  Signal sync_released_, sync_idle_;
+  std::shared_ptr<int> alive_ = std::make_shared<int>();
   std::uint64_t losses_ = 0;
   std::optional<Error> last_loss_;
   bool closed_ = false;

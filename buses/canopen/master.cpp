@@ -116,8 +116,11 @@ void Master::on_frame(const can::ReceivedFrame& received) {
       ++counters_.foreign_node;
       foreign_nodes_.insert(node);
       return;
-    case Service::nmt:
     case Service::sync:
+      ++counters_.foreign_syncs;
+      foreign_sync_at_ = received.at;
+      [[fallthrough]];
+    case Service::nmt:
     case Service::sdo_request:
     case Service::rpdo:
       ++counters_.foreign_node;  // own frames do not come here: another master

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "buses/can/port.hpp"
@@ -24,9 +25,10 @@ struct MasterHandlers {
 
 /// Frames that concern no configured node, and what was wrong with others; since start.
 struct MasterCounters {
-  std::uint64_t unknown_cob = 0;   ///< no service of ours, and no PDO that somebody subscribed to
-  std::uint64_t foreign_node = 0;  ///< of a node that is not configured, or of another master
-  std::uint64_t malformed = 0;     ///< of a configured node, but not as CiA 301 has it
+  std::uint64_t unknown_cob = 0;    ///< no service of ours, and no PDO that somebody subscribed to
+  std::uint64_t foreign_node = 0;   ///< of a node that is not configured, or of another master
+  std::uint64_t malformed = 0;      ///< of a configured node, but not as CiA 301 has it
+  std::uint64_t foreign_syncs = 0;  ///< SYNC of another producer; also an EMCY with its identifier
 };
 
 /// Thread: core. Adopts nodes as they are: starting it sends nothing (M25).
@@ -69,6 +71,8 @@ class Master {
   /// Stops by itself when the link is lost, and stays so (M24).
   [[nodiscard]] SyncProducer& sync() { return sync_; }
   [[nodiscard]] const SyncProducer& sync() const { return sync_; }
+  /// When another producer's SYNC came last.
+  [[nodiscard]] std::optional<TimePoint> foreign_sync_at() const { return foreign_sync_at_; }
   [[nodiscard]] const NmtMonitor& nmt() const { return nmt_; }
   [[nodiscard]] const EmergencyHistory& emergencies() const { return emergencies_; }
   [[nodiscard]] const can::Port& port() const { return *port_; }
@@ -96,6 +100,7 @@ class Master {
   std::set<std::uint8_t> nodes_, foreign_nodes_;
   std::map<std::uint32_t, PdoHandler> pdos_;
   MasterCounters counters_;
+  std::optional<TimePoint> foreign_sync_at_;
 };
 
 }  // namespace axisd::canopen

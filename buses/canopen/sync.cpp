@@ -27,13 +27,46 @@ Result<void> SyncProducer::start(SyncSettings settings, Handler on_sync) {
   ++run_;
   running_ = true;
   due_ = clock_->now() + settings_.period;
-  arm();
+  if (!held_) arm();
   return {};
 }
 
 void SyncProducer::stop() {
   running_ = false;
   timer_.reset();
+}
+
+void SyncProducer::hold() {
+  held_ = true;
+  timer_.reset();
+}
+
+void SyncProducer::resume() {
+  held_ = false;
+  if (!running_) return;
+  // Close behind one that was sent beside the cycles another would only cost the network twice the answers.
+  const auto earliest = std::max(clock_->now(), sent_once_ + settings_.period / 2);
+  if (due_ < earliest)
+    due_ += (earliest - due_ + settings_.period - Duration(1)) / settings_.period * settings_.period;
+  arm();
+}
+
+void SyncProducer::put(const can::SendOptions& options, can::Completion completion) {
+  if (settings_.counter_overflow != 0) counter_ = counter_ % settings_.counter_overflow + 1;
+  ++on_its_way_;
+  port_->send(sync_frame(settings_.cob_id, counter_), options,
+              [this, completion = std::move(completion)](const can::SendResult& result) {
+                --on_its_way_;
+                completion(result);
+                if (on_its_way_ == 0 && on_idle_) on_idle_();
+              });
+}
+
+void SyncProducer::send_once(const can::SendOptions& options, can::Completion completion) {
+  put(options, [this, completion = std::move(completion)](const can::SendResult& result) {
+    if (result.status == can::SendStatus::sent) sent_once_ = result.sent_at;
+    completion(result);
+  });
 }
 
 void SyncProducer::arm() {
@@ -46,11 +79,10 @@ void SyncProducer::on_cycle() {
   const auto lost = late / settings_.period;
   counters_.missed += static_cast<std::uint64_t>(lost);
   due_ += (lost + 1) * settings_.period;
-  if (settings_.counter_overflow != 0) counter_ = counter_ % settings_.counter_overflow + 1;
   // What the network does not take within this cycle would only push the next one away.
   const can::SendOptions how{.transaction_class = TransactionClass::motion,
                              .deadline = due_ - std::chrono::nanoseconds(1)};
-  port_->send(sync_frame(settings_.cob_id, counter_), how, [this, run = run_](const can::SendResult& result) {
+  put(how, [this, run = run_](const can::SendResult& result) {
     if (run != run_) return;
     if (result.status != can::SendStatus::sent) {
       ++counters_.missed;

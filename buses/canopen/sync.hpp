@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <utility>
 
 #include "buses/can/port.hpp"
 #include "buses/canopen/cob.hpp"
@@ -34,18 +35,31 @@ class SyncProducer {
   /// Called when a SYNC is on the network, with its time.
   using Handler = std::function<void(TimePoint)>;
   SyncProducer(Clock& clock, can::Port& port) : clock_(&clock), port_(&port) {}
+  SyncProducer(const SyncProducer&) = delete;
 
   /// The first SYNC goes out one period from now. It does not start again by itself when the link was lost: a
   /// set-point that waits for a SYNC in a drive must be neutralised before (M24). invalid_argument: a period
   /// below 1 ms, or a counter overflow that CiA 301 does not allow.
   Result<void> start(SyncSettings settings, Handler on_sync = {});
   void stop();
+  /// Cycles are left out (and not counted as missed) until resume(), which goes on at the times of before.
+  void hold();
+  void resume();
+  [[nodiscard]] bool held() const { return held_; }
+  /// Sends one SYNC now, beside the cycles, which need not run; it is not counted.
+  void send_once(const can::SendOptions& options, can::Completion completion);
+  /// SYNCs were given to the port that have not ended.
+  [[nodiscard]] bool on_its_way() const { return on_its_way_ > 0; }
+  /// Called when that ceases.
+  void on_idle(std::function<void()> handler) { on_idle_ = std::move(handler); }
+  /// Cycles are under way, held or not.
   [[nodiscard]] bool running() const { return running_; }
   [[nodiscard]] const SyncCounters& counters() const { return counters_; }
 
  private:
   void arm();
   void on_cycle();
+  void put(const can::SendOptions& options, can::Completion completion);
 
   Clock* clock_;
   can::Port* port_;
@@ -55,7 +69,10 @@ class SyncProducer {
   TimePoint due_{};
   std::uint8_t counter_ = 0;
   std::uint64_t run_ = 0;  ///< completions of an earlier run are not counted
-  bool running_ = false;
+  bool running_ = false, held_ = false;
+  int on_its_way_ = 0;
+  TimePoint sent_once_ = TimePoint::min();
+  std::function<void()> on_idle_;
   Clock::Timer timer_;
 };
 

@@ -28,7 +28,9 @@ class FakePort final : public can::Port {
     timers_.push_back(world_->clock().call_at(
         world_->now() + frame_time, [this, frame, options, completion = std::move(completion)] {
           if (silent_) return;
-          const auto verdict = may_send(options.guard, world_->now());
+          auto verdict = may_send(options.guard, world_->now());
+          for (const auto& guard : options.more_guards)
+            if (verdict == Verdict::send) verdict = may_send(guard, world_->now());
           auto status = next_status;
           if (!state_.can_send()) status = can::SendStatus::port_down;
           if (verdict != Verdict::send) status = can::SendStatus::superseded;
