@@ -112,6 +112,19 @@ struct Drift {
 /// memory, and with it its position and configuration (M6, M7, M20).
 using ContinuityMark = std::array<std::uint16_t, 6>;
 
+/// A positioning move of which all but the trigger stands in the drive, verified (M6, M22). Nothing of it
+/// waits there: dropping it leaves nothing behind. It does not outlive its drive. Thread: core.
+class PreparedMove {
+ public:
+  virtual ~PreparedMove() = default;
+  /// Starts this one and `others`, prepared by other drives on the same bus, in the same instant: the time of
+  /// it. All of them or none. Errors: superseded where one was stopped, or told something else, since; as of
+  /// start_move(); invalid_argument. With an outcome other than `unknown` none has moved nor will; with
+  /// `unknown` each may have started, and was told to stop: the caller confirms it. Once only; all stay alive
+  /// meanwhile.
+  virtual Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others) = 0;
+};
+
 /// One drive. All sequences are coroutines of the core thread. Errors carry bus, node, register and native
 /// code; `outcome` says what is known about the execution. Thread: core.
 class Drive {
@@ -160,6 +173,15 @@ class Drive {
   virtual Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) = 0;
   virtual Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) = 0;
   virtual Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) = 0;
+
+  /// Why this drive cannot start in the same instant as others on its bus; empty: it can, which was proven in
+  /// this power cycle (M24).
+  [[nodiscard]] virtual std::string no_common_start() const { return "its bus has no common trigger"; }
+  /// start_move() up to the trigger. Errors: as of that, never `unknown`; not_supported: no_common_start().
+  virtual Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile /*profile*/,
+                                                                   MotionGuard /*guard*/) {
+    co_return fail(Reason::not_supported, no_common_start(), "start it by itself");
+  }
 
   /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop does not) in class `stop`.
   virtual Task<Result<void>> stop(StopKind kind) = 0;

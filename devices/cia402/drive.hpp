@@ -72,6 +72,10 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
+  // drive_group_start.cpp
+  [[nodiscard]] std::string no_common_start() const override { return no_common_start_; }
+  Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile profile, MotionGuard guard) override;
+
   // drive_configuration.cpp
   Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
 
@@ -89,6 +93,7 @@ class Cia402Drive final : public Drive {
  private:
   using Object = canopen::Object;
   using SdoOptions = canopen::SdoOptions;
+  class Prepared;
   struct Trigger {
     Object object;
     std::int64_t value = 0;
@@ -129,12 +134,16 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> set_heartbeat();
   Task<Result<void>> set_pdos();
   Task<Result<std::string>> set_state_pdos();
+  Task<> set_start_pdo();
   void listen(const std::vector<canopen::PdoOutcome>& outcomes);
   void unsubscribe();
   /// Nothing waits for a SYNC in this drive (M24).
   Task<Result<void>> settle(SdoOptions options);
   Task<Result<void>> disarm(SdoOptions options);
-  Task<Result<void>> leave_operational();
+  Task<Result<void>> overwrite_waiting(std::uint16_t number, canopen::PdoState state, SdoOptions options);
+  [[nodiscard]] bool is_start_pdo(std::uint16_t number, const canopen::PdoState& state) const;
+  Task<Result<void>> leave_operational(bool confirmed);
+  Task<Result<void>> enter_operational();
   [[nodiscard]] bool is_silent();
   Task<Result<void>> start_node();
 
@@ -206,11 +215,30 @@ class Cia402Drive final : public Drive {
                            Trigger trigger, MotionGuard guard);
   Task<Result<void>> start_once(MotionBlock block, OperationMode mode, std::optional<HomingProfile> homing,
                                 Trigger trigger, MotionGuard guard, bool& triggered);
+  [[nodiscard]] Error not_enabled(State state) const;
+  /// All that comes before a trigger. The time: as of read_canary().
+  Task<Result<TimePoint>> prepare_start(MotionBlock block, OperationMode mode,
+                                        std::optional<HomingProfile> homing, SdoOptions motion);
   Task<Result<void>> pull_trigger(OperationMode mode, Trigger trigger, SdoOptions options, bool& triggered);
   Task<> acknowledge_set_point(SdoOptions options);
   Task<Result<void>> prepare_homing(HomingProfile profile, SdoOptions options);
   Task<Result<void>> write_homing_method(HomingMethod method, SdoOptions options);
   Task<Result<void>> home_here(SdoOptions options);
+
+  // drive_group_start.cpp
+  void give_up_common_start();
+  /// What waits in the drive for a SYNC follows what it is told, so that no SYNC undoes it.
+  Task<> follow_waiting(std::uint16_t word);
+  Task<Result<void>> settle_armed(SdoOptions options);
+  Task<> prove_common_start();
+  Task<std::string> obstacle_to_proof(SdoOptions options);
+  Task<Result<std::string>> show_common_start(std::uint16_t held, SdoOptions options);
+  Task<Result<bool>> shows(std::uint16_t word, bool stays, SdoOptions options);
+  Task<Result<void>> let_wait(std::uint16_t word, SdoOptions options);
+  Task<Result<TimePoint>> check_prepared(MotionBlock block, SdoOptions options);
+  Task<Result<void>> confirm_started();
+  [[nodiscard]] canopen::Bytes neutral_bytes() const;
+  void note_move_began(TimePoint at);
 
   // drive_configuration.cpp
   Task<Result<Values>> read_values(std::vector<std::uint32_t> addresses, SdoOptions options);
@@ -264,6 +292,13 @@ class Cia402Drive final : public Drive {
   int missed_pdos_ = 0;                         ///< readings in a row for which none came in time
   std::optional<std::uint32_t> command_pdo_{};  ///< takes the control word at once
   std::string link_note_;
+
+  // Starts in common with others.
+  std::optional<std::uint32_t> start_pdo_{};  ///< takes the control word at the next SYNC
+  bool proof_due_ = false, disproven_ = false;
+  std::string no_common_start_ = "it is not configured yet";
+  std::shared_ptr<AxisGate> start_gate_ = std::make_shared<AxisGate>();  ///< of what is prepared, or proven
+  bool settling_ = false;
 
   // What the drive is known to hold; nothing: unknown.
   std::optional<std::uint16_t> control_;

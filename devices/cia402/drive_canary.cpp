@@ -139,9 +139,10 @@ Task<Result<void>> Cia402Drive::check_continuity(TransactionClass transaction_cl
   const SdoOptions options{.transaction_class = transaction_class};
   if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
   // The link, or the node's state, may have been lost in between.
-  if (!settled_)
-    if (const auto settled = co_await settle(options); !settled) co_return settled;
-  co_return co_await start_node();
+  if (const auto settled = co_await settle(options); !settled) co_return settled;
+  if (const auto started = co_await start_node(); !started || !proof_due_) co_return started;
+  co_await prove_common_start();
+  co_return co_await settle(options);
 }
 
 }  // namespace axisd::cia402

@@ -24,10 +24,10 @@ constexpr auto heartbeat_patience = milliseconds(1000);
 constexpr auto event_period = milliseconds(20), inhibit_period = milliseconds(10);
 /// Nobody who takes part in the network is silent for so long.
 constexpr auto silence_of_absent = milliseconds(1000);
-/// For a node to follow an NMT command that it does not confirm (it may have no heartbeat).
-constexpr auto nmt_patience = milliseconds(50);
 constexpr std::uint32_t full_speed = 1'000'000;
-constexpr std::uint16_t command_number = 1;
+constexpr std::uint16_t command_number = 1, start_number = 2;  ///< of RPDOs
+constexpr std::uint8_t with_each_sync = 1;
+canopen::PdoMapping control_alone() { return {{.object = object::control_word, .bits = 16}}; }
 
 canopen::SdoOptions in(TransactionClass transaction_class) {
   return {.transaction_class = transaction_class};
@@ -215,6 +215,9 @@ void Cia402Drive::unsubscribe() {
   subscribed_.clear();
   sync_.reset();
   command_pdo_.reset();
+  start_pdo_.reset();
+  proof_due_ = false;
+  no_common_start_ = "it is not configured yet";
 }
 
 Task<Result<void>> Cia402Drive::set_pdos() {
@@ -230,13 +233,44 @@ Task<Result<void>> Cia402Drive::set_pdos() {
                                        .number = command_number,
                                        .cob_id = canopen::rpdo_id(command_number, node_.id()),
                                        .transmission_type = canopen::event_driven_of_profile,
-                                       .mapping = {{.object = object::control_word, .bits = 16}}},
+                                       .mapping = control_alone()},
                                       patiently());
   const bool at_once = command.state.transmission_type.value_or(0) >= canopen::event_driven_of_manufacturer;
-  if (command.carries({{.object = object::control_word, .bits = 16}}) && at_once)
-    command_pdo_ = command.state.cob_id();
+  if (command.carries(control_alone()) && at_once) command_pdo_ = command.state.cob_id();
   for (const auto object : command.written) count_write(object.key());
+  co_await set_start_pdo();
   co_return Result<void>{};
+}
+
+/// Group starts come by another one, with a SYNC (M24). Whether its type counts is proven later.
+Task<> Cia402Drive::set_start_pdo() {
+  start_pdo_.reset();
+  proof_due_ = disproven_ = false;
+  if (bus_->settings().sync_period == Duration{}) {
+    no_common_start_ = "the network has no SYNC (sync_period is 0)";
+    co_return;
+  }
+  const canopen::PdoSettings wanted{.direction = PdoDirection::receive,
+                                    .number = start_number,
+                                    .cob_id = canopen::rpdo_id(start_number, node_.id()),
+                                    .transmission_type = with_each_sync,
+                                    .mapping = control_alone()};
+  const auto outcome = co_await canopen::configure_pdo(node_, wanted, patiently());
+  for (const auto object : outcome.written) count_write(object.key());
+  no_common_start_ = objection(outcome, wanted);
+  if (no_common_start_.empty() && !is_start_pdo(start_number, outcome.state))
+    no_common_start_ =
+        fmt::format("RPDO {} has the identifier {:03X}h", start_number, outcome.state.cob_id());
+  if (!no_common_start_.empty()) co_return;
+  start_pdo_ = outcome.state.cob_id();
+  no_common_start_ = "not proven yet";
+  proof_due_ = true;
+}
+
+bool Cia402Drive::is_start_pdo(std::uint16_t number, const canopen::PdoState& state) const {
+  return number == start_number && state.enabled() && state.mapping == control_alone() &&
+         state.cob_id() == canopen::rpdo_id(start_number, node_.id()) &&
+         state.transmission_type == with_each_sync;
 }
 
 /// The text: why there are none. Errors: the node is gone.
@@ -286,58 +320,6 @@ void Cia402Drive::listen(const std::vector<canopen::PdoOutcome>& outcomes) {
     subscribed_.push_back(id);
   }
   if (pdos_.synchronous()) sync_ = bus_->on_sync([this](TimePoint at) { pdos_.on_sync(at); });
-}
-
-/// axisd arms no set-point for a SYNC, but another master, or an earlier program, may have: an RPDO that
-/// waits for a SYNC no longer does.
-Task<Result<void>> Cia402Drive::settle(SdoOptions options) {
-  if (const auto disarmed = co_await disarm(std::move(options)); !disarmed) co_return disarmed;
-  settled_ = true;
-  bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
-  co_return Result<void>{};
-}
-
-/// What an RPDO has received already waits in the drive whatever its type becomes, or is applied by the very
-/// change: it is gone only where there are no PDOs, in Pre-Operational.
-Task<Result<void>> Cia402Drive::disarm(SdoOptions options) {
-  constexpr std::uint8_t sub_type = 2;
-  constexpr std::uint16_t pdos = 4;
-  std::vector<Object> armed;
-  for (std::uint16_t number = 1; number <= pdos; ++number) {
-    const auto object = canopen::communication_object(PdoDirection::receive, number, sub_type);
-    const auto type = co_await node_.read_if_there(object, options);
-    if (!type) co_return failed(type.error());
-    if (*type && **type < canopen::event_driven_of_manufacturer) armed.push_back(object);
-  }
-  if (armed.empty()) co_return Result<void>{};
-  if (const auto left = co_await leave_operational(); !left) co_return left;
-  Result<void> written;
-  for (const auto object : armed)
-    if (written) written = co_await write_object(object, canopen::event_driven_of_profile, 1, options);
-  // Whatever came of it: its state comes by PDO.
-  const auto started = co_await bus_->master().command(node_.id(), canopen::NmtCommand::start);
-  node_started_ = started.has_value();
-  co_return written ? started : written;
-}
-
-Task<Result<void>> Cia402Drive::leave_operational() {
-  const auto told = co_await bus_->master().command(node_.id(), canopen::NmtCommand::enter_pre_operational);
-  if (!told) co_return told;
-  const auto until = clock_->now() + nmt_patience;
-  while (clock_->now() < until &&
-         bus_->master().nmt().status(node_.id()).state != canopen::NmtState::pre_operational)
-    co_await news_.wait_until(until);
-  co_return Result<void>{};
-}
-
-Task<Result<void>> Cia402Drive::start_node() {
-  // A node without heartbeat does not say what it is: then it is started once.
-  const auto state = bus_->master().nmt().status(node_.id()).state;
-  const bool unsaid = state == canopen::NmtState::unknown;
-  if (state == canopen::NmtState::operational || (unsaid && node_started_)) co_return Result<void>{};
-  const auto started = co_await bus_->master().command(node_.id(), canopen::NmtCommand::start);
-  node_started_ = started.has_value();
-  co_return started;
 }
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context) {

@@ -16,15 +16,12 @@ using std::chrono::milliseconds;
 constexpr int chain_attempts = 3;
 constexpr auto acknowledge_limit = milliseconds(100);
 
-/// The set-point or homing begins with the rise of bit 4 (6.2.2).
-constexpr std::uint16_t start_word = 0x000F | control::start;
-
 }  // namespace
 
 Task<Result<void>> Cia402Drive::start_move(MoveProfile profile, MotionGuard guard) {
   const auto block = encode(*model_, setup_.pulses_per_revolution, profile);
   co_return co_await start(block, OperationMode::profile_position, std::nullopt,
-                           {object::control_word, start_word}, std::move(guard));
+                           {object::control_word, control::start_word}, std::move(guard));
 }
 
 Task<Result<void>> Cia402Drive::start_velocity(VelocityProfile profile, MotionGuard guard) {
@@ -43,7 +40,7 @@ Task<Result<void>> Cia402Drive::start_homing(HomingProfile profile, MotionGuard 
     co_return fail(
         error_at(Reason::configuring, object::target_position, "the drive is not configured yet", "wait"));
   co_return co_await start(expected_.back(), OperationMode::homing, profile,
-                           {object::control_word, start_word}, std::move(guard));
+                           {object::control_word, control::start_word}, std::move(guard));
 }
 
 Task<Result<void>> Cia402Drive::start(MotionBlock block, OperationMode mode,
@@ -68,21 +65,9 @@ Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode
                                            std::optional<HomingProfile> homing, Trigger trigger,
                                            MotionGuard guard, bool& triggered) {
   const SdoOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
-  if (rebooted_) co_return fail(lost_memory());
   give_up_leaving();
-  const auto state = co_await read_status(motion);
-  if (!state) co_return fail(state.error());
-  if (*state != State::operation_enabled)
-    co_return fail(error_at(Reason::disabled, object::status_word,
-                            fmt::format("the drive is in {}", to_string(*state)), "enable the axis first"));
-  if (const auto ready = co_await make_ready(*state, mode, motion); !ready) co_return ready;
-  if (homing)
-    if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
-
-  const auto canary = co_await read_canary(motion);
+  const auto canary = co_await prepare_start(block, mode, std::move(homing), motion);
   if (!canary) co_return fail(canary.error());
-  if (!homing)
-    if (const auto written = co_await write_canary(distinct(block), motion); !written) co_return written;
   // A drive that restarts after the canary was read is silent for longer than reboot_guard: a trigger bound
   // within it never meets default parameters.
   auto fresh = motion;
@@ -90,6 +75,30 @@ Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode
   if (const auto pulled = co_await pull_trigger(mode, trigger, fresh, triggered); !pulled) co_return pulled;
   if (mode == OperationMode::profile_position) co_await acknowledge_set_point(motion);
   co_return Result<void>{};
+}
+
+Error Cia402Drive::not_enabled(State state) const {
+  return error_at(Reason::disabled, object::status_word, fmt::format("the drive is in {}", to_string(state)),
+                  "enable the axis first");
+}
+
+Task<Result<TimePoint>> Cia402Drive::prepare_start(MotionBlock block, OperationMode mode,
+                                                   std::optional<HomingProfile> homing, SdoOptions motion) {
+  if (rebooted_) co_return fail(lost_memory());
+  if (const auto settled = co_await settle_armed(motion); !settled) co_return fail(settled.error());
+  const auto state = co_await read_status(motion);
+  if (!state) co_return fail(state.error());
+  if (*state != State::operation_enabled) co_return fail(not_enabled(*state));
+  if (const auto ready = co_await make_ready(*state, mode, motion); !ready) co_return fail(ready.error());
+  if (homing)
+    if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared)
+      co_return fail(prepared.error());
+
+  const auto canary = co_await read_canary(motion);
+  if (!canary || homing) co_return canary;
+  if (const auto written = co_await write_canary(distinct(block), motion); !written)
+    co_return fail(written.error());
+  co_return canary;
 }
 
 Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger, SdoOptions options,
@@ -103,13 +112,17 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
   if (!triggered || stops != stops_) co_return pulled;
   live_ = Live{.since = began};
   if (mode == OperationMode::profile_velocity) negative_ = trigger.value < 0;
-  if (mode == OperationMode::profile_position && last_position_)
-    negative_ = expected_.front()[target] < *last_position_;
+  if (mode == OperationMode::profile_position) note_move_began(began);
   if (mode == OperationMode::homing) {
     homed_ = false;
     homing_.begin(began, last_position_, homing_offset_);
   }
   co_return pulled;
+}
+
+void Cia402Drive::note_move_began(TimePoint at) {
+  live_ = Live{.since = at};
+  if (last_position_) negative_ = expected_.front()[target] < *last_position_;
 }
 
 /// The drive has taken the set-point: bit 4 goes back, so that nothing is left to take. What fails here does
@@ -167,17 +180,16 @@ Task<Result<void>> Cia402Drive::clear_position(MotionGuard guard) {
 Task<Result<void>> Cia402Drive::home_here(SdoOptions options) {
   constexpr std::int64_t present_position = 35;
   give_up_leaving();
+  if (const auto settled = co_await settle_armed(options); !settled) co_return settled;
   const auto state = co_await read_status(options);
   if (!state) co_return fail(state.error());
-  if (*state != State::operation_enabled)
-    co_return fail(error_at(Reason::disabled, object::status_word,
-                            fmt::format("the drive is in {}", to_string(*state)), "enable the axis first"));
+  if (*state != State::operation_enabled) co_return fail(not_enabled(*state));
   if (const auto ready = co_await make_ready(*state, OperationMode::homing, options); !ready) co_return ready;
   if (has(*model_, object::home_offset))
     if (const auto zero = co_await write_verified(object::home_offset, 0, options); !zero) co_return zero;
   const auto chosen = co_await write_verified(object::homing_method, present_position, options);
   if (!chosen) co_return chosen;
-  if (const auto told = co_await write_control(start_word, options); !told) co_return told;
+  if (const auto told = co_await write_control(control::start_word, options); !told) co_return told;
   const auto attained = [](std::int64_t word) {
     return (word & status::mode_specific) != 0 && (word & status::target_reached) != 0;
   };

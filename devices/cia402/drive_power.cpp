@@ -220,6 +220,7 @@ Task<Result<void>> Cia402Drive::step_to_enabled(State state, SdoOptions options)
 Task<Result<void>> Cia402Drive::enable(MotionGuard guard) {
   const SdoOptions options{.transaction_class = TransactionClass::motion, .guard = std::move(guard)};
   give_up_leaving();
+  if (const auto settled = co_await settle_armed(options); !settled) co_return settled;
   if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
   const auto state = co_await read_status(options);
   if (!state) co_return fail(state.error());

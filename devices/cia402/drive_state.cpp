@@ -40,6 +40,7 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
     case Kind::state_changed:
       break;
   }
+  give_up_common_start();
   news_.notify_all();
   if (attention_) attention_();
 }
@@ -48,6 +49,7 @@ void Cia402Drive::on_emergency(const canopen::Emergency& emergency) {
   const auto group = emergency.code >> 8U;
   const bool of_communication = group == 0x81 || group == 0x82;
   if (!emergency.is_reset() && !of_communication) pending_alarm_ = alarm_of(*model_, emergency.code);
+  give_up_common_start();
   news_.notify_all();
   if (attention_) attention_();
 }
@@ -165,6 +167,7 @@ DriveSample Cia402Drive::judge(const Reading& reading) {
 
 /// Whatever else is begun, or stopped, ends this: nothing of it goes out after that.
 void Cia402Drive::give_up_leaving() {
+  give_up_common_start();
   leave_gate_->raise();
   bus_->purge_superseded();
   leave_homing_ = false;

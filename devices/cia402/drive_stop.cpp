@@ -82,6 +82,7 @@ Task<Result<std::uint16_t>> Cia402Drive::held_control(SdoOptions options) {
 }
 
 Task<Result<void>> Cia402Drive::write_control(std::uint16_t word, SdoOptions options) {
+  co_await follow_waiting(word);
   // Whoever asks meanwhile (a stop) must not go by what stood there before; but bits that are the same before
   // and after stand there whether this is executed or not.
   const auto bits = static_cast<std::uint16_t>(word & control::state_bits);
@@ -135,6 +136,7 @@ Task<> Cia402Drive::zero_velocity(SdoOptions options) {
 Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   ++stops_;
   leave_gate_->raise();
+  give_up_common_start();
   leave_homing_ = leave_homing_ || homing_.active() || mode_ == OperationMode::homing;
   homing_.end();
   live_.reset();
@@ -155,6 +157,8 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   // A quick stop first has to say how: 605Dh may be read when bit 8 rises, and a ramp that 60FFh = 0 began
   // may be all that the drive then does.
   const bool known = state_bits_.has_value();
+  // What waits for a SYNC first: it would undo the halt. It was armed in Operation Enabled.
+  co_await follow_waiting(with_halt(state_bits_.value_or(control_word(Command::enable_operation))));
   if (known && !quick) co_await send_control_pdo(with_halt(*state_bits_));
   if (!known || !quick) co_await zero_velocity(urgent);
   const auto option = quick ? model_->meaning.halt_at_once : model_->meaning.halt_on_ramp;

@@ -33,6 +33,8 @@ namespace control {
 
 inline constexpr std::uint16_t state_bits = 0x000F;
 inline constexpr std::uint16_t start = 0x0010;  ///< new set-point; homing start
+/// Operation Enabled, with the rise of that bit.
+inline constexpr std::uint16_t start_word = 0x001F;
 inline constexpr std::uint16_t fault_reset = 0x0080;
 inline constexpr std::uint16_t halt = 0x0100;
 

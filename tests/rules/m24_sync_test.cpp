@@ -22,10 +22,10 @@ void write(simulation::SimulatedCanNode& node, std::uint16_t index, std::uint8_t
        static_cast<std::uint8_t>(value >> 24U)});
 }
 
-TEST(M24, WhatAnEarlierMasterArmedNeverStarts) {
+void expect_nothing_armed_starts(const CanRigOptions& options) {
   for (const std::uint16_t number : {0, 1}) {
     SCOPED_TRACE(number);
-    CanRig rig({.sync_period = 10ms, .limits = false});
+    CanRig rig(options);
     rig.ready();
     rig.stop_daemon();
     rig.touch([&](auto& node) {
@@ -54,6 +54,12 @@ TEST(M24, WhatAnEarlierMasterArmedNeverStarts) {
     rig.done(MoveAbsoluteRequest{.position = 3});
     EXPECT_EQ(rig.state()->link_note, "");
   }
+}
+
+TEST(M24, WhatAnEarlierMasterArmedNeverStarts) {
+  for_each_reading({.sync_period = 10ms, .limits = false},
+                   {{"rpdo_kept"}, {"rpdo_applied_by_type"}, {"rpdo_kept", "rpdo_applied_by_type"}},
+                   &expect_nothing_armed_starts);
 }
 
 TEST(M24, ANodeThatIsHeardButDoesNotAnswerKeepsSyncFromStarting) {

@@ -42,8 +42,8 @@ const Reading readings[] = {
        return b.read(0x6040);
      },
      0, 0x100},
-    {"rpdo_kept",
-     [](Bench& b) { return after_frames(b, {"201 00 01", "000 80 01", "000 01 01", "080"}); }, 0, 0x100},
+    {"rpdo_kept", [](Bench& b) { return after_frames(b, {"201 00 01", "000 80 01", "000 01 01", "080"}); }, 0,
+     0x100},
     {"rpdo_applied_by_type",
      [](Bench& b) {
        after_frames(b, {"201 00 01"});
