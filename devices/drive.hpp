@@ -212,7 +212,9 @@ class Drive {
   /// when they count, and how the drive's switches must stand for that. Errors: out_of_range, not_supported.
   virtual Task<Result<std::string>> change_serial(SerialChange change) = 0;
 
-  virtual Task<Result<void>> clear_alarm() = 0;
+  /// Resets an alarm whose cause is gone; one that stays shows in the next sample. Never changes the power
+  /// stage of a drive that is in no alarm any more.
+  virtual Task<Result<void>> clear_alarm(MotionGuard guard) = 0;
   /// Sets the drive's position counter to zero; only at standstill. Verified by the caller's next sample.
   virtual Task<Result<void>> clear_position(MotionGuard guard) = 0;
 };

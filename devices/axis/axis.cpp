@@ -133,17 +133,19 @@ void Axis::on_sample(const DriveSample& sample) {
   sampled_.notify_all();
 }
 
+Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {
+  const auto* spec = find_alarm(*descriptor_, code);
+  auto cause = error(Reason::alarm,
+                     fmt::format("{} alarm {} ({})", what, code, spec != nullptr ? spec->name : "unknown"),
+                     spec != nullptr ? std::string(spec->remedy) : "see the drive's manual");
+  cause.where.native_code = code;
+  return cause;
+}
+
 void Axis::on_alarm(const DriveSample& sample) {
   if (fault_ && fault_->reason == Reason::alarm && fault_->where.native_code == sample.alarm_code) return;
-  const auto* spec = find_alarm(*descriptor_, sample.alarm_code);
-  const bool known = spec != nullptr;
-  auto cause =
-      error(Reason::alarm,
-            fmt::format("the drive reports alarm {} ({})", sample.alarm_code, known ? spec->name : "unknown"),
-            known ? std::string(spec->remedy) : "see the drive's manual");
-  cause.where.native_code = sample.alarm_code;
   lose_trust();
-  enter_error_stop(std::move(cause));
+  enter_error_stop(alarm_error(sample.alarm_code, "the drive reports"));
   // Also for an alarm that clears itself: nothing may go on by itself when it does (M5).
   begin_stop(StopKind::stop, false, nullptr);
 }

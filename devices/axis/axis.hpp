@@ -258,6 +258,8 @@ class Axis {
   void keep_deceleration(const Activity& activity);
   [[nodiscard]] Duration deceleration_bound() const;
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
+  /// "{what} alarm 2 (overvoltage)", with what there is to do.
+  [[nodiscard]] Error alarm_error(std::uint16_t code, std::string_view what) const;
 
   AxisEnvironment env_;
   AxisSettings settings_;

@@ -108,7 +108,7 @@ Task<> Axis::run_disable(ActivityPtr activity) {
 Task<> Axis::run_reset(ActivityPtr activity) {
   activity->command->activate();
   if (sample_ && sample_->alarm_code != 0) {
-    const auto cleared = co_await drive_->clear_alarm();
+    const auto cleared = co_await drive_->clear_alarm(guard(*activity));
     if (!current(*activity)) co_return;
     if (!cleared) {
       finish(*activity, [&](CommandRecord& command) { command.error(cleared.error()); });
@@ -123,10 +123,12 @@ Task<> Axis::run_reset(ActivityPtr activity) {
   finish(*activity, [&](CommandRecord& command) {
     if (clean)
       command.done();
+    else if (!sample)
+      command.error(sample.error());
+    else if (sample->alarm_code != 0)
+      command.error(alarm_error(sample->alarm_code, "the drive still reports"));
     else
-      command.error(
-          sample ? error(Reason::alarm, "the drive still reports an alarm or moves", "clear its cause first")
-                 : sample.error());
+      command.error(error(Reason::moving, "the axis moves", "stop it, then reset it"));
   });
 }
 

@@ -332,13 +332,10 @@ Result<CommandPtr> Axis::accept(const ResetRequest& request, const CommandOption
   if (stopping_.running) return fail(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
   if (sample_ && sample_->alarm_code != 0) {
+    // All others may have lost their cause and wait for this: the drive says whether they have.
     const auto* spec = find_alarm(*descriptor_, sample_->alarm_code);
-    if (spec == nullptr || spec->reset != AlarmReset::by_command) {
-      auto cause = error(Reason::alarm, fmt::format("alarm {} is still present", sample_->alarm_code),
-                         spec == nullptr ? "see the drive's manual" : std::string(spec->remedy));
-      cause.where.native_code = sample_->alarm_code;
-      return fail(std::move(cause));
-    }
+    if (spec != nullptr && spec->reset == AlarmReset::power_cycle)
+      return fail(alarm_error(sample_->alarm_code, "only a power cycle ends"));
   }
   const auto activity = begin(request, options, AxisState::standstill, {});
   launch(run_reset(activity), "reset");

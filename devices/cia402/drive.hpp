@@ -61,7 +61,7 @@ class Cia402Drive final : public Drive {
   // drive_power.cpp
   Task<Result<void>> enable(MotionGuard guard) override;
   Task<Result<void>> disable(MotionGuard guard) override;
-  Task<Result<void>> clear_alarm() override;
+  Task<Result<void>> clear_alarm(MotionGuard guard) override;
 
   // drive_stop.cpp
   Task<Result<void>> stop(StopKind kind) override;

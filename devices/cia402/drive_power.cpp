@@ -266,20 +266,26 @@ Task<Result<void>> Cia402Drive::disable(MotionGuard guard) {
   co_return Result<void>{};
 }
 
+/// In Fault bits 0 to 3 mean nothing, and 15 leads to Switch On Disabled. They stay as they are all the same:
+/// a drive that has left Fault by itself meanwhile, with its motor held, is not released by them.
 Task<Result<void>> Cia402Drive::reset_fault(SdoOptions options) {
-  // In Fault bits 0 to 3 mean nothing, and 15 leads to Switch On Disabled: nothing is released or enabled.
-  if (const auto low = co_await write_control(0, options); !low) co_return low;
-  if (const auto edge = co_await write_control(control::fault_reset, options); !edge) co_return edge;
+  const auto held = co_await held_control(options);
+  if (!held) co_return fail(held.error());
+  const auto quiet = static_cast<std::uint16_t>((*held & control::state_bits) | control::halt);
+  if (const auto low = co_await write_control(quiet, options); !low) co_return low;
+  const auto reset = static_cast<std::uint16_t>(quiet | control::fault_reset);
+  if (const auto edge = co_await write_control(reset, options); !edge) co_return edge;
   const auto word = co_await read_until(
       object::status_word,
       [](std::int64_t shown) { return state_of(static_cast<std::uint16_t>(shown)) != State::fault; },
       transition_limit, options);
   if (!word) co_return fail(word.error());
-  co_return co_await write_control(0, std::move(options));
+  co_return co_await write_control(quiet, std::move(options));
 }
 
-Task<Result<void>> Cia402Drive::clear_alarm() {
-  const SdoOptions options{.transaction_class = TransactionClass::parameters, .attempts = 3};
+Task<Result<void>> Cia402Drive::clear_alarm(MotionGuard guard) {
+  const SdoOptions options{
+      .transaction_class = TransactionClass::parameters, .guard = std::move(guard), .attempts = 3};
   const auto state = co_await read_status(options);
   if (!state) co_return fail(state.error());
   if (const auto zero = co_await write_verified(object::target_velocity, 0, options); !zero) co_return zero;

@@ -46,7 +46,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
   Task<Result<void>> stop(StopKind kind) override;
-  Task<Result<void>> clear_alarm() override;
+  Task<Result<void>> clear_alarm(MotionGuard guard) override;
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
   // drive_parameters.cpp

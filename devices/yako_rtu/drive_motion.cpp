@@ -188,8 +188,9 @@ Task<Result<void>> YakoRtuDrive::stop(StopKind kind) {
   }
 }
 
-Task<Result<void>> YakoRtuDrive::clear_alarm() {
-  const auto written = co_await node_.write_patiently(reg::alarm_clear, 1, in(TransactionClass::parameters));
+Task<Result<void>> YakoRtuDrive::clear_alarm(MotionGuard guard) {
+  const auto written = co_await node_.write_patiently(
+      reg::alarm_clear, 1, {.transaction_class = TransactionClass::parameters, .guard = std::move(guard)});
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }

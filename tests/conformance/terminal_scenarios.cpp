@@ -107,10 +107,17 @@ std::string outputs(const Setup& setup) {
     bench.outside("alarm @1 2");
     bench.pass(1s);
     EXPECT_TRUE(alarm());
+    const auto early = expect_end(bench.client.reset(), v1::COMMAND_STATE_ERROR, v1::REASON_ALARM);
+    EXPECT_FALSE(early.cause().remedy().empty()) << "it does not say what to do";
+    EXPECT_TRUE(alarm());
     bench.outside("alarm @1 0");
     bench.pass(1s);
     EXPECT_EQ(alarm(), setup.on("fault_needs_reset")) << "the output follows the drive's alarm";
-    bench.finish(1);
+    expect_done(bench.client.reset());
+    EXPECT_FALSE(alarm());
+    bench.ready();
+    expect_done(bench.client.move_to(5));
+    bench.finish(2);
   }
   return "yes";
 }
