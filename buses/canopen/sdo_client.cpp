@@ -224,6 +224,7 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
     target.active.reset();
     target.lane(request->options.transaction_class).push_front(std::move(request));
   } else if (step.kind == Kind::send) {
+    active.opened = true;
     if (target.stop_waits() && active.request->options.transaction_class != TransactionClass::stop)
       cut(target);
     else
@@ -269,19 +270,23 @@ void SdoClient::on_due(Node& node) {
         error.remedy = "check that the drive's object dictionary is the expected one";
       }
       node.late.expect(active.transfer.object(), now);
-      send_abort(node, active.transfer.abort(SdoAbort::timed_out), active.request->options.transaction_class);
+      const auto own_class = active.request->options.transaction_class;
+      // Another stop follows at once: see cut().
+      if (active.opened || (own_class != TransactionClass::stop && !node.stop_waits()))
+        send_abort(node, active.transfer.abort(SdoAbort::timed_out), own_class);
       fail_active(node, std::move(error), !endless);
     }
   }
   pump(node);
 }
 
-/// A stop takes the place of what is under way.
+/// A stop takes the place of what is under way. A server that has not answered yet has nothing open, and is
+/// spared the abort: a small one has one buffer, and of two frames in a row loses the second.
 void SdoClient::cut(Node& node) {
   auto& active = *node.active;
   ++counters_.cut_by_stop;
   node.late.expect(active.transfer.object(), clock_->now());
-  send_abort(node, active.transfer.abort(SdoAbort::general), TransactionClass::stop);
+  if (active.opened) send_abort(node, active.transfer.abort(SdoAbort::general), TransactionClass::stop);
   if (active.probe) {
     auto request = std::move(active.request);
     node.active.reset();

@@ -46,6 +46,7 @@ struct SdoClient::Active {
   SdoTransfer transfer;
   bool probe = false;  ///< `transfer` reads another object, to bring both sides in step before `request`
   bool ambiguous = false;
+  bool opened = false;                   ///< the server has answered, and waits for what continues it
   std::uint64_t frame_id = 0;            ///< of the frame that was sent last
   TimePoint first_sent{};                ///< end of the first frame
   std::optional<TimePoint> last_sent{};  ///< end of the last frame; nothing while it waits in the port

@@ -321,7 +321,7 @@ class Cia402Drive final : public Drive {
   HomingWatch homing_;
   bool leave_homing_ = false;  ///< it has ended, and the drive is to go back to position mode
   std::shared_ptr<AxisGate> leave_gate_ = std::make_shared<AxisGate>();
-  std::int32_t homing_offset_ = 0;
+  HomingWatch::Start homing_start_;
   std::optional<bool> homed_;  ///< how our last homing of this power cycle ended; nothing: as the drive says
   std::optional<Live> live_;
   std::optional<std::int32_t> last_position_;

@@ -41,6 +41,7 @@ void Cia402Drive::forget_power_cycle() {
   expected_.clear();
   expected_mark_.reset();
   forget_words();
+  unsubscribe();  // its PDOs are what a power-up left of them
   halt_.reset();
   saving_.reset();
   found_closed_.reset();

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "buses/canopen/sdo_abort.hpp"
@@ -15,6 +16,14 @@ using std::chrono::milliseconds;
 
 constexpr int chain_attempts = 3;
 constexpr auto acknowledge_limit = milliseconds(100);
+
+/// From the slow speed of the last approach, on the ramp of the homing.
+std::int32_t braking_pulses(const HomingProfile& profile, std::int64_t pulses_per_revolution) {
+  const double seconds = std::chrono::duration<double>(profile.acceleration_time).count();
+  const double per_second =
+      std::abs(profile.search_velocity_rpm) / 60.0 * static_cast<double>(pulses_per_revolution);
+  return static_cast<std::int32_t>(std::lround(per_second * seconds / 2));
+}
 
 }  // namespace
 
@@ -115,7 +124,8 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
   if (mode == OperationMode::profile_position) note_move_began(began);
   if (mode == OperationMode::homing) {
     homed_ = false;
-    homing_.begin(began, last_position_, homing_offset_);
+    homing_start_.from = last_position_;
+    homing_.begin(began, homing_start_);
   }
   co_return pulled;
 }
@@ -134,9 +144,14 @@ Task<> Cia402Drive::acknowledge_set_point(SdoOptions options) {
   (void)co_await write_control(control_word(Command::enable_operation), std::move(options));
 }
 
-/// Compared and not just written: some drives save these.
+/// In homing mode already, at rest. Compared and not just written: some drives save these.
 Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions options) {
-  homing_offset_ = profile.offset_pulses;
+  homing_start_ = {.offset = profile.offset_pulses,
+                   .braking = braking_pulses(profile, setup_.pulses_per_revolution)};
+  const auto word = co_await read_object(object::status_word, options);
+  if (!word) co_return fail(word.error());
+  const auto bits = static_cast<std::uint16_t>(*word);
+  homing_start_.tied_to_rest = (bits & status::mode_specific) != 0 && (bits & model_->status.homed) == 0;
   for (const auto& [object, value] : encode(*model_, setup_.pulses_per_revolution, profile)) {
     const auto present = co_await read_object(object, options);
     if (!present) co_return fail(present.error());

@@ -26,7 +26,6 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
     case Kind::booted:
       rebooted_ = rebooted_ || !expected_.empty() || expected_mark_;
       forget_power_cycle();
-      unsubscribe();
       pending_alarm_ = 0;
       heartbeat_lost_ = false;
       break;

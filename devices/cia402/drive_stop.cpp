@@ -16,6 +16,8 @@ using std::chrono::milliseconds;
 constexpr auto proof_lasts = milliseconds(1000);
 /// Under a stop nobody waits longer for a mode.
 constexpr auto urgent_mode_limit = milliseconds(20);
+/// Nor for the reply to what goes before the halt: with the reply lost it is there all the same.
+constexpr auto urgent_reply_limit = milliseconds(20);
 constexpr std::size_t word_bytes = 2;
 
 /// The state in which a drive rests that follows this control word.
@@ -151,6 +153,7 @@ Task<Result<void>> Cia402Drive::stop(StopKind kind) {
 /// drive has them. Never bit 2 (M12): without 605Ah and 6085h nobody knows how the drive would stop.
 Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   const SdoOptions urgent{.transaction_class = TransactionClass::stop};
+  const SdoOptions first{.transaction_class = TransactionClass::stop, .timeout = urgent_reply_limit};
   co_await wake_if_stopped();
   drop_stale_knowledge();
   const auto with_halt = [](std::uint16_t bits) { return static_cast<std::uint16_t>(bits | control::halt); };
@@ -160,11 +163,11 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   // What waits for a SYNC first: it would undo the halt. It was armed in Operation Enabled.
   co_await follow_waiting(with_halt(state_bits_.value_or(control_word(Command::enable_operation))));
   if (known && !quick) co_await send_control_pdo(with_halt(*state_bits_));
-  if (!known || !quick) co_await zero_velocity(urgent);
+  if (!known || !quick) co_await zero_velocity(first);
   const auto option = quick ? model_->meaning.halt_at_once : model_->meaning.halt_on_ramp;
   if (halt_option_ != option) {
     halt_option_.reset();
-    if (co_await write_object(object::halt_option, option, 0, urgent)) halt_option_ = option;
+    if (co_await write_object(object::halt_option, option, 0, first)) halt_option_ = option;
   }
   if (quick && state_bits_) co_await send_control_pdo(with_halt(*state_bits_));
   bool was_halted = control_ ? (*control_ & control::halt) != 0 : halt_.has_value();

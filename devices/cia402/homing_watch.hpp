@@ -15,7 +15,8 @@ namespace axisd::cia402 {
 ///
 /// The bit may be left from an earlier homing, by a drive that ignored this start, or that was stopped on its
 /// way: it counts once it was seen low, or the motor has moved to where only a homing leads. And with a stop
-/// terminal in the way nothing is home.
+/// terminal in the way nothing is home. A bit that is never seen at rest but high may be low only because the
+/// motor turned: see Start::tied_to_rest.
 class HomingWatch {
  public:
   /// Between its phases the motor rests for less than this.
@@ -27,8 +28,16 @@ class HomingWatch {
     bool held_up = false;  ///< a stop terminal is active
   };
 
-  /// `from`: where the motor stood; `offset`: 607Ch.
-  void begin(TimePoint at, std::optional<std::int32_t> from, std::int32_t offset);
+  struct Start {
+    std::optional<std::int32_t> from{};  ///< where the motor stood
+    std::int32_t offset = 0;             ///< 607Ch
+    std::int32_t braking = 0;            ///< pulses that it may turn on beyond the switch
+    /// Before the start the bit was high, and CiA 402's own: while the motor turns it says nothing, so that a
+    /// stop which nobody saw (a pulse at a terminal) would make it rise.
+    bool tied_to_rest = false;
+  };
+
+  void begin(TimePoint at, Start start);
   void end() { began_.reset(); }
   /// Takes a sample, and says whether homing goes on.
   bool goes_on(const DriveSample& sample, Signs signs);
@@ -37,11 +46,10 @@ class HomingWatch {
   [[nodiscard]] bool reached() const { return reached_; }
 
  private:
-  [[nodiscard]] bool at_home(std::int32_t position) const;
+  [[nodiscard]] bool at_home(std::int32_t position, std::int64_t tolerance) const;
 
   std::optional<TimePoint> began_;
-  std::optional<std::int32_t> from_;
-  std::int64_t offset_ = 0;
+  Start start_;
   bool was_low_ = false, moved_ = false, held_up_ = false, reached_ = false;
   TimePoint resting_since_{};
   std::int32_t resting_at_ = 0;

@@ -61,6 +61,41 @@ TEST(M21, AHomingThatAStopTerminalEndsOnItsWayIsNotHome) {
   });
 }
 
+/// A pulse between two samples: only the place tells.
+TEST(M21, AHomingThatAnUnseenStopEndedIsNotHome) {
+  for_each_reading(
+      {.connect = false,
+       .adjust =
+           [](AxisSettings& axis) {
+             with_stop_input(axis);
+             axis.poll_moving = 400ms;
+           }},
+      bits, [](const CanRigOptions& options) {
+        CanRig rig(options);
+        rig.nodes().add_fault(
+            {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
+        rig.reconnect();
+        rig.done(EnableRequest{});
+        rig.done(HomeRequest{});
+        EXPECT_EQ(rig.state()->trust, PositionTrust::homed);
+        rig.done(MoveAbsoluteRequest{.position = 40});
+        const auto command = rig.submit(HomeRequest{});
+        const auto before = rig.shaft();
+        ASSERT_TRUE(rig.run_until([&] { return rig.shaft() < before - 2000; }, 10s));
+        rig.touch([](auto& node) { node.set_input("X3", true); });
+        rig.run(15ms);
+        rig.touch([](auto& node) { node.set_input("X3", false); });
+        rig.run(5s);
+        EXPECT_LT(rig.shaft(), before);
+        EXPECT_TRUE(command->has_ended());
+        EXPECT_NE(command->value().state, CommandState::done);
+        EXPECT_NE(rig.state()->trust, PositionTrust::homed);
+        rig.done(ResetRequest{});
+        rig.done(HomeRequest{});
+        EXPECT_EQ(rig.state()->trust, PositionTrust::homed);
+      });
+}
+
 TEST(M21, AMotionThatFollowsHomingAtOnceIsNotHalted) {
   for (const bool polled : {false, true}) {
     CanRig rig({.limits = false, .connect = false});

@@ -218,5 +218,51 @@ TEST(M08, EnablingSurvivesALostReply) {
   }
 }
 
+/// What is said before the halt is there, though its reply is lost.
+TEST(M12, AHaltDoesNotWaitForALostReply) {
+  for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
+    CanRig rig;
+    rig.ready();
+    (void)rig.submit(MoveRelativeRequest{.distance = 200});
+    rig.run(500ms);
+    ASSERT_TRUE(rig.drive->shaft_moving());
+    for (const std::uint16_t object : {0x605D, 0x60FF})
+      rig.nodes().add_fault({.kind = simulation::FaultKind::drop_reply, .count = -1, .object = object});
+    rig.frames.clear();
+    const auto from = rig.world.now();
+    (void)rig.submit(StopRequest{.kind = kind});
+    ASSERT_TRUE(rig.run_until([&] { return !rig.writes_of(0x604000).empty(); }, 1s));
+    EXPECT_LE(rig.world.now() - from, 50ms) << static_cast<int>(kind);
+    rig.nodes().clear_faults();
+    rig.run(3s);
+    EXPECT_FALSE(rig.drive->shaft_moving());
+  }
+}
+
+/// After a power-up that only the canary saw an RPDO may be anything, also one that waits for a SYNC.
+TEST(M24, NoStopByAPdoThatAPowerUpMayHaveChanged) {
+  CanRig rig({.adjust = [](AxisSettings& axis) { axis.poll_idle = 5s; }});
+  rig.ready();
+  rig.frames.clear();
+  (void)rig.complete(StopRequest{});
+  ASSERT_GT(rig.count_of(control_rpdo + CanRig::node_id), 0) << "stops go by RPDO 1";
+  rig.network.set_fault([](const can::Frame& frame) {
+    return can::Network::Fault{.drop = frame.id == 0x700U + CanRig::node_id};
+  });
+  rig.cycle_power();
+  rig.run(500ms);
+  ASSERT_EQ(rig.state()->link, LinkState::online) << "nobody has noticed";
+  (void)rig.submit(EnableRequest{});
+  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link != LinkState::online; }, 3s));
+  rig.frames.clear();
+  for (int i = 0; i < 3; ++i) {  // the first one learns what the control word holds
+    (void)rig.machine->submit("feeder", StopRequest{}, {});
+    rig.run(20ms);
+  }
+  EXPECT_GE(rig.writes_of(0x604000).size(), 2U);
+  EXPECT_TRUE(rig.writes_of(0x140002).empty()) << "the RPDO is not set up again yet";
+  EXPECT_EQ(rig.count_of(control_rpdo + CanRig::node_id), 0);
+}
+
 }  // namespace
 }  // namespace axisd::test

@@ -137,9 +137,9 @@ TEST(SdoClient, AStopCutsWhatIsUnderWayAfterTheTurnaround) {
   net.world.run_for(2ms);
   net.download("stop", 1, control, {0x0F, 1}, {.transaction_class = TransactionClass::stop});
   net.world.run_for(50ms);
-  EXPECT_THAT(net.port->log,
-              ElementsAre("601#4041600000000000", "601#8041600000000008", "601#2B4060000F010000"));
-  EXPECT_EQ(net.port->times[2] - net.port->times[0], 10ms + net.port->frame_time);
+  // Nothing is open in a server that has not answered: no abort, which might cost it the stop.
+  EXPECT_THAT(net.port->log, ElementsAre("601#4041600000000000", "601#2B4060000F010000"));
+  EXPECT_EQ(net.port->times[1] - net.port->times[0], 10ms + net.port->frame_time);
   EXPECT_TRUE(net.results.at("stop"));
   EXPECT_FALSE(net.results.at("stop")->ambiguous);
   EXPECT_EQ(net.results.at("read").error().reason, Reason::superseded);

@@ -120,7 +120,7 @@ bool goes_on(HomingWatch& watch, const DriveSample& sample) {
 
 TEST(HomingWatch, EndsWithTheRiseOfTheBit) {
   HomingWatch watch;
-  watch.begin(start, away, offset);
+  watch.begin(start, {.from = away, .offset = offset});
   EXPECT_TRUE(goes_on(watch, at(-1ms, false, true))) << "from before";
   EXPECT_TRUE(goes_on(watch, at(10ms, true, false)));
   EXPECT_TRUE(goes_on(watch, at(20ms, false, false))) << "a pause between two phases";
@@ -134,7 +134,7 @@ TEST(HomingWatch, EndsWithTheRiseOfTheBit) {
 TEST(HomingWatch, ABitOfTheLastTimeIsNoEnd) {
   for (const std::int32_t end : {0, offset, -offset, 60}) {
     HomingWatch watch;
-    watch.begin(start, away, offset);
+    watch.begin(start, {.from = away, .offset = offset});
     EXPECT_TRUE(goes_on(watch, at(10ms, false, true, away)));
     EXPECT_TRUE(goes_on(watch, at(20ms, true, true, 50)));
     EXPECT_TRUE(goes_on(watch, at(30ms, false, true, end)));
@@ -147,7 +147,7 @@ TEST(HomingWatch, ABitOfTheLastTimeIsNoEnd) {
 TEST(HomingWatch, AStartThatTheDriveIgnoredReachesNothing) {
   for (const std::int32_t where : {0, away}) {
     HomingWatch watch;
-    watch.begin(start, where, offset);
+    watch.begin(start, {.from = where, .offset = offset});
     EXPECT_TRUE(goes_on(watch, at(10ms, false, true, where)));
     EXPECT_FALSE(goes_on(watch, at(520ms, false, true, where)));
     EXPECT_FALSE(watch.reached());
@@ -156,7 +156,7 @@ TEST(HomingWatch, AStartThatTheDriveIgnoredReachesNothing) {
 
 TEST(HomingWatch, AwayFromHomeABitThatRoseIsWaitedFor) {
   HomingWatch watch;
-  watch.begin(start, away, offset);
+  watch.begin(start, {.from = away, .offset = offset});
   EXPECT_TRUE(goes_on(watch, at(10ms, true, false, 4000)));
   EXPECT_TRUE(goes_on(watch, at(20ms, false, true, 3000))) << "it may be a pause";
   EXPECT_FALSE(goes_on(watch, at(530ms, false, true, 3000)));
@@ -165,7 +165,7 @@ TEST(HomingWatch, AwayFromHomeABitThatRoseIsWaitedFor) {
 
 TEST(HomingWatch, NothingIsHomeWhereAStopTerminalWasActive) {
   HomingWatch watch;
-  watch.begin(start, away, offset);
+  watch.begin(start, {.from = away, .offset = offset});
   EXPECT_TRUE(goes_on(watch, at(10ms, true, false, 4000)));
   EXPECT_TRUE(watch.goes_on(at(20ms, true, false, 3000), {.low = true, .held_up = true}));
   EXPECT_TRUE(goes_on(watch, at(30ms, false, true, 2990)));
@@ -173,9 +173,34 @@ TEST(HomingWatch, NothingIsHomeWhereAStopTerminalWasActive) {
   EXPECT_FALSE(watch.reached());
 }
 
+/// A stop that nobody saw, and CiA 402's bit of the last time: low while the motor turns, high at rest.
+TEST(HomingWatch, ABitThatIsTiedToRestCountsWhereAHomingEnds) {
+  constexpr std::int32_t braking = 40;
+  for (const std::int32_t end : {3000, offset + braking + 20, braking, 0, offset, -offset - braking}) {
+    HomingWatch watch;
+    watch.begin(start, {.from = away, .offset = offset, .braking = braking, .tied_to_rest = true});
+    EXPECT_TRUE(goes_on(watch, at(10ms, true, false, 4000)));
+    EXPECT_TRUE(goes_on(watch, at(20ms, false, false, end))) << "the bit comes a cycle later";
+    EXPECT_TRUE(goes_on(watch, at(40ms, false, true, end)));
+    EXPECT_FALSE(goes_on(watch, at(530ms, false, true, end)));
+    EXPECT_EQ(watch.reached(), end != 3000 && end != offset + braking + 20) << end;
+  }
+}
+
+TEST(HomingWatch, ABitThatIsLowInAPauseIsNotTiedToRest) {
+  HomingWatch watch;
+  watch.begin(start, {.from = away, .offset = offset, .tied_to_rest = true});
+  EXPECT_TRUE(goes_on(watch, at(10ms, true, false, 4000)));
+  EXPECT_TRUE(goes_on(watch, at(20ms, false, false, 3000)));
+  EXPECT_TRUE(goes_on(watch, at(80ms, false, false, 3000)));
+  EXPECT_TRUE(goes_on(watch, at(120ms, true, false, 3500)));
+  EXPECT_FALSE(goes_on(watch, at(200ms, false, true, 0)));
+  EXPECT_TRUE(watch.reached());
+}
+
 TEST(HomingWatch, EndsWhenThePowerStageIsReleased) {
   HomingWatch watch;
-  watch.begin(start, {}, offset);
+  watch.begin(start, {.offset = offset});
   auto sample = at(10ms, true, false);
   sample.enabled = false;
   EXPECT_FALSE(goes_on(watch, sample));
