@@ -42,7 +42,7 @@ struct DriveSample {
 };
 
 struct DriveIdentity {
-  std::uint16_t model_code = 0;
+  std::uint32_t model_code = 0;
   std::string version;
 };
 

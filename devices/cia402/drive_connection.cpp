@@ -108,7 +108,7 @@ Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_c
                             fmt::format("not a {}: {}", model_->descriptor->model, fits.error().message),
                             fits.error().remedy));
   }
-  DriveIdentity identity{.model_code = static_cast<std::uint16_t>(found->product.value_or(0))};
+  DriveIdentity identity{.model_code = found->product.value_or(0)};
   // CiA 301 7.5.2.18: major and minor revision, of what the drive can do as CANopen sees it.
   if (found->revision && !model_->objects.software_version)
     identity.version = fmt::format("{}.{}", *found->revision >> 16U, *found->revision & 0xFFFFU);
