@@ -136,6 +136,15 @@ v1::ErrorDetail expect_refused(const grpc::Status& status, const v1::ErrorDetail
   return error;
 }
 
+void expect_no_such_plant(const Setup& setup, const Recipe& recipe, std::string_view text) {
+  try {
+    const Bench bench(setup, recipe, false);
+    ADD_FAILURE() << "accepted, although: " << text;
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string_view(error.what()).find(text), std::string_view::npos) << error.what();
+  }
+}
+
 void expect_state(const v1::AxisState& state, v1::State expected) {
   EXPECT_EQ(v1::State_Name(state.state()), v1::State_Name(expected)) << state.ShortDebugString();
 }

@@ -96,6 +96,8 @@ inline v1::Command expect_done(const Answer<v1::Command>& answer) {
 }
 void expect_command(const v1::Command& command, v1::CommandState state,
                     v1::Reason cause = v1::REASON_UNSPECIFIED);
+/// The configuration of this recipe is refused when it is loaded; `text` is part of the findings.
+void expect_no_such_plant(const Setup& setup, const Recipe& recipe, std::string_view text);
 /// The call was refused before anything was sent, for this reason, with a message and what to do about it.
 template <class Response>
 v1::ErrorDetail expect_refused(const Answer<Response>& answer, v1::Reason reason);

@@ -47,11 +47,22 @@ std::string wrong_model(const Setup& setup) {
   return "both named";
 }
 
+/// Two numbers of the model that move nothing, the first one to be changed.
+std::pair<const ManualParameter*, const ManualParameter*> device_numbers(const Manual& manual) {
+  if (!manual.has("device_numbers"))
+    return {manual.find_title("Start speed"), manual.find_title("Microstep setting")};
+  const auto addresses = manual.list("device_numbers");
+  const auto at = [&](std::size_t i) {
+    return manual.find(static_cast<std::uint32_t>(std::stoll(addresses.at(i), nullptr, 0)));
+  };
+  return {at(0), at(1)};
+}
+
 std::string one_address_twice(const Setup& setup) {
   const auto& manual = setup.manual;
   auto plant = make_plant(manual, setup.variant, {});
-  plant.drives.push_back(fmt::format("node=1,model={},eeprom.{}=3", manual.model(),
-                                     manual.find_title("Microstep setting")->address));
+  plant.drives.push_back(
+      fmt::format("node=1,model={},eeprom.{}=3", manual.model(), device_numbers(manual).second->address));
   Bench bench(setup, plant, {}, false);
   bench.pass(5s);
   const auto state = bench.state();
@@ -79,11 +90,14 @@ std::string scan(const Setup& setup) {
   const auto formats = setup.manual.list("formats");
   const bool serial = !formats.empty();
   auto plant = make_plant(setup.manual, setup.variant, {});
-  std::map<int, std::pair<std::string, std::uint32_t>> expected{{1, {setup.manual.model(), rate}}}, found;
+  // What only its data sheet describes is found, but nothing on the bus names it.
+  const bool nameless = setup.manual.has("data_sheet");
+  const auto name_of = [&](const Manual& manual) { return nameless ? std::string() : manual.model(); };
+  std::map<int, std::pair<std::string, std::uint32_t>> expected{{1, {name_of(setup.manual), rate}}}, found;
   int node = 2;
   for (const auto& manual : same_bus(setup.manual)) {
     plant.drives.push_back(fmt::format("node={},model={}", node, manual.model()));
-    expected[node++] = {manual.model(), rate};
+    expected[node++] = {name_of(manual), rate};
     if (!serial) continue;
     plant.drives.push_back(
         fmt::format("node={},model={},{}", node, manual.model(), set_to_rate(manual, std::to_string(slow))));
@@ -113,7 +127,7 @@ std::string scan(const Setup& setup) {
       EXPECT_NE(serial, one.version().empty()) << "a CAN node has an identity instead";
       EXPECT_NE(serial, one.has_product());
       EXPECT_EQ(one.configured_as(), one.node() == 1 ? "axis" : "") << one.node();
-      EXPECT_GT(one.pulses_per_revolution(), 0U);
+      EXPECT_EQ(one.pulses_per_revolution() == 0, nameless);
     }
   }
   const auto status = reader->Finish();
@@ -123,7 +137,7 @@ std::string scan(const Setup& setup) {
   EXPECT_EQ(total, serial ? 24U : 12U);
   bench.await_online();
   bench.finish(0);
-  return "all models";
+  return nameless ? "without its name" : "all models";
 }
 
 /// One exchange past all axes: a register, or an object with its type.
@@ -161,25 +175,26 @@ std::int64_t number_read(Bench& bench, std::uint32_t node, std::uint32_t address
   return read->values(0);
 }
 
-/// Two 16-bit values of the model, as a node that is no axis.
+/// Two numbers of the model, as a node that is no axis.
 std::string device_lines(const Manual& manual) {
-  const auto speed = manual.find_title("Start speed")->address;
-  const auto microstep = manual.find_title("Microstep setting")->address;
-  const auto at = [&](std::uint32_t address) {
-    return manual.bus() == "canopen" ? fmt::format("object: {:04X}h:{:02X}", address >> 8U, address & 0xFFU)
-                                     : fmt::format("address: 0x{:04X}", address);
+  const auto [speed, microstep] = device_numbers(manual);
+  const auto at = [&](const ManualParameter& one) {
+    const auto where = manual.bus() == "canopen"
+                           ? fmt::format("object: {:04X}h:{:02X}", one.address >> 8U, one.address & 0xFFU)
+                           : fmt::format("address: 0x{:04X}", one.address);
+    return fmt::format("{}, type: {}", where, one.type == "U32" ? "u32" : "u16");
   };
   const bool objects = manual.bus() == "canopen";
   return fmt::format(
       "devices:\n  fan:\n    bus: line\n    node: 9\n    model: {}\n    poll: 100 ms\n    {}:\n"
-      "      speed: {{ {}, type: u16, scale: 0.5, unit: rpm, access: rw }}\n"
-      "      microstep: {{ {}, type: u16 }}\n",
-      objects ? "canopen-generic" : "modbus-generic", objects ? "objects" : "registers", at(speed),
-      at(microstep));
+      "      speed: {{ {}, scale: 0.5, unit: rpm, access: rw }}\n"
+      "      microstep: {{ {} }}\n",
+      objects ? "canopen-generic" : "modbus-generic", objects ? "objects" : "registers", at(*speed),
+      at(*microstep));
 }
 
 void expect_named_values(Bench& bench) {
-  const auto& microstep = *bench.setup.manual.find_title("Microstep setting");
+  const auto& microstep = *device_numbers(bench.setup.manual).second;
   v1::WriteDeviceRequest write;
   write.set_device("fan");
   write.set_register_("speed");
@@ -216,7 +231,8 @@ std::string other_nodes(const Setup& setup) {
   })) << code;
   EXPECT_FALSE(transact(bench, 1, at("start_parameter"), 2).ok())
       << "a start command for an axis, past the axis";
-  const auto time = manual.find_title("Acceleration time")->address;
+  const auto* ramp = manual.find_title("Acceleration time");
+  const auto time = ramp != nullptr ? ramp->address : device_numbers(manual).first->address;
   EXPECT_TRUE(transact(bench, 9, time, 321).ok());
   EXPECT_EQ(number_read(bench, 9, time), 321);
   const auto hole = transact(bench, 9, at("hole"));
@@ -227,6 +243,28 @@ std::string other_nodes(const Setup& setup) {
   return "yes";
 }
 
+/// Empty: the model needs none.
+std::string data_sheet_line(const Manual& manual) {
+  if (!manual.has("data_sheet")) return {};
+  return fmt::format("    drive: {{ eds: {}/{} }}\n", AXISD_SOURCE_DIR, manual.text("data_sheet"));
+}
+
+/// Switches and, where it has outputs, two of them, as the lines of an axis.
+std::string switch_lines(const Manual& manual, bool invert) {
+  const std::string functions[] = {"home", "positive_limit", "negative_limit"};
+  std::string inputs;
+  for (const auto& function : functions) {
+    const auto only = manual.terminal_of(function_of_drive(function, invert));
+    const bool low = only.empty() && function == "negative_limit";
+    inputs += fmt::format("{}{}: {}", inputs.empty() ? "" : ", ",
+                          only.empty() ? fmt::format("X{}", &function - functions) : only,
+                          low ? "{ function: negative_limit, active: low }" : function);
+  }
+  const bool outputs = !manual.list("outputs").empty();
+  return fmt::format("    inputs: {{ {} }}\n{}", inputs,
+                     outputs ? "    outputs: { Y0: alarm, Y1: in_position }\n" : "");
+}
+
 /// As many drives as a bus carries, of all models for it, one YAML: all up within 5 s of bus time, and fresh
 /// from then on. At 115200 baud a state takes about 9 ms of the line: five a second of each, the default,
 /// would be more than it can carry. At 1 Mbit/s the answers of 32 drives to one SYNC take about 8 ms.
@@ -235,15 +273,16 @@ std::string full_bus(const Setup& setup) {
   const auto count = static_cast<int>(setup.manual.number("max_drives"));
   Plant plant{.yaml = bus_lines(setup.manual, 0, 20ms), .drives = {}};
   for (int i = 0; i < count; ++i) {
-    const auto& model = models[static_cast<std::size_t>(i) % models.size()].model();
+    const auto& manual = models[static_cast<std::size_t>(i) % models.size()];
+    const auto& model = manual.model();
     plant.yaml += fmt::format(
         "  {}:\n    bus: line\n    node: {}\n    model: {}\n    unit: mm\n"
         "    scale: {{ microstep: 4000 pulses/rev, travel: 10 mm/rev, invert: {} }}\n"
         "    limits: {{ position: [0, 400], velocity: 100 mm/s }}\n"
         "    homing: {{ method: negative_limit, velocity: 50 mm/s, search_velocity: 5 mm/s }}\n"
-        "    inputs: {{ X0: home, X1: positive_limit, X2: {{ function: negative_limit, active: low }} }}\n"
-        "    outputs: {{ Y0: alarm, Y1: in_position }}\n    poll: {{ idle: 500 ms }}\n",
-        i == 0 ? "axis" : fmt::format("axis{}", i), i + 1, model, setup.variant.invert);
+        "{}{}    poll: {{ idle: 500 ms }}\n",
+        i == 0 ? "axis" : fmt::format("axis{}", i), i + 1, model, setup.variant.invert,
+        switch_lines(manual, setup.variant.invert), data_sheet_line(manual));
     plant.drives.push_back(fmt::format("node={},model={}", i + 1, model));
   }
   Bench bench(setup, plant, {}, false);

@@ -68,7 +68,7 @@ std::string thousand_moves(const Setup& setup) {
 }
 
 constexpr Scenario scenarios[] = {
-    {"restarts", "EEPROM: two restarts in a row", &restarts},
+    {"restarts_in_a_row", "EEPROM: two restarts in a row", &restarts},
     {"thousand_moves", "EEPROM: 1,000 moves", &thousand_moves},
 };
 

@@ -57,6 +57,13 @@ std::string released_by_terminal(const Setup& setup) {
   return "yes";
 }
 
+std::string not_released_by_terminal(const Setup& setup) {
+  expect_no_such_plant(
+      setup, {.home_switch = false, .limit_switches = false, .inputs = {{"motor_free"}}, .homing = ""},
+      "has no input function 'motor_free'");
+  return "no";
+}
+
 std::string found_energised(const Setup& setup) {
   Bench bench(setup);
   bench.ready();
@@ -74,7 +81,8 @@ std::string found_energised(const Setup& setup) {
 
 constexpr Scenario scenarios[] = {
     {"enable_and_disable", "power stage: enable, disable", &enable_and_disable},
-    {"released_by_terminal", "power stage released by a terminal", &released_by_terminal},
+    {"released_by_terminal", "power stage released by a terminal", &released_by_terminal,
+     &not_released_by_terminal},
     {"found_energised", "found energised after a restart of the daemon, position kept", &found_energised},
 };
 

@@ -80,9 +80,30 @@ std::vector<Variant> variants_of(const std::string& model, const Subject& subjec
   return all;
 }
 
+namespace {
+
+/// Scenarios go by their names: each has one of its own, and what a model lacks is one of them.
+void check_names(const std::vector<Manual>& manuals, std::vector<std::string>& failures) {
+  std::vector<std::string_view> names;
+  for (const auto& subject : subjects())
+    for (const auto& scenario : subject.scenarios) {
+      if (std::ranges::find(names, scenario.name) != names.end())
+        failures.push_back(fmt::format("two scenarios have the name {}", scenario.name));
+      names.push_back(scenario.name);
+    }
+  for (const auto& manual : manuals)
+    if (manual.has("lacks"))
+      for (const auto& name : manual.list("lacks"))
+        if (std::ranges::find(names, name) == names.end())
+          failures.push_back(fmt::format("{} lacks {}, which is no scenario", manual.model(), name));
+}
+
+}  // namespace
+
 std::string capability_matrix(std::vector<std::string>& failures) {
   std::vector<Manual> manuals;
   for (const auto& model : models()) manuals.emplace_back(model);
+  check_names(manuals, failures);
   std::string text = "| |", rule = "| --- |";
   for (const auto& manual : manuals) {
     text += fmt::format(" {} |", manual.model());
@@ -105,17 +126,15 @@ std::string capability_matrix(std::vector<std::string>& failures) {
 Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant,
                      const TargetMaker& make_target) {
   Finding finding;
-  if (manual.lacks(scenario.name)) {
-    finding.shown = "no";
-    return finding;
-  }
+  auto* const run = manual.lacks(scenario.name) ? scenario.refused : scenario.run;
   ::testing::TestPartResultArray parts;
   std::string broken;
   {
     const ::testing::ScopedFakeTestPartResultReporter reporter(
         ::testing::ScopedFakeTestPartResultReporter::INTERCEPT_ONLY_CURRENT_THREAD, &parts);
     try {
-      finding.shown = scenario.run({.manual = manual, .variant = variant, .make_target = make_target});
+      if (run == nullptr) throw Broken("lacked by its abilities, but nothing shows that it is refused");
+      finding.shown = run({.manual = manual, .variant = variant, .make_target = make_target});
     } catch (const std::exception& error) {
       broken = error.what();
     }

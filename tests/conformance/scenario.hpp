@@ -15,6 +15,9 @@ struct Scenario {
   std::string_view ability;  ///< row of the capability matrix
   /// Says what the model showed ("yes", "7", "1 2 3 5"); expectations fail as in any test. May throw Broken.
   std::string (*run)(const Setup& setup);
+  /// Runs instead for a model that lacks what the scenario is about, by its abilities: shows that it is
+  /// refused, and that the refusal says why.
+  std::string (*refused)(const Setup& setup) = nullptr;
 };
 
 /// Scenarios of one subject. `varied`: every one in every variant, else with the simulator's defaults, plain

@@ -202,6 +202,14 @@ v1::SegmentTable table_of(std::int64_t count) {
   return table;
 }
 
+std::string not_started_from_outside(const Setup& setup) {
+  for (const std::string function : {"jog_positive", "homing_start"})
+    expect_no_such_plant(
+        setup, {.home_switch = false, .limit_switches = false, .inputs = {{function}}, .homing = ""},
+        fmt::format("has no input function '{}'", function));
+  return "no";
+}
+
 Answer<v1::WriteSegmentsResponse> write(Bench& bench, const v1::SegmentTable& table) {
   v1::WriteSegmentsRequest request;
   request.set_axis("axis");
@@ -271,7 +279,8 @@ std::string by_api(const Setup& setup) {
 constexpr Scenario scenarios[] = {
     {"positions", "position segments (PT) selected and started by terminals", &positions},
     {"velocities", "velocity segments (PV) selected and started by terminals", &velocities},
-    {"stopped_from_outside", "stop of a motion that a terminal started", &stopped_from_outside},
+    {"stopped_from_outside", "stop of a motion that a terminal started", &stopped_from_outside,
+     &not_started_from_outside},
     {"by_api", "segment table over the API, in user units", &by_api},
 };
 

@@ -148,9 +148,42 @@ std::string set_serial(const Setup& setup) {
   return setup.manual.text("bauds_custom");
 }
 
+/// The address and rate of such a drive are for its switches, or its maker's tool.
+template <class Response, class Request, class Stub>
+void expect_nothing_set(const Setup& setup,
+                        std::unique_ptr<grpc::ClientReader<Response>> (Stub::*method)(grpc::ClientContext*,
+                                                                                      const Request&),
+                        Request request) {
+  request.set_axis("axis");
+  request.set_confirm("axis");
+  Bench bench(setup);
+  expect_done(bench.client.disable());
+  grpc::Status status;
+  EXPECT_TRUE(follow<Response>(bench, method, request, status, [] {}).empty());
+  expect_refused(status, Client::detail_of(status), v1::REASON_NOT_SUPPORTED);
+  power_cycle(bench);
+  bench.await_online();
+  bench.finish(0);
+}
+
+std::string no_readdress(const Setup& setup) {
+  v1::ReaddressRequest request;
+  request.set_node(9);
+  expect_nothing_set(setup, &v1::DriveService::Stub::Readdress, request);
+  return "no";
+}
+
+std::string no_set_serial(const Setup& setup) {
+  v1::SetSerialRequest request;
+  request.set_baud(static_cast<std::uint32_t>(std::stoi(setup.manual.list("bauds_dip").back())));
+  expect_nothing_set(setup, &v1::DriveService::Stub::SetSerial, request);
+  return "no";
+}
+
 constexpr Scenario scenarios[] = {
-    {"readdress", "address changed and verified", &readdress},
-    {"set_serial", "baud rate (and format) changed, verified where the daemon can follow", &set_serial},
+    {"readdress", "address changed and verified", &readdress, &no_readdress},
+    {"set_serial", "baud rate (and format) changed, verified where the daemon can follow", &set_serial,
+     &no_set_serial},
 };
 
 }  // namespace

@@ -27,11 +27,11 @@ bool input_active(Bench& bench, const std::string& function) {
 }
 
 /// M29: the edge lies within the interval that the event gives, and that is no longer than a refresh.
-void expect_edge(const v1::Event& event, bool active, Duration at) {
+void expect_edge(const v1::Event& event, const std::string& function, bool active, Duration at) {
   // The input's filter lets a level through after 10 ms (4.3); the pulse counts from then on.
   constexpr Duration filter = 11ms;
   const auto& edge = event.terminal_edge();
-  EXPECT_EQ(edge.function(), "stop");
+  EXPECT_EQ(edge.function(), function);
   EXPECT_EQ(edge.active(), active);
   EXPECT_LE(from_proto(edge.after()), at + filter) << "the edge came before the interval";
   EXPECT_GE(from_proto(edge.before()), at) << "the edge came after the interval";
@@ -39,32 +39,40 @@ void expect_edge(const v1::Event& event, bool active, Duration at) {
 }
 
 std::string levels_and_edges(const Setup& setup) {
+  // Inputs that have their function for good have their level, too.
+  const bool fixed = !setup.manual.terminal_of("home").empty();
+  const std::string function = fixed ? "home" : "stop";
   for (const bool low : {false, true}) {
     SCOPED_TRACE(low ? "active low" : "active high");
-    Recipe recipe{.limit_switches = false, .inputs = {{"stop", low}}, .homing = ""};
+    const Recipe recipe{
+        .home_switch = !fixed, .limit_switches = false, .inputs = {{function, low}}, .homing = ""};
+    if (fixed && low) {
+      expect_no_such_plant(setup, recipe, "the level of terminal");
+      return "active high";
+    }
     Bench bench(setup, recipe, false);
-    bench.set_input("stop", false);
+    bench.set_input(function, false);
     bench.await_online();
     bench.pass(1s);
-    EXPECT_FALSE(input_active(bench, "stop"));
+    EXPECT_FALSE(input_active(bench, function));
     const auto rising = bench.now();
-    bench.set_input("stop", true);
+    bench.set_input(function, true);
     bench.pass(500ms);
-    EXPECT_TRUE(input_active(bench, "stop"));
+    EXPECT_TRUE(input_active(bench, function));
     const auto falling = bench.now();
-    bench.set_input("stop", false);
+    bench.set_input(function, false);
     bench.pass(500ms);
-    EXPECT_FALSE(input_active(bench, "stop"));
+    EXPECT_FALSE(input_active(bench, function));
     std::vector<v1::Event> edges;
     bench.client.events_until([&](const v1::Event& event) {
-      if (event.has_terminal_edge() && event.terminal_edge().terminal() == bench.terminal("stop") &&
+      if (event.has_terminal_edge() && event.terminal_edge().terminal() == bench.terminal(function) &&
           from_proto(event.terminal_edge().before()) >= rising)
         edges.push_back(event);
       return edges.size() == 2;
     });
     if (edges.size() != 2) throw Broken("no events of both edges");
-    expect_edge(edges[0], true, rising);
-    expect_edge(edges[1], false, falling);
+    expect_edge(edges[0], function, true, rising);
+    expect_edge(edges[1], function, false, falling);
     EXPECT_LT(edges[0].sequence(), edges[1].sequence());
     bench.finish(0);
   }
@@ -150,12 +158,7 @@ std::string drift(const Setup& setup) {
 /// What cannot work is refused when the configuration is loaded.
 std::string conflicts(const Setup& setup) {
   const auto refused = [&](const Recipe& recipe, std::string_view text) {
-    try {
-      const Bench bench(setup, recipe, false);
-      ADD_FAILURE() << "accepted, although: " << text;
-    } catch (const std::invalid_argument& error) {
-      EXPECT_NE(std::string_view(error.what()).find(text), std::string_view::npos) << error.what();
-    }
+    expect_no_such_plant(setup, recipe, text);
   };
   if (setup.manual.terminal_of("home").empty())
     refused({.limit_switches = false, .inputs = {{"home"}}, .homing = ""}, "function 'home' is assigned to");
@@ -167,11 +170,44 @@ std::string conflicts(const Setup& setup) {
   return "refused";
 }
 
+/// Only an input that there is for good.
+Recipe one_input(const std::string& function, std::string keys = {}) {
+  return {.home_switch = false,
+          .limit_switches = false,
+          .inputs = {{function}},
+          .homing = "",
+          .keys = std::move(keys)};
+}
+
+std::string no_stop_terminals(const Setup& setup) {
+  for (const std::string function : {"stop", "quick_stop"})
+    expect_no_such_plant(setup, one_input(function), fmt::format("has no input function '{}'", function));
+  return "no";
+}
+
+std::string no_outputs(const Setup& setup) {
+  expect_no_such_plant(setup, one_input("home", "    outputs: { Y0: alarm }\n"), "has no output terminal");
+  return "no";
+}
+
+/// What cannot be changed cannot be lost.
+std::string fixed_functions(const Setup& setup) {
+  const auto home = setup.manual.terminal_of("home");
+  expect_no_such_plant(
+      setup,
+      {.home_switch = false,
+       .limit_switches = false,
+       .homing = "",
+       .keys = fmt::format("    inputs: {{ {}: positive_limit }}\n", home)},
+      fmt::format("terminal {} of model {} is always the drive's", home, setup.manual.model()));
+  return "no";
+}
+
 constexpr Scenario scenarios[] = {
     {"levels_and_edges", "inputs as state and as edge, both active levels", &levels_and_edges},
-    {"stop_terminals", "stop terminals end a motion", &stop_terminals},
-    {"outputs", "outputs as state, both active levels", &outputs},
-    {"drift", "lost terminal functions are reported", &drift},
+    {"stop_terminals", "stop terminals end a motion", &stop_terminals, &no_stop_terminals},
+    {"outputs", "outputs as state, both active levels", &outputs, &no_outputs},
+    {"drift", "lost terminal functions are reported", &drift, &fixed_functions},
     {"conflicts", "impossible terminals", &conflicts},
 };
 
