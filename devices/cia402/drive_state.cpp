@@ -123,6 +123,8 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
   const SdoOptions options{.transaction_class = transaction_class};
   // A chain that starts something does not wait for a PDO.
   auto sample = co_await look(transaction_class != TransactionClass::motion, options);
+  // The drive may have been reset between its status word and 603Fh: neither comes with the other.
+  if (sample && sample->alarm_code == alarm_without_code) sample = co_await look(false, options);
   // What a drive does with a change of its mode in motion is not said.
   const bool rests = sample && !sample->moving && stopping_ == 0 && sample->asked_at >= stopped_at_;
   if (leave_homing_ && rests && !rebooted_) {

@@ -109,7 +109,6 @@ std::uint16_t alarm_of(const Model& model, std::uint16_t error_code) {
 
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
                          ActiveLow active_low) {
-  constexpr std::uint16_t without_code = 0xFFFF;
   const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
   const auto is = [word](std::uint16_t bits) { return (word & bits) != 0; };
   const auto& bits = model.status;
@@ -133,7 +132,7 @@ DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution,
   sample.in_position = bits.in_position != 0 ? is(bits.in_position) : is(status::target_reached);
   sample.alarm_code = alarm_of(model, static_cast<std::uint16_t>(value_of(values, object::error_code)));
   const bool faulty = state == State::fault || state == State::fault_reaction_active || is(bits.alarm);
-  if (sample.alarm_code == 0 && faulty) sample.alarm_code = without_code;
+  if (sample.alarm_code == 0 && faulty) sample.alarm_code = alarm_without_code;
   // 60FDh has inputs of the maker's beyond those that CiA 402 names.
   const auto known = (std::uint64_t{1} << model.descriptor->inputs.size()) - 1;
   const auto inputs = known & static_cast<std::uint64_t>(value_of(values, model.objects.inputs));

@@ -39,6 +39,9 @@ struct ActiveLow {
   std::uint32_t inputs = 0, outputs = 0;
 };
 
+/// Alarm of a sample whose status word tells of a fault that 603Fh does not name.
+constexpr std::uint16_t alarm_without_code = 0xFFFF;
+
 /// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's.
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
                          ActiveLow active_low = {});

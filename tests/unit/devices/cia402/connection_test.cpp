@@ -1,4 +1,4 @@
-// First contact with simulated YSS-Cs.
+// First contact with simulated YSS-Cs, and what they report.
 #include <gtest/gtest.h>
 
 #include "tests/unit/devices/cia402/drive_bench.hpp"
@@ -23,6 +23,28 @@ TEST(Cia402Connection, ASecondDriveWithTheSameNodeIdIsNoticedThoughItAnswersLate
   const auto moved = bench.run(bench.drive().enable({}));
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().reason, Reason::misconfigured) << to_string(moved.error());
+}
+
+/// The status word tells of the fault still, 603Fh no more.
+TEST(Cia402Alarms, AResetBetweenTwoObjectsOfOneReadingIsNoOtherAlarm) {
+  DriveBench bench;
+  bench.bring_up();
+  bench.simulated().raise_alarm(2);
+  bench.nodes().advance();
+  bench.world().run_for(std::chrono::milliseconds(200));
+  const auto alarmed = bench.run(bench.drive().read_state(TransactionClass::motion));
+  ASSERT_TRUE(alarmed) << to_string(alarmed.error());
+  ASSERT_EQ(alarmed->alarm_code, 2);
+  bool cleared = false;
+  bench.nodes().set_observer([&](TimePoint, bool received, const can::Frame& frame) {
+    const bool asks_for_error_code =
+        received && frame.id == 0x605 && frame.data[1] == 0x3F && frame.data[2] == 0x60;
+    if (asks_for_error_code && !std::exchange(cleared, true)) bench.simulated().raise_alarm(0);
+  });
+  const auto sample = bench.run(bench.drive().read_state(TransactionClass::motion));
+  ASSERT_TRUE(sample) << to_string(sample.error());
+  ASSERT_TRUE(cleared);
+  EXPECT_EQ(sample->alarm_code, 0);
 }
 
 }  // namespace
