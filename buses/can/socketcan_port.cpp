@@ -24,8 +24,8 @@ using namespace std::chrono_literals;
 
 constexpr Duration first_back_off = 250ms;
 constexpr Duration longest_back_off = 4s;
-constexpr int frames_per_turn = 64;  // then others have their turn on the core thread
-constexpr int most_turns = 64;       // what the receive buffer holds at most, several times over
+constexpr unsigned frames_per_turn = 32;  // then others have their turn on the core thread
+constexpr int most_turns = 128;           // what the receive buffer holds at most, several times over
 constexpr int receive_buffer = 1 << 20;
 
 template <class T>
@@ -53,21 +53,50 @@ int bound_socket(int index) {
   return -1;
 }
 
+}  // namespace
+
+/// What one recvmmsg(2) takes: a system call for each frame, and one more to learn that there is no other,
+/// would cost more than all that is done with the frames.
+struct SocketCanPort::Batch {
+  struct Slot {
+    can_frame frame{};
+    alignas(cmsghdr) std::array<std::byte, 128> control{};
+    iovec data{.iov_base = &frame, .iov_len = sizeof(frame)};
+  };
+
+  Batch() {
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      messages.at(i).msg_hdr.msg_iov = &slots.at(i).data;
+      messages.at(i).msg_hdr.msg_iovlen = 1;
+      messages.at(i).msg_hdr.msg_control = slots.at(i).control.data();
+    }
+  }
+
+  /// How many frames it took, or -1 with errno.
+  int receive(int socket) {
+    for (auto& message : messages) message.msg_hdr.msg_controllen = Slot{}.control.size();
+    return ::recvmmsg(socket, messages.data(), frames_per_turn, MSG_DONTWAIT, nullptr);
+  }
+
+  std::array<Slot, frames_per_turn> slots;
+  std::array<mmsghdr, frames_per_turn> messages{};
+};
+
 /// The kernel stamps with the wall clock, which may be set at any moment: what cannot be is taken for now.
-TimePoint on_our_clock(const timespec& stamp, const Clock& clock) {
-  const auto now = clock.now();
-  const Duration age = clock.wall(now).time_since_epoch() -
+TimePoint SocketCanPort::Moment::of(const timespec& stamp) const {
+  const Duration age = wall.time_since_epoch() -
                        (std::chrono::seconds(stamp.tv_sec) + std::chrono::nanoseconds(stamp.tv_nsec));
   return age < Duration{} || age > 10s ? now : now - age;
 }
-
-}  // namespace
 
 SocketCanPort::SocketCanPort(const Executor& executor, Clock& clock, PortSettings settings)
     : PortCore(clock, std::move(settings)),
       monitor_(executor, this->settings().interface, [this](const LinkReport& report) { on_report(report); }),
       socket_(executor),
-      self_(std::make_shared<SocketCanPort*>(this)) {}
+      self_(std::make_shared<SocketCanPort*>(this)),
+      batch_(std::make_unique<Batch>()) {}
+
+SocketCanPort::~SocketCanPort() { *self_ = nullptr; }
 
 void SocketCanPort::open() { try_again(); }
 
@@ -165,47 +194,41 @@ void SocketCanPort::wait() {
   socket_.async_wait(boost::asio::posix::stream_descriptor::wait_read,
                      [self = self_, index = index_](const boost::system::error_code& error) {
                        if (error || *self == nullptr || (*self)->index_ != index) return;
-                       (*self)->read_some(frames_per_turn);
+                       (*self)->read_some();
                        (*self)->settle();
                        if ((*self)->index_ == index) (*self)->wait();
                      });
 }
 
 void SocketCanPort::catch_up() {
-  for (int turns = 0; turns < most_turns && read_some(frames_per_turn); ++turns) {
+  for (int turns = 0; turns < most_turns && read_some(); ++turns) {
   }
 }
 
-bool SocketCanPort::read_some(int most) {
-  for (int i = 0; i < most; ++i) {
-    if (index_ == 0) return false;
-    can_frame frame{};
-    iovec data{.iov_base = &frame, .iov_len = sizeof(frame)};
-    alignas(cmsghdr) std::array<std::byte, 128> control;
-    msghdr message{};
-    message.msg_iov = &data;
-    message.msg_iovlen = 1;
-    message.msg_control = control.data();
-    message.msg_controllen = control.size();
-    const auto length = ::recvmsg(socket_.native_handle(), &message, MSG_DONTWAIT);
-    if (length == static_cast<ssize_t>(sizeof(frame))) {
-      on_message(frame, message);
-    } else if (length < 0) {
-      if (errno == EAGAIN) return false;
-      on_error(errno);
-    }
+bool SocketCanPort::read_some() {
+  if (index_ == 0) return false;
+  const int count = batch_->receive(socket_.native_handle());
+  if (count < 0) {
+    if (errno == EAGAIN) return false;
+    on_error(errno);
+    return true;
   }
-  return true;
+  const auto now = clock().now();
+  const Moment moment{.now = now, .wall = clock().wall(now)};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
+    if (batch_->messages.at(i).msg_len == sizeof(can_frame))
+      on_message(batch_->slots.at(i).frame, batch_->messages.at(i).msg_hdr, moment);
+  return true;  // or an error: that comes with the next call
 }
 
-void SocketCanPort::on_message(const can_frame& frame, msghdr& message) {
-  auto at = clock().now();
+void SocketCanPort::on_message(const can_frame& frame, msghdr& message, const Moment& moment) {
+  auto at = moment.now;
   for (auto* each = CMSG_FIRSTHDR(&message); each != nullptr; each = CMSG_NXTHDR(&message, each)) {
     if (each->cmsg_level != SOL_SOCKET) continue;
     if (each->cmsg_type == SO_TIMESTAMPNS) {
       timespec stamp{};
       std::memcpy(&stamp, CMSG_DATA(each), sizeof(stamp));
-      at = on_our_clock(stamp, clock());
+      at = moment.of(stamp);
     } else if (each->cmsg_type == SO_RXQ_OVFL) {
       std::uint32_t total = 0;
       std::memcpy(&total, CMSG_DATA(each), sizeof(total));

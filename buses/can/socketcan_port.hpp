@@ -8,6 +8,7 @@
 
 struct msghdr;
 struct can_frame;
+struct timespec;
 
 namespace axisd::can {
 
@@ -16,9 +17,17 @@ namespace axisd::can {
 class SocketCanPort final : public PortCore {
  public:
   SocketCanPort(const Executor& executor, Clock& clock, PortSettings settings);
-  ~SocketCanPort() override { *self_ = nullptr; }
+  ~SocketCanPort() override;
 
  private:
+  struct Batch;
+  /// When frames were taken from the socket, on both clocks.
+  struct Moment {
+    TimePoint now;
+    WallTime wall;
+    [[nodiscard]] TimePoint of(const timespec& stamp) const;
+  };
+
   void open() override;
   void shut() override;
   Written write(const Frame& frame) override;
@@ -30,9 +39,9 @@ class SocketCanPort final : public PortCore {
   bool open_socket(int index);
   void close_socket();
   void wait();
-  /// Reads at most `most` frames; false: nothing is left.
-  bool read_some(int most);
-  void on_message(const can_frame& frame, msghdr& message);
+  /// Takes some frames, or an error, from the socket; false: nothing was left.
+  bool read_some();
+  void on_message(const can_frame& frame, msghdr& message, const Moment& moment);
   /// The socket failed with `error`: what that says of the link.
   void on_error(int error);
   void try_again_later();
@@ -41,7 +50,8 @@ class SocketCanPort final : public PortCore {
   LinkMonitor monitor_;
   boost::asio::posix::stream_descriptor socket_;
   std::shared_ptr<SocketCanPort*> self_;  ///< a handler that is already queued finds out that this is gone
-  int index_ = 0;                         ///< interface that the socket is bound to; 0: none
+  std::unique_ptr<Batch> batch_;
+  int index_ = 0;  ///< interface that the socket is bound to; 0: none
   bool echo_is_proof_ = false;
   std::uint32_t overflows_ = 0;  ///< of this socket
   Clock::Timer retry_;

@@ -38,13 +38,14 @@ void CoreLoop::run() {
     // At most a second asleep, so that the watchdog sees an idle loop alive.
     const auto ran = io_.run_one_for(std::chrono::seconds(1));
     if (io_.stopped()) break;
-    last_progress_.store(monotonic_now(), std::memory_order_relaxed);
+    auto began = monotonic_now();
+    last_progress_.store(began, std::memory_order_relaxed);
     if (ran == 0) continue;
     while (!io_.stopped()) {
       lane_.drain();
-      const auto began = monotonic_now();
       if (io_.poll_one() == 0) break;
-      const auto took = (monotonic_now() - began).count();
+      const auto ended = monotonic_now();
+      const auto took = (ended - std::exchange(began, ended)).count();
       if (took > longest_.load(std::memory_order_relaxed)) longest_.store(took, std::memory_order_relaxed);
     }
   }

@@ -279,7 +279,7 @@ class Cia402Drive final : public Drive {
   bool other_homing_codes_ = false;              ///< it refused the first of HomingCode, and took the other
 
   // The way to the drive.
-  Signal news_;  ///< a PDO came, or something happened to the node
+  Signal news_;  ///< PDOs completed a reading, or something happened to the node
   std::function<void()> attention_;
   bool rebooted_ = false;        ///< since configure(), and nobody was told yet
   bool heartbeat_lost_ = false;  ///< its PDOs are not waited for

@@ -57,8 +57,7 @@ void Cia402Drive::on_pdo(std::size_t index, const can::ReceivedFrame& received) 
   const auto bits = can::worst_case_bits(received.frame);
   const auto on_wire = std::chrono::nanoseconds(std::chrono::seconds(1)) * bits /
                        std::max<std::uint32_t>(bus_->settings().bitrate, 1);
-  pdos_.on_pdo(index, received.frame.bytes(), received.at - on_wire, received.at);
-  news_.notify_all();
+  if (pdos_.on_pdo(index, received.frame.bytes(), received.at - on_wire, received.at)) news_.notify_all();
 }
 
 bool Cia402Drive::pdos_usable() const {

@@ -32,15 +32,18 @@ void StatePdos::on_sync(TimePoint at) {
   for (auto& part : parts_) part.there = false;
 }
 
-void StatePdos::on_pdo(std::size_t index, std::span<const std::uint8_t> bytes, TimePoint begin,
+bool StatePdos::on_pdo(std::size_t index, std::span<const std::uint8_t> bytes, TimePoint begin,
                        TimePoint end) {
   auto values = canopen::unpack_pdo(layout_.at(index), bytes);
-  if (!values || (synchronous_ && !sync_)) return;
+  if (!values || (synchronous_ && !sync_)) return false;
   if (parts_.at(index).there) late_ = false;
   parts_.at(index) = {.values = std::move(*values), .begin = begin, .end = end, .there = true};
-  if (!complete()) return;
-  if (!synchronous_) return assemble(std::ranges::min(parts_, {}, &Part::begin).begin);
-  assemble(late_ ? previous_sync_.value_or(*sync_) : *sync_);
+  if (!complete()) return false;
+  if (synchronous_)
+    assemble(late_ ? previous_sync_.value_or(*sync_) : *sync_);
+  else
+    assemble(std::ranges::min(parts_, {}, &Part::begin).begin);
+  return true;
 }
 
 void StatePdos::assemble(TimePoint asked_at) {

@@ -32,8 +32,10 @@ class StatePdos {
   /// Nothing that came counts any more.
   void forget();
   void on_sync(TimePoint at);
-  /// `begin`: of its frame on the wire, `end` likewise. PDOs that are too short are ignored.
-  void on_pdo(std::size_t index, std::span<const std::uint8_t> bytes, TimePoint begin, TimePoint end);
+  /// `begin`: of its frame on the wire, `end` likewise. PDOs that are too short are ignored. True: there is a
+  /// new reading.
+  [[nodiscard]] bool on_pdo(std::size_t index, std::span<const std::uint8_t> bytes, TimePoint begin,
+                            TimePoint end);
   /// The newest reading, if it is no older than `since`.
   [[nodiscard]] std::optional<Reading> since(TimePoint since) const;
 

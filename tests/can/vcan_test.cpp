@@ -1,4 +1,5 @@
 // SocketCanPort on virtual interfaces.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
 
@@ -158,6 +159,25 @@ TEST_F(Vcan, ErrorPassiveIsToldAndStillSends) {
   EXPECT_TRUE(bench.until(LinkState::up));
   EXPECT_EQ(bench.port.counters().error_frames, 2U);
   EXPECT_TRUE(bench.received.empty());  // error frames are no frames
+}
+
+TEST_F(Vcan, TakesFramesThatCameTogetherInOrderAndThenWhatFollows) {
+  Peer peer("cell");
+  const auto before = bench.clock.now();
+  constexpr std::uint32_t burst = 100;  // more than it takes at once
+  for (std::uint32_t i = 0; i < burst; ++i)
+    EXPECT_TRUE(peer.send(frame_of(i, {static_cast<std::uint8_t>(i)})));
+  bench.send(burst);
+  ASSERT_TRUE(bench.until_ended(1));
+  const auto after = bench.clock.now();
+  ASSERT_EQ(bench.received.size(), burst);
+  for (std::uint32_t i = 0; i < burst; ++i) {
+    const auto& each = bench.received.at(i);
+    EXPECT_EQ(each.frame, frame_of(i, {static_cast<std::uint8_t>(i)}));
+    EXPECT_GE(each.at, before - 5ms);  // as the two clocks are read one after the other
+    EXPECT_LE(each.at, after);
+  }
+  EXPECT_EQ(bench.endings.texts(), (Texts{fmt::format("{}:sent", burst)}));
 }
 
 TEST_F(Vcan, CountsWhatTheKernelDropped) {

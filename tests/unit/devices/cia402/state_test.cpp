@@ -43,14 +43,14 @@ const std::vector<std::uint8_t> second{0x02, 0xFF, 0x05, 0x00, 0x01, 0x00, 0x03}
 
 TEST(StatePdos, ByEventAReadingIsAsOldAsItsOldestPart) {
   auto all = pdos(false);
-  all.on_pdo(0, first(-7), start, start + 1ms);
+  EXPECT_FALSE(all.on_pdo(0, first(-7), start, start + 1ms));
   EXPECT_FALSE(all.since(start));
-  all.on_pdo(1, second, start + 5ms, start + 6ms);
+  EXPECT_TRUE(all.on_pdo(1, second, start + 5ms, start + 6ms));
   ASSERT_TRUE(all.since(start));
   EXPECT_EQ(all.since(start)->asked_at, start);
   EXPECT_EQ(all.since(start)->measured_at, start + 6ms);
   EXPECT_FALSE(all.since(start + 1ms));
-  all.on_pdo(0, first(-8), start + 9ms, start + 10ms);
+  EXPECT_TRUE(all.on_pdo(0, first(-8), start + 9ms, start + 10ms));
   EXPECT_TRUE(all.since(start + 5ms));
   const auto sample = decode_state(model(), 1000, all.since(start + 5ms)->values);
   EXPECT_EQ(sample.position_pulses, -8);
@@ -64,30 +64,30 @@ TEST(StatePdos, ByEventAReadingIsAsOldAsItsOldestPart) {
 
 TEST(StatePdos, WithSyncAReadingIsAsOldAsItsSync) {
   auto all = pdos(true);
-  all.on_pdo(0, first(1), start, start);
-  all.on_pdo(1, second, start, start);
+  EXPECT_FALSE(all.on_pdo(0, first(1), start, start));
+  EXPECT_FALSE(all.on_pdo(1, second, start, start));
   EXPECT_FALSE(all.since(start - 1s)) << "of no SYNC";
   all.on_sync(start + 10ms);
-  all.on_pdo(1, second, start + 11ms, start + 12ms);
+  EXPECT_FALSE(all.on_pdo(1, second, start + 11ms, start + 12ms));
   EXPECT_FALSE(all.since(start));
-  all.on_pdo(0, first(2), start + 12ms, start + 13ms);
+  EXPECT_TRUE(all.on_pdo(0, first(2), start + 12ms, start + 13ms));
   ASSERT_TRUE(all.since(start + 10ms));
   EXPECT_EQ(all.since(start)->asked_at, start + 10ms);
   // One that is missing may come in the next cycle: then it is that old.
   all.on_sync(start + 20ms);
-  all.on_pdo(0, first(3), start + 21ms, start + 21ms);
+  EXPECT_FALSE(all.on_pdo(0, first(3), start + 21ms, start + 21ms));
   all.on_sync(start + 30ms);
-  all.on_pdo(0, first(4), start + 31ms, start + 31ms);
-  all.on_pdo(1, second, start + 32ms, start + 32ms);
+  EXPECT_FALSE(all.on_pdo(0, first(4), start + 31ms, start + 31ms));
+  EXPECT_TRUE(all.on_pdo(1, second, start + 32ms, start + 32ms));
   EXPECT_EQ(all.since(start)->asked_at, start + 20ms);
   // A drive that needs longer than a period stays that late, though each cycle is complete.
   all.on_sync(start + 40ms);
-  all.on_pdo(0, first(5), start + 41ms, start + 41ms);
-  all.on_pdo(1, second, start + 42ms, start + 42ms);
+  EXPECT_FALSE(all.on_pdo(0, first(5), start + 41ms, start + 41ms));
+  EXPECT_TRUE(all.on_pdo(1, second, start + 42ms, start + 42ms));
   EXPECT_EQ(all.since(start)->asked_at, start + 30ms);
   // Until it sends twice in one cycle.
-  all.on_pdo(0, first(6), start + 48ms, start + 48ms);
-  all.on_pdo(1, second, start + 49ms, start + 49ms);
+  EXPECT_TRUE(all.on_pdo(0, first(6), start + 48ms, start + 48ms));
+  EXPECT_TRUE(all.on_pdo(1, second, start + 49ms, start + 49ms));
   EXPECT_EQ(all.since(start)->asked_at, start + 40ms);
   all.forget();
   EXPECT_FALSE(all.since(start));
@@ -95,8 +95,8 @@ TEST(StatePdos, WithSyncAReadingIsAsOldAsItsSync) {
 
 TEST(StatePdos, ShortOnesAreNoReading) {
   auto all = pdos(false);
-  all.on_pdo(0, std::vector<std::uint8_t>{1, 2, 3}, start, start);
-  all.on_pdo(1, second, start, start);
+  EXPECT_FALSE(all.on_pdo(0, std::vector<std::uint8_t>{1, 2, 3}, start, start));
+  EXPECT_FALSE(all.on_pdo(1, second, start, start));
   EXPECT_FALSE(all.since(start));
 }
 
