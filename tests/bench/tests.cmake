@@ -1,7 +1,25 @@
-# Benchmarks: built on demand (tests/bench/run.sh), never a part of the tests.
+# Benchmarks: built on demand (tests/bench/run.sh). That they run to their end is a test of tests/run.sh all, which
+# builds bench_programs in preset dev; the figures are none.
 if(AXISD_SANITIZE)
   return()
 endif()
 add_executable(bench_can EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/can_bench.cpp)
 target_include_directories(bench_can PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(bench_can PRIVATE axisd_test_support axisd_core)
+add_executable(bench_bare_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_loop.cpp)
+
+if(AXISD_GRPC)
+  add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop axisd axisd-sim axisctl)
+  set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
+  set(text "")
+  foreach(command bring-up core)
+    string(APPEND text "add_test(bench.${command} $<TARGET_FILE:bench_can> ${command} 2)\n")
+  endforeach()
+  string(APPEND text
+    "add_test(bench.sync_in_guest ${CMAKE_SOURCE_DIR}/tests/guest/run.sh -t 200 /usr/bin/python3 -B "
+    "${CMAKE_CURRENT_LIST_DIR}/can_bench.py ${CMAKE_BINARY_DIR} --rounds 1 --seconds 1 --nodes 2)\n"
+    "set_tests_properties(bench.bring-up bench.core bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"
+    "set_tests_properties(bench.sync_in_guest PROPERTIES RESOURCE_LOCK guest COST 100)\n")
+  file(GENERATE OUTPUT ${include_file} CONTENT "${text}")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${include_file})
+endif()
