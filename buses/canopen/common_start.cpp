@@ -139,14 +139,17 @@ class CommonStart {
 
 Task<> for_each_at_once(Executor executor, Clock& clock, std::size_t count,
                         std::function<Task<>(std::size_t)> function) {
-  std::size_t missing = count;
-  Signal ended(executor, clock);
-  const auto one = [](Task<> task, std::size_t& left, Signal& end) -> Task<> {
-    co_await std::move(task);
-    if (--left == 0) end.notify_all();
+  struct Gathering {
+    std::size_t missing;
+    Signal ended;
   };
-  for (std::size_t i = 0; i < count; ++i) spawn(executor, one(function(i), missing, ended), "together");
-  while (missing > 0) co_await ended.wait();
+  Gathering gathering{.missing = count, .ended = Signal(executor, clock)};
+  const auto one = [](Task<> task, Gathering& all) -> Task<> {
+    co_await std::move(task);
+    if (--all.missing == 0) all.ended.notify_all();
+  };
+  for (std::size_t i = 0; i < count; ++i) spawn(executor, one(function(i), gathering), "together");
+  while (gathering.missing > 0) co_await gathering.ended.wait();
 }
 
 Task<Result<TimePoint>> common_start(CanopenBus& bus, std::vector<SyncStart> members) {

@@ -75,7 +75,7 @@ Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode
                                            MotionGuard guard, bool& triggered) {
   const SdoOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
   give_up_leaving();
-  const auto canary = co_await prepare_start(block, mode, std::move(homing), motion);
+  const auto canary = co_await prepare_start(block, mode, homing, motion);
   if (!canary) co_return fail(canary.error());
   // A drive that restarts after the canary was read is silent for longer than reboot_guard: a trigger bound
   // within it never meets default parameters.
