@@ -30,7 +30,11 @@ class LateReplies {
     outstanding_ = 0;
   }
   /// A reply came that nobody waits for. False: none can be late; another node sent it.
-  [[nodiscard]] bool explain() { return outstanding_ > 0 && outstanding_-- > 0; }
+  [[nodiscard]] bool explain() {
+    if (outstanding_ == 0) return false;
+    --outstanding_;
+    return true;
+  }
   [[nodiscard]] bool may_come(Object object, TimePoint now) const {
     const auto found = until_.find(object);
     return found != until_.end() && found->second >= now;
