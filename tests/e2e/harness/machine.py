@@ -12,9 +12,8 @@ from .simulator import Simulator
 from .wire import WireLog
 
 
-#: On a busy computer the kernel's worker hands over the bytes of pseudo terminals late, by up to a second (observed),
-#: and a guest stands still for as long. Drives that boot slowly permit a guard that a motion's start fits into all the
-#: same.
+#: On a busy computer the kernel's worker hands over the bytes of pseudo terminals late, by up to a second (observed).
+#: Drives that boot slowly permit a guard that a motion's start fits into all the same.
 PATIENT = {"reboot_guard": "950 ms", "stop_margin": "2 s"}
 BOOT = "boot_ms=1000"
 
@@ -33,10 +32,10 @@ class Axis:
     def option(self):
         model = self.keys.get("model", "ykd2405pr")
         words = f"node={self.node},model={model}"
-        if "boot_ms" not in self.simulated:
-            words += f",{BOOT}"
-        if model != "yss-c":  # which is always released then
+        if model != "yss-c":  # which is always released then, and on a network of the guest, where nobody is late
             words += ",switch.enabled_at_power_up=off"
+            if "boot_ms" not in self.simulated:
+                words += f",{BOOT}"
         return words + (f",{self.simulated}" if self.simulated else "")
 
 
@@ -59,7 +58,8 @@ def spinner(node=1, bus="line", simulated="", **keys):
 
 def turntable(node=5, bus="can0", simulated="", **keys):
     """A round table on a CAN network, 4000 pulses/rev before its gear of 10."""
-    keys = {"model": "yss-c", "unit": "deg", "scale": "{ microstep: 4000 pulses/rev, gear: 10/1 }",
+    keys = {"model": "yss-c", "reboot_guard": "250 ms", "unit": "deg",
+            "scale": "{ microstep: 4000 pulses/rev, gear: 10/1 }",
             "limits": "{ velocity: 360 deg/s, acceleration_time: 150 ms }"} | keys
     return Axis(node, bus, simulated, **keys)
 
