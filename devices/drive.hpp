@@ -151,7 +151,7 @@ class Drive {
   [[nodiscard]] virtual std::string link_note() const { return {}; }
   /// Called on the core thread when the drive has something to tell that should not wait for the next poll:
   /// it booted, fell silent, or reported an alarm. read_state() then tells what.
-  virtual void on_attention(std::function<void()> /*handler*/) {}
+  virtual void on_attention(const std::function<void()>& /*handler*/) {}
 
   /// The drive follows its position by an encoder, as it is configured.
   [[nodiscard]] virtual bool closed_loop() const = 0;

@@ -51,7 +51,7 @@ class Cia402Drive final : public Drive {
   // drive_state.cpp
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
   [[nodiscard]] std::string link_note() const override { return link_note_; }
-  void on_attention(std::function<void()> handler) override { attention_ = std::move(handler); }
+  void on_attention(const std::function<void()>& handler) override { attention_ = handler; }
 
   // drive_canary.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;

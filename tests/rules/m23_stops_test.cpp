@@ -180,8 +180,9 @@ TEST(M23, ALostReplyAfterTheEndOfAHaltLeavesTheDriveWatched) {
     rig.done(StopRequest{.kind = StopKind::stop});
     int replies = 0;
     rig.network.set_fault([&replies, lost](const can::Frame& frame) {
-      const bool reply = frame.id == 0x580U + CanRig::node_id;
-      return can::Network::Fault{.drop = reply && (++replies == lost || replies == lost + 1)};
+      if (frame.id != 0x580U + CanRig::node_id) return can::Network::Fault{};
+      ++replies;
+      return can::Network::Fault{.drop = replies == lost || replies == lost + 1};
     });
     const auto before = rig.shaft();
     (void)rig.submit(EnableRequest{});
