@@ -10,5 +10,5 @@ deploy/install-packages.sh test
 cmake --preset release >/dev/null
 ninja -C build/release --quiet axisd axisd-sim axisctl bench_can bench_bare_loop
 build/release/tests/bench_can bring-up 32
-build/release/tests/bench_can core 20
+build/release/tests/bench_can core 16
 tests/guest/run.sh -t 400 /usr/bin/python3 -B tests/bench/can_bench.py build/release
