@@ -10,7 +10,7 @@ endif()
 add_compile_options(-Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wno-missing-designated-field-initializers
                     -ffile-prefix-map=${CMAKE_SOURCE_DIR}/= -fdebug-compilation-dir=.)
 if(CMAKE_BUILD_TYPE STREQUAL "Debug")
-  # Unoptimised: coroutines and gRPC compile 2.5 times as fast, and virtual time makes the tests quick anyway.
+  # Unoptimised: coroutines and gRPC compile 2.5 times as fast. What is slow all the same is HOT (axisd.cmake).
   add_compile_options(-O0 -g1)
   add_compile_definitions(_GLIBCXX_ASSERTIONS)
 endif()
