@@ -13,6 +13,9 @@ namespace {
 
 /// A stop without a reply is repeated at once, this often before the motor's state decides.
 constexpr int stop_attempts = 3;
+/// Standstill that no stop was acknowledged before is looked at so often, with further attempts each time:
+/// what rests by itself is not what was asked for. After that the drive simply does not acknowledge.
+constexpr int unacknowledged_rounds = 4;
 
 }  // namespace
 
@@ -87,6 +90,7 @@ Task<> Axis::run_stop() {
 Task<Result<void>> Axis::stop_and_confirm() {
   bool released = false;
   int silent = 0;  // replies in a row that did not come
+  int rounds = 0;  // of attempts without any
   for (;;) {
     const auto requests = stopping_.requests;
     const auto kind = stopping_.kind;
@@ -111,6 +115,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
         polled ? co_await standstill_by(since, since + patience, requests)
                : (sent || link_ != LinkState::offline) && co_await standstill_unpolled(since + patience);
     if (rests && requests != stopping_.requests) continue;
+    if (rests && no_reply && ++rounds < unacknowledged_rounds) continue;
     if (rests) co_return Result<void>{};
     if (link_ == LinkState::offline) {
       auto cause = error(Reason::not_confirmed, "the drive fell silent before its standstill was confirmed",

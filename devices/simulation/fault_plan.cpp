@@ -19,7 +19,7 @@ struct KindName {
   std::string_view name;
   unsigned wires;  ///< where it can be
 };
-constexpr std::array<KindName, 19> kind_names{{
+constexpr std::array<KindName, 21> kind_names{{
     {FaultKind::drop_request, "drop_request", on_rtu | on_can},
     {FaultKind::corrupt_request, "corrupt_request", on_rtu},
     {FaultKind::drop_reply, "drop_reply", on_rtu | on_can},
@@ -28,6 +28,8 @@ constexpr std::array<KindName, 19> kind_names{{
     {FaultKind::truncate_reply, "truncate_reply", on_rtu},
     {FaultKind::echo, "echo", on_rtu},
     {FaultKind::drip, "drip", on_rtu},
+    {FaultKind::duplicate_request, "duplicate_request", on_rtu},
+    {FaultKind::duplicate_reply, "duplicate_reply", on_rtu},
     {FaultKind::foreign_frame, "foreign_frame", on_rtu},
     {FaultKind::hang_up, "hang_up", on_rtu},
     {FaultKind::reboot_before, "reboot_before", on_rtu | on_can},
@@ -107,8 +109,10 @@ std::optional<std::vector<std::uint8_t>> parse_hex(std::string_view text) {
 template <class Integer, class Target>
 bool take(std::string_view value, Target& into) {
   const auto number = parse_number<Integer>(value);
-  if (number) into = *number;
-  return number.has_value();
+  if (!number) return false;
+  const Integer known = *number;
+  into = known;
+  return true;
 }
 
 bool set_field(Fault& fault, Wire wire, std::string_view key, std::string_view value) {

@@ -16,18 +16,20 @@
 namespace axisd::simulation {
 
 enum class FaultKind : std::uint8_t {
-  drop_request,     ///< the node never sees the request
-  corrupt_request,  ///< one bit of the request is wrong when it reaches the node
-  drop_reply,       ///< the node executes the request, its reply is lost
-  delay_reply,      ///< the reply comes `delay` later
-  corrupt_reply,    ///< one bit of the reply is wrong
-  truncate_reply,   ///< the last byte of the reply is missing
-  echo,             ///< the adapter returns the request before the reply
-  drip,             ///< the bytes of the reply come `delay` apart
-  foreign_frame,    ///< `bytes` come before the reply (default: a sound reply of node 247)
-  hang_up,          ///< the adapter is pulled out instead of passing the request on
-  reboot_before,    ///< the supply fails for `delay` just before the request arrives
-  reboot_after,     ///< the request is executed, then the supply fails for `delay`; the reply is lost
+  drop_request,       ///< the node never sees the request
+  corrupt_request,    ///< one bit of the request is wrong when it reaches the node
+  drop_reply,         ///< the node executes the request, its reply is lost
+  delay_reply,        ///< the reply comes `delay` later
+  corrupt_reply,      ///< one bit of the reply is wrong
+  truncate_reply,     ///< the last byte of the reply is missing
+  echo,               ///< the adapter returns the request before the reply
+  drip,               ///< the bytes of the reply come `delay` apart
+  duplicate_request,  ///< the node hears the request twice, one right after the other
+  duplicate_reply,    ///< the reply comes again, `delay` after its end
+  foreign_frame,      ///< `bytes` come before the reply (default: a sound reply of node 247)
+  hang_up,            ///< the adapter is pulled out instead of passing the request on
+  reboot_before,      ///< the supply fails for `delay` just before the request arrives
+  reboot_after,       ///< the request is executed, then the supply fails for `delay`; the reply is lost
   // On CAN only. `silence` to `reboot` strike at once, unless `cob`, `object` or `skip` names a frame.
   abort,           ///< an SDO request is not executed but aborted with `code` (default 08000000h)
   wrong_toggle,    ///< an upload is answered in segments with a wrong toggle bit

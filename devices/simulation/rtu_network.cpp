@@ -129,7 +129,9 @@ std::optional<ReplyPlan> RtuNetwork::on_request(std::span<const std::uint8_t> fr
   if (const auto* fault = find(faults, FaultKind::reboot_before)) reboot(frame, fault->delay);
   std::vector<std::uint8_t> heard(frame.begin(), frame.end());
   if (find(faults, FaultKind::corrupt_request) != nullptr) heard.back() ^= 1U;  // of the CRC
-  auto reply = find(faults, FaultKind::drop_request) != nullptr ? std::nullopt : dispatch(heard);
+  const bool passes = find(faults, FaultKind::drop_request) == nullptr;
+  auto reply = passes ? dispatch(heard) : std::nullopt;
+  if (passes && find(faults, FaultKind::duplicate_request) != nullptr) dispatch(heard);
   if (find(faults, FaultKind::drop_reply) != nullptr) reply.reset();
   if (const auto* fault = find(faults, FaultKind::reboot_after)) {
     reboot(frame, fault->delay);
@@ -156,6 +158,10 @@ std::optional<ReplyPlan> RtuNetwork::plan(std::span<const std::uint8_t> request,
     if (find(faults, FaultKind::truncate_reply) != nullptr) reply->pop_back();
     const auto* drip = find(faults, FaultKind::drip);
     append(plan, *reply, begin, character, drip == nullptr ? Duration{} : drip->delay);
+    if (const auto* again = find(faults, FaultKind::duplicate_reply)) {
+      append(plan, *reply, plan.arrivals.back() + again->delay, character, {});
+      plan.repeated = reply->size();
+    }
   }
   if (plan.bytes.empty()) return std::nullopt;
   plan.begin = plan.arrivals.front() - character;

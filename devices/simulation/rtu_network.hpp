@@ -32,6 +32,7 @@ struct ReplyPlan {
   TimePoint end;                    ///< last bit of the last byte
   std::vector<std::uint8_t> bytes;  ///< all bytes, an echo or a foreign frame before the reply included
   std::vector<TimePoint> arrivals;  ///< end of each byte
+  std::size_t repeated = 0;         ///< bytes at the end that are the reply once more
 };
 
 /// A frame seen on the wire. `received`: from the master, also when a fault or a cut cable keeps it from the

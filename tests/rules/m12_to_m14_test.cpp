@@ -150,6 +150,21 @@ TEST(M13, AStopThatNeverArrives) {
   }
 }
 
+/// A drive that rests anyway proves nothing about the stop.
+TEST(M13, AStopToADriveAtRestIsSentUntilItArrives) {
+  Rig rig;
+  rig.ready();
+  int arrived = 0;
+  rig.line->set_on_bind([&](const WireEntry& entry) {
+    if (entry.address() == 0x0028 && rig.faults().pending() == 0) ++arrived;
+  });
+  rig.fault({.kind = FaultKind::drop_request, .register_address = 0x0028, .count = 5});
+  const auto stop = rig.submit(StopRequest{});
+  EXPECT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 10s));
+  EXPECT_EQ(stop->value().state, CommandState::done) << describe(stop->value());
+  EXPECT_EQ(arrived, 1);
+}
+
 TEST(M13, StopWithActiveStopTerminalsAndInPtPv) {
   for (const int mode : {2, 3}) {
     for (const bool ignored : {false, true}) {

@@ -8,7 +8,7 @@
 
 namespace axisd::test {
 
-class BorrowedNode final : public simulation::SimulatedRtuNode {
+class BorrowedNode : public simulation::SimulatedRtuNode {
  public:
   explicit BorrowedNode(simulation::SimulatedRtuNode& node) : node_(&node) {}
   [[nodiscard]] std::uint8_t address() const override { return node_->address(); }

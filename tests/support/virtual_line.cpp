@@ -96,19 +96,28 @@ void VirtualLine::request_sent() {
   const auto latest = result_.request_end + exchange.reply_timeout;
   timer_ = world_->clock().call_at(latest, [this] { end(ExchangeStatus::timeout); });
   if (!reply) return;
-  if (reply->end <= latest) {
+  const std::span<const std::uint8_t> bytes = reply->bytes;
+  const auto first = bytes.size() - reply->repeated;
+  const auto first_end = reply->end - (reply->arrivals.back() - reply->arrivals.at(first - 1));
+  if (first_end <= latest) {
     reply_coming_ = true;
     result_.reply_begin = reply->begin;
   }
-  const auto id = ++last_arrival_;
-  arrivals_[id] = world_->clock().call_at(reply->end, [this, id, bytes = std::move(reply->bytes)]() mutable {
-    // The timer lives as long as its callback runs.
-    const auto timer = std::move(arrivals_.extract(id).mapped());
-    hear(std::move(bytes));
-  });
+  arrive(first_end, bytes.first(first));
+  if (reply->repeated > 0) arrive(reply->end, bytes.subspan(first));
 }
 
-void VirtualLine::hear(std::vector<std::uint8_t> bytes) {
+void VirtualLine::arrive(TimePoint when, std::span<const std::uint8_t> bytes) {
+  const auto id = ++last_arrival_;
+  auto arrived = [this, id, copy = std::vector(bytes.begin(), bytes.end())] {
+    // The timer lives as long as its callback runs.
+    const auto timer = std::move(arrivals_.extract(id).mapped());
+    hear(copy);
+  };
+  arrivals_[id] = world_->clock().call_at(when, std::move(arrived));
+}
+
+void VirtualLine::hear(std::span<const std::uint8_t> bytes) {
   quiet_since_ = std::max(quiet_since_, world_->now());
   if (armed_ != nullptr) {  // the silence begins anew
     timer_ = world_->clock().call_at(earliest_begin(), [this] { bind(); });
@@ -117,11 +126,10 @@ void VirtualLine::hear(std::vector<std::uint8_t> bytes) {
   // Bytes that arrive while the request is being sent are lost with it.
   if (under_way_ == nullptr || world_->now() < result_.request_end) return;
   // The reply proper comes last; an echo or a foreign frame may stand before it.
-  const std::span<const std::uint8_t> all = bytes;
   Reply best;
   for (std::size_t skip = 0;
-       skip < all.size() && best.kind != ReplyKind::match && best.kind != ReplyKind::exception; ++skip)
-    if (auto decoded = decode(under_way_->request, all.subspan(skip)); decoded.kind != ReplyKind::corrupt)
+       skip < bytes.size() && best.kind != ReplyKind::match && best.kind != ReplyKind::exception; ++skip)
+    if (auto decoded = decode(under_way_->request, bytes.subspan(skip)); decoded.kind != ReplyKind::corrupt)
       best = std::move(decoded);
   if (best.kind == ReplyKind::foreign) {
     ++result_.foreign_frames;

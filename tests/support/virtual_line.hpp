@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -69,7 +70,8 @@ class VirtualLine final : public modbus_rtu::Line {
   void bind();
   bool use(const modbus_rtu::SerialSettings& serial);
   void request_sent();
-  void hear(std::vector<std::uint8_t> bytes);
+  void arrive(TimePoint when, std::span<const std::uint8_t> bytes);
+  void hear(std::span<const std::uint8_t> bytes);
   void end(modbus_rtu::ExchangeStatus status, Verdict verdict = Verdict::send);
 
   VirtualWorld* world_;

@@ -1,0 +1,118 @@
+#include "tests/chaos/episode.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "tests/chaos/client.hpp"
+#include "tests/chaos/judge.hpp"
+#include "tests/chaos/plant.hpp"
+
+namespace axisd::chaos {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr auto faulty_time = 30s;
+constexpr auto look_period = 25ms;
+
+/// Looks at the positions again and again.
+class Looker {
+ public:
+  Looker(Plant& plant, Judge& judge) : plant_(&plant), judge_(&judge) { wait(); }
+
+ private:
+  void wait() {
+    next_ = plant_->world.clock().call_at(plant_->world.now() + look_period, [this] {
+      judge_->look();
+      wait();
+    });
+  }
+  Plant* plant_;
+  Judge* judge_;
+  Clock::Timer next_;
+};
+
+/// The faults have ended: every axis comes back, and every one can be stopped.
+void settle(Plant& plant, Judge& judge) {
+  plant.set_faulty(false);
+  plant.world.run_for(3s);  // replies that are late, and drives that boot
+  plant.world.run_until(
+      [&] {
+        return std::ranges::all_of(plant.stations, [](const Station& station) {
+          return station.axis->snapshot()->link == LinkState::online;
+        });
+      },
+      60s);
+  for (auto& station : plant.stations) {
+    if (station.axis->snapshot()->link != LinkState::online) judge.violation(station.name, "stays offline");
+    (void)station.axis->release_stop();
+    judge.stop_asked(station.name);
+  }
+  judge.inhibited(true);
+  const auto stops = plant.machine->stop_all("the end");
+  for (const auto& stop : stops) judge.accepted(*stop);
+  plant.world.run_until(
+      [&] { return std::ranges::all_of(stops, [](const auto& stop) { return (*stop)->has_ended(); }); }, 30s);
+  for (const auto& stop : stops)
+    if ((*stop)->value().state != CommandState::done)
+      judge.violation((*stop)->value().axis, "the last stop is not confirmed");
+  plant.world.run_for(1s);
+  judge.conclude();
+}
+
+}  // namespace
+
+void Outcome::add(const Outcome& other) {
+  transactions += other.transactions;
+  faulted += other.faulted;
+  commands += other.commands;
+  done += other.done;
+  not_executed += other.not_executed;
+  starts += other.starts;
+  stops += other.stops;
+  positions += other.positions;
+  marks += other.marks;
+  violations += other.violations;
+}
+
+Outcome run_episode(std::uint64_t seed) {
+  Plant plant(seed);
+  Judge judge(plant);
+  plant.set_faulty(true);
+  {
+    const Looker looker(plant, judge);
+    std::vector<std::unique_ptr<Client>> clients;
+    for (const auto* name : {"anna", "bert", "cora"})
+      clients.push_back(std::make_unique<Client>(plant, judge, name, seed * 10 + clients.size() + 1));
+    plant.world.run_for(faulty_time);
+    for (const auto& client : clients) client->rest();
+    settle(plant, judge);
+  }
+  for (const auto& violation : judge.violations()) ADD_FAILURE() << violation;
+  if (!judge.violations().empty()) ADD_FAILURE() << fmt::format("repeat it with: test_chaos --seed {}", seed);
+  const auto& tally = judge.tally();
+  return {.transactions = plant.transactions(),
+          .faulted = plant.faulted(),
+          .commands = tally.commands,
+          .done = tally.done,
+          .not_executed = tally.not_executed,
+          .starts = tally.starts,
+          .stops = tally.stops,
+          .positions = tally.positions,
+          .marks = tally.marks,
+          .violations = static_cast<int>(judge.violations().size())};
+}
+
+Outcome run_episodes(std::uint64_t first_seed, std::uint64_t faulted) {
+  Outcome all;
+  for (auto seed = first_seed; all.faulted < faulted && all.violations == 0; ++seed)
+    all.add(run_episode(seed));
+  return all;
+}
+
+}  // namespace axisd::chaos
