@@ -17,6 +17,8 @@ import sys
 import tempfile
 import time
 
+from figures import lateness, running, spread, table
+
 INTERFACE = "vcan0"
 SERVER = "127.0.0.1:7443"
 SYNC = 0x080
@@ -79,17 +81,6 @@ axes:
         sys.exit("can_bench.py: not every axis came online")
 
 
-@contextlib.contextmanager
-def running(*command, **options):
-    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options) as process:
-        try:
-            yield process
-            if process.poll() is not None:
-                sys.exit(f"can_bench.py: {command[0]} ended with {process.returncode}")
-        finally:
-            process.terminate()
-
-
 def cpu_seconds(pid):
     fields = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -124,17 +115,6 @@ class Observer:
         return [whole + part / 1e9 for whole, part in found]
 
 
-def lateness(stamps, period):
-    """How late each was. All three send at absolute times, so that the schedule is a grid of the period: the one that
-    most are closest behind. That none was sent early moves it to the earliest of them."""
-    early = period / 10
-
-    def behind(begin):
-        return [(stamp - begin + early) % period - early for stamp in stamps]
-    late = min((behind(stamp) for stamp in stamps[:200]), key=sum)
-    return sorted(each - min(late) for each in late)
-
-
 def measure(program, nodes, period, seconds):
     with program(period) as pid:
         Observer().wait()
@@ -148,17 +128,6 @@ def measure(program, nodes, period, seconds):
     return {"sent": len(stamps), "missed": round((stamps[-1] - stamps[0]) * 1000 / period) + 1 - len(stamps),
             "frames": frames / len(stamps), "late": statistics.median(late), "late 99%": late[len(late) * 99 // 100],
             "latest": late[-1], "cpu": cpu / frames * 1e6}
-
-
-def spread(values, digits=0):
-    """Minimum, median and maximum of the rounds."""
-    return " / ".join(f"{value:.{digits}f}" for value in (min(values), statistics.median(values), max(values)))
-
-
-def table(rows):
-    widths = [max(map(len, column)) for column in zip(*rows)]
-    for row in rows:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
 
 
 def report(rounds, wire, cpu):

@@ -1,14 +1,25 @@
 #!/bin/bash
 # Builds what the benchmarks need (preset release) and runs them; every figure stands beside a yardstick's, measured in
 # the same run. See README.md.
-#   tests/bench/run.sh can
+#   tests/bench/run.sh [can|rtu|rpc|machine|all]      (default: all)
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
-[ "${1:-}" = can ] || { echo "usage: tests/bench/run.sh can" >&2; exit 2; }
+part=${1:-all}
+case "$part" in can | rtu | rpc | machine | all) ;; *)
+  echo "usage: tests/bench/run.sh [can|rtu|rpc|machine|all]" >&2
+  exit 2
+  ;;
+esac
+wants() { [ "$part" = "$1" ] || [ "$part" = all ]; }
 
 deploy/install-packages.sh test
 cmake --preset release >/dev/null
-ninja -C build/release --quiet axisd axisd-sim axisctl bench_can bench_bare_loop
-build/release/tests/bench_can bring-up 32
-build/release/tests/bench_can core 16
-tests/guest/run.sh -t 400 /usr/bin/python3 -B tests/bench/can_bench.py build/release
+ninja -C build/release --quiet bench_programs
+if wants can; then
+  build/release/tests/bench_can bring-up 32
+  build/release/tests/bench_can core 16
+  tests/guest/run.sh -t 400 /usr/bin/python3 -B tests/bench/can_bench.py build/release
+fi
+for each in rtu rpc machine; do
+  if wants "$each"; then /usr/bin/python3 -B "tests/bench/${each}_bench.py" build/release; fi
+done

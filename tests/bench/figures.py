@@ -1,0 +1,52 @@
+"""What the benchmarks have in common: running programs, their CPU time, tables."""
+import contextlib
+import pathlib
+import statistics
+import subprocess
+import sys
+
+
+@contextlib.contextmanager
+def running(*command, **options):
+    """A process that must live until the end of the context."""
+    name = pathlib.Path(sys.argv[0]).name
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options) as process:
+        try:
+            yield process
+            if process.poll() is not None:
+                sys.exit(f"{name}: {command[0]} ended with {process.returncode}")
+        finally:
+            process.terminate()
+
+
+def cpu_seconds(pid):
+    """CPU time of all its threads, as the scheduler counts it: exact, not by ticks."""
+    tasks = pathlib.Path(f"/proc/{pid}/task").iterdir()
+    return sum(int((task / "schedstat").read_text(encoding="ascii").split()[0]) for task in tasks) / 1e9
+
+
+def spread(values, digits=0):
+    """Minimum, median and maximum of the rounds."""
+    return " / ".join(f"{value:.{digits}f}" for value in (min(values), statistics.median(values), max(values)))
+
+
+def lateness(stamps, period):
+    """How late each is, sorted. What is sent at absolute times is on a grid of the period: on the one that most are
+    closest behind. That none is sent early moves it to the earliest of them."""
+    early = period / 10
+
+    def behind(begin):
+        return [(stamp - begin + early) % period - early for stamp in stamps]
+    late = min((behind(stamp) for stamp in stamps[:200]), key=sum)
+    return sorted(each - min(late) for each in late)
+
+
+def percentile(values, share):
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(len(ordered) * share))]
+
+
+def table(rows):
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())

@@ -1,0 +1,82 @@
+"""What axisd costs with 1 to 480 axes: start to READY, CPU time, memory. README.md says what is measured.
+
+    machine_bench.py BUILD [--rounds N] [--seconds S] [--axes N ...]
+"""
+import argparse
+import contextlib
+import os
+import pathlib
+import socket
+import sys
+import tempfile
+import time
+
+from figures import cpu_seconds, spread, table
+from rtu_cell import Cell, Line
+
+NODES = 16  # of a line
+POLL = "200 ms"  # the default
+
+
+@contextlib.contextmanager
+def notify_socket(directory):
+    """Where a service tells systemd that it is ready."""
+    path = str(pathlib.Path(directory) / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as notified:
+        notified.bind(path)
+        notified.settimeout(60)
+        yield path, notified
+
+
+def resident_mib(pid):
+    status = pathlib.Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+    return int(next(line for line in status.splitlines() if line.startswith("VmRSS:")).split()[1]) / 1024
+
+
+def measure(build, axes, off, seconds):
+    sizes = [min(NODES, axes - first) for first in range(0, axes, NODES)]
+    with tempfile.TemporaryDirectory() as directory, notify_socket(directory) as (path, notified), \
+            contextlib.ExitStack() as stack:
+        lines = [Line(build, directory, 115200, size, range(1, 1 + off // len(sizes)), name=f"line-{index}")
+                 for index, size in enumerate(sizes)]
+        for line in lines:
+            stack.enter_context(line.open())
+        cell = Cell(build, lines, POLL)
+        begin = time.monotonic()
+        with cell.run(env={**os.environ, "NOTIFY_SOCKET": path}) as process:
+            while b"READY=1" not in notified.recv(4096):
+                pass
+            ready = time.monotonic() - begin
+            cell.wait_online(process)
+            online = time.monotonic() - begin
+            time.sleep(2)
+            cpu = cpu_seconds(process.pid)
+            time.sleep(seconds)
+            cpu = cpu_seconds(process.pid) - cpu
+            return {"ready": ready * 1e3, "online": online, "cpu": cpu / seconds * 100,
+                    "rss": resident_mib(process.pid)}
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("build")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--seconds", type=float, default=5, help="of each measurement")
+    parser.add_argument("--axes", type=int, nargs="*", default=[1, 8, 30, 120, 480])
+    given = parser.parse_args()
+    build = os.path.abspath(given.build)
+    cases = [(axes, 0) for axes in given.axes] + [(64, 8)]
+    rows = [["axes", "of them off", "start to READY, ms", "to all online, s", "CPU, % of a core", "per axis",
+             "memory, MiB"]]
+    for axes, off in cases:
+        found = [measure(build, axes, off, given.seconds) for _ in range(given.rounds)]
+        rows.append([str(axes), str(off), spread([each["ready"] for each in found]),
+                     spread([each["online"] for each in found], 1), spread([each["cpu"] for each in found], 1),
+                     spread([each["cpu"] / axes for each in found], 3), spread([each["rss"] for each in found], 1)])
+        print(".", end="", file=sys.stderr, flush=True)
+    print(f"\naxes on RS-485 lines of {NODES} at 115200 bit/s, refreshed each {POLL}; min / median / max of the rounds")
+    table(rows)
+
+
+if __name__ == "__main__":
+    main()
