@@ -39,10 +39,17 @@ struct AxisEntry {
   SimulationSettings simulation;
 };
 
+/// `flight_recorder:` the newest frames of each bus, kept in memory and written to a file after a fault.
+struct FlightRecorderSettings {
+  int memory = 384;  ///< KiB per bus; some 10 exchanges on RS-485 take one
+  int files = 20;    ///< kept in the state directory; the oldest go
+};
+
 struct Configuration {
   std::string machine;
   std::string state_directory = "/var/lib/axisd";  ///< where the daemon keeps its persistent state
   ServerSettings server;
+  FlightRecorderSettings flight_recorder;
   std::vector<modbus_rtu::LineSettings> lines;     ///< `buses:` of the kind modbus_rtu
   std::vector<canopen::NetworkSettings> networks;  ///< of the kind canopen
   std::vector<AxisEntry> axes;

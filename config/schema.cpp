@@ -56,6 +56,27 @@ constexpr KeySpec server_keys[] = {
      .apply = [](Target& t, const Value&) { t.configuration->server.tls.emplace(); }},
 };
 
+constexpr KeySpec flight_recorder_keys[] = {
+    {.key = "memory",
+     .kind = Kind::integer,
+     .description = "KiB that the newest frames of each bus may take; 384 hold some 4000 exchanges.",
+     .example = "64",
+     .default_value = "384",
+     .minimum = 16,
+     .maximum = 1024,
+     .apply = [](Target& t,
+                 const Value& v) { t.configuration->flight_recorder.memory = static_cast<int>(v.integer); }},
+    {.key = "files",
+     .kind = Kind::integer,
+     .description = "Flight records that are kept in the state directory; the oldest are removed.",
+     .example = "100",
+     .default_value = "20",
+     .minimum = 1,
+     .maximum = 1000,
+     .apply = [](Target& t,
+                 const Value& v) { t.configuration->flight_recorder.files = static_cast<int>(v.integer); }},
+};
+
 constexpr std::string_view formats[] = {"8N1", "8N2", "8E1", "8O1"};
 constexpr modbus_rtu::Format format_values[] = {{modbus_rtu::Parity::none, 1},
                                                 {modbus_rtu::Parity::none, 2},
@@ -179,6 +200,10 @@ std::span<const KeySpec> schema() {
        .kind = Kind::section,
        .description = "Where the gRPC API is served.",
        .children = server_keys},
+      {.key = "flight_recorder",
+       .kind = Kind::section,
+       .description = "The newest frames of each bus, written to a file after a fault.",
+       .children = flight_recorder_keys},
       {.key = "buses",
        .kind = Kind::named_sections,
        .required = true,

@@ -22,6 +22,7 @@
 #include "daemon/logging.hpp"
 #include "daemon/ports.hpp"
 #include "daemon/store/file_store.hpp"
+#include "daemon/store/flight_files.hpp"
 
 namespace axisd {
 
@@ -128,13 +129,16 @@ int run_daemon(const Options& options, config::Configuration configuration) {
   auto store = store::FileStore::open(configuration.state_directory, loop.executor());
   if (!store) return give_up(store.error());
   if ((*store)->damage()) spdlog::error("{}", to_string(*(*store)->damage()));
-  WireLog wire_log;
+  core::FrameObserver wire_log;
   if (!options.wire_log.empty()) {
     auto opened = open_wire_log(options.wire_log);
     if (!opened) return give_up(opened.error());
     wire_log = std::move(*opened);
   }
-  auto ports = Ports::open(loop, configuration, options.link_helper, std::move(wire_log.frames));
+  store::FlightFiles flight_files(std::filesystem::path(configuration.state_directory) / "flight",
+                                  static_cast<std::size_t>(configuration.flight_recorder.files),
+                                  loop.executor());
+  auto ports = Ports::open(loop, configuration, options.link_helper);
   if (!ports) return give_up(ports.error());
 
   const auto instance_id = make_instance_id((*store)->loaded().start_count);
@@ -146,7 +150,8 @@ int run_daemon(const Options& options, config::Configuration configuration) {
                              .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
                              .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
                              .link_helper = (*ports)->link_helper(),
-                             .observer = std::move(wire_log.exchanges),
+                             .observer = std::move(wire_log),
+                             .flight_records = &flight_files,
                              .published =
                                  [&published_to] {
                                    if (published_to != nullptr) published_to->published();

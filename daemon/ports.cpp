@@ -7,14 +7,12 @@
 
 namespace axisd {
 
-Ports::Ports(core::CoreLoop& loop, const std::string& link_helper, core::NetworkObserver observer)
-    : loop_(&loop),
-      link_client_(loop.executor(), loop.clock(), link_helper),
-      observer_(std::move(observer)) {}
+Ports::Ports(core::CoreLoop& loop, const std::string& link_helper)
+    : loop_(&loop), link_client_(loop.executor(), loop.clock(), link_helper) {}
 
 Result<std::unique_ptr<Ports>> Ports::open(core::CoreLoop& loop, const config::Configuration& configuration,
-                                           const std::string& link_helper, core::NetworkObserver observer) {
-  std::unique_ptr<Ports> ports(new Ports(loop, link_helper, std::move(observer)));
+                                           const std::string& link_helper) {
+  std::unique_ptr<Ports> ports(new Ports(loop, link_helper));
   auto lines = SimulatedLines::open(configuration);
   if (!lines) return fail(lines.error());
   ports->lines_ = std::move(*lines);
@@ -33,13 +31,9 @@ std::unique_ptr<modbus_rtu::Line> Ports::make_line(const modbus_rtu::LineSetting
 
 std::unique_ptr<can::Port> Ports::make_port(const canopen::NetworkSettings& settings) {
   can::PortSettings port{.bus = settings.name, .interface = settings.interface, .bitrate = settings.bitrate};
-  std::unique_ptr<can::Port> made;
   if (auto* network = networks_->find(settings.name); network != nullptr)
-    made = std::make_unique<can::NetworkPort>(loop_->clock(), std::move(port), *network);
-  else
-    made = std::make_unique<can::SocketCanPort>(loop_->executor(), loop_->clock(), std::move(port));
-  if (!observer_.wanted()) return made;
-  return std::make_unique<core::ObservedPort>(std::move(made), loop_->clock(), observer_);
+    return std::make_unique<can::NetworkPort>(loop_->clock(), std::move(port), *network);
+  return std::make_unique<can::SocketCanPort>(loop_->executor(), loop_->clock(), std::move(port));
 }
 
 core::LinkHelper Ports::link_helper() {

@@ -9,7 +9,6 @@
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/link_client.hpp"
 #include "daemon/core/link_cycler.hpp"
-#include "daemon/core/observed_port.hpp"
 #include "daemon/simulated_lines.hpp"
 #include "daemon/simulated_networks.hpp"
 
@@ -20,10 +19,9 @@ namespace axisd {
 /// or before that runs.
 class Ports {
  public:
-  /// `observer`: of CAN frames, may be empty. Errors: as of SimulatedLines and SimulatedNetworks.
+  /// Errors: as of SimulatedLines and SimulatedNetworks.
   static Result<std::unique_ptr<Ports>> open(core::CoreLoop& loop, const config::Configuration& configuration,
-                                             const std::string& link_helper,
-                                             core::NetworkObserver observer = {});
+                                             const std::string& link_helper);
   Ports(const Ports&) = delete;
 
   std::unique_ptr<modbus_rtu::Line> make_line(const modbus_rtu::LineSettings& settings);
@@ -31,11 +29,10 @@ class Ports {
   [[nodiscard]] core::LinkHelper link_helper();
 
  private:
-  Ports(core::CoreLoop& loop, const std::string& link_helper, core::NetworkObserver observer);
+  Ports(core::CoreLoop& loop, const std::string& link_helper);
 
   core::CoreLoop* loop_;
   core::LinkClient link_client_;
-  core::NetworkObserver observer_;
   std::unique_ptr<SimulatedLines> lines_;
   std::unique_ptr<SimulatedNetworks> networks_;
 };

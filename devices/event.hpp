@@ -37,12 +37,18 @@ struct ConfigurationDrift {
   std::string text;
 };
 
-using EventContent = std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift>;
+/// The newest frames of a bus were written to a file.
+struct FlightRecordWritten {
+  std::string bus, name, reason;
+};
+
+using EventContent =
+    std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon
   WallTime at{};
-  std::string axis;
+  std::string axis;  ///< empty: it concerns a bus
   EventContent content;
 };
 

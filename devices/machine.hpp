@@ -15,6 +15,7 @@
 #include "devices/axis/snapshot.hpp"
 #include "devices/bus_access.hpp"
 #include "devices/bus_kind.hpp"
+#include "devices/bus_watch.hpp"
 #include "devices/drive_access.hpp"
 #include "devices/event.hpp"
 
@@ -93,6 +94,7 @@ class Machine {
 
   [[nodiscard]] virtual DriveAccess& drive_access() = 0;
   [[nodiscard]] virtual BusAccess& bus_access() = 0;
+  [[nodiscard]] virtual BusWatch& bus_watch() = 0;
   [[nodiscard]] virtual EventSource& events() = 0;
 
   /// Called on the core thread whenever any snapshot was published; set once before serving.

@@ -245,6 +245,7 @@ Examples:
   axisctl bus read line-a 9 0x0000 4
   axisctl bus write line-a 40 16 -5 0x00FF
   axisctl bus status can0
+  axisctl bus statistics line-a
   axisctl bus transact can0 5 read 6041h:00
   axisctl bus transact can0 50 write 6200h:01 3 --type u8)");
   bus->add_subcommand("list", "All buses, a table for each kind")->callback([&invocation] {
@@ -255,6 +256,7 @@ Examples:
   status_command->add_option("BUS", *name, "Name of the bus");
   status_command->callback([&invocation, name] { status(invocation, *name); });
   add_scan_command(*bus, invocation);
+  add_watch_commands(*bus, invocation);
   add_exchanges(*bus, invocation);
 
   auto* device = app.add_subcommand("device", "Nodes that are not axes ('devices:' of the configuration)");

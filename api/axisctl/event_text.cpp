@@ -36,6 +36,10 @@ std::string text_of(const v1::ConfigurationDrift& drift) {
   return drift.text().empty() ? "holds its configuration again" : "drift: " + drift.text();
 }
 
+std::string text_of(const v1::FlightRecordWritten& record) {
+  return fmt::format("{}: flight record {}: {}", record.bus(), record.name(), record.reason());
+}
+
 std::string content(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
@@ -46,6 +50,8 @@ std::string content(const v1::Event& event) {
       return text_of(event.link_change());
     case v1::Event::kConfigurationDrift:
       return text_of(event.configuration_drift());
+    case v1::Event::kFlightRecord:
+      return text_of(event.flight_record());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -57,8 +63,8 @@ std::string content(const v1::Event& event) {
 std::string event_line(const v1::Event& event) {
   // Milliseconds: no bus is quicker.
   const auto at = TimeUtil::MillisecondsToTimestamp(TimeUtil::TimestampToMilliseconds(event.at()));
-  return fmt::format("{}  {}  {}  {}", TimeUtil::ToString(at), event.sequence(), event.axis(),
-                     content(event));
+  return fmt::format("{}  {}  {}  {}", TimeUtil::ToString(at), event.sequence(),
+                     event.axis().empty() ? "-" : event.axis(), content(event));
 }
 
 v1::EventKind parse_event_kind(std::string_view text) {
@@ -70,7 +76,7 @@ v1::EventKind parse_event_kind(std::string_view text) {
   }
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
-                            "configuration",
+                            "configuration, flight",
                             text));
 }
 

@@ -103,6 +103,7 @@ int run(int argc, const char* const* argv) {
   add_command_commands(app, invocation);
   add_drive_commands(app, invocation);
   add_bus_commands(app, invocation);
+  add_trace_command(app, invocation);
   add_event_commands(app, invocation);
   add_system_commands(app, invocation);
   add_offline_commands(app, invocation);

@@ -22,6 +22,18 @@ class BusServiceImpl final : public v1::BusService::CallbackService {
                     v1::TransactResponse* response) override;
   grpc::ServerWriteReactor<v1::ScanResponse>* Scan(Context* context, const v1::ScanRequest* request) override;
 
+  // bus_watch_calls.cpp
+  Reactor* GetBusStatistics(Context* context, const v1::GetBusStatisticsRequest* request,
+                            v1::GetBusStatisticsResponse* response) override;
+  grpc::ServerWriteReactor<v1::TraceBusResponse>* TraceBus(Context* context,
+                                                           const v1::TraceBusRequest* request) override;
+  Reactor* ListFlightRecords(Context* context, const v1::ListFlightRecordsRequest* request,
+                             v1::ListFlightRecordsResponse* response) override;
+  Reactor* GetFlightRecord(Context* context, const v1::GetFlightRecordRequest* request,
+                           v1::GetFlightRecordResponse* response) override;
+  Reactor* WriteFlightRecord(Context* context, const v1::WriteFlightRecordRequest* request,
+                             v1::WriteFlightRecordResponse* response) override;
+
  private:
   Reactor* transact_object(Context* context, const v1::TransactRequest* request,
                            v1::TransactResponse* response);

@@ -33,6 +33,13 @@ void fill(const ConfigurationDrift& from, v1::Event& event) {
   event.mutable_configuration_drift()->set_text(from.text);
 }
 
+void fill(const FlightRecordWritten& from, v1::Event& event) {
+  auto& to = *event.mutable_flight_record();
+  to.set_bus(from.bus);
+  to.set_name(from.name);
+  to.set_reason(from.reason);
+}
+
 }  // namespace
 
 v1::EventKind kind_of(const Event& event) {
@@ -41,6 +48,7 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const StateChange&) const { return v1::EVENT_KIND_STATE_CHANGE; }
     v1::EventKind operator()(const LinkChange&) const { return v1::EVENT_KIND_LINK_CHANGE; }
     v1::EventKind operator()(const ConfigurationDrift&) const { return v1::EVENT_KIND_CONFIGURATION_DRIFT; }
+    v1::EventKind operator()(const FlightRecordWritten&) const { return v1::EVENT_KIND_FLIGHT_RECORD; }
   };
   return std::visit(Kind{}, event.content);
 }

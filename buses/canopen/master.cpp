@@ -71,8 +71,10 @@ Task<Result<can::SendResult>> Master::send_pdo(std::uint32_t cob_id, Bytes bytes
                    "use an identifier of 11 bits, not 0, and 8 bytes at most");
   const auto frame = can::make_frame(cob_id, bytes);
   const auto result = co_await sent(frame, std::move(options));
-  if (result.status == can::SendStatus::sent) co_return result;
-  co_return fail(can::error_of(result, port_->settings().bus, frame));
+  if (result.status != can::SendStatus::sent)
+    co_return fail(can::error_of(result, port_->settings().bus, frame));
+  if (const auto cob = classify(cob_id); cob.service == Service::rpdo) ++traffic_.at(cob.node).rpdos;
+  co_return result;
 }
 
 Result<void> Master::subscribe_pdo(std::uint32_t cob_id, PdoHandler handler) {
@@ -100,11 +102,12 @@ void Master::on_frame(const can::ReceivedFrame& received) {
     ++counters_.unknown_cob;
     return;
   }
+  const auto [service, node, number] = classify(frame.id);
+  if (service == Service::tpdo && !frame.rtr) ++traffic_.at(node).tpdos;
   if (const auto pdo = pdos_.find(frame.id); pdo != pdos_.end() && !frame.rtr) {
     const auto handler = pdo->second;  // it may end its own subscription
     return handler(received);
   }
-  const auto [service, node, number] = classify(frame.id);
   switch (service) {
     case Service::sdo_reply:
       // Also of nodes that are only looked for.
@@ -155,7 +158,9 @@ void Master::on_emergency(std::uint8_t node, const can::ReceivedFrame& received)
 }
 
 void Master::on_node_event(const NodeEvent& event) {
+  if (event.kind == NodeEvent::Kind::heartbeat_lost) ++traffic_.at(event.node).heartbeats_lost;
   if (event.kind == NodeEvent::Kind::booted) {
+    ++traffic_.at(event.node).boots;
     sdo_.on_boot(event.node);
     emergencies_.on_boot(event.node);
   }

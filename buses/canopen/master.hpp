@@ -31,6 +31,13 @@ struct MasterCounters {
   std::uint64_t foreign_syncs = 0;  ///< SYNC of another producer; also an EMCY with its identifier
 };
 
+/// What came from or went to one node beside SDO and EMCY; since start.
+struct NodeTraffic {
+  std::uint64_t tpdos = 0;  ///< received, by the identifiers of the predefined set
+  std::uint64_t rpdos = 0;  ///< sent, likewise
+  std::uint64_t heartbeats_lost = 0, boots = 0;
+};
+
 /// Thread: core. Adopts nodes as they are: starting it sends nothing (M25).
 class Master {
  public:
@@ -77,6 +84,9 @@ class Master {
   [[nodiscard]] const EmergencyHistory& emergencies() const { return emergencies_; }
   [[nodiscard]] const can::Port& port() const { return *port_; }
   [[nodiscard]] const MasterCounters& counters() const { return counters_; }
+  [[nodiscard]] const NodeTraffic& traffic(std::uint8_t node) const { return traffic_.at(node); }
+  /// Nodes that were added.
+  [[nodiscard]] const std::set<std::uint8_t>& nodes() const { return nodes_; }
   /// Nodes that are not configured but heard.
   [[nodiscard]] const std::set<std::uint8_t>& foreign_nodes() const { return foreign_nodes_; }
 
@@ -100,6 +110,7 @@ class Master {
   std::set<std::uint8_t> nodes_, foreign_nodes_;
   std::map<std::uint32_t, PdoHandler> pdos_;
   MasterCounters counters_;
+  std::array<NodeTraffic, highest_node + 1> traffic_{};  ///< by node-ID
   std::optional<TimePoint> foreign_sync_at_;
 };
 

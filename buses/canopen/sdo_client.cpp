@@ -67,7 +67,7 @@ Task<Result<SdoAnswer>> SdoClient::transact(std::uint8_t id, RequestPtr request)
                 .message = fmt::format("{} requests wait for this node", known.count()),
                 .remedy = "retry later"};
   if (why) {
-    ++counters_.rejected;
+    ++(nodes_.contains(id) ? node(id).counters : others_).rejected;
     why->where = {.bus = port_->settings().bus, .node = id, .object = request->object.key()};
     co_return fail(std::move(*why));
   }
@@ -141,14 +141,14 @@ void SdoClient::begin(Node& node, RequestPtr request) {
                     "check power, wiring, node-ID and bit rate of the node"));
       return;
     }
-    ++counters_.resynchronisations;
+    ++node.counters.resynchronisations;
     transfer = SdoTransfer::upload(*object, settings_.upload_limit);
   }
   node.active.emplace(Active{.request = std::move(request),
                              .transfer = std::move(transfer),
                              .probe = probe,
                              .ambiguous = held && !probe});
-  ++counters_.transfers;
+  ++node.counters.transfers;
   send(node, node.active->transfer.first_frame());
 }
 
@@ -204,7 +204,7 @@ void SdoClient::on_sent(std::uint8_t id, std::uint64_t frame_id, const can::Send
 void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
   const auto found = nodes_.find(id);
   if (found == nodes_.end()) {
-    ++counters_.unexpected_replies;
+    ++others_.unexpected_replies;
     return;
   }
   auto& target = *found->second;
@@ -236,7 +236,7 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
                              .sent_at = active.first_sent,
                              .answered_at = received.at});
   } else {
-    ++(step.frame ? counters_.protocol_errors : counters_.aborted_by_node);
+    ++(step.frame ? target.counters.protocol_errors : target.counters.aborted_by_node);
     if (step.frame) send_abort(target, *step.frame, active.request->options.transaction_class);
     finish(target, fail(std::move(step.error)));
   }
@@ -245,8 +245,31 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
 
 /// Nobody waits for this reply: late, or of a second node with this node-ID.
 void SdoClient::on_unexpected(Node& node) {
-  ++counters_.unexpected_replies;
+  ++node.counters.unexpected_replies;
   if (!node.late.explain()) node.surplus.on_surplus();
+}
+
+SdoCounters& SdoCounters::operator+=(const SdoCounters& other) {
+  transfers += other.transfers;
+  aborted_by_node += other.aborted_by_node;
+  timeouts += other.timeouts;
+  protocol_errors += other.protocol_errors;
+  unexpected_replies += other.unexpected_replies;
+  resynchronisations += other.resynchronisations;
+  cut_by_stop += other.cut_by_stop;
+  rejected += other.rejected;
+  return *this;
+}
+
+SdoCounters SdoClient::counters(std::uint8_t node) const {
+  const auto found = nodes_.find(node);
+  return found == nodes_.end() ? SdoCounters{} : found->second->counters;
+}
+
+SdoCounters SdoClient::counters() const {
+  auto sum = others_;
+  for (const auto& [id, node] : nodes_) sum += node->counters;
+  return sum;
 }
 
 bool SdoClient::answers_twice(std::uint8_t node) const {
@@ -262,7 +285,7 @@ void SdoClient::on_due(Node& node) {
     const auto timeout = active.request->options.timeout.value_or(settings_.timeout);
     const bool endless = now >= active.limit;
     if (endless || now >= *active.last_sent + timeout) {
-      ++counters_.timeouts;
+      ++node.counters.timeouts;
       auto error = no_reply_error(active.transfer);
       if (endless && active.limit > active.first_sent + timeout) {
         error.message =
@@ -284,7 +307,7 @@ void SdoClient::on_due(Node& node) {
 /// spared the abort: a small one has one buffer, and of two frames in a row loses the second.
 void SdoClient::cut(Node& node) {
   auto& active = *node.active;
-  ++counters_.cut_by_stop;
+  ++node.counters.cut_by_stop;
   node.late.expect(active.transfer.object(), clock_->now());
   if (active.opened) send_abort(node, active.transfer.abort(SdoAbort::general), TransactionClass::stop);
   if (active.probe) {

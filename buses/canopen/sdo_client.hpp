@@ -53,6 +53,7 @@ struct SdoCounters {
   std::uint64_t transfers = 0, aborted_by_node = 0, timeouts = 0, protocol_errors = 0,
                 unexpected_replies = 0,  ///< discarded: nobody waited for them
       resynchronisations = 0, cut_by_stop = 0, rejected = 0;
+  SdoCounters& operator+=(const SdoCounters& other);
 };
 
 /// Thread: core.
@@ -84,7 +85,10 @@ class SdoClient {
   /// Ends everything; nothing is begun any more.
   void close();
 
-  [[nodiscard]] const SdoCounters& counters() const { return counters_; }
+  /// Of all nodes.
+  [[nodiscard]] SdoCounters counters() const;
+  /// Of one node; all 0 if nothing was ever asked of it.
+  [[nodiscard]] SdoCounters counters(std::uint8_t node) const;
   /// More replies come from this node-ID than were asked for: two nodes have it.
   [[nodiscard]] bool answers_twice(std::uint8_t node) const;
   [[nodiscard]] const SdoSettings& settings() const { return settings_; }
@@ -118,7 +122,7 @@ class SdoClient {
   can::Port* port_;
   SdoSettings settings_;
   std::map<std::uint8_t, std::unique_ptr<Node>> nodes_;
-  SdoCounters counters_;
+  SdoCounters others_;  ///< of nodes of which nothing was asked yet
   std::uint64_t last_frame_id_ = 0;
   bool closed_ = false;
 };

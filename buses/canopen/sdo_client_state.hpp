@@ -60,6 +60,7 @@ struct SdoClient::Node {
   std::optional<Active> active;
   LateReplies late;
   SurplusReplies surplus;
+  SdoCounters counters;
   /// Of so many requests one comes from a lower class than the highest, so that polling starves nobody.
   static constexpr unsigned reservation = 8;
   unsigned bound = 0;  ///< requests that overtook a lower class

@@ -59,7 +59,8 @@ RtuBus::RtuBus(Executor executor, Clock& clock, LineSettings settings, std::uniq
       clock_(&clock),
       settings_(std::move(settings)),
       line_(std::move(line)),
-      port_changed_(executor_, clock) {}
+      port_changed_(executor_, clock),
+      statistics_(settings_.serial(), clock.now()) {}
 
 RtuBus::~RtuBus() = default;
 
@@ -83,6 +84,12 @@ bool RtuBus::needs_resync(const Request& request) const {
 int RtuBus::garbled(std::uint8_t node) const {
   const auto found = garbled_.find(node);
   return found == garbled_.end() ? 0 : found->second;
+}
+
+LineStatistics RtuBus::statistics() const {
+  auto copy = statistics_;
+  copy.waiting([this](TransactionClass transaction_class) { return queue_.size(transaction_class); });
+  return copy;
 }
 
 Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOptions options) const {
@@ -112,6 +119,8 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
     co_return fail(Reason::internal, "stops and motion go out with the line's own serial settings only");
   auto transaction = std::make_unique<Transaction>();
   transaction->transaction_class = options.transaction_class;
+  const auto transaction_class = options.transaction_class;
+  transaction->queued_at = clock_->now();
   transaction->exchange = exchange_for(std::move(request), *frame, std::move(options));
 
   Promise<Result<Answer>> promise(executor_, *clock_);
@@ -119,6 +128,7 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
     promise.set(answer(ended, result));
   });
   queue_.push(std::move(transaction));
+  statistics_.queued(transaction_class, queue_.size(transaction_class));
   pump();
   co_return co_await promise.get();
 }
@@ -173,6 +183,7 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   auto resync = std::make_unique<Transaction>();
   resync->transaction_class = waiting->transaction_class;
   resync->reserved = waiting->reserved;
+  resync->queued_at = waiting->queued_at;
   resync->exchange = waiting->exchange;
   auto& request = resync->exchange.request;
   while (request.count > 1 && needs_resync(request)) --request.count;
@@ -207,7 +218,6 @@ void RtuBus::reap(TimePoint now) {
 void RtuBus::on_result(const ExchangeResult& result) {
   auto ended = std::exchange(current_, nullptr);
   if (!ended) return;
-  if (observer_) observer_(settings_.name, ended->exchange, result);
   note_late_read(ended->exchange.request, result);
   note_garbled(ended->exchange.request, result);
   end(std::move(ended), result);
@@ -264,33 +274,9 @@ void RtuBus::on_port(const PortStatus& status) {
 }
 
 void RtuBus::end(TransactionPtr transaction, const ExchangeResult& result) {
-  count(result);
+  statistics_.ended(*transaction, result);
+  if (observer_) observer_(*transaction, result);
   for (const auto& tell : transaction->on_end) tell(*transaction, result);
-}
-
-void RtuBus::count(const ExchangeResult& result) {
-  counters_.foreign_frames += static_cast<std::uint64_t>(result.foreign_frames);
-  switch (result.status) {
-    case ExchangeStatus::replied:
-      ++counters_.transactions;
-      if (result.reply.kind == ReplyKind::exception) ++counters_.exceptions;
-      break;
-    case ExchangeStatus::timeout:
-    case ExchangeStatus::cut:
-      ++counters_.timeouts;
-      break;
-    case ExchangeStatus::corrupt:
-      ++counters_.corrupt;
-      break;
-    case ExchangeStatus::unsupported:
-      break;
-    case ExchangeStatus::not_sent:
-      ++(result.verdict == Verdict::expired ? counters_.dropped_expired : counters_.dropped_superseded);
-      break;
-    case ExchangeStatus::io_error:
-      ++counters_.io_errors;
-      break;
-  }
 }
 
 Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResult& result) const {

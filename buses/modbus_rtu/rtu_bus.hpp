@@ -9,6 +9,7 @@
 #include "buses/bus.hpp"
 #include "buses/clock.hpp"
 #include "buses/modbus_rtu/line.hpp"
+#include "buses/modbus_rtu/line_statistics.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "buses/modbus_rtu/transaction_queue.hpp"
 #include "buses/signal.hpp"
@@ -23,14 +24,8 @@ struct Answer {
   TimePoint answered_at;                 ///< last byte of the reply
 };
 
-/// Counters of one bus. Read on the core thread.
-struct BusCounters {
-  std::uint64_t transactions = 0, timeouts = 0, corrupt = 0, exceptions = 0, foreign_frames = 0,
-                dropped_expired = 0, dropped_superseded = 0, io_errors = 0;
-};
-
-/// What went over the wire, for traces. Called on the core thread after each exchange; must not block.
-using ExchangeObserver = std::function<void(const std::string& bus, const Exchange&, const ExchangeResult&)>;
+/// Told how each transaction ended, sent or not, for traces. Called on the core thread; must not block.
+using ExchangeObserver = std::function<void(const Transaction&, const ExchangeResult&)>;
 
 /// One RS-485 line on the core thread: queues transactions, hands the line one at a time, and tells each
 /// caller exactly once how its transaction ended. Thread: core.
@@ -59,7 +54,9 @@ class RtuBus final : public Bus {
   [[nodiscard]] bool simulated() const override { return settings_.simulated(); }
   [[nodiscard]] const PortStatus& port() const override { return port_; }
   [[nodiscard]] Signal& port_changed() override { return port_changed_; }
-  [[nodiscard]] const BusCounters& counters() const { return counters_; }
+  /// With how many wait now.
+  [[nodiscard]] LineStatistics statistics() const;
+  [[nodiscard]] BusCounters counters() const { return statistics_.counters(); }
   /// Damaged replies of `node` in a row, without a sound one or silence between them.
   [[nodiscard]] int garbled(std::uint8_t node) const;
   [[nodiscard]] TimePoint last_progress() const override { return line_->last_progress(); }
@@ -75,7 +72,6 @@ class RtuBus final : public Bus {
   void on_port(const PortStatus& status);
   void reap(TimePoint now);
   void end(TransactionPtr transaction, const ExchangeResult& result);
-  void count(const ExchangeResult& result);
   void note_late_read(const Request& request, const ExchangeResult& result);
   void note_garbled(const Request& request, const ExchangeResult& result);
   [[nodiscard]] Result<Answer> answer(const Transaction& transaction, const ExchangeResult& result) const;
@@ -94,7 +90,7 @@ class RtuBus final : public Bus {
   std::map<std::uint8_t, std::map<std::uint16_t, TimePoint>> late_reads_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Clock::Timer expiry_;
-  BusCounters counters_;
+  LineStatistics statistics_;
   bool closed_ = false;
   ExchangeObserver observer_;
   std::shared_ptr<AxisGate> override_gate_ = std::make_shared<AxisGate>();

@@ -18,6 +18,7 @@ struct Transaction {
   Exchange exchange;
   TransactionClass transaction_class = TransactionClass::parameters;
   std::uint64_t sequence = 0;  ///< order of arrival; set by the queue
+  TimePoint queued_at{};       ///< when it was asked for
   bool reserved = false;       ///< it was given out by the reservation: only a stop may take its place
   /// Called exactly once each. Several: identical reads that were merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
@@ -47,6 +48,10 @@ class TransactionQueue {
   /// Earliest deadline of all, or TimePoint::max().
   [[nodiscard]] TimePoint next_deadline() const;
   [[nodiscard]] std::size_t size() const;
+  /// Of one class.
+  [[nodiscard]] std::size_t size(TransactionClass transaction_class) const {
+    return lanes_.at(static_cast<std::size_t>(transaction_class)).size();
+  }
 
  private:
   using Lane = std::deque<TransactionPtr>;

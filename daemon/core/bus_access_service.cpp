@@ -41,16 +41,16 @@ void tell(const std::weak_ptr<void>& alive, const std::function<void(Result<Scan
 
 }  // namespace
 
-BusAccessService::BusAccessService(Executor executor, Clock& clock, MachineCore& machine)
-    : executor_(std::move(executor)), clock_(&clock), machine_(&machine) {}
-
-Error BusAccessService::no_such_bus(const std::string& name) const {
+Error no_such_bus(const MachineCore& machine, const std::string& name) {
   std::string known;
-  for (const auto& bus : machine_->buses()) known += (known.empty() ? "" : ", ") + bus->name();
+  for (const auto& bus : machine.buses()) known += (known.empty() ? "" : ", ") + bus->name();
   return {.reason = Reason::invalid_argument,
           .message = fmt::format("there is no bus '{}'", name),
           .remedy = fmt::format("the configuration has: {}", known)};
 }
+
+BusAccessService::BusAccessService(Executor executor, Clock& clock, MachineCore& machine)
+    : executor_(std::move(executor)), clock_(&clock), machine_(&machine) {}
 
 void BusAccessService::transact(TransactRequest request,
                                 std::function<void(Result<std::vector<std::uint16_t>>)> callback) {
@@ -68,7 +68,7 @@ Task<Result<std::vector<std::uint16_t>>> BusAccessService::run_transact(Transact
     co_return fail(Reason::invalid_argument,
                    fmt::format("{} is a CAN network: it has no registers", request.bus),
                    "read or write an object");
-  if (bus == nullptr) co_return fail(no_such_bus(request.bus));
+  if (bus == nullptr) co_return fail(no_such_bus(*machine_, request.bus));
   const bool writes = !request.values.empty();
   const Address where{.bus = request.bus, .node = request.node, .object = request.address};
   if (writes)
@@ -102,7 +102,7 @@ Task<Result<std::vector<std::uint8_t>>> BusAccessService::run_transact(ObjectReq
     co_return fail(Reason::invalid_argument,
                    fmt::format("{} is an RS-485 line: it has no objects", request.bus),
                    "read or write registers");
-  if (bus == nullptr) co_return fail(no_such_bus(request.bus));
+  if (bus == nullptr) co_return fail(no_such_bus(*machine_, request.bus));
   const bool writes = !request.bytes.empty();
   const Address where{.bus = request.bus, .node = request.node, .object = request.object};
   if (writes)
@@ -126,7 +126,7 @@ Result<std::unique_ptr<NodeScan>> BusAccessService::scan_of(ScanRequest request,
   if (auto* network = machine_->find_network(request.bus))
     return std::make_unique<NetworkScan>(executor_, *clock_, *machine_, *network, std::move(request),
                                          std::move(alive));
-  return fail(no_such_bus(request.bus));
+  return fail(no_such_bus(*machine_, request.bus));
 }
 
 std::shared_ptr<void> BusAccessService::scan(ScanRequest request, ScanCallback callback) {

@@ -14,6 +14,9 @@
 
 namespace axisd::core {
 
+/// The error of a request that names a bus that is not there.
+[[nodiscard]] Error no_such_bus(const MachineCore& machine, const std::string& name);
+
 /// What the API can ask of the buses: hands it to the core thread, where the sequences run; closing the
 /// machine ends them. Thread: any, from construction (before the core runs) to destruction (after it ended).
 class BusAccessService final : public BusAccess {
@@ -38,7 +41,6 @@ class BusAccessService final : public BusAccess {
   Task<> run_scan(ScanRequest request, std::weak_ptr<void> alive, ScanCallback callback);
   [[nodiscard]] Result<std::unique_ptr<NodeScan>> scan_of(ScanRequest request,
                                                           std::weak_ptr<void> alive) const;
-  [[nodiscard]] Error no_such_bus(const std::string& name) const;
 
   Executor executor_;
   Clock* clock_;

@@ -46,25 +46,35 @@ void log_link(const canopen::CanopenBus& network, std::string& told) {
 }  // namespace
 
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
-    : parts_(std::move(parts)), book_(*parts_.clock, parts_.instance_id) {
+    : parts_(std::move(parts)),
+      book_(*parts_.clock, parts_.instance_id),
+      flight_recorder_(*parts_.clock, parts_.flight_records,
+                       [this](const std::string& axis, const FlightRecordWritten& record) {
+                         events_.record(parts_.clock->wall(parts_.clock->now()), axis, record);
+                       }) {
+  const auto memory = static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024;
   if (parts_.persistence != nullptr) {
     const auto& inhibit = parts_.persistence->loaded().inhibit;
     set_inhibit(inhibit.active, inhibit.by);
   }
   for (const auto& line : configuration.lines) {
+    add_recorder(line.name, memory, 0);
     lines_.push_back(
         std::make_unique<modbus_rtu::RtuBus>(parts_.executor, *parts_.clock, line, parts_.make_line(line)));
     buses_.push_back(lines_.back().get());
   }
   for (const auto& network : configuration.networks) {
-    networks_.push_back(std::make_unique<canopen::CanopenBus>(parts_.executor, *parts_.clock, network,
-                                                              parts_.make_port(network)));
+    auto& recorder = add_recorder(network.name, memory, static_cast<int>(network.bitrate));
+    networks_.push_back(std::make_unique<canopen::CanopenBus>(
+        parts_.executor, *parts_.clock, network,
+        std::make_unique<ObservedPort>(parts_.make_port(network), *parts_.clock,
+                                       recorder.network_observer())));
     buses_.push_back(networks_.back().get());
     cyclers_.push_back(
         std::make_unique<LinkCycler>(parts_.executor, *parts_.clock, *networks_.back(), parts_.link_helper));
   }
   const auto record = [this](const std::string& axis, EventContent content) {
-    events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
+    on_event(axis, std::move(content));
   };
   for (const auto& entry : configuration.axes) {
     const auto& settings = entry.axis;
@@ -143,10 +153,11 @@ void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
 }
 
 void MachineCore::start() {
-  for (const auto& line : lines_) line->start(parts_.observer);
+  for (std::size_t i = 0; i < lines_.size(); ++i) lines_[i]->start(recorders_[i]->exchange_observer());
   for (const auto& network : networks_) network->start();
   for (const auto& cycler : cyclers_) launch(cycler->run(), "link cycler");
   for (const auto& network : networks_) launch(watch(*network), "network watch");
+  for (auto* bus : buses_) launch(watch_port(*bus), "port watch");
   for (const auto& axis : axes_) axis->start();
   for (const auto& device : devices_) device->start();
 }
@@ -164,6 +175,52 @@ Task<> MachineCore::watch(canopen::CanopenBus& network) {
         axis->bus_lost(
             network.last_loss().value_or(Error{.reason = Reason::bus_down, .message = "the bus was lost"}));
   }
+}
+
+/// A port that was lost leaves what went before it in a flight record.
+Task<> MachineCore::watch_port(Bus& bus) {
+  while (!closing_) {
+    const bool was_open = bus.port().open;
+    co_await bus.port_changed().wait();
+    if (closing_ || !was_open || bus.port().open) continue;
+    flight_recorder_.fault(*find_recorder(bus.name()), {},
+                           bus.port().error ? to_string(*bus.port().error) : "the bus was lost");
+  }
+}
+
+BusRecorder& MachineCore::add_recorder(const std::string& bus, std::size_t memory, int bit_rate) {
+  recorders_.push_back(std::make_unique<BusRecorder>(bus, memory, bit_rate, *parts_.clock, parts_.observer));
+  return *recorders_.back();
+}
+
+const BusRecorder* MachineCore::find_recorder(std::string_view bus) const {
+  const auto found = std::ranges::find_if(recorders_, [&](const auto& r) { return r->bus() == bus; });
+  return found == recorders_.end() ? nullptr : found->get();
+}
+
+void MachineCore::on_event(const std::string& axis, EventContent content) {
+  if (const auto* found = find(axis)) note_fault(*found, content);
+  events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
+}
+
+/// What a person will ask about afterwards: an axis that stopped by an error (an alarm, a stop that was not
+/// confirmed, an outcome that is unknown), or whose drive fell silent while it moved.
+void MachineCore::note_fault(const Axis& axis, const EventContent& content) {
+  const auto now = axis.snapshot();
+  const auto& recorder = *find_recorder(axis.settings().bus);
+  const auto& name = axis.settings().name;
+  const auto because = [&](std::string_view what, const std::optional<Error>& error) {
+    std::string_view message = error ? error->message : std::string_view();
+    if (message.starts_with(name + ": ")) message.remove_prefix(name.size() + 2);
+    flight_recorder_.fault(recorder, name,
+                           fmt::format("{}: {}{}{}", name, what, message.empty() ? "" : ": ", message));
+  };
+  if (const auto* state = std::get_if<StateChange>(&content);
+      state != nullptr && state->to == AxisState::error_stop)
+    because("ErrorStop", now->fault);
+  if (const auto* link = std::get_if<LinkChange>(&content);
+      link != nullptr && link->to == LinkState::offline && now->moving)
+    because("silent while it moved", now->link_error);
 }
 
 Axis* MachineCore::find(std::string_view axis) const {
@@ -232,6 +289,7 @@ bool MachineCore::at_rest() const {
 
 void MachineCore::close() {
   closing_ = true;
+  flight_recorder_.close();
   for (const auto& axis : axes_) axis->close();
   for (const auto& device : devices_) device->close();
   for (const auto& cycler : cyclers_) cycler->close();

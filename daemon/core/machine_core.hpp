@@ -10,7 +10,9 @@
 #include "buses/canopen/canopen_bus.hpp"
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "config/configuration.hpp"
+#include "daemon/core/bus_recorder.hpp"
 #include "daemon/core/event_log.hpp"
+#include "daemon/core/flight_recorder.hpp"
 #include "daemon/core/link_cycler.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
@@ -30,7 +32,8 @@ struct MachineParts {
   /// May be empty where the configuration has no CAN network.
   std::function<std::unique_ptr<can::Port>(const canopen::NetworkSettings&)> make_port{};
   LinkHelper link_helper{};  ///< without: links stay as they are after bus-off and stalls (M26)
-  modbus_rtu::ExchangeObserver observer;
+  FrameObserver observer{};  ///< told every frame (the wire log); may be empty
+  store::RecordFiles* flight_records = nullptr;  ///< may be null: none are written
   std::function<void()> published;
 };
 
@@ -73,21 +76,31 @@ class MachineCore {
   void stop_moving_axes();
   [[nodiscard]] bool at_rest() const;
   [[nodiscard]] std::vector<BusStatus> bus_status() const;
+  /// What sees the frames of a bus. nullptr if there is none of that name.
+  [[nodiscard]] const BusRecorder* find_recorder(std::string_view bus) const;
+  [[nodiscard]] FlightRecorder& flight_recorder() { return flight_recorder_; }
   /// Runs a sequence that uses what this owns; closed() waits for its end.
   void launch(Task<> sequence, const char* name);
   /// Ends all sequences; then closed() comes true and the machine can be destroyed. Moves nothing.
   void close();
   [[nodiscard]] bool closed() const;
+  [[nodiscard]] bool closing() const { return closing_; }
   /// Every bus is open, or it is known why not.
   [[nodiscard]] bool buses_reported() const;
 
  private:
   Task<> watch(canopen::CanopenBus& network);
+  Task<> watch_port(Bus& bus);
+  BusRecorder& add_recorder(const std::string& bus, std::size_t memory, int bit_rate);
+  void on_event(const std::string& axis, EventContent content);
+  void note_fault(const Axis& axis, const EventContent& content);
   void set_inhibit(bool inhibited, const std::string& by);
 
   MachineParts parts_;
   CommandBook book_;
   EventLog events_;
+  std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before these, which tell them
+  FlightRecorder flight_recorder_;
   bool inhibited_ = false;
   int latches_ = 0;  ///< StopAlls so far
   boost::atomic_shared_ptr<const std::string> inhibited_by_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/core/bus_access_service.hpp"
+#include "daemon/core/bus_watch_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/drive_access_service.hpp"
 #include "daemon/core/machine_core.hpp"
@@ -34,6 +35,7 @@ class MachineService final : public Machine {
   void buses(std::function<void(std::vector<BusStatus>)> callback) override;
   [[nodiscard]] DriveAccess& drive_access() override { return drive_access_; }
   [[nodiscard]] BusAccess& bus_access() override { return bus_access_; }
+  [[nodiscard]] BusWatch& bus_watch() override { return bus_watch_; }
   [[nodiscard]] EventSource& events() override { return machine_->events(); }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override { return loop_->clock().wall(t); }
@@ -52,6 +54,7 @@ class MachineService final : public Machine {
   MachineCore* machine_;
   DriveAccessService drive_access_;
   BusAccessService bus_access_;
+  BusWatchService bus_watch_;
   std::string name_;
   std::string instance_id_;
   std::atomic<bool> closing_{false};

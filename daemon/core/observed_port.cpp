@@ -10,27 +10,26 @@ ObservedPort::ObservedPort(std::unique_ptr<can::Port> inner, Clock& clock, Netwo
       observer_(std::make_shared<const NetworkObserver>(std::move(observer))) {}
 
 void ObservedPort::start(can::PortHandlers handlers) {
-  const auto& bus = settings().bus;
-  inner_->start({.on_frame =
-                     [observer = observer_, bus,
-                      told = std::move(handlers.on_frame)](const can::ReceivedFrame& received) {
-                       observer->received(bus, received);
-                       if (told) told(received);
-                     },
-                 .on_state =
-                     [observer = observer_, bus, clock = clock_,
-                      told = std::move(handlers.on_state)](const can::PortState& state) {
-                       observer->state(bus, state, clock->now());
-                       if (told) told(state);
-                     }});
+  inner_->start(
+      {.on_frame =
+           [observer = observer_, told = std::move(handlers.on_frame)](const can::ReceivedFrame& received) {
+             observer->received(received);
+             if (told) told(received);
+           },
+       .on_state =
+           [observer = observer_, clock = clock_,
+            told = std::move(handlers.on_state)](const can::PortState& state) {
+             observer->state(state, clock->now());
+             if (told) told(state);
+           }});
 }
 
 void ObservedPort::send(const can::Frame& frame, const can::SendOptions& options,
                         can::Completion completion) {
   inner_->send(frame, options,
-               [observer = observer_, bus = settings().bus, frame, clock = clock_,
+               [observer = observer_, frame, transaction_class = options.transaction_class, clock = clock_,
                 told = std::move(completion)](const can::SendResult& result) {
-                 observer->ended(bus, frame, result, clock->now());
+                 observer->ended(frame, transaction_class, result, clock->now());
                  if (told) told(result);
                });
 }

@@ -9,19 +9,18 @@ namespace axisd::core {
 
 /// Told everything that a CAN port does, in the order in which it tells it. Thread: core; must not wait.
 struct NetworkObserver {
-  std::function<void(const std::string& bus, const can::ReceivedFrame& received)> received;
+  std::function<void(const can::ReceivedFrame& received)> received;
   /// A frame of ours ended; `at`: when that was known.
-  std::function<void(const std::string& bus, const can::Frame& frame, const can::SendResult& result,
-                     TimePoint at)>
+  std::function<void(const can::Frame& frame, TransactionClass transaction_class,
+                     const can::SendResult& result, TimePoint at)>
       ended;
-  std::function<void(const std::string& bus, const can::PortState& state, TimePoint at)> state;
-  [[nodiscard]] bool wanted() const { return received && ended && state; }
+  std::function<void(const can::PortState& state, TimePoint at)> state;
 };
 
-/// A port that tells an observer before it tells its owner (for the wire log). Thread: core.
+/// A port that tells an observer before it tells its owner. Thread: core.
 class ObservedPort final : public can::Port {
  public:
-  /// Precondition: the observer is wanted(). `clock` outlives it.
+  /// Precondition: the observer has all its functions. `clock` outlives it.
   ObservedPort(std::unique_ptr<can::Port> inner, Clock& clock, NetworkObserver observer);
 
   void start(can::PortHandlers handlers) override;

@@ -1,23 +1,10 @@
 #include "daemon/store/file_store.hpp"
 
-#include <csignal>
 #include <utility>
 
+#include "daemon/store/thread.hpp"
+
 namespace axisd::store {
-namespace {
-
-/// Starts a thread that takes no signals: those belong to the main thread.
-std::thread start_thread(std::function<void()> body) {
-  sigset_t all;
-  sigset_t before;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &before);
-  std::thread thread(std::move(body));
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  return thread;
-}
-
-}  // namespace
 
 Result<std::unique_ptr<FileStore>> FileStore::open(const std::filesystem::path& directory, Executor core) {
   auto opened = StateDirectory::open(directory);

@@ -35,6 +35,7 @@
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/axis/snapshot.hpp"
+#include "devices/axis/unknown_outcomes.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
 #include "devices/event.hpp"
@@ -86,6 +87,8 @@ class Axis {
   [[nodiscard]] const Scale& scale() const { return scale_; }
   [[nodiscard]] const std::optional<DriveIdentity>& identity() const { return identity_; }
   [[nodiscard]] std::uint64_t eeprom_writes() const { return eeprom_writes_; }
+  /// Since start.
+  [[nodiscard]] const UnknownOutcomes& unknown_starts() const { return unknown_starts_; }
   /// Errors: offline, configuring.
   [[nodiscard]] Result<void> check_online() const;
   /// Keeps commands other than stops away from the drive while it lives. Errors: moving, fault (the power
@@ -281,6 +284,7 @@ class Axis {
   std::string drift_;                ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;  ///< of begin_maintenance()
   std::uint64_t eeprom_writes_ = 0;
+  UnknownOutcomes unknown_starts_;
   bool absolute_segments_ = false;
 
   std::optional<DriveSample> sample_;

@@ -278,14 +278,19 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   while (env_.clock->now() < deadline || !sample_ || sample_->asked_at < deadline) {
     wake_.notify_all();
     co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(50)));
-    if (!current(*activity)) co_return false;  // offline, too: then the command has ended as unknown
+    if (!current(*activity)) {  // offline, too: then the command has ended as unknown
+      ++unknown_starts_.unresolved;
+      co_return false;
+    }
     if (sample_->asked_at >= since &&
         (sample_->moving || tracker_.counter() != base || sample_->mode != DriveMode::positioning)) {
+      ++unknown_starts_.executed;
       activity->command->activate();
       publish();
       co_return true;
     }
   }
+  ++unknown_starts_.not_executed;
   cause.outcome = Outcome::not_executed;
   cause.message = fmt::format("{}: the start frame got no reply, and the drive did not move: {}",
                               settings_.name, cause.message);

@@ -133,6 +133,44 @@ class FakeNodes:
             return bus_pb.TransactResponse(data=b"\x37\x02", value=0x237)
         return bus_pb.TransactResponse(values=[0xFFFF - i for i in range(request.read)])
 
+    async def GetBusStatistics(self, request, context):
+        self.note("GetBusStatistics", request, context)
+        line = bus_pb.BusStatistics(bus="line-a", kind=bus_pb.BUS_KIND_MODBUS_RTU, utilisation=0.25, classes=[
+            bus_pb.ClassStatistics(transaction_class=bus_pb.TRANSACTION_CLASS_MOTION, sent=10, dropped_superseded=2,
+                                   queueing=bus_pb.LatencyHistogram(counts=[5, 5]))], nodes=[
+            bus_pb.NodeStatistics(node=1, name="feeder", line=bus_pb.LineNodeStatistics(replies=9, timeouts=1))])
+        line.since_start.FromSeconds(60)
+        line.classes[0].queueing.longest.FromMicroseconds(110)
+        network = bus_pb.BusStatistics(bus="can0", kind=bus_pb.BUS_KIND_CANOPEN, nodes=[
+            bus_pb.NodeStatistics(node=5, network=bus_pb.NetworkNodeStatistics(sdo_timeouts=3, tpdos=40))])
+        return bus_pb.GetBusStatisticsResponse(buses=[line, network])
+
+    async def TraceBus(self, request, context):
+        self.note("TraceBus", request, context)
+        yield bus_pb.TraceBusResponse()
+        sent = bus_pb.TracedFrame(sequence=7, monotonic_ns=5, kind=bus_pb.TRACE_KIND_SENT, node=5,
+                                  transaction_class=bus_pb.TRANSACTION_CLASS_STOP, data=b"\x40\x41\x60\0\0\0\0\0",
+                                  can=bus_pb.CanIdentifier(id=0x605, length=8), text="5 can0 tx 605#4041600000000000")
+        sent.at.FromNanoseconds(1_700_000_000_123_456_789)
+        yield bus_pb.TraceBusResponse(frames=[sent], lost=3)
+        yield bus_pb.TraceBusResponse(frames=[bus_pb.TracedFrame(
+            sequence=8, monotonic_ns=6, kind=bus_pb.TRACE_KIND_LINK, why="bus_off", text="6 can0 link bus_off")])
+        await asyncio.sleep(3600)
+
+    async def ListFlightRecords(self, request, context):
+        self.note("ListFlightRecords", request, context)
+        record = bus_pb.FlightRecord(name="line-a-1.wire", bus="line-a", reason="feeder: ErrorStop: alarm 2", size=77)
+        record.written_at.FromSeconds(1_700_000_000)
+        return bus_pb.ListFlightRecordsResponse(records=[record])
+
+    async def GetFlightRecord(self, request, context):
+        self.note("GetFlightRecord", request, context)
+        return bus_pb.GetFlightRecordResponse(text="# bus: line-a\n")
+
+    async def WriteFlightRecord(self, request, context):
+        self.note("WriteFlightRecord", request, context)
+        return bus_pb.WriteFlightRecordResponse(name="line-a-2.wire")
+
     async def Scan(self, request, context):
         self.note("Scan", request, context)
         if request.bus == "endless":

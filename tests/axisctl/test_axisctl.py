@@ -336,7 +336,8 @@ class Completion(AxisctlTest):
         self.assertEqual(self.complete("--timeout", "2s", "state", "gh"), ["ghost"])
         self.assertEqual(self.complete("move", "feeder", ""), [])
         self.assertEqual(sorted(self.complete("bus", "")),
-                         ["list", "read", "scan", "status", "transact", "write"])
+                         ["list", "read", "record", "record-now", "records", "scan", "statistics", "status",
+                          "transact", "write"])
         self.assertEqual(self.complete("drive", "info", "fe"), ["feeder"])
         self.assertEqual(self.complete("--json", "drive", "read", "tu"), ["turntable"])
         self.assertIn("--verify", self.complete("drive", "readdress", "feeder", "--v"))

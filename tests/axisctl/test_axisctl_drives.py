@@ -10,6 +10,32 @@ from axisd.v1 import drive_service_pb2
 
 
 class Drives(AxisctlTest):
+    def test_statistics_of_each_kind_of_bus(self):
+        text = self.ok("bus", "statistics")
+        self.assertIn("line-a: occupied 25 % of the last 10 s", text)
+        self.assertRegex(text, r"(?m)^motion +10 +0 +0 +0\.1 ms +0\.1 ms +0\.1 ms")
+        self.assertRegex(text, r"(?m)^ +1  feeder +0 % +9 +1")
+        self.assertRegex(text, r"(?m)^ +5 +0 +0 +3 +0 +40")
+        self.assertEqual(self.json("bus", "statistics")[0]["buses"][0]["classes"][0]["sent"], "10")
+
+    def test_a_trace_as_text_candump_and_json(self):
+        trace = ("trace", "can0", "--for", "1s")
+        self.assertEqual(self.ok(*trace).splitlines(), ["# 3 frames were lost here", "5 can0 tx 605#4041600000000000",
+                                                        "6 can0 link bus_off"])
+        done = self.run_axisctl(*trace, "--format", "candump")
+        self.assertEqual((done.stdout, done.stderr), ("(1700000000.123456) can0 605#4041600000000000\n",
+                                                      "can0: 1 frames, 3 were lost\n"))
+        first, second = self.json(*trace)
+        self.assertEqual((first["lost"], second["frames"][0]["why"]), ("3", "bus_off"))
+        self.assertIn("candump is a format for CAN", self.fails(2, "trace", "line-a", "--format", "candump"))
+        self.assertIn("there is no bus", self.fails(2, "trace", "nowhere"))
+        self.assertIn("cannot be written", self.fails(2, *trace, "--output", "/no/such/directory/file"))
+
+    def test_flight_records(self):
+        self.assertRegex(self.ok("bus", "records"), r"line-a-1\.wire +line-a +2023-11-14T22:13:20Z +77 +feeder: Error")
+        self.assertEqual(self.ok("bus", "record", "line-a-1.wire"), "# bus: line-a\n")
+        self.assertEqual(self.ok("bus", "record-now", "line-a"), "line-a-2.wire\n")
+
     def test_info(self):
         text = self.ok("drive", "info", "feeder")
         self.assertRegex(text, r"model: +ykd2405pr \(YKD2405PR\)")

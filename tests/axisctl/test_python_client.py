@@ -214,6 +214,35 @@ class Drives(ClientTest):
         await self.machine.write_registers("line-a", 9, 16, [5])
         self.assertEqual(list(self.calls("Transact")[1].write.values), [5])
 
+    async def test_statistics(self):
+        buses = await self.machine.bus_statistics()
+        line, network = buses["line-a"], buses["can0"]
+        self.assertEqual((line.kind, line.utilisation, line.since_start), (axisd.BusKind.MODBUS_RTU, 0.25, 60))
+        motion = line.classes["motion"]
+        self.assertEqual((motion.sent, motion.raw.dropped_superseded), (10, 2))
+        self.assertAlmostEqual(motion.queueing.percentile(0.5), 0.1e-3)
+        self.assertAlmostEqual(motion.queueing.percentile(0.99), 0.11e-3)
+        self.assertEqual((line.nodes[1].name, line.nodes[1].timeouts), ("feeder", 1))
+        self.assertEqual((network.nodes[5].timeouts, network.nodes[5].raw.network.tpdos), (3, 40))
+
+    async def test_trace(self):
+        frames = []
+        async for frame in self.machine.trace("can0", node=5):
+            frames.append(frame)
+            if len(frames) == 2:
+                break
+        self.assertEqual(self.calls("TraceBus")[0].node, 5)
+        sent, link = frames
+        self.assertEqual((sent.sequence, sent.kind, sent.transaction_class, sent.lost), (7, "sent", "stop", 3))
+        self.assertEqual((sent.raw.can.id, sent.data[:3]), (0x605, b"\x40\x41\x60"))
+        self.assertEqual((link.kind, link.why, link.lost, link.transaction_class), ("link", "bus_off", 0, ""))
+
+    async def test_flight_records(self):
+        (record,) = await self.machine.flight_records()
+        self.assertEqual((record.bus, record.size, record.written_at.year), ("line-a", 77, 2023))
+        self.assertEqual(await self.machine.flight_record(record.name), "# bus: line-a\n")
+        self.assertEqual(await self.machine.write_flight_record("line-a"), "line-a-2.wire")
+
     async def test_objects_and_a_scan_of_a_can_network(self):
         found = [node async for progress in self.machine.scan("can0") for node in progress.found]
         self.assertEqual([(node.node, node.vendor, node.product, node.revision) for node in found],

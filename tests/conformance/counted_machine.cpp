@@ -107,13 +107,46 @@ class CountedBuses final : public BusAccess {
   CallLedger* ledger_;
 };
 
+class CountedWatch final : public BusWatch {
+ public:
+  CountedWatch(BusWatch& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
+
+  void statistics(std::string bus,
+                  std::function<void(Result<std::vector<BusStatistics>>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->statistics(bus, ledger_->answer(ticket, callback)); });
+  }
+  /// Never counts: it has no end of its own.
+  std::shared_ptr<TraceToken> trace(TraceRequest request,
+                                    std::function<void(Result<TraceBatch>)> callback) override {
+    return inner_->trace(std::move(request), std::move(callback));
+  }
+  void flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->flight_records(ledger_->answer(ticket, callback)); });
+  }
+  void flight_record(std::string name, std::function<void(Result<std::string>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->flight_record(name, ledger_->answer(ticket, callback)); });
+  }
+  void write_flight_record(std::string bus, std::string client,
+                           std::function<void(Result<std::string>)> callback) override {
+    ledger_->enter([=, this](auto ticket) {
+      inner_->write_flight_record(bus, client, ledger_->answer(ticket, callback));
+    });
+  }
+
+ private:
+  BusWatch* inner_;
+  CallLedger* ledger_;
+};
+
 class CountedMachine final : public Machine {
  public:
   CountedMachine(Machine& inner, CallLedger& ledger)
       : inner_(&inner),
         ledger_(&ledger),
         drives_(inner.drive_access(), ledger),
-        buses_(inner.bus_access(), ledger) {}
+        buses_(inner.bus_access(), ledger),
+        watch_(inner.bus_watch(), ledger) {}
 
   [[nodiscard]] std::vector<std::string> axis_names() const override { return inner_->axis_names(); }
   [[nodiscard]] AxisSnapshotPtr snapshot(std::string_view axis) const override {
@@ -154,6 +187,7 @@ class CountedMachine final : public Machine {
 
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }
+  [[nodiscard]] BusWatch& bus_watch() override { return watch_; }
   [[nodiscard]] EventSource& events() override { return inner_->events(); }
   void on_published(std::function<void()> notify) override { inner_->on_published(std::move(notify)); }
   [[nodiscard]] WallTime wall(TimePoint t) const override { return inner_->wall(t); }
@@ -164,6 +198,7 @@ class CountedMachine final : public Machine {
   CallLedger* ledger_;
   CountedDrives drives_;
   CountedBuses buses_;
+  CountedWatch watch_;
 };
 
 }  // namespace

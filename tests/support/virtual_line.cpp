@@ -138,6 +138,7 @@ void VirtualLine::hear(std::span<const std::uint8_t> bytes) {
   }
   const bool answered = best.kind == ReplyKind::match || best.kind == ReplyKind::exception;
   result_.reply = std::move(best);
+  result_.reply_frame = Frame(bytes.first(std::min(bytes.size(), Frame::capacity)));
   end(answered ? ExchangeStatus::replied : ExchangeStatus::corrupt);
 }
 

@@ -8,18 +8,21 @@
 """
 from .axis import Axis, Jog
 from .drive import Drive
-from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FoundNode, LinkChange, Parameter,
-                     PositionSegment, ScanProgress, Segments, SerialProgress, StateChange, TerminalCapability,
-                     TerminalEdge, VelocitySegment)
+from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
+                     LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress, StateChange,
+                     TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import AxisdError, MotionError, RefusedError, UnreachableError
 from .machine import Machine, connect
+from .traffic import BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, TracedFrame
 from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
                     Network, NetworkLink, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
-    "Alarm", "Axis", "AxisState", "AxisdError", "Bus", "BusKind", "Command", "CommandState", "ConfigurationDrift",
-    "Cursor", "Device", "Drive", "DriveInfo", "ErrorDetail", "Event", "FoundNode", "Info", "Jog", "Link", "LinkChange",
-    "Machine", "MotionCause", "MotionError", "MotionValues", "Network", "NetworkLink", "Parameter", "PermittedRange",
-    "PositionSegment", "RefusedError", "ScanProgress", "Segments", "SerialProgress", "State", "StateChange", "StopResult", "Terminal",
-    "TerminalCapability", "TerminalEdge", "Tick", "Trust", "UnreachableError", "VelocitySegment", "connect",
+    "Alarm", "Axis", "AxisState", "AxisdError", "Bus", "BusKind", "BusStatistics", "ClassStatistics", "Command",
+    "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo", "ErrorDetail", "Event",
+    "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Link", "LinkChange", "Machine",
+    "MotionCause", "MotionError", "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Parameter",
+    "PermittedRange", "PositionSegment", "RefusedError", "ScanProgress", "Segments", "SerialProgress", "State",
+    "StateChange", "StopResult", "Terminal", "TerminalCapability", "TerminalEdge", "Tick", "TracedFrame", "Trust",
+    "UnreachableError", "VelocitySegment", "connect",
 ]

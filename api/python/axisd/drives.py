@@ -220,7 +220,18 @@ class ConfigurationDrift:
     text: str
 
 
-def _content(raw: event_service_pb2.Event) -> TerminalEdge | StateChange | LinkChange | ConfigurationDrift | None:
+@dataclasses.dataclass(frozen=True)
+class FlightRecordWritten:
+    """The newest frames of a bus were written to a file: Machine.flight_record()."""
+    bus: str
+    name: str
+    reason: str
+
+
+Content = TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten
+
+
+def _content(raw: event_service_pb2.Event) -> Content | None:
     kind = raw.WhichOneof("content")
     content = getattr(raw, kind) if kind else None
     if kind == "terminal_edge":
@@ -235,6 +246,8 @@ def _content(raw: event_service_pb2.Event) -> TerminalEdge | StateChange | LinkC
         return LinkChange(_member(Link, types_pb2.LinkState.DESCRIPTOR, "LINK_STATE_", content.to), content.detail)
     if kind == "configuration_drift":
         return ConfigurationDrift(content.text)
+    if kind == "flight_record":
+        return FlightRecordWritten(content.bus, content.name, content.reason)
     return None
 
 
@@ -252,7 +265,7 @@ class Event:
     sequence: int
     at: datetime.datetime | None
     axis: str
-    content: TerminalEdge | StateChange | LinkChange | ConfigurationDrift | None
+    content: Content | None
     cursor: Cursor
     lost: int
     raw: event_service_pb2.Event = dataclasses.field(repr=False, compare=False)

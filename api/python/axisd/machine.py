@@ -14,6 +14,7 @@ from .axis import Axis
 from .calls import Seconds, done, duration
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, translate
+from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
                  command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
@@ -191,6 +192,38 @@ class Machine:
         write = bus_service_pb2.ObjectWrite(data=data)
         request = bus_service_pb2.TransactRequest(bus=bus, node=node, address=index << 8 | sub, write_object=write)
         await self._call(self._buses.Transact, request, bus)
+
+    async def bus_statistics(self, bus: str = "") -> dict[str, BusStatistics]:
+        """How much a bus (or each) was used, how long exchanges took, and what went wrong."""
+        request = bus_service_pb2.GetBusStatisticsRequest(bus=bus)
+        response = await self._call(self._buses.GetBusStatistics, request, bus)
+        return {one.bus: BusStatistics.of(one) for one in response.buses}
+
+    async def trace(self, bus: str, *, node: int | None = None) -> AsyncIterator[TracedFrame]:
+        """The frames of a bus from now on, without end, and what was not sent."""
+        request = bus_service_pb2.TraceBusRequest(bus=bus, node=node)
+        async with contextlib.aclosing(self._stream(self._buses.TraceBus, request, bus)) as stream:
+            lost = 0
+            async for batch in stream:
+                lost += batch.lost
+                for frame in batch.frames:
+                    yield TracedFrame.of(frame, lost)
+                    lost = 0
+
+    async def flight_records(self) -> list[FlightRecord]:
+        """What was recorded after faults, oldest first."""
+        response = await self._call(self._buses.ListFlightRecords, bus_service_pb2.ListFlightRecordsRequest(), "")
+        return [FlightRecord.of(record) for record in response.records]
+
+    async def flight_record(self, name: str) -> str:
+        """The text of one."""
+        request = bus_service_pb2.GetFlightRecordRequest(name=name)
+        return (await self._call(self._buses.GetFlightRecord, request, name)).text
+
+    async def write_flight_record(self, bus: str) -> str:
+        """Writes one now; returns its name."""
+        request = bus_service_pb2.WriteFlightRecordRequest(bus=bus)
+        return (await self._call(self._buses.WriteFlightRecord, request, bus)).name
 
     async def devices(self) -> dict[str, Device]:
         """The nodes that are not axes, as they were last read."""

@@ -156,6 +156,85 @@ void FakeBuses::write_device(std::string device, std::string name, double value,
   answer<double>(callback, value + 0.01);
 }
 
+void FakeWatch::frames(Result<TraceBatch> batch) {
+  const std::lock_guard lock(mutex_);
+  if (const auto token = token_.lock()) token->wanted = false;
+  post_([traced = traced_, batch = std::move(batch)] { traced(batch); });
+}
+
+bool FakeWatch::wanted() const {
+  const std::lock_guard lock(mutex_);
+  const auto token = token_.lock();
+  return token && token->wanted;
+}
+
+void FakeWatch::statistics(std::string bus,
+                           std::function<void(Result<std::vector<BusStatistics>>)> callback) {
+  note("statistics " + bus);
+  using namespace std::chrono_literals;
+  modbus_rtu::LineStatistics line({}, TimePoint{});
+  line.queued(TransactionClass::motion, 3);
+  modbus_rtu::Transaction transaction;
+  transaction.transaction_class = TransactionClass::motion;
+  transaction.exchange.request.node = 3;
+  modbus_rtu::ExchangeResult result{.status = modbus_rtu::ExchangeStatus::replied,
+                                    .reply = {.kind = modbus_rtu::ReplyKind::exception, .exception_code = 2},
+                                    .request_begin = TimePoint(1s),
+                                    .request_end = TimePoint(1001ms),
+                                    .reply_begin = TimePoint(1003ms),
+                                    .reply_end = TimePoint(1005ms)};
+  transaction.queued_at = TimePoint(998ms);
+  line.ended(transaction, result);
+  result = {.status = modbus_rtu::ExchangeStatus::not_sent, .verdict = Verdict::superseded};
+  line.ended(transaction, result);
+  BusStatistics statistics{.bus = "line-a",
+                           .since_start = 10s,
+                           .recent_load = 0.25,
+                           .overall_load = 0.125,
+                           .line = std::move(line)};
+  statistics.known[3] = {.name = "feeder",
+                         .unknown_starts = {.executed = 1, .not_executed = 2, .unresolved = 3}};
+  BusStatistics network{.bus = "can0", .kind = BusKind::canopen, .since_start = 10s};
+  network.network[5] = {.sdo = {.transfers = 7, .aborted_by_node = 1, .timeouts = 2},
+                        .traffic = {.tpdos = 40, .rpdos = 4, .heartbeats_lost = 1, .boots = 2},
+                        .emergencies = 6};
+  answer(callback, Result<std::vector<BusStatistics>>({std::move(statistics), std::move(network)}));
+}
+
+std::shared_ptr<TraceToken> FakeWatch::trace(TraceRequest request,
+                                             std::function<void(Result<TraceBatch>)> callback) {
+  note("trace " + request.bus + (request.node ? " " + std::to_string(*request.node) : ""));
+  if (const auto error = refusal()) {
+    post_([callback, error] { callback(fail(*error)); });
+    return nullptr;
+  }
+  auto token = std::make_shared<TraceToken>();
+  const std::lock_guard lock(mutex_);
+  traced_ = std::move(callback);
+  token_ = token;
+  return token;
+}
+
+void FakeWatch::flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) {
+  note("flight_records");
+  answer(callback, Result<std::vector<FlightRecord>>({{.name = "line-a-1.wire",
+                                                       .bus = "line-a",
+                                                       .reason = "feeder: ErrorStop",
+                                                       .written_at = WallTime(std::chrono::hours(1)),
+                                                       .size = 77}}));
+}
+
+void FakeWatch::flight_record(std::string name, std::function<void(Result<std::string>)> callback) {
+  note("flight_record " + name);
+  answer(callback, Result<std::string>("# bus: line-a\n"));
+}
+
+void FakeWatch::write_flight_record(std::string bus, std::string client,
+                                    std::function<void(Result<std::string>)> callback) {
+  note("write_flight_record " + bus + " " + client);
+  answer(callback, Result<std::string>("line-a-2.wire"));
+}
+
 void FakeEvents::add(std::string axis, EventContent content) {
   std::function<void()> notify;
   {

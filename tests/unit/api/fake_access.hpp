@@ -94,6 +94,28 @@ class FakeBuses final : public FakeAccess, public BusAccess {
   std::function<void(Result<ScanProgress>)> progress_;
 };
 
+class FakeWatch final : public FakeAccess, public BusWatch {
+ public:
+  using FakeAccess::FakeAccess;
+
+  /// Of a trace that was begun.
+  void frames(Result<TraceBatch> batch);
+  /// The reader of the trace can take the next batch.
+  [[nodiscard]] bool wanted() const;
+
+  void statistics(std::string bus, std::function<void(Result<std::vector<BusStatistics>>)> callback) override;
+  std::shared_ptr<TraceToken> trace(TraceRequest request,
+                                    std::function<void(Result<TraceBatch>)> callback) override;
+  void flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) override;
+  void flight_record(std::string name, std::function<void(Result<std::string>)> callback) override;
+  void write_flight_record(std::string bus, std::string client,
+                           std::function<void(Result<std::string>)> callback) override;
+
+ private:
+  std::function<void(Result<TraceBatch>)> traced_;
+  std::weak_ptr<TraceToken> token_;
+};
+
 class FakeEvents final : public EventSource {
  public:
   /// Keeps at most `kept` events.

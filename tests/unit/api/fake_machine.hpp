@@ -42,6 +42,7 @@ class FakeMachine final : public Machine {
 
   FakeDrives& drives() { return drives_; }
   FakeBuses& nodes() { return buses_; }
+  FakeWatch& watch() { return watch_; }
   FakeEvents& event_log() { return events_; }
 
   [[nodiscard]] std::vector<Submitted> submitted() const;
@@ -65,6 +66,7 @@ class FakeMachine final : public Machine {
   void buses(std::function<void(std::vector<BusStatus>)> callback) override;
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }
+  [[nodiscard]] BusWatch& bus_watch() override { return watch_; }
   [[nodiscard]] EventSource& events() override { return events_; }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override;
@@ -90,6 +92,7 @@ class FakeMachine final : public Machine {
   std::atomic<TimePoint> now_{TimePoint(std::chrono::hours(1))};
   FakeDrives drives_{[this](Job job) { post(std::move(job)); }};
   FakeBuses buses_{[this](Job job) { post(std::move(job)); }};
+  FakeWatch watch_{[this](Job job) { post(std::move(job)); }};
   FakeEvents events_{[this](Job job) { post(std::move(job)); }};
   std::thread core_;
 };

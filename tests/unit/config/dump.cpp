@@ -142,6 +142,8 @@ std::string dump(const Configuration& configuration) {
   Dump dump;
   dump.field("machine", configuration.machine);
   dump.field("state_directory", configuration.state_directory);
+  dump.field("flight_recorder.memory", configuration.flight_recorder.memory);
+  dump.field("flight_recorder.files", configuration.flight_recorder.files);
   dump.field("listen", configuration.server.listen);
   if (const auto& tls = configuration.server.tls) {
     dump.field("tls", fmt::format("{} {} {}", tls->certificate, tls->key, tls->client_ca));

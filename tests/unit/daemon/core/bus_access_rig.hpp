@@ -12,6 +12,7 @@
 #include "daemon/core/bus_access_service.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/simulation/simulator.hpp"
+#include "tests/support/fake_record_files.hpp"
 #include "tests/support/register_node.hpp"
 #include "tests/support/virtual_line.hpp"
 
@@ -25,6 +26,7 @@ class BusAccessRig : public testing::Test {
  protected:
   BusAccessRig() {
     configuration_.machine = "m";
+    configuration_.flight_recorder.memory = 16;  // some 300 frames
     configuration_.lines.push_back({.name = "line-a", .port = "sim"});
     for (const std::uint8_t node : {1, 2}) {
       AxisSettings axis{
@@ -47,7 +49,8 @@ class BusAccessRig : public testing::Test {
                            auto made = std::make_unique<VirtualLine>(world_, settings);
                            line_ = made.get();
                            return made;
-                         }},
+                         },
+                     .flight_records = &records_},
         configuration_);
     access_ = std::make_unique<BusAccessService>(world_.executor(), world_.clock(), *machine_);
     line_->network().advance(world_.now());
@@ -62,7 +65,9 @@ class BusAccessRig : public testing::Test {
 
   simulation::SimulatedRtuNode& add_drive(std::string_view model,
                                           const simulation::SimulatedNodeSettings& settings) {
-    return line_->network().add(simulation::find_simulator(model)->make(settings));
+    auto& drive = line_->network().add(simulation::find_simulator(model)->make(settings));
+    drives_.push_back(&drive);
+    return drive;
   }
   RegisterNode& add(std::uint8_t node, std::map<std::uint16_t, std::uint16_t> registers,
                     std::optional<simulation::Serial> serial = std::nullopt) {
@@ -130,10 +135,12 @@ class BusAccessRig : public testing::Test {
   }
 
   VirtualWorld world_;
+  FakeRecordFiles records_{world_.executor()};
   config::Configuration configuration_;
   VirtualLine* line_ = nullptr;
   std::unique_ptr<MachineCore> machine_;
   std::unique_ptr<BusAccessService> access_;
+  std::vector<simulation::SimulatedRtuNode*> drives_;  ///< as they were added: a1, a2, ...
   RegisterNode* io_ = nullptr;
 };
 

@@ -23,15 +23,16 @@ TEST(ObservedPort, TellsTheObserverFirstAndThenItsOwner) {
   Texts told;
   const auto note = [&told](const std::string& who, const std::string& what) { told.push_back(who + what); };
   NetworkObserver observer{
-      .received = [&](const std::string& bus,
-                      const can::ReceivedFrame& received) { note(bus + " rx ", to_string(received.frame)); },
+      .received = [&](const can::ReceivedFrame& received) { note("rx ", to_string(received.frame)); },
       .ended =
-          [&](const std::string& bus, const can::Frame& frame, const can::SendResult& result, TimePoint at) {
+          [&](const can::Frame& frame, TransactionClass transaction_class, const can::SendResult& result,
+              TimePoint at) {
             EXPECT_EQ(at, world.now());
-            note(bus + " tx ", to_string(frame) + " " + std::string(to_string(result.status)));
+            EXPECT_EQ(transaction_class, TransactionClass::motion);
+            note("tx ", to_string(frame) + " " + std::string(to_string(result.status)));
           },
-      .state = [&](const std::string& bus, const can::PortState& state,
-                   TimePoint) { note(bus + " link ", std::string(to_string(state.link))); }};
+      .state = [&](const can::PortState& state,
+                   TimePoint) { note("link ", std::string(to_string(state.link))); }};
   ObservedPort port(std::move(inner), world.clock(), observer);
   port.start(
       {.on_frame = [&](const can::ReceivedFrame& received) { note("frame ", to_string(received.frame)); },
@@ -41,7 +42,7 @@ TEST(ObservedPort, TellsTheObserverFirstAndThenItsOwner) {
   network.transmit(peer, can::make_frame(0x705, {}));
   world.run_for(1ms);
   const auto send = [&](std::uint32_t id) {
-    port.send(can::make_frame(id, {}), {},
+    port.send(can::make_frame(id, {}), {.transaction_class = TransactionClass::motion},
               [&](const can::SendResult& result) { note("ended ", std::string(to_string(result.status))); });
   };
   send(0x205);
@@ -49,9 +50,8 @@ TEST(ObservedPort, TellsTheObserverFirstAndThenItsOwner) {
   link->report(can::Controller::bus_off);
   send(0x206);
   world.run_for(1ms);
-  EXPECT_EQ(told, (Texts{"cell link up", "state up", "cell rx 705#", "frame 705#", "cell tx 205# sent",
-                         "ended sent", "cell link bus_off", "state bus_off", "cell tx 206# port_down",
-                         "ended port_down"}));
+  EXPECT_EQ(told, (Texts{"link up", "state up", "rx 705#", "frame 705#", "tx 205# sent", "ended sent",
+                         "link bus_off", "state bus_off", "tx 206# port_down", "ended port_down"}));
   EXPECT_EQ(port.counters().sent, 1U);
   EXPECT_TRUE(port.state().needs_cycle());
   port.close();
