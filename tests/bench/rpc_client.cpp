@@ -99,6 +99,7 @@ class Watcher final : public grpc::ClientReadReactor<v1::WatchAxesResponse> {
 
 void watch(Stub& stub, int streams, std::chrono::seconds duration, std::size_t limit) {
   std::vector<std::unique_ptr<Watcher>> watchers;
+  watchers.reserve(static_cast<std::size_t>(streams));
   for (int i = 0; i < streams; ++i) watchers.push_back(std::make_unique<Watcher>(stub, limit));
   std::this_thread::sleep_for(duration);
   for (const auto& watcher : watchers) watcher->end();

@@ -17,6 +17,15 @@ const std::vector<std::vector<const char*>> bits = {{"homed_only_bit8"},
 
 void with_stop_input(AxisSettings& axis) { axis.inputs.push_back({.terminal = "X3", .function = "stop"}); }
 
+/// Connects and enables; `polled`: a drive that takes no TPDO.
+void enable(CanRig& rig, bool polled) {
+  if (polled)
+    rig.nodes().add_fault(
+        {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
+  rig.reconnect();
+  rig.done(EnableRequest{});
+}
+
 TEST(M21, AHomingThatTheDriveIgnoresDoesNotReachHome) {
   for_each_reading({.adjust = with_stop_input}, bits, [](const CanRigOptions& options) {
     for (const bool restart : {false, true}) {
@@ -99,11 +108,7 @@ TEST(M21, AHomingThatAnUnseenStopEndedIsNotHome) {
 TEST(M21, AMotionThatFollowsHomingAtOnceIsNotHalted) {
   for (const bool polled : {false, true}) {
     CanRig rig({.limits = false, .connect = false});
-    if (polled)
-      rig.nodes().add_fault(
-          {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
-    rig.reconnect();
-    rig.done(EnableRequest{});
+    enable(rig, polled);
     for (int time = 0; time < 4; ++time) {
       rig.done(HomeRequest{});
       const auto command = rig.submit(MoveVelocityRequest{.velocity = 20});
@@ -115,20 +120,21 @@ TEST(M21, AMotionThatFollowsHomingAtOnceIsNotHalted) {
   }
 }
 
+/// Lets it home for `duration`. False: it does not turn.
+bool homes(CanRig& rig, bool polled, Duration duration) {
+  enable(rig, polled);
+  (void)rig.submit(HomeRequest{});
+  rig.run(duration);
+  return rig.drive->shaft_moving();
+}
+
 TEST(M12, TheModeStaysWhileAStoppedHomingRunsOut) {
   for (const bool polled : {false, true}) {
     CanRig rig({.connect = false, .adjust = [](AxisSettings& axis) {
                   axis.homing->velocity = 50;
                   axis.homing->acceleration_time = 1000ms;
                 }});
-    if (polled)
-      rig.nodes().add_fault(
-          {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
-    rig.reconnect();
-    rig.done(EnableRequest{});
-    (void)rig.submit(HomeRequest{});
-    rig.run(700ms);
-    ASSERT_TRUE(rig.drive->shaft_moving());
+    ASSERT_TRUE(homes(rig, polled, 700ms));
     (void)rig.submit(StopRequest{.kind = StopKind::stop});
     bool moved = true;
     for (int i = 0; i < 200 && moved; ++i) {
@@ -144,14 +150,7 @@ TEST(M12, TheModeStaysWhileAStoppedHomingRunsOut) {
 TEST(M05, AnAlarmThatEndsAHomingIsToldThoughItIsGone) {
   for (const bool polled : {false, true}) {
     CanRig rig({.connect = false});
-    if (polled)
-      rig.nodes().add_fault(
-          {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
-    rig.reconnect();
-    rig.done(EnableRequest{});
-    (void)rig.submit(HomeRequest{});
-    rig.run(500ms);
-    ASSERT_TRUE(rig.drive->shaft_moving());
+    ASSERT_TRUE(homes(rig, polled, 500ms));
     rig.touch([](auto& node) { node.raise_alarm(2); });
     rig.run(500us);
     rig.touch([](auto& node) { node.raise_alarm(0); });

@@ -19,6 +19,14 @@ void expect_started_once(GroupBench& bench, std::int64_t target) {
   }
 }
 
+/// Together to 0, which takes no longer than `duration`.
+void goes_back(GroupBench& bench, Duration duration) {
+  ASSERT_TRUE(bench.prepare(0));
+  ASSERT_TRUE(bench.start());
+  bench.run(duration);
+  for (auto& member : bench.members) EXPECT_EQ(bench.shaft(member), 0);
+}
+
 TEST(M24GroupStart, DrivesStartInOneSync) {
   for (const int drives : {2, 16}) {
     SCOPED_TRACE(drives);
@@ -44,10 +52,7 @@ TEST(M24GroupStart, DrivesStartInOneSync) {
     for (std::size_t i = 2; drives == 2 && i < syncs.size(); ++i)
       EXPECT_LT(std::chrono::abs((syncs[i] - syncs[1] + 5ms) % 10ms - 5ms), 500us);
     // And again, back: nothing is left of the first time.
-    ASSERT_TRUE(bench.prepare(0));
-    ASSERT_TRUE(bench.start());
-    bench.run(1500ms);
-    for (auto& member : bench.members) EXPECT_EQ(bench.shaft(member), 0);
+    goes_back(bench, 1500ms);
   }
 }
 
@@ -167,10 +172,7 @@ TEST(M24GroupStart, AStopBetweenArmingAndSyncStopsAll) {
       EXPECT_LE(bench.members[i].node->starts(), none ? 0 : 1);
     }
     // It goes on as if nothing had been.
-    ASSERT_TRUE(bench.prepare(0));
-    ASSERT_TRUE(bench.start());
-    bench.run(3s);
-    for (auto& member : bench.members) EXPECT_EQ(bench.shaft(member), 0);
+    goes_back(bench, 3s);
   }
 }
 

@@ -57,6 +57,16 @@ class EdsFile : public ::testing::Test {
     ASSERT_NE(at, std::string::npos) << from;
     write(text.replace(at, from.size(), to));
   }
+  /// The example with an object (in its list as `number`=0x...) turned into one of the maker's.
+  void write_without(std::string_view number, std::string_view object) const {
+    auto text = read_text(source_path("config/examples/standard-drive.eds"));
+    for (const auto& entry : {fmt::format("{}=0x{}", number, object), fmt::format("[{}]", object)}) {
+      const auto at = text.find(entry);
+      ASSERT_NE(at, std::string::npos) << entry;
+      text.replace(at + entry.find(object), object.size(), "609B");
+    }
+    write(text);
+  }
   [[nodiscard]] std::string found(Axis axis = {}) const {
     axis.eds = path_.string();
     return findings(load(axis));
@@ -153,8 +163,7 @@ TEST_F(EdsFile, ADriveWithoutHomingModeHasNoHoming) {
 }
 
 TEST_F(EdsFile, ADriveWithoutDigitalInputsHasNoTerminals) {
-  auto text = read_text(source_path("config/examples/standard-drive.eds"));
-  write(text.replace(text.find("48=0x60FD"), 9, "48=0x609B").replace(text.find("[60FD]"), 6, "[609B]"));
+  write_without("48", "60FD");
   EXPECT_EQ(found({.inputs = ""}), "");
   EXPECT_THAT(
       found({.inputs = "NEG: negative_limit"}),
@@ -162,8 +171,7 @@ TEST_F(EdsFile, ADriveWithoutDigitalInputsHasNoTerminals) {
 }
 
 TEST_F(EdsFile, ADriveWithoutHomingAccelerationTakesNoTimeForIt) {
-  auto text = read_text(source_path("config/examples/standard-drive.eds"));
-  write(text.replace(text.find("47=0x609A"), 9, "47=0x609B").replace(text.find("[609A]"), 6, "[609B]"));
+  write_without("47", "609A");
   const std::string homing =
       "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 mm/s";
   EXPECT_EQ(found({.more = homing + " }\n"}), "");
