@@ -120,7 +120,7 @@ void NetworkPort::set_up(bool up) {
   if (up) {
     id_ = network_->join([this](const Frame& frame, TimePoint at, bool own) {
       if (own)
-        own_frame_seen(frame, at, true);
+        own_frame_seen(frame, at, clock().now(), true);
       else
         frame_received(frame, at);
       settle_later();

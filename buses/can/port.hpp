@@ -121,6 +121,9 @@ struct PortHandlers {
   std::function<void(const ReceivedFrame&)> on_frame;  ///< of other nodes; own frames end in their Completion
   /// After each change; everything that the change ended has been completed before.
   std::function<void(const PortState&)> on_state;
+  /// Asked after frames came: whether nobody waits for a single frame, so that the next ones may gather below
+  /// for a moment, to be taken together. Empty: never.
+  std::function<bool()> may_gather{};
 };
 
 /// One CAN network. Thread: core.

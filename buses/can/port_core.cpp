@@ -50,8 +50,12 @@ void PortCore::frame_received(const Frame& frame, TimePoint at) {
   events_.emplace_back(ReceivedFrame{.frame = frame, .at = at});
 }
 
-void PortCore::own_frame_seen(const Frame& frame, TimePoint at, bool proof) {
-  queue_.echo(frame, at, clock_->now(), proof);
+void PortCore::own_frame_seen(const Frame& frame, TimePoint at, TimePoint now, bool proof) {
+  queue_.echo(frame, at, now, proof);
+}
+
+bool PortCore::may_gather() const {
+  return queue_.unconfirmed() == 0 && queue_.queued() == 0 && handlers_.may_gather && handlers_.may_gather();
 }
 
 void PortCore::link_changed() {
@@ -68,6 +72,7 @@ void PortCore::link_changed() {
 
 void PortCore::pump() {
   if (!tracker_.state().can_send()) return queue_.end_all();
+  if (queue_.queued() == 0) return;  // mostly so, and each look at the clock costs
   const auto now = clock_->now();
   while (const auto* frame = queue_.next(now)) {
     switch (write(*frame)) {

@@ -43,7 +43,8 @@ class PortCore : public Port {
   virtual bool drained() { return true; }
 
   void frame_received(const Frame& frame, TimePoint at);
-  void own_frame_seen(const Frame& frame, TimePoint at, bool proof);
+  /// `now`: when it was seen; `at`: its time stamp.
+  void own_frame_seen(const Frame& frame, TimePoint at, TimePoint now, bool proof);
   /// Ends what a change of the tracker's state ends, and remembers to tell. After each change.
   void link_changed();
   /// After a batch of reports: sends what may go now, and tells what happened.
@@ -51,6 +52,8 @@ class PortCore : public Port {
   /// Settles when something is due: at once (but not within this call) if there is something to tell.
   void settle_later();
 
+  /// Neither frames of ours are under way, nor does anybody wait for a single one of others.
+  [[nodiscard]] bool may_gather() const;
   [[nodiscard]] Clock& clock() const { return *clock_; }
   [[nodiscard]] LinkTracker& tracker() { return tracker_; }
   [[nodiscard]] PortCounters& counts() { return counters_; }

@@ -25,7 +25,10 @@ using namespace std::chrono_literals;
 constexpr Duration first_back_off = 250ms;
 constexpr Duration longest_back_off = 4s;
 constexpr unsigned frames_per_turn = 32;  // then others have their turn on the core thread
-constexpr int most_turns = 128;           // what the receive buffer holds at most, several times over
+/// Nodes answer a SYNC one after another, a frame in 0.1 ms or more: this long they gather. What else comes
+/// in between, an EMCY, waits no longer than that.
+constexpr Duration gather_time = 500us;
+constexpr int most_turns = 128;  // what the receive buffer holds at most, several times over
 constexpr int receive_buffer = 1 << 20;
 
 template <class T>
@@ -186,6 +189,7 @@ bool SocketCanPort::open_socket(int index) {
 
 void SocketCanPort::close_socket() {
   boost::system::error_code ignored;
+  gathering_.reset();
   socket_.close(ignored);
   index_ = 0;
 }
@@ -194,31 +198,46 @@ void SocketCanPort::wait() {
   socket_.async_wait(boost::asio::posix::stream_descriptor::wait_read,
                      [self = self_, index = index_](const boost::system::error_code& error) {
                        if (error || *self == nullptr || (*self)->index_ != index) return;
-                       (*self)->read_some();
+                       const auto took = (*self)->read_some();
                        (*self)->settle();
-                       if ((*self)->index_ == index) (*self)->wait();
+                       if ((*self)->index_ == index) (*self)->go_on(took);
                      });
 }
 
+/// As long as frames come, nobody needs to be woken by them.
+void SocketCanPort::go_on(Took last) {
+  if (last == Took::some && may_gather())
+    gathering_ = clock().call_at(clock().now() + gather_time, [this] { on_gathered(); });
+  else
+    wait();
+}
+
+void SocketCanPort::on_gathered() {
+  const int index = index_;
+  const auto took = read_some();
+  settle();
+  if (index_ == index) go_on(took);
+}
+
 void SocketCanPort::catch_up() {
-  for (int turns = 0; turns < most_turns && read_some(); ++turns) {
+  for (int turns = 0; turns < most_turns && read_some() != Took::nothing; ++turns) {
   }
 }
 
-bool SocketCanPort::read_some() {
-  if (index_ == 0) return false;
+SocketCanPort::Took SocketCanPort::read_some() {
+  if (index_ == 0) return Took::nothing;
   const int count = batch_->receive(socket_.native_handle());
   if (count < 0) {
-    if (errno == EAGAIN) return false;
+    if (errno == EAGAIN) return Took::nothing;
     on_error(errno);
-    return true;
+    return Took::some;
   }
   const auto now = clock().now();
   const Moment moment{.now = now, .wall = clock().wall(now)};
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
     if (batch_->messages.at(i).msg_len == sizeof(can_frame))
       on_message(batch_->slots.at(i).frame, batch_->messages.at(i).msg_hdr, moment);
-  return true;  // or an error: that comes with the next call
+  return count == frames_per_turn ? Took::as_many_as_fit : Took::some;  // an error comes with the next call
 }
 
 void SocketCanPort::on_message(const can_frame& frame, msghdr& message, const Moment& moment) {
@@ -242,7 +261,7 @@ void SocketCanPort::on_message(const can_frame& frame, msghdr& message, const Mo
       link_changed();
     }
   } else if ((message.msg_flags & MSG_CONFIRM) != 0) {  // sent by this very socket
-    own_frame_seen(from_kernel(frame), at, echo_is_proof_);
+    own_frame_seen(from_kernel(frame), at, moment.now, echo_is_proof_);
   } else {
     frame_received(from_kernel(frame), at);
   }

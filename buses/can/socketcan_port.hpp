@@ -21,6 +21,11 @@ class SocketCanPort final : public PortCore {
 
  private:
   struct Batch;
+  enum class Took : std::uint8_t {
+    nothing,
+    some,  ///< or an error
+    as_many_as_fit,
+  };
   /// When frames were taken from the socket, on both clocks.
   struct Moment {
     TimePoint now;
@@ -39,8 +44,11 @@ class SocketCanPort final : public PortCore {
   bool open_socket(int index);
   void close_socket();
   void wait();
-  /// Takes some frames, or an error, from the socket; false: nothing was left.
-  bool read_some();
+  /// After a look at the socket: takes up the next frames one by one, or lets them gather.
+  void go_on(Took last);
+  void on_gathered();
+  /// Takes frames, or an error, from the socket.
+  Took read_some();
   void on_message(const can_frame& frame, msghdr& message, const Moment& moment);
   /// The socket failed with `error`: what that says of the link.
   void on_error(int error);
@@ -54,7 +62,7 @@ class SocketCanPort final : public PortCore {
   int index_ = 0;  ///< interface that the socket is bound to; 0: none
   bool echo_is_proof_ = false;
   std::uint32_t overflows_ = 0;  ///< of this socket
-  Clock::Timer retry_;
+  Clock::Timer retry_, gathering_;
   Duration back_off_{};
 };
 

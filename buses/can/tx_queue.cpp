@@ -70,7 +70,7 @@ const Frame* TxQueue::next(TimePoint now) {
     end(std::move(lane->front().completion), {.status = verdict});
     lane->pop_front();
   }
-  refused_since_.reset();  // nobody asks for room any more
+  forget_refusal();
   return nullptr;
 }
 
@@ -122,6 +122,11 @@ void TxQueue::drained(TimePoint now) {
 
 bool TxQueue::awaits_drain() const { return std::ranges::any_of(unconfirmed_, &Unconfirmed::echoed); }
 
+/// Nobody asks for room any more.
+void TxQueue::forget_refusal() {
+  if (queued() == 0) refused_since_.reset();
+}
+
 template <class Predicate>
 void TxQueue::end_where(Predicate status_of_waiting) {
   for (auto& lane : lanes_) {
@@ -132,6 +137,7 @@ void TxQueue::end_where(Predicate status_of_waiting) {
       return true;
     });
   }
+  forget_refusal();
 }
 
 void TxQueue::reap(TimePoint now) {
@@ -147,7 +153,6 @@ void TxQueue::end_all() {
   for (auto& each : std::exchange(unconfirmed_, {}))
     end(std::move(each.completion), {.status = SendStatus::unknown, .handed_over = each.handed_over});
   end_where([](const Waiting&) { return SendStatus::port_down; });
-  refused_since_.reset();
   retry_at_ = TimePoint{};
   back_off_ = Duration{};
 }

@@ -77,6 +77,7 @@ class TxQueue {
   void end(Completion completion, SendResult result);
   void confirm(const std::deque<Unconfirmed>::iterator& which, TimePoint at, TimePoint now);
   Lane* first_lane();
+  void forget_refusal();
   [[nodiscard]] TimePoint stalls_at() const;
   template <class Predicate>
   void end_where(Predicate status_of);

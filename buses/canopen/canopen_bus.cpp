@@ -1,11 +1,19 @@
 #include "buses/canopen/canopen_bus.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
 
 namespace axisd::canopen {
+
+namespace {
+
+/// Bring-up, and whatever follows a common start that went wrong, is over by then, or it needs a person.
+constexpr auto sync_patience = std::chrono::seconds(5);
+
+}  // namespace
 
 CanopenBus::CanopenBus(Executor executor, Clock& clock, NetworkSettings settings,
                        std::unique_ptr<can::Port> port)
@@ -59,12 +67,54 @@ void CanopenBus::set_readiness(std::uint8_t node, Readiness readiness) {
 }
 
 void CanopenBus::consider_sync() {
-  if (settings_.sync_period == Duration{} || closed_ || !port_.open || master_.sync().running()) return;
-  const auto blocks = [](const auto& node) { return !node.second.may_hear_sync(); };
+  const bool wanted = settings_.sync_period != Duration{} && !closed_ && port_.open;
+  const bool blocked = wanted && !master_.sync().running() && sync_blocker() != nullptr;
+  watch_sync(blocked);
+  if (!wanted || blocked || master_.sync().running()) return;
   const auto settled = [](const auto& node) { return node.second.readiness == Readiness::settled; };
-  if (std::ranges::any_of(nodes_, blocks) || std::ranges::none_of(nodes_, settled)) return;
+  if (std::ranges::none_of(nodes_, settled)) return;
   // The loader has checked the period.
   (void)master_.sync().start({.period = settings_.sync_period}, [this](TimePoint at) { tell_sync(at); });
+}
+
+const std::pair<const std::uint8_t, CanopenBus::Node>* CanopenBus::sync_blocker() const {
+  const auto found =
+      std::ranges::find_if(nodes_, [](const auto& node) { return !node.second.may_hear_sync(); });
+  return found == nodes_.end() ? nullptr : &*found;
+}
+
+void CanopenBus::watch_sync(bool blocked) {
+  if (blocked && !sync_overdue_)
+    sync_overdue_ = clock_->call_at(clock_->now() + sync_patience, [this] { tell_sync_trouble(); });
+  if (blocked) return;
+  sync_overdue_.reset();
+  if (std::exchange(sync_trouble_, std::nullopt))
+    spdlog::info("{}: nothing stands against SYNC any more", name());
+}
+
+/// Again and again as long as it lasts: another node may be the reason meanwhile.
+void CanopenBus::tell_sync_trouble() {
+  sync_overdue_.reset();
+  const auto* blocker = sync_blocker();
+  watch_sync(blocker != nullptr);
+  if (blocker == nullptr) return;
+  const auto& [id, node] = *blocker;
+  Error error{.reason = Reason::not_confirmed,
+              .message = fmt::format("no SYNC is sent: node {} was heard and not brought up, and may hold "
+                                     "something for the next SYNC",
+                                     id),
+              .remedy = "see the state of its axis or device",
+              .where = {.bus = name(), .node = id}};
+  if (node.armed) {
+    error.message =
+        fmt::format("no SYNC is sent: node {} was prepared for a common start, and would start with it", id);
+    error.remedy =
+        "reconnect the node, or switch its supply off and on; a daemon that is restarted instead would not "
+        "know of this, and start it";
+  }
+  const bool told = sync_trouble_ && sync_trouble_->message == error.message;
+  sync_trouble_ = std::move(error);
+  if (!told) spdlog::warn("{}", to_string(*sync_trouble_));
 }
 
 std::shared_ptr<void> CanopenBus::on_sync(std::function<void(TimePoint)> handler) {
@@ -178,6 +228,7 @@ void CanopenBus::on_port(const can::PortState& state) {
   port_ = {.open = state.can_send(), .error = state.error};
   if (!port_.open)
     for (auto& [id, node] : nodes_) node.readiness = Readiness::unknown;
+  consider_sync();
   port_changed_.notify_all();
 }
 
@@ -185,6 +236,7 @@ void CanopenBus::close() {
   closed_ = true;
   master_.close();
   port_ = {.open = false, .error = std::nullopt};
+  consider_sync();
   port_changed_.notify_all();
 }
 

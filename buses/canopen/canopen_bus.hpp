@@ -57,6 +57,10 @@ class CanopenBus final : public Bus {
   /// Its cycles go out.
   [[nodiscard]] bool sync_running() const { return master_.sync().running() && !master_.sync().held(); }
 
+  /// Why no cycles have gone out for some seconds though the network is up, and what to do; nothing: they do,
+  /// or there are to be none. Logged as well.
+  [[nodiscard]] const std::optional<Error>& sync_trouble() const { return sync_trouble_; }
+
   /// Starts nodes with one SYNC: all of them, or none. The time of the SYNC: its end on the wire. Cycles of
   /// SYNC are held meanwhile, and go on afterwards at the times of before, if there are any. Errors with an
   /// outcome other than `unknown`: no SYNC was sent, and none is before each member that was armed is
@@ -116,6 +120,10 @@ class CanopenBus final : public Bus {
   void on_port(const can::PortState& state);
   void on_node(const NodeEvent& event);
   void consider_sync();
+  /// The node for whose sake no SYNC is started; nullptr: none.
+  [[nodiscard]] const std::pair<const std::uint8_t, Node>* sync_blocker() const;
+  void watch_sync(bool blocked);
+  void tell_sync_trouble();
   void release_sync();
   void tell_sync(TimePoint at);
 
@@ -130,6 +138,8 @@ class CanopenBus final : public Bus {
   int last_sync_handler_ = 0;
   std::weak_ptr<void> holder_;  ///< of SYNC
   Signal sync_released_, sync_idle_;
+  std::optional<Clock::Timer> sync_overdue_;  ///< while SYNC should run and does not
+  std::optional<Error> sync_trouble_;
   std::shared_ptr<int> alive_ = std::make_shared<int>();
   std::uint64_t losses_ = 0;
   std::optional<Error> last_loss_;

@@ -21,7 +21,9 @@ Master::~Master() = default;
 void Master::start(MasterHandlers handlers) {
   handlers_ = std::move(handlers);
   port_->start({.on_frame = [this](const can::ReceivedFrame& received) { on_frame(received); },
-                .on_state = [this](const can::PortState& state) { on_port_state(state); }});
+                .on_state = [this](const can::PortState& state) { on_port_state(state); },
+                // The answers to SYNC come in crowds. Before it runs, bring-up goes from answer to answer.
+                .may_gather = [this] { return sync_.running() && !sdo_.urgent(); }});
 }
 
 void Master::close() {

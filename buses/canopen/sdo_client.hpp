@@ -89,6 +89,8 @@ class SdoClient {
   [[nodiscard]] SdoCounters counters() const;
   /// Of one node; all 0 if nothing was ever asked of it.
   [[nodiscard]] SdoCounters counters(std::uint8_t node) const;
+  /// A request of a stop or a motion is under way, at some node.
+  [[nodiscard]] bool urgent() const;
   /// More replies come from this node-ID than were asked for: two nodes have it.
   [[nodiscard]] bool answers_twice(std::uint8_t node) const;
   [[nodiscard]] const SdoSettings& settings() const { return settings_; }

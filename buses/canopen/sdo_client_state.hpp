@@ -1,4 +1,4 @@
-// What the SDO client keeps for each node. Used by sdo_client.cpp only.
+// What the SDO client keeps for each node. Used by sdo_client.cpp and sdo_exchange.cpp only.
 #pragma once
 
 #include <fmt/format.h>

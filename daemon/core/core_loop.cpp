@@ -4,6 +4,11 @@
 #include <utility>
 
 namespace axisd::core {
+namespace {
+
+constexpr auto longest_sleep = std::chrono::seconds(1);
+
+}  // namespace
 
 void StopLane::request(AxisGate& gate, std::function<void()> serve) {
   gate.request_stop();
@@ -26,28 +31,35 @@ void StopLane::drain() {
 }
 
 CoreLoop::CoreLoop()
-    : work_(boost::asio::make_work_guard(io_)), clock_(&own_clock_.emplace(io_)), lane_(io_.get_executor()) {}
+    : work_(boost::asio::make_work_guard(io_)),
+      clock_(&own_clock_.emplace(io_, AsioClock::Served::by_loop)),
+      lane_(io_.get_executor()) {}
 
 CoreLoop::CoreLoop(Clock& clock)
     : work_(boost::asio::make_work_guard(io_)), clock_(&clock), lane_(io_.get_executor()) {}
 
 void CoreLoop::run() {
-  last_progress_ = monotonic_now();
-  for (;;) {
-    lane_.drain();
-    // At most a second asleep, so that the watchdog sees an idle loop alive.
-    const auto ran = io_.run_one_for(std::chrono::seconds(1));
-    if (io_.stopped()) break;
-    auto began = monotonic_now();
+  // At most a second asleep, so that the watchdog sees an idle loop alive.
+  Clock::Timer beat;
+  const std::function<void()> beats = [&] { beat = clock_->call_at(clock_->now() + longest_sleep, beats); };
+  beats();
+  auto began = monotonic_now();
+  while (!io_.stopped()) {
     last_progress_.store(began, std::memory_order_relaxed);
-    if (ran == 0) continue;
-    while (!io_.stopped()) {
-      lane_.drain();
-      if (io_.poll_one() == 0) break;
+    lane_.drain();
+    // What is due comes before handlers: frames that wait to be read can be read a little later, SYNC cannot
+    // be sent late.
+    const bool served = own_clock_->serve(began);
+    const bool ran = io_.poll_one() > 0;
+    if (served || ran) {
       const auto ended = monotonic_now();
       const auto took = (ended - std::exchange(began, ended)).count();
       if (took > longest_.load(std::memory_order_relaxed)) longest_.store(took, std::memory_order_relaxed);
     }
+    if (ran) continue;
+    own_clock_->wake_in_time();
+    io_.run_one();
+    began = monotonic_now();
   }
 }
 

@@ -41,7 +41,8 @@ class CoreLoop {
   [[nodiscard]] Clock& clock() { return *clock_; }
   [[nodiscard]] StopLane& lane() { return lane_; }
 
-  /// Runs handlers until stop(). Thread: becomes the core thread.
+  /// Runs handlers until stop(), and what the clock has to call before each of them. Precondition: the clock
+  /// is its own. Thread: becomes the core thread.
   void run();
   /// Serves stops that wait and one handler that is ready; with `wait` one that is yet to come. False: there
   /// was none, or stop() was called. Thread: becomes the core thread.

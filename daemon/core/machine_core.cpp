@@ -320,7 +320,7 @@ std::vector<BusStatus> MachineCore::bus_status() const {
                    .baud = static_cast<int>(bus->settings().bitrate),
                    .open = bus->port().open,
                    .simulated = bus->settings().simulated(),
-                   .error = bus->port().error,
+                   .error = bus->port().error ? bus->port().error : bus->sync_trouble(),
                    .network = network_status(*bus, *cyclers_[i])});
   }
   return all;

@@ -21,7 +21,8 @@ void ObservedPort::start(can::PortHandlers handlers) {
             told = std::move(handlers.on_state)](const can::PortState& state) {
              observer->state(state, clock->now());
              if (told) told(state);
-           }});
+           },
+       .may_gather = std::move(handlers.may_gather)});
 }
 
 void ObservedPort::send(const can::Frame& frame, const can::SendOptions& options,

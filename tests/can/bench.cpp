@@ -58,7 +58,8 @@ Bench::Bench(PortSettings settings) : port(io.get_executor(), clock, std::move(s
 
 void Bench::start() {
   port.start({.on_frame = [this](const ReceivedFrame& frame) { received.push_back(frame); },
-              .on_state = [this](const PortState& state) { states.push_back(state.link); }});
+              .on_state = [this](const PortState& state) { states.push_back(state.link); },
+              .may_gather = [this] { return patient; }});
 }
 
 bool Bench::until(const std::function<bool()>& condition) {

@@ -63,6 +63,7 @@ class Bench {
   Endings endings;
   std::vector<ReceivedFrame> received;
   std::vector<LinkState> states;
+  bool patient = false;  ///< frames may gather
 };
 
 inline PortSettings settings_of(const std::string& interface) {

@@ -54,6 +54,34 @@ TEST_F(Vcan, SendsWithEchoAndReceivesWithTimeStamps) {
   EXPECT_EQ(bench.port.counters().received, 3U);
 }
 
+TEST_F(Vcan, FramesThatGatherComeInOrderWithTheirOwnTimes) {
+  bench.patient = true;
+  Peer peer("cell");
+  std::uint32_t last = 0;
+  // More than is taken at once, then some that come while others gather, then one alone.
+  for (const auto count : {100U, 3U, 1U}) {
+    for (std::uint32_t i = 0; i < count; ++i) ASSERT_TRUE(peer.send(frame_of(++last)));
+    ASSERT_TRUE(bench.until([&] { return bench.received.size() == last; }));
+  }
+  for (std::uint32_t i = 0; i < last; ++i) {
+    EXPECT_EQ(bench.received.at(i).frame.id, i + 1);
+    // The two clocks are read one after the other: in order but for that.
+    if (i > 0) EXPECT_GE(bench.received.at(i).at, bench.received.at(i - 1).at - 5ms);
+  }
+  // What is sent meanwhile is confirmed all the same, and an interface that goes while frames gather is seen.
+  bench.send(1);
+  ASSERT_TRUE(bench.until_ended(1));
+  EXPECT_EQ(bench.endings.texts(), Texts{"1:sent"});
+  ASSERT_TRUE(peer.send(frame_of(1)));
+  ip("link set cell down");
+  ASSERT_TRUE(bench.until(LinkState::down));
+  ip("link set cell up");
+  ASSERT_TRUE(bench.until(LinkState::up));
+  const auto before = bench.received.size();
+  ASSERT_TRUE(bench.until([&] { return peer.send(frame_of(2)); }));
+  ASSERT_TRUE(bench.until([&] { return bench.received.size() > before; }));
+}
+
 TEST_F(Vcan, AStopOvertakesWhatIsQueued) {
   Peer peer("cell");
   for (std::uint32_t id = 1; id <= 6; ++id) bench.send(id);

@@ -199,7 +199,7 @@ TEST(M24GroupStart, ANodeThatHearsNothingKeepsSyncFromGoingOnUntilItIsSettled) {
   auto& started = bench.launch();
   // It hears what arms it, and nothing after that for a while.
   bench.run_until([&] { return bench.count_of(0x311) > 0; }, 1s);
-  bench.fault({.kind = FaultKind::silence, .node = 17, .delay = 5s});
+  bench.fault({.kind = FaultKind::silence, .node = 17, .delay = 8s});
   ASSERT_TRUE(bench.run_until([&] { return started.has_value(); }, 5s));
   ASSERT_FALSE(*started);
   EXPECT_EQ((*started).error().outcome, Outcome::unknown);
@@ -208,7 +208,13 @@ TEST(M24GroupStart, ANodeThatHearsNothingKeepsSyncFromGoingOnUntilItIsSettled) {
   bench.frames.clear();
   bench.run(3s);
   EXPECT_EQ(bench.count_of(sync_id), 0) << "it would start when it hears again";
+  EXPECT_FALSE(bench.bus.sync_trouble()) << "mostly it is over by itself";
+  bench.run(3s);
+  ASSERT_TRUE(bench.bus.sync_trouble()) << "nobody is told";
+  EXPECT_EQ(bench.bus.sync_trouble()->where.node, 17);
+  EXPECT_NE(bench.bus.sync_trouble()->remedy.find("supply"), std::string::npos);
   bench.run(5s);
+  EXPECT_FALSE(bench.bus.sync_trouble());
   EXPECT_TRUE(bench.online());
   EXPECT_TRUE(bench.bus.sync_running());
   EXPECT_EQ(bench.members[1].node->starts(), 0);
