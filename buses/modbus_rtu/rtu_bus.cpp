@@ -127,7 +127,10 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
   transaction->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
     promise.set(answer(ended, result));
   });
-  queue_.push(std::move(transaction));
+  if (held_until(*transaction))
+    queue_.hold(std::move(transaction));
+  else
+    queue_.push(std::move(transaction));
   statistics_.queued(transaction_class, queue_.size(transaction_class));
   pump();
   co_return co_await promise.get();
@@ -169,11 +172,51 @@ void RtuBus::pump() {
 }
 
 void RtuBus::arm_next() {
-  current_ = queue_.pop();
+  while ((current_ = queue_.pop()) && held_until(*current_)) queue_.hold(std::move(current_));
+  await_release();
   if (!current_) return;
   if (current_->transaction_class != TransactionClass::stop && needs_resync(current_->exchange.request))
     current_ = resync_before(std::move(current_));
   line_->arm(current_->exchange);
+}
+
+/// Until when the quarantine of its node forbids sending it; nothing: it may be sent.
+std::optional<TimePoint> RtuBus::held_until(const Transaction& transaction) const {
+  if (transaction.transaction_class == TransactionClass::scan || transaction.exchange.serial)
+    return std::nullopt;
+  const auto ready = quarantine_.ready_at(transaction.exchange.request.node,
+                                          transaction.transaction_class == TransactionClass::stop);
+  return ready > clock_->now() ? std::optional(ready) : std::nullopt;
+}
+
+/// What was put aside is looked at again as soon as the first of it may be sent.
+void RtuBus::await_release() {
+  auto next = TimePoint::max();
+  for (const auto& held : queue_.held()) next = std::min(next, held_until(*held).value_or(clock_->now()));
+  release_ = next == TimePoint::max() ? Clock::Timer{} : clock_->call_at(next, [this] {
+    queue_.release();
+    pump();
+  });
+}
+
+void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result) {
+  const auto node = ended.exchange.request.node;
+  switch (result.status) {
+    case ExchangeStatus::timeout:
+    case ExchangeStatus::cut:
+      if (ended.transaction_class == TransactionClass::scan || ended.exchange.serial) break;
+      quarantine_.silent(node, clock_->now(),
+                         result.reply_end - result.request_begin + silence(settings_.serial()),
+                         ended.transaction_class == TransactionClass::stop);
+      break;
+    case ExchangeStatus::replied:
+    case ExchangeStatus::corrupt:  // somebody is there
+      quarantine_.answered(node);
+      queue_.release();
+      break;
+    default:
+      break;
+  }
 }
 
 /// Another length than any late reply's: those are then discarded as foreign, not taken for this answer.
@@ -220,6 +263,7 @@ void RtuBus::on_result(const ExchangeResult& result) {
   if (!ended) return;
   note_late_read(ended->exchange.request, result);
   note_garbled(ended->exchange.request, result);
+  note_silence(*ended, result);
   end(std::move(ended), result);
   pump();
 }
@@ -264,6 +308,7 @@ void RtuBus::on_port(const PortStatus& status) {
   port_ = status;
   if (port_.error) port_.error->where.bus = settings_.name;
   late_reads_.clear();
+  quarantine_.forget();
   if (!port_.open) {
     // What is under way gets its own result from the line; what waits can no longer be sent in time.
     const ExchangeResult lost{.status = ExchangeStatus::not_sent, .verdict = Verdict::send};

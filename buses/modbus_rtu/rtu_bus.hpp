@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "buses/clock.hpp"
 #include "buses/modbus_rtu/line.hpp"
 #include "buses/modbus_rtu/line_statistics.hpp"
+#include "buses/modbus_rtu/quarantine.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "buses/modbus_rtu/transaction_queue.hpp"
 #include "buses/signal.hpp"
@@ -59,6 +61,9 @@ class RtuBus final : public Bus {
   [[nodiscard]] BusCounters counters() const { return statistics_.counters(); }
   /// Damaged replies of `node` in a row, without a sound one or silence between them.
   [[nodiscard]] int garbled(std::uint8_t node) const;
+  /// Nodes that do not answer are probed with back-off. Bus scans, and exchanges with serial settings of
+  /// their own, neither count nor wait.
+  [[nodiscard]] const Quarantine& quarantine() const { return quarantine_; }
   [[nodiscard]] TimePoint last_progress() const override { return line_->last_progress(); }
 
  private:
@@ -67,6 +72,9 @@ class RtuBus final : public Bus {
   [[nodiscard]] bool may_come_late(std::uint8_t node, std::uint16_t count) const;
   void pump();
   void arm_next();
+  [[nodiscard]] std::optional<TimePoint> held_until(const Transaction& transaction) const;
+  void await_release();
+  void note_silence(const Transaction& ended, const ExchangeResult& result);
   TransactionPtr resync_before(TransactionPtr waiting);
   void on_result(const ExchangeResult& result);
   void on_port(const PortStatus& status);
@@ -89,7 +97,8 @@ class RtuBus final : public Bus {
   /// does not say which registers it carries.
   std::map<std::uint8_t, std::map<std::uint16_t, TimePoint>> late_reads_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
-  Clock::Timer expiry_;
+  Quarantine quarantine_;
+  Clock::Timer expiry_, release_;
   LineStatistics statistics_;
   bool closed_ = false;
   ExchangeObserver observer_;

@@ -83,6 +83,8 @@ TransactionQueue::Lane* TransactionQueue::next_below(std::size_t top) {
 }
 
 void TransactionQueue::hasten(std::uint8_t node, TransactionClass to) {
+  for (auto& held : held_)
+    if (held->exchange.request.node == node) held->transaction_class = std::min(held->transaction_class, to);
   for (auto index = static_cast<std::size_t>(to) + 1; index < lanes_.size(); ++index) {
     std::vector<TransactionPtr> hastened;
     for (auto& transaction : lanes_.at(index))
@@ -103,20 +105,24 @@ std::optional<TransactionClass> TransactionQueue::top_class() const {
 
 std::vector<TransactionPtr> TransactionQueue::take_unsendable(TimePoint now) {
   std::vector<TransactionPtr> taken;
-  for (auto& candidate : lanes_) {
-    const auto unsendable = [now](const TransactionPtr& transaction) {
-      return transaction->exchange.deadline < now ||
-             may_send(transaction->exchange.guard, now) != Verdict::send;
-    };
-    for (auto& transaction : candidate)
-      if (unsendable(transaction)) taken.push_back(std::move(transaction));
-    std::erase(candidate, nullptr);
-  }
+  for (auto& candidate : lanes_) take_unsendable(candidate, now, taken);
+  take_unsendable(held_, now, taken);
   return taken;
 }
 
+void TransactionQueue::take_unsendable(auto& from, TimePoint now, std::vector<TransactionPtr>& into) {
+  for (auto& transaction : from)
+    if (transaction->exchange.deadline < now || may_send(transaction->exchange.guard, now) != Verdict::send)
+      into.push_back(std::move(transaction));
+  std::erase(from, nullptr);
+}
+
+void TransactionQueue::release() {
+  for (auto& transaction : std::exchange(held_, {})) insert(std::move(transaction));
+}
+
 std::vector<TransactionPtr> TransactionQueue::take_all() {
-  std::vector<TransactionPtr> taken;
+  auto taken = std::exchange(held_, {});
   for (auto& candidate : lanes_) {
     std::ranges::move(candidate, std::back_inserter(taken));
     candidate.clear();
@@ -128,11 +134,12 @@ TimePoint TransactionQueue::next_deadline() const {
   auto earliest = TimePoint::max();
   for (const auto& candidate : lanes_)
     if (!candidate.empty()) earliest = std::min(earliest, candidate.front()->exchange.deadline);
+  for (const auto& held : held_) earliest = std::min(earliest, held->exchange.deadline);
   return earliest;
 }
 
 std::size_t TransactionQueue::size() const {
-  std::size_t total = 0;
+  std::size_t total = held_.size();
   for (const auto& candidate : lanes_) total += candidate.size();
   return total;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "buses/modbus_rtu/line.hpp"
@@ -38,6 +39,11 @@ class TransactionQueue {
   void put_back(TransactionPtr transaction);
   /// The next one, or nullptr.
   TransactionPtr pop();
+  /// Puts one aside: it is not given out before release().
+  void hold(TransactionPtr transaction) { held_.push_back(std::move(transaction)); }
+  /// All that were put aside take their places again.
+  void release();
+  [[nodiscard]] const std::vector<TransactionPtr>& held() const { return held_; }
   /// Class of the next one by strict order.
   [[nodiscard]] std::optional<TransactionClass> top_class() const;
   /// What waits for `node` in a lower class than `to` becomes that urgent.
@@ -60,9 +66,11 @@ class TransactionQueue {
   }
   bool merge(Transaction& transaction);
   void insert(TransactionPtr transaction);
+  static void take_unsendable(auto& from, TimePoint now, std::vector<TransactionPtr>& into);
   Lane* next_below(std::size_t top);
 
   std::array<Lane, transaction_class_count> lanes_;
+  std::vector<TransactionPtr> held_;
   int reservation_;
   int popped_since_reservation_ = 0;
   std::size_t last_reserved_ = 0;  ///< class that had the last reservation

@@ -163,6 +163,9 @@ class Axis {
   Task<Result<void>> prove_or_configure();
   Task<> poll();
   Task<bool> poll_once(int& failures);
+  /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
+  void poll_fast(TimePoint from, Duration longest);
+  [[nodiscard]] TimePoint next_poll(TimePoint began) const;
   Task<> look_for_drift();
   Task<Result<void>> check_for_drift();
   void set_drift(const std::string& text);
@@ -281,8 +284,9 @@ class Axis {
   bool restore_tried_ = false;
   int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
-  std::string drift_;                ///< what the drive no longer holds as configured
-  std::weak_ptr<void> maintenance_;  ///< of begin_maintenance()
+  TimePoint fast_from_{}, fast_until_{};  ///< of poll_fast()
+  std::string drift_;                     ///< what the drive no longer holds as configured
+  std::weak_ptr<void> maintenance_;       ///< of begin_maintenance()
   std::uint64_t eeprom_writes_ = 0;
   UnknownOutcomes unknown_starts_;
   bool absolute_segments_ = false;

@@ -13,6 +13,8 @@ namespace {
 constexpr auto first_backoff = milliseconds(100);
 constexpr auto longest_backoff = milliseconds(1000);
 constexpr int attempts_before_offline = 3;
+/// Less than any reading takes on RS-485; on CAN the state may be known already.
+constexpr auto fastest_poll = milliseconds(2);
 /// The canary is read at least every second (M7), whatever the polling period; the rest is for the wire.
 constexpr auto continuity_period = milliseconds(800);
 constexpr auto continuity_latest = milliseconds(950);
@@ -33,10 +35,8 @@ Task<> Axis::connect() {
     // Both would write to the drive's memory.
     while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
     if (closing_) co_return;
-    // The first contact is as urgent as any state; repeated silence must not cost the neighbours much.
-    const bool first = backoff == first_backoff;
-    const auto connected =
-        co_await try_connect(first ? TransactionClass::idle_state : TransactionClass::scan);
+    // The bus sees to it that repeated silence does not cost the neighbours much.
+    const auto connected = co_await try_connect(TransactionClass::idle_state);
     if (closing_) co_return;
     if (connected && !configured_) continue;  // it was told to begin again meanwhile
     if (connected) {
@@ -191,9 +191,21 @@ Task<> Axis::poll() {
     if (!co_await poll_once(failures)) co_return;
     if (failures > 0) continue;  // the bus's own timeouts pace the repetition
     co_await look_for_drift();
-    co_await wake_.wait_until(std::min(began + (busy() ? settings_.poll_moving : settings_.poll_idle),
-                                       continuity_checked_ + continuity_latest));
+    co_await wake_.wait_until(std::min(next_poll(began), continuity_checked_ + continuity_latest));
   }
+}
+
+void Axis::poll_fast(TimePoint from, Duration longest) {
+  fast_from_ = from;
+  fast_until_ = from + longest;
+  wake_.notify_all();
+}
+
+TimePoint Axis::next_poll(TimePoint began) const {
+  if (!busy()) return began + settings_.poll_idle;
+  if (began >= fast_from_ && began < fast_until_) return began + fastest_poll;
+  const auto next = began + settings_.poll_moving;
+  return began < fast_from_ ? std::min(next, fast_from_) : next;
 }
 
 /// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
@@ -262,7 +274,10 @@ void Axis::reconfigure(const std::string& why, bool position_lost) {
 /// False: the link is gone.
 Task<bool> Axis::poll_once(int& failures) {
   Result<void> result;
-  if (env_.clock->now() - continuity_checked_ >= continuity_period) {
+  const auto now = env_.clock->now();
+  // Where an end is awaited the canary waits as long as it may.
+  const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
+  if (now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
     result = co_await drive_->check_continuity(busy() ? TransactionClass::moving_state
                                                       : TransactionClass::idle_state);
     if (result) continuity_checked_ = env_.clock->now();

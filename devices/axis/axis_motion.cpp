@@ -17,6 +17,10 @@ namespace {
 constexpr auto start_window = milliseconds(500);
 /// Beyond the predicted time: the prediction is exact for the profile, the drive's own latency is unknown.
 constexpr auto overrun_margin = std::chrono::seconds(1);
+/// So long after the predicted end it is looked for as fast as the bus can.
+constexpr auto end_window = milliseconds(300);
+/// And from so long before, at most: a motion too short for its velocity ends before its prediction.
+constexpr Duration longest_end_lead = milliseconds(100);
 /// A counter that was told to become zero shows it within this.
 constexpr auto zeroing_window = milliseconds(200);
 constexpr auto zeroing_poll = milliseconds(5);
@@ -305,6 +309,9 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
   const auto latest =
       plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
   const auto tolerance = target_tolerance();
+  // The end is expected: it is to be told at once.
+  const auto end_lead = std::min(plan.predicted / 3, longest_end_lead);
+  if (!plan.endless) poll_fast(since + plan.predicted - end_lead, end_lead + end_window);
   for (;;) {
     const auto deadline = std::min(activity->hold_until.value_or(latest), latest);
     co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(20)));

@@ -109,6 +109,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto since = env_.clock->now();
     const auto patience =
         settings_.stop_margin + (kind == StopKind::quick_stop ? Duration{0} : deceleration_bound());
+    poll_fast(since, patience);
     // Only an axis that is online is polled.
     const bool polled = link_ == LinkState::online;
     const bool rests =
@@ -149,15 +150,14 @@ Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests
   std::int64_t resting_at = 0;
   while (link_ != LinkState::offline && requests == stopping_.requests) {
     if (sample_ && sample_->asked_at >= since) {
+      const bool settled = resting_since && resting_at == tracker_.counter();
+      const bool rested = settled && sample_->asked_at - *resting_since >= rest;
+      if (!sample_->moving && (sample_->mode != DriveMode::homing || rested)) co_return true;
       if (sample_->moving) {
         resting_since.reset();
-      } else if (sample_->mode != DriveMode::homing) {
-        co_return true;
-      } else if (!resting_since || resting_at != tracker_.counter()) {
+      } else if (!settled) {
         resting_since = sample_->asked_at;
         resting_at = tracker_.counter();
-      } else if (sample_->asked_at - *resting_since >= rest) {
-        co_return true;
       }
       if (sample_->asked_at >= deadline + (resting_since ? rest : Duration{0})) co_return false;
     }

@@ -1,9 +1,9 @@
 // M15 and the scheduling that it rests on: many axes on one line, none of them starved.
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <string>
+#include <map>
 
+#include "tests/rules/shared_line.hpp"
 #include "tests/support/rig.hpp"
 
 namespace axisd::test {
@@ -11,70 +11,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// `count` axes on one line, endless, 1000 pulses/rev.
-class Line {
- public:
-  Line(int count, int baud) {
-    configuration_.machine = "line";
-    configuration_.lines.push_back({.name = "line-a", .port = "sim", .baud = baud});
-    for (int i = 1; i <= count; ++i) {
-      AxisSettings axis{.name = "a" + std::to_string(i),
-                        .bus = "line-a",
-                        .node = static_cast<std::uint8_t>(i),
-                        .model = "ykd2405pr"};
-      axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
-      axis.limits.velocity = 100;
-      configuration_.axes.push_back({.axis = axis});
-    }
-    machine_ = std::make_unique<core::MachineCore>(
-        core::MachineParts{.executor = world.executor(),
-                           .clock = &world.clock(),
-                           .instance_id = "t",
-                           .make_line =
-                               [this](const modbus_rtu::LineSettings& settings) {
-                                 auto made = std::make_unique<VirtualLine>(world, settings);
-                                 line = made.get();
-                                 return made;
-                               }},
-        configuration_);
-    for (int i = 1; i <= count; ++i)
-      line->network().add(
-          simulation::find_simulator("ykd2405pr")->make({.address = static_cast<std::uint8_t>(i)}));
-    line->network().advance(world.now());
-    machine_->start();
-  }
-  ~Line() {
-    machine_->close();
-    EXPECT_TRUE(world.run_until([this] { return machine_->closed(); }, 60s));
-  }
-  [[nodiscard]] bool all(const std::function<bool(const AxisSnapshot&)>& condition) const {
-    for (const auto& axis : machine_->axes())
-      if (!condition(*axis->snapshot())) return false;
-    return true;
-  }
-  core::MachineCore& machine() { return *machine_; }
-  CommandPtr submit(int axis, const Action& action) {
-    auto command = machine_->submit("a" + std::to_string(axis), action, {});
-    EXPECT_TRUE(command) << (command ? "" : to_string(command.error()));
-    return command.value_or(nullptr);
-  }
-
-  VirtualWorld world;
-  VirtualLine* line = nullptr;
-
- private:
-  config::Configuration configuration_;
-  std::unique_ptr<core::MachineCore> machine_;
-};
-
 TEST(M15, EveryAxisConnectsOnASlowLine) {
-  Line line(16, 9600);
+  SharedLine line(16, 9600);
   EXPECT_TRUE(line.world.run_until(
       [&] { return line.all([](const AxisSnapshot& a) { return a.link == LinkState::online; }); }, 60s));
 }
 
 TEST(M15, MovingAxesLeaveTheOthersTheirShare) {
-  Line line(8, 115200);
+  SharedLine line(8, 115200);
   const auto online = [&] {
     return line.all([](const AxisSnapshot& a) { return a.link == LinkState::online; });
   };
@@ -94,7 +38,7 @@ TEST(M15, MovingAxesLeaveTheOthersTheirShare) {
 }
 
 TEST(M15, StopAllOnASlowLineConfirmsWithoutEscalating) {
-  Line line(16, 9600);
+  SharedLine line(16, 9600);
   ASSERT_TRUE(line.world.run_until(
       [&] { return line.all([](const AxisSnapshot& a) { return a.link == LinkState::online; }); }, 60s));
   for (int i = 1; i <= 16; ++i) {

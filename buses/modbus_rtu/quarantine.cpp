@@ -1,0 +1,37 @@
+#include "buses/modbus_rtu/quarantine.hpp"
+
+#include <algorithm>
+
+namespace axisd::modbus_rtu {
+
+void Quarantine::silent(std::uint8_t node, TimePoint now, Duration cost, bool stop) {
+  auto& known = nodes_[node];
+  known.good = 0;
+  // Stops alone do not put a node there: their repetitions are few, and urgent.
+  if (stop && known.level == 0) return;
+  ++known.silent;
+  if (known.level == 0 && known.answered_once && known.silent < quarantine_after) return;
+  constexpr int most_doublings = 20;
+  known.level = std::min(known.level + 1, most_doublings);
+  ++known.held;
+  const auto hold = std::min(quarantine_first_hold * (1 << (known.level - 1)), cost * quarantine_share);
+  // A stop that came before its turn is made up for by the next probe.
+  known.next = std::max(known.next, now) + hold;
+  if (stop) known.next_stop = now + hold;
+}
+
+void Quarantine::answered(std::uint8_t node) {
+  auto& known = nodes_[node];
+  known.answered_once = true;
+  known.silent = 0;
+  known.next = known.next_stop = {};
+  if (++known.good >= quarantine_trust_after) known.level = 0;
+}
+
+TimePoint Quarantine::ready_at(std::uint8_t node, bool stop) const {
+  const auto known = nodes_.find(node);
+  if (known == nodes_.end()) return {};
+  return stop ? known->second.next_stop : known->second.next;
+}
+
+}  // namespace axisd::modbus_rtu

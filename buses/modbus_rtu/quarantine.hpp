@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+
+#include "buses/clock.hpp"
+
+namespace axisd::modbus_rtu {
+
+/// Requests in vain in a row that put a node into quarantine; one is enough for a node that never answered.
+inline constexpr int quarantine_after = 3;
+/// Of the time of its line, a node in quarantine may cost the others one part in so many (2 %).
+inline constexpr int quarantine_share = 50;
+/// First wait between two probes; it doubles up to what the share demands.
+inline constexpr Duration quarantine_first_hold = std::chrono::milliseconds(100);
+/// Replies in a row that end the suspicion: until then one more request in vain is enough.
+inline constexpr int quarantine_trust_after = 4;
+
+/// Holds requests to nodes that do not answer back, so that waiting for them costs their neighbours a bounded
+/// share of the line. A stop is held back only after another one that went out in vain. Pure.
+class Quarantine {
+ public:
+  struct Node {
+    int silent = 0;          ///< requests in vain in a row
+    int level = 0;           ///< 0: trusted; else how often the wait was doubled, plus 1
+    int good = 0;            ///< replies in a row
+    std::uint64_t held = 0;  ///< times that it was held back
+    TimePoint next{};        ///< not before: any request
+    TimePoint next_stop{};   ///< not before: a stop
+    bool answered_once = false;
+    [[nodiscard]] bool quarantined() const { return level > 0 && silent > 0; }
+  };
+
+  /// A request ended in vain at `now`, after the line was kept from others for `cost`.
+  void silent(std::uint8_t node, TimePoint now, Duration cost, bool stop);
+  void answered(std::uint8_t node);
+  void forget() { nodes_.clear(); }
+  /// Not before this.
+  [[nodiscard]] TimePoint ready_at(std::uint8_t node, bool stop) const;
+  /// By address; only those that were asked something.
+  [[nodiscard]] const std::map<std::uint8_t, Node>& nodes() const { return nodes_; }
+
+ private:
+  std::map<std::uint8_t, Node> nodes_;
+};
+
+}  // namespace axisd::modbus_rtu

@@ -1,0 +1,131 @@
+// What nodes that do not answer cost the others of their line, and how soon the end of a motion is told.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "tests/rules/shared_line.hpp"
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int count = 16;
+
+bool is_silent(int node, int silent) { return node > count - silent; }
+
+/// Sixteen axes polled as fast as the line can; returns the lowest of the rates that the answering ones keep,
+/// as parts of those they have when all answer. Also checks that silence costs at most 2 % per node.
+double rate_kept(int silent) {
+  SharedLine line(count, 115200, [](AxisSettings& axis) { axis.poll_idle = 1ms; });
+  const auto online = [&] {
+    return line.all([](const AxisSnapshot& axis) { return axis.link == LinkState::online; });
+  };
+  EXPECT_TRUE(line.world.run_until(online, 20s));
+  const auto replies = [&] {
+    line.line->forget_wire();
+    line.world.run_for(30s);
+    std::map<int, int> by_node;
+    Duration in_vain{};
+    for (const auto& entry : line.line->wire()) {
+      if (entry.status == modbus_rtu::ExchangeStatus::replied) ++by_node[entry.node()];
+      if (entry.status == modbus_rtu::ExchangeStatus::timeout) in_vain += entry.end - entry.begin + 1750us;
+    }
+    return std::pair(by_node, in_vain);
+  };
+  const auto before = replies().first;
+  for (int node = 1; node <= count; ++node)
+    if (is_silent(node, silent)) line.line->network().node(static_cast<std::uint8_t>(node))->set_power(false);
+  line.world.run_for(10s);
+  const auto [after, in_vain] = replies();
+  EXPECT_LE(in_vain, 30'000ms * 21 * silent / 1000) << silent << " silent";
+  EXPECT_GE(in_vain, 30'000ms * 10 * silent / 1000) << "they are probed all the same";
+  double lowest = 10;
+  for (int node = 1; node <= count - silent; ++node)
+    lowest = std::min(lowest, static_cast<double>(after.at(node)) / before.at(node));
+  // They are found again.
+  for (int node = 1; node <= count; ++node)
+    if (is_silent(node, silent)) line.line->network().node(static_cast<std::uint8_t>(node))->set_power(true);
+  EXPECT_TRUE(line.world.run_until(online, 10s));
+  return lowest;
+}
+
+TEST(M15, OneSilentNodeOfSixteenLeavesTheOthersTheirRate) { EXPECT_GE(rate_kept(1), 0.95); }
+TEST(M15, ThreeSilentNodesOfSixteenLeaveTheOthersTheirRate) { EXPECT_GE(rate_kept(3), 0.90); }
+
+TEST(M15, AxesThatAreOfflineAtStartDoNotDelayTheOthers) {
+  SharedLine line(count, 115200);
+  for (const std::uint8_t node : {1, 2, 3, 4}) line.line->network().node(node)->set_power(false);
+  EXPECT_TRUE(line.world.run_until(
+      [&] {
+        return std::ranges::count_if(line.machine().axes(), [](const auto& axis) {
+                 return axis->snapshot()->link == LinkState::online;
+               }) == count - 4;
+      },
+      10s));
+}
+
+/// Each axis gets its first stop at once; what is repeated to those that do not answer waits (M4, M15).
+TEST(M15, RepeatedStopsToSilentNodesCostLittle) {
+  SharedLine line(count, 115200);
+  ASSERT_TRUE(line.world.run_until(
+      [&] { return line.all([](const AxisSnapshot& axis) { return axis.link == LinkState::online; }); },
+      20s));
+  const auto enabled = line.submit(16, EnableRequest{});
+  ASSERT_TRUE(line.world.run_until([&] { return enabled->has_ended(); }, 5s));
+  line.submit(16, MoveVelocityRequest{.velocity = 20});
+  line.world.run_for(1s);
+  line.line->network().faults().add({.kind = simulation::FaultKind::drop_request, .node = 16, .count = -1});
+  line.world.run_for(10s);
+  line.line->forget_wire();
+  const auto asked = line.world.now();
+  const auto stop = line.submit(16, StopRequest{});
+  line.world.run_for(20s);
+  const auto& wire = line.line->wire();
+  const auto first = std::ranges::find_if(
+      wire, [](const WireEntry& entry) { return entry.node() == 16 && entry.address() == 0x0028; });
+  ASSERT_NE(first, wire.end());
+  EXPECT_LE(first->begin - asked, 45ms) << "the first attempt is never held back";
+  Duration in_vain{};
+  int stops = 0;
+  for (const auto& entry : wire) {
+    if (entry.node() == 16) in_vain += entry.end - entry.begin + 1750us;
+    stops += entry.node() == 16 && entry.address() == 0x0028 ? 1 : 0;
+  }
+  EXPECT_GE(stops, 5) << "it stays owed";
+  EXPECT_LE(in_vain, 20'000ms * 3 / 100);
+  line.line->network().faults().clear();
+  ASSERT_TRUE(line.world.run_until([&] { return !line.line->network().node(16)->shaft_moving(); }, 5s));
+}
+
+/// From the true end of a move, by the simulator, to its Done. Shorter moves, which never reach their
+/// velocity, end before they are expected to.
+TEST(M10, DoneOfAMoveThatReachesItsVelocityIsToldAtOnce) {
+  Duration latest{};
+  for (int length = 11; length <= 40; ++length) {
+    Rig rig;
+    rig.ready();
+    const auto move = rig.submit(MoveAbsoluteRequest{.position = static_cast<double>(length)});
+    ASSERT_TRUE(rig.run_until(
+        [&] {
+          rig.drive->advance(rig.world.now());
+          return rig.drive->shaft_moving();
+        },
+        1s));
+    std::optional<TimePoint> ended;
+    while (!move->has_ended() && rig.world.now().time_since_epoch() < 2h) {
+      rig.run(200us);
+      rig.drive->advance(rig.world.now());
+      if (!ended && !rig.drive->shaft_moving()) ended = rig.world.now();
+    }
+    ASSERT_EQ(move->value().state, CommandState::done) << describe(move->value());
+    latest = std::max(latest, rig.world.now() - *ended);
+  }
+  ::testing::Test::RecordProperty("latest_us", std::to_string(latest / 1us));
+  EXPECT_LE(latest, 8ms) << "the next reading of the state";
+}
+
+}  // namespace
+}  // namespace axisd::test
