@@ -271,7 +271,9 @@ void RtuBus::on_result(const ExchangeResult& result) {
 void RtuBus::note_late_read(const Request& request, const ExchangeResult& result) {
   switch (result.status) {
     case ExchangeStatus::replied:
-      late_reads_.erase(request.node);  // replies come in order: nothing older can follow
+      // Replies come in order: nothing older can follow. The echo of a write may be that of the same write
+      // before, which was late.
+      if (request.function == Function::read_holding_registers) late_reads_.erase(request.node);
       break;
     case ExchangeStatus::timeout:
     case ExchangeStatus::cut:

@@ -39,6 +39,35 @@ TEST(RtuBus, ALateReplyNeverAnswersAnotherRead) {
   }
 }
 
+/// The echo of a write that was late answers the same write when it is repeated: a read between the two may
+/// still be on its way.
+TEST(RtuBus, TheEchoOfARepeatedWriteDoesNotProveThatAReadIsNoLongerLate) {
+  for (int delay = 60; delay < 110; delay += 2) {
+    BusRig rig;
+    rig.line->network().node(1)->poke(0x0020, 111);
+    rig.line->network().node(1)->poke(0x0032, 222);
+    rig.line->network().faults().add({.kind = FaultKind::delay_reply,
+                                      .node = 1,
+                                      .function = 6,
+                                      .delay = std::chrono::milliseconds(delay)});
+    rig.line->network().faults().add(
+        {.kind = FaultKind::delay_reply, .node = 1, .function = 3, .delay = std::chrono::milliseconds(60)});
+    Request stop{.node = 1, .function = Function::write_single_register, .address = 0x0028};
+    stop.values.push_back(0);
+    const TransactionOptions urgent{.transaction_class = TransactionClass::stop};
+    rig.transact("stop", stop, urgent);
+    rig.world.run_for(35ms);
+    rig.transact("late",
+                 {.node = 1, .function = Function::read_holding_registers, .address = 0x0020, .count = 4},
+                 urgent);
+    rig.world.run_for(35ms);
+    rig.transact("repeated", stop, urgent);
+    rig.read("next", 0x0032, 4);
+    rig.world.run_for(800ms);
+    if (const auto& next = rig.results.at("next")) EXPECT_EQ(next->registers.at(0), 222) << delay;
+  }
+}
+
 TEST(RtuBus, OneSilentNodeDoesNotDisturbItsNeighbour) {
   BusRig rig;
   rig.line->network().node(1)->set_power(false);
