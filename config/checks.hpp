@@ -13,6 +13,9 @@ void check_machine(const Configuration& configuration, Diagnostics& diagnostics,
 /// Each device by itself.
 void check_devices(const Configuration& configuration, Diagnostics& diagnostics, const Places& places);
 
+/// Buses with `budget: refuse` against what is asked of them. Precondition: there is no other finding.
+void check_budgets(const Configuration& configuration, Diagnostics& diagnostics, const Places& places);
+
 /// Fills in what follows from other keys (travel, settings of the model), then checks the axis by itself.
 void complete_axis(AxisEntry& entry, Diagnostics& diagnostics, const Places& places);
 

@@ -55,6 +55,7 @@ LoadResult load_text(std::string_view text, const std::string& file_name) try {
   for (auto& entry : configuration.axes) complete_axis(entry, diagnostics, places);
   check_devices(configuration, diagnostics, places);
   check_machine(configuration, diagnostics, places);
+  if (diagnostics.empty()) check_budgets(configuration, diagnostics, places);
   if (!diagnostics.empty()) return {{}, diagnostics.sorted()};
   return {std::move(configuration), {}};
 } catch (const std::exception& error) {  // out of memory

@@ -77,6 +77,39 @@ constexpr KeySpec flight_recorder_keys[] = {
                  const Value& v) { t.configuration->flight_recorder.files = static_cast<int>(v.integer); }},
 };
 
+constexpr std::string_view budget_policies[] = {"warn", "refuse"};
+
+/// Of either kind of bus: `Bus` is the member of Target that points to it.
+template <auto Bus>
+constexpr KeySpec budget_key{
+    .key = "budget",
+    .kind = Kind::choice,
+    .description =
+        "Whether a configuration that asks more of the bus than it can do is refused, or only warned of.",
+    .example = "refuse",
+    .default_value = "warn",
+    .choices = budget_policies,
+    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.refuse = v.text == "refuse"; }};
+template <auto Bus>
+constexpr KeySpec stop_bound_key{
+    .key = "stop_bound",
+    .kind = Kind::duration,
+    .description =
+        "Within this after its request the last frame of a stop of all axes must have gone out, at worst.",
+    .example = "400 ms",
+    .minimum = 1,
+    .maximum = 60'000,
+    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.stop_bound = v.duration; }};
+template <auto Bus>
+constexpr KeySpec refresh_bound_key{
+    .key = "refresh_bound",
+    .kind = Kind::duration,
+    .description = "While all axes move, each must be read this often, at worst.",
+    .example = "3 s",
+    .minimum = 1,
+    .maximum = 60'000,
+    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.refresh_bound = v.duration; }};
+
 constexpr std::string_view formats[] = {"8N1", "8N2", "8E1", "8O1"};
 constexpr modbus_rtu::Format format_values[] = {{modbus_rtu::Parity::none, 1},
                                                 {modbus_rtu::Parity::none, 2},
@@ -117,6 +150,9 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .minimum = 1,
      .maximum = 1000,
      .apply = [](Target& t, const Value& v) { t.line->turnaround_max = v.duration; }},
+    budget_key<&Target::line>,
+    stop_bound_key<&Target::line>,
+    refresh_bound_key<&Target::line>,
 };
 
 constexpr KeySpec canopen_keys[] = {
@@ -153,6 +189,9 @@ constexpr KeySpec canopen_keys[] = {
      .minimum = 5,
      .maximum = 5000,
      .apply = [](Target& t, const Value& v) { t.network->sdo_timeout = v.duration; }},
+    budget_key<&Target::network>,
+    stop_bound_key<&Target::network>,
+    refresh_bound_key<&Target::network>,
 };
 
 constexpr KeySpec bus_keys[] = {

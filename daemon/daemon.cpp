@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "api/server/server.hpp"
+#include "config/budget.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
@@ -111,6 +112,12 @@ server::ServerOptions server_options(const config::ServerSettings& settings) {
   return options;
 }
 
+void log_budget(const BusBudgetReport& budget) {
+  spdlog::info("budget of {}", config::summary(budget));
+  for (const auto& [key, text, remedy] : budget.excess)
+    spdlog::warn("{}: {}; {}", budget.predicted.bus, text, remedy);
+}
+
 int give_up(const Error& error) {
   spdlog::critical("{}", to_string(error));
   end_logging();
@@ -141,6 +148,8 @@ int run_daemon(const Options& options, config::Configuration configuration) {
   auto ports = Ports::open(loop, configuration, options.link_helper);
   if (!ports) return give_up(ports.error());
 
+  const auto budgets = config::budgets(configuration);
+  for (const auto& budget : budgets) log_budget(budget);
   const auto instance_id = make_instance_id((*store)->loaded().start_count);
   core::MachineService* published_to = nullptr;
   core::MachineCore machine({.executor = loop.executor(),
@@ -152,6 +161,7 @@ int run_daemon(const Options& options, config::Configuration configuration) {
                              .link_helper = (*ports)->link_helper(),
                              .observer = std::move(wire_log),
                              .flight_records = &flight_files,
+                             .budgets = budgets,
                              .published =
                                  [&published_to] {
                                    if (published_to != nullptr) published_to->published();

@@ -16,6 +16,7 @@
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
 #include "buses/task.hpp"
+#include "buses/transaction_set.hpp"
 #include "devices/bus_kind.hpp"
 #include "devices/drive.hpp"
 
@@ -160,6 +161,8 @@ struct DriveDescriptor {
   PersistSettings saves = PersistSettings::all();  ///< parts of `persist:` that it saves as they are written
   RtuIdentification identification{};              ///< of modbus_rtu models
   std::optional<CanIdentification> can_identification{};  ///< of canopen models; nothing: it cannot be told
+  RtuTransactionSet rtu_transactions{};                   ///< of modbus_rtu models
+  CanTransactionSet can_transactions{};                   ///< of canopen models
   std::unique_ptr<Drive> (*make)(DriveContext context) = nullptr;
   /// Of a model that a file of the machine builder describes: the descriptor of one drive, made from this one
   /// and its settings. It reads the file: not on the core thread. Then `make` needs it in DriveSetup.

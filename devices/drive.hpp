@@ -186,6 +186,9 @@ class Drive {
   /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop does not) in class `stop`.
   virtual Task<Result<void>> stop(StopKind kind) = 0;
 
+  /// When the last stop frame that is known to have gone out had done so: its last byte or bit.
+  [[nodiscard]] virtual std::optional<TimePoint> stop_sent_at() const { return std::nullopt; }
+
   /// Reads back what the configuration owns among terminals and scale.
   virtual Task<Result<Drift>> check_drift(TransactionClass transaction_class) = 0;
   /// The drive takes its motion from elsewhere, as it is configured (pulse inputs): axisd watches it.

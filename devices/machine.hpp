@@ -13,6 +13,7 @@
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "devices/axis/command.hpp"
 #include "devices/axis/snapshot.hpp"
+#include "devices/budget.hpp"
 #include "devices/bus_access.hpp"
 #include "devices/bus_kind.hpp"
 #include "devices/bus_watch.hpp"
@@ -91,6 +92,8 @@ class Machine {
   virtual void cancel_command(std::string id, CommandCallback callback) = 0;
 
   virtual void buses(std::function<void(std::vector<BusStatus>)> callback) = 0;
+  /// What each bus can promise, with what was seen up to now.
+  virtual void budgets(std::function<void(std::vector<BusBudgetReport>)> callback) = 0;
 
   [[nodiscard]] virtual DriveAccess& drive_access() = 0;
   [[nodiscard]] virtual BusAccess& bus_access() = 0;

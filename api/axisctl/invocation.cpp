@@ -106,6 +106,7 @@ int run(int argc, const char* const* argv) {
   add_trace_command(app, invocation);
   add_event_commands(app, invocation);
   add_system_commands(app, invocation);
+  add_budget_command(app, invocation);
   add_offline_commands(app, invocation);
   try {
     app.parse(reversed_arguments(argc, argv));

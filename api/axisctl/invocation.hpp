@@ -39,6 +39,7 @@ void add_command_commands(CLI::App& app, Invocation& invocation);  ///< command 
 void add_drive_commands(CLI::App& app, Invocation& invocation);    ///< drive ...
 void add_bus_commands(CLI::App& app, Invocation& invocation);      ///< bus scan|read|write, device list|write
 void add_trace_command(CLI::App& app, Invocation& invocation);     ///< trace
+void add_budget_command(CLI::App& app, Invocation& invocation);    ///< budget
 void add_event_commands(CLI::App& app, Invocation& invocation);    ///< events
 void add_system_commands(CLI::App& app, Invocation& invocation);   ///< buses, info
 void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, schema, completion

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "api/budget/convert.hpp"
 #include "api/server/bus_convert.hpp"
 #include "api/server/bus_validate.hpp"
 #include "api/server/convert.hpp"
@@ -31,6 +32,24 @@ BusServiceImpl::Reactor* BusServiceImpl::ListBuses(Context* context, const v1::L
       call->complete([response, buses = std::move(buses)] {
         for (const auto& bus : buses) to_proto(bus, *response->add_buses());
         return grpc::Status::OK;
+      });
+    });
+  });
+}
+
+BusServiceImpl::Reactor* BusServiceImpl::GetBudget(Context* context, const v1::GetBudgetRequest* request,
+                                                   v1::GetBudgetResponse* response) {
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
+    services_.machine.budgets([call, response, bus = request->bus()](std::vector<BusBudgetReport> budgets) {
+      call->complete([response, bus, budgets = std::move(budgets)] {
+        for (const auto& budget : budgets)
+          if (bus.empty() || budget.predicted.bus == bus) api::to_proto(budget, *response->add_budgets());
+        if (bus.empty() || !response->budgets().empty()) return grpc::Status::OK;
+        return to_status({.reason = Reason::invalid_argument,
+                          .message = fmt::format("there is no bus '{}'", bus),
+                          .remedy = "list them: axisctl bus list"});
       });
     });
   });

@@ -14,6 +14,8 @@ class BusServiceImpl final : public v1::BusService::CallbackService {
   using Reactor = grpc::ServerUnaryReactor;
   Reactor* ListBuses(Context* context, const v1::ListBusesRequest* request,
                      v1::ListBusesResponse* response) override;
+  Reactor* GetBudget(Context* context, const v1::GetBudgetRequest* request,
+                     v1::GetBudgetResponse* response) override;
   Reactor* ListDevices(Context* context, const v1::ListDevicesRequest* request,
                        v1::ListDevicesResponse* response) override;
   Reactor* WriteDevice(Context* context, const v1::WriteDeviceRequest* request,

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "buses/budget.hpp"
 #include "buses/clock.hpp"
 
 namespace axisd::canopen {
@@ -15,6 +16,7 @@ struct NetworkSettings {
   std::uint32_t bitrate = 1'000'000;                      ///< bit/s; the interface's must be the same
   Duration sync_period{};                                 ///< of the SYNC that this master produces; 0: none
   Duration sdo_timeout = std::chrono::milliseconds(100);  ///< from the end of a request to its reply
+  BudgetPolicy budget{};
   [[nodiscard]] bool simulated() const { return interface == "sim"; }
 };
 

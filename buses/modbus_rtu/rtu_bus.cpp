@@ -11,8 +11,6 @@ namespace axisd::modbus_rtu {
 
 namespace {
 
-/// Margin for the operating system and USB adapters on top of what the wire and the node take.
-constexpr auto timeout_margin = std::chrono::milliseconds(10);
 /// So long after its time a reply may still come: gateways and drives that save to their EEPROM.
 constexpr auto latest_reply = std::chrono::seconds(5);
 /// Damaged replies in a row that are no accident any more.
@@ -101,7 +99,7 @@ Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOp
           .frame = frame,
           .guard = std::move(options.guard),
           .deadline = options.deadline,
-          .reply_timeout = turnaround + reply + timeout_margin,
+          .reply_timeout = turnaround + reply + reply_margin,
           .turnaround_max = std::min(turnaround, settings_.turnaround_max),
           .serial = overrides ? options.serial : std::nullopt};
 }
@@ -331,6 +329,7 @@ Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResu
   if (result.status == ExchangeStatus::replied && result.reply.kind != ReplyKind::exception)
     return Answer{.registers = result.reply.registers,
                   .sent_at = result.request_begin,
+                  .request_end = result.request_end,
                   .answered_at = result.reply_end};
   auto error = error_of(transaction.exchange, result);
   error.where.bus = settings_.name;

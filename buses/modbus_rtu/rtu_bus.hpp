@@ -23,6 +23,7 @@ namespace axisd::modbus_rtu {
 struct Answer {
   std::vector<std::uint16_t> registers;  ///< of a read
   TimePoint sent_at;                     ///< first byte of the request on the wire
+  TimePoint request_end;                 ///< last byte of the request
   TimePoint answered_at;                 ///< last byte of the reply
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "buses/budget.hpp"
 #include "buses/clock.hpp"
 
 namespace axisd::modbus_rtu {
@@ -27,6 +28,9 @@ struct SerialSettings {
   bool operator==(const SerialSettings&) const = default;
 };
 
+/// Of the wait for a reply, on top of what the wire and the node take: operating system and USB adapters.
+inline constexpr Duration reply_margin = std::chrono::milliseconds(10);
+
 /// One RS-485 line as the YAML describes it.
 struct LineSettings {
   std::string name;   ///< bus name
@@ -35,6 +39,7 @@ struct LineSettings {
   Format format{};
   Duration turnaround_max =
       std::chrono::milliseconds(20);  ///< longest time a node takes before its first byte
+  BudgetPolicy budget{};
   [[nodiscard]] bool simulated() const { return port == "sim"; }
   [[nodiscard]] SerialSettings serial() const { return {.baud = baud, .format = format}; }
 };

@@ -31,7 +31,8 @@ using TransactionPtr = std::unique_ptr<Transaction>;
 /// next, the lower ones in turn (never instead of a stop). Pure: no I/O, no clock of its own.
 class TransactionQueue {
  public:
-  explicit TransactionQueue(int reservation = 8) : reservation_(reservation) {}
+  static constexpr int default_reservation = 8;
+  explicit TransactionQueue(int reservation = default_reservation) : reservation_(reservation) {}
 
   /// A read equal to one that waits joins it (and lends it its urgency); everything else is queued.
   void push(TransactionPtr transaction);

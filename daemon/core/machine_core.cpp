@@ -236,7 +236,7 @@ Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& ac
   return found->submit(action, options);
 }
 
-std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client) {
+std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client, TimePoint arrived) {
   ++latches_;
   set_inhibit(true, client);
   spdlog::warn("StopAll by {}: motion is inhibited until it is released", client);
@@ -256,7 +256,8 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client)
   std::ranges::sort(order);
   std::vector<Result<CommandPtr>> results(axes_.size(), fail(Reason::internal, "not stopped"));
   for (const auto& [urgency, i] : order)
-    results[i] = axes_[i]->submit(StopRequest{.kind = StopKind::stop}, {.client = client});
+    results[i] = axes_[i]->submit(StopRequest{.kind = StopKind::stop, .all = true},
+                                  {.client = client, .arrived = arrived});
   return results;
 }
 
@@ -324,6 +325,14 @@ std::vector<BusStatus> MachineCore::bus_status() const {
                    .network = network_status(*bus, *cyclers_[i])});
   }
   return all;
+}
+
+std::vector<BusBudgetReport> MachineCore::budgets() const {
+  auto reports = parts_.budgets;
+  for (auto& report : reports)
+    for (auto& axis : report.axes)
+      if (const auto* seen = find(axis.predicted.axis)) axis.observed = seen->observed();
+  return reports;
 }
 
 bool MachineCore::buses_reported() const {

@@ -34,6 +34,7 @@ struct MachineParts {
   LinkHelper link_helper{};  ///< without: links stay as they are after bus-off and stalls (M26)
   FrameObserver observer{};  ///< told every frame (the wire log); may be empty
   store::RecordFiles* flight_records = nullptr;  ///< may be null: none are written
+  std::vector<BusBudgetReport> budgets{};        ///< as computed; may be empty: none is told
   std::function<void()> published;
 };
 
@@ -67,7 +68,8 @@ class MachineCore {
 
   Result<CommandPtr> submit(const std::string& axis, const Action& action, const CommandOptions& options);
   /// Latches the inhibit first, then stops every axis, moving ones first (M14).
-  std::vector<Result<CommandPtr>> stop_all(const std::string& client);
+  /// `arrived`: as of CommandOptions.
+  std::vector<Result<CommandPtr>> stop_all(const std::string& client, TimePoint arrived = {});
   /// Ends the inhibit once that is durable.
   void release_inhibit(const std::string& client, std::function<void(Result<void>)> done);
   /// Who latched the inhibit, or nullptr. Thread: any.
@@ -79,6 +81,8 @@ class MachineCore {
   /// What sees the frames of a bus. nullptr if there is none of that name.
   [[nodiscard]] const BusRecorder* find_recorder(std::string_view bus) const;
   [[nodiscard]] FlightRecorder& flight_recorder() { return flight_recorder_; }
+  /// Those of the parts, with what the axes have seen.
+  [[nodiscard]] std::vector<BusBudgetReport> budgets() const;
   /// Runs a sequence that uses what this owns; closed() waits for its end.
   void launch(Task<> sequence, const char* name);
   /// Ends all sequences; then closed() comes true and the machine can be destroyed. Moves nothing.

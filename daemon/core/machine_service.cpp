@@ -73,6 +73,7 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
   const auto found = axes_.find(axis);
   const auto* stop = std::get_if<StopRequest>(&action);
   const bool disable = std::holds_alternative<DisableRequest>(action);
+  options.arrived = now();
   auto serve = [this, axis, action = std::move(action), options = std::move(options), until,
                 callback = std::move(callback)]() mutable {
     const bool is_stop =
@@ -101,8 +102,8 @@ void MachineService::stop_all(std::string client, WaitUntil until,
     std::vector<Result<Command>> results;
     std::size_t missing = 0;
   };
-  auto serve = [this, client = std::move(client), until, callback = std::move(callback)] {
-    const auto commands = machine_->stop_all(client);
+  auto serve = [this, client = std::move(client), arrived = now(), until, callback = std::move(callback)] {
+    const auto commands = machine_->stop_all(client, arrived);
     auto gathering = std::make_shared<Gathering>();
     gathering->results.assign(commands.size(), fail(Reason::internal, "no answer"));
     gathering->missing = commands.size();
@@ -159,6 +160,10 @@ void MachineService::cancel_command(std::string id, CommandCallback callback) {
 
 void MachineService::buses(std::function<void(std::vector<BusStatus>)> callback) {
   post(loop_->executor(), [this, callback = std::move(callback)] { callback(machine_->bus_status()); });
+}
+
+void MachineService::budgets(std::function<void(std::vector<BusBudgetReport>)> callback) {
+  post(loop_->executor(), [this, callback = std::move(callback)] { callback(machine_->budgets()); });
 }
 
 void MachineService::on_published(std::function<void()> notify) { notify_ = std::move(notify); }

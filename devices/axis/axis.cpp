@@ -123,6 +123,10 @@ void Axis::on_sample(const DriveSample& sample) {
     lose_trust();  // open loop: the overtravel stop has no ramp (M20)
   if (!sample.enabled) on_released(sample, before && before->enabled);
   if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = false;
+  if (link_ == LinkState::online)
+    observed_.on_sample(sample, busy());
+  else
+    observed_.interrupted();
   if (terminal_motion_ && !sample.moving) {
     terminal_motion_ = false;
     tracker_.forget_target();

@@ -31,6 +31,7 @@
 #include "buses/signal.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/command_book.hpp"
+#include "devices/axis/observed_times.hpp"
 #include "devices/axis/planner.hpp"
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
@@ -106,6 +107,8 @@ class Axis {
   [[nodiscard]] const AxisSettings& settings() const { return settings_; }
   /// Nothing moves, as far as is known, and no stop is under way.
   [[nodiscard]] bool at_rest() const;
+  /// Longest times seen, beside those of the bus budget.
+  [[nodiscard]] const ObservedAxis& observed() const { return observed_.values(); }
   /// Thread: any.
   [[nodiscard]] const std::shared_ptr<AxisGate>& gate() const { return gate_; }
   /// Thread: any.
@@ -139,7 +142,10 @@ class Axis {
   /// Keeps the poll loop off the node: a start is one uninterrupted chain (M6).
   class Chain {
    public:
-    explicit Chain(Axis& axis) : axis_(&axis) { ++axis_->chains_; }
+    explicit Chain(Axis& axis) : axis_(&axis) {
+      ++axis_->chains_;
+      axis_->observed_.interrupted();
+    }
     ~Chain() {
       --axis_->chains_;
       axis_->wake_.notify_all();
@@ -302,6 +308,7 @@ class Axis {
 
   ActivityPtr activity_;
   Stopping stopping_;
+  ObservedTimes observed_;
   std::optional<Error> bus_loss_;  ///< not yet acted upon
   bool stop_owed_ = false;         ///< M4: to a silent node, until standstill is confirmed
   bool enabled_by_us_ = false;

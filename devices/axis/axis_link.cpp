@@ -15,8 +15,6 @@ constexpr auto longest_backoff = milliseconds(1000);
 constexpr int attempts_before_offline = 3;
 /// Less than any reading takes on RS-485; on CAN the state may be known already.
 constexpr auto fastest_poll = milliseconds(2);
-/// The canary is read at least every second (M7), whatever the polling period; the rest is for the wire.
-constexpr auto continuity_period = milliseconds(800);
 constexpr auto continuity_latest = milliseconds(950);
 
 }  // namespace

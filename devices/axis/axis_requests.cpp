@@ -320,6 +320,7 @@ Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions
                               options.client.empty() ? "the daemon" : options.client)));
   // The drive keeps the deceleration that was set before the motion: the answer says which (M12).
   if (request.kind != StopKind::quick_stop) command->grant({.deceleration_time = deceleration_bound()});
+  if (options.arrived != TimePoint{}) observed_.stop_requested(options.arrived, request.all);
   begin_stop(request.kind, request.hold, command);
   publish();
   return command;

@@ -66,12 +66,14 @@ Task<> Axis::run_stop() {
   stopping_.shown = AxisState::standstill;
   tracker_.forget_target();
   if (confirmed) {
+    observed_.standstill_confirmed(env_.clock->now());
     stop_owed_ = false;
     // Open loop: a stop without a ramp may have lost steps (M12).
     if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
     remember_position();
     for (const auto& command : commands) command->done();
   } else {
+    observed_.stop_failed();
     stop_owed_ = true;
     if (!fault_) fault_ = confirmed.error();
     spdlog::error("{}", to_string(confirmed.error()));
@@ -96,6 +98,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto kind = stopping_.kind;
     const auto sent = co_await drive_->stop(kind);
     wake_.notify_all();
+    if (const auto out = drive_->stop_sent_at()) observed_.stop_sent(*out);
     const bool no_reply = !sent && sent.error().reason == Reason::no_reply;
     if (no_reply && link_ != LinkState::offline && ++silent < stop_attempts) continue;
     silent = 0;

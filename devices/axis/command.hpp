@@ -66,6 +66,7 @@ struct CommandOptions {
   std::string request_id;  ///< required for motion
   std::uint64_t lease_token = 0;
   TimePoint not_after = TimePoint::max();
+  TimePoint arrived{};  ///< at the server; not set: the daemon's own
   BufferMode buffer_mode = BufferMode::aborting;
 };
 
@@ -94,6 +95,7 @@ struct JogRequest {
 struct StopRequest {
   StopKind kind = StopKind::stop;
   bool hold = false;
+  bool all = false;  ///< of all axes
 };  ///< halt, stop or quick_stop
 struct ResetRequest {};
 struct SetPositionRequest {

@@ -90,6 +90,10 @@ struct HomingSettings {
 /// Value of a model-specific setting, after the descriptor's schema was applied.
 using SettingValue = std::variant<bool, std::int64_t, double, std::string>;
 
+/// How often the canary is read, whatever the polling period: at least every second (M7), less what the wire
+/// takes.
+inline constexpr Duration continuity_period = milliseconds(800);
+
 struct AxisSettings {
   std::string name;
   std::string bus;

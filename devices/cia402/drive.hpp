@@ -65,6 +65,7 @@ class Cia402Drive final : public Drive {
 
   // drive_stop.cpp
   Task<Result<void>> stop(StopKind kind) override;
+  [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stop_sent_at_; }
 
   // drive_motion.cpp
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
@@ -338,6 +339,7 @@ class Cia402Drive final : public Drive {
   std::optional<bool> found_closed_;  ///< loop mode as it was before this power cycle's first write
   std::set<std::uint32_t> unsaved_;   ///< saved objects that did not hold what was written
   std::uint64_t eeprom_writes_ = 0;
+  std::optional<TimePoint> stop_sent_at_;
 };
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);

@@ -20,8 +20,6 @@ using std::chrono::milliseconds;
 
 constexpr auto heartbeat_period = milliseconds(250);
 constexpr auto heartbeat_patience = milliseconds(1000);
-/// Of event PDOs at 1 Mbit/s: a node sends them at least, and at most, this often.
-constexpr auto event_period = milliseconds(20), inhibit_period = milliseconds(10);
 /// Nobody who takes part in the network is silent for so long.
 constexpr auto silence_of_absent = milliseconds(1000);
 constexpr std::uint32_t full_speed = 1'000'000;

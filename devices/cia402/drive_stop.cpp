@@ -99,6 +99,7 @@ Task<Result<void>> Cia402Drive::write_control(std::uint16_t word, SdoOptions opt
   const bool executed = answer || answer.error().outcome == Outcome::unknown;
   if (executed && (word & control::halt) == 0) halt_.reset();
   if (!answer) co_return failed(answer.error());
+  if ((word & control::halt) != 0 && !command_pdo_) stop_sent_at_ = answer->sent_at;
   if (write != control_writes_) co_return Result<void>{};  // overtaken by a later one
   if (answer->ambiguous) {
     const auto held = co_await held_control(std::move(options));
@@ -125,8 +126,9 @@ Task<> Cia402Drive::wake_if_stopped() {
 /// At once, where there is an RPDO for it. Nobody confirms it: the same follows by SDO.
 Task<> Cia402Drive::send_control_pdo(std::uint16_t word) {
   if (!command_pdo_) co_return;
-  (void)co_await bus_->master().send_pdo(*command_pdo_, canopen::number_bytes(word, word_bytes),
-                                         {.transaction_class = TransactionClass::stop});
+  const auto sent = co_await bus_->master().send_pdo(*command_pdo_, canopen::number_bytes(word, word_bytes),
+                                                     {.transaction_class = TransactionClass::stop});
+  if (sent && (word & control::halt) != 0) stop_sent_at_ = sent->sent_at;
 }
 
 /// M12. In a mode that nobody knows it does no harm, and it asks for no knowledge of the control word.

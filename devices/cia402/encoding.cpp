@@ -100,6 +100,20 @@ std::vector<canopen::PdoMapping> state_layout(const Model& model) {
   return layout;
 }
 
+CanTransactionSet transactions_of(const Model& model, std::uint8_t watched) {
+  CanTransactionSet set{.pdo_inhibit = inhibit_period,
+                        .pdo_event = event_period,
+                        .drift_transfers = watched,
+                        .stop_transfers = stop_transfers};
+  const auto layout = state_layout(model);
+  for (std::size_t i = 0; i < std::min(layout.size(), set.state_pdos.size()); ++i)
+    set.state_pdos.at(i) = static_cast<std::uint8_t>(canopen::pdo_size(layout[i]));
+  const auto states = state_objects(model).size() + (model.objects.moving ? 1U : 0U);
+  set.state_transfers = static_cast<std::uint8_t>(states);
+  set.continuity_transfers = static_cast<std::uint8_t>(motion_objects(model).size());
+  return set;
+}
+
 std::uint16_t alarm_of(const Model& model, std::uint16_t error_code) {
   const auto& meaning = model.meaning;
   const auto own = static_cast<std::uint16_t>(error_code & meaning.alarm_mask);

@@ -42,6 +42,14 @@ struct ActiveLow {
 /// Alarm of a sample whose status word tells of a fault that 603Fh does not name.
 constexpr std::uint16_t alarm_without_code = 0xFFFF;
 
+/// Of event PDOs at 1 Mbit/s: a node sends them at least, and at most, this often.
+inline constexpr auto event_period = std::chrono::milliseconds(20),
+                      inhibit_period = std::chrono::milliseconds(10);
+/// 60FFh, 605Dh, the control word as the drive holds it, and the control word with bit 8.
+inline constexpr std::uint8_t stop_transfers = 4;
+/// What the driver asks of the network for such a drive; `watched`: objects that are looked at for drift.
+CanTransactionSet transactions_of(const Model& model, std::uint8_t watched);
+
 /// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's.
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
                          ActiveLow active_low = {});

@@ -6,6 +6,7 @@
 #include <array>
 #include <limits>
 
+#include "devices/cia402/encoding.hpp"
 #include "devices/cia402/objects.hpp"
 
 namespace axisd::cia402_eds {
@@ -157,6 +158,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   if (eds.find(restore_all) != nullptr) model_.objects.restore = cia402::MemoryCommand{restore_all, load};
   model_.meaning.ramps_are_times = conventions.ramps_are_times;
   model_.meaning.velocity_in_rpm = conventions.velocity_in_rpm;
+  can_transactions = cia402::transactions_of(model_, 0);  // it has nothing that could drift
 }
 
 Result<std::shared_ptr<const DriveDescriptor>> specialise(

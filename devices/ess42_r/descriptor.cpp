@@ -4,6 +4,7 @@
 #include "devices/ess42_r/parameters.hpp"
 #include "devices/yako_rtu/drive.hpp"
 #include "devices/yako_rtu/tables.hpp"
+#include "devices/yako_rtu/transactions.hpp"
 
 namespace axisd::ess42_r {
 
@@ -72,6 +73,7 @@ std::span<const DriveDescriptor> descriptors() {
       .identification = {.model_codes = model_codes,
                          .lacks_register = 0x004E,
                          .microstep_codes = yako_rtu::closed_loop_microsteps},
+      .rtu_transactions = yako_rtu::transactions,
       .make = &make,
   }};
   return models;

@@ -7,6 +7,7 @@
 #include "devices/ssd2608pr/parameters.hpp"
 #include "devices/yako_rtu/drive.hpp"
 #include "devices/yako_rtu/tables.hpp"
+#include "devices/yako_rtu/transactions.hpp"
 
 namespace axisd::ssd2608pr {
 
@@ -89,6 +90,7 @@ std::span<const DriveDescriptor> descriptors() {
       .identification = {.model_codes = model_codes,
                          .has_register = 0x004E,
                          .microstep_codes = yako_rtu::closed_loop_microsteps},
+      .rtu_transactions = yako_rtu::transactions,
       .make = &make,
   }};
   return models;

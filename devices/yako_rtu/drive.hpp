@@ -46,6 +46,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
   Task<Result<void>> stop(StopKind kind) override;
+  [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stop_sent_at_; }
   Task<Result<void>> clear_alarm(MotionGuard guard) override;
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
@@ -128,6 +129,7 @@ class YakoRtuDrive final : public Drive {
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
   std::set<std::uint16_t> unsaved_;   ///< saved registers that did not hold what was written
   std::uint64_t eeprom_writes_ = 0;
+  std::optional<TimePoint> stop_sent_at_;
 };
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);

@@ -181,7 +181,10 @@ Task<Result<void>> YakoRtuDrive::stop(StopKind kind) {
   const std::uint16_t value = kind == StopKind::quick_stop ? 1 : 0;  // 7.6.2: zero is a command
   for (int attempt = 1;; ++attempt) {
     const auto written = co_await node_.write(reg::stop, value, in(TransactionClass::stop));
-    if (written) co_return Result<void>{};
+    if (written) {
+      stop_sent_at_ = written->request_end;
+      co_return Result<void>{};
+    }
     // A refusal mostly means that the frame was damaged (01, which some firmware answers): at once again.
     if (written.error().reason != Reason::refused || attempt == stop_attempts)
       co_return failed(written.error());

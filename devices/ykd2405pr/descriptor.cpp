@@ -3,6 +3,7 @@
 
 #include "devices/yako_rtu/drive.hpp"
 #include "devices/yako_rtu/tables.hpp"
+#include "devices/yako_rtu/transactions.hpp"
 #include "devices/ykd2405pr/parameters.hpp"
 
 namespace axisd::ykd2405pr {
@@ -112,6 +113,7 @@ std::span<const DriveDescriptor> descriptors() {
                        .closed_loop = false,
                        .communication_watchdog = false},
       .identification = {.model_codes = model_codes, .microstep_codes = microsteps},
+      .rtu_transactions = yako_rtu::transactions,
       .make = &make,
   }};
   return models;

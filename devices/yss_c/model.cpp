@@ -133,6 +133,15 @@ constexpr cia402::VendorObjects objects{.moving = object::moving,
                                         .output_levels = object::output_levels,
                                         .first_output_function = object::first_output_function};
 
+/// 6041h, 6064h and 2002h; 603Fh, 2003h, 2004h and 6061h. By SDO 2001h as well.
+constexpr CanTransactionSet transactions{.state_pdos = {8, 7},
+                                         .pdo_inhibit = cia402::inhibit_period,
+                                         .pdo_event = cia402::event_period,
+                                         .state_transfers = 8,
+                                         .continuity_transfers = 5,
+                                         .drift_transfers = 30,
+                                         .stop_transfers = cia402::stop_transfers};
+
 std::unique_ptr<Drive> make(DriveContext context) { return cia402::make_drive(model(), std::move(context)); }
 
 }  // namespace
@@ -197,6 +206,7 @@ const DriveDescriptor& descriptor() {
       // 7: 6098h..609Ah and 607Ch are RW without S, and there are no segments.
       .saves = {.terminals = true, .drive = true},
       .can_identification = identification,
+      .can_transactions = transactions,
       .make = &make,
   };
   return the_descriptor;

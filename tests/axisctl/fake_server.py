@@ -14,7 +14,7 @@ from google.protobuf import duration_pb2
 from fake_axis import ENDS, STEP, FakeAxis, offline_detail, refuse  # makes axisd importable
 from fake_drives import SERVICES, FakeDrives, FakeEvents, FakeNodes
 from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes_rpc,
-                      bus_service_pb2 as bus_pb, bus_service_pb2_grpc as bus_rpc,
+                      budget_pb2 as budget_pb, bus_service_pb2 as bus_pb, bus_service_pb2_grpc as bus_rpc,
                       command_service_pb2 as command_pb, command_service_pb2_grpc as command_rpc,
                       error_pb2, system_service_pb2 as system_pb, system_service_pb2_grpc as system_rpc, types_pb2)
 
@@ -302,6 +302,19 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, axes_rpc.AxisServiceService
                            link_helper_error=error_pb2.ErrorDetail(
                                reason=error_pb2.REASON_BUS_DOWN, message="there is no link helper",
                                remedy="enable axisd-link.socket")))])
+
+    async def GetBudget(self, request, context):
+        self.note("GetBudget", request, context)
+        return bus_pb.GetBudgetResponse(budgets=[budget_pb.BusBudget(
+            bus="line-a", load=[budget_pb.LoadBudget(utilisation=0.25, utilisation_max=0.5,
+                                                     refresh_idle=duration_pb2.Duration(nanos=300000000))],
+            stops=[budget_pb.StopBudget(axes=1, last_frame=duration_pb2.Duration(nanos=28000000))],
+            axes=[budget_pb.AxisBudget(
+                axis="feeder", unit="mm", way_alone=10.5, deceleration_time=duration_pb2.Duration(nanos=150000000),
+                stop_alone=budget_pb.StopBudget(axes=1, last_frame=duration_pb2.Duration(nanos=28000000)),
+                observed=budget_pb.ObservedTimes(stop_frame=duration_pb2.Duration(nanos=7000000)))],
+            excess=[budget_pb.BudgetExcess(key="stop_bound", message="too late", remedy="raise it")],
+            notes=["a note"])])
 
     async def GetInfo(self, request, context):
         self.note("GetInfo", request, context)

@@ -148,6 +148,14 @@ class WholeMachine(ClientTest):
         self.assertEqual(network.network.link_helper_error.remedy, "enable axisd-link.socket")
         self.assertEqual((await self.machine.info()).machine, "press-1")
 
+    async def test_budgets(self):
+        budget, = await self.machine.budgets()
+        self.assertEqual((budget.bus, budget.utilisation, budget.excess), ("line-a", (0.25,), ("too late",)))
+        self.assertEqual(budget.stops, (axisd.StopBudget(1, 0.028, None),))
+        feeder = budget.axes[0]
+        self.assertEqual((feeder.stop_alone.last_frame, feeder.seen_stop_frame, feeder.seen_standstill),
+                         (0.028, 0.007, None))
+
     async def test_watch(self):
         ticks = []
         async for tick in self.machine.watch(["feeder"], period=0.01):

@@ -184,6 +184,9 @@ class CountedMachine final : public Machine {
   void buses(std::function<void(std::vector<BusStatus>)> callback) override {
     ledger_->enter([=, this](auto ticket) { inner_->buses(ledger_->answer(ticket, callback)); });
   }
+  void budgets(std::function<void(std::vector<BusBudgetReport>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->budgets(ledger_->answer(ticket, callback)); });
+  }
 
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }

@@ -7,6 +7,7 @@
         await feeder.move(120, velocity=50)
 """
 from .axis import Axis, Jog
+from .budget import AxisBudget, BusBudget, StopBudget
 from .drive import Drive
 from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress, StateChange,
@@ -18,11 +19,11 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
                     Network, NetworkLink, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
-    "Alarm", "Axis", "AxisState", "AxisdError", "Bus", "BusKind", "BusStatistics", "ClassStatistics", "Command",
-    "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo", "ErrorDetail", "Event",
-    "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Link", "LinkChange", "Machine",
-    "MotionCause", "MotionError", "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Parameter",
-    "PermittedRange", "PositionSegment", "RefusedError", "ScanProgress", "Segments", "SerialProgress", "State",
-    "StateChange", "StopResult", "Terminal", "TerminalCapability", "TerminalEdge", "Tick", "TracedFrame", "Trust",
-    "UnreachableError", "VelocitySegment", "connect",
+    "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
+    "ClassStatistics", "Command", "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
+    "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Link",
+    "LinkChange", "Machine", "MotionCause", "MotionError", "MotionValues", "Network", "NetworkLink", "NodeStatistics",
+    "Parameter", "PermittedRange", "PositionSegment", "RefusedError", "ScanProgress", "Segments", "SerialProgress",
+    "State", "StateChange", "StopBudget", "StopResult", "Terminal", "TerminalCapability", "TerminalEdge", "Tick",
+    "TracedFrame", "Trust", "UnreachableError", "VelocitySegment", "connect",
 ]

@@ -11,6 +11,7 @@ import grpc
 import grpc.aio
 
 from .axis import Axis
+from .budget import BusBudget
 from .calls import Seconds, done, duration
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, translate
@@ -159,6 +160,11 @@ class Machine:
     async def buses(self) -> list[Bus]:
         response = await self._call(self._buses.ListBuses, bus_service_pb2.ListBusesRequest(), "")
         return [Bus.of(bus) for bus in response.buses]
+
+    async def budgets(self) -> list[BusBudget]:
+        """What each bus can promise, and the longest times that were seen."""
+        response = await self._call(self._buses.GetBudget, bus_service_pb2.GetBudgetRequest(), "")
+        return [BusBudget.of(budget) for budget in response.budgets]
 
     async def scan(self, bus: str, *, first_node: int = 1, last_node: int = 127, bauds: Iterable[int] = (),
                    formats: Iterable[str] = (), reply_timeout: Seconds | None = None) -> AsyncIterator[ScanProgress]:

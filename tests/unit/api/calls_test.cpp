@@ -233,6 +233,28 @@ TEST_F(Calls, SystemAndBuses) {
             "outcome: OUTCOME_NOT_SENT bus: \"can0\" }");
 }
 
+TEST_F(Calls, BudgetsOfAllBusesOrOfOne) {
+  serve();
+  const auto buses = v1::BusService::NewStub(channel_);
+  Call c1, c2, c3;
+  v1::GetBudgetRequest request;
+  v1::GetBudgetResponse all, one;
+  EXPECT_TRUE(buses->GetBudget(&c1, request, &all).ok());
+  ASSERT_EQ(all.budgets_size(), 1);
+  EXPECT_EQ(
+      all.budgets(0).ShortDebugString(),
+      "bus: \"line-a\" load { utilisation: 0.25 utilisation_max: 0.5 refresh_idle { nanos: 300000000 } } "
+      "stops { axes: 1 last_frame { nanos: 28000000 } standstill { nanos: 120000000 } } "
+      "axes { axis: \"feeder\" stop_alone { } stop_all { } deceleration_time { nanos: 150000000 } "
+      "way_alone: 10.5 unit: \"mm\" observed { stop_frame { nanos: 7000000 } } } "
+      "excess { key: \"stop_bound\" message: \"too late\" remedy: \"raise it\" } notes: \"a note\"");
+  request.set_bus("line-a");
+  EXPECT_TRUE(buses->GetBudget(&c2, request, &one).ok());
+  EXPECT_EQ(one.budgets_size(), 1);
+  request.set_bus("line-z");
+  EXPECT_EQ(buses->GetBudget(&c3, request, &one).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
 TEST_F(Calls, CommandsAsResources) {
   serve();
   const auto commands = v1::CommandService::NewStub(channel_);

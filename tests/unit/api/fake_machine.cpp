@@ -190,6 +190,22 @@ void FakeMachine::cancel_command(std::string id, CommandCallback callback) {
   answer(callback, result_of("feeder", CommandKind::home));
 }
 
+void FakeMachine::budgets(std::function<void(std::vector<BusBudgetReport>)> callback) {
+  BusBudgetReport report;
+  report.predicted = {
+      .bus = "line-a",
+      .load = {{.moving = 0, .utilisation = 0.25, .utilisation_max = 0.5, .refresh_idle = 300ms}},
+      .stops = {{.axes = 1, .last_frame = 28ms, .standstill = 120ms}},
+      .notes = {"a note"}};
+  report.axes.push_back({.predicted = {.axis = "feeder", .refresh_moving_all = Duration::max()},
+                         .deceleration = 150ms,
+                         .unit = "mm",
+                         .way_alone = 10.5,
+                         .observed = {.stop_frame = 7ms}});
+  report.excess.push_back({.key = "stop_bound", .text = "too late", .remedy = "raise it"});
+  post([callback = std::move(callback), report] { callback({report}); });
+}
+
 void FakeMachine::buses(std::function<void(std::vector<BusStatus>)> callback) {
   BusStatus status{
       .name = "line-a", .port = "sim", .baud = 115200, .open = true, .simulated = true, .error = {}};

@@ -64,6 +64,7 @@ class FakeMachine final : public Machine {
   std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
   void cancel_command(std::string id, CommandCallback callback) override;
   void buses(std::function<void(std::vector<BusStatus>)> callback) override;
+  void budgets(std::function<void(std::vector<BusBudgetReport>)> callback) override;
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }
   [[nodiscard]] BusWatch& bus_watch() override { return watch_; }

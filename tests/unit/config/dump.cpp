@@ -93,6 +93,12 @@ void dump_segments(Dump& dump, const SegmentSettings& segments) {
   }
 }
 
+void dump_budget(Dump& dump, const BudgetPolicy& budget) {
+  dump.field("budget.refuse", budget.refuse);
+  dump.field("budget.stop_bound", budget.stop_bound);
+  dump.field("budget.refresh_bound", budget.refresh_bound);
+}
+
 void dump_device(Dump& dump, const DeviceSettings& device) {
   dump.enter(fmt::format("devices.{}", device.name));
   dump.field("bus", device.bus);
@@ -155,6 +161,7 @@ std::string dump(const Configuration& configuration) {
     dump.field("parity", bus.format.parity);
     dump.field("stop_bits", bus.format.stop_bits);
     dump.field("turnaround_max", bus.turnaround_max);
+    dump_budget(dump, bus.budget);
   }
   for (const auto& bus : configuration.networks) {
     dump.enter(fmt::format("buses.{}", bus.name));
@@ -162,6 +169,7 @@ std::string dump(const Configuration& configuration) {
     dump.field("bitrate", bus.bitrate);
     dump.field("sync_period", bus.sync_period);
     dump.field("sdo_timeout", bus.sdo_timeout);
+    dump_budget(dump, bus.budget);
   }
   for (const auto& [axis, simulation] : configuration.axes) {
     dump_axis(dump, axis);

@@ -9,6 +9,7 @@ import yaml
 # Only the loader can tell these: relations between keys, arithmetic, and what the YAML parser drops silently.
 LOADER_ONLY = {
     "baud_of_model",
+    "budget",
     "canopen_models",
     "device_nodes",
     "device_same_address",

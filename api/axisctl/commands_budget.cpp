@@ -1,0 +1,57 @@
+// budget: of a file without a daemon, or of the daemon, with what was seen there.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "api/axisctl/budget_view.hpp"
+#include "api/axisctl/format.hpp"
+#include "api/axisctl/invocation.hpp"
+#include "api/axisctl/terminal.hpp"
+#include "api/budget/convert.hpp"
+#include "axisd/v1/bus_service.grpc.pb.h"
+#include "config/budget.hpp"
+
+namespace axisd::axisctl {
+namespace {
+
+void show(const Invocation& invocation, const v1::GetBudgetResponse& response) {
+  if (invocation.json) return print_line(json(response));
+  std::string text;
+  for (const auto& budget : response.budgets())
+    text += (text.empty() ? "" : "\n") + budget_text(budget, use_colour());
+  print(text);
+}
+
+void budget_of_file(Invocation& invocation, const std::string& path) {
+  const auto result = config::load_file(path);
+  if (!result.configuration) {
+    invocation.status = ExitCode::usage;
+    for (const auto& diagnostic : result.diagnostics)
+      fmt::print(stderr, "{}\n", config::to_string(diagnostic));
+    return;
+  }
+  v1::GetBudgetResponse response;
+  for (const auto& report : config::budgets(*result.configuration))
+    api::to_proto(report, *response.add_budgets());
+  show(invocation, response);
+}
+
+}  // namespace
+
+void add_budget_command(CLI::App& app, Invocation& invocation) {
+  auto* command = app.add_subcommand(
+      "budget",
+      "What each bus can promise: of FILE without a daemon (status 2 where it is refused), else of the "
+      "daemon, beside the longest times that were seen");
+  const auto path = std::make_shared<std::string>();
+  command->add_option("FILE", *path, "The YAML file");
+  command->callback([&invocation, path] {
+    if (!path->empty()) return budget_of_file(invocation, *path);
+    show(invocation, invocation.client().call(&v1::BusService::Stub::GetBudget, v1::GetBudgetRequest(),
+                                              std::string_view()));
+  });
+}
+
+}  // namespace axisd::axisctl

@@ -1,0 +1,38 @@
+// The budget of an RS-485 line. Pure.
+#pragma once
+
+#include <vector>
+
+#include "buses/budget.hpp"
+#include "buses/modbus_rtu/settings.hpp"
+#include "buses/transaction_set.hpp"
+
+namespace axisd::modbus_rtu {
+
+struct AxisDemand {
+  std::string name;
+  RtuTransactionSet set{};
+  Duration poll_moving{}, poll_idle{};  ///< > 0
+  Duration continuity_period{};         ///< of the canary; > 0
+  Duration drift_check{};               ///< > 0
+  bool segments = false;                ///< the configuration owns its segment table, too
+};
+
+/// A node that is not an axis: read block by block, in class `parameters`.
+struct DeviceDemand {
+  std::vector<ExchangeSize> blocks;
+  Duration poll{};
+};
+
+/// What is asked of one line.
+struct LineDemand {
+  LineSettings line;
+  std::vector<AxisDemand> axes;
+  std::vector<DeviceDemand> devices{};
+  int silent_nodes = 1;  ///< so many may answer nothing at all
+};
+
+/// Holds for any pattern of requests that keeps to the demand. Never fails.
+BusBudget budget_of(const LineDemand& demand);
+
+}  // namespace axisd::modbus_rtu

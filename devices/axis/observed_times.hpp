@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+
+#include "devices/budget.hpp"
+#include "devices/drive.hpp"
+
+namespace axisd {
+
+/// Notes the longest times of one axis, from the times of the frames themselves. Pure. Thread: core.
+class ObservedTimes {
+ public:
+  /// A reading by the poll loop. `busy`: the axis has something to do, and is polled fast.
+  void on_sample(const DriveSample& sample, bool busy);
+  /// The next reading does not follow the last one: something else had the node, or it was away.
+  void interrupted() { last_.reset(); }
+
+  /// `arrived`: at the server. `all`: of a stop of all axes. A stop that the axis decided on itself has none.
+  void stop_requested(TimePoint arrived, bool all);
+  /// The stop frame's last byte or bit.
+  void stop_sent(TimePoint end);
+  void standstill_confirmed(TimePoint at);
+  /// Standstill was not confirmed, and will not be for this request.
+  void stop_failed() { stop_.reset(); }
+
+  [[nodiscard]] const ObservedAxis& values() const { return values_; }
+
+ private:
+  struct Last {
+    TimePoint asked_at;
+    bool busy, moving;
+  };
+  struct Stop {
+    TimePoint arrived;
+    bool all = false, sent = false;
+  };
+  std::optional<Last> last_;
+  std::optional<Stop> stop_;
+  ObservedAxis values_;
+};
+
+}  // namespace axisd

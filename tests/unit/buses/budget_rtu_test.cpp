@@ -1,0 +1,132 @@
+// The bounds of a line against what happens on it, in virtual time.
+#include "buses/budget_rtu.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <map>
+#include <numeric>
+
+#include "tests/unit/buses/line_load.hpp"
+
+namespace axisd::modbus_rtu::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::array<ExchangeSize, 4> start_chain = {reading(6), reading(6), writing(6), ExchangeSize{}};
+
+LineDemand demand_of(int axes, int baud) {
+  LineDemand demand{.line = {.name = "a", .port = "sim", .baud = baud}, .axes = {}};
+  for (int i = 0; i < axes; ++i)
+    demand.axes.push_back({.name = "axis" + std::to_string(i + 1),
+                           .set = {.state = reading(10),
+                                   .continuity = reading(6),
+                                   .start = start_chain,
+                                   .stop = {},
+                                   .longest = writing(16)},
+                           .poll_moving = 20ms,
+                           .poll_idle = 200ms,
+                           .continuity_period = 800ms,
+                           .drift_check = 10s});
+  return demand;
+}
+
+struct Case {
+  int axes, baud, moving;
+  bool silent;
+};
+
+std::string name_of(const testing::TestParamInfo<Case>& info) {
+  const auto& one = info.param;
+  return std::to_string(one.axes) + "At" + std::to_string(one.baud) + "With" + std::to_string(one.moving) +
+         "Moving" + (one.silent ? "OneSilent" : "");
+}
+
+class Loads : public testing::TestWithParam<Case> {
+ protected:
+  [[nodiscard]] static std::optional<std::size_t> silent() {
+    return GetParam().silent ? std::optional(static_cast<std::size_t>(GetParam().axes - 1)) : std::nullopt;
+  }
+};
+
+TEST_P(Loads, NothingIsReadLessOftenThanPredicted) {
+  const auto [count, baud, moving, is_silent] = GetParam();
+  const auto demand = demand_of(count, baud);
+  const auto budget = budget_of(demand);
+  const auto& load = budget.load.at(static_cast<std::size_t>(moving));
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    LineLoad line(demand, seed, silent());
+    line.begin(moving, true);
+    line.world().run_for(40s);
+    for (int i = 0; i < count; ++i) {
+      const auto& axis = *line.axes[static_cast<std::size_t>(i)];
+      if (axis.silent) continue;
+      EXPECT_GT(axis.longest_refresh, Duration{}) << "axis " << i + 1 << ", seed " << seed;
+      EXPECT_LE(axis.longest_refresh, i < moving ? load.refresh_moving : load.refresh_idle)
+          << "axis " << i + 1 << ", seed " << seed;
+    }
+    EXPECT_EQ(line.late_frames, 0) << "seed " << seed;
+    EXPECT_GT(line.completed[TransactionClass::parameters], 0) << "seed " << seed;
+  }
+}
+
+TEST_P(Loads, StopsComeAsSoonAsPredictedAndNotMuchSooner) {
+  const auto [count, baud, moving, is_silent] = GetParam();
+  const auto demand = demand_of(count, baud);
+  const auto budget = budget_of(demand);
+  std::map<std::size_t, LineLoad::Stopped> worst;
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    LineLoad line(demand, seed, silent());
+    line.begin(moving, true);
+    std::vector<std::size_t> all(static_cast<std::size_t>(count));
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    for (int stop = 0; stop < 60; ++stop) {
+      line.world().run_for(line.random(100'000, 900'000) * 1us);
+      std::vector<std::size_t> which = all;
+      if (stop % 2 == 0) which = {static_cast<std::size_t>(line.random(0, count - 1))};
+      const auto seen = line.stop(which);
+      const auto& bound = budget.stops.at(which.size() - 1);
+      ASSERT_LE(seen.last_frame + host_allowance, bound.last_frame) << which.size() << " axes, seed " << seed;
+      ASSERT_LE(seen.standstill + host_allowance, bound.standstill) << which.size() << " axes, seed " << seed;
+      auto& most = worst[which.size()];
+      most.last_frame = std::max(most.last_frame, seen.last_frame);
+      most.standstill = std::max(most.standstill, seen.standstill);
+    }
+  }
+  for (const auto& [axes, seen] : worst)
+    EXPECT_GE(2 * seen.last_frame, budget.stops.at(axes - 1).last_frame) << axes << " axes";
+}
+
+INSTANTIATE_TEST_SUITE_P(RtuBudget, Loads,
+                         testing::Values(Case{1, 115200, 1, false}, Case{6, 115200, 0, false},
+                                         Case{6, 115200, 2, true}, Case{6, 19200, 6, false},
+                                         Case{12, 115200, 11, true}, Case{4, 9600, 2, true}),
+                         name_of);
+
+TEST(RtuBudget, FiguresOfOneDriveByHand) {
+  const auto demand = demand_of(1, 115200);
+  const auto budget = budget_of(demand);
+  // 8N1: 86.8 us a character. The longest exchange, 16 registers: 41 + 8 characters and 20 ms.
+  const auto longest = wire_time(demand.line, 41) + 20ms + wire_time(demand.line, 8);
+  EXPECT_EQ(budget.stops[0].last_frame, host_allowance + longest + 1750us + wire_time(demand.line, 8));
+  // Polls of 8 + 25 characters and twice 1.75 ms every 200 ms, canaries of 8 + 17 every 800 ms.
+  EXPECT_NEAR(budget.load[0].utilisation, (3.5 + 33 * 0.0868) / 200 + (3.5 + 25 * 0.0868) / 800, 1e-4);
+  EXPECT_GT(budget.load[1].utilisation, budget.load[0].utilisation);
+}
+
+TEST(RtuBudget, MoreAxesAndSlowerLinesPromiseLess) {
+  Duration before{};
+  for (const int baud : {115200, 38400, 19200, 9600}) {
+    const auto budget = budget_of(demand_of(8, baud));
+    EXPECT_GT(budget.stops.back().last_frame, before) << baud;
+    before = budget.stops.back().last_frame;
+    for (std::size_t i = 1; i < budget.stops.size(); ++i)
+      EXPECT_GT(budget.stops[i].last_frame, budget.stops[i - 1].last_frame);
+    for (std::size_t i = 2; i < budget.load.size(); ++i)
+      EXPECT_GT(budget.load[i].refresh_moving, budget.load[i - 1].refresh_moving);
+  }
+}
+
+}  // namespace
+}  // namespace axisd::modbus_rtu::test
