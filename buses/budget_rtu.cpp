@@ -118,7 +118,7 @@ Duration Analysis::wait_idle(int moving) const {
                               [this](const AxisDemand& axis) { return cost(axis.set.start); });
   const auto always = in_flight_ + 2 * late_ + of_class + chains + silence(demand_.line);
   auto fastest = Duration::max();
-  for (const auto& axis : demand_.axes) fastest = std::min(fastest, axis.poll_moving);
+  for (const auto& axis : demand_.axes) fastest = std::min(fastest, axis.poll_fastest);
   constexpr int classes_below_motion = 4;
   const auto by_reservation = always + std::int64_t{idle} * classes_below_motion *
                                            TransactionQueue::default_reservation *

@@ -22,6 +22,7 @@ modbus_rtu::LineDemand demand_of(const modbus_rtu::LineSettings& line, const Con
                              .set = descriptor_of(axis)->rtu_transactions,
                              .poll_moving = axis.poll_moving,
                              .poll_idle = axis.poll_idle,
+                             .poll_fastest = std::min(axis.poll_moving, fastest_poll),
                              .continuity_period = continuity_period,
                              .drift_check = axis.drift_check,
                              .segments = axis.segments.has_value()});

@@ -13,8 +13,6 @@ namespace {
 constexpr auto first_backoff = milliseconds(100);
 constexpr auto longest_backoff = milliseconds(1000);
 constexpr int attempts_before_offline = 3;
-/// Less than any reading takes on RS-485; on CAN the state may be known already.
-constexpr auto fastest_poll = milliseconds(2);
 constexpr auto continuity_latest = milliseconds(950);
 
 }  // namespace

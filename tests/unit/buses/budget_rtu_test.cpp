@@ -27,6 +27,7 @@ LineDemand demand_of(int axes, int baud) {
                                    .longest = writing(16)},
                            .poll_moving = 20ms,
                            .poll_idle = 200ms,
+                           .poll_fastest = 2ms,
                            .continuity_period = 800ms,
                            .drift_check = 10s});
   return demand;

@@ -106,8 +106,9 @@ Task<> LineLoad::poll(LoadedAxis& axis, const AxisDemand& demand) {
       if (axis.stop_acknowledged && !axis.standstill && answer.sent_at >= *axis.stop_acknowledged)
         axis.standstill = answer.answered_at;
     }
-    co_await axis.wake.wait_until(began +
-                                  (axis.moving || axis.stopping ? demand.poll_moving : demand.poll_idle));
+    co_await axis.wake.wait_until(began + (axis.stopping ? demand.poll_fastest
+                                           : axis.moving ? demand.poll_moving
+                                                         : demand.poll_idle));
   }
 }
 
