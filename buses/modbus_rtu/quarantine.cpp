@@ -25,7 +25,8 @@ void Quarantine::answered(std::uint8_t node) {
   known.answered_once = true;
   known.silent = 0;
   known.next = known.next_stop = {};
-  if (++known.good >= quarantine_trust_after) known.level = 0;
+  // Whoever is there again waits briefly only, so that an axis soon knows when it is gone once more.
+  known.level = ++known.good >= quarantine_trust_after ? 0 : std::min(known.level, 1);
 }
 
 TimePoint Quarantine::ready_at(std::uint8_t node, bool stop) const {

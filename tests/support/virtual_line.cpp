@@ -103,15 +103,17 @@ void VirtualLine::request_sent() {
     reply_coming_ = true;
     result_.reply_begin = reply->begin;
   }
-  arrive(first_end, bytes.first(first));
-  if (reply->repeated > 0) arrive(reply->end, bytes.subspan(first));
+  // What follows within the silence keeps the line busy until its own end.
+  arrive(first_end, bytes.first(first), reply->end);
+  if (reply->repeated > 0) arrive(reply->end, bytes.subspan(first), reply->end);
 }
 
-void VirtualLine::arrive(TimePoint when, std::span<const std::uint8_t> bytes) {
+void VirtualLine::arrive(TimePoint when, std::span<const std::uint8_t> bytes, TimePoint busy_until) {
   const auto id = ++last_arrival_;
-  auto arrived = [this, id, copy = std::vector(bytes.begin(), bytes.end())] {
+  auto arrived = [this, id, busy_until, copy = std::vector(bytes.begin(), bytes.end())] {
     // The timer lives as long as its callback runs.
     const auto timer = std::move(arrivals_.extract(id).mapped());
+    quiet_since_ = std::max(quiet_since_, busy_until);
     hear(copy);
   };
   arrivals_[id] = world_->clock().call_at(when, std::move(arrived));
@@ -162,7 +164,7 @@ void VirtualLine::end(ExchangeStatus status, Verdict verdict) {
       wire_.back().status = status;
       wire_.back().end = world_->now();
     }
-    quiet_since_ = world_->now();
+    quiet_since_ = std::max(quiet_since_, world_->now());
   }
   under_way_ = nullptr;
   reply_coming_ = false;

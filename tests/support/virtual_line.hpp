@@ -70,7 +70,7 @@ class VirtualLine final : public modbus_rtu::Line {
   void bind();
   bool use(const modbus_rtu::SerialSettings& serial);
   void request_sent();
-  void arrive(TimePoint when, std::span<const std::uint8_t> bytes);
+  void arrive(TimePoint when, std::span<const std::uint8_t> bytes, TimePoint busy_until);
   void hear(std::span<const std::uint8_t> bytes);
   void end(modbus_rtu::ExchangeStatus status, Verdict verdict = Verdict::send);
 
