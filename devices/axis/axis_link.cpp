@@ -346,7 +346,9 @@ void Axis::on_reboot(const Error& cause) {
   enabled_by_us_ = false;
   link_ = LinkState::configuring;
   link_error_ = cause;
-  supersede(cause);
+  auto told = cause;
+  if (activity_ && activity_->may_run) told.outcome = Outcome::unknown;  // it may have started before
+  supersede(told);
   lose_trust();
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();

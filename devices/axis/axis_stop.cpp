@@ -118,7 +118,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const bool rests =
         polled ? co_await standstill_by(since, since + patience, requests)
                : (sent || link_ != LinkState::offline) && co_await standstill_unpolled(since + patience);
-    if (rests && requests != stopping_.requests) continue;
+    if (requests != stopping_.requests) continue;  // each gets a frame of its own, also by a silent node
     if (rests && no_reply && ++rounds < unacknowledged_rounds) continue;
     if (rests) co_return Result<void>{};
     if (link_ == LinkState::offline) {
@@ -127,7 +127,6 @@ Task<Result<void>> Axis::stop_and_confirm() {
       cause.outcome = Outcome::unknown;
       co_return fail(std::move(cause));
     }
-    if (requests != stopping_.requests) continue;
     if (kind != StopKind::quick_stop) {
       spdlog::warn("{}: standstill not confirmed in time; quick stop", settings_.name);
       stopping_.kind = StopKind::quick_stop;
