@@ -269,9 +269,13 @@ void RtuBus::on_result(const ExchangeResult& result) {
 void RtuBus::note_late_read(const Request& request, const ExchangeResult& result) {
   switch (result.status) {
     case ExchangeStatus::replied:
-      // Replies come in order: nothing older can follow. The echo of a write may be that of the same write
-      // before, which was late.
-      if (request.function == Function::read_holding_registers) late_reads_.erase(request.node);
+      // Replies come in order: nothing older can follow. But the echo of a write may be that of the same
+      // write before, which was late, and an exception that of any read before: its own may still come then.
+      if (request.function != Function::read_holding_registers) break;
+      if (result.reply.kind == ReplyKind::match)
+        late_reads_.erase(request.node);
+      else if (late_reads_.contains(request.node))
+        late_reads_[request.node][request.count] = clock_->now() + latest_reply;
       break;
     case ExchangeStatus::timeout:
     case ExchangeStatus::cut:
