@@ -237,6 +237,7 @@ class Axis {
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
   Task<bool> is_no_reboot(ActivityPtr activity);
+  Task<bool> proven_continuous(ActivityPtr activity);
   [[nodiscard]] std::int64_t target_tolerance() const;
   bool judge_rest(Activity& activity);
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);

@@ -199,6 +199,12 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
 /// prove that it is the same one.
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
   if (std::abs(activity->plan.target_counter) > target_tolerance()) co_return true;
+  co_return co_await proven_continuous(activity);
+}
+
+/// The drive was not restarted since its parameters were last written: the canary is read until it answers.
+/// False: the activity has ended.
+Task<bool> Axis::proven_continuous(ActivityPtr activity) {
   Result<void> proof;
   do {
     proof = co_await drive_->check_continuity(TransactionClass::moving_state);
@@ -211,7 +217,9 @@ Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
   if (proof.error().reason == Reason::rebooted) {
     on_reboot(proof.error());
   } else {
-    finish(*activity, [&](CommandRecord& command) { command.error(proof.error()); });
+    auto cause = proof.error();
+    cause.outcome = Outcome::unknown;
+    fail_with_stop(*activity, std::move(cause));
   }
   co_return false;
 }
@@ -293,6 +301,11 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
       publish();
       co_return true;
     }
+  }
+  // Its standstill is no proof: a restart would have ended a motion, too.
+  if (!co_await proven_continuous(activity)) {
+    ++unknown_starts_.unresolved;
+    co_return false;
   }
   ++unknown_starts_.not_executed;
   cause.outcome = Outcome::not_executed;
