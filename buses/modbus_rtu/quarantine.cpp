@@ -17,22 +17,20 @@ void Quarantine::silent(std::uint8_t node, TimePoint now, Duration cost, bool st
   const auto hold = std::min(quarantine_first_hold * (1 << (known.level - 1)), cost * quarantine_share);
   // A stop that came before its turn is made up for by the next probe.
   known.next = std::max(known.next, now) + hold;
-  if (stop) known.next_stop = now + hold;
 }
 
 void Quarantine::answered(std::uint8_t node) {
   auto& known = nodes_[node];
   known.answered_once = true;
   known.silent = 0;
-  known.next = known.next_stop = {};
+  known.next = {};
   // Whoever is there again waits briefly only, so that an axis soon knows when it is gone once more.
   known.level = ++known.good >= quarantine_trust_after ? 0 : std::min(known.level, 1);
 }
 
-TimePoint Quarantine::ready_at(std::uint8_t node, bool stop) const {
+TimePoint Quarantine::ready_at(std::uint8_t node) const {
   const auto known = nodes_.find(node);
-  if (known == nodes_.end()) return {};
-  return stop ? known->second.next_stop : known->second.next;
+  return known == nodes_.end() ? TimePoint{} : known->second.next;
 }
 
 }  // namespace axisd::modbus_rtu

@@ -18,7 +18,7 @@ inline constexpr Duration quarantine_first_hold = std::chrono::milliseconds(100)
 inline constexpr int quarantine_trust_after = 4;
 
 /// Holds requests to nodes that do not answer back, so that waiting for them costs their neighbours a bounded
-/// share of the line. A stop is held back only after another one that went out in vain. Pure.
+/// share of the line. Stops are never held (M15): an axis repeats them a few times only. Pure.
 class Quarantine {
  public:
   struct Node {
@@ -26,8 +26,7 @@ class Quarantine {
     int level = 0;           ///< 0: trusted; else how often the wait was doubled, plus 1
     int good = 0;            ///< replies in a row
     std::uint64_t held = 0;  ///< times that it was held back
-    TimePoint next{};        ///< not before: any request
-    TimePoint next_stop{};   ///< not before: a stop
+    TimePoint next{};        ///< not before
     bool answered_once = false;
     [[nodiscard]] bool quarantined() const { return level > 0 && silent > 0; }
   };
@@ -36,8 +35,8 @@ class Quarantine {
   void silent(std::uint8_t node, TimePoint now, Duration cost, bool stop);
   void answered(std::uint8_t node);
   void forget() { nodes_.clear(); }
-  /// Not before this.
-  [[nodiscard]] TimePoint ready_at(std::uint8_t node, bool stop) const;
+  /// No request but a stop before this.
+  [[nodiscard]] TimePoint ready_at(std::uint8_t node) const;
   /// By address; only those that were asked something.
   [[nodiscard]] const std::map<std::uint8_t, Node>& nodes() const { return nodes_; }
 

@@ -180,10 +180,11 @@ void RtuBus::arm_next() {
 
 /// Until when the quarantine of its node forbids sending it; nothing: it may be sent.
 std::optional<TimePoint> RtuBus::held_until(const Transaction& transaction) const {
-  if (transaction.transaction_class == TransactionClass::scan || transaction.exchange.serial)
+  using enum TransactionClass;
+  if (transaction.transaction_class == stop || transaction.transaction_class == scan ||
+      transaction.exchange.serial)
     return std::nullopt;
-  const auto ready = quarantine_.ready_at(transaction.exchange.request.node,
-                                          transaction.transaction_class == TransactionClass::stop);
+  const auto ready = quarantine_.ready_at(transaction.exchange.request.node);
   return ready > clock_->now() ? std::optional(ready) : std::nullopt;
 }
 
@@ -192,9 +193,14 @@ void RtuBus::await_release() {
   auto next = TimePoint::max();
   for (const auto& held : queue_.held()) next = std::min(next, held_until(*held).value_or(clock_->now()));
   release_ = next == TimePoint::max() ? Clock::Timer{} : clock_->call_at(next, [this] {
-    queue_.release();
+    release_ready();
     pump();
   });
+}
+
+/// What is still held must not take a place: the queue's reservation would be spent on it.
+void RtuBus::release_ready() {
+  queue_.release([this](const Transaction& held) { return !held_until(held); });
 }
 
 void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result) {
@@ -210,7 +216,7 @@ void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result
     case ExchangeStatus::replied:
     case ExchangeStatus::corrupt:  // somebody is there
       quarantine_.answered(node);
-      queue_.release();
+      release_ready();
       break;
     default:
       break;

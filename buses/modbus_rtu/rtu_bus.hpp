@@ -75,6 +75,7 @@ class RtuBus final : public Bus {
   void arm_next();
   [[nodiscard]] std::optional<TimePoint> held_until(const Transaction& transaction) const;
   void await_release();
+  void release_ready();
   void note_silence(const Transaction& ended, const ExchangeResult& result);
   TransactionPtr resync_before(TransactionPtr waiting);
   void on_result(const ExchangeResult& result);

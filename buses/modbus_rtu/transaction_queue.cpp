@@ -117,8 +117,10 @@ void TransactionQueue::take_unsendable(auto& from, TimePoint now, std::vector<Tr
   std::erase(from, nullptr);
 }
 
-void TransactionQueue::release() {
-  for (auto& transaction : std::exchange(held_, {})) insert(std::move(transaction));
+void TransactionQueue::release(const std::function<bool(const Transaction&)>& ready) {
+  for (auto& transaction : held_)
+    if (ready(*transaction)) insert(std::move(transaction));
+  std::erase(held_, nullptr);
 }
 
 std::vector<TransactionPtr> TransactionQueue::take_all() {

@@ -42,8 +42,8 @@ class TransactionQueue {
   TransactionPtr pop();
   /// Puts one aside: it is not given out before release().
   void hold(TransactionPtr transaction) { held_.push_back(std::move(transaction)); }
-  /// All that were put aside take their places again.
-  void release();
+  /// Those that were put aside and are `ready` take their places again.
+  void release(const std::function<bool(const Transaction&)>& ready);
   [[nodiscard]] const std::vector<TransactionPtr>& held() const { return held_; }
   /// Class of the next one by strict order.
   [[nodiscard]] std::optional<TransactionClass> top_class() const;
