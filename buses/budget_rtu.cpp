@@ -189,8 +189,9 @@ StopBudget Analysis::stop(const AxisDemand& last, int axes) const {
   const auto stops = [this](const AxisDemand& axis) { return cost(axis.set.stop); };
   const auto others = static_cast<std::size_t>(axes - 1);
   StopBudget stop{.axes = axes};
-  stop.last_frame = host_allowance + in_flight_ + dearest(others, stops) + (axes > 1 ? late_ : Duration{}) +
-                    silence(demand_.line) + wire(last.set.stop.request);
+  // Stops do not cut each other: the one of a silent node, which is owed it, may be under way.
+  stop.last_frame = host_allowance + in_flight_ + dearest(others, stops) +
+                    (count() > 1 ? late_ : Duration{}) + silence(demand_.line) + wire(last.set.stop.request);
   const auto acknowledged = demand_.line.turnaround_max + wire(last.set.stop.reply);
   // The first reading after the shaft rests; it may be asked for just before. Whatever is not stopped may
   // start, and a silent node is told again, twice. What waits for a stopping axis anyway is hastened.

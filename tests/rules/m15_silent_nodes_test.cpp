@@ -95,7 +95,8 @@ TEST(M15, RepeatedStopsToSilentNodesCostLittle) {
     stops += entry.node() == 16 && entry.address() == 0x0028 ? 1 : 0;
   }
   EXPECT_GE(stops, 5) << "it stays owed";
-  EXPECT_LE(in_vain, 20'000ms * 3 / 100);
+  // No stop is held back, so that the one that is owed each second costs more than probes alone.
+  EXPECT_LE(in_vain, 20'000ms * 4 / 100);
   line.line->network().faults().clear();
   ASSERT_TRUE(line.world.run_until([&] { return !line.line->network().node(16)->shaft_moving(); }, 5s));
 }
