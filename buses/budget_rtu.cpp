@@ -78,6 +78,7 @@ Duration Analysis::cost(std::span<const ExchangeSize> all) const {
 
 Duration Analysis::dearest(std::size_t among, const std::function<Duration(const AxisDemand&)>& of) const {
   std::vector<Duration> costs;
+  costs.reserve(demand_.axes.size());
   for (const auto& axis : demand_.axes) costs.push_back(of(axis));
   std::ranges::sort(costs, std::greater{});
   Duration sum{};

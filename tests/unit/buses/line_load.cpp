@@ -52,6 +52,7 @@ LineLoad::LineLoad(LineDemand demand, unsigned seed, std::optional<std::size_t> 
 LineLoad::~LineLoad() {
   closing_ = true;
   for (const auto& axis : axes) axis->wake.notify_all();
+  bus_->close();  // ends also what is held back from a silent node
   world_.run_for(10s);
 }
 
