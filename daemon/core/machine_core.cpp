@@ -252,6 +252,7 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
     return axis.at_rest() ? 1 : 0;
   };
   std::vector<std::pair<int, std::size_t>> order;
+  order.reserve(axes_.size());
   for (std::size_t i = 0; i < axes_.size(); ++i) order.emplace_back(rank(*axes_[i]), i);
   std::ranges::sort(order);
   std::vector<Result<CommandPtr>> results(axes_.size(), fail(Reason::internal, "not stopped"));
@@ -305,6 +306,7 @@ bool MachineCore::closed() const {
 
 std::vector<BusStatus> MachineCore::bus_status() const {
   std::vector<BusStatus> all;
+  all.reserve(lines_.size() + networks_.size());
   for (const auto& bus : lines_)
     all.push_back({.name = bus->settings().name,
                    .port = bus->settings().port,
