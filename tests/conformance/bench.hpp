@@ -24,6 +24,8 @@ struct Setup {
   const Manual& manual;
   const Variant& variant;
   TargetMaker make_target = &make_virtual_target;
+  /// Time on this target is the processor's: repetitions are divided between cases instead of done in each.
+  bool brief = false;
   /// How the simulator stands at an open point of the manual; false for one that this model does not have.
   [[nodiscard]] bool on(std::string_view switch_name) const;
 };

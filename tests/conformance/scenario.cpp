@@ -124,7 +124,7 @@ std::string capability_matrix(std::vector<std::string>& failures) {
 }
 
 Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant,
-                     const TargetMaker& make_target) {
+                     const TargetMaker& make_target, bool brief) {
   Finding finding;
   auto* const run = manual.lacks(scenario.name) ? scenario.refused : scenario.run;
   ::testing::TestPartResultArray parts;
@@ -134,7 +134,7 @@ Finding run_scenario(const Scenario& scenario, const Manual& manual, const Varia
         ::testing::ScopedFakeTestPartResultReporter::INTERCEPT_ONLY_CURRENT_THREAD, &parts);
     try {
       if (run == nullptr) throw Broken("lacked by its abilities, but nothing shows that it is refused");
-      finding.shown = run({.manual = manual, .variant = variant, .make_target = make_target});
+      finding.shown = run({.manual = manual, .variant = variant, .make_target = make_target, .brief = brief});
     } catch (const std::exception& error) {
       broken = error.what();
     }

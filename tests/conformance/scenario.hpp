@@ -59,6 +59,6 @@ struct Finding {
 std::string capability_matrix(std::vector<std::string>& failures);
 
 Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant,
-                     const TargetMaker& make_target = &make_virtual_target);
+                     const TargetMaker& make_target = &make_virtual_target, bool brief = false);
 
 }  // namespace axisd::conformance

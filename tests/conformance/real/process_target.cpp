@@ -35,6 +35,15 @@ std::string adapted(std::string yaml, const std::string& interface) {
   return yaml;
 }
 
+/// A vcan has no bit rate: the simulator is told which it would have.
+std::string bitrate_of(const std::string& yaml) {
+  constexpr std::string_view key = "bitrate: ";
+  const auto at = yaml.find(key);
+  if (at == std::string::npos) throw std::invalid_argument("no bit rate in\n" + yaml);
+  const auto begin = at + key.size();
+  return yaml.substr(begin, yaml.find_first_not_of("0123456789", begin) - begin);
+}
+
 /// One line to a unix socket, and its answer.
 std::string exchange(const std::string& path, std::string_view line) {
   const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -59,8 +68,9 @@ class ProcessTarget final : public Target {
   ProcessTarget(const Programs& programs, const std::string& interface, const Plant& plant)
       : axisd_(programs.axisd) {
     directory_.write("axisd.yaml", adapted(plant.yaml, interface));
-    std::vector<std::string> arguments{programs.axisd_sim, "--can", interface, "--control",
-                                       directory_ / "sim.sock"};
+    std::vector<std::string> arguments{
+        programs.axisd_sim,    "--can", interface, "--control", directory_ / "sim.sock", "--bitrate",
+        bitrate_of(plant.yaml)};
     for (const auto& drive : plant.drives) arguments.insert(arguments.end(), {"--drive", drive});
     simulator_ = std::make_unique<Process>(arguments, directory_ / "sim.log");
     if (!wait_until([&] { return simulator_->output().find("ready") != std::string::npos; }, patience))
