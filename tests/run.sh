@@ -3,15 +3,16 @@
 #   tests/run.sh quick    preset dev
 #   tests/run.sh all      the same tests under AddressSanitizer + UBSan (preset asan), those without gRPC, whose library
 #                         is not instrumented, under ThreadSanitizer (preset tsan), clang-tidy on changed files, and
-#                         in preset dev the conformance suite in all its variants (asan runs a sample), and the scenarios
-#                         on SocketCAN, whose guests are too small for AddressSanitizer, and that the benchmarks run.
+#                         in preset dev the whole conformance suite and 100,000 faulted transactions (asan runs a sample
+#                         of both), the scenarios on SocketCAN, whose guests are too small for AddressSanitizer, and
+#                         that the benchmarks run.
 #                         Default.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 
 case "${1:-all}" in
   quick) presets=(dev) whole=() selection=(--label-exclude slow) ;;
-  all) presets=(asan tsan) whole=(test_conformance can_scenarios bench_programs) selection=() ;;
+  all) presets=(asan tsan) whole=(test_conformance test_chaos can_scenarios bench_programs) selection=() ;;
   *) echo "usage: tests/run.sh [quick|all]" >&2; exit 2 ;;
 esac
 jobs=$(nproc)
