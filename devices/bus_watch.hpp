@@ -25,6 +25,15 @@ struct NetworkNodeStatistics {
   std::uint64_t emergencies = 0;
 };
 
+/// Of one node of an RS-485 line: while it does not answer, it is asked with growing waits.
+struct QuarantineStatus {
+  bool active = false;
+  Duration lasting{};        ///< while active: since so long
+  Duration next_probe_in{};  ///< likewise; 0: its next request goes out
+  std::uint64_t probes = 0;  ///< likewise: requests in vain since it began
+  std::uint64_t times = 0;   ///< that it was put there
+};
+
 /// Counters since start. A copy: nobody waits for its reader.
 struct BusStatistics {
   /// A configured node.
@@ -38,8 +47,16 @@ struct BusStatistics {
   double recent_load = 0;   ///< share of the last BusLoad::window in which it was occupied
   double overall_load = 0;  ///< likewise of `since_start`
   std::optional<modbus_rtu::LineStatistics> line{};         ///< of an RS-485 line
+  std::map<std::uint8_t, QuarantineStatus> quarantine{};    ///< of an RS-485 line: those that ever were there
+  std::size_t held_back = 0;                                ///< of an RS-485 line: until the next probe
   std::map<std::uint8_t, NetworkNodeStatistics> network{};  ///< of a CAN network
   std::map<std::uint8_t, Known> known{};
+};
+
+/// One tick of a stream of statistics.
+struct StatisticsTick {
+  std::vector<BusStatistics> buses{};
+  std::uint64_t missed = 0;  ///< ticks since the one before that its reader was too slow for
 };
 
 struct TraceRequest {
@@ -65,10 +82,10 @@ struct TraceBatch {
   std::uint64_t lost = 0;  ///< frames of any node before them that are no longer kept
 };
 
-/// A trace under way. Dropping it ends it.
-struct TraceToken {
-  /// The reader sets it when it can take the next batch, whoever gives one clears it: what waits for a slow
-  /// reader stays in the ring of the bus, and is lost there.
+/// A stream under way. Dropping it ends it.
+struct StreamToken {
+  /// The reader sets it when it can take the next message, whoever gives one clears it: nothing is made for a
+  /// slow reader, so nothing waits for it.
   std::atomic<bool> wanted{true};
 };
 
@@ -78,6 +95,9 @@ struct FlightRecord {
   std::uint64_t size = 0;  ///< bytes
 };
 
+/// Each tick is a copy that the core thread makes.
+inline constexpr Duration shortest_statistics_period = std::chrono::milliseconds(100);
+
 /// Part of Machine. Thread: any; callbacks arrive on the core thread and must only hand over.
 class BusWatch {
  public:
@@ -86,10 +106,14 @@ class BusWatch {
   /// Of one bus, or of all if the name is empty. Errors: invalid_argument (unknown bus).
   virtual void statistics(std::string bus,
                           std::function<void(Result<std::vector<BusStatistics>>)> callback) = 0;
+  /// The same at once and every `period` (at least `shortest_statistics_period`). A tick that the reader
+  /// cannot take is made when it can, of the newest values; further ones until then are missed.
+  virtual std::shared_ptr<StreamToken> watch_statistics(
+      std::string bus, Duration period, std::function<void(Result<StatisticsTick>)> callback) = 0;
   /// Calls back with the frames from now on, some at a time, first with none; or once with an error
   /// (invalid_argument: unknown bus).
-  virtual std::shared_ptr<TraceToken> trace(TraceRequest request,
-                                            std::function<void(Result<TraceBatch>)> callback) = 0;
+  virtual std::shared_ptr<StreamToken> trace(TraceRequest request,
+                                             std::function<void(Result<TraceBatch>)> callback) = 0;
 
   /// Oldest first. Errors: storage, not_supported (nothing is kept).
   virtual void flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) = 0;

@@ -8,8 +8,8 @@
 
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/event_text.hpp"
+#include "api/axisctl/follow.hpp"
 #include "api/axisctl/format.hpp"
-#include "api/axisctl/interrupt.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -64,21 +64,12 @@ void show(const Invocation& invocation, const v1::WatchEventsResponse& batch,
 
 void events(Invocation& invocation, const Arguments& arguments) {
   const auto query = query_of(invocation, arguments);
-  grpc::ClientContext context;
-  const Interrupt interrupt([&context] { context.TryCancel(); });
-  v1::EventService::Stub stub(invocation.client().channel());
-  const auto stream = stub.WatchEvents(&context, query.request);
-  bool complete = false;
-  for (v1::WatchEventsResponse batch; !complete && stream->Read(&batch);) {
-    show(invocation, batch, query.from);
-    complete = !arguments.follow && batch.cursor() >= batch.newest();
-  }
-  if (complete) context.TryCancel();
-  const auto status = stream->Finish();
-  // Ctrl-C is how one stops following.
-  if (complete || interrupt.requested()) return;
-  if (status.ok()) throw Failure(ExitCode::unreachable, "the daemon ended the stream");
-  throw invocation.client().failure(status, arguments.axes.size() == 1 ? arguments.axes.front() : "");
+  follow<v1::WatchEventsResponse>(invocation.client(), &v1::EventService::Stub::WatchEvents, query.request,
+                                  arguments.axes.size() == 1 ? arguments.axes.front() : "",
+                                  [&](const v1::WatchEventsResponse& batch) {
+                                    show(invocation, batch, query.from);
+                                    return arguments.follow || batch.cursor() < batch.newest();
+                                  });
 }
 
 }  // namespace

@@ -3,13 +3,14 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "api/axisctl/duration.hpp"
+#include "api/axisctl/follow.hpp"
 #include "api/axisctl/format.hpp"
-#include "api/axisctl/interrupt.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/live_view.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/state_view.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -29,67 +30,36 @@ void list(Invocation& invocation, bool names) {
   axis_table(response.axes()).print(use_colour());
 }
 
+std::vector<std::string> lines_of(const v1::WatchAxesResponse& batch) {
+  auto lines = axis_table(batch.axes()).lines(use_colour(), terminal_columns());
+  if (batch.dropped() > 0)
+    lines.push_back(fmt::format("({} ticks came too fast for this terminal)", batch.dropped()));
+  return lines;
+}
+
 struct WatchArguments {
   std::vector<std::string> axes;
   std::string period = "200ms";
   std::uint64_t count = 0;  ///< 0: without end
 };
 
-/// Shows batches as they arrive: a table redrawn in place on a terminal, else a line per tick.
-class WatchView {
- public:
-  explicit WatchView(bool as_json) : json_(as_json), live_(!as_json && is_terminal(STDOUT_FILENO)) {
-    if (live_) print("\x1b[?25l");  // no cursor jumping about
-  }
-  WatchView(const WatchView&) = delete;
-  WatchView& operator=(const WatchView&) = delete;
-  ~WatchView() {
-    if (live_) print("\x1b[?25h");
-  }
-
-  void show(const v1::WatchAxesResponse& batch) {
-    if (json_) return print_line(json(batch));
-    if (!live_) return print_line(tick_line(batch));
-    auto lines = axis_table(batch.axes()).lines(use_colour(), terminal_columns());
-    if (batch.dropped() > 0)
-      lines.push_back(fmt::format("({} ticks came too fast for this terminal)", batch.dropped()));
-    // A table that is higher than the terminal would scroll instead of being redrawn.
-    lines.resize(std::min(lines.size(), static_cast<std::size_t>(std::max(1, terminal_rows() - 1))));
-    std::string text = drawn_ > 0 ? fmt::format("\x1b[{}A", drawn_) : "";
-    for (const auto& line : lines) text += "\r\x1b[K" + line + "\n";
-    text += "\x1b[J";
-    drawn_ = lines.size();
-    print(text);
-  }
-
- private:
-  bool json_, live_;
-  std::size_t drawn_ = 0;
-};
-
 void watch(Invocation& invocation, const WatchArguments& arguments) {
   v1::WatchAxesRequest request;
   for (const auto& axis : arguments.axes) request.add_axes(axis);
   set(*request.mutable_period(), parse_duration(arguments.period, "--period"));
-  grpc::ClientContext context;
-  const Interrupt interrupt([&context] { context.TryCancel(); });
-  v1::AxisService::Stub stub(invocation.client().channel());
-  const auto stream = stub.WatchAxes(&context, request);
+  std::optional<LiveView> live;
+  if (!invocation.json && is_terminal(STDOUT_FILENO)) live.emplace();
   std::uint64_t seen = 0;
-  {
-    WatchView view(invocation.json);
-    for (v1::WatchAxesResponse batch; stream->Read(&batch);) {
-      view.show(batch);
-      if (++seen == arguments.count) break;
-    }
-  }
-  const bool complete = arguments.count > 0 && seen == arguments.count;
-  if (complete) context.TryCancel();
-  const auto status = stream->Finish();
-  // Ctrl-C is how one leaves a watch.
-  if (complete || interrupt.requested()) return;
-  if (status.ok()) throw Failure(ExitCode::unreachable, "the daemon ended the stream");
-  throw invocation.client().failure(status, arguments.axes.size() == 1 ? arguments.axes.front() : "");
+  follow<v1::WatchAxesResponse>(invocation.client(), &v1::AxisService::Stub::WatchAxes, request,
+                                arguments.axes.size() == 1 ? arguments.axes.front() : "",
+                                [&](const v1::WatchAxesResponse& batch) {
+                                  if (live) {
+                                    live->show(lines_of(batch));
+                                  } else {
+                                    print_line(invocation.json ? json(batch) : tick_line(batch));
+                                  }
+                                  return ++seen != arguments.count;
+                                });
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "api/axisctl/format.hpp"
@@ -37,6 +38,13 @@ std::string unknown_starts(const v1::UnknownOutcomes& outcomes) {
                      outcomes.not_executed(), outcomes.unresolved());
 }
 
+std::string quarantine(const v1::Quarantine& quarantine) {
+  if (!quarantine.active())
+    return quarantine.times() == 0 ? "" : fmt::format("{} x so far", quarantine.times());
+  return fmt::format("for {}, {} probes, next in {}", duration_text(seconds(quarantine.lasting())),
+                     quarantine.probes(), duration_text(seconds(quarantine.next_probe_in())));
+}
+
 }  // namespace
 
 double percentile(const v1::LatencyHistogram& histogram, double share) {
@@ -53,9 +61,11 @@ double percentile(const v1::LatencyHistogram& histogram, double share) {
 }
 
 std::string load_line(const v1::BusStatistics& bus) {
-  return fmt::format("{}: occupied {} of the last 10 s, {} of {} since the start", bus.bus(),
+  const auto held_back = fmt::format("; {} requests are held back for nodes in quarantine", bus.held_back());
+  return fmt::format("{}: occupied {} of the last 10 s, {} of {} since the start{}", bus.bus(),
                      percent(bus.utilisation()), percent(bus.utilisation_since_start()),
-                     duration_text(std::round(seconds(bus.since_start()))));
+                     duration_text(std::round(seconds(bus.since_start()))),
+                     bus.held_back() > 0 ? held_back : "");
 }
 
 Table class_table(const v1::BusStatistics& bus) {
@@ -80,7 +90,7 @@ Table class_table(const v1::BusStatistics& bus) {
 
 Table line_node_table(const v1::BusStatistics& bus) {
   Table table({"NODE", "NAME", "LOAD", "REPLIES", "TIMEOUTS", "CORRUPT", "I/O ERRORS", "REPEATS",
-               "TURNAROUND", "EXCEPTIONS", "STARTS WITHOUT REPLY"},
+               "TURNAROUND", "QUARANTINE", "EXCEPTIONS", "STARTS WITHOUT REPLY"},
               {0, 2, 3, 4, 5, 6, 7, 8});
   for (const auto& node : bus.nodes()) {
     const auto& line = node.line();
@@ -88,7 +98,7 @@ Table line_node_table(const v1::BusStatistics& bus) {
                std::to_string(line.replies()), std::to_string(line.timeouts()),
                std::to_string(line.corrupt_replies()), std::to_string(line.io_errors()),
                std::to_string(line.repeats()), time_text(seconds(line.longest_turnaround())),
-               exceptions(line), unknown_starts(node.unknown_starts())});
+               quarantine(line.quarantine()), exceptions(line), unknown_starts(node.unknown_starts())});
   }
   return table;
 }
@@ -107,6 +117,24 @@ Table network_node_table(const v1::BusStatistics& bus) {
                unknown_starts(node.unknown_starts())});
   }
   return table;
+}
+
+std::vector<std::string> statistics_lines(const google::protobuf::RepeatedPtrField<v1::BusStatistics>& buses,
+                                          bool colour, int columns) {
+  std::vector<std::string> all;
+  const auto add = [&](const Table& table) {
+    std::ranges::move(table.lines(colour, columns), std::back_inserter(all));
+  };
+  for (const auto& bus : buses) {
+    if (!all.empty()) all.emplace_back();
+    add(Table({load_line(bus)}));
+    const bool network = bus.kind() == v1::BUS_KIND_CANOPEN;
+    if (!network) add(class_table(bus));
+    if (bus.nodes().empty()) continue;
+    if (!network) all.emplace_back();
+    add(network ? network_node_table(bus) : line_node_table(bus));
+  }
+  return all;
 }
 
 }  // namespace axisd::axisctl

@@ -27,6 +27,8 @@ class BusServiceImpl final : public v1::BusService::CallbackService {
   // bus_watch_calls.cpp
   Reactor* GetBusStatistics(Context* context, const v1::GetBusStatisticsRequest* request,
                             v1::GetBusStatisticsResponse* response) override;
+  grpc::ServerWriteReactor<v1::WatchBusStatisticsResponse>* WatchBusStatistics(
+      Context* context, const v1::WatchBusStatisticsRequest* request) override;
   grpc::ServerWriteReactor<v1::TraceBusResponse>* TraceBus(Context* context,
                                                            const v1::TraceBusRequest* request) override;
   Reactor* ListFlightRecords(Context* context, const v1::ListFlightRecordsRequest* request,

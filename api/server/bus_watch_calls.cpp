@@ -6,9 +6,10 @@
 
 #include "api/server/bus_service.hpp"
 #include "api/server/bus_watch_convert.hpp"
+#include "api/server/paced_stream.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/status.hpp"
-#include "api/server/trace_stream.hpp"
+#include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
 
 namespace axisd::server {
@@ -30,8 +31,29 @@ BusServiceImpl::Reactor* BusServiceImpl::GetBusStatistics(Context* context,
   });
 }
 
+grpc::ServerWriteReactor<v1::WatchBusStatisticsResponse>* BusServiceImpl::WatchBusStatistics(
+    Context* context, const v1::WatchBusStatisticsRequest* request) {
+  using Stream = PacedStream<v1::WatchBusStatisticsResponse, StatisticsTick>;
+  using Refused = RefusedStream<v1::WatchBusStatisticsResponse>;
+  const auto period = watch_period(*request);
+  if (!period) return new Refused(to_status(period.error()));
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::stream);
+  if (!ticket) return new Refused(to_status(ticket.error()));
+  auto* stream = Stream::start(
+      services_, context, *std::move(ticket),
+      [&](Stream::Take take) {
+        return services_.machine.bus_watch().watch_statistics(request->bus(), *period, std::move(take));
+      },
+      [](const StatisticsTick& from, v1::WatchBusStatisticsResponse& to) {
+        to.set_missed(from.missed);
+        for (const auto& bus : from.buses) to_proto(bus, *to.add_buses());
+      });
+  return stream != nullptr ? stream : new Refused(shutting_down());
+}
+
 grpc::ServerWriteReactor<v1::TraceBusResponse>* BusServiceImpl::TraceBus(Context* context,
                                                                          const v1::TraceBusRequest* request) {
+  using Stream = PacedStream<v1::TraceBusResponse, TraceBatch>;
   using Refused = RefusedStream<v1::TraceBusResponse>;
   TraceRequest trace{.bus = request->bus()};
   if (request->has_node()) {
@@ -45,7 +67,12 @@ grpc::ServerWriteReactor<v1::TraceBusResponse>* BusServiceImpl::TraceBus(Context
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
   if (!ticket) return new Refused(to_status(ticket.error()));
   spdlog::info("{}: traces {}", client, trace.bus);
-  auto* stream = TraceStream::start(services_, context, *std::move(ticket), std::move(trace));
+  auto* stream = Stream::start(
+      services_, context, *std::move(ticket),
+      [&](Stream::Take take) {
+        return services_.machine.bus_watch().trace(std::move(trace), std::move(take));
+      },
+      [bus = request->bus()](const TraceBatch& from, v1::TraceBusResponse& to) { to_proto(from, bus, to); });
   return stream != nullptr ? stream : new Refused(shutting_down());
 }
 

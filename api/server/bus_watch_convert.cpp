@@ -82,6 +82,14 @@ void fill(const modbus_rtu::NodeStatistics& from, Duration since_start, v1::Line
                                    std::chrono::duration<double>(since_start));
 }
 
+void fill(const QuarantineStatus& from, v1::Quarantine& to) {
+  to.set_active(from.active);
+  to_proto(from.lasting, *to.mutable_lasting());
+  to_proto(from.next_probe_in, *to.mutable_next_probe_in());
+  to.set_probes(from.probes);
+  to.set_times(from.times);
+}
+
 void fill(const NetworkNodeStatistics& from, v1::NetworkNodeStatistics& to) {
   to.set_sdo_transfers(from.sdo.transfers);
   to.set_sdo_aborts(from.sdo.aborted_by_node);
@@ -115,6 +123,8 @@ void fill_nodes(const BusStatistics& from, v1::BusStatistics& to) {
       const auto counted = from.line->nodes().find(node);
       fill(counted == from.line->nodes().end() ? modbus_rtu::NodeStatistics{} : counted->second,
            from.since_start, *entry.mutable_line());
+      if (const auto there = from.quarantine.find(node); there != from.quarantine.end())
+        fill(there->second, *entry.mutable_line()->mutable_quarantine());
     } else if (const auto counted = from.network.find(node); counted != from.network.end()) {
       fill(counted->second, *entry.mutable_network());
     }
@@ -152,6 +162,7 @@ void to_proto(const BusStatistics& from, v1::BusStatistics& to) {
   to_proto(from.since_start, *to.mutable_since_start());
   to.set_utilisation(from.recent_load);
   to.set_utilisation_since_start(from.overall_load);
+  to.set_held_back(from.held_back);
   if (from.line)
     for (std::size_t i = 0; i < from.line->classes().size(); ++i) {
       auto& entry = *to.add_classes();

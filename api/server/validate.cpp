@@ -23,6 +23,7 @@ constexpr Duration longest_hold = 2s;  // M16: these drives have no communicatio
 constexpr Duration longest_time =
     1h;  // of a ramp; the drives take milliseconds, this only keeps sums in range
 constexpr Duration default_period = 100ms, shortest_period = 10ms, longest_period = 60s;
+constexpr Duration default_statistics_period = 1s;
 
 double in_seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
 
@@ -258,6 +259,11 @@ Result<Action> to_action(const v1::SetPositionRequest& from) {
 Result<Duration> watch_period(const v1::WatchAxesRequest& from) {
   if (!from.has_period()) return default_period;
   return duration(from.period(), "period", shortest_period, longest_period);
+}
+
+Result<Duration> watch_period(const v1::WatchBusStatisticsRequest& from) {
+  if (!from.has_period()) return default_statistics_period;
+  return duration(from.period(), "period", shortest_statistics_period, longest_period);
 }
 
 Result<std::vector<std::string>> watched_axes(const v1::WatchAxesRequest& from, const Machine& machine) {

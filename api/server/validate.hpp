@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "axisd/v1/axis_service.pb.h"
+#include "axisd/v1/bus_service.pb.h"
 #include "axisd/v1/system_service.pb.h"
 #include "devices/machine.hpp"
 
@@ -52,6 +53,8 @@ struct Submission {
 
 /// Time between the batches of WatchAxes. Errors: out_of_range.
 [[nodiscard]] Result<Duration> watch_period(const v1::WatchAxesRequest& from);
+/// Time between the messages of WatchBusStatistics. Errors: invalid_argument, out_of_range.
+[[nodiscard]] Result<Duration> watch_period(const v1::WatchBusStatisticsRequest& from);
 /// The axes to watch, in the machine's order and without repetitions. Errors: invalid_argument, unknown_axis.
 [[nodiscard]] Result<std::vector<std::string>> watched_axes(const v1::WatchAxesRequest& from,
                                                             const Machine& machine);

@@ -9,11 +9,18 @@ void Quarantine::silent(std::uint8_t node, TimePoint now, Duration cost, bool st
   known.good = 0;
   // Stops alone do not put a node there: their repetitions are few, and urgent.
   if (stop && known.level == 0) return;
+  const bool was_there = known.quarantined();
   ++known.silent;
   if (known.level == 0 && known.answered_once && known.silent < quarantine_after) return;
   constexpr int most_doublings = 20;
+  if (was_there) {
+    ++known.probes;
+  } else {
+    known.since = now;
+    known.probes = 0;
+    ++known.entered;
+  }
   known.level = std::min(known.level + 1, most_doublings);
-  ++known.held;
   const auto hold = std::min(quarantine_first_hold * (1 << (known.level - 1)), cost * quarantine_share);
   // A stop that came before its turn is made up for by the next probe.
   known.next = std::max(known.next, now) + hold;
@@ -26,6 +33,10 @@ void Quarantine::answered(std::uint8_t node) {
   known.next = {};
   // Whoever is there again waits briefly only, so that an axis soon knows when it is gone once more.
   known.level = ++known.good >= quarantine_trust_after ? 0 : std::min(known.level, 1);
+}
+
+void Quarantine::forget() {
+  for (auto& [address, node] : nodes_) node = {.entered = node.entered};
 }
 
 TimePoint Quarantine::ready_at(std::uint8_t node) const {

@@ -22,11 +22,13 @@ inline constexpr int quarantine_trust_after = 4;
 class Quarantine {
  public:
   struct Node {
-    int silent = 0;          ///< requests in vain in a row
-    int level = 0;           ///< 0: trusted; else how often the wait was doubled, plus 1
-    int good = 0;            ///< replies in a row
-    std::uint64_t held = 0;  ///< times that it was held back
-    TimePoint next{};        ///< not before
+    int silent = 0;             ///< requests in vain in a row
+    int level = 0;              ///< 0: trusted; else how often the wait was doubled, plus 1
+    int good = 0;               ///< replies in a row
+    TimePoint next{};           ///< not before
+    TimePoint since{};          ///< when it was put into quarantine, if it is there
+    std::uint64_t probes = 0;   ///< requests in vain since then
+    std::uint64_t entered = 0;  ///< times that it was put there; kept by forget()
     bool answered_once = false;
     [[nodiscard]] bool quarantined() const { return level > 0 && silent > 0; }
   };
@@ -34,7 +36,8 @@ class Quarantine {
   /// A request ended in vain at `now`, after the line was kept from others for `cost`.
   void silent(std::uint8_t node, TimePoint now, Duration cost, bool stop);
   void answered(std::uint8_t node);
-  void forget() { nodes_.clear(); }
+  /// The port was lost, or is there again: everybody is trusted once more.
+  void forget();
   /// No request but a stop before this.
   [[nodiscard]] TimePoint ready_at(std::uint8_t node) const;
   /// By address; only those that were asked something.

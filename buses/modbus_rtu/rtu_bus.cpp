@@ -90,6 +90,12 @@ LineStatistics RtuBus::statistics() const {
   return copy;
 }
 
+std::size_t RtuBus::held_back() const {
+  auto held = queue_.size();
+  for (int i = 0; i < transaction_class_count; ++i) held -= queue_.size(static_cast<TransactionClass>(i));
+  return held;
+}
+
 Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOptions options) const {
   const auto turnaround = options.turnaround_max.value_or(settings_.turnaround_max);
   const auto reply = wire_time(options.serial.value_or(settings_.serial()), reply_size(request));

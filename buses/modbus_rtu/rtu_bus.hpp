@@ -65,6 +65,8 @@ class RtuBus final : public Bus {
   /// Nodes that do not answer are probed with back-off. Bus scans, and exchanges with serial settings of
   /// their own, neither count nor wait.
   [[nodiscard]] const Quarantine& quarantine() const { return quarantine_; }
+  /// Requests to such nodes that wait for the next probe; none of them is counted as waiting in its class.
+  [[nodiscard]] std::size_t held_back() const;
   [[nodiscard]] TimePoint last_progress() const override { return line_->last_progress(); }
 
  private:

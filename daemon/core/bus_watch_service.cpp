@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "buses/signal.hpp"
@@ -33,6 +34,21 @@ std::map<std::uint8_t, NetworkNodeStatistics> nodes_of(const canopen::Master& ma
   return nodes;
 }
 
+std::map<std::uint8_t, QuarantineStatus> quarantine_of(const modbus_rtu::RtuBus& line, TimePoint now) {
+  std::map<std::uint8_t, QuarantineStatus> nodes;
+  for (const auto& [address, node] : line.quarantine().nodes()) {
+    if (node.entered == 0) continue;
+    auto& status = nodes[address];
+    status.times = node.entered;
+    status.active = node.quarantined();
+    if (!status.active) continue;
+    status.lasting = now - node.since;
+    status.next_probe_in = std::max(node.next - now, Duration{});
+    status.probes = node.probes;
+  }
+  return nodes;
+}
+
 void set_load(const BusLoad& load, TimePoint now, BusStatistics& to) {
   to.since_start = now - load.since();
   to.recent_load = load.recent(now);
@@ -49,6 +65,8 @@ BusStatistics BusWatchService::statistics_of(const Bus& bus) const {
   const auto now = clock_->now();
   if (const auto* line = machine_->find_line(bus.name())) {
     statistics.line = line->statistics();
+    statistics.quarantine = quarantine_of(*line, now);
+    statistics.held_back = line->held_back();
     set_load(statistics.line->load(), now, statistics);
   } else if (const auto* network = machine_->find_network(bus.name())) {
     statistics.kind = BusKind::canopen;
@@ -59,20 +77,60 @@ BusStatistics BusWatchService::statistics_of(const Bus& bus) const {
   return statistics;
 }
 
-void BusWatchService::statistics(std::string bus,
-                                 std::function<void(Result<std::vector<BusStatistics>>)> callback) {
-  post(executor_, [this, bus = std::move(bus), callback = std::move(callback)] {
-    std::vector<BusStatistics> all;
-    for (const auto* known : machine_->buses())
-      if (bus.empty() || known->name() == bus) all.push_back(statistics_of(*known));
-    if (all.empty() && !bus.empty()) return callback(fail(no_such_bus(*machine_, bus)));
-    callback(std::move(all));
-  });
+Result<std::vector<BusStatistics>> BusWatchService::statistics_of(const std::string& bus) const {
+  std::vector<BusStatistics> all;
+  for (const auto* known : machine_->buses())
+    if (bus.empty() || known->name() == bus) all.push_back(statistics_of(*known));
+  if (all.empty() && !bus.empty()) return fail(no_such_bus(*machine_, bus));
+  return all;
 }
 
-std::shared_ptr<TraceToken> BusWatchService::trace(TraceRequest request,
-                                                   std::function<void(Result<TraceBatch>)> callback) {
-  auto token = std::make_shared<TraceToken>();
+void BusWatchService::statistics(std::string bus,
+                                 std::function<void(Result<std::vector<BusStatistics>>)> callback) {
+  post(executor_,
+       [this, bus = std::move(bus), callback = std::move(callback)] { callback(statistics_of(bus)); });
+}
+
+std::shared_ptr<StreamToken> BusWatchService::watch_statistics(
+    std::string bus, Duration period, std::function<void(Result<StatisticsTick>)> callback) {
+  auto token = std::make_shared<StreamToken>();
+  post(executor_, [this, bus = std::move(bus), period, alive = std::weak_ptr(token),
+                   callback = std::move(callback)]() mutable {
+    machine_->launch(run_statistics(std::move(bus), period, std::move(alive), std::move(callback)),
+                     "statistics");
+  });
+  return token;
+}
+
+Task<> BusWatchService::run_statistics(std::string bus, Duration period, std::weak_ptr<StreamToken> alive,
+                                       std::function<void(Result<StatisticsTick>)> callback) {
+  std::uint64_t missed = 0;
+  bool owed = false;
+  auto due = clock_->now();
+  while (!machine_->closing()) {
+    const auto now = clock_->now();
+    if (now >= due) {
+      if (std::exchange(owed, true)) ++missed;
+      due += ((now - due) / period + 1) * period;
+    }
+    {
+      const auto token = alive.lock();
+      if (!token) co_return;
+      if (owed && token->wanted.exchange(false, std::memory_order_acq_rel)) {
+        owed = false;
+        auto buses = statistics_of(bus);
+        if (!buses) co_return callback(fail(buses.error()));
+        callback(StatisticsTick{.buses = *std::move(buses), .missed = std::exchange(missed, 0)});
+      }
+    }
+    // However long the period: an end is noticed soon, and a tick that is owed given.
+    co_await sleep_until(executor_, *clock_, std::min(due, now + shortest_statistics_period));
+  }
+}
+
+std::shared_ptr<StreamToken> BusWatchService::trace(TraceRequest request,
+                                                    std::function<void(Result<TraceBatch>)> callback) {
+  auto token = std::make_shared<StreamToken>();
   post(executor_, [this, request = std::move(request), alive = std::weak_ptr(token),
                    callback = std::move(callback)]() mutable {
     if (machine_->find_recorder(request.bus) == nullptr)
@@ -82,7 +140,7 @@ std::shared_ptr<TraceToken> BusWatchService::trace(TraceRequest request,
   return token;
 }
 
-Task<> BusWatchService::run_trace(TraceRequest request, std::weak_ptr<TraceToken> alive,
+Task<> BusWatchService::run_trace(TraceRequest request, std::weak_ptr<StreamToken> alive,
                                   std::function<void(Result<TraceBatch>)> callback) {
   const auto& frames = machine_->find_recorder(request.bus)->frames();
   auto place = frames.end();

@@ -24,19 +24,25 @@ class BusWatchService final : public BusWatch {
   BusWatchService(Executor executor, Clock& clock, MachineCore& machine);
 
   void statistics(std::string bus, std::function<void(Result<std::vector<BusStatistics>>)> callback) override;
-  std::shared_ptr<TraceToken> trace(TraceRequest request,
-                                    std::function<void(Result<TraceBatch>)> callback) override;
+  std::shared_ptr<StreamToken> watch_statistics(
+      std::string bus, Duration period, std::function<void(Result<StatisticsTick>)> callback) override;
+  std::shared_ptr<StreamToken> trace(TraceRequest request,
+                                     std::function<void(Result<TraceBatch>)> callback) override;
   void flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) override;
   void flight_record(std::string name, std::function<void(Result<std::string>)> callback) override;
   void write_flight_record(std::string bus, std::string client,
                            std::function<void(Result<std::string>)> callback) override;
 
  private:
-  Task<> run_trace(TraceRequest request, std::weak_ptr<TraceToken> alive,
+  Task<> run_statistics(std::string bus, Duration period, std::weak_ptr<StreamToken> alive,
+                        std::function<void(Result<StatisticsTick>)> callback);
+  Task<> run_trace(TraceRequest request, std::weak_ptr<StreamToken> alive,
                    std::function<void(Result<TraceBatch>)> callback);
   [[nodiscard]] TraceBatch batch_of(const FrameRing& frames, FrameRing::Place& place,
                                     const TraceRequest& request) const;
   [[nodiscard]] BusStatistics statistics_of(const Bus& bus) const;
+  /// Errors: invalid_argument (unknown bus).
+  [[nodiscard]] Result<std::vector<BusStatistics>> statistics_of(const std::string& bus) const;
 
   Executor executor_;
   Clock* clock_;

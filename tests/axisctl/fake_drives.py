@@ -135,15 +135,29 @@ class FakeNodes:
 
     async def GetBusStatistics(self, request, context):
         self.note("GetBusStatistics", request, context)
+        return bus_pb.GetBusStatisticsResponse(buses=self.statistics())
+
+    async def WatchBusStatistics(self, request, context):
+        self.note("WatchBusStatistics", request, context)
+        while True:
+            yield bus_pb.WatchBusStatisticsResponse(buses=self.statistics())
+            await asyncio.sleep(0.01)
+
+    @staticmethod
+    def statistics():
         line = bus_pb.BusStatistics(bus="line-a", kind=bus_pb.BUS_KIND_MODBUS_RTU, utilisation=0.25, classes=[
             bus_pb.ClassStatistics(transaction_class=bus_pb.TRANSACTION_CLASS_MOTION, sent=10, dropped_superseded=2,
                                    queueing=bus_pb.LatencyHistogram(counts=[5, 5]))], nodes=[
-            bus_pb.NodeStatistics(node=1, name="feeder", line=bus_pb.LineNodeStatistics(replies=9, timeouts=1))])
+            bus_pb.NodeStatistics(node=1, name="feeder", line=bus_pb.LineNodeStatistics(
+                replies=9, timeouts=1, quarantine=bus_pb.Quarantine(active=True, probes=4, times=1)),
+                unknown_starts=bus_pb.UnknownOutcomes(executed=2))], held_back=3)
+        line.nodes[0].line.quarantine.lasting.FromSeconds(75)
+        line.nodes[0].line.quarantine.next_probe_in.FromMilliseconds(250)
         line.since_start.FromSeconds(60)
         line.classes[0].queueing.longest.FromMicroseconds(110)
         network = bus_pb.BusStatistics(bus="can0", kind=bus_pb.BUS_KIND_CANOPEN, nodes=[
             bus_pb.NodeStatistics(node=5, network=bus_pb.NetworkNodeStatistics(sdo_timeouts=3, tpdos=40))])
-        return bus_pb.GetBusStatisticsResponse(buses=[line, network])
+        return [line, network]
 
     async def TraceBus(self, request, context):
         self.note("TraceBus", request, context)

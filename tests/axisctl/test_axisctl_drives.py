@@ -16,7 +16,17 @@ class Drives(AxisctlTest):
         self.assertRegex(text, r"(?m)^motion +10 +0 +0 +0\.1 ms +0\.1 ms +0\.1 ms")
         self.assertRegex(text, r"(?m)^ +1  feeder +0 % +9 +1")
         self.assertRegex(text, r"(?m)^ +5 +0 +0 +3 +0 +40")
+        self.assertRegex(text, r"(?m)^ +1  feeder .* for 1 min 15 s, 4 probes, next in 250 ms")
+        self.assertIn("3 requests are held back", text)
         self.assertEqual(self.json("bus", "statistics")[0]["buses"][0]["classes"][0]["sent"], "10")
+
+    def test_statistics_again_and_again(self):
+        watch = ("bus", "statistics", "line-a", "--watch", "--count", "3")
+        self.assertEqual(self.ok(*watch).count("line-a: occupied 25 % of the last 10 s"), 3)
+        ticks = self.json(*watch, "--period", "500ms")
+        self.assertEqual([tick["buses"][0]["utilisation"] for tick in ticks], [0.25] * 3)
+        self.assertEqual([call.period.ToMilliseconds() for call in self.server.calls("WatchBusStatistics")], [1000, 500])
+        self.fails(2, "bus", "statistics", "--count", "3")
 
     def test_a_trace_as_text_candump_and_json(self):
         trace = ("trace", "can0", "--for", "1s")

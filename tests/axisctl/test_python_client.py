@@ -233,6 +233,21 @@ class Drives(ClientTest):
         self.assertEqual((line.nodes[1].name, line.nodes[1].timeouts), ("feeder", 1))
         self.assertEqual((network.nodes[5].timeouts, network.nodes[5].raw.network.tpdos), (3, 40))
 
+        feeder = line.nodes[1]
+        self.assertEqual((feeder.quarantine, feeder.unknown_starts.executed, line.held_back),
+                         (axisd.Quarantine(True, 75, 0.25, 4, 1), 2, 3))
+        self.assertFalse(network.nodes[5].quarantine.active)
+
+    async def test_statistics_again_and_again(self):
+        seen = []
+        async for buses in self.machine.watch_bus_statistics("line-a", period=0.5):
+            seen.append(buses["line-a"].utilisation)
+            if len(seen) == 2:
+                break
+        self.assertEqual(seen, [0.25, 0.25])
+        request = self.calls("WatchBusStatistics")[0]
+        self.assertEqual((request.bus, request.period.ToMilliseconds()), ("line-a", 500))
+
     async def test_trace(self):
         frames = []
         async for frame in self.machine.trace("can0", node=5):

@@ -115,9 +115,13 @@ class CountedWatch final : public BusWatch {
                   std::function<void(Result<std::vector<BusStatistics>>)> callback) override {
     ledger_->enter([=, this](auto ticket) { inner_->statistics(bus, ledger_->answer(ticket, callback)); });
   }
-  /// Never counts: it has no end of its own.
-  std::shared_ptr<TraceToken> trace(TraceRequest request,
-                                    std::function<void(Result<TraceBatch>)> callback) override {
+  /// Never counts, as trace(): it has no end of its own.
+  std::shared_ptr<StreamToken> watch_statistics(
+      std::string bus, Duration period, std::function<void(Result<StatisticsTick>)> callback) override {
+    return inner_->watch_statistics(std::move(bus), period, std::move(callback));
+  }
+  std::shared_ptr<StreamToken> trace(TraceRequest request,
+                                     std::function<void(Result<TraceBatch>)> callback) override {
     return inner_->trace(std::move(request), std::move(callback));
   }
   void flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) override {

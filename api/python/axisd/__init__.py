@@ -14,7 +14,8 @@ from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event
                      TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import AxisdError, MotionError, RefusedError, UnreachableError
 from .machine import Machine, connect
-from .traffic import BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, TracedFrame
+from .traffic import (BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, Quarantine, TracedFrame,
+                      UnknownOutcomes)
 from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
                     Network, NetworkLink, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
@@ -23,7 +24,7 @@ __all__ = [
     "ClassStatistics", "Command", "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Link",
     "LinkChange", "Machine", "MotionCause", "MotionError", "MotionValues", "Network", "NetworkLink", "NodeStatistics",
-    "Parameter", "PermittedRange", "PositionSegment", "RefusedError", "ScanProgress", "Segments", "SerialProgress",
-    "State", "StateChange", "StopBudget", "StopResult", "Terminal", "TerminalCapability", "TerminalEdge", "Tick",
-    "TracedFrame", "Trust", "UnreachableError", "VelocitySegment", "connect",
+    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "RefusedError", "ScanProgress", "Segments",
+    "SerialProgress", "State", "StateChange", "StopBudget", "StopResult", "Terminal", "TerminalCapability",
+    "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",
 ]

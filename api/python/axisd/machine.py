@@ -205,6 +205,14 @@ class Machine:
         response = await self._call(self._buses.GetBusStatistics, request, bus)
         return {one.bus: BusStatistics.of(one) for one in response.buses}
 
+    async def watch_bus_statistics(self, bus: str = "", *,
+                                   period: Seconds = 1.0) -> AsyncIterator[dict[str, BusStatistics]]:
+        """The same again and again, every 0.1 to 60 s; a slow reader misses some, and never gets old ones."""
+        request = bus_service_pb2.WatchBusStatisticsRequest(bus=bus, period=duration(period))
+        async with contextlib.aclosing(self._stream(self._buses.WatchBusStatistics, request, bus)) as stream:
+            async for tick in stream:
+                yield {one.bus: BusStatistics.of(one) for one in tick.buses}
+
     async def trace(self, bus: str, *, node: int | None = None) -> AsyncIterator[TracedFrame]:
         """The frames of a bus from now on, without end, and what was not sent."""
         request = bus_service_pb2.TraceBusRequest(bus=bus, node=node)

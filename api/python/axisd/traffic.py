@@ -47,21 +47,52 @@ class ClassStatistics:
 
 
 @dataclasses.dataclass(frozen=True)
+class Quarantine:
+    """A node of a line that does not answer is asked with growing waits. `active`: now, for `lasting` seconds, with
+    `probes` in vain and the next one in `next_probe_in` seconds. `times`: that it was put there."""
+    active: bool
+    lasting: float
+    next_probe_in: float
+    probes: int
+    times: int
+
+    @classmethod
+    def of(cls, raw: bus_service_pb2.Quarantine) -> Quarantine:
+        return cls(raw.active, seconds(raw.lasting), seconds(raw.next_probe_in), raw.probes, raw.times)
+
+
+@dataclasses.dataclass(frozen=True)
+class UnknownOutcomes:
+    """Starts whose frame got no reply, by what reading the drive back showed."""
+    executed: int
+    not_executed: int
+    unresolved: int
+
+    @classmethod
+    def of(cls, raw: bus_service_pb2.UnknownOutcomes) -> UnknownOutcomes:
+        return cls(raw.executed, raw.not_executed, raw.unresolved)
+
+
+@dataclasses.dataclass(frozen=True)
 class NodeStatistics:
     """One node: `timeouts` are those of exchanges or of SDO transfers; all counters are in `raw`."""
     node: int
     name: str
     timeouts: int
+    quarantine: Quarantine
+    unknown_starts: UnknownOutcomes
     raw: bus_service_pb2.NodeStatistics = dataclasses.field(repr=False, compare=False)
 
     @classmethod
     def of(cls, raw: bus_service_pb2.NodeStatistics) -> NodeStatistics:
-        return cls(raw.node, raw.name, raw.network.sdo_timeouts if raw.HasField("network") else raw.line.timeouts, raw)
+        return cls(raw.node, raw.name, raw.network.sdo_timeouts if raw.HasField("network") else raw.line.timeouts,
+                   Quarantine.of(raw.line.quarantine), UnknownOutcomes.of(raw.unknown_starts), raw)
 
 
 @dataclasses.dataclass(frozen=True)
 class BusStatistics:
-    """Since the daemon started, `utilisation` (0 to 1) of the last 10 seconds. `classes` are those of a line."""
+    """Since the daemon started, `utilisation` (0 to 1) of the last 10 seconds. `classes` are those of a line, and so is
+    `held_back`: requests that wait for the next probe of a node in quarantine."""
     bus: str
     kind: BusKind
     since_start: float
@@ -69,6 +100,7 @@ class BusStatistics:
     utilisation_since_start: float
     classes: dict[str, ClassStatistics]
     nodes: dict[int, NodeStatistics]
+    held_back: int
     raw: bus_service_pb2.BusStatistics = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -77,7 +109,7 @@ class BusStatistics:
         return cls(raw.bus, _member(BusKind, bus_service_pb2.BusKind.DESCRIPTOR, "BUS_KIND_", raw.kind),
                    seconds(raw.since_start), raw.utilisation, raw.utilisation_since_start,
                    {one.transaction_class: one for one in classes},
-                   {node.node: NodeStatistics.of(node) for node in raw.nodes}, raw)
+                   {node.node: NodeStatistics.of(node) for node in raw.nodes}, raw.held_back, raw)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -156,10 +156,28 @@ void FakeBuses::write_device(std::string device, std::string name, double value,
   answer<double>(callback, value + 0.01);
 }
 
-void FakeWatch::frames(Result<TraceBatch> batch) {
+template <class T>
+void FakeWatch::give(const std::function<void(Result<T>)>& to, Result<T> what) {
   const std::lock_guard lock(mutex_);
   if (const auto token = token_.lock()) token->wanted = false;
-  post_([traced = traced_, batch = std::move(batch)] { traced(batch); });
+  post_([to, what = std::move(what)] { to(what); });
+}
+
+void FakeWatch::frames(Result<TraceBatch> batch) { give(traced_, std::move(batch)); }
+void FakeWatch::tick(Result<StatisticsTick> tick) { give(watched_, std::move(tick)); }
+
+template <class T>
+std::shared_ptr<StreamToken> FakeWatch::begin(std::function<void(Result<T>)> callback,
+                                              std::function<void(Result<T>)>& kept) {
+  if (const auto error = refusal()) {
+    post_([callback, error] { callback(fail(*error)); });
+    return nullptr;
+  }
+  auto token = std::make_shared<StreamToken>();
+  const std::lock_guard lock(mutex_);
+  kept = std::move(callback);
+  token_ = token;
+  return token;
 }
 
 bool FakeWatch::wanted() const {
@@ -192,6 +210,8 @@ void FakeWatch::statistics(std::string bus,
                            .recent_load = 0.25,
                            .overall_load = 0.125,
                            .line = std::move(line)};
+  statistics.quarantine[3] = {.active = true, .lasting = 7s, .next_probe_in = 250ms, .probes = 4, .times = 2};
+  statistics.held_back = 5;
   statistics.known[3] = {.name = "feeder",
                          .unknown_starts = {.executed = 1, .not_executed = 2, .unresolved = 3}};
   BusStatistics network{.bus = "can0", .kind = BusKind::canopen, .since_start = 10s};
@@ -201,18 +221,16 @@ void FakeWatch::statistics(std::string bus,
   answer(callback, Result<std::vector<BusStatistics>>({std::move(statistics), std::move(network)}));
 }
 
-std::shared_ptr<TraceToken> FakeWatch::trace(TraceRequest request,
-                                             std::function<void(Result<TraceBatch>)> callback) {
+std::shared_ptr<StreamToken> FakeWatch::trace(TraceRequest request,
+                                              std::function<void(Result<TraceBatch>)> callback) {
   note("trace " + request.bus + (request.node ? " " + std::to_string(*request.node) : ""));
-  if (const auto error = refusal()) {
-    post_([callback, error] { callback(fail(*error)); });
-    return nullptr;
-  }
-  auto token = std::make_shared<TraceToken>();
-  const std::lock_guard lock(mutex_);
-  traced_ = std::move(callback);
-  token_ = token;
-  return token;
+  return begin(std::move(callback), traced_);
+}
+
+std::shared_ptr<StreamToken> FakeWatch::watch_statistics(
+    std::string bus, Duration period, std::function<void(Result<StatisticsTick>)> callback) {
+  note(fmt::format("watch_statistics {} {}", bus, period / 1ms));
+  return begin(std::move(callback), watched_);
 }
 
 void FakeWatch::flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) {

@@ -100,20 +100,31 @@ class FakeWatch final : public FakeAccess, public BusWatch {
 
   /// Of a trace that was begun.
   void frames(Result<TraceBatch> batch);
-  /// The reader of the trace can take the next batch.
+  /// Of a stream of statistics that was begun.
+  void tick(Result<StatisticsTick> tick);
+  /// The reader of the stream that was begun last can take the next message.
   [[nodiscard]] bool wanted() const;
 
   void statistics(std::string bus, std::function<void(Result<std::vector<BusStatistics>>)> callback) override;
-  std::shared_ptr<TraceToken> trace(TraceRequest request,
-                                    std::function<void(Result<TraceBatch>)> callback) override;
+  std::shared_ptr<StreamToken> watch_statistics(
+      std::string bus, Duration period, std::function<void(Result<StatisticsTick>)> callback) override;
+  std::shared_ptr<StreamToken> trace(TraceRequest request,
+                                     std::function<void(Result<TraceBatch>)> callback) override;
   void flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) override;
   void flight_record(std::string name, std::function<void(Result<std::string>)> callback) override;
   void write_flight_record(std::string bus, std::string client,
                            std::function<void(Result<std::string>)> callback) override;
 
  private:
+  template <class T>
+  std::shared_ptr<StreamToken> begin(std::function<void(Result<T>)> callback,
+                                     std::function<void(Result<T>)>& kept);
+  template <class T>
+  void give(const std::function<void(Result<T>)>& to, Result<T> what);
+
   std::function<void(Result<TraceBatch>)> traced_;
-  std::weak_ptr<TraceToken> token_;
+  std::function<void(Result<StatisticsTick>)> watched_;
+  std::weak_ptr<StreamToken> token_;
 };
 
 class FakeEvents final : public EventSource {

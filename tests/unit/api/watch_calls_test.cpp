@@ -54,6 +54,13 @@ TEST_F(WatchCalls, StatisticsTellEverythingThatWasCounted) {
   ASSERT_EQ(node.line().exceptions_size(), 1);
   EXPECT_EQ(node.line().exceptions(0).name(), "illegal data address");
   EXPECT_EQ(node.line().longest_turnaround().nanos(), 2'000'000);
+  const auto& quarantine = node.line().quarantine();
+  EXPECT_TRUE(quarantine.active());
+  EXPECT_EQ(quarantine.lasting().seconds(), 7);
+  EXPECT_EQ(quarantine.next_probe_in().nanos(), 250'000'000);
+  EXPECT_EQ(quarantine.probes(), 4U);
+  EXPECT_EQ(quarantine.times(), 2U);
+  EXPECT_EQ(line.held_back(), 5U);
   EXPECT_EQ(node.unknown_starts().not_executed(), 2U);
   EXPECT_FALSE(node.has_network());
   const auto& network = response.buses(1);
@@ -62,6 +69,49 @@ TEST_F(WatchCalls, StatisticsTellEverythingThatWasCounted) {
   EXPECT_EQ(network.nodes(0).network().sdo_timeouts(), 2U);
   EXPECT_EQ(network.nodes(0).network().tpdos(), 40U);
   EXPECT_EQ(network.nodes(0).network().emergencies(), 6U);
+}
+
+TEST_F(WatchCalls, StatisticsComeAtThePaceOfTheirReader) {
+  Call context;
+  v1::WatchBusStatisticsRequest request;
+  request.set_bus("line-a");
+  request.mutable_period()->set_nanos(250'000'000);
+  const auto reader = stub()->WatchBusStatistics(&context, request);
+  ASSERT_TRUE(eventually([this] { return machine_.watch().wanted(); }));
+  EXPECT_THAT(machine_.watch().log(), ElementsAre("watch_statistics line-a 250"));
+  for (std::uint64_t missed = 0; missed < 3; ++missed) {
+    machine_.watch().tick(StatisticsTick{.buses = {{.bus = "line-a", .recent_load = 0.5}}, .missed = missed});
+    v1::WatchBusStatisticsResponse response;
+    ASSERT_TRUE(reader->Read(&response));
+    EXPECT_EQ(response.missed(), missed);
+    ASSERT_EQ(response.buses_size(), 1);
+    EXPECT_EQ(response.buses(0).utilisation(), 0.5);
+    ASSERT_TRUE(eventually([this] { return machine_.watch().wanted(); })) << "asks for the next one";
+  }
+  context.TryCancel();
+  reader->Finish();
+  EXPECT_TRUE(eventually([this] { return !machine_.watch().wanted(); })) << "it ends with its stream";
+}
+
+TEST_F(WatchCalls, StatisticsComeOnceASecondUnlessAskedOtherwiseAndNotTooOften) {
+  const auto code = [this](std::optional<int> milliseconds) {
+    Call context;
+    v1::WatchBusStatisticsRequest request;
+    if (milliseconds) {
+      request.mutable_period()->set_seconds(*milliseconds / 1000);
+      request.mutable_period()->set_nanos(*milliseconds % 1000 * 1'000'000);
+    }
+    const auto reader = stub()->WatchBusStatistics(&context, request);
+    if (!milliseconds) {
+      EXPECT_TRUE(eventually([this] { return machine_.watch().wanted(); }));
+      context.TryCancel();
+    }
+    return reader->Finish().error_code();
+  };
+  for (const int milliseconds : {0, 99, 60'001})
+    EXPECT_EQ(code(milliseconds), grpc::StatusCode::OUT_OF_RANGE) << milliseconds;
+  EXPECT_EQ(code({}), grpc::StatusCode::CANCELLED);
+  EXPECT_THAT(machine_.watch().log(), ElementsAre("watch_statistics  1000"));
 }
 
 TEST_F(WatchCalls, ATraceIsWrittenBatchByBatch) {

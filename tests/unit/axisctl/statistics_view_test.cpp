@@ -64,8 +64,32 @@ TEST(StatisticsView, ShowsWhatMatters) {
   const auto lines = line_node_table(bus).lines(false);
   EXPECT_THAT(lines.at(1), HasSubstr("7 x 02 illegal data address"));
   EXPECT_THAT(lines.at(1), HasSubstr("1: 1 executed, 0 not, 0 unresolved"));
+  auto& quarantine = *node.mutable_line()->mutable_quarantine();
+  quarantine.set_times(2);
+  EXPECT_THAT(line_node_table(bus).lines(false).at(1), HasSubstr("2 x so far"));
+  quarantine.set_active(true);
+  quarantine.set_probes(4);
+  quarantine.mutable_lasting()->set_seconds(75);
+  quarantine.mutable_next_probe_in()->set_nanos(250'000'000);
+  EXPECT_THAT(line_node_table(bus).lines(false).at(1), HasSubstr("for 1 min 15 s, 4 probes, next in 250 ms"));
+  bus.set_held_back(5);
+  EXPECT_THAT(load_line(bus), HasSubstr("; 5 requests are held back"));
   node.mutable_network()->set_heartbeats_lost(77);
   EXPECT_THAT(network_node_table(bus).lines(false).at(1), HasSubstr("77"));
+}
+
+TEST(StatisticsView, HasEachBusBelowTheOtherAsWideAsTheTerminal) {
+  v1::GetBusStatisticsResponse all;
+  auto& line = *all.add_buses();
+  line.set_bus("line-a");
+  line.add_classes()->set_transaction_class(v1::TRANSACTION_CLASS_STOP);
+  auto& network = *all.add_buses();
+  network.set_bus("can0");
+  network.set_kind(v1::BUS_KIND_CANOPEN);
+  network.add_nodes()->set_node(5);
+  EXPECT_THAT(statistics_lines(all.buses(), false, 12),
+              ElementsAre("line-a: occu", HasSubstr("CLASS"), HasSubstr("stop"), "", "can0: occupi",
+                          HasSubstr("NODE"), HasSubstr("5")));
 }
 
 }  // namespace

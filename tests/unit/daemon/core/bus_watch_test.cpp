@@ -18,8 +18,8 @@ class BusWatchTest : public test::BusAccessRig {
     int batches = 0;
     std::optional<Error> error;
   };
-  std::shared_ptr<TraceToken> trace(TraceRequest request, Traced& to, bool quick = true) {
-    auto token = std::make_shared<std::weak_ptr<TraceToken>>();
+  std::shared_ptr<StreamToken> trace(TraceRequest request, Traced& to, bool quick = true) {
+    auto token = std::make_shared<std::weak_ptr<StreamToken>>();
     auto made = watch_.trace(std::move(request), [&to, token, quick](Result<TraceBatch> batch) {
       ++to.batches;
       if (!batch) {
@@ -76,6 +76,93 @@ TEST_F(BusWatchTest, StatisticsNameTheNodesAndAgreeWithTheWire) {
   watch_.statistics("line-x", [&](auto result) { unknown = std::move(result); });
   ASSERT_TRUE(world_.run_until([&] { return unknown.has_value(); }, 1s));
   EXPECT_EQ(unknown->error().reason, Reason::invalid_argument);
+}
+
+TEST_F(BusWatchTest, StatisticsTellSinceWhenANodeIsInQuarantine) {
+  start();
+  EXPECT_FALSE(statistics().quarantine.contains(2));
+  drives_.at(1)->set_power(false);
+  world_.run_for(20s);
+  const auto silent = statistics();
+  const auto& there = silent.quarantine.at(2);
+  EXPECT_TRUE(there.active);
+  EXPECT_GT(there.lasting, 15s);
+  EXPECT_LE(there.lasting, 20s);
+  EXPECT_GT(there.probes, 1U);
+  EXPECT_EQ(there.times, 1U);
+  EXPECT_FALSE(silent.quarantine.contains(1));
+  // Every probe is a request without a reply; those before it was put there are no probes.
+  const auto timeouts = silent.line->nodes().at(2).timeouts;
+  EXPECT_LT(there.probes, timeouts);
+  EXPECT_LE(timeouts - there.probes, 10U);
+  ASSERT_TRUE(world_.run_until([this] { return statistics().held_back > 0; }, 10s));
+  EXPECT_GT(statistics().quarantine.at(2).next_probe_in, 0s);
+
+  drives_.at(1)->set_power(true);
+  world_.run_for(30s);
+  const auto back = statistics();
+  EXPECT_FALSE(back.quarantine.at(2).active);
+  EXPECT_EQ(back.quarantine.at(2).probes, 0U);
+  EXPECT_EQ(back.quarantine.at(2).lasting, 0s);
+  EXPECT_GE(back.quarantine.at(2).times, 1U);
+  EXPECT_EQ(back.held_back, 0U);
+}
+
+TEST_F(BusWatchTest, ALostPortKeepsCountHowOftenANodeWasInQuarantine) {
+  start();
+  drives_.at(1)->set_power(false);
+  world_.run_for(10s);
+  line_->set_open(false);
+  world_.run_for(100ms);
+  const auto lost = statistics();
+  EXPECT_FALSE(lost.quarantine.at(2).active);
+  EXPECT_EQ(lost.quarantine.at(2).times, 1U);
+  line_->set_open(true);
+  world_.run_for(10s);
+  EXPECT_EQ(statistics().quarantine.at(2).times, 2U);
+}
+
+TEST_F(BusWatchTest, StatisticsComeAtOnceAndThenEachPeriodUntilNobodyWantsThem) {
+  start();
+  std::vector<TimePoint> at;
+  std::weak_ptr<StreamToken> reader;
+  const auto take = [&](Result<StatisticsTick> tick) {
+    ASSERT_TRUE(tick);
+    EXPECT_EQ(tick->buses.at(0).bus, "line-a");
+    EXPECT_EQ(tick->missed, 0U);
+    at.push_back(world_.now());
+    if (const auto token = reader.lock()) token->wanted = true;
+  };
+  auto token = watch_.watch_statistics("", 250ms, take);
+  reader = token;
+  const auto begin = world_.now();
+  world_.run_for(1100ms);
+  EXPECT_EQ(at, (std::vector<TimePoint>{begin, begin + 250ms, begin + 500ms, begin + 750ms, begin + 1000ms}));
+  token.reset();
+  world_.run_for(1s);
+  EXPECT_EQ(at.size(), 5U);
+}
+
+TEST_F(BusWatchTest, ASlowReaderOfStatisticsIsOwedOneTickAndGetsTheNewestValues) {
+  start();
+  std::vector<StatisticsTick> ticks;
+  const auto token = watch_.watch_statistics("line-a", 1s, [&](auto tick) { ticks.push_back(tick.value()); });
+  world_.run_for(5500ms);  // those at 1 s to 5 s cannot be taken
+  ASSERT_EQ(ticks.size(), 1U);
+  token->wanted = true;
+  world_.run_for(shortest_statistics_period);
+  ASSERT_EQ(ticks.size(), 2U);
+  EXPECT_EQ(ticks.at(1).missed, 4U);
+  EXPECT_GE(ticks.at(1).buses.at(0).since_start - ticks.at(0).buses.at(0).since_start, 5400ms);
+  token->wanted = true;
+  world_.run_for(500ms);
+  ASSERT_EQ(ticks.size(), 3U) << "the one at 6 s is not late";
+  EXPECT_EQ(ticks.at(2).missed, 0U);
+  std::optional<Error> error;
+  const auto nobody = watch_.watch_statistics("line-x", 1s, [&](auto tick) { error = tick.error(); });
+  world_.run_for(10ms);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->reason, Reason::invalid_argument);
 }
 
 TEST_F(BusWatchTest, ATraceHasEveryFrameOnceAndInOrder) {
