@@ -225,7 +225,7 @@ class Axis {
   bool renewed(const Action& action, const CommandOptions& options, Duration hold);
   ActivityPtr begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan);
 
-  // axis_motion.cpp: sequences
+  // axis_motion.cpp: sequences; axis_rezero.cpp: make_room()
   [[nodiscard]] bool current(const Activity& activity) const;
   [[nodiscard]] MotionGuard guard(const Activity& activity) const;
   Task<bool> reach_standstill(ActivityPtr activity);

@@ -21,9 +21,6 @@ constexpr auto overrun_margin = std::chrono::seconds(1);
 constexpr auto end_window = milliseconds(300);
 /// And from so long before, at most: a motion too short for its velocity ends before its prediction.
 constexpr Duration longest_end_lead = milliseconds(100);
-/// A counter that was told to become zero shows it within this.
-constexpr auto zeroing_window = milliseconds(200);
-constexpr auto zeroing_poll = milliseconds(5);
 
 }  // namespace
 
@@ -103,49 +100,6 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
   }
   activity->may_run = true;
   co_return true;
-}
-
-/// Zeroes the drive's counter before a target could leave its 32 bit, or what the drive takes (M19).
-Task<Result<void>> Axis::make_room(ActivityPtr activity) {
-  if (planner_.reachable(activity->plan.target_counter)) co_return Result<void>{};
-  // A sample that was asked for meanwhile may show either counter: none is taken for a motion.
-  rezeroing_ = true;
-  auto cleared = co_await drive_->clear_position(guard(*activity));
-  // Without a reply it may have been cleared: the counter tells, and clearing it twice changes nothing.
-  if (!cleared && cleared.error().outcome != Outcome::unknown) {
-    rezeroing_ = false;
-    co_return cleared;
-  }
-  const bool zero = co_await counter_shows_zero();
-  rezeroing_ = false;
-  if (zero) {
-    activity->plan.target_counter -= tracker_.counter();
-    tracker_.rezero(0);
-    co_return Result<void>{};
-  }
-  // It may become zero at any time, which would look like a motion.
-  lose_trust();
-  tracker_.forget_target();
-  auto cause =
-      error(Reason::not_confirmed, "the drive's position counter could not be zeroed", "repeat the move");
-  cause.outcome = Outcome::not_executed;
-  co_return fail(std::move(cause));
-}
-
-/// When an acknowledged zeroing shows is not said. The poll rests meanwhile, so what these samples tell is
-/// heard here. Goes on when superseded: what the counter means has to be known all the same.
-Task<bool> Axis::counter_shows_zero() {
-  const auto latest = env_.clock->now() + zeroing_window;
-  for (;;) {
-    const auto sample = co_await drive_->read_state(TransactionClass::motion);
-    if (sample) {
-      on_sample(*sample);
-      if (sample->moving) co_return false;
-      if (sample->position_pulses == 0) co_return true;
-    }
-    if (env_.clock->now() >= latest) co_return false;
-    co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + zeroing_poll);
-  }
 }
 
 Task<> Axis::run_move(ActivityPtr activity) {
