@@ -153,7 +153,8 @@ class Cia402Drive final : public Drive {
   void on_emergency(const canopen::Emergency& emergency);
   void on_pdo(std::size_t index, const can::ReceivedFrame& received);
   [[nodiscard]] bool pdos_usable() const;
-  [[nodiscard]] Duration pdo_patience() const;
+  [[nodiscard]] bool alive(TimePoint now) const;
+  [[nodiscard]] Duration pdo_patience(TimePoint now) const;
   Task<std::optional<Reading>> next_pdos();
   Task<Result<Reading>> poll_objects(SdoOptions options);
   Task<Result<DriveSample>> look(bool by_pdo, SdoOptions options);

@@ -14,6 +14,8 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr auto longest_pdo_wait = milliseconds(60);
+/// Of a node that is alive.
+constexpr auto longest_pdo_wait_alive = milliseconds(100);
 constexpr int missed_in_a_row = 3;
 /// A motion that was triggered shows within this, or did not start.
 constexpr auto start_window = milliseconds(500);
@@ -65,12 +67,27 @@ bool Cia402Drive::pdos_usable() const {
   return !pdos_.synchronous() || bus_->sync_running();
 }
 
-Duration Cia402Drive::pdo_patience() const {
+/// Its heartbeat came lately: two of them are due in that time.
+bool Cia402Drive::alive(TimePoint now) const {
+  constexpr auto lately = milliseconds(500);
+  const auto status = bus_->master().nmt().status(node_.id());
+  return status.state == canopen::NmtState::operational && status.last_heard &&
+         now - *status.last_heard < lately;
+}
+
+/// What a node that is alive does not send in time is mostly on its way: to ask for the same by SDO only
+/// makes what comes after it later still. So such a node gets some cycles more, but where the end of a stop
+/// is waited for.
+Duration Cia402Drive::pdo_patience(TimePoint now) const {
   constexpr auto reply = milliseconds(10);
-  const auto period = bus_->settings().sync_period;
+  constexpr int cycles_alive = 6;
   if (!pdos_.synchronous()) return longest_pdo_wait;
-  if (!pdos_.late()) return std::min<Duration>(2 * period + reply, longest_pdo_wait);
-  return std::max<Duration>(3 * period + reply, longest_pdo_wait);
+  const auto period = bus_->settings().sync_period;
+  const auto wanted = pdos_.late() ? std::max<Duration>(3 * period + reply, longest_pdo_wait)
+                                   : std::min<Duration>(2 * period + reply, longest_pdo_wait);
+  const bool stopping = halt_ && !halt_->rested;
+  if (!alive(now) || stopping) return wanted;
+  return std::max(wanted, std::min<Duration>(cycles_alive * period + reply, longest_pdo_wait_alive));
 }
 
 /// The first complete reading that is no older than this call, if it comes soon.
@@ -79,14 +96,13 @@ Task<std::optional<Reading>> Cia402Drive::next_pdos() {
   // A drive that does not send them costs one short wait now and then, and not with every reading.
   const bool hopeless = missed_pdos_ >= missed_in_a_row && !pdos_.since(since - std::chrono::seconds(1));
   if (!pdos_usable() || hopeless) co_return std::nullopt;
-  const auto until = since + pdo_patience();
-  while (clock_->now() < until && pdos_usable()) {
+  const auto until = since + pdo_patience(since);
+  for (bool in_time = true; in_time && pdos_usable(); in_time = co_await news_.wait_until(until)) {
     if (auto reading = pdos_.since(since)) {
       missed_pdos_ = 0;
       link_note_.clear();
       co_return reading;
     }
-    co_await news_.wait_until(until);
   }
   if (pdos_usable()) ++missed_pdos_;
   co_return std::nullopt;

@@ -47,5 +47,37 @@ TEST(Cia402Alarms, AResetBetweenTwoObjectsOfOneReadingIsNoOtherAlarm) {
   EXPECT_EQ(sample->alarm_code, 0);
 }
 
+/// What a busy network brings late is waited for: asking by SDO as well would only make it busier. But what
+/// waits is told with the age that it has, and a node that is not heard any more is asked.
+TEST(Cia402State, LatePdosOfALivingNodeAreWaitedForAndThoseOfASilentOneAreNot) {
+  using std::chrono::milliseconds;
+  for (const bool heartbeat : {true, false}) {
+    DriveBench bench({}, DriveBench::plain_setup(), milliseconds(10));
+    bench.bring_up();
+    bench.world().run_for(std::chrono::seconds(1));
+    const auto without = [&](bool pdos) {
+      bench.network().set_fault([=](const can::Frame& frame) {
+        const bool beat = frame.id == 0x700U + DriveBench::node;
+        const bool pdo = frame.id == 0x180U + DriveBench::node || frame.id == 0x280U + DriveBench::node;
+        return can::Network::Fault{.drop = (beat && !heartbeat) || (pdo && pdos)};
+      });
+    };
+    without(false);
+    bench.world().run_for(milliseconds(600));
+    without(true);
+    const auto begun = bench.world().now();
+    const auto pdos_again = bench.world().clock().call_at(begun + milliseconds(45), [&] { without(false); });
+    int asked = 0;
+    bench.nodes().set_observer([&](TimePoint, bool received, const can::Frame& frame) {
+      if (received && frame.id == 0x600U + DriveBench::node) ++asked;
+    });
+    const auto sample = bench.run(bench.drive().read_state(TransactionClass::moving_state));
+    ASSERT_TRUE(sample) << to_string(sample.error());
+    EXPECT_EQ(asked == 0, heartbeat) << asked;
+    EXPECT_GE(sample->asked_at, begun);
+    EXPECT_GE(sample->measured_at, begun + (heartbeat ? milliseconds(45) : milliseconds(30)));
+  }
+}
+
 }  // namespace
 }  // namespace axisd::cia402

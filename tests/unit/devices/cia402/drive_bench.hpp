@@ -21,8 +21,14 @@ class DriveBench {
  public:
   static constexpr std::uint8_t node = 5;
 
-  explicit DriveBench(simulation::SimulatedNodeSettings simulated = {}, DriveSetup setup = plain_setup())
-      : nodes_(world_.clock(), network_) {
+  explicit DriveBench(simulation::SimulatedNodeSettings simulated = {}, DriveSetup setup = plain_setup(),
+                      Duration sync_period = {})
+      : nodes_(world_.clock(), network_),
+        bus_(world_.executor(), world_.clock(),
+             canopen::NetworkSettings{.name = "can0", .interface = "sim", .sync_period = sync_period},
+             std::make_unique<can::NetworkPort>(
+                 world_.clock(), can::PortSettings{.bus = "can0", .interface = "sim", .bitrate = 1'000'000},
+                 network_)) {
     simulated.address = simulated.address == 1 ? node : simulated.address;
     simulated_ = &nodes_.nodes().add(std::make_unique<yss_c::SimulatedDrive>(std::move(simulated)));
     world_.run_for(std::chrono::seconds(1));  // it boots
@@ -89,11 +95,7 @@ class DriveBench {
   can::Network network_{world_.clock(), 1'000'000};
   simulation::NetworkNodes nodes_;
   simulation::SimulatedCanNode* simulated_ = nullptr;
-  canopen::CanopenBus bus_{
-      world_.executor(), world_.clock(), canopen::NetworkSettings{.name = "can0", .interface = "sim"},
-      std::make_unique<can::NetworkPort>(
-          world_.clock(), can::PortSettings{.bus = "can0", .interface = "sim", .bitrate = 1'000'000},
-          network_)};
+  canopen::CanopenBus bus_;
   std::unique_ptr<Drive> drive_;
 };
 
