@@ -1,4 +1,5 @@
 // Drives on a CAN interface of the kernel.
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -59,8 +60,13 @@ int serve_can(const Options& options) {
   const auto log = FrameLog::open(options.log);
   if (!log) return complain(log.error());
 
+  // Each drive has a controller of its own: none waits until another's frame is confirmed.
+  constexpr std::size_t frames_of_a_drive = 4;
   can::SocketCanPort port(io.get_executor(), clock,
-                          {.bus = "axisd-sim", .interface = options.can, .bitrate = options.bitrate});
+                          {.bus = "axisd-sim",
+                           .interface = options.can,
+                           .bitrate = options.bitrate,
+                           .window = frames_of_a_drive * std::max<std::size_t>(made->size(), 1)});
   CanNodes nodes(clock, [&port](const can::Frame& frame) { port.send(frame, {}, {}); });
   if (options.bitrate != 0) nodes.set_bitrate(options.bitrate);
   for (auto& node : *made) nodes.add(std::move(node));
