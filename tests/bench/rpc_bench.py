@@ -1,7 +1,7 @@
 """axisd's API with 64 axes on four RS-485 lines, in turns with a bare gRPC server that sends the same messages.
 README.md says what is measured.
 
-    rpc_bench.py BUILD [--rounds N] [--seconds S] [--stops N]
+    rpc_bench.py BUILD [--rounds N] [--seconds S]
 """
 import argparse
 import contextlib
@@ -14,28 +14,10 @@ import tempfile
 import time
 
 from figures import cpu_seconds, lateness, percentile, running, spread, table
-from rtu_cell import SERVER, Cell, Line, silence
+from rtu_cell import SERVER, Cell, Client, Line
 
 BARE = "127.0.0.1:7445"
 PERIOD = 0.010  # s, of WatchAxes
-FULL_SPEED = "1 ms"
-STOP = "0600280000"  # FC06, register 0x0028 = 0
-
-
-class Client:
-    def __init__(self, build, target):
-        self.program, self.target = f"{build}/tests/bench_rpc_client", target
-
-    def start(self, *words):
-        return subprocess.Popen([self.program, self.target, *map(str, words)], stdout=subprocess.PIPE, text=True)
-
-    def run(self, *words):
-        """The lines that it prints, split into words."""
-        with self.start(*words) as process:
-            lines = [line.split() for line in process.stdout]
-        if process.returncode != 0:
-            sys.exit(f"rpc_bench.py: bench_rpc_client {words[0]} ended with {process.returncode}")
-        return lines
 
 
 def used(pid, act):
@@ -110,44 +92,13 @@ def overload(client, given):
                                    for name, each in (("GetAxis", calls), ("Stop", stops))])
 
 
-def earliest(line, frames, called):
-    """When a request that was called for at `called` may begin: after what is under way, and the silence."""
-    before = [(begin, frame) for begin, _, frame in frames if begin <= called]
-    begin, frame = before[-1]
-    free = begin + line.wire(len(frame) // 2)
-    if before[-1] in [(at, text) for at, asked, text in frames if asked]:  # its reply is still to come
-        free = next(at + line.wire(len(text) // 2) for at, asked, text in frames if at > begin and not asked)
-    return max(called, free + silence(line.baud))
-
-
-def stop_latency(build, given):
-    """From the call in the client to the first byte, beyond what had to be waited for."""
-    excess = []
-    with tempfile.TemporaryDirectory() as directory, Line(build, directory, 115200, 16).open() as line, \
-            Cell(build, [line], FULL_SPEED).online():
-        begin = time.monotonic()
-        calls = Client(build, SERVER).run("stop", given.stops)
-        frames = line.frames(begin, time.monotonic())
-    for called, _, axis in calls:
-        called, node = int(called) / 1e9, int(axis.rsplit("-", 1)[1])
-        index = next(i for i, (at, asked, frame) in enumerate(frames)
-                     if asked and at > called and frame.startswith(f"{node:02X}{STOP}"))
-        excess.append((frames[index][0] - earliest(line, frames[max(0, index - 8):index + 1], called)) * 1e6)
-    print(f"\n{len(excess)} stops at random moments on a saturated line of 16 drives at 115200 bit/s: from the call in "
-          "the client\nto the first byte of the frame, beyond the transaction under way and its silence, us")
-    table([["p50", "99 %", "99.9 %", "maximum"],
-           [f"{percentile(excess, share):.0f}" for share in (0.5, 0.99, 0.999, 1)]])
-
-
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=int, default=5, help="of each measurement")
-    parser.add_argument("--stops", type=int, default=1000)
     given = parser.parse_args()
     build = os.path.abspath(given.build)
-    stop_latency(build, given)
     with tempfile.TemporaryDirectory() as directory, contextlib.ExitStack() as stack:
         lines = [stack.enter_context(Line(build, directory, 115200, 16, name=f"line-{index}").open())
                  for index in range(4)]

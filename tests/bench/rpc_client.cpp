@@ -1,11 +1,12 @@
-// The client of rpc_bench.py, the same for axisd and for the bare server. Times are of the monotonic clock,
+// The client of the benchmarks, the same for axisd and for the bare server. Times are of the monotonic clock,
 // in ns.
 //   bench_rpc_client TARGET fetch FILE      writes the answer of ListAxes
 //   bench_rpc_client TARGET get SECONDS     GetAxis, one after the other; prints how long each took
 //   bench_rpc_client TARGET watch N SECONDS N streams, a batch each 10 ms; prints when each came, by stream
 //   bench_rpc_client TARGET stall N SECONDS the same, but after its first batch nobody reads
-//   bench_rpc_client TARGET stop N          Stop at random moments, axes in turn; prints when each was called
-//                                           and answered, and for which axis
+//   bench_rpc_client TARGET stop N          Stop at random moments, of the axes that are online in turn;
+//   prints
+//                                           when each was called and answered, and for which axis
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
@@ -108,7 +109,9 @@ void watch(Stub& stub, int streams, std::chrono::seconds duration, std::size_t l
 }
 
 void stop(Stub& stub, int count) {
-  const auto axes = list(stub);
+  std::vector<std::string> axes;
+  for (const auto& axis : list(stub).axes())
+    if (axis.link() == v1::LINK_STATE_ONLINE) axes.push_back(axis.axis());
   std::mt19937 random(1);
   std::uniform_int_distribution<int> pause_us(20'000, 60'000);
   for (int i = 0; i < count; ++i) {
@@ -116,7 +119,7 @@ void stop(Stub& stub, int count) {
     grpc::ClientContext context;
     v1::StopRequest request;
     v1::StopResponse response;
-    request.set_axis(axes.axes(i % axes.axes_size()).axis());
+    request.set_axis(axes.at(static_cast<std::size_t>(i) % axes.size()));
     request.mutable_options()->set_request_id("bench-" + std::to_string(now()));
     const auto begin = now();
     must(stub.Stop(&context, request, &response), "Stop");

@@ -1,7 +1,8 @@
 """An RS-485 line of 16 drives that is asked as fast as it allows: axisd, a tight loop on libmodbus and python3-pymodbus
-in turns, at the same simulated drives. README.md says what is measured.
+in turns, at the same simulated drives; stops on such a line, silent nodes, four lines. One table, with what is asked of
+each figure. README.md says what is measured.
 
-    rtu_bench.py BUILD [--rounds N] [--seconds S] [--nodes N] [--baud BAUD ...]
+    rtu_bench.py BUILD [--rounds N] [--seconds S] [--nodes N] [--baud BAUD ...] [--stops N]
 """
 import argparse
 import contextlib
@@ -13,6 +14,7 @@ import sys
 import tempfile
 import time
 
+import rtu_stops
 from figures import cpu_seconds, percentile, running, spread, table
 from rtu_cell import Cell, Line, silence
 
@@ -68,6 +70,23 @@ def violations(line, frames):
                for (begin, asked_first, frame), (following, asked, _) in itertools.pairwise(frames))
 
 
+class Table:
+    """Rows of figures: minimum, median and maximum of the rounds."""
+
+    def __init__(self):
+        self.rows = [["", "axisd", "libmodbus", "pymodbus", "asked", "met"]]
+
+    def add(self, what, found, digits=0, asked="", met=None):
+        """`found`: the figures of each round, by program. `met` judges the medians."""
+        medians = [statistics.median(rounds) for rounds in found.values()]
+        verdict = "" if met is None else "yes" if met(*medians) else "NO"
+        cells = [spread(found[name], digits) if name in found else "" for name in self.rows[0][1:4]]
+        self.rows.append([what, *cells, asked, verdict])
+
+    def say(self, what, figure, asked="", met=None):
+        self.rows.append([what, figure, "", "", asked, "" if met is None else "yes" if met else "NO"])
+
+
 def measure(program, line, seconds):
     cpu, (frames,) = watch(program, [line], seconds)
     excess = excesses(line, frames)
@@ -76,34 +95,47 @@ def measure(program, line, seconds):
         sys.exit(f"rtu_bench.py: {len(excess)} readings in {seconds} s: the drives do not answer")
     median, ideal = statistics.median(excess), line.ideal() * 1e6
     return {"excess": median, "p99": percentile(excess, 0.99), "efficiency": ideal / (ideal + median),
-            "per second": requests / seconds, "status": len(excess) / requests * 100, "cpu": cpu / requests * 1e6,
-            "violations": violations(line, frames)}
+            "rate": requests / seconds, "cpu": cpu / requests * 1e6, "violations": violations(line, frames)}
 
 
-def report(title, found):
-    print(f"\n{title}; min / median / max of the rounds")
-    bare = found["libmodbus"]
-    table([["", "excess, us", "99 %", "efficiency", "transactions/s", "ratio", "CPU/transaction, us", "ratio",
-            "t3.5 violated"]] + [
-        [name, spread([each["excess"] for each in rounds]), spread([each["p99"] for each in rounds]),
-         spread([each["efficiency"] for each in rounds], 4), spread([each["per second"] for each in rounds], 1),
-         spread([each["per second"] / one["per second"] for each, one in zip(rounds, bare)], 2),
-         spread([each["cpu"] for each in rounds]),
-         spread([each["cpu"] / one["cpu"] for each, one in zip(rounds, bare)], 2),
-         str(sum(each["violations"] for each in rounds))] for name, rounds in found.items()])
-
-
-def compare(build, given, baud):
-    with tempfile.TemporaryDirectory() as directory, Line(build, directory, baud, given.nodes).open() as line:
+def in_turns(build, given, baud, untimed=False):
+    """The figures of each round, by what and by program."""
+    with tempfile.TemporaryDirectory() as directory, \
+            Line(build, directory, baud, given.nodes, untimed=untimed).open() as line:
         loops = Loops(build, line)
         turns = {"axisd": Cell(build, [line], FULL_SPEED).online, "libmodbus": loops.libmodbus,
                  "pymodbus": loops.pymodbus}
-        found = {name: [] for name in turns}
+        found = {}
         for _ in range(given.rounds):
             for name, program in turns.items():
-                found[name].append(measure(program, line, given.seconds))
-    ideal = line.ideal() * 1e3
-    report(f"{given.nodes} drives at {baud} bit/s, status reads of ideally {ideal:.2f} ms", found)
+                for what, figure in measure(program, line, given.seconds).items():
+                    found.setdefault(what, {}).setdefault(name, []).append(figure)
+    return found
+
+
+def ratios(found):
+    return {"axisd": [one / bare for one, bare in zip(found["axisd"], found["libmodbus"])]}
+
+
+def compare(build, given, baud, rows):
+    found, title = in_turns(build, given, baud), f"{baud} bit/s: "
+    rows.add(title + "excess of a reading, us, median", found["excess"], 0, "<= libmodbus",
+             lambda axisd, bare, _: axisd <= bare)
+    rows.add(title + "99 %", found["p99"])
+    rows.add(title + "efficiency", found["efficiency"], 4, ">= libmodbus - 0.002",
+             lambda axisd, bare, _: axisd >= bare - 0.002)
+    rows.add(title + "transactions/s", found["rate"], 1)
+    rows.add(title + "CPU per transaction, us", found["cpu"])
+    rows.add(title + "CPU, of libmodbus's", ratios(found["cpu"]), 2, "<= 1.25", lambda ratio: ratio <= 1.25)
+    rows.add(title + "t3.5 violated", found["violations"], 0, "0",
+             lambda axisd, *_: max(found["violations"]["axisd"]) == axisd == 0)
+
+
+def compare_untimed(build, given, rows):
+    found = in_turns(build, given, 115200, untimed=True)
+    rows.add("untimed: transactions/s", found["rate"])
+    rows.add("untimed: of libmodbus's", ratios(found["rate"]), 3, ">= 0.8", lambda ratio: ratio >= 0.8)
+    rows.add("untimed: CPU per transaction, us", found["cpu"])
 
 
 def rates(line, frames, seconds):
@@ -115,7 +147,7 @@ def rates(line, frames, seconds):
     return [each / seconds for each in count.values()]
 
 
-def compare_silent(build, given):
+def compare_silent(build, given, rows):
     """What nodes that do not answer cost the others, against the same line without them being asked for."""
     found = {}
     for _ in range(given.rounds):
@@ -124,39 +156,54 @@ def compare_silent(build, given):
                     Line(build, directory, 115200, given.nodes, range(2, 2 + dead)).open() as line:
                 _, (frames,) = watch(Cell(build, [line], FULL_SPEED).online, [line], given.seconds)
                 found.setdefault(dead, []).append(sum(rates(line, frames, given.seconds)))
-    print(f"\n{given.nodes} drives at 115200 bit/s, of which some are silent: readings per second of the others in all")
-    table([["silent", "readings/s", "ratio"]] + [
-        [str(dead), spread(each, 1), spread([one / whole for one, whole in zip(each, found[0])], 3)]
-        for dead, each in found.items()])
+    rows.add("115200 bit/s: readings/s, all answer", {"axisd": found[0]}, 1)
+    for dead, name, bar in ((1, "one", 0.95), (3, "three", 0.9)):
+        shares = [one / whole for one, whole in zip(found[dead], found[0])]
+        rows.add(f"of that with {name} silent", {"axisd": shares}, 3, f">= {bar}", lambda share, bar=bar: share >= bar)
 
 
-def four_lines(build, given):
-    shares = []
+def four_lines(build, given, rows):
+    cpu, rate = [], []
     for _ in range(given.rounds):
         with tempfile.TemporaryDirectory() as directory, contextlib.ExitStack() as stack:
             lines = [stack.enter_context(Line(build, directory, 115200, given.nodes, name=f"line-{index}").open())
                      for index in range(4)]
-            cpu, seen = watch(Cell(build, lines, FULL_SPEED).online, lines, given.seconds)
-            requests = sum(asked for frames in seen for _, asked, _ in frames)
-            shares.append((cpu / given.seconds * 100, requests / given.seconds))
-    print(f"\n4 lines x {given.nodes} drives at 115200 bit/s, all asked as fast as they allow")
-    table([["", "CPU, % of a core", "transactions/s"],
-           ["axisd", spread([cpu for cpu, _ in shares], 1), spread([rate for _, rate in shares], 1)]])
+            used, seen = watch(Cell(build, lines, FULL_SPEED).online, lines, given.seconds)
+            cpu.append(used / given.seconds * 100)
+            rate.append(sum(asked for frames in seen for _, asked, _ in frames) / given.seconds)
+    rows.add(f"4 lines x {given.nodes} drives, 115200 bit/s: transactions/s", {"axisd": rate}, 1)
+    rows.add("their CPU, % of a core", {"axisd": cpu}, 1, "<= 10", lambda share: share <= 10)
+
+
+def stops(build, given, rows):
+    for silent in (0, 1):
+        found = rtu_stops.measure(build, given.nodes, silent, given.stops)
+        title = f"stop, 115200 bit/s, {'one' if silent else 'none'} silent: "
+        for name, share, bar in (("p50", 0.5, 200), ("p99", 0.99, 1000), ("p99.9", 0.999, None), ("maximum", 1, None)):
+            figure = percentile(found.excess, share)
+            rows.say(f"{title}{name}, us", f"{figure:.0f}", f"<= {bar}" if bar else "", figure <= bar if bar else None)
+        rows.say(f"{title}longest to its last byte, ms", f"{found.longest:.1f}",
+                 f"<= {found.bound:.1f} (published)", found.longest <= found.bound)
 
 
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
-    parser.add_argument("--rounds", type=int, default=4)
-    parser.add_argument("--seconds", type=float, default=8, help="of each measurement")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--seconds", type=float, default=5, help="of each measurement")
     parser.add_argument("--nodes", type=int, default=16, help="4 to 127")
-    parser.add_argument("--baud", type=int, nargs="*", default=[115200, 19200, 256000])
+    parser.add_argument("--baud", type=int, nargs="*", default=[115200, 19200])
+    parser.add_argument("--stops", type=int, default=1000, help="of each kind")
     given = parser.parse_args()
-    build = os.path.abspath(given.build)
+    build, rows = os.path.abspath(given.build), Table()
     for baud in given.baud:
-        compare(build, given, baud)
-    compare_silent(build, given)
-    four_lines(build, given)
+        compare(build, given, baud, rows)
+    compare_untimed(build, given, rows)
+    four_lines(build, given, rows)
+    stops(build, given, rows)
+    compare_silent(build, given, rows)
+    print(f"\nRS-485 lines of {given.nodes} drives, asked as fast as they allow; min / median / max of the rounds")
+    table(rows.rows)
 
 
 if __name__ == "__main__":

@@ -21,22 +21,27 @@ def silence(baud):
 class Line:
     """Simulated drives on a terminal, as a process of its own, and what it saw on the wire."""
 
-    def __init__(self, build, directory, baud, nodes, silent=(), name="line"):
+    def __init__(self, build, directory, baud, nodes, silent=(), name="line", untimed=False):
+        """`untimed`: bytes take no time, and drives answer at once."""
         self.build, self.directory, self.baud, self.nodes = build, pathlib.Path(directory), baud, nodes
-        self.silent = silent
+        self.silent, self.untimed = silent, untimed
         self.port, self.log = self.directory / name, self.directory / f"{name}.log"
         # A slave keeps 3.5 characters of silence before it answers: no drive is faster.
-        self.turnaround = silence(baud)
+        self.turnaround = 0 if untimed else silence(baud)
+
+    def _command(self):
+        if self.untimed:
+            return [f"{self.build}/tests/bench_untimed_line", self.port, self.log, str(self.nodes)]
+        drives = [word for node in range(1, self.nodes + 1) for word in (
+            "--drive", f"node={node},model=ykd2405pr" + (",powered=off" if node in self.silent else ""))]
+        return [f"{self.build}/daemon/axisd-sim", "--link", self.port, "--baud", str(self.baud), "--turnaround-us",
+                str(round(self.turnaround * 1e6)), "--log", self.log, *drives]
 
     @contextlib.contextmanager
     def open(self):
-        drives = [word for node in range(1, self.nodes + 1) for word in (
-            "--drive", f"node={node},model=ykd2405pr" + (",powered=off" if node in self.silent else ""))]
-        with running(f"{self.build}/daemon/axisd-sim", "--link", self.port, "--baud", str(self.baud), "--turnaround-us",
-                     str(round(self.turnaround * 1e6)), "--log", self.log, *drives, stdout=subprocess.PIPE,
-                     text=True) as process:
+        with running(*self._command(), stdout=subprocess.PIPE, text=True) as process:
             if not process.stdout.readline().startswith("ready"):
-                sys.exit(f"{sys.argv[0]}: axisd-sim did not start")
+                sys.exit(f"{sys.argv[0]}: the drives did not start")
             yield self
 
     def frames(self, begin, end):
@@ -52,11 +57,29 @@ class Line:
         return found
 
     def wire(self, size):
-        return size * BITS / self.baud
+        return 0 if self.untimed else size * BITS / self.baud
 
     def ideal(self):
         """Of one status read, from its first byte to the first of the next request."""
         return self.wire(REQUEST) + self.turnaround + self.wire(REPLY) + silence(self.baud)
+
+
+class Client:
+    """The calls of bench_rpc_client to a server."""
+
+    def __init__(self, build, target):
+        self.program, self.target = f"{build}/tests/bench_rpc_client", target
+
+    def start(self, *words):
+        return subprocess.Popen([self.program, self.target, *map(str, words)], stdout=subprocess.PIPE, text=True)
+
+    def run(self, *words):
+        """The lines that it prints, split into words."""
+        with self.start(*words) as process:
+            lines = [line.split() for line in process.stdout]
+        if process.returncode != 0:
+            sys.exit(f"{sys.argv[0]}: bench_rpc_client {words[0]} ended with {process.returncode}")
+        return lines
 
 
 class Cell:
@@ -98,14 +121,18 @@ buses:
             self.wait_online(process)
             yield process.pid
 
+    def ask(self, *words):
+        """What axisctl prints; empty if the call fails."""
+        command = [f"{self.build}/api/axisctl/axisctl", "--server", SERVER, "--json", *words]
+        asked = subprocess.run(command, capture_output=True, text=True, check=False)
+        return json.loads(asked.stdout) if asked.returncode == 0 else {}
+
     def wait_online(self, process):
-        command = [f"{self.build}/api/axisctl/axisctl", "--server", SERVER, "--json", "list"]
         expected = sum(line.nodes - len(line.silent) for line in self.lines)
         end = time.monotonic() + 120
         while time.monotonic() < end and process.poll() is None:
             time.sleep(0.5)
-            listed = subprocess.run(command, capture_output=True, text=True, check=False)
-            axes = json.loads(listed.stdout).get("axes", []) if listed.returncode == 0 else []
+            axes = self.ask("list").get("axes", [])
             if sum(axis.get("link") == "LINK_STATE_ONLINE" for axis in axes) == expected:
                 return
         sys.exit(f"{sys.argv[0]}: not every axis came online")

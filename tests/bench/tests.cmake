@@ -9,14 +9,17 @@ target_link_libraries(bench_can PRIVATE axisd_test_support axisd_core)
 add_executable(bench_bare_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_loop.cpp)
 add_executable(bench_modbus_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/modbus_loop.cpp)
 target_link_libraries(bench_modbus_loop PRIVATE PkgConfig::MODBUS)
+add_executable(bench_untimed_line EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/untimed_line.cpp)
+target_include_directories(bench_untimed_line PRIVATE ${CMAKE_SOURCE_DIR})
+target_link_libraries(bench_untimed_line PRIVATE axisd_simulation)
 
 if(AXISD_GRPC)
   foreach(program rpc_client bare_server)
     add_executable(bench_${program} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/${program}.cpp)
     target_link_libraries(bench_${program} PRIVATE axisd_proto)
   endforeach()
-  add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop bench_modbus_loop bench_rpc_client bench_bare_server
-                                           axisd axisd-sim axisctl)
+  add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop bench_modbus_loop bench_untimed_line bench_rpc_client
+                                           bench_bare_server axisd axisd-sim axisctl)
   set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
   set(text "")
   foreach(command bring-up core)
@@ -26,9 +29,9 @@ if(AXISD_GRPC)
     "add_test(bench.sync_in_guest ${CMAKE_SOURCE_DIR}/tests/guest/run.sh -t 200 /usr/bin/python3 -B "
     "${CMAKE_CURRENT_LIST_DIR}/can_bench.py ${CMAKE_BINARY_DIR} --rounds 1 --seconds 1 --nodes 2)\n"
     "add_test(bench.rtu /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rtu_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
-    "--seconds 1 --nodes 4 --baud 115200)\n"
+    "--seconds 1 --nodes 4 --baud 115200 --stops 5)\n"
     "add_test(bench.rpc /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rpc_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
-    "--seconds 1 --stops 5)\n"
+    "--seconds 1)\n"
     "add_test(bench.machine /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/machine_bench.py ${CMAKE_BINARY_DIR} "
     "--rounds 1 --seconds 1 --axes 1)\n"
     "set_tests_properties(bench.rtu bench.rpc bench.machine PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"

@@ -1,0 +1,56 @@
+"""Stops at random moments on a saturated line, for rtu_bench.py: how long after the call the frame begins, beyond what
+had to be waited for, and the longest beside the bound that axisd publishes."""
+import dataclasses
+import tempfile
+import time
+
+from rtu_cell import SERVER, Cell, Client, Line, silence
+
+STOP = "0600280000"  # FC06, register 0x0028 = 0
+POLL = "1 ms"  # a refresh period that no line of 16 can keep: it is never idle
+TURNAROUND_MAX = 20e-3  # s, the default: from then on a stop cuts the wait for a silent node
+
+
+@dataclasses.dataclass
+class Found:
+    excess: list  # of each stop, us
+    longest: float  # from the call to the last byte, ms
+    bound: float  # of that, ms
+
+
+def earliest(line, frames, called):
+    """When a request that was called for at `called` may begin: after what is under way, and the silence."""
+    last = max(index for index, (begin, _, _) in enumerate(frames) if begin <= called)
+    (begin, asked, frame), (at, asked_again, reply) = frames[last:last + 2]
+    free = begin + line.wire(len(frame) // 2)
+    if asked and asked_again:  # a node that did not answer
+        return max(called, free + TURNAROUND_MAX)
+    if asked:
+        free = at + line.wire(len(reply) // 2)
+    return max(called, free + silence(line.baud))
+
+
+def bound(cell):
+    """Published: from a stop's arrival to its last byte, in ms."""
+    axes = cell.ask("budget")["budgets"][0]["axes"]
+    return max(float(axis["stop_alone"]["last_frame"].rstrip("s")) for axis in axes) * 1e3
+
+
+def measure(build, nodes, silent, count):
+    with tempfile.TemporaryDirectory() as directory, \
+            Line(build, directory, 115200, nodes, range(2, 2 + silent)).open() as line:
+        cell = Cell(build, [line], POLL)
+        with cell.online():
+            begin = time.monotonic()
+            calls = Client(build, SERVER).run("stop", count)
+            time.sleep(0.5)  # the last was answered, its frame may be still to come
+            frames = line.frames(begin, time.monotonic())
+            found = Found([], 0, bound(cell))
+    for called, _, axis in calls:
+        called, node = int(called) / 1e9, int(axis.rsplit("-", 1)[1])
+        index = next(i for i, (at, asked, frame) in enumerate(frames)
+                     if asked and at > called and frame.startswith(f"{node:02X}{STOP}"))
+        sent, _, frame = frames[index]
+        found.excess.append((sent - earliest(line, frames[max(0, index - 8):index + 1], called)) * 1e6)
+        found.longest = max(found.longest, (sent + line.wire(len(frame) // 2) - called) * 1e3)
+    return found
