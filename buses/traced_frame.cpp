@@ -32,23 +32,26 @@ void append_line(std::string& text, std::string_view bus, const TracedFrame& fra
   const auto content = frame.on_network ? can::to_string(frame.frame()) : modbus_rtu::to_hex(frame.bytes);
   switch (frame.kind) {
     case TracedFrame::Kind::sent:
-      fmt::format_to(out, "tx {}\n", content);
-      return;
+      fmt::format_to(out, "tx {}", content);
+      break;
     case TracedFrame::Kind::received:
-      fmt::format_to(out, "rx {}\n", content);
-      return;
+      fmt::format_to(out, "rx {}", content);
+      break;
     case TracedFrame::Kind::not_sent:
-      fmt::format_to(out, "-- {} {}{}\n", content, frame.on_network ? "" : "not sent: ", frame.why);
-      return;
+      fmt::format_to(out, "-- {} {}{}", content, frame.on_network ? "" : "not sent: ", frame.why);
+      break;
     case TracedFrame::Kind::failed:
       if (frame.on_network)
-        fmt::format_to(out, "-- {} {}\n", content, frame.why);
+        fmt::format_to(out, "-- {} {}", content, frame.why);
       else
-        fmt::format_to(out, "-- {}\n", frame.why);
-      return;
+        fmt::format_to(out, "-- {}", frame.why);
+      break;
     case TracedFrame::Kind::link:
-      fmt::format_to(out, "link {}\n", frame.why);
+      fmt::format_to(out, "link {}", frame.why);
+      break;
   }
+  if (frame.asked_for()) fmt::format_to(out, " @{}", to_string(frame.transaction_class));
+  text += '\n';
 }
 
 }  // namespace axisd

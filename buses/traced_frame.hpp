@@ -34,26 +34,34 @@ struct TracedFrame {
   std::string_view why{};               ///< "timeout"; static text
   std::span<const std::uint8_t> bytes;  ///< RTU: with its CRC; CAN: the data. Valid during the call
 
+  /// Somebody here wanted it, in `transaction_class`; else it came by itself.
+  [[nodiscard]] bool asked_for() const {
+    return !on_network || (kind != Kind::received && kind != Kind::link);
+  }
   /// Sets what a CAN frame has. `frame` must outlive this.
   void set(const can::Frame& frame);
   [[nodiscard]] can::Frame frame() const;
 };
 
-/// Appends the line that the text format has for it, with its line end; times are CLOCK_MONOTONIC:
+/// Version of the text format; 1 had no classes.
+inline constexpr int trace_text_version = 2;
+
+/// Appends the line that the text format has for it, with its line end; times are CLOCK_MONOTONIC, @<class>
+/// is the class of the transaction (stop, motion, moving_state, idle_state, parameters, scan):
 ///
-///   <ns> <bus> tx <hex>             request
-///   <ns> <bus> rx <hex>             reply
-///   <ns> <bus> -- <why>             no sound reply to the request before: timeout, cut, corrupt, port lost
-///   <ns> <bus> -- <hex> not sent: <why>
+///   <ns> <bus> tx <hex> @<class>    request
+///   <ns> <bus> rx <hex> @<class>    reply
+///   <ns> <bus> -- <why> @<class>    no sound reply to the request before: timeout, cut, corrupt, port lost
+///   <ns> <bus> -- <hex> not sent: <why> @<class>
 ///
 /// and on a CAN network, frames as candump writes them:
 ///
-///   <ns> <bus> tx 605#2B406000...   handed to the interface (the line is written when its fate is known)
-///   <ns> <bus> rx 585#...           received
-///   <ns> <bus> -- <frame> <why>     not sent; `unknown`, after its tx line: never confirmed
-///   <ns> <bus> link <state>         up, down, bus_off, ...
+///   <ns> <bus> tx 605#2B406000... @<class>  handed to the interface (written when its fate is known)
+///   <ns> <bus> rx 585#...                   received
+///   <ns> <bus> -- <frame> <why> @<class>    not sent; `unknown`, after its tx line: never confirmed
+///   <ns> <bus> link <state>                 up, down, bus_off, ...
 ///
-/// Lines that begin with # say where a file comes from.
+/// Lines that begin with # say where a file comes from, and the version of the format.
 void append_line(std::string& text, std::string_view bus, const TracedFrame& frame);
 
 }  // namespace axisd

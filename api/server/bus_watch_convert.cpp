@@ -137,9 +137,7 @@ void fill(const KeptFrame& from, const std::string& bus, v1::TracedFrame& to) {
   to.set_monotonic_ns(frame.at.time_since_epoch().count());
   to_proto(from.wall, *to.mutable_at());
   to.set_kind(static_cast<v1::TraceKind>(std::to_underlying(frame.kind) + 1));
-  const bool asked_for = !frame.on_network ||
-                         (frame.kind != TracedFrame::Kind::received && frame.kind != TracedFrame::Kind::link);
-  if (asked_for) to.set_transaction_class(class_of(frame.transaction_class));
+  if (frame.asked_for()) to.set_transaction_class(class_of(frame.transaction_class));
   to.set_node(frame.node);
   to.set_data(from.data.data(), from.data.size());
   if (frame.on_network && frame.kind != TracedFrame::Kind::link) {

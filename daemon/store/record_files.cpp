@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "buses/traced_frame.hpp"
+
 namespace axisd::store {
 namespace {
 
@@ -31,9 +33,9 @@ std::string record_head(const std::string& bus, const std::string& reason, TimeP
   auto one_line = reason;
   std::ranges::replace(one_line, '\n', ' ');
   const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(wall.time_since_epoch()).count();
-  return fmt::format("{}{}\n{}{}\n# CLOCK_MONOTONIC {} ns is {}.{:09} s since 1970\n", bus_key, bus,
-                     reason_key, one_line, monotonic.time_since_epoch().count(), ns / 1'000'000'000,
-                     ns % 1'000'000'000);
+  return fmt::format("{}{}\n{}{}\n# CLOCK_MONOTONIC {} ns is {}.{:09} s since 1970\n# format: {}\n", bus_key,
+                     bus, reason_key, one_line, monotonic.time_since_epoch().count(), ns / 1'000'000'000,
+                     ns % 1'000'000'000, trace_text_version);
 }
 
 void describe(std::string_view text, FlightRecord& record) {

@@ -5,7 +5,7 @@ import struct
 import time
 import unittest
 
-from harness import Scenario, crc, pb, wait_for
+from harness import Scenario, crc, frame_bytes, pb, wait_for
 
 USER0 = 147
 
@@ -80,7 +80,7 @@ class Traces(Scenario):
         link, packets = pcap_packets(pathlib.Path(pcap).read_bytes())
         self.assertEqual(link, USER0)
         self.assertGreater(len(packets), 5)
-        on_wire = [bytes.fromhex("".join(line.split()[3:])) for line in log if line.split()[2] in ("tx", "rx")]
+        on_wire = [frame_bytes(line) for line in log if line.split()[2] in ("tx", "rx")]
         for _, frame in packets:
             self.assertEqual(frame[-2:], crc(frame[:-2]), frame.hex())
         frames = [frame for _, frame in packets]
@@ -106,7 +106,7 @@ class Traces(Scenario):
         lines = [line for line in text.splitlines() if not line.startswith("#")]
         log = self.logged(machine, time.monotonic_ns())
         self.assertEqual(lines, log[:len(lines)])  # the ring holds more than there was
-        self.assertIn("01 06 00 28 00 00", text)  # the stop that followed
+        self.assertRegex(text, r"tx 01 06 00 28 00 00 .. .. @stop\n")  # the one that followed
         asked = machine.axisctl("bus", "record-now", "line")
         self.assertEqual(asked.returncode, 0, asked)
         self.assertEqual(len(self.json(machine, "bus", "records")["records"]), 2)

@@ -120,7 +120,7 @@ class Frame:
 
 
 class CanLog:
-    """The CAN frames in a log file, of daemon (`<ns> <bus> tx 605#...`) or simulator (`<ns> rx 605#...`)."""
+    """The CAN frames in a log file, of daemon (`<ns> <bus> tx 605#... @<class>`) or simulator (`<ns> rx 605#...`)."""
 
     def __init__(self, path):
         self.path = pathlib.Path(path)
@@ -137,7 +137,7 @@ class CanLog:
         found = []
         for words in self.lines():
             if words[1] not in ("tx", "rx"):
-                words = [words[0], *words[2:]]
+                words = [words[0], *(word for word in words[2:] if not word.startswith("@"))]
             if len(words) != 3 or words[1] not in ("tx", "rx") or "#" not in words[2] or "R" in words[2]:
                 continue
             identifier, data = words[2].split("#")

@@ -15,6 +15,11 @@ def crc(data):
     return value.to_bytes(2, "little")
 
 
+def frame_bytes(line):
+    """Of a line of the daemon's log that has a frame which was on the wire."""
+    return bytes.fromhex("".join(word for word in line.split()[3:] if not word.startswith("@")))
+
+
 @dataclasses.dataclass(frozen=True)
 class Frame:
     """One request."""
@@ -54,7 +59,7 @@ class Frame:
 
 
 class WireLog:
-    """The requests in a log file, of daemon (`<ns> <bus> tx <hex>`) or simulator (`<ns> rx <hex>`)."""
+    """The requests in a log file, of daemon (`<ns> <bus> tx <hex> @<class>`) or simulator (`<ns> rx <hex>`)."""
 
     def __init__(self, path):
         self.path = pathlib.Path(path)
@@ -72,7 +77,7 @@ class WireLog:
             if words[1] == "rx":
                 data = bytes.fromhex("".join(words[2:]))
             elif words[2] == "tx" and bus in (None, words[1]):
-                data = bytes.fromhex("".join(words[3:]))
+                data = frame_bytes(line)
             else:
                 continue
             frame = Frame(int(words[0]), data)

@@ -135,7 +135,7 @@ TEST_F(WatchCalls, ATraceIsWrittenBatchByBatch) {
     EXPECT_EQ(frame.kind(), v1::TRACE_KIND_NOT_SENT);
     EXPECT_EQ(frame.transaction_class(), v1::TRANSACTION_CLASS_MOTION);
     EXPECT_EQ(frame.why(), "superseded");
-    EXPECT_EQ(frame.text(), "5000000000 line-a -- 03 06 not sent: superseded");
+    EXPECT_EQ(frame.text(), "5000000000 line-a -- 03 06 not sent: superseded @motion");
     EXPECT_FALSE(frame.has_can());
     ASSERT_TRUE(eventually([this] { return machine_.watch().wanted(); })) << "asks for the next one";
   }

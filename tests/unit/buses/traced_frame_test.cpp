@@ -16,15 +16,16 @@ std::string line(const TracedFrame& frame) {
 TEST(TracedFrame, HasALineForEachThingThatHappensOnALine) {
   const std::vector<std::uint8_t> bytes = {0x01, 0x03, 0xAB};
   TracedFrame frame{.at = TimePoint(Duration(17)), .node = 1, .bytes = bytes};
-  EXPECT_EQ(line(frame), "17 line-a tx 01 03 AB\n");
+  EXPECT_EQ(line(frame), "17 line-a tx 01 03 AB @parameters\n");
   frame.kind = TracedFrame::Kind::received;
-  EXPECT_EQ(line(frame), "17 line-a rx 01 03 AB\n");
+  EXPECT_EQ(line(frame), "17 line-a rx 01 03 AB @parameters\n");
   frame.kind = TracedFrame::Kind::not_sent;
+  frame.transaction_class = TransactionClass::motion;
   frame.why = "superseded";
-  EXPECT_EQ(line(frame), "17 line-a -- 01 03 AB not sent: superseded\n");
+  EXPECT_EQ(line(frame), "17 line-a -- 01 03 AB not sent: superseded @motion\n");
   frame.kind = TracedFrame::Kind::failed;
   frame.why = "timeout";
-  EXPECT_EQ(line(frame), "17 line-a -- timeout\n");
+  EXPECT_EQ(line(frame), "17 line-a -- timeout @motion\n");
 }
 
 TEST(TracedFrame, ShowsCanFramesAsCandumpDoes) {
@@ -34,13 +35,15 @@ TEST(TracedFrame, ShowsCanFramesAsCandumpDoes) {
   frame.set(sent);
   EXPECT_EQ(frame.node, 5);
   EXPECT_EQ(frame.frame(), sent);
-  EXPECT_EQ(line(frame), "17 line-a tx 605#4041600000000000\n");
+  EXPECT_EQ(line(frame), "17 line-a tx 605#4041600000000000 @parameters\n");
   frame.kind = TracedFrame::Kind::not_sent;
   frame.why = "port_down";
-  EXPECT_EQ(line(frame), "17 line-a -- 605#4041600000000000 port_down\n");
+  EXPECT_EQ(line(frame), "17 line-a -- 605#4041600000000000 port_down @parameters\n");
   frame.kind = TracedFrame::Kind::failed;
   frame.why = "unknown";
-  EXPECT_EQ(line(frame), "17 line-a -- 605#4041600000000000 unknown\n");
+  EXPECT_EQ(line(frame), "17 line-a -- 605#4041600000000000 unknown @parameters\n");
+  frame.kind = TracedFrame::Kind::received;
+  EXPECT_EQ(line(frame), "17 line-a rx 605#4041600000000000\n") << "nobody asked for it";
   frame.kind = TracedFrame::Kind::link;
   frame.why = "bus_off";
   EXPECT_EQ(line(frame), "17 line-a link bus_off\n");
@@ -51,7 +54,7 @@ TEST(TracedFrame, BelongsToNoNodeWithAnIdentifierOf29Bits) {
   const can::Frame extended{.id = 0x605, .extended = true};
   frame.set(extended);
   EXPECT_EQ(frame.node, 0);
-  EXPECT_EQ(line(frame), "0 line-a tx 00000605#\n");
+  EXPECT_EQ(line(frame), "0 line-a tx 00000605# @parameters\n");
 }
 
 }  // namespace

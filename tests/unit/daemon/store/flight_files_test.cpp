@@ -54,7 +54,7 @@ TEST_F(FlightFilesTest, GivesBackWhatWasWritten) {
   EXPECT_EQ(records->front().size, head.size() + 15);
   EXPECT_EQ(*read("line-a-1.wire"),
             "# bus: line-a\n# reason: feeder: ErrorStop: no reply\n"
-            "# CLOCK_MONOTONIC 5 ns is 1.500000000 s since 1970\n5 line-a tx 01\n");
+            "# CLOCK_MONOTONIC 5 ns is 1.500000000 s since 1970\n# format: 2\n5 line-a tx 01\n");
 }
 
 TEST_F(FlightFilesTest, KeepsTheNewest) {
