@@ -50,6 +50,7 @@ struct BusStatistics {
   std::map<std::uint8_t, QuarantineStatus> quarantine{};    ///< of an RS-485 line: those that ever were there
   std::size_t held_back = 0;                                ///< of an RS-485 line: until the next probe
   std::map<std::uint8_t, NetworkNodeStatistics> network{};  ///< of a CAN network
+  std::optional<StatisticsByClass> sdo{};                   ///< of a CAN network
   std::map<std::uint8_t, Known> known{};
 };
 

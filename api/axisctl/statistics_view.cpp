@@ -129,9 +129,9 @@ std::vector<std::string> statistics_lines(const google::protobuf::RepeatedPtrFie
     if (!all.empty()) all.emplace_back();
     add(Table({load_line(bus)}));
     const bool network = bus.kind() == v1::BUS_KIND_CANOPEN;
-    if (!network) add(class_table(bus));
+    add(class_table(bus));
     if (bus.nodes().empty()) continue;
-    if (!network) all.emplace_back();
+    all.emplace_back();
     add(network ? network_node_table(bus) : line_node_table(bus));
   }
   return all;

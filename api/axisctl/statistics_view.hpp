@@ -13,7 +13,7 @@ namespace axisd::axisctl {
 double percentile(const v1::LatencyHistogram& histogram, double share);
 /// "line-a: occupied 12.5 % of the last 10 s, 8 % of 3 min 5 s since the start", and what is held back.
 std::string load_line(const v1::BusStatistics& bus);
-/// Of an RS-485 line: what waited and went out, per class.
+/// What waited and went out, per class.
 Table class_table(const v1::BusStatistics& bus);
 /// Of an RS-485 line.
 Table line_node_table(const v1::BusStatistics& bus);

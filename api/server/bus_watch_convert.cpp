@@ -50,7 +50,7 @@ void fill(const LatencyHistogram& from, v1::LatencyHistogram& to) {
   to_proto(from.longest(), *to.mutable_longest());
 }
 
-void fill(const modbus_rtu::ClassStatistics& from, v1::ClassStatistics& to) {
+void fill(const ClassStatistics& from, v1::ClassStatistics& to) {
   to.set_sent(from.sent);
   to.set_waiting(from.waiting);
   to.set_most_waiting(from.most_waiting);
@@ -61,6 +61,14 @@ void fill(const modbus_rtu::ClassStatistics& from, v1::ClassStatistics& to) {
   to.set_dropped_lease_lost(from.drops.lease_lost);
   to.set_dropped_port_lost(from.drops.port_lost);
   to.set_dropped_unsupported(from.drops.unsupported);
+}
+
+void fill_classes(const StatisticsByClass& from, v1::BusStatistics& to) {
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    auto& entry = *to.add_classes();
+    entry.set_transaction_class(class_of(static_cast<TransactionClass>(i)));
+    fill(from.at(i), entry);
+  }
 }
 
 void fill(const modbus_rtu::NodeStatistics& from, Duration since_start, v1::LineNodeStatistics& to) {
@@ -161,12 +169,8 @@ void to_proto(const BusStatistics& from, v1::BusStatistics& to) {
   to.set_utilisation(from.recent_load);
   to.set_utilisation_since_start(from.overall_load);
   to.set_held_back(from.held_back);
-  if (from.line)
-    for (std::size_t i = 0; i < from.line->classes().size(); ++i) {
-      auto& entry = *to.add_classes();
-      entry.set_transaction_class(class_of(static_cast<TransactionClass>(i)));
-      fill(from.line->classes().at(i), entry);
-    }
+  if (from.line) fill_classes(from.line->classes(), to);
+  if (from.sdo) fill_classes(*from.sdo, to);
   fill_nodes(from, to);
 }
 

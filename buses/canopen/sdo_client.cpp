@@ -76,8 +76,12 @@ Task<Result<SdoAnswer>> SdoClient::transact(std::uint8_t id, RequestPtr request)
   Promise<Result<SdoAnswer>> promise(executor_, *clock_);
   request->done = [&promise](Result<SdoAnswer> result) { promise.set(std::move(result)); };
   auto& target = node(id);
-  target.lane(request->options.transaction_class).push_back(std::move(request));
+  request->asked_at = clock_->now();
+  const auto own_class = request->options.transaction_class;
+  target.lane(own_class).push_back(std::move(request));
   pump(target);
+  auto& most = classes_.at(std::to_underlying(own_class)).most_waiting;
+  most = std::max(most, waiting(own_class));
   co_return co_await promise.get();
 }
 
@@ -130,6 +134,7 @@ void SdoClient::end_queued(Node& node, const std::function<std::optional<Error>(
 
 void SdoClient::complete(Node& node, RequestPtr request, Result<SdoAnswer> result) {
   if (!result) {
+    if (!request->sent) count_drop(*request, result.error().reason);
     if (request->perhaps_done) result.error().outcome = Outcome::unknown;
     auto& where = result.error().where;
     where.bus = port_->settings().bus;
@@ -160,6 +165,49 @@ SdoCounters SdoClient::counters() const {
   auto sum = others_;
   for (const auto& [id, node] : nodes_) sum += node->counters;
   return sum;
+}
+
+std::size_t SdoClient::waiting(TransactionClass transaction_class) const {
+  std::size_t sum = 0;
+  for (const auto& [id, node] : nodes_) sum += node->lane(transaction_class).size();
+  return sum;
+}
+
+StatisticsByClass SdoClient::classes() const {
+  auto all = classes_;
+  for (std::size_t i = 0; i < all.size(); ++i) all.at(i).waiting = waiting(static_cast<TransactionClass>(i));
+  return all;
+}
+
+void SdoClient::count_drop(const Request& request, Reason why) {
+  auto& drops = classes_.at(std::to_underlying(request.options.transaction_class)).drops;
+  switch (why) {
+    case Reason::expired:
+      ++drops.expired;
+      return;
+    case Reason::superseded:
+      ++drops.superseded;
+      return;
+    case Reason::lease_lost:
+      ++drops.lease_lost;
+      return;
+    default:
+      ++drops.port_lost;
+  }
+}
+
+void SdoClient::count_begin(const Active& active) {
+  if (active.probe) return;
+  active.request->sent = true;
+  auto& counted = classes_.at(std::to_underlying(active.request->options.transaction_class));
+  ++counted.sent;
+  counted.queueing.add(active.first_sent - active.request->asked_at);
+}
+
+void SdoClient::count_end(const Active& active, TimePoint at) {
+  if (active.probe || !active.any_sent()) return;
+  classes_.at(std::to_underlying(active.request->options.transaction_class))
+      .exchange.add(at - active.first_sent);
 }
 
 bool SdoClient::answers_twice(std::uint8_t node) const {

@@ -11,6 +11,7 @@
 #include "buses/can/port.hpp"
 #include "buses/canopen/late_replies.hpp"
 #include "buses/canopen/sdo_transfer.hpp"
+#include "buses/class_statistics.hpp"
 #include "buses/signal.hpp"
 
 namespace axisd::canopen {
@@ -89,6 +90,8 @@ class SdoClient {
   [[nodiscard]] SdoCounters counters() const;
   /// Of one node; all 0 if nothing was ever asked of it.
   [[nodiscard]] SdoCounters counters(std::uint8_t node) const;
+  /// Of all nodes, without the reads that only bring a node in step again.
+  [[nodiscard]] StatisticsByClass classes() const;
   /// A request of a stop or a motion is under way, at some node.
   [[nodiscard]] bool urgent() const;
   /// More replies come from this node-ID than were asked for: two nodes have it.
@@ -116,6 +119,10 @@ class SdoClient {
   void fail_active(Node& node, Error error, bool may_retry);
   void finish(Node& node, Result<SdoAnswer> result);
   void complete(Node& node, RequestPtr request, Result<SdoAnswer> result);
+  [[nodiscard]] std::size_t waiting(TransactionClass transaction_class) const;
+  void count_drop(const Request& request, Reason why);
+  void count_begin(const Active& active);
+  void count_end(const Active& active, TimePoint at);
   void end_queued(Node& node, const std::function<std::optional<Error>(const Request&)>& why);
   void arm(Node& node);
 
@@ -125,6 +132,7 @@ class SdoClient {
   SdoSettings settings_;
   std::map<std::uint8_t, std::unique_ptr<Node>> nodes_;
   SdoCounters others_;  ///< of nodes of which nothing was asked yet
+  StatisticsByClass classes_;
   std::uint64_t last_frame_id_ = 0;
   bool closed_ = false;
 };

@@ -38,6 +38,8 @@ struct SdoClient::Request {
   SdoOptions options;
   int attempts = 1;
   bool perhaps_done = false;  ///< an earlier attempt may have been executed
+  TimePoint asked_at{};       ///< of this attempt
+  bool sent = false;          ///< some attempt, or perhaps
   std::function<void(Result<SdoAnswer>)> done;
 };
 

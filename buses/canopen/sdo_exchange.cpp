@@ -66,6 +66,7 @@ void SdoClient::on_sent(std::uint8_t id, std::uint64_t frame_id, const can::Send
     active.last_sent = result.sent_at;
     if (!active.any_sent()) {
       active.first_sent = result.sent_at;
+      count_begin(active);
       active.limit =
           result.sent_at + active.request->options.transfer_limit.value_or(settings_.transfer_limit);
     }
@@ -73,6 +74,7 @@ void SdoClient::on_sent(std::uint8_t id, std::uint64_t frame_id, const can::Send
   }
   auto error = can::error_of(result, port_->settings().bus, frame);
   if (result.status == can::SendStatus::unknown) {
+    active.request->sent = true;
     target.late.expect(active.transfer.object(), clock_->now());
     error.outcome = active.transfer.complete_at_server() ? Outcome::unknown : Outcome::not_executed;
   } else if (active.any_sent()) {
@@ -184,8 +186,10 @@ void SdoClient::fail_active(Node& node, Error error, bool may_retry) {
                                 to_string(node.active->transfer.object()), error.message);
     error.outcome = Outcome::not_sent;
   } else if (may_retry && --node.active->request->attempts > 0) {
+    count_end(*node.active, clock_->now());
     auto request = std::move(node.active->request);
     request->perhaps_done |= error.outcome == Outcome::unknown;
+    request->asked_at = clock_->now();
     node.active.reset();
     node.lane(request->options.transaction_class).push_front(std::move(request));
     return;
@@ -194,6 +198,7 @@ void SdoClient::fail_active(Node& node, Error error, bool may_retry) {
 }
 
 void SdoClient::finish(Node& node, Result<SdoAnswer> result) {
+  count_end(*node.active, result ? result->answered_at : clock_->now());
   auto request = std::move(node.active->request);
   node.active.reset();
   complete(node, std::move(request), std::move(result));

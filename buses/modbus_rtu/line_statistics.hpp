@@ -5,7 +5,7 @@
 #include <map>
 
 #include "buses/bus_load.hpp"
-#include "buses/latency_histogram.hpp"
+#include "buses/class_statistics.hpp"
 #include "buses/modbus_rtu/transaction_queue.hpp"
 
 namespace axisd::modbus_rtu {
@@ -16,22 +16,6 @@ struct BusCounters {
                 dropped_expired = 0,
                 dropped_superseded = 0,  ///< also those whose lease or port was lost
       io_errors = 0;
-};
-
-/// Transactions of which not a byte was sent, by cause.
-struct Drops {
-  std::uint64_t expired = 0, superseded = 0, lease_lost = 0, port_lost = 0,
-                unsupported = 0;  ///< the port cannot do the serial settings
-};
-
-/// What became of the transactions of one class.
-struct ClassStatistics {
-  std::uint64_t sent = 0;   ///< exchanges that went out, with or without a reply
-  std::size_t waiting = 0;  ///< now
-  std::size_t most_waiting = 0;
-  LatencyHistogram queueing;  ///< from being asked for to the first byte, with the silence before it
-  LatencyHistogram exchange;  ///< from the first byte to the end of the reply, or of the wait for it
-  Drops drops;
 };
 
 /// What became of the exchanges with one node.
@@ -65,9 +49,7 @@ class LineStatistics {
   }
 
   [[nodiscard]] BusCounters counters() const;
-  [[nodiscard]] const std::array<ClassStatistics, transaction_class_count>& classes() const {
-    return classes_;
-  }
+  [[nodiscard]] const StatisticsByClass& classes() const { return classes_; }
   [[nodiscard]] const std::map<std::uint8_t, NodeStatistics>& nodes() const { return nodes_; }
   /// The line is occupied by an exchange from the silence before it to the end of the reply, or of the wait
   /// for it.
@@ -85,7 +67,7 @@ class LineStatistics {
   void count(NodeStatistics& node, const ExchangeResult& result);
 
   SerialSettings serial_;
-  std::array<ClassStatistics, transaction_class_count> classes_;
+  StatisticsByClass classes_;
   std::map<std::uint8_t, NodeStatistics> nodes_;
   std::map<std::uint8_t, Asked> last_;  ///< by node
   std::uint64_t foreign_frames_ = 0;

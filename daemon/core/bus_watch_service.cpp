@@ -71,6 +71,7 @@ BusStatistics BusWatchService::statistics_of(const Bus& bus) const {
   } else if (const auto* network = machine_->find_network(bus.name())) {
     statistics.kind = BusKind::canopen;
     statistics.network = nodes_of(network->master());
+    statistics.sdo = network->master().sdo().classes();
     set_load(machine_->find_recorder(bus.name())->network_load(), now, statistics);
   }
   add_known(*machine_, statistics);

@@ -31,7 +31,7 @@ class Latency:
 
 @dataclasses.dataclass(frozen=True)
 class ClassStatistics:
-    """One class of what waits for a line ("stop", "motion" ...); how many were dropped by which cause is in `raw`."""
+    """One class of what waits for a bus ("stop", "motion" ...); how many were dropped by which cause is in `raw`."""
     transaction_class: str
     sent: int
     waiting: int

@@ -218,6 +218,7 @@ void FakeWatch::statistics(std::string bus,
   network.network[5] = {.sdo = {.transfers = 7, .aborted_by_node = 1, .timeouts = 2},
                         .traffic = {.tpdos = 40, .rpdos = 4, .heartbeats_lost = 1, .boots = 2},
                         .emergencies = 6};
+  network.sdo.emplace().at(4).exchange.add(3ms);
   answer(callback, Result<std::vector<BusStatistics>>({std::move(statistics), std::move(network)}));
 }
 

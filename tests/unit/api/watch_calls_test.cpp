@@ -64,7 +64,9 @@ TEST_F(WatchCalls, StatisticsTellEverythingThatWasCounted) {
   EXPECT_EQ(node.unknown_starts().not_executed(), 2U);
   EXPECT_FALSE(node.has_network());
   const auto& network = response.buses(1);
-  EXPECT_EQ(network.classes_size(), 0);
+  ASSERT_EQ(network.classes_size(), 6);
+  EXPECT_EQ(network.classes(4).transaction_class(), v1::TRANSACTION_CLASS_PARAMETERS);
+  EXPECT_EQ(network.classes(4).exchange().longest().nanos(), 3'000'000);
   ASSERT_EQ(network.nodes_size(), 1);
   EXPECT_EQ(network.nodes(0).network().sdo_timeouts(), 2U);
   EXPECT_EQ(network.nodes(0).network().tpdos(), 40U);

@@ -89,7 +89,7 @@ TEST(StatisticsView, HasEachBusBelowTheOtherAsWideAsTheTerminal) {
   network.add_nodes()->set_node(5);
   EXPECT_THAT(statistics_lines(all.buses(), false, 12),
               ElementsAre("line-a: occu", HasSubstr("CLASS"), HasSubstr("stop"), "", "can0: occupi",
-                          HasSubstr("NODE"), HasSubstr("5")));
+                          HasSubstr("CLASS"), "", HasSubstr("NODE"), HasSubstr("5")));
 }
 
 }  // namespace

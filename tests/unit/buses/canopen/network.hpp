@@ -167,6 +167,9 @@ struct Network {
     spawn(world.executor(), one(*this, std::move(name), node, object, std::move(bytes), std::move(options)),
           "test");
   }
+  [[nodiscard]] ClassStatistics counted(TransactionClass transaction_class) const {
+    return master->sdo().classes().at(std::to_underlying(transaction_class));
+  }
   /// Runs `task` to its end and gives its value.
   template <class T>
   T run(Task<T> task) {
