@@ -38,9 +38,10 @@ class Traces(CanScenario):
             at, packets = at + 16 + size, packets + 1
         self.assertGreater(packets, 50)
 
-        (bus,) = machine.axisctl("bus", "statistics", "can0").stdout.split("\n\n")
-        self.assertRegex(bus, r"can0: occupied \d")
-        self.assertTrue(re.search(r"5 +table", bus), bus)
+        classes, nodes = machine.axisctl("bus", "statistics", "can0").stdout.split("\n\n")
+        self.assertRegex(classes, r"can0: occupied \d")
+        self.assertRegex(classes, r"(?m)^parameters +[1-9]")  # each that was brought up was asked
+        self.assertTrue(re.search(r"5 +table", nodes), nodes)
         machine.sim.close()
         machine.lines.clear()
         machine.daemon.terminate()
