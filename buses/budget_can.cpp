@@ -181,7 +181,7 @@ StopBudget Analysis::stop(const AxisDemand& last, int axes) const {
   const auto by_sdo = sum_of(cut_after, sum_of(times(last.set.stop_transfers - 1, transfer(others)),
                                                sent(sdo_bytes, others, sdo_bytes)));
   const auto frame = by_pdo(last) ? sent(command_bytes, others, command_bytes) : by_sdo;
-  stop.last_frame = sum_of(host_allowance, frame);
+  stop.last_frame = sum_of(demand_.network.budget.host_allowance, frame);
   stop.standstill = sum_of(sum_of(stop.last_frame, sum_of(cut_after, acknowledged)),
                            sum_of(refresh(last, last.poll_moving, 0), reading(last)));
   return stop;

@@ -38,13 +38,22 @@ class Analysis {
  private:
   [[nodiscard]] int count() const { return static_cast<int>(demand_.axes.size()); }
   [[nodiscard]] Duration wire(std::size_t characters) const { return wire_time(demand_.line, characters); }
+  /// Of an axis or a device.
+  [[nodiscard]] Duration turnaround(const auto& node) const {
+    return node.turnaround_max.value_or(demand_.line.turnaround_max);
+  }
   /// From the first byte of the request to the last of a reply that comes as late as it may.
-  [[nodiscard]] Duration answered(ExchangeSize one) const {
-    return wire(one.request) + demand_.line.turnaround_max + wire(one.reply);
+  [[nodiscard]] Duration answered(ExchangeSize one, Duration turnaround_max) const {
+    return wire(one.request) + turnaround_max + wire(one.reply);
+  }
+  [[nodiscard]] Duration answered(ExchangeSize one, const AxisDemand& axis) const {
+    return answered(one, turnaround(axis));
   }
   /// What an exchange costs those behind it.
-  [[nodiscard]] Duration cost(ExchangeSize one) const { return silence(demand_.line) + answered(one); }
-  [[nodiscard]] Duration cost(std::span<const ExchangeSize> all) const;
+  [[nodiscard]] Duration cost(ExchangeSize one, const AxisDemand& axis) const {
+    return silence(demand_.line) + answered(one, axis);
+  }
+  [[nodiscard]] Duration cost(std::span<const ExchangeSize> all, const AxisDemand& axis) const;
   /// The sum over all axes but one, the cheapest, of the `among` dearest.
   [[nodiscard]] Duration dearest(std::size_t among,
                                  const std::function<Duration(const AxisDemand&)>& of) const;
@@ -56,23 +65,30 @@ class Analysis {
   [[nodiscard]] double utilisation(int moving, bool slow) const;
 
   const LineDemand& demand_;
+  Duration slowest_;      ///< turnaround_max of the node that has the longest
   Duration in_flight_{};  ///< rest of what was bound just before, if it is answered
   Duration late_{};       ///< what nodes that stay silent cost more than ones that answer late
   std::int64_t longest_chain_ = 0;
 };
 
-Analysis::Analysis(const LineDemand& demand) : demand_(demand), late_(demand.silent_nodes * reply_margin) {
-  const auto also = [this](ExchangeSize one) { in_flight_ = std::max(in_flight_, answered(one)); };
+Analysis::Analysis(const LineDemand& demand)
+    : demand_(demand), slowest_(demand.line.turnaround_max), late_(demand.silent_nodes * reply_margin) {
+  const auto also = [this](ExchangeSize one, const auto& node) {
+    slowest_ = std::max(slowest_, turnaround(node));
+    in_flight_ = std::max(in_flight_, answered(one, turnaround(node)));
+  };
   for (const auto& axis : demand.axes) {
-    for (const auto one : {axis.set.state, axis.set.continuity, axis.set.stop, axis.set.longest}) also(one);
+    for (const auto one : {axis.set.state, axis.set.continuity, axis.set.stop, axis.set.longest})
+      also(one, axis);
     longest_chain_ = std::max(longest_chain_, std::ssize(axis.set.start));
   }
-  for (const auto& device : demand.devices) std::ranges::for_each(device.blocks, also);
+  for (const auto& device : demand.devices)
+    for (const auto one : device.blocks) also(one, device);
 }
 
-Duration Analysis::cost(std::span<const ExchangeSize> all) const {
+Duration Analysis::cost(std::span<const ExchangeSize> all, const AxisDemand& axis) const {
   Duration sum{};
-  for (const auto one : all) sum += cost(one);
+  for (const auto one : all) sum += cost(one, axis);
   return sum;
 }
 
@@ -97,9 +113,9 @@ Duration Analysis::reservations(std::int64_t overtaking) const {
 Duration Analysis::wait_moving(int moving, int starting) const {
   const auto others = static_cast<std::size_t>(std::max(0, moving - 1));
   const auto chains = std::min(others, static_cast<std::size_t>(starting));
-  const auto poll = [this](const AxisDemand& axis) { return cost(axis.set.state); };
+  const auto poll = [this](const AxisDemand& axis) { return cost(axis.set.state, axis); };
   const auto chain = [this](const AxisDemand& axis) {
-    return std::max(cost(axis.set.start), cost(axis.set.state));
+    return std::max(cost(axis.set.start, axis), cost(axis.set.state, axis));
   };
   const auto overtaking =
       static_cast<std::int64_t>(others - chains) + static_cast<std::int64_t>(chains) * longest_chain_ + 1;
@@ -112,11 +128,11 @@ Duration Analysis::wait_moving(int moving, int starting) const {
 Duration Analysis::wait_idle(int moving) const {
   const auto idle = std::max(1, count() - moving);
   const auto polled = dearest(static_cast<std::size_t>(moving),
-                              [this](const AxisDemand& axis) { return cost(axis.set.state); });
+                              [this](const AxisDemand& axis) { return cost(axis.set.state, axis); });
   const auto of_class = dearest(static_cast<std::size_t>(idle - 1),
-                                [this](const AxisDemand& axis) { return cost(axis.set.longest); });
+                                [this](const AxisDemand& axis) { return cost(axis.set.longest, axis); });
   const auto chains = dearest(static_cast<std::size_t>(moving),
-                              [this](const AxisDemand& axis) { return cost(axis.set.start); });
+                              [this](const AxisDemand& axis) { return cost(axis.set.start, axis); });
   const auto always = in_flight_ + 2 * late_ + of_class + chains + silence(demand_.line);
   auto fastest = Duration::max();
   for (const auto& axis : demand_.axes) fastest = std::min(fastest, axis.poll_fastest);
@@ -137,34 +153,33 @@ Duration Analysis::wait_idle(int moving) const {
 
 /// One reading may be preceded by the canary; the next one is asked for a period after the last, or at once.
 Duration Analysis::refresh_moving(const AxisDemand& axis, Duration wait) const {
-  return std::max(axis.poll_moving, answered(axis.set.state)) + wait + answered(axis.set.continuity) + wait;
+  return std::max(axis.poll_moving, answered(axis.set.state, axis)) + wait +
+         answered(axis.set.continuity, axis) + wait;
 }
 
 Duration Analysis::refresh_idle(const AxisDemand& axis, Duration wait) const {
-  auto busy = answered(axis.set.state);
-  for (const auto one : drift_of(axis)) busy += wait + answered(one);
-  return std::max(axis.poll_idle, busy) + wait + answered(axis.set.continuity) + wait;
+  auto busy = answered(axis.set.state, axis);
+  for (const auto one : drift_of(axis)) busy += wait + answered(one, axis);
+  return std::max(axis.poll_idle, busy) + wait + answered(axis.set.continuity, axis) + wait;
 }
 
 double Analysis::utilisation(int moving, bool slow) const {
   // Before a reply a node is silent for as long as the master before a request.
-  const auto turnaround = slow ? demand_.line.turnaround_max : silence(demand_.line);
-  const auto busy = [&](ExchangeSize one) {
-    return std::chrono::duration<double>(silence(demand_.line) + wire(one.request) + turnaround +
-                                         wire(one.reply))
-        .count();
+  const auto busy = [&](ExchangeSize one, const auto& node) {
+    const auto wait = slow ? turnaround(node) : silence(demand_.line);
+    return std::chrono::duration<double>(silence(demand_.line) + answered(one, wait)).count();
   };
   double sum = 0;
   int left = moving;
   for (const auto& axis : demand_.axes) {
     const bool moves = left-- > 0;
-    sum += busy(axis.set.state) * rate(moves ? axis.poll_moving : axis.poll_idle);
-    sum += busy(axis.set.continuity) * rate(axis.continuity_period);
+    sum += busy(axis.set.state, axis) * rate(moves ? axis.poll_moving : axis.poll_idle);
+    sum += busy(axis.set.continuity, axis) * rate(axis.continuity_period);
     if (moves) continue;
-    for (const auto one : drift_of(axis)) sum += busy(one) * rate(axis.drift_check);
+    for (const auto one : drift_of(axis)) sum += busy(one, axis) * rate(axis.drift_check);
   }
   for (const auto& device : demand_.devices)
-    for (const auto one : device.blocks) sum += busy(one) * rate(device.poll);
+    for (const auto one : device.blocks) sum += busy(one, device) * rate(device.poll);
   return sum;
 }
 
@@ -187,20 +202,21 @@ LoadBudget Analysis::load(int moving) const {
 
 /// A stop overtakes all but what is under way, which it cuts at turnaround_max; another stop it does not cut.
 StopBudget Analysis::stop(const AxisDemand& last, int axes) const {
-  const auto stops = [this](const AxisDemand& axis) { return cost(axis.set.stop); };
+  const auto stops = [this](const AxisDemand& axis) { return cost(axis.set.stop, axis); };
   const auto others = static_cast<std::size_t>(axes - 1);
   StopBudget stop{.axes = axes};
   // Stops do not cut each other: the one of a silent node, which is owed it, may be under way.
-  stop.last_frame = host_allowance + in_flight_ + dearest(others, stops) +
+  stop.last_frame = demand_.line.budget.host_allowance + in_flight_ + dearest(others, stops) +
                     (count() > 1 ? late_ : Duration{}) + silence(demand_.line) + wire(last.set.stop.request);
-  const auto acknowledged = demand_.line.turnaround_max + wire(last.set.stop.reply);
+  const auto acknowledged = turnaround(last) + wire(last.set.stop.reply);
   // The first reading after the shaft rests; it may be asked for just before. Whatever is not stopped may
   // start, and a silent node is told again, twice. What waits for a stopping axis anyway is hastened.
   const auto hastened = dearest(static_cast<std::size_t>(axes),
-                                [this](const AxisDemand& axis) { return cost(axis.set.longest); });
+                                [this](const AxisDemand& axis) { return cost(axis.set.longest, axis); });
   stop.standstill =
       stop.last_frame + acknowledged + refresh_moving(last, wait_moving(count(), count() - axes)) +
-      2 * demand_.silent_nodes * (cost(last.set.stop) + reply_margin) + hastened + answered(last.set.state);
+      2 * demand_.silent_nodes * (silence(demand_.line) + answered(last.set.stop, slowest_) + reply_margin) +
+      hastened + answered(last.set.state, last);
   return stop;
 }
 
@@ -214,7 +230,7 @@ AxisBudget Analysis::axis(const AxisDemand& axis) const {
 }
 
 std::string Analysis::note_on_transact() const {
-  const auto more = answered(longest_of_all) - in_flight_;
+  const auto more = answered(longest_of_all, slowest_) - in_flight_;
   return fmt::format(
       "while somebody reads 125 registers at once over the API, a stop may take {:.0f} ms more",
       std::chrono::duration<double, std::milli>(more).count());

@@ -1,6 +1,7 @@
 // The budget of an RS-485 line. Pure.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "buses/budget.hpp"
@@ -12,17 +13,19 @@ namespace axisd::modbus_rtu {
 struct AxisDemand {
   std::string name;
   RtuTransactionSet set{};
-  Duration poll_moving{}, poll_idle{};  ///< > 0
-  Duration poll_fastest{};              ///< where the end of a motion is awaited; > 0
-  Duration continuity_period{};         ///< of the canary; > 0
-  Duration drift_check{};               ///< > 0
-  bool segments = false;                ///< the configuration owns its segment table, too
+  Duration poll_moving{}, poll_idle{};       ///< > 0
+  Duration poll_fastest{};                   ///< where the end of a motion is awaited; > 0
+  Duration continuity_period{};              ///< of the canary; > 0
+  Duration drift_check{};                    ///< > 0
+  bool segments = false;                     ///< the configuration owns its segment table, too
+  std::optional<Duration> turnaround_max{};  ///< of this drive; nothing: the line's
 };
 
 /// A node that is not an axis: read block by block, in class `parameters`.
 struct DeviceDemand {
   std::vector<ExchangeSize> blocks;
   Duration poll{};
+  std::optional<Duration> turnaround_max{};  ///< of this node; nothing: the line's
 };
 
 /// What is asked of one line.

@@ -27,11 +27,13 @@ class Bus {
   /// Fires when the port opens or is lost.
   [[nodiscard]] virtual Signal& port_changed() = 0;
 
-  /// Motion frames whose gate was raised end, whether they wait or are armed. Called for each stop before its
-  /// frame is queued.
-  virtual void purge_superseded() = 0;
+  /// `gate` of `node` was raised: the motion frames that it guarded end, whether they wait or are armed.
+  /// Called for each stop before its frame is queued; what waits for others costs it no time.
+  virtual void purge_superseded(std::uint8_t node, const AxisGate& gate) = 0;
   /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
   virtual void hasten(std::uint8_t node, TransactionClass to) = 0;
+  /// Requests to this node wait for their turn, because it does not answer.
+  [[nodiscard]] virtual bool holds_back(std::uint8_t /*node*/) const { return false; }
   /// A node of this bus is about to be energised: what would be noise to it ends as superseded, unless it has
   /// gone out.
   virtual void about_to_energise() = 0;

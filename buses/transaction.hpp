@@ -27,6 +27,9 @@ struct TransactionOptions {
   TransactionClass transaction_class = TransactionClass::parameters;
   TimePoint deadline = TimePoint::max();  ///< not sent after this
   MotionGuard guard{};                    ///< for motion frames
+  /// Of a stop that was sent in vain before: while its node does not answer anything, it is repeated as
+  /// seldom as the node is probed.
+  bool patient = false;
   /// Of this node in this exchange (saving to an EEPROM takes long); nothing: the bus's. A stop still cuts
   /// the wait after the bus's: its bound is worth more than a reply that may collide with it.
   std::optional<Duration> turnaround_max{};

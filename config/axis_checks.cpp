@@ -28,6 +28,7 @@ void AxisChecks::run() {
   complete_scale();
   check_policies();
   check_poll();
+  check_turnaround();
   check_drift_check();
   check_persist();
   if (axis_.scale.modulo && given("limits.position")) {
@@ -171,6 +172,12 @@ void AxisChecks::check_poll() {
       fmt::format("idle axes would be polled more often ({}) than moving ones ({})",
                   format_duration(axis_.poll_idle), format_duration(axis_.poll_moving)),
       "make poll.idle at least poll.moving");
+}
+
+void AxisChecks::check_turnaround() {
+  if (model_ == nullptr || model_->bus == BusKind::modbus_rtu || !given("turnaround_max")) return;
+  add("turnaround_max", fmt::format("model {} is not on RS-485", axis_.model),
+      "leave it out; the canopen bus has sdo_timeout");
 }
 
 void AxisChecks::check_time(std::string_view key, Duration value, int minimum_ms) {

@@ -43,6 +43,7 @@ class AxisChecks {
   void complete_scale();
   void check_policies();
   void check_poll();
+  void check_turnaround();
   void check_drift_check();
   void check_persist();
   void check_times();

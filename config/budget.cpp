@@ -25,11 +25,13 @@ modbus_rtu::LineDemand demand_of(const modbus_rtu::LineSettings& line, const Con
                              .poll_fastest = std::min(axis.poll_moving, fastest_poll),
                              .continuity_period = continuity_period,
                              .drift_check = axis.drift_check,
-                             .segments = axis.segments.has_value()});
+                             .segments = axis.segments.has_value(),
+                             .turnaround_max = axis.turnaround_max});
   for (const auto& device : configuration.devices) {
     if (device.bus != line.name) continue;
     auto& one = demand.devices.emplace_back();
     one.poll = device.poll;
+    one.turnaround_max = device.turnaround_max;
     for (const auto& block : blocks_of(device.values)) one.blocks.push_back(reading(block.count));
   }
   return demand;

@@ -76,11 +76,21 @@ void check_node(const DeviceSettings& device, Diagnostics& diagnostics, const Pl
                   fmt::format("write a value between 1 and {}", highest_node));
 }
 
+void check_turnaround(const DeviceSettings& device, Diagnostics& diagnostics, const Places& places) {
+  const auto path = fmt::format("devices.{}.", device.name);
+  if (device.kind == BusKind::modbus_rtu || !places.usable(path + "model") ||
+      !places.given(path + "turnaround_max"))
+    return;
+  diagnostics.add(places.mark(path + "turnaround_max"), "model canopen-generic is not on RS-485",
+                  "leave it out; the canopen bus has sdo_timeout");
+}
+
 }  // namespace
 
 void check_devices(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   for (const auto& device : configuration.devices) {
     check_node(device, diagnostics, places);
+    check_turnaround(device, diagnostics, places);
     if (!check_values(device, diagnostics, places)) continue;
     if (device.kind == BusKind::canopen) {
       check_objects(device, diagnostics, places);

@@ -109,6 +109,18 @@ constexpr KeySpec refresh_bound_key{
     .minimum = 1,
     .maximum = 60'000,
     .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.refresh_bound = v.duration; }};
+template <auto Bus>
+constexpr KeySpec host_allowance_key{
+    .key = "host_allowance",
+    .kind = Kind::duration,
+    .description =
+        "What this computer may take of a stop's time, from its request to the wire; part of every stop "
+        "bound. 1 ms for a real-time kernel that has nothing else to do.",
+    .example = "1 ms",
+    .default_value = "5 ms",
+    .minimum = 1,
+    .maximum = 1000,
+    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.host_allowance = v.duration; }};
 
 constexpr std::string_view formats[] = {"8N1", "8N2", "8E1", "8O1"};
 constexpr modbus_rtu::Format format_values[] = {{modbus_rtu::Parity::none, 1},
@@ -153,6 +165,7 @@ constexpr KeySpec modbus_rtu_keys[] = {
     budget_key<&Target::line>,
     stop_bound_key<&Target::line>,
     refresh_bound_key<&Target::line>,
+    host_allowance_key<&Target::line>,
 };
 
 constexpr KeySpec canopen_keys[] = {
@@ -192,6 +205,7 @@ constexpr KeySpec canopen_keys[] = {
     budget_key<&Target::network>,
     stop_bound_key<&Target::network>,
     refresh_bound_key<&Target::network>,
+    host_allowance_key<&Target::network>,
 };
 
 constexpr KeySpec bus_keys[] = {

@@ -185,6 +185,9 @@ class Drive {
 
   /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop does not) in class `stop`.
   virtual Task<Result<void>> stop(StopKind kind) = 0;
+  /// Repeats a stop that is owed to a node which did not answer the last one: where waiting for it costs
+  /// others time, not more often than silent nodes are probed, and at once when anything of it is heard.
+  virtual Task<Result<void>> repeat_stop() { return stop(StopKind::stop); }
 
   /// When the last stop frame that is known to have gone out had done so: its last byte or bit.
   [[nodiscard]] virtual std::optional<TimePoint> stop_sent_at() const { return std::nullopt; }

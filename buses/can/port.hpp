@@ -141,7 +141,7 @@ class Port {
   /// Queues `frame`, and hands it over at once if nothing is before it.
   virtual void send(const Frame& frame, const SendOptions& options, Completion completion) = 0;
   /// Ends queued motion frames whose gate was raised. Called for each stop before its frame is queued.
-  virtual void purge_superseded() = 0;
+  virtual void purge_superseded(const AxisGate& gate) = 0;
   /// Ends everything as when the port goes down, completed before this returns, and sends nothing any more.
   /// No handler is called after it. The destructor calls nothing at all: close first. A handler may
   /// call it, but not destroy the port.

@@ -31,8 +31,8 @@ void PortCore::send(const Frame& frame, const SendOptions& options, Completion c
   settle_later();
 }
 
-void PortCore::purge_superseded() {
-  queue_.purge_superseded(clock_->now());
+void PortCore::purge_superseded(const AxisGate& gate) {
+  queue_.purge_superseded(gate, clock_->now());
   settle_later();
 }
 

@@ -17,7 +17,7 @@ class PortCore : public Port {
 
   void start(PortHandlers handlers) final;
   void send(const Frame& frame, const SendOptions& options, Completion completion) final;
-  void purge_superseded() final;
+  void purge_superseded(const AxisGate& gate) final;
   void close() final;
   [[nodiscard]] const PortState& state() const final { return tracker_.state(); }
   [[nodiscard]] const PortCounters& counters() const final { return counters_; }

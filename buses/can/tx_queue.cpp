@@ -1,6 +1,7 @@
 #include "buses/can/tx_queue.hpp"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 namespace axisd::can {
@@ -34,6 +35,22 @@ SendStatus allowed(const SendOptions& options, TimePoint now) {
   return status;
 }
 
+/// After this nobody wants it sent.
+TimePoint end_of(const SendOptions& options) {
+  auto last = std::min(options.deadline, options.guard.not_after);
+  for (const auto& guard : options.more_guards) last = std::min(last, guard.not_after);
+  return last;
+}
+
+/// Each once.
+std::set<const AxisGate*> gates_of(const SendOptions& options) {
+  std::set<const AxisGate*> gates;
+  if (options.guard.gate) gates.insert(options.guard.gate.get());
+  for (const auto& guard : options.more_guards)
+    if (guard.gate) gates.insert(guard.gate.get());
+  return gates;
+}
+
 }  // namespace
 
 /// `sent`: it may go.
@@ -53,8 +70,25 @@ void TxQueue::push(const Frame& frame, const SendOptions& options, Completion co
   if (queued() >= (stop ? 2 * limit_ : limit_))
     return end(std::move(completion), {.status = SendStatus::queue_full});
   if (stop) retry_at_ = TimePoint{};
-  lanes_.at(static_cast<std::size_t>(options.transaction_class))
-      .push_back({.frame = frame, .options = options, .completion = std::move(completion)});
+  auto& lane = lanes_.at(static_cast<std::size_t>(options.transaction_class));
+  const auto place =
+      lane.insert(lane.end(), {.frame = frame, .options = options, .completion = std::move(completion)});
+  for (const auto* gate : gates_of(options)) guarded_[gate].push_back(place);
+  if (const auto last = end_of(options); last != TimePoint::max()) ends_.emplace(last, place);
+}
+
+TxQueue::Waiting TxQueue::take(Place place) {
+  for (const auto* gate : gates_of(place->options)) {
+    const auto guarded = guarded_.find(gate);
+    std::erase(guarded->second, place);
+    if (guarded->second.empty()) guarded_.erase(guarded);
+  }
+  const auto [first, last] = ends_.equal_range(end_of(place->options));
+  const auto ending = std::find_if(first, last, [&](const auto& one) { return one.second == place; });
+  if (ending != last) ends_.erase(ending);
+  auto taken = std::move(*place);
+  lanes_.at(static_cast<std::size_t>(taken.options.transaction_class)).erase(place);
+  return taken;
 }
 
 TxQueue::Lane* TxQueue::first_lane() {
@@ -67,19 +101,17 @@ const Frame* TxQueue::next(TimePoint now) {
   while (auto* lane = first_lane()) {
     const auto verdict = judge(lane->front(), now);
     if (verdict == SendStatus::sent) return &lane->front().frame;
-    end(std::move(lane->front().completion), {.status = verdict});
-    lane->pop_front();
+    end(take(lane->begin()).completion, {.status = verdict});
   }
   forget_refusal();
   return nullptr;
 }
 
 void TxQueue::handed_over(TimePoint now) {
-  auto* lane = first_lane();
+  auto waiting = take(first_lane()->begin());
   if (unconfirmed_.empty()) progress_ = now;
   unconfirmed_.push_back(
-      {.frame = lane->front().frame, .completion = std::move(lane->front().completion), .handed_over = now});
-  lane->pop_front();
+      {.frame = waiting.frame, .completion = std::move(waiting.completion), .handed_over = now});
   refused_since_.reset();
   retry_at_ = TimePoint{};
   back_off_ = Duration{};
@@ -127,32 +159,28 @@ void TxQueue::forget_refusal() {
   if (queued() == 0) refused_since_.reset();
 }
 
-template <class Predicate>
-void TxQueue::end_where(Predicate status_of_waiting) {
-  for (auto& lane : lanes_) {
-    std::erase_if(lane, [&](Waiting& waiting) {
-      const auto status = status_of_waiting(waiting);
-      if (status == SendStatus::sent) return false;
-      end(std::move(waiting.completion), {.status = status});
-      return true;
-    });
-  }
+void TxQueue::reap(TimePoint now) {
+  looked_at_ = now;
+  while (!ends_.empty() && ends_.begin()->first < now)
+    end(take(ends_.begin()->second).completion, {.status = SendStatus::expired});
   forget_refusal();
 }
 
-void TxQueue::reap(TimePoint now) {
-  looked_at_ = now;
-  end_where([&](const Waiting& waiting) { return judge(waiting, now); });
-}
-
-void TxQueue::purge_superseded(TimePoint now) {
-  end_where([&](const Waiting& waiting) { return allowed(waiting.options, now); });
+void TxQueue::purge_superseded(const AxisGate& gate, TimePoint now) {
+  const auto guarded = guarded_.find(&gate);
+  if (guarded == guarded_.end()) return;
+  for (const auto place : std::vector(guarded->second)) {
+    const auto status = allowed(place->options, now);
+    if (status != SendStatus::sent) end(take(place).completion, {.status = status});
+  }
+  forget_refusal();
 }
 
 void TxQueue::end_all() {
   for (auto& each : std::exchange(unconfirmed_, {}))
     end(std::move(each.completion), {.status = SendStatus::unknown, .handed_over = each.handed_over});
-  end_where([](const Waiting&) { return SendStatus::port_down; });
+  while (auto* lane = first_lane()) end(take(lane->begin()).completion, {.status = SendStatus::port_down});
+  forget_refusal();
   retry_at_ = TimePoint{};
   back_off_ = Duration{};
 }
@@ -171,14 +199,8 @@ TimePoint TxQueue::next_event() const {
   if (awaits_drain()) at = std::min(at, looked_at_ + drain_interval);
   const bool waits = queued() > 0;
   if (waits && unconfirmed_.size() < window_ && retry_at_ > TimePoint{}) at = std::min(at, retry_at_);
-  for (const auto& lane : lanes_) {
-    for (const auto& waiting : lane) {
-      auto end = std::min(waiting.options.deadline, waiting.options.guard.not_after);
-      for (const auto& guard : waiting.options.more_guards) end = std::min(end, guard.not_after);
-      if (end != TimePoint::max())
-        at = std::min(at, end + Duration(1));  // the deadline itself is still in time
-    }
-  }
+  // The deadline itself is still in time.
+  if (!ends_.empty()) at = std::min(at, ends_.begin()->first + Duration(1));
   return at;
 }
 

@@ -3,7 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <list>
+#include <map>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "buses/can/port.hpp"
@@ -46,8 +49,8 @@ class TxQueue {
 
   /// Ends queued frames whose deadline or validity has passed.
   void reap(TimePoint now);
-  /// Ends queued frames whose guard forbids sending.
-  void purge_superseded(TimePoint now);
+  /// Ends the queued frames that `gate` guards and that may not be sent any more. Looks at no others.
+  void purge_superseded(const AxisGate& gate, TimePoint now);
   /// The port cannot send any more: queued frames end as `port_down`, unconfirmed ones as `unknown`.
   void end_all();
 
@@ -71,21 +74,24 @@ class TxQueue {
     TimePoint handed_over;
     bool echoed = false;
   };
-  using Lane = std::deque<Waiting>;
+  using Lane = std::list<Waiting>;
+  using Place = Lane::iterator;
 
   static SendStatus judge(const Waiting& waiting, TimePoint now);
   void end(Completion completion, SendResult result);
   void confirm(const std::deque<Unconfirmed>::iterator& which, TimePoint at, TimePoint now);
   Lane* first_lane();
+  Waiting take(Place place);
   void forget_refusal();
   [[nodiscard]] TimePoint stalls_at() const;
-  template <class Predicate>
-  void end_where(Predicate status_of);
 
   std::size_t window_;
   std::size_t limit_;
   Duration stall_timeout_;
   std::array<Lane, transaction_class_count> lanes_;
+  // Where everything is that one gate guards, and what ends by itself.
+  std::unordered_map<const AxisGate*, std::vector<Place>> guarded_;
+  std::multimap<TimePoint, Place> ends_;
   std::deque<Unconfirmed> unconfirmed_;  ///< in the order of handing over
   std::vector<Ended> ended_;
   TimePoint progress_{};                    ///< last confirmation, or the hand-over that began the waiting

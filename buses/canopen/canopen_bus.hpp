@@ -100,7 +100,9 @@ class CanopenBus final : public Bus {
   [[nodiscard]] bool simulated() const override { return settings_.simulated(); }
   [[nodiscard]] const PortStatus& port() const override { return port_; }
   [[nodiscard]] Signal& port_changed() override { return port_changed_; }
-  void purge_superseded() override { master_.purge_superseded(); }
+  void purge_superseded(std::uint8_t node, const AxisGate& gate) override {
+    master_.purge_superseded(node, gate);
+  }
   /// Each node has a queue of its own, in which nothing waits behind another's requests.
   void hasten(std::uint8_t /*node*/, TransactionClass /*to*/) override {}
   void about_to_energise() override {}

@@ -75,7 +75,7 @@ class CommonStart {
     if (!error_ || (unknown && error_->outcome != Outcome::unknown)) error_ = std::move(error);
     // What is still queued for the other members is not sent any more.
     together_->raise();
-    bus_->purge_superseded();
+    for (const auto& member : members_) bus_->purge_superseded(member.node, *together_);
   }
 
   Task<> arm(std::size_t index) {

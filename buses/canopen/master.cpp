@@ -93,9 +93,9 @@ Result<void> Master::subscribe_pdo(std::uint32_t cob_id, PdoHandler handler) {
   return {};
 }
 
-void Master::purge_superseded() {
-  port_->purge_superseded();
-  sdo_.purge_superseded();
+void Master::purge_superseded(std::uint8_t node, const AxisGate& gate) {
+  port_->purge_superseded(gate);
+  sdo_.purge_superseded(node);
 }
 
 void Master::on_frame(const can::ReceivedFrame& received) {

@@ -70,7 +70,7 @@ class Master {
   Result<void> subscribe_pdo(std::uint32_t cob_id, PdoHandler handler);
 
   /// For each stop, before its frame is queued: nothing that its axis's gate forbids waits any longer.
-  void purge_superseded();
+  void purge_superseded(std::uint8_t node, const AxisGate& gate);
 
   [[nodiscard]] RemoteNode node(std::uint8_t id) { return {sdo_, id}; }
   [[nodiscard]] SdoClient& sdo() { return sdo_; }

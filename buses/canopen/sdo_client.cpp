@@ -253,8 +253,8 @@ void SdoClient::on_port(const can::PortState& state) {
   }
 }
 
-void SdoClient::purge_superseded() {
-  for (auto& [id, each] : nodes_) pump(*each);
+void SdoClient::purge_superseded(std::uint8_t node) {
+  if (const auto found = nodes_.find(node); found != nodes_.end()) pump(*found->second);
 }
 
 void SdoClient::close() {

@@ -82,7 +82,7 @@ class SdoClient {
   /// After the port's state changed: without a link everything ends.
   void on_port(const can::PortState& state);
   /// Ends queued motion whose gate was raised. Called for each stop.
-  void purge_superseded();
+  void purge_superseded(std::uint8_t node);
   /// Ends everything; nothing is begun any more.
   void close();
 

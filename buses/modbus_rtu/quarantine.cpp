@@ -21,9 +21,16 @@ void Quarantine::silent(std::uint8_t node, TimePoint now, Duration cost, bool st
     ++known.entered;
   }
   known.level = std::min(known.level + 1, most_doublings);
-  const auto hold = std::min(quarantine_first_hold * (1 << (known.level - 1)), cost * quarantine_share);
-  // A stop that came before its turn is made up for by the next probe.
-  known.next = std::max(known.next, now) + hold;
+  const auto hold = std::min(quarantine_first_hold * (1 << (known.level - 1)), longest_hold(cost));
+  // A stop that came before its turn is made up for by the next probe; however many came, only once: a node
+  // that is back is not to wait for what somebody did while it was gone.
+  known.next = std::min(std::max(known.next, now) + hold, now + 2 * hold);
+}
+
+Duration Quarantine::longest_hold(Duration cost) const {
+  const auto silent = std::ranges::count_if(nodes_, [](const auto& one) { return one.second.quarantined(); });
+  return std::min(cost * quarantine_share,
+                  std::max(quarantine_longest_hold, cost * quarantine_common_share * silent));
 }
 
 void Quarantine::answered(std::uint8_t node) {

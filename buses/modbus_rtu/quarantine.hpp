@@ -12,13 +12,18 @@ namespace axisd::modbus_rtu {
 inline constexpr int quarantine_after = 3;
 /// Of the time of its line, a node in quarantine may cost the others one part in so many (2 %).
 inline constexpr int quarantine_share = 50;
+/// Longest wait between two probes, where that costs the line no more than one part in so many (4 %) for all
+/// such nodes together: a drive that is switched on again is to be found soon also where a wait for a silent
+/// one takes long.
+inline constexpr Duration quarantine_longest_hold = std::chrono::seconds(2);
+inline constexpr int quarantine_common_share = 25;
 /// First wait between two probes; it doubles up to what the share demands.
 inline constexpr Duration quarantine_first_hold = std::chrono::milliseconds(100);
 /// Replies in a row that end the suspicion: until then one more request in vain is enough.
 inline constexpr int quarantine_trust_after = 4;
 
 /// Holds requests to nodes that do not answer back, so that waiting for them costs their neighbours a bounded
-/// share of the line. Stops are never held (M15): an axis repeats them a few times only. Pure.
+/// share of the line. Stops are never held (M15), but for the repetitions of one that is owed. Pure.
 class Quarantine {
  public:
   struct Node {
@@ -33,17 +38,20 @@ class Quarantine {
     [[nodiscard]] bool quarantined() const { return level > 0 && silent > 0; }
   };
 
-  /// A request ended in vain at `now`, after the line was kept from others for `cost`.
+  /// A request ended in vain at `now`, after the line was kept from others for `cost`. `stop`: one that does
+  /// not wait for its turn.
   void silent(std::uint8_t node, TimePoint now, Duration cost, bool stop);
   void answered(std::uint8_t node);
   /// The port was lost, or is there again: everybody is trusted once more.
   void forget();
-  /// No request but a stop before this.
+  /// No request but a new stop before this.
   [[nodiscard]] TimePoint ready_at(std::uint8_t node) const;
   /// By address; only those that were asked something.
   [[nodiscard]] const std::map<std::uint8_t, Node>& nodes() const { return nodes_; }
 
  private:
+  [[nodiscard]] Duration longest_hold(Duration cost) const;
+
   std::map<std::uint8_t, Node> nodes_;
 };
 

@@ -1,10 +1,6 @@
 #include "buses/modbus_rtu/rtu_bus.hpp"
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 namespace axisd::modbus_rtu {
@@ -13,41 +9,9 @@ namespace {
 
 /// So long after its time a reply may still come: gateways and drives that save to their EEPROM.
 constexpr auto latest_reply = std::chrono::seconds(5);
-/// Damaged replies in a row that are no accident any more.
-constexpr int garbled_often = 3;
 
 ExchangeResult not_sent(Verdict verdict, TimePoint now) {
   return {.status = ExchangeStatus::not_sent, .verdict = verdict, .request_begin = now, .request_end = now};
-}
-
-Error not_sent_error(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::expired:
-      return {.reason = Reason::expired,
-              .message = "not sent: its time had passed",
-              .remedy = "repeat the request"};
-    case Verdict::lease_lost:
-      return {.reason = Reason::lease_lost,
-              .message = "not sent: the lease is gone",
-              .remedy = "acquire it again"};
-    default:
-      return {.reason = Reason::superseded, .message = "not sent: a stop or a newer command took its place"};
-  }
-}
-
-Error garbled_error(int in_a_row) {
-  Error error{.reason = Reason::no_reply,
-              .message = "only damaged bytes came back",
-              .remedy = "check termination, shielding and that no address is used twice",
-              .outcome = Outcome::unknown};
-  if (in_a_row >= garbled_often) {
-    error.message =
-        fmt::format("only damaged bytes came back, {} times in a row (two nodes on one address?)", in_a_row);
-    error.remedy =
-        "switch off one node after the other to find a second one with this address; else check the "
-        "baud rate, termination and shielding";
-  }
-  return error;
 }
 
 }  // namespace
@@ -79,11 +43,6 @@ bool RtuBus::needs_resync(const Request& request) const {
   return request.function == Function::read_holding_registers && may_come_late(request.node, request.count);
 }
 
-int RtuBus::garbled(std::uint8_t node) const {
-  const auto found = garbled_.find(node);
-  return found == garbled_.end() ? 0 : found->second;
-}
-
 LineStatistics RtuBus::statistics() const {
   auto copy = statistics_;
   copy.waiting([this](TransactionClass transaction_class) { return queue_.size(transaction_class); });
@@ -97,7 +56,8 @@ std::size_t RtuBus::held_back() const {
 }
 
 Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOptions options) const {
-  const auto turnaround = options.turnaround_max.value_or(settings_.turnaround_max);
+  const auto usual = turnaround_max(request.node);
+  const auto turnaround = options.turnaround_max.value_or(usual);
   const auto reply = wire_time(options.serial.value_or(settings_.serial()), reply_size(request));
   const bool overrides = options.serial && options.serial != settings_.serial();
   if (overrides) options.guard = {.gate = override_gate_, .epoch = override_gate_->epoch()};
@@ -106,7 +66,7 @@ Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOp
           .guard = std::move(options.guard),
           .deadline = options.deadline,
           .reply_timeout = turnaround + reply + reply_margin,
-          .turnaround_max = std::min(turnaround, settings_.turnaround_max),
+          .turnaround_max = std::min(turnaround, usual),
           .serial = overrides ? options.serial : std::nullopt};
 }
 
@@ -124,6 +84,7 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
   auto transaction = std::make_unique<Transaction>();
   transaction->transaction_class = options.transaction_class;
   const auto transaction_class = options.transaction_class;
+  transaction->patient = options.patient;
   transaction->queued_at = clock_->now();
   transaction->exchange = exchange_for(std::move(request), *frame, std::move(options));
 
@@ -131,7 +92,7 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
   transaction->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
     promise.set(answer(ended, result));
   });
-  if (held_until(*transaction))
+  if (must_wait(*transaction))
     queue_.hold(std::move(transaction));
   else
     queue_.push(std::move(transaction));
@@ -140,11 +101,30 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
   co_return co_await promise.get();
 }
 
-void RtuBus::purge_superseded() { pump(); }
+void RtuBus::purge_superseded(std::uint8_t /*node*/, const AxisGate& gate) {
+  const auto now = clock_->now();
+  for (auto& transaction : queue_.take_forbidden(gate, now)) drop(std::move(transaction), now);
+  pump();
+}
 
 void RtuBus::about_to_energise() {
   override_gate_->raise();
-  pump();
+  purge_superseded({}, *override_gate_);
+}
+
+/// Ends what may not be sent any more.
+void RtuBus::drop(TransactionPtr transaction, TimePoint now) {
+  const auto verdict = may_send(transaction->exchange.guard, now);
+  end(std::move(transaction), not_sent(verdict == Verdict::send ? Verdict::expired : verdict, now));
+}
+
+void RtuBus::set_turnaround_max(std::uint8_t node, Duration turnaround) {
+  turnarounds_.insert_or_assign(node, turnaround);
+}
+
+Duration RtuBus::turnaround_max(std::uint8_t node) const {
+  const auto own = turnarounds_.find(node);
+  return own == turnarounds_.end() ? settings_.turnaround_max : own->second;
 }
 
 void RtuBus::hasten(std::uint8_t node, TransactionClass to) { queue_.hasten(node, to); }
@@ -161,12 +141,10 @@ void RtuBus::pump() {
     const bool dead = may_send(current_->exchange.guard, now) != Verdict::send;
     if ((overtaken || dead) && line_->revoke()) {
       auto revoked = std::exchange(current_, nullptr);
-      if (dead) {
-        const auto verdict = may_send(revoked->exchange.guard, now);
-        end(std::move(revoked), not_sent(verdict, now));
-      } else {
+      if (dead)
+        drop(std::move(revoked), now);
+      else
         queue_.put_back(std::move(revoked));
-      }
     } else if (top == TransactionClass::stop) {
       line_->cut_wait();
     }
@@ -176,7 +154,17 @@ void RtuBus::pump() {
 }
 
 void RtuBus::arm_next() {
-  while ((current_ = queue_.pop()) && held_until(*current_)) queue_.hold(std::move(current_));
+  const auto now = clock_->now();
+  while (auto next = queue_.pop()) {
+    if (may_send(next->exchange.guard, now) != Verdict::send) {
+      drop(std::move(next), now);
+    } else if (must_wait(*next)) {
+      queue_.hold(std::move(next));
+    } else {
+      current_ = std::move(next);
+      break;
+    }
+  }
   await_release();
   if (!current_) return;
   if (current_->transaction_class != TransactionClass::stop && needs_resync(current_->exchange.request))
@@ -184,20 +172,18 @@ void RtuBus::arm_next() {
   line_->arm(current_->exchange);
 }
 
-/// Until when the quarantine of its node forbids sending it; nothing: it may be sent.
-std::optional<TimePoint> RtuBus::held_until(const Transaction& transaction) const {
+/// The quarantine of its node forbids sending it now.
+bool RtuBus::must_wait(const Transaction& transaction) const {
   using enum TransactionClass;
-  if (transaction.transaction_class == stop || transaction.transaction_class == scan ||
-      transaction.exchange.serial)
-    return std::nullopt;
-  const auto ready = quarantine_.ready_at(transaction.exchange.request.node);
-  return ready > clock_->now() ? std::optional(ready) : std::nullopt;
+  const bool urgent = transaction.transaction_class == stop && !transaction.patient;
+  if (urgent || transaction.transaction_class == scan || transaction.exchange.serial) return false;
+  return holds_back(transaction.exchange.request.node);
 }
 
 /// What was put aside is looked at again as soon as the first of it may be sent.
 void RtuBus::await_release() {
   auto next = TimePoint::max();
-  for (const auto& held : queue_.held()) next = std::min(next, held_until(*held).value_or(clock_->now()));
+  for (const auto node : queue_.held_nodes()) next = std::min(next, quarantine_.ready_at(node));
   release_ = next == TimePoint::max() ? Clock::Timer{} : clock_->call_at(next, [this] {
     release_ready();
     pump();
@@ -206,7 +192,9 @@ void RtuBus::await_release() {
 
 /// What is still held must not take a place: the queue's reservation would be spent on it.
 void RtuBus::release_ready() {
-  queue_.release([this](const Transaction& held) { return !held_until(held); });
+  const auto now = clock_->now();
+  for (const auto node : queue_.held_nodes())
+    if (quarantine_.ready_at(node) <= now) queue_.release(node);
 }
 
 void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result) {
@@ -217,12 +205,12 @@ void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result
       if (ended.transaction_class == TransactionClass::scan || ended.exchange.serial) break;
       quarantine_.silent(node, clock_->now(),
                          result.reply_end - result.request_begin + silence(settings_.serial()),
-                         ended.transaction_class == TransactionClass::stop);
+                         ended.transaction_class == TransactionClass::stop && !ended.patient);
       break;
     case ExchangeStatus::replied:
     case ExchangeStatus::corrupt:  // somebody is there
       quarantine_.answered(node);
-      release_ready();
+      queue_.release(node);
       break;
     default:
       break;
@@ -235,6 +223,7 @@ void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result
 TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   auto resync = std::make_unique<Transaction>();
   resync->transaction_class = waiting->transaction_class;
+  resync->sequence = waiting->sequence;
   resync->reserved = waiting->reserved;
   resync->queued_at = waiting->queued_at;
   resync->exchange = waiting->exchange;
@@ -258,11 +247,8 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
 }
 
 void RtuBus::reap(TimePoint now) {
-  for (auto& transaction : queue_.take_unsendable(now)) {
-    const auto verdict = may_send(transaction->exchange.guard, now);
-    end(std::move(transaction), not_sent(verdict == Verdict::send ? Verdict::expired : verdict, now));
-  }
-  const auto next = queue_.next_deadline();
+  for (auto& transaction : queue_.take_expired(now)) drop(std::move(transaction), now);
+  const auto next = queue_.next_expiry();
   expiry_ = next == TimePoint::max()
                 ? Clock::Timer{}
                 : clock_->call_at(next + std::chrono::nanoseconds(1), [this] { pump(); });
@@ -300,18 +286,6 @@ void RtuBus::note_late_read(const Request& request, const ExchangeResult& result
   }
 }
 
-void RtuBus::note_garbled(const Request& request, const ExchangeResult& result) {
-  if (result.status == ExchangeStatus::corrupt) {
-    const int in_a_row = ++garbled_[request.node];
-    if (in_a_row != garbled_often) return;
-    auto error = garbled_error(in_a_row);
-    error.where = {.bus = settings_.name, .node = request.node};
-    spdlog::warn("{}", to_string(error));
-  } else if (result.status != ExchangeStatus::not_sent && result.status != ExchangeStatus::unsupported) {
-    garbled_.erase(request.node);
-  }
-}
-
 void RtuBus::close() {
   closed_ = true;
   on_port({.open = false, .error = Error{.reason = Reason::cancelled, .message = "the bus is being closed"}});
@@ -338,56 +312,6 @@ void RtuBus::end(TransactionPtr transaction, const ExchangeResult& result) {
   statistics_.ended(*transaction, result);
   if (observer_) observer_(*transaction, result);
   for (const auto& tell : transaction->on_end) tell(*transaction, result);
-}
-
-Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResult& result) const {
-  const auto& request = transaction.exchange.request;
-  if (result.status == ExchangeStatus::replied && result.reply.kind != ReplyKind::exception)
-    return Answer{.registers = result.reply.registers,
-                  .sent_at = result.request_begin,
-                  .request_end = result.request_end,
-                  .answered_at = result.reply_end};
-  auto error = error_of(transaction.exchange, result);
-  error.where.bus = settings_.name;
-  error.where.node = request.node;
-  error.where.object = request.address;
-  return fail(std::move(error));
-}
-
-Error RtuBus::error_of(const Exchange& exchange, const ExchangeResult& result) const {
-  switch (result.status) {
-    case ExchangeStatus::replied: {
-      Error error{
-          .reason = Reason::refused,
-          .message = fmt::format("the node answered with exception {:02}", result.reply.exception_code),
-          .outcome = Outcome::refused};
-      error.where.native_code = result.reply.exception_code;
-      return error;
-    }
-    case ExchangeStatus::timeout:
-    case ExchangeStatus::cut:
-      return {.reason = Reason::no_reply,
-              .message = "no reply",
-              .remedy = "check power, wiring, address and baud rate of the node",
-              .outcome = Outcome::unknown};
-    case ExchangeStatus::corrupt:
-      return garbled_error(garbled(exchange.request.node));
-    case ExchangeStatus::unsupported:
-      return {.reason = Reason::not_supported,
-              .message = fmt::format("port {} cannot do {}", settings_.port,
-                                     to_string(exchange.serial.value_or(settings_.serial()))),
-              .remedy = "choose other settings, or another adapter"};
-    case ExchangeStatus::not_sent:
-      if (result.verdict != Verdict::send) return not_sent_error(result.verdict);
-      return port_.error.value_or(
-          Error{.reason = Reason::bus_down, .message = "the port was lost before it could be sent"});
-    case ExchangeStatus::io_error:
-      return {.reason = Reason::bus_down,
-              .message = fmt::format("port {}: {}", settings_.port, std::strerror(result.native_error)),
-              .remedy = "check the adapter; it is opened again by itself",
-              .outcome = Outcome::unknown};
-  }
-  return {.reason = Reason::internal, .message = "unhandled exchange status"};
 }
 
 }  // namespace axisd::modbus_rtu

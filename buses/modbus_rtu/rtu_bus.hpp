@@ -45,12 +45,19 @@ class RtuBus final : public Bus {
   /// port cannot do options.serial: not sent).
   Task<Result<Answer>> transact(Request request, TransactionOptions options);
 
-  void purge_superseded() override;
+  void purge_superseded(std::uint8_t node, const AxisGate& gate) override;
   /// Exchanges with serial settings of their own end.
   void about_to_energise() override;
   void hasten(std::uint8_t node, TransactionClass to) override;
+  [[nodiscard]] bool holds_back(std::uint8_t node) const override {
+    return quarantine_.ready_at(node) > clock_->now();
+  }
   void close() override;
   [[nodiscard]] bool idle() const override { return current_ == nullptr && queue_.size() == 0; }
+
+  /// Of this node, in place of the line's.
+  void set_turnaround_max(std::uint8_t node, Duration turnaround);
+  [[nodiscard]] Duration turnaround_max(std::uint8_t node) const;
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
   [[nodiscard]] const std::string& name() const override { return settings_.name; }
@@ -75,7 +82,7 @@ class RtuBus final : public Bus {
   [[nodiscard]] bool may_come_late(std::uint8_t node, std::uint16_t count) const;
   void pump();
   void arm_next();
-  [[nodiscard]] std::optional<TimePoint> held_until(const Transaction& transaction) const;
+  [[nodiscard]] bool must_wait(const Transaction& transaction) const;
   void await_release();
   void release_ready();
   void note_silence(const Transaction& ended, const ExchangeResult& result);
@@ -83,6 +90,7 @@ class RtuBus final : public Bus {
   void on_result(const ExchangeResult& result);
   void on_port(const PortStatus& status);
   void reap(TimePoint now);
+  void drop(TransactionPtr transaction, TimePoint now);
   void end(TransactionPtr transaction, const ExchangeResult& result);
   void note_late_read(const Request& request, const ExchangeResult& result);
   void note_garbled(const Request& request, const ExchangeResult& result);
@@ -92,6 +100,7 @@ class RtuBus final : public Bus {
   Executor executor_;
   Clock* clock_;
   LineSettings settings_;
+  std::map<std::uint8_t, Duration> turnarounds_;  ///< of nodes that have their own
   std::unique_ptr<Line> line_;
   PortStatus port_;
   Signal port_changed_;

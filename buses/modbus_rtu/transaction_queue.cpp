@@ -17,40 +17,73 @@ bool sends_the_same(const Transaction& a, const Transaction& b) {
          a.exchange.turnaround_max == b.exchange.turnaround_max;
 }
 
-bool before(const TransactionPtr& a, const TransactionPtr& b) {
-  return std::pair(a->exchange.deadline, a->sequence) < std::pair(b->exchange.deadline, b->sequence);
+/// After this nobody wants it sent.
+TimePoint expiry_of(const Transaction& transaction) {
+  return std::min(transaction.exchange.deadline, transaction.exchange.guard.not_after);
 }
 
 }  // namespace
 
+bool TransactionQueue::Order::operator()(const TransactionPtr& a, const TransactionPtr& b) const {
+  return std::pair(a->exchange.deadline, a->sequence) < std::pair(b->exchange.deadline, b->sequence);
+}
+
 void TransactionQueue::push(TransactionPtr transaction) {
   transaction->sequence = ++last_sequence_;
   if (is_read(*transaction) && merge(*transaction)) return;
-  insert(std::move(transaction));
+  insert(std::move(transaction), false);
 }
 
-void TransactionQueue::put_back(TransactionPtr transaction) { insert(std::move(transaction)); }
+void TransactionQueue::put_back(TransactionPtr transaction) { insert(std::move(transaction), false); }
+
+void TransactionQueue::hold(TransactionPtr transaction) { insert(std::move(transaction), true); }
 
 bool TransactionQueue::merge(Transaction& transaction) {
-  for (auto& known_lane : lanes_) {
-    const auto found = std::ranges::find_if(
-        known_lane, [&](const auto& known) { return sends_the_same(*known, transaction); });
-    if (found == known_lane.end()) continue;
-    auto known = std::move(*found);
-    known_lane.erase(found);
-    std::ranges::move(transaction.on_end, std::back_inserter(known->on_end));
-    known->transaction_class = std::min(known->transaction_class, transaction.transaction_class);
-    // The later deadline: an answer that still serves one of them is worth sending for.
-    known->exchange.deadline = std::max(known->exchange.deadline, transaction.exchange.deadline);
-    insert(std::move(known));
-    return true;
-  }
-  return false;
+  const auto waiting = by_node_.find(transaction.exchange.request.node);
+  if (waiting == by_node_.end()) return false;
+  const auto found = std::ranges::find_if(waiting->second, [&](const auto& one) {
+    return !one.second.held && sends_the_same(*one.second.transaction, transaction);
+  });
+  if (found == waiting->second.end()) return false;
+  auto known = take(found->second.transaction);
+  std::ranges::move(transaction.on_end, std::back_inserter(known->on_end));
+  known->transaction_class = std::min(known->transaction_class, transaction.transaction_class);
+  // The later deadline: an answer that still serves one of them is worth sending for.
+  known->exchange.deadline = std::max(known->exchange.deadline, transaction.exchange.deadline);
+  insert(std::move(known), false);
+  return true;
 }
 
-void TransactionQueue::insert(TransactionPtr transaction) {
-  auto& target = lane(transaction->transaction_class);
-  target.insert(std::ranges::upper_bound(target, transaction, before), std::move(transaction));
+void TransactionQueue::insert(TransactionPtr transaction, bool held) {
+  auto* one = transaction.get();
+  if (one->sequence == 0) one->sequence = ++last_sequence_;
+  const auto node = one->exchange.request.node;
+  if (const auto* gate = one->exchange.guard.gate.get()) guarded_[gate].push_back(one);
+  if (const auto expiry = expiry_of(*one); expiry != TimePoint::max())
+    expiries_.emplace(std::pair(expiry, one->sequence), one);
+  Place place{.transaction = one, .held = held};
+  if (held)
+    held_[node].push_back(std::move(transaction));
+  else
+    place.in_lane = lane(one->transaction_class).insert(std::move(transaction)).first;
+  by_node_[node].emplace(one->sequence, place);
+}
+
+TransactionPtr TransactionQueue::take(Transaction* transaction) {
+  const auto node = transaction->exchange.request.node;
+  const auto place = by_node_.at(node).extract(transaction->sequence).mapped();
+  expiries_.erase({expiry_of(*transaction), transaction->sequence});
+  if (const auto guarded = guarded_.find(transaction->exchange.guard.gate.get()); guarded != guarded_.end()) {
+    std::erase(guarded->second, transaction);
+    if (guarded->second.empty()) guarded_.erase(guarded);
+  }
+  if (!place.held) return std::move(lane(transaction->transaction_class).extract(place.in_lane).value());
+  auto& aside = held_.at(node);
+  const auto found = std::ranges::find(aside, transaction, &TransactionPtr::get);
+  auto taken = std::move(*found);
+  aside.erase(found);
+  if (aside.empty()) held_.erase(node);
+  return taken;
 }
 
 TransactionPtr TransactionQueue::pop() {
@@ -65,8 +98,7 @@ TransactionPtr TransactionQueue::pop() {
     last_reserved_ = static_cast<std::size_t>(lower - lanes_.data());
     chosen = lower;
   }
-  auto transaction = std::move(chosen->front());
-  chosen->pop_front();
+  auto transaction = take(chosen->begin()->get());
   transaction->reserved = reserved;
   return transaction;
 }
@@ -83,65 +115,72 @@ TransactionQueue::Lane* TransactionQueue::next_below(std::size_t top) {
 }
 
 void TransactionQueue::hasten(std::uint8_t node, TransactionClass to) {
-  for (auto& held : held_)
-    if (held->exchange.request.node == node) held->transaction_class = std::min(held->transaction_class, to);
-  for (auto index = static_cast<std::size_t>(to) + 1; index < lanes_.size(); ++index) {
-    std::vector<TransactionPtr> hastened;
-    for (auto& transaction : lanes_.at(index))
-      if (transaction->exchange.request.node == node) hastened.push_back(std::move(transaction));
-    std::erase(lanes_.at(index), nullptr);
-    for (auto& transaction : hastened) {
-      transaction->transaction_class = to;
-      insert(std::move(transaction));
-    }
+  const auto waiting = by_node_.find(node);
+  if (waiting == by_node_.end()) return;
+  std::vector<Place> late;
+  for (const auto& [sequence, place] : waiting->second)
+    if (place.transaction->transaction_class > to) late.push_back(place);
+  for (const auto& place : late) {
+    auto hastened = take(place.transaction);
+    hastened->transaction_class = to;
+    insert(std::move(hastened), place.held);
   }
 }
 
 std::optional<TransactionClass> TransactionQueue::top_class() const {
   for (const auto& candidate : lanes_)
-    if (!candidate.empty()) return candidate.front()->transaction_class;
+    if (!candidate.empty()) return (*candidate.begin())->transaction_class;
   return std::nullopt;
 }
 
-std::vector<TransactionPtr> TransactionQueue::take_unsendable(TimePoint now) {
+std::vector<TransactionPtr> TransactionQueue::take_forbidden(const AxisGate& gate, TimePoint now) {
   std::vector<TransactionPtr> taken;
-  for (auto& candidate : lanes_) take_unsendable(candidate, now, taken);
-  take_unsendable(held_, now, taken);
+  const auto guarded = guarded_.find(&gate);
+  if (guarded == guarded_.end()) return taken;
+  for (auto* transaction : std::vector(guarded->second))
+    if (may_send(transaction->exchange.guard, now) != Verdict::send) taken.push_back(take(transaction));
   return taken;
 }
 
-void TransactionQueue::take_unsendable(auto& from, TimePoint now, std::vector<TransactionPtr>& into) {
-  for (auto& transaction : from)
-    if (transaction->exchange.deadline < now || may_send(transaction->exchange.guard, now) != Verdict::send)
-      into.push_back(std::move(transaction));
-  std::erase(from, nullptr);
+std::vector<TransactionPtr> TransactionQueue::take_expired(TimePoint now) {
+  std::vector<TransactionPtr> taken;
+  while (next_expiry() < now) taken.push_back(take(expiries_.begin()->second));
+  return taken;
 }
 
-void TransactionQueue::release(const std::function<bool(const Transaction&)>& ready) {
-  for (auto& transaction : held_)
-    if (ready(*transaction)) insert(std::move(transaction));
-  std::erase(held_, nullptr);
+void TransactionQueue::release(std::uint8_t node) {
+  const auto found = held_.find(node);
+  if (found == held_.end()) return;
+  std::vector<Transaction*> aside;
+  aside.reserve(found->second.size());
+  for (const auto& one : found->second) aside.push_back(one.get());
+  for (auto* transaction : aside) insert(take(transaction), false);
+}
+
+std::vector<std::uint8_t> TransactionQueue::held_nodes() const {
+  std::vector<std::uint8_t> nodes;
+  nodes.reserve(held_.size());
+  for (const auto& [node, aside] : held_) nodes.push_back(node);
+  return nodes;
 }
 
 std::vector<TransactionPtr> TransactionQueue::take_all() {
-  auto taken = std::exchange(held_, {});
-  for (auto& candidate : lanes_) {
-    std::ranges::move(candidate, std::back_inserter(taken));
-    candidate.clear();
-  }
+  std::vector<Transaction*> all;
+  for (const auto& [node, places] : by_node_)
+    for (const auto& [sequence, place] : places) all.push_back(place.transaction);
+  std::vector<TransactionPtr> taken;
+  taken.reserve(all.size());
+  for (auto* transaction : all) taken.push_back(take(transaction));
   return taken;
 }
 
-TimePoint TransactionQueue::next_deadline() const {
-  auto earliest = TimePoint::max();
-  for (const auto& candidate : lanes_)
-    if (!candidate.empty()) earliest = std::min(earliest, candidate.front()->exchange.deadline);
-  for (const auto& held : held_) earliest = std::min(earliest, held->exchange.deadline);
-  return earliest;
+TimePoint TransactionQueue::next_expiry() const {
+  return expiries_.empty() ? TimePoint::max() : expiries_.begin()->first.first;
 }
 
 std::size_t TransactionQueue::size() const {
-  std::size_t total = held_.size();
+  std::size_t total = 0;
+  for (const auto& [node, aside] : held_) total += aside.size();
   for (const auto& candidate : lanes_) total += candidate.size();
   return total;
 }

@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -18,8 +20,9 @@ namespace axisd::modbus_rtu {
 struct Transaction {
   Exchange exchange;
   TransactionClass transaction_class = TransactionClass::parameters;
-  std::uint64_t sequence = 0;  ///< order of arrival; set by the queue
+  std::uint64_t sequence = 0;  ///< order of arrival, unique; set by the queue
   TimePoint queued_at{};       ///< when it was asked for
+  bool patient = false;        ///< though a stop, it waits as others do for a node in quarantine
   bool reserved = false;       ///< it was given out by the reservation: only a stop may take its place
   /// Called exactly once each. Several: identical reads that were merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
@@ -29,6 +32,9 @@ using TransactionPtr = std::unique_ptr<Transaction>;
 /// Order of one bus: strict classes, earliest deadline within a class, then order of arrival. So that no
 /// class is ever starved, every `reservation`-th pop takes the head of a class *below* the one that would be
 /// next, the lower ones in turn (never instead of a stop). Pure: no I/O, no clock of its own.
+///
+/// What a stop asks for (take_forbidden, hasten, push, pop) looks only at what waits for its own axis; the
+/// rest of the queue costs it the logarithm of its length.
 class TransactionQueue {
  public:
   static constexpr int default_reservation = 8;
@@ -38,22 +44,25 @@ class TransactionQueue {
   void push(TransactionPtr transaction);
   /// Returns one that pop() gave out but that was not sent, to its old place.
   void put_back(TransactionPtr transaction);
-  /// The next one, or nullptr.
+  /// The next one, or nullptr. Whether it may be sent still is the caller's to ask.
   TransactionPtr pop();
-  /// Puts one aside: it is not given out before release().
-  void hold(TransactionPtr transaction) { held_.push_back(std::move(transaction)); }
-  /// Those that were put aside and are `ready` take their places again.
-  void release(const std::function<bool(const Transaction&)>& ready);
-  [[nodiscard]] const std::vector<TransactionPtr>& held() const { return held_; }
+  /// Puts one aside: it is not given out before release() of its node.
+  void hold(TransactionPtr transaction);
+  /// What was put aside for `node` takes its places again.
+  void release(std::uint8_t node);
+  /// Nodes for which something was put aside.
+  [[nodiscard]] std::vector<std::uint8_t> held_nodes() const;
   /// Class of the next one by strict order.
   [[nodiscard]] std::optional<TransactionClass> top_class() const;
   /// What waits for `node` in a lower class than `to` becomes that urgent.
   void hasten(std::uint8_t node, TransactionClass to);
-  /// Takes out all whose deadline has passed, or whose guard forbids sending.
-  std::vector<TransactionPtr> take_unsendable(TimePoint now);
+  /// Takes out all that `gate` forbids to send.
+  std::vector<TransactionPtr> take_forbidden(const AxisGate& gate, TimePoint now);
+  /// Takes out all whose deadline or validity has passed.
+  std::vector<TransactionPtr> take_expired(TimePoint now);
   std::vector<TransactionPtr> take_all();
-  /// Earliest deadline of all, or TimePoint::max().
-  [[nodiscard]] TimePoint next_deadline() const;
+  /// Earliest deadline, or end of validity, of all; or TimePoint::max().
+  [[nodiscard]] TimePoint next_expiry() const;
   [[nodiscard]] std::size_t size() const;
   /// Of one class.
   [[nodiscard]] std::size_t size(TransactionClass transaction_class) const {
@@ -61,17 +70,30 @@ class TransactionQueue {
   }
 
  private:
-  using Lane = std::deque<TransactionPtr>;
+  struct Order {
+    bool operator()(const TransactionPtr& a, const TransactionPtr& b) const;
+  };
+  using Lane = std::set<TransactionPtr, Order>;
+  struct Place {
+    Transaction* transaction = nullptr;
+    bool held = false;
+    Lane::iterator in_lane{};  ///< unless held
+  };
+
   Lane& lane(TransactionClass transaction_class) {
     return lanes_.at(static_cast<std::size_t>(transaction_class));
   }
+  void insert(TransactionPtr transaction, bool held);
+  TransactionPtr take(Transaction* transaction);
   bool merge(Transaction& transaction);
-  void insert(TransactionPtr transaction);
-  static void take_unsendable(auto& from, TimePoint now, std::vector<TransactionPtr>& into);
   Lane* next_below(std::size_t top);
 
   std::array<Lane, transaction_class_count> lanes_;
-  std::vector<TransactionPtr> held_;
+  std::map<std::uint8_t, std::vector<TransactionPtr>> held_;
+  // Where everything is that waits for one node, or that one gate guards, and what ends by itself.
+  std::map<std::uint8_t, std::map<std::uint64_t, Place>> by_node_;  ///< in the order of arrival
+  std::unordered_map<const AxisGate*, std::vector<Transaction*>> guarded_;
+  std::map<std::pair<TimePoint, std::uint64_t>, Transaction*> expiries_;
   int reservation_;
   int popped_since_reservation_ = 0;
   std::size_t last_reserved_ = 0;  ///< class that had the last reservation

@@ -92,6 +92,8 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                                    .canopen = find_network(settings.bus),
                                    .node = settings.node,
                                    .setup = std::move(*setup)});
+    if (auto* line = find_line(settings.bus); line != nullptr && settings.turnaround_max)
+      line->set_turnaround_max(settings.node, *settings.turnaround_max);
     axes_.push_back(std::make_unique<Axis>(AxisEnvironment{.executor = parts_.executor,
                                                            .clock = parts_.clock,
                                                            .bus = bus,
@@ -112,6 +114,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
     auto* line = find_line(settings.bus);
     auto* network = find_network(settings.bus);
     if (settings.kind == BusKind::modbus_rtu && line != nullptr) {
+      if (settings.turnaround_max) line->set_turnaround_max(settings.node, *settings.turnaround_max);
       devices_.push_back(std::make_unique<ModbusDevice>(parts_.executor, *parts_.clock, *line, settings));
     } else if (settings.kind == BusKind::canopen && network != nullptr) {
       devices_.push_back(std::make_unique<CanopenDevice>(parts_.executor, *parts_.clock, *network, settings));
@@ -122,6 +125,13 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
 }
 
 MachineCore::~MachineCore() = default;
+
+/// A stop of some axes is promised no later than one of all.
+void MachineCore::expect_stops() {
+  for (const auto& report : parts_.budgets)
+    for (const auto& axis : report.axes)
+      if (auto* found = find(axis.predicted.axis)) found->expect_stop_within(axis.predicted.all.last_frame);
+}
 
 Bus* MachineCore::find_bus(std::string_view bus) const {
   const auto found = std::ranges::find_if(buses_, [&](const auto* b) { return b->name() == bus; });
@@ -153,6 +163,7 @@ void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
 }
 
 void MachineCore::start() {
+  expect_stops();
   for (std::size_t i = 0; i < lines_.size(); ++i) lines_[i]->start(recorders_[i]->exchange_observer());
   for (const auto& network : networks_) network->start();
   for (const auto& cycler : cyclers_) launch(cycler->run(), "link cycler");

@@ -84,6 +84,7 @@ class MachineCore {
   /// Those of the parts, with what the axes have seen.
   [[nodiscard]] std::vector<BusBudgetReport> budgets() const;
   /// Runs a sequence that uses what this owns; closed() waits for its end.
+  void expect_stops();
   void launch(Task<> sequence, const char* name);
   /// Ends all sequences; then closed() comes true and the machine can be destroyed. Moves nothing.
   void close();

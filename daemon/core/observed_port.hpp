@@ -25,7 +25,7 @@ class ObservedPort final : public can::Port {
 
   void start(can::PortHandlers handlers) override;
   void send(const can::Frame& frame, const can::SendOptions& options, can::Completion completion) override;
-  void purge_superseded() override { inner_->purge_superseded(); }
+  void purge_superseded(const AxisGate& gate) override { inner_->purge_superseded(gate); }
   void close() override { inner_->close(); }
   [[nodiscard]] const can::PortState& state() const override { return inner_->state(); }
   [[nodiscard]] const can::PortCounters& counters() const override { return inner_->counters(); }

@@ -94,6 +94,8 @@ class Machine {
                                     .canopen = network == nullptr ? nullptr : network->get(),
                                     .node = entry.axis.node,
                                     .setup = {.own_descriptor = entry.axis.own_descriptor}}));
+      if (line != nullptr && entry.axis.turnaround_max)
+        line->get()->set_turnaround_max(entry.axis.node, *entry.axis.turnaround_max);
       buses_.push_back(line != nullptr ? static_cast<Bus*>(line->get()) : network->get());
     }
     // After the drives, which are attached to their network before it starts.

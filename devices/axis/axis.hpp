@@ -107,6 +107,8 @@ class Axis {
   [[nodiscard]] const AxisSettings& settings() const { return settings_; }
   /// Nothing moves, as far as is known, and no stop is under way.
   [[nodiscard]] bool at_rest() const;
+  /// From a stop's request to its frame, by the bus budget; what takes longer is told once.
+  void expect_stop_within(Duration bound) { observed_.expect_stop_within(bound); }
   /// Longest times seen, beside those of the bus budget.
   [[nodiscard]] const ObservedAxis& observed() const { return observed_.values(); }
   /// Thread: any.
@@ -162,7 +164,8 @@ class Axis {
   // axis_link.cpp: the way to the drive
   Task<> run();
   Task<> connect();
-  Task<Result<void>> try_connect(TransactionClass contact);
+  /// `again`: the attempt before was in vain.
+  Task<Result<void>> try_connect(TransactionClass contact, bool again);
   Task<Result<void>> settle_found_motion();
   [[nodiscard]] bool found_in_motion() const;
   [[nodiscard]] bool found_by_terminal() const;
@@ -265,6 +268,7 @@ class Axis {
   void supersede(const Error& cause);
   void begin_stop(StopKind kind, bool hold, CommandPtr command);
   Task<> run_stop();
+  void note_stop_sent(TimePoint end);
   Task<Result<void>> stop_and_confirm();
   Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
   Task<bool> standstill_unpolled(TimePoint deadline);

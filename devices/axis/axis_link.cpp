@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "devices/axis/axis.hpp"
 
@@ -26,13 +27,14 @@ Task<> Axis::run() {
 
 Task<> Axis::connect() {
   Duration backoff = first_backoff;
+  bool again = false;
   while (!closing_ && link_ != LinkState::online) {
     co_await wait_for_port();
     // Both would write to the drive's memory.
     while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
     if (closing_) co_return;
     // The bus sees to it that repeated silence does not cost the neighbours much.
-    const auto connected = co_await try_connect(TransactionClass::idle_state);
+    const auto connected = co_await try_connect(TransactionClass::idle_state, std::exchange(again, true));
     if (closing_) co_return;
     if (connected && !configured_) continue;  // it was told to begin again meanwhile
     if (connected) {
@@ -50,7 +52,9 @@ Task<> Axis::connect() {
       spdlog::warn("{}: {}", settings_.name, to_string(connected.error()));
     link_error_ = connected.error();
     publish();
-    co_await wake_.wait_until(env_.clock->now() + backoff);
+    // What the bus holds back goes out as soon as anything of the node is heard: it should be there by then.
+    const auto pause = env_.bus->holds_back(settings_.node) ? Duration(first_backoff) : backoff;
+    co_await wake_.wait_until(env_.clock->now() + pause);
     backoff = std::min<Duration>(backoff * 2, longest_backoff);
   }
   publish();
@@ -67,10 +71,10 @@ Task<> Axis::wait_for_port() {
   }
 }
 
-Task<Result<void>> Axis::try_connect(TransactionClass contact) {
+Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   if (stop_owed_) {
     // Whatever the drive is doing now, the first frame it gets is a stop (M4).
-    const auto stopped = co_await drive_->stop(StopKind::stop);
+    const auto stopped = co_await (again ? drive_->repeat_stop() : drive_->stop(StopKind::stop));
     if (!stopped) co_return stopped;
   }
   auto identity = co_await drive_->identify(contact);
@@ -320,7 +324,7 @@ void Axis::go_offline(const Error& cause) {
   link_ = LinkState::offline;
   link_error_ = cause;
   gate_->raise();
-  env_.bus->purge_superseded();
+  env_.bus->purge_superseded(settings_.node, *gate_);
   const bool moved = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
                      terminal_motion_ || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).

@@ -46,7 +46,7 @@ void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>&
 void Axis::fail_with_stop(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
   gate_->raise();
-  env_.bus->purge_superseded();
+  env_.bus->purge_superseded(settings_.node, *gate_);
   tracker_.forget_target();
   keep_deceleration(activity);
   stopping_.shown = activity.state;
@@ -59,7 +59,7 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
 void Axis::abort_at_rest(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
   gate_->raise();
-  env_.bus->purge_superseded();
+  env_.bus->purge_superseded(settings_.node, *gate_);
   keep_deceleration(activity);
   begin_stop(StopKind::halt, false, nullptr);
   finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
@@ -67,7 +67,7 @@ void Axis::abort_at_rest(Activity& activity, Error cause) {
 
 void Axis::enter_error_stop(Error cause) {
   gate_->raise();
-  env_.bus->purge_superseded();
+  env_.bus->purge_superseded(settings_.node, *gate_);
   if (!fault_ || fault_->reason != cause.reason || fault_->where.native_code != cause.where.native_code) {
     spdlog::error("{}", to_string(cause));
     fault_ = cause;
@@ -288,6 +288,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       const bool jog = activity->command->value().kind == CommandKind::jog;
       stopping_.shown = activity->state;
       gate_->raise();
+      env_.bus->purge_superseded(settings_.node, *gate_);
       keep_deceleration(*activity);
       begin_stop(StopKind::halt, false, nullptr);
       auto cause =

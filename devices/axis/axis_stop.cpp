@@ -23,7 +23,7 @@ constexpr int unacknowledged_rounds = 4;
 void Axis::supersede(const Error& cause) {
   gate_->raise();
   ++accept_epoch_;
-  env_.bus->purge_superseded();
+  env_.bus->purge_superseded(settings_.node, *gate_);
   if (auto activity = std::exchange(activity_, nullptr)) {
     keep_deceleration(*activity);
     if (activity->state != AxisState::standstill) tracker_.forget_target();
@@ -89,6 +89,17 @@ Task<> Axis::run_stop() {
   wake_.notify_all();
 }
 
+void Axis::note_stop_sent(TimePoint end) {
+  const auto late = observed_.stop_sent(end);
+  if (!late) return;
+  const auto in_ms = [](Duration time) { return std::chrono::duration<double, std::milli>(time).count(); };
+  spdlog::warn(
+      "{}: a stop frame had gone out {:.1f} ms after its request; the budget promises {:.1f} ms. Lost "
+      "frames, "
+      "or this computer: relieve it, or raise host_allowance of bus {} (told once)",
+      settings_.name, in_ms(late->seen), in_ms(late->expected), settings_.bus);
+}
+
 Task<Result<void>> Axis::stop_and_confirm() {
   bool released = false;
   int silent = 0;  // replies in a row that did not come
@@ -98,7 +109,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto kind = stopping_.kind;
     const auto sent = co_await drive_->stop(kind);
     wake_.notify_all();
-    if (const auto out = drive_->stop_sent_at()) observed_.stop_sent(*out);
+    if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out);
     const bool no_reply = !sent && sent.error().reason == Reason::no_reply;
     if (no_reply && link_ != LinkState::offline && ++silent < stop_attempts) continue;
     silent = 0;

@@ -1,6 +1,7 @@
 #include "devices/axis/observed_times.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace axisd {
 
@@ -19,11 +20,14 @@ void ObservedTimes::stop_requested(TimePoint arrived, bool all) {
   if (!stop_) stop_ = {.arrived = arrived, .all = all};
 }
 
-void ObservedTimes::stop_sent(TimePoint end) {
-  if (!stop_ || stop_->sent || end < stop_->arrived) return;
+std::optional<ObservedTimes::Late> ObservedTimes::stop_sent(TimePoint end) {
+  if (!stop_ || stop_->sent || end < stop_->arrived) return std::nullopt;
   stop_->sent = true;
+  const auto seen = end - stop_->arrived;
   auto& longest = stop_->all ? values_.stop_frame_all : values_.stop_frame;
-  longest = std::max(longest, end - stop_->arrived);
+  longest = std::max(longest, seen);
+  if (seen <= expected_stop_) return std::nullopt;
+  return Late{.seen = seen, .expected = std::exchange(expected_stop_, Duration::max())};
 }
 
 void ObservedTimes::standstill_confirmed(TimePoint at) {

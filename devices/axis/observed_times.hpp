@@ -17,8 +17,13 @@ class ObservedTimes {
 
   /// `arrived`: at the server. `all`: of a stop of all axes. A stop that the axis decided on itself has none.
   void stop_requested(TimePoint arrived, bool all);
-  /// The stop frame's last byte or bit.
-  void stop_sent(TimePoint end);
+  /// By the bus budget, from the request to the frame's end.
+  void expect_stop_within(Duration bound) { expected_stop_ = bound; }
+  struct Late {
+    Duration seen, expected;
+  };
+  /// The stop frame's last byte or bit. Returns the first that took longer than expected.
+  std::optional<Late> stop_sent(TimePoint end);
   void standstill_confirmed(TimePoint at);
   /// Standstill was not confirmed, and will not be for this request.
   void stop_failed() { stop_.reset(); }
@@ -36,6 +41,7 @@ class ObservedTimes {
   };
   std::optional<Last> last_;
   std::optional<Stop> stop_;
+  Duration expected_stop_ = Duration::max();
   ObservedAxis values_;
 };
 

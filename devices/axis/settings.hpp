@@ -111,6 +111,7 @@ struct AxisSettings {
   bool require_trust = true;             ///< absolute moves need a trusted position
   double jog_travel = 0;          ///< user units; longest jog of an axis whose position is unknown (M16)
   double position_tolerance = 0;  ///< user units; 0: one pulse
+  std::optional<Duration> turnaround_max{};  ///< RS-485: of this drive; nothing: its line's
   Duration poll_moving = milliseconds(20);
   Duration poll_idle = milliseconds(200);
   Duration reboot_guard = milliseconds(100);        ///< M6; below the drive's shortest boot time

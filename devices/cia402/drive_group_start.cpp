@@ -193,7 +193,7 @@ canopen::Bytes Cia402Drive::neutral_bytes() const {
 
 void Cia402Drive::give_up_common_start() {
   start_gate_->raise();
-  bus_->purge_superseded();
+  bus_->purge_superseded(node_.id(), *start_gate_);
 }
 
 Task<> Cia402Drive::follow_waiting(std::uint16_t word) {

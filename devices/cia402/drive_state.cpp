@@ -185,7 +185,7 @@ DriveSample Cia402Drive::judge(const Reading& reading) {
 void Cia402Drive::give_up_leaving() {
   give_up_common_start();
   leave_gate_->raise();
-  bus_->purge_superseded();
+  bus_->purge_superseded(node_.id(), *leave_gate_);
   leave_homing_ = false;
 }
 

@@ -140,6 +140,7 @@ Task<> Cia402Drive::zero_velocity(SdoOptions options) {
 Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   ++stops_;
   leave_gate_->raise();
+  bus_->purge_superseded(node_.id(), *leave_gate_);
   give_up_common_start();
   leave_homing_ = leave_homing_ || homing_.active() || mode_ == OperationMode::homing;
   homing_.end();

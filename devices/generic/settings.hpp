@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,6 +47,7 @@ struct DeviceSettings {
   BusKind kind = BusKind::modbus_rtu;
   std::uint8_t node = 1;
   Duration poll = std::chrono::milliseconds(500);
+  std::optional<Duration> turnaround_max{};  ///< RS-485: of this node; nothing: its line's
   std::vector<ValueSettings> values;
   /// What its values are called in messages.
   [[nodiscard]] std::string_view noun() const { return kind == BusKind::modbus_rtu ? "register" : "object"; }

@@ -46,6 +46,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
   Task<Result<void>> stop(StopKind kind) override;
+  Task<Result<void>> repeat_stop() override;
   [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stop_sent_at_; }
   Task<Result<void>> clear_alarm(MotionGuard guard) override;
   Task<Result<void>> clear_position(MotionGuard guard) override;
@@ -90,6 +91,7 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] bool saves_at_rest() const;
 
   // drive_motion.cpp
+  Task<Result<void>> send_stop(StopKind kind, bool patient);
   Task<Result<void>> write_canary(MotionBlock block, TransactionOptions options);
   Task<Result<Answer>> read_canary(TransactionOptions options);
   [[nodiscard]] MotionBlock distinct(MotionBlock block) const;

@@ -177,10 +177,15 @@ Task<Result<void>> YakoRtuDrive::prepare_homing(HomingBlock block, TransactionOp
   co_return Result<void>{};
 }
 
-Task<Result<void>> YakoRtuDrive::stop(StopKind kind) {
+Task<Result<void>> YakoRtuDrive::stop(StopKind kind) { return send_stop(kind, false); }
+
+Task<Result<void>> YakoRtuDrive::repeat_stop() { return send_stop(StopKind::stop, true); }
+
+Task<Result<void>> YakoRtuDrive::send_stop(StopKind kind, bool patient) {
   const std::uint16_t value = kind == StopKind::quick_stop ? 1 : 0;  // 7.6.2: zero is a command
   for (int attempt = 1;; ++attempt) {
-    const auto written = co_await node_.write(reg::stop, value, in(TransactionClass::stop));
+    const auto written = co_await node_.write(
+        reg::stop, value, {.transaction_class = TransactionClass::stop, .patient = patient});
     if (written) {
       stop_sent_at_ = written->request_end;
       co_return Result<void>{};

@@ -153,7 +153,7 @@ class GroupBench {
   }
   void stop(Member& member) {
     member.gate->raise();
-    bus.purge_superseded();
+    bus.purge_superseded(member.node->address(), *member.gate);
     spawn(world.executor(), stop_of(member), "stop");
   }
 

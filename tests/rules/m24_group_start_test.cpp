@@ -265,7 +265,7 @@ TEST(M24GroupStart, NobodyMovesTwiceLateOrByItselfUnderFaults) {
         break;
       case 6:
         victim.gate->raise();
-        bench.bus.purge_superseded();
+        bench.bus.purge_superseded(node, *victim.gate);
         break;
       case 7:
         bench.fault({.kind = FaultKind::drop_request,

@@ -195,11 +195,15 @@ TEST(CanBudget, StopsComeAsSoonAsPredictedAndNotMuchSooner) {
           all = std::max(all, network.stop(axes));
       }
     }
-    EXPECT_LE(one + host_allowance, budget.stops.front().last_frame) << axes << " at " << bitrate;
-    EXPECT_LE(all + host_allowance, budget.stops.back().last_frame) << axes << " at " << bitrate;
+    EXPECT_LE(one + BudgetPolicy{}.host_allowance, budget.stops.front().last_frame)
+        << axes << " at " << bitrate;
+    EXPECT_LE(all + BudgetPolicy{}.host_allowance, budget.stops.back().last_frame)
+        << axes << " at " << bitrate;
     if (axes == 1) continue;  // its request and its reply never wait at once
-    EXPECT_GE(2 * one, budget.stops.front().last_frame - host_allowance) << axes << " at " << bitrate;
-    EXPECT_GE(2 * all, budget.stops.back().last_frame - host_allowance) << axes << " at " << bitrate;
+    EXPECT_GE(2 * one, budget.stops.front().last_frame - BudgetPolicy{}.host_allowance)
+        << axes << " at " << bitrate;
+    EXPECT_GE(2 * all, budget.stops.back().last_frame - BudgetPolicy{}.host_allowance)
+        << axes << " at " << bitrate;
   }
 }
 

@@ -33,15 +33,26 @@ LineDemand demand_of(int axes, int baud) {
   return demand;
 }
 
+/// Every second drive answers late, the others sooner than the line's limit.
+LineDemand mixed(LineDemand demand) {
+  for (std::size_t i = 0; i < demand.axes.size(); ++i)
+    demand.axes[i].turnaround_max = i % 2 == 0 ? Duration(5ms) : Duration(45ms);
+  return demand;
+}
+
 struct Case {
   int axes, baud, moving;
   bool silent;
+  bool is_mixed = false;
+  [[nodiscard]] LineDemand demand() const {
+    return is_mixed ? mixed(demand_of(axes, baud)) : demand_of(axes, baud);
+  }
 };
 
 std::string name_of(const testing::TestParamInfo<Case>& info) {
   const auto& one = info.param;
   return std::to_string(one.axes) + "At" + std::to_string(one.baud) + "With" + std::to_string(one.moving) +
-         "Moving" + (one.silent ? "OneSilent" : "");
+         "Moving" + (one.silent ? "OneSilent" : "") + (one.is_mixed ? "Mixed" : "");
 }
 
 class Loads : public testing::TestWithParam<Case> {
@@ -52,8 +63,8 @@ class Loads : public testing::TestWithParam<Case> {
 };
 
 TEST_P(Loads, NothingIsReadLessOftenThanPredicted) {
-  const auto [count, baud, moving, is_silent] = GetParam();
-  const auto demand = demand_of(count, baud);
+  const auto [count, baud, moving, is_silent, is_mixed] = GetParam();
+  const auto demand = GetParam().demand();
   const auto budget = budget_of(demand);
   const auto& load = budget.load.at(static_cast<std::size_t>(moving));
   for (unsigned seed = 1; seed <= 3; ++seed) {
@@ -73,8 +84,8 @@ TEST_P(Loads, NothingIsReadLessOftenThanPredicted) {
 }
 
 TEST_P(Loads, StopsComeAsSoonAsPredictedAndNotMuchSooner) {
-  const auto [count, baud, moving, is_silent] = GetParam();
-  const auto demand = demand_of(count, baud);
+  const auto [count, baud, moving, is_silent, is_mixed] = GetParam();
+  const auto demand = GetParam().demand();
   const auto budget = budget_of(demand);
   std::map<std::size_t, LineLoad::Stopped> worst;
   for (unsigned seed = 1; seed <= 3; ++seed) {
@@ -88,21 +99,25 @@ TEST_P(Loads, StopsComeAsSoonAsPredictedAndNotMuchSooner) {
       if (stop % 2 == 0) which = {static_cast<std::size_t>(line.random(0, count - 1))};
       const auto seen = line.stop(which);
       const auto& bound = budget.stops.at(which.size() - 1);
-      ASSERT_LE(seen.last_frame + host_allowance, bound.last_frame) << which.size() << " axes, seed " << seed;
-      ASSERT_LE(seen.standstill + host_allowance, bound.standstill) << which.size() << " axes, seed " << seed;
+      ASSERT_LE(seen.last_frame + demand.line.budget.host_allowance, bound.last_frame)
+          << which.size() << " axes, seed " << seed;
+      ASSERT_LE(seen.standstill + demand.line.budget.host_allowance, bound.standstill)
+          << which.size() << " axes, seed " << seed;
       auto& most = worst[which.size()];
       most.last_frame = std::max(most.last_frame, seen.last_frame);
       most.standstill = std::max(most.standstill, seen.standstill);
     }
   }
   for (const auto& [axes, seen] : worst)
-    EXPECT_GE(2 * seen.last_frame, budget.stops.at(axes - 1).last_frame) << axes << " axes";
+    EXPECT_GE(2 * (seen.last_frame + demand.line.budget.host_allowance), budget.stops.at(axes - 1).last_frame)
+        << axes << " axes";
 }
 
 INSTANTIATE_TEST_SUITE_P(RtuBudget, Loads,
                          testing::Values(Case{1, 115200, 1, false}, Case{6, 115200, 0, false},
                                          Case{6, 115200, 2, true}, Case{6, 19200, 6, false},
-                                         Case{12, 115200, 11, true}, Case{4, 9600, 2, true}),
+                                         Case{12, 115200, 11, true}, Case{4, 9600, 2, true},
+                                         Case{5, 115200, 3, true, true}),
                          name_of);
 
 TEST(RtuBudget, FiguresOfOneDriveByHand) {
@@ -110,10 +125,35 @@ TEST(RtuBudget, FiguresOfOneDriveByHand) {
   const auto budget = budget_of(demand);
   // 8N1: 86.8 us a character. The longest exchange, 16 registers: 41 + 8 characters and 20 ms.
   const auto longest = wire_time(demand.line, 41) + 20ms + wire_time(demand.line, 8);
-  EXPECT_EQ(budget.stops[0].last_frame, host_allowance + longest + 1750us + wire_time(demand.line, 8));
+  EXPECT_EQ(budget.stops[0].last_frame,
+            demand.line.budget.host_allowance + longest + 1750us + wire_time(demand.line, 8));
   // Polls of 8 + 25 characters and twice 1.75 ms every 200 ms, canaries of 8 + 17 every 800 ms.
   EXPECT_NEAR(budget.load[0].utilisation, (3.5 + 33 * 0.0868) / 200 + (3.5 + 25 * 0.0868) / 800, 1e-4);
   EXPECT_GT(budget.load[1].utilisation, budget.load[0].utilisation);
+}
+
+TEST(RtuBudget, ASlowDriveCostsTheOthersOnlyWhatItTakes) {
+  auto demand = demand_of(2, 115200);
+  const auto before = budget_of(demand);
+  demand.axes[1].turnaround_max = 120ms;
+  const auto slow = budget_of(demand);
+  EXPECT_EQ(slow.stops[1].last_frame - before.stops[1].last_frame, 2 * 100ms)
+      << "of what is under way, and of its own stop before the other's";
+  for (auto& axis : demand.axes) axis.turnaround_max = 4ms;
+  EXPECT_EQ(before.stops[1].last_frame - budget_of(demand).stops[1].last_frame, 2 * 16ms);
+  EXPECT_EQ(before.load[0].utilisation, budget_of(demand).load[0].utilisation);
+  EXPECT_LT(budget_of(demand).load[0].utilisation_max, before.load[0].utilisation_max);
+}
+
+TEST(RtuBudget, TheHostsShareIsPartOfEachStop) {
+  auto demand = demand_of(2, 115200);
+  const auto before = budget_of(demand);
+  demand.line.budget.host_allowance += 7ms;
+  const auto after = budget_of(demand);
+  for (std::size_t i = 0; i < before.stops.size(); ++i) {
+    EXPECT_EQ(after.stops[i].last_frame - before.stops[i].last_frame, 7ms);
+    EXPECT_EQ(after.stops[i].standstill - before.stops[i].standstill, 7ms);
+  }
 }
 
 TEST(RtuBudget, MoreAxesAndSlowerLinesPromiseLess) {

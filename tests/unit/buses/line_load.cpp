@@ -45,6 +45,8 @@ LineLoad::LineLoad(LineDemand demand, unsigned seed, std::optional<std::size_t> 
   }
   line_->set_on_bind([this](const WireEntry& entry) { on_bind(entry); });
   bus_ = std::make_unique<RtuBus>(world_.executor(), world_.clock(), demand_.line, std::move(line));
+  for (std::size_t i = 0; i < demand_.axes.size(); ++i)
+    if (const auto own = demand_.axes[i].turnaround_max) bus_->set_turnaround_max(axes[i]->node, *own);
   bus_->start();
   world_.run_for(10ms);
 }
@@ -58,7 +60,7 @@ LineLoad::~LineLoad() {
 
 /// Each reply comes as late as it may, or nearly, or sooner.
 void LineLoad::on_bind(const WireEntry& entry) {
-  const auto spare = demand_.line.turnaround_max - 2ms;  // that late it comes by itself
+  const auto spare = bus_->turnaround_max(entry.node()) - 2ms;  // that late it comes by itself
   const auto late = random(0, 2) == 0 ? spare : spare * random(0, 100) / 100;
   line_->network().faults().clear();
   line_->network().faults().add({.kind = simulation::FaultKind::delay_reply, .delay = late});
@@ -181,7 +183,7 @@ LineLoad::Stopped LineLoad::stop(const std::vector<std::size_t>& which) {
     axis.stop_sent = axis.stop_acknowledged = axis.standstill = std::nullopt;
     axis.stopping = true;
     axis.gate->raise();
-    bus_->purge_superseded();
+    bus_->purge_superseded(axis.node, *axis.gate);
     bus_->hasten(axis.node, TransactionClass::moving_state);
     spawn(world_.executor(), send_stop(axis), "stop");
   }

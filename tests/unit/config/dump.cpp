@@ -97,6 +97,7 @@ void dump_budget(Dump& dump, const BudgetPolicy& budget) {
   dump.field("budget.refuse", budget.refuse);
   dump.field("budget.stop_bound", budget.stop_bound);
   dump.field("budget.refresh_bound", budget.refresh_bound);
+  dump.field("budget.host_allowance", budget.host_allowance);
 }
 
 void dump_device(Dump& dump, const DeviceSettings& device) {
@@ -105,6 +106,7 @@ void dump_device(Dump& dump, const DeviceSettings& device) {
   dump.field("kind", device.kind);
   dump.field("node", device.node);
   dump.field("poll", device.poll);
+  dump.field("turnaround_max", device.turnaround_max);
   for (const auto& entry : device.values) {
     const auto path = fmt::format("values.{}.", entry.name);
     dump.field(path + "address", entry.address);
@@ -129,6 +131,7 @@ void dump_axis(Dump& dump, const AxisSettings& axis) {
   dump.field("require_trust", axis.require_trust);
   dump.field("jog_travel", axis.jog_travel);
   dump.field("position_tolerance", axis.position_tolerance);
+  dump.field("turnaround_max", axis.turnaround_max);
   dump.field("poll_moving", axis.poll_moving);
   dump.field("poll_idle", axis.poll_idle);
   dump.field("reboot_guard", axis.reboot_guard);

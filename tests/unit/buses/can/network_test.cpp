@@ -103,7 +103,7 @@ TEST(CanPort, AStopOvertakesWhatIsQueuedAndMotionBehindItIsSuperseded) {
   const auto gate = std::make_shared<AxisGate>();
   for (std::uint32_t id = 1; id <= 8; ++id) bench.send(id, guarded_by(gate));
   gate->raise();
-  bench.port.purge_superseded();
+  bench.port.purge_superseded(*gate);
   bench.send(9, options_of(Class::stop));
   bench.world.run_for(10ms);
   EXPECT_EQ(bench.others, (Texts{"001#", "002#", "003#", "004#", "009#"}));

@@ -102,9 +102,35 @@ TEST(TxQueue, PurgeEndsWhatAStopOvertookThoughTheWindowIsFull) {
   bench.push(5, guarded_by(gate));
   bench.push(6);
   gate->raise();
-  bench.queue.purge_superseded(bench.now);
+  bench.queue.purge_superseded(*gate, bench.now);
   EXPECT_EQ(bench.ended(), (Texts{"5:superseded"}));
   EXPECT_EQ(bench.queue.queued(), 1U);
+}
+
+/// Whatever a purge looks at and finds forbidden it ends: what it leaves it has not looked at.
+TEST(TxQueue, APurgeLooksAtNothingThatOtherGatesGuard) {
+  Bench bench;
+  const auto own = std::make_shared<AxisGate>();
+  std::vector<std::shared_ptr<AxisGate>> others;
+  for (std::uint32_t id = 1; id <= 6; ++id) {
+    others.push_back(std::make_shared<AxisGate>());
+    bench.push(id, guarded_by(others.back()));
+    others.back()->raise();
+  }
+  auto shared = guarded_by(others.front());  // of a common start: two gates, both still old
+  shared.guard = {};
+  shared.more_guards = {{.gate = own, .epoch = own->epoch()},
+                        {.gate = others.front(), .epoch = others.front()->epoch()}};
+  bench.push(300, shared);
+  bench.push(301, guarded_by(own));
+  own->raise();
+  bench.queue.purge_superseded(*own, bench.now);
+  EXPECT_EQ(bench.ended(), (Texts{"300:superseded", "301:superseded"}));
+  EXPECT_EQ(bench.queue.queued(), 6U);
+  bench.queue.purge_superseded(*others.front(), bench.now);
+  EXPECT_EQ(bench.ended(), (Texts{"300:superseded", "301:superseded", "1:superseded"}));
+  EXPECT_EQ(bench.hand_over(), Ids{}) << "nor is any of the others ever sent";
+  EXPECT_EQ(bench.queue.queued(), 0U);
 }
 
 TEST(TxQueue, EndsWaitingFramesJustAfterTheirDeadline) {

@@ -43,7 +43,7 @@ class FakePort final : public can::Port {
           if (on_sent) on_sent(frame);
         }));
   }
-  void purge_superseded() override { ++purges; }
+  void purge_superseded(const AxisGate& /*gate*/) override { ++purges; }
   void close() override { silent_ = true; }
   [[nodiscard]] const can::PortState& state() const override { return state_; }
   [[nodiscard]] const can::PortCounters& counters() const override { return counters_; }

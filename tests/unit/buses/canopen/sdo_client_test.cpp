@@ -172,14 +172,14 @@ TEST(SdoClient, ARaisedGateIsNeverSent) {
                {.transaction_class = TransactionClass::motion, .guard = guard});
   net.world.run_for(50us);
   gate->raise();
-  net.master->purge_superseded();
+  for (const std::uint8_t node : {1, 2}) net.master->purge_superseded(node, *gate);
   net.world.run_for(100ms);
   EXPECT_THAT(net.port->log, ElementsAre("601#4041600000000000"));
   for (const auto* which : {"queued", "bound"}) {
     EXPECT_EQ(net.results.at(which).error().reason, Reason::superseded);
     EXPECT_EQ(net.results.at(which).error().outcome, Outcome::not_sent);
   }
-  EXPECT_EQ(net.port->purges, 1);
+  EXPECT_EQ(net.port->purges, 2);
 }
 
 TEST(SdoClient, ADeadlineEndsWhatWaits) {

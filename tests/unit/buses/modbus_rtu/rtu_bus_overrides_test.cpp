@@ -83,6 +83,35 @@ TEST(RtuBusOverrides, ATurnaroundOfItsOwnWaitsLonger) {
   EXPECT_TRUE(rig.results.at("patient"));
 }
 
+TEST(RtuBusOverrides, ANodeMayHaveATurnaroundOfItsOwn) {
+  const auto wait_for = [](std::optional<Duration> own) {
+    BusRig rig;
+    if (own) rig.bus->set_turnaround_max(9, *own);
+    rig.transact("read", read_of(9));  // nobody answers there
+    rig.world.run_for(1s);
+    EXPECT_EQ(rig.line->wire().size(), 1U);
+    return rig.line->wire()[0].end - rig.line->wire()[0].begin;
+  };
+  const auto usual = wait_for(std::nullopt);
+  EXPECT_EQ(wait_for(50ms) - usual, 30ms);
+  EXPECT_EQ(usual - wait_for(5ms), 15ms);
+}
+
+TEST(RtuBusOverrides, AStopWaitsForASlowNodeAsLongAsThatNeeds) {
+  BusRig rig;
+  rig.bus->set_turnaround_max(9, 60ms);
+  rig.transact("slow", read_of(9));
+  rig.world.run_for(10ms);
+  const auto begin = rig.line->wire().at(0).begin;
+  rig.transact("stop",
+               {.node = 1, .function = Function::write_single_register, .address = 0x0028, .values = {0}},
+               {.transaction_class = TransactionClass::stop});
+  rig.world.run_for(100ms);
+  ASSERT_EQ(rig.line->wire().size(), 2U);
+  EXPECT_GE(rig.line->wire()[1].begin - begin, 60ms);
+  EXPECT_LE(rig.line->wire()[1].begin - begin, 63ms);
+}
+
 TEST(RtuBusOverrides, AStopDoesNotWaitForAPatientExchange) {
   BusRig rig;
   rig.transact("patient", read_of(9), {.turnaround_max = 3s});  // nobody answers there

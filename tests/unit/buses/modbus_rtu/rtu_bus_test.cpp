@@ -97,6 +97,38 @@ TEST(RtuBus, AStopOvertakesWhatIsArmedAndCutsAnotherNodesSilence) {
   EXPECT_LE(rig.line->wire()[1].begin - asked, 25ms);  // turnaround_max and the silence
 }
 
+/// Of a node that does not answer: a new stop goes at once, its repetition as seldom as any probe, and at
+/// once when anything is heard of the node.
+TEST(RtuBus, RepeatedStopsToASilentNodeWaitForTheirTurn) {
+  BusRig rig;
+  rig.line->network().node(1)->set_power(false);
+  for (int i = 0; i < 8; ++i) {
+    rig.world.run_for(2s);
+    rig.read("r", 0x0020, 1, 1);
+    rig.world.run_for(50ms);
+  }
+  ASSERT_TRUE(rig.bus->holds_back(1));
+  Request stop{.node = 1, .function = Function::write_single_register, .address = 0x0028};
+  stop.values.push_back(0);
+  const auto stops_in = [&](Duration time) {
+    rig.line->forget_wire();
+    rig.world.run_for(time);
+    return std::ranges::count(rig.line->wire(), 0x0028, &test::WireEntry::address);
+  };
+  rig.transact("new", stop, {.transaction_class = TransactionClass::stop});
+  EXPECT_EQ(stops_in(50ms), 1);
+  rig.transact("again", stop, {.transaction_class = TransactionClass::stop, .patient = true});
+  EXPECT_EQ(stops_in(1s), 0);
+  rig.line->network().node(1)->set_power(true);
+  rig.world.run_for(100ms);  // it boots
+  EXPECT_FALSE(rig.results.contains("again"));
+  rig.transact("looked for", {.node = 1, .function = Function::read_holding_registers, .count = 1},
+               {.transaction_class = TransactionClass::scan});
+  EXPECT_EQ(stops_in(50ms), 1);
+  EXPECT_TRUE(rig.results.contains("again"));
+  EXPECT_FALSE(rig.bus->holds_back(1));
+}
+
 TEST(RtuBus, ARaisedGateIsNeverSent) {
   for (int offset = 0; offset < 40; ++offset) {
     BusRig rig;
@@ -111,7 +143,7 @@ TEST(RtuBus, ARaisedGateIsNeverSent) {
     const bool was_sent = std::ranges::any_of(
         rig.line->wire(), [](const test::WireEntry& entry) { return entry.address() == 0x0027; });
     gate->raise();
-    rig.bus->purge_superseded();
+    rig.bus->purge_superseded(1, *gate);
     rig.world.run_for(1s);
     EXPECT_EQ(rig.results.at("trigger").has_value(), was_sent);
     if (!was_sent) EXPECT_EQ(rig.results.at("trigger").error().reason, Reason::superseded);

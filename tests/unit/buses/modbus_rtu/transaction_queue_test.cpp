@@ -43,7 +43,7 @@ TEST(TransactionQueue, EarliestDeadlineThenArrival) {
   queue.push(read_of(2, Class::parameters, now + 2s));
   queue.push(read_of(3, Class::parameters, now + 1s));
   queue.push(read_of(4, Class::parameters, now + 1s));
-  EXPECT_EQ(queue.next_deadline(), now + 1s);
+  EXPECT_EQ(queue.next_expiry(), now + 1s);
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{3, 4, 2, 1}));
 }
 
@@ -95,21 +95,75 @@ TEST(TransactionQueue, EveryEighthComesFromBelowButNeverBeforeAStop) {
   for (int i = 0; i < 10; ++i) EXPECT_LT(stops.pop()->exchange.request.address, 100);
 }
 
-TEST(TransactionQueue, TakesOutWhatMayNotBeSent) {
+TransactionPtr motion_of(std::uint16_t address, const std::shared_ptr<AxisGate>& gate,
+                         TimePoint not_after = TimePoint::max(), std::uint8_t node = 1) {
+  auto motion = read_of(address, Class::motion, TimePoint::max(), node);
+  motion->exchange.guard = {.gate = gate, .epoch = gate->epoch(), .not_after = not_after};
+  return motion;
+}
+
+TEST(TransactionQueue, TakesOutWhatCameTooLate) {
   TransactionQueue queue;
   const TimePoint now{10s};
+  const auto gate = std::make_shared<AxisGate>();
   queue.push(read_of(1, Class::parameters, now - 1ns));
   queue.push(read_of(2, Class::parameters, now));
-  const auto gate = std::make_shared<AxisGate>();
-  auto motion = read_of(3, Class::motion);
-  motion->exchange.guard = {.gate = gate, .epoch = gate->epoch()};
-  queue.push(std::move(motion));
-  EXPECT_EQ(queue.take_unsendable(now).size(), 1U);
-  gate->raise();
-  const auto taken = queue.take_unsendable(now);
-  ASSERT_EQ(taken.size(), 1U);
-  EXPECT_EQ(taken[0]->exchange.request.address, 3);
+  queue.push(motion_of(3, gate, now - 2ns));
+  queue.hold(read_of(4, Class::idle_state, now - 1s, 9));
+  EXPECT_EQ(queue.next_expiry(), now - 1s);
+  std::vector<std::uint16_t> expired;
+  for (const auto& each : queue.take_expired(now)) expired.push_back(each->exchange.request.address);
+  EXPECT_EQ(expired, (std::vector<std::uint16_t>{4, 3, 1}));
+  EXPECT_EQ(queue.next_expiry(), now);
   EXPECT_EQ(drain(queue), std::vector<std::uint16_t>{2});
+  EXPECT_EQ(queue.next_expiry(), TimePoint::max());
+}
+
+TEST(TransactionQueue, TakesOutWhatItsGateForbidsAndOnlyThat) {
+  TransactionQueue queue;
+  const auto gate = std::make_shared<AxisGate>();
+  queue.push(motion_of(1, gate));
+  queue.hold(motion_of(2, gate));
+  gate->raise();
+  queue.push(motion_of(3, gate));
+  queue.push(read_of(4, Class::motion));
+  EXPECT_EQ(queue.take_forbidden(*gate, TimePoint{}).size(), 2U);
+  EXPECT_TRUE(queue.take_forbidden(*gate, TimePoint{}).empty());
+  EXPECT_EQ(queue.size(), 2U);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{3, 4}));
+}
+
+/// Whatever a purge looks at and finds forbidden it takes out: what it leaves it has not looked at.
+TEST(TransactionQueue, APurgeLooksAtNothingThatWaitsForOthers) {
+  TransactionQueue queue;
+  constexpr int others = 1000;
+  std::vector<std::shared_ptr<AxisGate>> gates;
+  for (std::uint16_t i = 0; i < others; ++i) {
+    gates.push_back(std::make_shared<AxisGate>());
+    queue.push(motion_of(i, gates.back(), TimePoint::max(), static_cast<std::uint8_t>(2 + i % 200)));
+    gates.back()->raise();
+  }
+  const auto own = std::make_shared<AxisGate>();
+  queue.push(motion_of(others, own));
+  own->raise();
+  EXPECT_EQ(queue.take_forbidden(*own, TimePoint{}).size(), 1U);
+  EXPECT_EQ(queue.size(), static_cast<std::size_t>(others));
+}
+
+TEST(TransactionQueue, WhatIsHeldWaitsForItsNodeAndIsHastenedWithIt) {
+  TransactionQueue queue;
+  for (const std::uint8_t node : {7, 8}) queue.hold(read_of(node, Class::idle_state, TimePoint::max(), node));
+  queue.push(read_of(1, Class::moving_state));
+  EXPECT_EQ(queue.held_nodes(), (std::vector<std::uint8_t>{7, 8}));
+  queue.hasten(8, Class::motion);
+  EXPECT_EQ(queue.size(Class::motion), 0U);
+  queue.release(8);
+  queue.release(9);
+  EXPECT_EQ(queue.held_nodes(), std::vector<std::uint8_t>{7});
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{8, 1}));
+  EXPECT_EQ(queue.take_all().size(), 1U);
+  EXPECT_EQ(queue.size(), 0U);
+  EXPECT_TRUE(queue.held_nodes().empty());
 }
 
 TEST(TransactionQueue, PutBackKeepsItsPlace) {

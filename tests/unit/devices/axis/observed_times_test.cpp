@@ -1,0 +1,53 @@
+#include "devices/axis/observed_times.hpp"
+
+#include <gtest/gtest.h>
+
+namespace axisd {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr TimePoint asked{10s};
+
+/// A stop whose frame ended so long after its request.
+std::optional<ObservedTimes::Late> stopped(ObservedTimes& times, Duration after, bool all = false) {
+  times.stop_requested(asked, all);
+  const auto late = times.stop_sent(asked + after);
+  times.standstill_confirmed(asked + after + 100ms);
+  return late;
+}
+
+TEST(ObservedTimes, KeepsTheLongestOfEachKindOfStop) {
+  ObservedTimes times;
+  for (const auto after : {3ms, 8ms, 5ms}) EXPECT_FALSE(stopped(times, after));
+  EXPECT_FALSE(stopped(times, 20ms, true));
+  EXPECT_EQ(times.values().stop_frame, 8ms);
+  EXPECT_EQ(times.values().standstill, 108ms);
+  EXPECT_EQ(times.values().stop_frame_all, 20ms);
+  EXPECT_EQ(times.values().standstill_all, 120ms);
+}
+
+TEST(ObservedTimes, TellsOnceWhatTookLongerThanPromised) {
+  ObservedTimes times;
+  times.expect_stop_within(6ms);
+  EXPECT_FALSE(stopped(times, 6ms));
+  const auto late = stopped(times, 7ms);
+  ASSERT_TRUE(late);
+  EXPECT_EQ(late->seen, 7ms);
+  EXPECT_EQ(late->expected, 6ms);
+  EXPECT_FALSE(stopped(times, 9ms)) << "once";
+  EXPECT_EQ(times.values().stop_frame, 9ms) << "but it is noted";
+}
+
+TEST(ObservedTimes, OnlyTheFirstFrameOfAStopCounts) {
+  ObservedTimes times;
+  times.expect_stop_within(6ms);
+  times.stop_requested(asked, false);
+  EXPECT_FALSE(times.stop_sent(asked - 1ms)) << "that of an earlier stop";
+  EXPECT_FALSE(times.stop_sent(asked + 4ms));
+  EXPECT_FALSE(times.stop_sent(asked + 40ms)) << "its repetition";
+  EXPECT_EQ(times.values().stop_frame, 4ms);
+}
+
+}  // namespace
+}  // namespace axisd
