@@ -20,6 +20,7 @@ if wants can; then
   build/release/tests/bench_can core 16
   tests/guest/run.sh -t 400 /usr/bin/python3 -B tests/bench/can_bench.py build/release
 fi
+if wants rtu; then build/release/tests/bench_queue; fi
 for each in rtu rpc machine; do
   if wants "$each"; then /usr/bin/python3 -B "tests/bench/${each}_bench.py" build/release; fi
 done

@@ -25,6 +25,12 @@ if(AXISD_GRPC)
   foreach(command bring-up core)
     string(APPEND text "add_test(bench.${command} $<TARGET_FILE:bench_can> ${command} 2)\n")
   endforeach()
+  add_executable(bench_queue EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/queue_bench.cpp)
+  target_include_directories(bench_queue PRIVATE ${CMAKE_SOURCE_DIR})
+  target_link_libraries(bench_queue PRIVATE axisd_buses)
+  add_dependencies(bench_programs bench_queue)
+  string(APPEND text "add_test(bench.queue $<TARGET_FILE:bench_queue>)\n"
+    "set_tests_properties(bench.queue PROPERTIES LABELS slow TIMEOUT 300)\n")
   string(APPEND text
     "add_test(bench.sync_in_guest ${CMAKE_SOURCE_DIR}/tests/guest/run.sh -t 200 /usr/bin/python3 -B "
     "${CMAKE_CURRENT_LIST_DIR}/can_bench.py ${CMAKE_BINARY_DIR} --rounds 1 --seconds 1 --nodes 2)\n"
