@@ -20,7 +20,7 @@ void Quarantine::silent(std::uint8_t node, TimePoint now, Duration cost, bool st
     known.probes = 0;
     ++known.entered;
   }
-  known.level = std::min(known.level + 1, most_doublings);
+  known.level = std::clamp(known.level + 1, 1, most_doublings);
   const auto hold = std::min(quarantine_first_hold * (1 << (known.level - 1)), longest_hold(cost));
   // A stop that came before its turn is made up for by the next probe; however many came, only once: a node
   // that is back is not to wait for what somebody did while it was gone.

@@ -57,6 +57,7 @@ void FakeDrives::read_parameters(std::string axis, std::vector<std::uint32_t> ad
                                  ValuesCallback callback) {
   note(fmt::format("read_parameters {} {:#x}", axis, fmt::join(addresses, " ")));
   std::vector<ParameterValue> values;
+  values.reserve(addresses.size());
   for (const auto address : addresses) values.push_back({.address = address, .value = -1 - int(address)});
   answer<std::vector<ParameterValue>>(callback, std::move(values));
 }
