@@ -2,7 +2,7 @@
 import time
 import unittest
 
-from harness import DONE, CanScenario, CanSimulator, error_pb, pb, turntable, wait_for
+from harness import DONE, CanScenario, CanSimulator, EndlessNode, bus_pb, error_pb, pb, turntable, wait_for
 
 CONTROL_WORD = 0x6040
 
@@ -157,6 +157,24 @@ class WrongNodes(CanScenario):
         self.assertIn("node-ID", state.link_error.remedy)
         self.assertEqual(machine.frames.writes(CONTROL_WORD, kind="tx"), [])
         self.assertEqual((machine.sim.shaft(5).starts, other.shaft(5).starts), (0, 0))
+
+    def test_uploads_without_an_end(self):
+        """Whoever asks is told why there is no value, the transfer is aborted, and the axis beside it goes on."""
+        machine = self.cell(axes={"table": turntable()})
+        move = self.mid_move(machine)
+        for size, reason, abort in ((7, "OUT_OF_RANGE", 0x05040005), (0, "NO_REPLY", 0x05040000)):
+            with self.subTest(size=size):
+                node = EndlessNode("vcan0", 9, size)
+                self.addCleanup(node.close)
+                detail = self.refused("OUT_OF_RANGE" if size else "UNAVAILABLE", reason, machine.client.call,
+                                      machine.client.bus.Transact, bus_pb.TransactRequest(
+                                          bus="can0", node=9, address=0x100800, read_object={}))
+                self.assertEqual((detail.node, detail.object), (9, 0x100800), detail)
+                wait_for(lambda node=node: node.aborts == [abort], "the transfer is aborted")
+                node.close()
+        self.assertFalse(machine.client.get_command(move).HasField("cause"))
+        machine.client.to_done("Halt", "table")
+        self.usable_again(machine)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """What the end-to-end scenarios share: real programs on pseudo terminals, a client, and the wire as it was."""
-from .can import (CanLog, Candump, CanSimulator, LinkHelper, Peer, SlcanAdapter, heartbeat, ip, sdo_reply,
-                  sdo_request)
+from .can import (CanLog, Candump, CanSimulator, EndlessNode, LinkHelper, Peer, SlcanAdapter, heartbeat, ip,
+                  sdo_reply, sdo_request)
 from .can_case import CanScenario
 from .case import Scenario
 from .client import (ACCEPTED, DONE, ENDED, STARTED, CallFailed, Client, axis_pb, bus_pb, command_pb, error_pb, pb,
@@ -9,7 +9,8 @@ from .machine import Axis, Machine, feeder, spinner, turntable
 from .programs import AXISCTL, AXISD, LIMIT, ROOT, Program, run, wait_for
 from .wire import BLOCK, ENABLE, HOMING, START, STOP, crc, frame_bytes
 
-__all__ = ["ACCEPTED", "AXISCTL", "AXISD", "Axis", "BLOCK", "CallFailed", "CanLog", "CanScenario", "CanSimulator", "Candump",
-           "Client", "DONE", "ENABLE", "ENDED", "HOMING", "LIMIT", "LinkHelper", "Machine", "Peer", "Program", "ROOT", "START", "STARTED", "STOP",
-           "Scenario", "SlcanAdapter", "axis_pb", "bus_pb", "command_pb", "crc", "error_pb", "feeder", "frame_bytes",
-           "heartbeat", "ip", "pb", "run", "sdo_reply", "sdo_request", "spinner", "system_pb", "turntable", "wait_for"]
+__all__ = ["ACCEPTED", "AXISCTL", "AXISD", "Axis", "BLOCK", "CallFailed", "CanLog", "CanScenario", "CanSimulator",
+           "Candump", "Client", "DONE", "ENABLE", "ENDED", "EndlessNode", "HOMING", "LIMIT", "LinkHelper", "Machine",
+           "Peer", "Program", "ROOT", "START", "STARTED", "STOP", "Scenario", "SlcanAdapter", "axis_pb", "bus_pb",
+           "command_pb", "crc", "error_pb", "feeder", "frame_bytes", "heartbeat", "ip", "pb", "run", "sdo_reply",
+           "sdo_request", "spinner", "system_pb", "turntable", "wait_for"]

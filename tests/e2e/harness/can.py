@@ -79,6 +79,39 @@ class Peer:
         self._socket.close()
 
 
+class EndlessNode(Peer):
+    """A node that answers every SDO upload by segments without an end, each of `size` bytes."""
+
+    def __init__(self, interface, node, size):
+        super().__init__(interface)
+        self._node, self._size = node, size
+        self.aborts = []  # codes that were sent to it
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self):
+        while not self._ended.is_set():
+            select.select([self], [], [], 0.05)
+            for cob_id, data in self.received():
+                if cob_id == sdo_request(self._node):
+                    self._answer(data)
+
+    def _answer(self, request):
+        if request[0] == 0x40:  # initiate upload: its size is not said
+            self.send(sdo_reply(self._node), bytes([0x40]) + request[1:4] + bytes(4))
+        elif request[0] >> 5 == 3:  # upload segment: never the last one
+            empty = (7 - self._size) << 1
+            self.send(sdo_reply(self._node), bytes([request[0] & 0x10 | empty]) + bytes(7))
+        elif request[0] == 0x80:
+            self.aborts.append(int.from_bytes(request[4:8], "little"))
+
+    def close(self):
+        self._ended.set()
+        self._thread.join()
+        super().close()
+
+
 class Candump:
     """candump of can-utils: what somebody else sees on an interface. Listens from its construction on."""
 
