@@ -27,17 +27,19 @@ constexpr std::string_view long_ones[] = {"every_alarm", "thousand_moves"};
 /// guests side by side have one each.
 std::vector<Job> jobs(const std::vector<Manual>& manuals, std::string_view named) {
   std::vector<Job> all;
+  std::ptrdiff_t long_jobs = 0;
+  const auto add = [&](Job job) {
+    const bool is_long = std::ranges::find(long_ones, job.scenario->name) != std::end(long_ones);
+    all.insert(is_long ? all.begin() + long_jobs++ : all.end(), job);
+  };
   for (const auto& manual : manuals)
     for (const auto& subject : subjects())
       for (const auto& scenario : subject.scenarios) {
         if (manual.lacks(scenario.name) || scenario.name.find(named) == std::string_view::npos) continue;
-        all.push_back({.scenario = &scenario, .manual = &manual, .variant = {}});
+        add({.scenario = &scenario, .manual = &manual, .variant = {}});
         if (subject.name == "motion" && !manual.has("data_sheet"))
-          all.push_back({.scenario = &scenario, .manual = &manual, .variant = {.invert = true}});
+          add({.scenario = &scenario, .manual = &manual, .variant = {.invert = true}});
       }
-  std::ranges::stable_partition(all, [](const Job& job) {
-    return std::ranges::find(long_ones, job.scenario->name) != std::end(long_ones);
-  });
   return all;
 }
 
