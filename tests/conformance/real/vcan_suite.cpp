@@ -28,7 +28,7 @@ constexpr std::string_view long_ones[] = {"every_alarm", "thousand_moves"};
 std::vector<Job> jobs(const std::vector<Manual>& manuals, std::string_view named) {
   std::vector<Job> all;
   std::ptrdiff_t long_jobs = 0;
-  const auto add = [&](Job job) {
+  const auto add = [&](const Job& job) {
     const bool is_long = std::ranges::find(long_ones, job.scenario->name) != std::end(long_ones);
     all.insert(is_long ? all.begin() + long_jobs++ : all.end(), job);
   };
