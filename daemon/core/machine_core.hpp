@@ -84,7 +84,6 @@ class MachineCore {
   /// Those of the parts, with what the axes have seen.
   [[nodiscard]] std::vector<BusBudgetReport> budgets() const;
   /// Runs a sequence that uses what this owns; closed() waits for its end.
-  void expect_stops();
   void launch(Task<> sequence, const char* name);
   /// Ends all sequences; then closed() comes true and the machine can be destroyed. Moves nothing.
   void close();
@@ -94,6 +93,7 @@ class MachineCore {
   [[nodiscard]] bool buses_reported() const;
 
  private:
+  void expect_stops();
   Task<> watch(canopen::CanopenBus& network);
   Task<> watch_port(Bus& bus);
   BusRecorder& add_recorder(const std::string& bus, std::size_t memory, int bit_rate);
