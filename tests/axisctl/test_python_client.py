@@ -134,7 +134,25 @@ class Jogging(ClientTest):
         self.assertFalse((await self.feeder.state()).moving)
 
 
+    async def test_the_block_can_ask_whether_it_was_ended(self):
+        with self.assertRaises(axisd.MotionError):
+            async with self.feeder.jog(3, hold=0.3) as jog:
+                jog.check()
+                await self.feeder.stop()
+                while True:
+                    await asyncio.sleep(0.01)
+                    jog.check()
+
+
 class WholeMachine(ClientTest):
+    async def test_wait_online(self):
+        self.assertIs((await self.feeder.wait_online()).link, axisd.Link.ONLINE)
+        ghost = asyncio.create_task(self.machine.axis("ghost").wait_online())
+        await asyncio.sleep(0.3)
+        self.assertFalse(ghost.done())
+        self.fake.axes["ghost"].state.link = axisd.v1.types_pb2.LINK_STATE_ONLINE
+        self.assertIs((await ghost).link, axisd.Link.ONLINE)
+
     async def test_axes_buses_info(self):
         axes = await self.machine.axes()
         self.assertEqual(list(axes), ["feeder", "turntable", "ghost", "sticky"])

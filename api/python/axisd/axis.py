@@ -4,14 +4,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import uuid
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from .calls import Seconds, command_options, done, duration
 from .drive import Drive
 from .errors import AxisdError, MotionError
-from .types import AxisState, Command
+from .types import AxisState, Command, Link
 from .v1 import axis_service_pb2
 
 if TYPE_CHECKING:
@@ -39,11 +39,20 @@ class Axis:
         request = axis_service_pb2.GetAxisRequest(axis=self.name)
         return AxisState.of((await self._machine._call(self._machine._axes.GetAxis, request, self.name)).state)
 
-    async def watch(self, period: Seconds = 0.1) -> AsyncIterator[AxisState]:
+    async def watch(self, period: Seconds = 0.1) -> AsyncGenerator[AxisState, None]:
         """The latest state at a steady rate."""
         async with contextlib.aclosing(self._machine.watch([self.name], period)) as ticks:
             async for tick in ticks:
                 yield tick.axes[self.name]
+
+    async def wait_online(self) -> AxisState:
+        """Waits until the drive answers and is configured, as enable() needs it; without a time limit of its own. A
+        drive whose terminals can start a motion is configured without power only: disable() it first."""
+        async with contextlib.aclosing(self.watch()) as states:
+            async for state in states:
+                if state.link is Link.ONLINE:
+                    return state
+        raise AxisdError(f"{self.name}: the daemon ended the stream before the drive was online")
 
     async def enable(self, *, wait: bool = True, request_id: str | None = None) -> Command:
         """Switches the power stage on. Never moves."""
@@ -126,18 +135,18 @@ class Axis:
 
 
 class Jog:
-    """A jog in progress; made by Axis.jog(). `command` is the latest answer of the daemon."""
+    """A jog in progress; made by Axis.jog(). `command` is the latest answer of the daemon, inside the block."""
+    command: Command
 
     def __init__(self, axis: Axis, velocity: float, hold: float, acceleration_time: Seconds | None,
                  deceleration_time: Seconds | None) -> None:
         self._axis = axis
         self._hold = hold
-        self._arguments = {"axis": axis.name, "velocity": velocity, "hold": duration(hold),
-                           "acceleration_time": duration(acceleration_time),
-                           "deceleration_time": duration(deceleration_time)}
+        self._arguments: dict[str, Any] = {
+            "axis": axis.name, "velocity": velocity, "hold": duration(hold),
+            "acceleration_time": duration(acceleration_time), "deceleration_time": duration(deceleration_time)}
         self._request_id = str(uuid.uuid4())
         self._renewal: asyncio.Task[None] | None = None
-        self.command: Command | None = None
 
     async def __aenter__(self) -> Jog:
         self.command = await self._call()
@@ -160,6 +169,11 @@ class Jog:
                     raise
         if failed and error is None and isinstance(failure, Exception):
             raise failure
+
+    def check(self) -> None:
+        """Raises what ended the jog early, if anything did; so does the end of the block."""
+        if self._renewal is not None and self._renewal.done():
+            self._renewal.result()
 
     async def _call(self) -> Command:
         # The same id each time: a repeat extends the hold, and never starts a jog anew that has ended.

@@ -2,11 +2,12 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from .v1 import budget_pb2
 
 
-def _seconds(raw, field: str) -> float | None:
+def _seconds(raw: Any, field: str) -> float | None:
     return getattr(raw, field).ToNanoseconds() / 1e9 if raw.HasField(field) else None
 
 

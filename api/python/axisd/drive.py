@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from typing import TYPE_CHECKING, Any
 
 from google.protobuf.duration_pb2 import Duration
@@ -80,7 +80,7 @@ class Drive:
         return Segments.of((await self._call("WriteSegments", request)).segments)
 
     async def readdress(self, node: int, *, confirm: str,
-                        verify: float | None = None) -> AsyncIterator[SerialProgress]:
+                        verify: float | None = None) -> AsyncGenerator[SerialProgress, None]:
         """Gives the drive another address, which counts from its next power-up. With `verify` it is then looked for, so
         many seconds. The configuration has to be changed, too."""
         request = drive_service_pb2.ReaddressRequest(axis=self.axis, node=node, confirm=confirm)
@@ -89,14 +89,14 @@ class Drive:
                 yield change
 
     async def set_serial(self, *, baud: int | None = None, format: str = "", confirm: str,
-                         verify: float | None = None) -> AsyncIterator[SerialProgress]:
+                         verify: float | None = None) -> AsyncGenerator[SerialProgress, None]:
         """The same for baud rate and format ("8N1", "8N2", "8E1" or "8O1")."""
         request = drive_service_pb2.SetSerialRequest(axis=self.axis, baud=baud, format=format, confirm=confirm)
         async with contextlib.aclosing(self._change("SetSerial", request, verify)) as changes:
             async for change in changes:
                 yield change
 
-    async def _change(self, name: str, request: Any, verify: float | None) -> AsyncIterator[SerialProgress]:
+    async def _change(self, name: str, request: Any, verify: float | None) -> AsyncGenerator[SerialProgress, None]:
         if verify is not None:
             time = Duration()
             time.FromTimedelta(datetime.timedelta(seconds=verify))

@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import pathlib
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncGenerator, Iterable
 from types import TracebackType
 from typing import Any
 
@@ -36,11 +37,14 @@ _OPTIONS = (
 )
 
 
-def connect(server: str = "localhost:7443", *, tls_ca: str | pathlib.Path | None = None,
+def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = None,
             tls_certificate: str | pathlib.Path | None = None, tls_key: str | pathlib.Path | None = None,
             timeout: float = 10.0) -> Machine:
-    """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Connects with the first call.
-    `timeout` limits how long the daemon may take to answer, not how long a motion may take."""
+    """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
+    localhost:7443. Connects with the first call. `timeout` limits how long the daemon may take to answer, not how long
+    a motion may take."""
+    if server is None:
+        server = os.environ.get("AXISD_SERVER", "localhost:7443")
     return Machine(server, tls_ca, tls_certificate, tls_key, timeout)
 
 
@@ -94,7 +98,7 @@ class Machine:
             request_id = options.request_id if options is not None else ""
             raise translate(error, subject, self.server, request_id) from None
 
-    async def _stream(self, method: Any, request: Any, subject: str) -> AsyncIterator[Any]:
+    async def _stream(self, method: Any, request: Any, subject: str) -> AsyncGenerator[Any, None]:
         call = method(request)
         try:
             async for message in call:
@@ -113,7 +117,7 @@ class Machine:
         response = await self._call(self._axes.ListAxes, axis_service_pb2.ListAxesRequest(), "")
         return {state.axis: AxisState.of(state) for state in response.axes}
 
-    async def watch(self, axes: Iterable[str] = (), period: Seconds = 0.1) -> AsyncIterator[Tick]:
+    async def watch(self, axes: Iterable[str] = (), period: Seconds = 0.1) -> AsyncGenerator[Tick, None]:
         """Latest states at a steady rate; a slow reader misses ticks, never gets old ones. None: all axes."""
         request = axis_service_pb2.WatchAxesRequest(axes=list(axes), period=duration(period))
         async with contextlib.aclosing(self._stream(self._axes.WatchAxes, request, "watch")) as stream:
@@ -125,7 +129,7 @@ class Machine:
         request = command_service_pb2.GetCommandRequest(id=command_id)
         return Command.of((await self._call(self._commands.GetCommand, request, command_id)).command)
 
-    async def watch_command(self, command_id: str) -> AsyncIterator[Command]:
+    async def watch_command(self, command_id: str) -> AsyncGenerator[Command, None]:
         """A command now and at each change, until it has ended."""
         request = command_service_pb2.WatchCommandRequest(id=command_id)
         async with contextlib.aclosing(self._stream(self._commands.WatchCommand, request, command_id)) as stream:
@@ -167,7 +171,8 @@ class Machine:
         return [BusBudget.of(budget) for budget in response.budgets]
 
     async def scan(self, bus: str, *, first_node: int = 1, last_node: int = 127, bauds: Iterable[int] = (),
-                   formats: Iterable[str] = (), reply_timeout: Seconds | None = None) -> AsyncIterator[ScanProgress]:
+                   formats: Iterable[str] = (),
+                   reply_timeout: Seconds | None = None) -> AsyncGenerator[ScanProgress, None]:
         """Looks for nodes; leaving the loop ends it. Other rates and formats than the bus's own are refused while any of
         its axes is enabled."""
         request = bus_service_pb2.ScanRequest(bus=bus, first_node=first_node, last_node=last_node, bauds=list(bauds),
@@ -206,14 +211,14 @@ class Machine:
         return {one.bus: BusStatistics.of(one) for one in response.buses}
 
     async def watch_bus_statistics(self, bus: str = "", *,
-                                   period: Seconds = 1.0) -> AsyncIterator[dict[str, BusStatistics]]:
+                                   period: Seconds = 1.0) -> AsyncGenerator[dict[str, BusStatistics], None]:
         """The same again and again, every 0.1 to 60 s; a slow reader misses some, and never gets old ones."""
         request = bus_service_pb2.WatchBusStatisticsRequest(bus=bus, period=duration(period))
         async with contextlib.aclosing(self._stream(self._buses.WatchBusStatistics, request, bus)) as stream:
             async for tick in stream:
                 yield {one.bus: BusStatistics.of(one) for one in tick.buses}
 
-    async def trace(self, bus: str, *, node: int | None = None) -> AsyncIterator[TracedFrame]:
+    async def trace(self, bus: str, *, node: int | None = None) -> AsyncGenerator[TracedFrame, None]:
         """The frames of a bus from now on, without end, and what was not sent."""
         request = bus_service_pb2.TraceBusRequest(bus=bus, node=node)
         async with contextlib.aclosing(self._stream(self._buses.TraceBus, request, bus)) as stream:
@@ -250,7 +255,7 @@ class Machine:
         return (await self._call(self._buses.WriteDevice, request, device)).value
 
     async def events(self, axes: Iterable[str] = (), *, after: Cursor | None = None,
-                     kept: bool = False) -> AsyncIterator[Event]:
+                     kept: bool = False) -> AsyncGenerator[Event, None]:
         """What happens from now on, in order and without end. `after`: the cursor of the last event that was seen, to go
         on there, also after a lost connection. `kept`: first everything that the daemon still keeps."""
         request = event_service_pb2.WatchEventsRequest(axes=list(axes))

@@ -1,0 +1,46 @@
+"""The machine of config/examples/demo.yaml, whose drives are simulated inside the daemon."""
+import os
+import pathlib
+import re
+import shutil
+import tempfile
+
+from .client import Client, pb
+from .machine import PATIENT
+from .programs import AXISD, ROOT, Program, wait_for
+
+EXAMPLE = ROOT / "config" / "examples" / "demo.yaml"
+
+
+class Demo:
+    """Runs from its construction to close(), which is a scenario's cleanup."""
+
+    def __init__(self):
+        self.directory = pathlib.Path(tempfile.mkdtemp(prefix="axdemo-"))
+        self.server = f"unix:{self.directory}/axisd.sock"
+        # A computer busy with tests is late; nothing else differs from the example.
+        patience = "".join(f"\n    {key}: {text}" for key, text in PATIENT.items())
+        text = re.sub(r"(?m)^    model: (?!yss-c).*$", lambda line: line[0] + patience, EXAMPLE.read_text())
+        config = self.directory / "demo.yaml"
+        config.write_text(text)
+        self.daemon = Program("axisd", [AXISD, "--config", str(config), "--state-directory",
+                                        str(self.directory / "state"), "--listen", self.server], self.directory)
+        self.client = Client(self.server)
+        wait_for(lambda: self._answers(), "all drives answer")
+
+    def _answers(self):
+        if not self.daemon.running():
+            raise AssertionError(f"axisd ended: {self.daemon.log()}")
+        if not os.path.exists(self.server.removeprefix("unix:")):
+            return False
+        return all(state.link != pb.LINK_STATE_OFFLINE for state in self.client.states())
+
+    def models(self):
+        """An axis of each model."""
+        return {state.model: state.axis for state in self.client.states()}
+
+    def close(self):
+        self.client.close()
+        self.daemon.terminate()
+        self.daemon.check_memory()
+        shutil.rmtree(self.directory)
