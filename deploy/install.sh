@@ -13,7 +13,7 @@ staged=${DESTDIR:-}
 deploy/install-packages.sh build
 deploy/install-packages.sh run
 cmake --preset release
-cmake --build --preset release --target axisd axisctl axisd-sim axisd-link api_reference
+cmake --build --preset release --target axisd axisctl axisd-sim axisd-link api_reference axisctl_manual
 cmake --install build/release --prefix /usr --strip
 [ -z "$staged" ] || exit 0
 

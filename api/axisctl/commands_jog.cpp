@@ -44,13 +44,6 @@ v1::JogRequest jog_request(const JogArguments& arguments, const std::string& uni
   return request;
 }
 
-v1::Command halt(Invocation& invocation, const std::string& axis) {
-  v1::HaltRequest request;
-  request.set_axis(axis);
-  request.mutable_options()->set_request_id(random_uuid());
-  return invocation.client().call(&Stub::Halt, request, axis, Lane::stop).command();
-}
-
 /// Renews until Ctrl-C, the end of --for or the end of the motion. Returns the command as last seen.
 v1::Command renew(Invocation& invocation, const JogArguments& arguments, const Interrupt& interrupt,
                   v1::JogRequest request, v1::Command command, std::chrono::nanoseconds hold) {
@@ -87,7 +80,7 @@ void jog(Invocation& invocation, const JogArguments& arguments) {
     // Without renewal the hold expires and the daemon halts the axis; asking for it as well is quicker if it
     // can.
     try {
-      halt(invocation, arguments.axis());
+      halt_axis(invocation, arguments.axis());
     } catch (const Failure&) {
       throw Failure(failure.code(), fmt::format("{}; the axis halts when its hold of {} ends", failure.what(),
                                                 arguments.hold));
@@ -99,7 +92,7 @@ void jog(Invocation& invocation, const JogArguments& arguments) {
     return;
   }
   invocation.status =
-      follow(invocation, halt(invocation, arguments.axis()), {.unit = before.unit(), .start = {}});
+      follow(invocation, halt_axis(invocation, arguments.axis()), {.unit = before.unit(), .start = {}});
 }
 
 }  // namespace

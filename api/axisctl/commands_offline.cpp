@@ -1,4 +1,4 @@
-// check, schema, completion: nothing here talks to a daemon.
+// check, schema, completion, man: nothing here talks to a daemon.
 #include <fmt/format.h>
 #include <google/protobuf/struct.pb.h>
 
@@ -9,6 +9,7 @@
 #include "api/axisctl/completion.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/man_page.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "config/configuration.hpp"
 
@@ -63,6 +64,10 @@ void add_offline_commands(CLI::App& app, Invocation& invocation) {
   completion->add_option("SHELL", *shell, "bash")->required()->check(CLI::IsMember({"bash"}));
   completion->callback([&app, shell] {
     if (*shell == "bash") print(bash_completion(app));
+  });
+
+  app.add_subcommand("man", "This program's manual page: axisctl man | man -l -")->callback([&app] {
+    print(man_page(app));
   });
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
@@ -13,16 +14,20 @@
 namespace axisd::axisctl {
 namespace {
 
-// A handler can reach only globals; Interrupt exists once at a time.
-int request_fd = -1;
+// A handler can reach only globals: the eventfd of each Interrupt that exists, the outer one first.
+std::array<std::atomic<int>, 2> requests{-1, -1};
 
 extern "C" void on_signal(int /*number*/) {
   const int saved = errno;
   const std::uint64_t one = 1;
-  // eventfd's counter cannot be full here, and there is nobody to tell.
-  [[maybe_unused]] const auto written = ::write(request_fd, &one, sizeof one);
+  for (const auto& request : requests)
+    // eventfd's counter cannot be full here, and there is nobody to tell.
+    if (const int fd = request; fd >= 0) [[maybe_unused]]
+      const auto written = ::write(fd, &one, sizeof one);
   errno = saved;
 }
+
+std::atomic<int>& free_place() { return requests[0] < 0 ? requests[0] : requests[1]; }
 
 void handle(void (*handler)(int)) {
   struct sigaction action{};
@@ -41,11 +46,12 @@ int new_eventfd() {
 
 }  // namespace
 
-Interrupt::Interrupt(std::function<void()> action) : closing_(new_eventfd()), action_(std::move(action)) {
-  request_fd = new_eventfd();
+Interrupt::Interrupt(std::function<void()> action)
+    : request_(new_eventfd()), closing_(new_eventfd()), action_(std::move(action)) {
+  free_place() = request_;
   handle(on_signal);
   thread_ = std::thread([this] {
-    std::array<pollfd, 2> fds{{{request_fd, POLLIN, 0}, {closing_, POLLIN, 0}}};
+    std::array<pollfd, 2> fds{{{request_, POLLIN, 0}, {closing_, POLLIN, 0}}};
     while (poll(fds.data(), fds.size(), -1) < 0 && errno == EINTR) {
     }
     if ((fds[0].revents & POLLIN) != 0) action_();
@@ -53,19 +59,20 @@ Interrupt::Interrupt(std::function<void()> action) : closing_(new_eventfd()), ac
 }
 
 Interrupt::~Interrupt() {
-  handle(SIG_DFL);
+  const bool outer = requests[0] == request_;
+  (outer ? requests[0] : requests[1]) = -1;
+  handle(outer ? SIG_DFL : on_signal);
   const std::uint64_t one = 1;
   [[maybe_unused]] const auto written = ::write(closing_, &one, sizeof one);
   thread_.join();
   close(closing_);
-  close(request_fd);
-  request_fd = -1;
+  close(request_);
 }
 
 bool Interrupt::requested() const { return wait_for(std::chrono::milliseconds(0)); }
 
 bool Interrupt::wait_for(std::chrono::milliseconds limit) const {
-  pollfd fd{request_fd, POLLIN, 0};
+  pollfd fd{request_, POLLIN, 0};
   // A signal that interrupts the wait has made the eventfd readable, so the repeat returns at once.
   int ready = poll(&fd, 1, static_cast<int>(limit.count()));
   if (ready < 0) ready = poll(&fd, 1, 0);

@@ -9,7 +9,7 @@
 namespace axisd::axisctl {
 
 /// While it lives, the first SIGINT or SIGTERM calls `action`, on a thread of its own; a second one ends the
-/// program as usual. One at a time.
+/// program as usual. At most one inside another (a command within a script); a signal is a request to both.
 class Interrupt {
  public:
   explicit Interrupt(std::function<void()> action);
@@ -22,6 +22,7 @@ class Interrupt {
   [[nodiscard]] bool wait_for(std::chrono::milliseconds limit) const;
 
  private:
+  int request_ = -1;  ///< eventfd that the signal makes readable
   int closing_ = -1;  ///< eventfd that ends the thread
   std::function<void()> action_;
   std::thread thread_;

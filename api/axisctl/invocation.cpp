@@ -49,27 +49,19 @@ void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_flag("--json", invocation.json, "Print JSON with the names of the proto, one object per line");
 }
 
-/// The arguments, last first as CLI11 wants them. "-.5" becomes "-0.5": CLI11 takes a dash and a digit for a
-/// value, a dash and a point for an option.
-std::vector<std::string> reversed_arguments(int argc, const char* const* argv) {
-  std::vector<std::string> words;
-  for (int i = argc - 1; i > 0; --i) {
-    std::string word = argv[i];
-    if (word.size() > 2 && word.starts_with("-.") && word[2] >= '0' && word[2] <= '9') word.insert(1, "0");
-    words.push_back(std::move(word));
-  }
-  return words;
+/// "-.5" becomes "-0.5": CLI11 takes a dash and a digit for a value, a dash and a point for an option.
+std::string with_leading_zero(std::string word) {
+  if (word.size() > 2 && word.starts_with("-.") && word[2] >= '0' && word[2] <= '9') word.insert(1, "0");
+  return word;
 }
 
-int usage_error(const CLI::App& app, const CLI::ParseError& error) {
-  if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
+Failure usage_error(const CLI::App& app, const CLI::ParseError& error) {
   std::string help = "axisctl";
   for (const auto* command = &app; !command->get_subcommands().empty();) {
     command = command->get_subcommands().front();
     help += " " + command->get_name();
   }
-  fmt::print(stderr, "axisctl: {}; see '{} --help'\n", error.what(), help);
-  return std::to_underlying(ExitCode::usage);
+  return {ExitCode::usage, fmt::format("{}; see '{} --help'", error.what(), help)};
 }
 
 }  // namespace
@@ -88,30 +80,49 @@ v1::AxisState Invocation::state(const std::string& axis) {
   return client().call(&v1::AxisService::Stub::GetAxis, request, axis).state();
 }
 
+std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
+  auto app = std::make_unique<CLI::App>("Commands the axes of a machine through axisd.", "axisctl");
+  app->set_version_flag("--version", std::string("axisctl " AXISD_VERSION));
+  app->footer(footer);
+  app->fallthrough();  // --json and the like may stand behind the subcommand, too
+  app->require_subcommand(1);
+  add_global_options(*app, invocation);
+  add_state_commands(*app, invocation);
+  add_motion_commands(*app, invocation);
+  add_jog_command(*app, invocation);
+  add_stop_commands(*app, invocation);
+  add_command_commands(*app, invocation);
+  add_run_command(*app, invocation);
+  add_plot_command(*app, invocation);
+  add_drive_commands(*app, invocation);
+  add_bus_commands(*app, invocation);
+  add_trace_command(*app, invocation);
+  add_event_commands(*app, invocation);
+  add_system_commands(*app, invocation);
+  add_budget_command(*app, invocation);
+  add_offline_commands(*app, invocation);
+  return app;
+}
+
+void execute(CLI::App& app, const std::vector<std::string>& words) {
+  std::vector<std::string> reversed;  // as CLI11 wants them
+  for (const auto& word : words) reversed.insert(reversed.begin(), with_leading_zero(word));
+  try {
+    app.parse(reversed);
+  } catch (const CLI::Success&) {
+    throw;
+  } catch (const CLI::ParseError& error) {
+    throw usage_error(app, error);
+  }
+}
+
 int run(int argc, const char* const* argv) {
   Invocation invocation;
-  CLI::App app("Commands the axes of a machine through axisd.", "axisctl");
-  app.set_version_flag("--version", std::string("axisctl " AXISD_VERSION));
-  app.footer(footer);
-  app.fallthrough();  // --json and the like may stand behind the subcommand, too
-  app.require_subcommand(1);
-  add_global_options(app, invocation);
-  add_state_commands(app, invocation);
-  add_motion_commands(app, invocation);
-  add_jog_command(app, invocation);
-  add_stop_commands(app, invocation);
-  add_command_commands(app, invocation);
-  add_drive_commands(app, invocation);
-  add_bus_commands(app, invocation);
-  add_trace_command(app, invocation);
-  add_event_commands(app, invocation);
-  add_system_commands(app, invocation);
-  add_budget_command(app, invocation);
-  add_offline_commands(app, invocation);
+  const auto app = make_app(invocation);
   try {
-    app.parse(reversed_arguments(argc, argv));
-  } catch (const CLI::ParseError& error) {
-    return usage_error(app, error);
+    execute(*app, {argv + 1, argv + argc});
+  } catch (const CLI::Success& text) {
+    return app->exit(text);
   } catch (const Failure& failure) {
     fmt::print(stderr, "axisctl: {}\n", failure.what());
     return std::to_underlying(failure.code());

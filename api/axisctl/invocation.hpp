@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "api/axisctl/client.hpp"
 #include "api/axisctl/error.hpp"
@@ -19,6 +20,8 @@ struct Invocation {
   std::string timeout = "10s";  ///< as given, parsed on first use
   bool json = false;
   ExitCode status = ExitCode::ok;
+  bool in_script = false;            ///< Ctrl-C is the script's, which halts what it started
+  std::vector<v1::Command> started;  ///< motion commands that this invocation sent
 
   /// The client, made at first use: offline commands need none.
   Client& client();
@@ -42,7 +45,14 @@ void add_trace_command(CLI::App& app, Invocation& invocation);     ///< trace
 void add_budget_command(CLI::App& app, Invocation& invocation);    ///< budget
 void add_event_commands(CLI::App& app, Invocation& invocation);    ///< events
 void add_system_commands(CLI::App& app, Invocation& invocation);   ///< buses, info
-void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, schema, completion
+void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, schema, completion, man
+void add_run_command(CLI::App& app, Invocation& invocation);       ///< run
+void add_plot_command(CLI::App& app, Invocation& invocation);      ///< plot
+
+/// The command line with all its subcommands.
+std::unique_ptr<CLI::App> make_app(Invocation& invocation);
+/// Parses `words` and runs what they ask for. Throws Failure, or CLI::Success for --help and --version.
+void execute(CLI::App& app, const std::vector<std::string>& words);
 
 /// The whole program. Prints errors; returns the exit status.
 int run(int argc, const char* const* argv);

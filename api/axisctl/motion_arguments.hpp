@@ -35,7 +35,8 @@ v1::Command send(Invocation& invocation,
                  grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                  const Request& request, Lane lane = Lane::ordinary) {
   try {
-    return invocation.client().call(method, request, request.axis(), lane).command();
+    invocation.started.push_back(invocation.client().call(method, request, request.axis(), lane).command());
+    return invocation.started.back();
   } catch (const Failure& failure) {
     if (failure.code() != ExitCode::unreachable) throw;
     throw Failure(failure.code(), std::string(failure.what()) +

@@ -68,12 +68,9 @@ class Painter {
 };
 
 ExitCode interrupted(Invocation& invocation, const v1::Command& command, const Follow& options) {
+  if (invocation.in_script) return ExitCode::interrupted;
   if (options.halt_on_interrupt) {
-    v1::HaltRequest request;
-    request.set_axis(command.axis());
-    request.mutable_options()->set_request_id(random_uuid());
-    const auto halt =
-        invocation.client().call(&v1::AxisService::Stub::Halt, request, command.axis(), Lane::stop).command();
+    const auto halt = halt_axis(invocation, command.axis());
     print_line(invocation.json ? json(halt) : command_line(halt, options.unit));
     return ExitCode::interrupted;
   }
@@ -85,6 +82,13 @@ ExitCode interrupted(Invocation& invocation, const v1::Command& command, const F
 }
 
 }  // namespace
+
+v1::Command halt_axis(Invocation& invocation, const std::string& axis) {
+  v1::HaltRequest request;
+  request.set_axis(axis);
+  request.mutable_options()->set_request_id(random_uuid());
+  return invocation.client().call(&v1::AxisService::Stub::Halt, request, axis, Lane::stop).command();
+}
 
 std::optional<double> percent_of_way(std::optional<double> start, std::optional<double> target,
                                      double position) {
