@@ -40,17 +40,29 @@ class AxisGate {
     }
   }
 
+  /// Of the lease that the axis is commanded under; 0: of none.
   [[nodiscard]] std::uint64_t fencing_token() const { return fencing_token_.load(std::memory_order_acquire); }
-  void set_fencing_token(std::uint64_t token) { fencing_token_.store(token, std::memory_order_release); }
+  [[nodiscard]] TimePoint lease_expires() const { return lease_expires_.load(std::memory_order_acquire); }
+  /// Motion that was given under another token, and any under this one from `expires` on, is not sent: the
+  /// latter also if the core is late to end the lease. First the time, then the token: a frame under the new
+  /// token never meets the old time.
+  void set_fencing_token(std::uint64_t token, TimePoint expires = TimePoint::max()) {
+    lease_expires_.store(expires, std::memory_order_release);
+    fencing_token_.store(token, std::memory_order_release);
+  }
 
  private:
   std::atomic<std::uint64_t> epoch_{1};
   std::atomic<std::uint64_t> fencing_token_{0};
+  std::atomic<TimePoint> lease_expires_{TimePoint::max()};
   std::atomic<int> pending_stops_{0};
 };
 
 /// What a motion frame carries to its bind.
 struct MotionGuard {
+  /// As fencing_token: of what everybody may do whoever leases the axis (disable it).
+  static constexpr std::uint64_t needs_no_lease = ~std::uint64_t{0};
+
   std::shared_ptr<const AxisGate> gate;  ///< null: not a motion frame, always sendable
   std::uint64_t epoch = 0;
   std::uint64_t fencing_token = 0;         ///< 0: given without a lease
@@ -64,7 +76,9 @@ inline Verdict may_send(const MotionGuard& guard, TimePoint now) {
   if (!guard.gate) return Verdict::send;
   if (guard.gate->epoch() != guard.epoch) return Verdict::superseded;
   if (now > guard.not_after) return Verdict::expired;
+  if (guard.fencing_token == MotionGuard::needs_no_lease) return Verdict::send;
   if (guard.gate->fencing_token() != guard.fencing_token) return Verdict::lease_lost;
+  if (guard.fencing_token != 0 && now >= guard.gate->lease_expires()) return Verdict::lease_lost;
   return Verdict::send;
 }
 

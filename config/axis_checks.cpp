@@ -129,6 +129,8 @@ void AxisChecks::check_policies() {
   if (axis_.stop_escalation_release) {
     add("stop_escalation", "'stop_escalation: release' would release a vertical load", "use none");
   }
+  if (axis_.on_lease_loss == LeaseLoss::disable)
+    add("on_lease_loss", "'on_lease_loss: disable' would release a vertical load", "use halt or stop");
 }
 
 void AxisChecks::check_persist() {

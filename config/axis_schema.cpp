@@ -228,6 +228,7 @@ constexpr KeySpec brake_keys[] = {
 
 constexpr std::string_view loads[] = {"normal", "vertical"};
 constexpr std::string_view escalations[] = {"none", "release"};
+constexpr std::string_view lease_losses[] = {"halt", "stop", "disable", "finish"};
 
 bool has(const std::vector<std::string>& items, std::string_view item) {
   return std::ranges::find(items, item) != items.end();
@@ -301,6 +302,18 @@ const KeySpec axis_keys[] = {
      .default_value = "normal",
      .choices = loads,
      .apply = [](Target& t, const Value& v) { t.axis->axis.vertical = v.text == "vertical"; }},
+    {.key = "on_lease_loss",
+     .kind = Kind::choice,
+     .description = "What the axis does when the lease that it is commanded under ends. finish: a move or "
+                    "homing that has started may end, all else halts; disable: stops, then releases the "
+                    "power stage.",
+     .example = "stop",
+     .default_value = "halt",
+     .choices = lease_losses,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.axis->axis.on_lease_loss = static_cast<LeaseLoss>(choice_index(lease_losses, v.text));
+         }},
     {.key = "stop_escalation",
      .kind = Kind::choice,
      .description = "release: a quick stop that is not confirmed is followed by releasing the power stage.",

@@ -11,6 +11,7 @@
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/generic/settings.hpp"
+#include "devices/lease/lease.hpp"
 
 namespace axisd::config {
 
@@ -50,6 +51,7 @@ struct Configuration {
   std::string state_directory = "/var/lib/axisd";  ///< where the daemon keeps its persistent state
   ServerSettings server;
   FlightRecorderSettings flight_recorder;
+  LeaseSettings leases;                            ///< `control:` and `leases:`
   std::vector<modbus_rtu::LineSettings> lines;     ///< `buses:` of the kind modbus_rtu
   std::vector<canopen::NetworkSettings> networks;  ///< of the kind canopen
   std::vector<AxisEntry> axes;

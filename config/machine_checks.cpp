@@ -207,11 +207,22 @@ void check_simulation(const Configuration& configuration, std::span<const BusEnt
   }
 }
 
+void check_leases(const LeaseSettings& leases, Diagnostics& diagnostics, const Places& places) {
+  if (!places.clean("leases")) return;
+  if (leases.shortest_ttl <= leases.default_ttl && leases.default_ttl <= leases.longest_ttl) return;
+  diagnostics.add(places.mark("leases.default_ttl"),
+                  fmt::format("a default_ttl of {} lies outside shortest_ttl to longest_ttl, {} to {}",
+                              format_duration(leases.default_ttl), format_duration(leases.shortest_ttl),
+                              format_duration(leases.longest_ttl)),
+                  "write a default_ttl between the other two");
+}
+
 }  // namespace
 
 void check_machine(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   const auto all = buses(configuration);
   check_server(configuration, diagnostics, places);
+  check_leases(configuration.leases, diagnostics, places);
   check_ports(all, diagnostics, places);
   check_bus_names(configuration, all, diagnostics, places);
   check_kinds(configuration, all, diagnostics, places);

@@ -11,9 +11,6 @@ namespace axisd::config {
 
 namespace {
 
-/// What is known, but not part of this release: says so instead of guessing at a typing error.
-constexpr std::string_view on_lease_loss = "on_lease_loss";
-
 std::vector<std::string_view> keys_of(std::span<const KeySpec> keys) {
   return names_of(keys, [](const KeySpec& spec) { return spec.key; });
 }
@@ -101,12 +98,6 @@ void Reader::check_keys(std::span<const Entry> entries, std::span<const KeySpec>
   for (const auto& [key, value] : entries) {
     if (find(keys, key.text) != nullptr) continue;
     const auto here = join(path, printable(key.text));
-    if (key.text == on_lease_loss && find(keys, "homing") != nullptr) {
-      // A machine builder who reads it in the file would rely on it.
-      report(here, key.mark, "'on_lease_loss' is not supported by this release, which has no leases",
-             "leave it out; jog and velocity with hold halt when they are not renewed");
-      continue;
-    }
     const auto message = fmt::format("unknown key {}{}", quoted(key.text), path.empty() ? "" : " in " + path);
     if (const auto sections = sections_with(keys, key.text); !sections.empty()) {
       report(here, key.mark, message, fmt::format("it belongs under {}", sections));

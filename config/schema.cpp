@@ -77,6 +77,35 @@ constexpr KeySpec flight_recorder_keys[] = {
                  const Value& v) { t.configuration->flight_recorder.files = static_cast<int>(v.integer); }},
 };
 
+constexpr std::string_view controls[] = {"open", "leased"};
+
+constexpr KeySpec lease_keys[] = {
+    {.key = "shortest_ttl",
+     .kind = Kind::duration,
+     .description = "Shortest time to live that a client may ask for.",
+     .example = "500 ms",
+     .default_value = "100 ms",
+     .minimum = 10,
+     .maximum = 3'600'000,
+     .apply = [](Target& t, const Value& v) { t.configuration->leases.shortest_ttl = v.duration; }},
+    {.key = "default_ttl",
+     .kind = Kind::duration,
+     .description = "Time to live where the client asks for none.",
+     .example = "1 s",
+     .default_value = "2 s",
+     .minimum = 10,
+     .maximum = 3'600'000,
+     .apply = [](Target& t, const Value& v) { t.configuration->leases.default_ttl = v.duration; }},
+    {.key = "longest_ttl",
+     .kind = Kind::duration,
+     .description = "Longest time to live: so long may a client that is gone keep its axes from others.",
+     .example = "5 s",
+     .default_value = "60 s",
+     .minimum = 10,
+     .maximum = 3'600'000,
+     .apply = [](Target& t, const Value& v) { t.configuration->leases.longest_ttl = v.duration; }},
+};
+
 constexpr std::string_view budget_policies[] = {"warn", "refuse"};
 
 /// Of either kind of bus: `Bus` is the member of Target that points to it.
@@ -257,6 +286,18 @@ std::span<const KeySpec> schema() {
        .kind = Kind::section,
        .description = "The newest frames of each bus, written to a file after a fault.",
        .children = flight_recorder_keys},
+      {.key = "control",
+       .kind = Kind::choice,
+       .description =
+           "open: an axis that nobody leases may be commanded by every client; leased: only under a lease.",
+       .example = "leased",
+       .default_value = "open",
+       .choices = controls,
+       .apply = [](Target& t, const Value& v) { t.configuration->leases.required = v.text == "leased"; }},
+      {.key = "leases",
+       .kind = Kind::section,
+       .description = "How long a client's lease may last before it has to be renewed.",
+       .children = lease_keys},
       {.key = "buses",
        .kind = Kind::named_sections,
        .required = true,

@@ -13,6 +13,7 @@
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/descriptor.hpp"
+#include "devices/lease/lease.hpp"
 
 namespace axisd {
 
@@ -44,7 +45,9 @@ struct SerialProgress {
 };
 
 /// Parts of Machine. Thread: any; callbacks arrive on the core thread, exactly once unless said otherwise.
-/// Errors of all: unknown_axis, offline, configuring, no_reply, refused with the register in `where`.
+/// Errors of all: unknown_axis, offline, configuring, no_reply, refused with the register in `where`; of
+/// those that change something also lease_required and lease_lost, as for motion. The lease counts when the
+/// work begins.
 class DriveAccess {
  public:
   using ValuesCallback = std::function<void(Result<std::vector<ParameterValue>>)>;
@@ -59,26 +62,26 @@ class DriveAccess {
   /// Writes all or, if any is refused by the checks, none; calls back with what was read back. Errors:
   /// out_of_range, invalid_argument (read-only, trigger, owned by the configuration: names the key), moving,
   /// fault (the power stage is on), misconfigured (read back differs).
-  virtual void write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+  virtual void write_parameters(std::string axis, std::vector<ParameterValue> values, Requester requester,
                                 ValuesCallback callback) = 0;
 
   /// Saves all RW registers to the drive's EEPROM (M27); at standstill and released only.
-  virtual void save_parameters(std::string axis, std::string client,
+  virtual void save_parameters(std::string axis, Requester requester,
                                std::function<void(Result<void>)> callback) = 0;
   /// Restores the factory settings, at standstill and released only. The text says which address, baud and
   /// format will apply after the next power-up.
-  virtual void restore_factory(std::string axis, std::string client,
+  virtual void restore_factory(std::string axis, Requester requester,
                                std::function<void(Result<std::string>)> callback) = 0;
 
   /// The segment table as the drive holds it, in the axis's units and direction; segments of 0 are left out.
   virtual void read_segments(std::string axis, SegmentsCallback callback) = 0;
   /// Replaces the whole table; refused if the configuration owns it.
-  virtual void write_segments(std::string axis, SegmentSettings segments, std::string client,
+  virtual void write_segments(std::string axis, SegmentSettings segments, Requester requester,
                               SegmentsCallback callback) = 0;
 
   /// Calls back with each phase, last with `verified` (or `written` without `verify`) or an error. Dropping
   /// the returned token ends the looking, not what was written.
-  virtual std::shared_ptr<void> change_serial(std::string axis, SerialChange change, std::string client,
+  virtual std::shared_ptr<void> change_serial(std::string axis, SerialChange change, Requester requester,
                                               std::function<void(Result<SerialProgress>)> callback) = 0;
 };
 

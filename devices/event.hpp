@@ -37,13 +37,21 @@ struct ConfigurationDrift {
   std::string text;
 };
 
+/// Who may command an axis changed. Renewals are no event.
+struct LeaseChange {
+  enum class What : std::uint8_t { acquired, released, expired, taken };
+  What what = What::acquired;
+  std::string holder;  ///< from now on; empty: nobody
+  std::string before;  ///< until now; empty: nobody
+};
+
 /// The newest frames of a bus were written to a file.
 struct FlightRecordWritten {
   std::string bus, name, reason;
 };
 
 using EventContent =
-    std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten>;
+    std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten, LeaseChange>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon

@@ -19,6 +19,7 @@
 #include "devices/bus_watch.hpp"
 #include "devices/drive_access.hpp"
 #include "devices/event.hpp"
+#include "devices/lease/lease.hpp"
 
 namespace axisd {
 
@@ -98,6 +99,7 @@ class Machine {
   [[nodiscard]] virtual DriveAccess& drive_access() = 0;
   [[nodiscard]] virtual BusAccess& bus_access() = 0;
   [[nodiscard]] virtual BusWatch& bus_watch() = 0;
+  [[nodiscard]] virtual LeaseAccess& lease_access() = 0;
   [[nodiscard]] virtual EventSource& events() = 0;
 
   /// Called on the core thread whenever any snapshot was published; set once before serving.

@@ -9,6 +9,7 @@
 #include "api/axisctl/drive_commands.hpp"
 #include "api/axisctl/drive_view.hpp"
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/lease_option.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/drive_service.grpc.pb.h"
 
@@ -41,6 +42,7 @@ Response confirmed_call(Invocation& invocation, const ConfirmedArguments& argume
   Request request;
   request.set_axis(arguments.axis);
   request.set_confirm(arguments.confirm);
+  request.set_lease_token(arguments.lease_token);
   auto& client = invocation.client();  // before its time limit is read
   return client.call_within(std::max(memory_time, invocation.connection.timeout), method, request,
                             arguments.axis);
@@ -68,6 +70,7 @@ void add_confirmed(CLI::App& command, ConfirmedArguments& arguments) {
       .add_option("--confirm", arguments.confirm, "The axis's name again: this changes the drive's memory")
       ->type_name("AXIS")
       ->required();
+  add_lease(command, arguments.lease_token);
 }
 
 void add_drive_commands(CLI::App& app, Invocation& invocation) {

@@ -9,6 +9,7 @@
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/interrupt.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/lease_option.hpp"
 #include "api/axisctl/motion_arguments.hpp"
 #include "api/axisctl/progress.hpp"
 #include "api/axisctl/quantity.hpp"
@@ -110,8 +111,7 @@ void add_jog_command(CLI::App& app, Invocation& invocation) {
       ->type_name("TIME")
       ->capture_default_str();
   add_ramps(*command, *arguments);
-  command->add_option("--lease-token", arguments->lease_token, "Fencing token of the lease that is held")
-      ->type_name("N");
+  add_lease(*command, arguments->lease_token);
   command->callback([&invocation, arguments] { jog(invocation, *arguments); });
 }
 

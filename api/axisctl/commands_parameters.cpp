@@ -8,6 +8,7 @@
 #include "api/axisctl/drive_commands.hpp"
 #include "api/axisctl/drive_view.hpp"
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/lease_option.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/drive_service.grpc.pb.h"
 
@@ -19,6 +20,7 @@ using Stub = v1::DriveService::Stub;
 struct Arguments {
   std::string axis, pattern;
   std::vector<std::string> names;
+  std::uint64_t lease_token = 0;
   bool read = false, describe = false;
 };
 
@@ -92,6 +94,7 @@ void read(Invocation& invocation, const Arguments& arguments) {
 void write(Invocation& invocation, const Arguments& arguments) {
   v1::WriteParametersRequest request;
   request.set_axis(arguments.axis);
+  request.set_lease_token(arguments.lease_token);
   Names names(invocation, arguments.axis);
   for (const auto& text : arguments.names) {
     auto& value = *request.add_values() = parse_assignment(text);
@@ -125,6 +128,7 @@ void add_parameter_commands(CLI::App& drive, Invocation& invocation) {
       "write", "Write parameters, all or none, and read them back; at standstill, power stage off", write);
   write_command->add_option("NAME=VALUE", written->names, "Decimal or hexadecimal: current=6, 2006h:00=0x8")
       ->required();
+  add_lease(*write_command, written->lease_token);
   write_command->footer("\nExample: axisctl drive write feeder lock_current=1 current=0x6");
 }
 

@@ -8,6 +8,7 @@
 
 #include "api/axisctl/drive_commands.hpp"
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/lease_option.hpp"
 #include "api/axisctl/segment_text.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/drive_service.grpc.pb.h"
@@ -20,6 +21,7 @@ using Stub = v1::DriveService::Stub;
 struct Arguments {
   std::string axis, file;
   std::vector<std::string> positions, velocities;
+  std::uint64_t lease_token = 0;
   bool absolute = false, clear = false;
 
   [[nodiscard]] bool listed() const { return absolute || !positions.empty() || !velocities.empty(); }
@@ -59,6 +61,7 @@ void segments(Invocation& invocation, const Arguments& arguments) {
   }
   v1::WriteSegmentsRequest request;
   request.set_axis(arguments.axis);
+  request.set_lease_token(arguments.lease_token);
   *request.mutable_segments() = table_of(arguments, unit);
   show(invocation, invocation.client().call(&Stub::WriteSegments, request, arguments.axis).segments(), unit);
 }
@@ -81,6 +84,7 @@ void add_segment_command(CLI::App& drive, Invocation& invocation) {
   command->add_option("--set", arguments->file, "The table from a file, as --json prints it")
       ->type_name("FILE");
   command->add_flag("--clear", arguments->clear, "Empty the table");
+  add_lease(*command, arguments->lease_token);
   command->footer(R"(
 Examples:
   axisctl drive segments feeder

@@ -27,6 +27,7 @@ Request request_of(const Arguments& arguments) {
   Request request;
   request.set_axis(arguments.axis);
   request.set_confirm(arguments.confirm);
+  request.set_lease_token(arguments.lease_token);
   if (!arguments.verify.empty()) set(*request.mutable_verify(), parse_duration(arguments.verify, "--verify"));
   return request;
 }

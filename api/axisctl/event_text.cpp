@@ -40,6 +40,23 @@ std::string text_of(const v1::FlightRecordWritten& record) {
   return fmt::format("{}: flight record {}: {}", record.bus(), record.name(), record.reason());
 }
 
+std::string text_of(const v1::LeaseChange& change) {
+  switch (change.kind()) {
+    case v1::LEASE_CHANGE_KIND_ACQUIRED:
+      return "leased by " + change.holder();
+    case v1::LEASE_CHANGE_KIND_RELEASED:
+      return "lease released by " + change.before();
+    case v1::LEASE_CHANGE_KIND_EXPIRED:
+      return fmt::format("lease of {} expired", change.before());
+    case v1::LEASE_CHANGE_KIND_TAKEN:
+      return change.holder().empty()
+                 ? fmt::format("lease of {} ended: another of its axes was taken", change.before())
+                 : fmt::format("lease taken by {} from {}", change.holder(), change.before());
+    default:
+      return "a change of the lease that this axisctl does not know";
+  }
+}
+
 std::string content(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
@@ -52,6 +69,8 @@ std::string content(const v1::Event& event) {
       return text_of(event.configuration_drift());
     case v1::Event::kFlightRecord:
       return text_of(event.flight_record());
+    case v1::Event::kLeaseChange:
+      return text_of(event.lease_change());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -76,7 +95,7 @@ v1::EventKind parse_event_kind(std::string_view text) {
   }
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
-                            "configuration, flight",
+                            "configuration, flight, lease",
                             text));
 }
 

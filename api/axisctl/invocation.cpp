@@ -26,7 +26,7 @@ Exit status:
   4    the daemon refused
   130  interrupted while waiting
 
-Environment: AXISD_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, NO_COLOR.)";
+Environment: AXISD_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_LEASE, NO_COLOR.)";
 
 void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_option("--server", invocation.connection.server, "The daemon: HOST:PORT or unix:PATH")
@@ -92,6 +92,7 @@ std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   add_jog_command(*app, invocation);
   add_stop_commands(*app, invocation);
   add_command_commands(*app, invocation);
+  add_lease_commands(*app, invocation);
   add_run_command(*app, invocation);
   add_plot_command(*app, invocation);
   add_drive_commands(*app, invocation);

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "api/axisctl/duration.hpp"
+#include "api/axisctl/lease_option.hpp"
 #include "api/axisctl/quantity.hpp"
 
 namespace axisd::axisctl {
@@ -35,8 +36,7 @@ void add_options(CLI::App& command, MotionArguments& arguments) {
       .add_option("--valid-for", arguments.valid_for,
                   "Send nothing to the drive after this time (default 60s)")
       ->type_name("TIME");
-  command.add_option("--lease-token", arguments.lease_token, "Fencing token of the lease that is held")
-      ->type_name("N");
+  add_lease(command, arguments.lease_token);
 }
 
 void add_wait(CLI::App& command, MotionArguments& arguments) {

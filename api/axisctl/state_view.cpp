@@ -77,6 +77,7 @@ std::string remarks(const v1::AxisState& state) {
   if (state.simulated()) append(text, "simulated");
   if (state.inhibited()) append(text, "all stopped");
   if (state.stop_held()) append(text, "stop held");
+  if (!state.lease_holder().empty()) append(text, "leased by " + state.lease_holder());
   if (state.alarm_code() != 0)
     append(text, fmt::format("alarm {} {}", state.alarm_code(), state.alarm_name()));
   if (const auto cause = foreign_motion(state); !cause.empty()) append(text, cause);
@@ -133,6 +134,7 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   if (state.moving())
     details.add("motion", foreign_motion(state).empty() ? "by command" : foreign_motion(state));
   details.add("command", state.command_id());
+  if (!state.lease_holder().empty()) details.add("lease", state.lease_holder());
   details.add("inputs", terminals(state.inputs()));
   details.add("outputs", terminals(state.outputs()));
   details.add("drive",

@@ -140,6 +140,7 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   to.set_drift(from.drift);
   to.set_eeprom_writes(from.eeprom_writes);
   to.set_link_note(from.link_note);
+  to.set_lease_holder(from.lease_holder);
   to.set_revision(from.revision);
 }
 

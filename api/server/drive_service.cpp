@@ -26,6 +26,12 @@ std::string entry(const grpc::CallbackServerContext& context, std::string_view a
   return fmt::format("{}: {} {}", client_of(context), axis, what);
 }
 
+/// Who asks for a change, and under which lease.
+template <class Request>
+Requester requester(const grpc::CallbackServerContext& context, const Request& request) {
+  return {.client = client_of(context), .lease_token = request.lease_token()};
+}
+
 }  // namespace
 
 DriveServiceImpl::Reactor* DriveServiceImpl::refuse(Context* context, std::string_view what,
@@ -92,7 +98,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteParameters(Context* context,
     std::string what = entry(*context, request->axis(), "write_parameters");
     for (const auto& value : request->values()) what += fmt::format(" {}={}", value.name(), value.value());
     services_.machine.drive_access().write_parameters(
-        request->axis(), *values, client_of(*context),
+        request->axis(), *values, requester(*context, *request),
         reply_with_value<Values>(
             call,
             [response, model = drive->model](const Values& read_back) {
@@ -112,7 +118,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::SaveParameters(Context* context,
     return refuse(context, "save_parameters", confirmed.error());
   return begin(context, [&](const Call& call) {
     services_.machine.drive_access().save_parameters(
-        axis, client_of(*context),
+        axis, requester(*context, *request),
         reply_with_value<void>(call, [] {}, entry(*context, axis, "save_parameters")));
   });
 }
@@ -127,7 +133,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::RestoreFactory(Context* context,
     return refuse(context, "restore_factory", confirmed.error());
   return begin(context, [&](const Call& call) {
     services_.machine.drive_access().restore_factory(
-        axis, client_of(*context),
+        axis, requester(*context, *request),
         reply_with_value<std::string>(
             call, [response](const std::string& text) { response->set_after_power_cycle(text); },
             entry(*context, axis, "restore_factory")));
@@ -161,7 +167,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteSegments(Context* context,
   const auto segments = segments_to_write(request->segments(), *drive);
   if (!segments) return refuse(context, "write_segments", segments.error());
   return begin(context, [&](const Call& call) {
-    services_.machine.drive_access().write_segments(request->axis(), *segments, client_of(*context),
+    services_.machine.drive_access().write_segments(request->axis(), *segments, requester(*context, *request),
                                                     reply_with_value<SegmentSettings>(
                                                         call,
                                                         [response](const SegmentSettings& read_back) {
@@ -193,8 +199,8 @@ grpc::ServerWriteReactor<Response>* DriveServiceImpl::change_serial(Context* con
   auto* stream = Stream::start(
       services_, context, *std::move(ticket),
       [&](typename Stream::Callback callback) {
-        return services_.machine.drive_access().change_serial(request.axis(), *change, client,
-                                                              std::move(callback));
+        return services_.machine.drive_access().change_serial(
+            request.axis(), *change, requester(*context, request), std::move(callback));
       },
       [last](const SerialProgress& from, Response& to) {
         to.set_phase(to_proto(from.phase));

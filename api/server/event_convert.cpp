@@ -1,5 +1,6 @@
 #include "api/server/event_convert.hpp"
 
+#include <utility>
 #include <variant>
 
 #include "api/server/convert.hpp"
@@ -40,6 +41,14 @@ void fill(const FlightRecordWritten& from, v1::Event& event) {
   to.set_reason(from.reason);
 }
 
+void fill(const LeaseChange& from, v1::Event& event) {
+  auto& to = *event.mutable_lease_change();
+  to.set_kind(static_cast<v1::LeaseChangeKind>(std::to_underlying(from.what) + 1));  // 0 is "unspecified"
+  to.set_holder(from.holder);
+  to.set_before(from.before);
+}
+static_assert(std::to_underlying(LeaseChange::What::taken) + 1 == v1::LEASE_CHANGE_KIND_TAKEN);
+
 }  // namespace
 
 v1::EventKind kind_of(const Event& event) {
@@ -49,6 +58,7 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const LinkChange&) const { return v1::EVENT_KIND_LINK_CHANGE; }
     v1::EventKind operator()(const ConfigurationDrift&) const { return v1::EVENT_KIND_CONFIGURATION_DRIFT; }
     v1::EventKind operator()(const FlightRecordWritten&) const { return v1::EVENT_KIND_FLIGHT_RECORD; }
+    v1::EventKind operator()(const LeaseChange&) const { return v1::EVENT_KIND_LEASE_CHANGE; }
   };
   return std::visit(Kind{}, event.content);
 }

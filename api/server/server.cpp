@@ -17,6 +17,7 @@
 #include "api/server/drive_service.hpp"
 #include "api/server/event_hub.hpp"
 #include "api/server/event_service.hpp"
+#include "api/server/lease_service.hpp"
 #include "api/server/status.hpp"
 #include "api/server/system_service.hpp"
 #include "api/server/watch_hub.hpp"
@@ -69,7 +70,8 @@ struct Server::Parts {
         system(services),
         bus(services),
         drive(services),
-        event(services) {}
+        event(services),
+        lease(services) {}
 
   std::shared_ptr<ReplyThread> reply;
   std::shared_ptr<OpenCalls> calls;
@@ -84,6 +86,7 @@ struct Server::Parts {
   BusServiceImpl bus;
   DriveServiceImpl drive;
   EventServiceImpl event;
+  LeaseServiceImpl lease;
   std::unique_ptr<AcceptLoop::Acceptor> tcp_acceptor, unix_acceptor;
   std::unique_ptr<grpc::Server> server;
   AcceptLoop accept;
@@ -120,8 +123,9 @@ Result<int> Server::start() {
   enable_plugins();
   grpc::ServerBuilder builder;
   limit_transport(builder);
-  for (grpc::Service* service : std::initializer_list<grpc::Service*>{
-           &parts_->axis, &parts_->command, &parts_->system, &parts_->bus, &parts_->drive, &parts_->event})
+  for (grpc::Service* service :
+       std::initializer_list<grpc::Service*>{&parts_->axis, &parts_->command, &parts_->system, &parts_->bus,
+                                             &parts_->drive, &parts_->event, &parts_->lease})
     builder.RegisterService(service);
   constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
   parts_->tcp_acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
@@ -148,7 +152,8 @@ Result<int> Server::start() {
   health->SetServingStatus(true);
   for (const auto* name : {v1::AxisService::service_full_name(), v1::CommandService::service_full_name(),
                            v1::SystemService::service_full_name(), v1::BusService::service_full_name(),
-                           v1::DriveService::service_full_name(), v1::EventService::service_full_name()})
+                           v1::DriveService::service_full_name(), v1::EventService::service_full_name(),
+                           v1::LeaseService::service_full_name()})
     health->SetServingStatus(name, true);
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,

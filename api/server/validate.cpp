@@ -163,14 +163,19 @@ Result<void> check_command_id(std::string_view id) {
   return fail(Reason::invalid_argument, "id is not a command id", "give the id as it stands in Command.id");
 }
 
+Result<void> check_request_id(std::string_view id, std::string_view field) {
+  if (usable_id(id)) return {};
+  return fail(Reason::invalid_argument, fmt::format("{} is not usable", field),
+              fmt::format("use 1 to {} printable ASCII characters without spaces", longest_id));
+}
+
 Result<Submission> motion_options(const v1::CommandOptions& from, std::string client,
                                   const Machine& machine) {
   if (from.request_id().empty())
     return fail(Reason::invalid_argument, "options.request_id is missing",
                 "give each motion an id of your own, so that repeating the call cannot repeat the motion");
-  if (!usable_id(from.request_id()))
-    return fail(Reason::invalid_argument, "options.request_id is not usable",
-                fmt::format("use 1 to {} printable ASCII characters without spaces", longest_id));
+  if (auto usable = check_request_id(from.request_id(), "options.request_id"); !usable)
+    return fail(usable.error());
   const auto until = wait_until(from.wait_until());
   if (!until) return fail(until.error());
   const auto mode = buffer_mode(from.buffer_mode());

@@ -18,6 +18,10 @@ namespace axisd::server {
 /// An id as the daemon gives them out: 1 to 128 printable characters. Errors: invalid_argument.
 [[nodiscard]] Result<void> check_command_id(std::string_view id);
 
+/// A client's own id of a request: 1 to 128 printable characters without spaces. Errors: invalid_argument,
+/// naming `field`.
+[[nodiscard]] Result<void> check_request_id(std::string_view id, std::string_view field);
+
 /// How a command is to be submitted.
 struct Submission {
   CommandOptions options;

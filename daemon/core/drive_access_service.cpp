@@ -27,6 +27,11 @@ Task<> answer(DriveOperations operations, std::function<Task<Result<T>>(const Dr
   callback(co_await operation(operations));
 }
 
+template <class T>
+Task<Result<T>> refused(Error error) {
+  co_return fail(std::move(error));
+}
+
 }  // namespace
 
 template <class T>
@@ -42,15 +47,26 @@ void DriveAccessService::run(std::string axis,
 }
 
 template <class T>
-void DriveAccessService::run_at_rest(std::string axis,
+void DriveAccessService::run_leased(std::string axis, Requester requester,
+                                    std::function<Task<Result<T>>(const DriveOperations&)> operation,
+                                    std::function<void(Result<T>)> callback, const char* name) {
+  auto guarded = [this, axis, requester = std::move(requester),
+                  operation = std::move(operation)](const DriveOperations& drive) {
+    const auto allowed = machine_->find(axis)->check_lease(requester);
+    return allowed ? operation(drive) : refused<T>(allowed.error());
+  };
+  run<T>(std::move(axis), std::move(guarded), std::move(callback), name);
+}
+
+template <class T>
+void DriveAccessService::run_at_rest(std::string axis, Requester requester,
                                      std::function<Task<Result<T>>(const DriveOperations&)> operation,
                                      std::function<void(Result<T>)> callback, const char* name) {
   auto guarded = [this, axis, operation = std::move(operation)](const DriveOperations& drive) {
-    auto refused = [](Error error) -> Task<Result<T>> { co_return fail(std::move(error)); };
     const auto rests = check_bus_rests(*machine_->find(axis));
-    return rests ? operation(drive) : refused(rests.error());
+    return rests ? operation(drive) : refused<T>(rests.error());
   };
-  run<T>(std::move(axis), std::move(guarded), std::move(callback), name);
+  run_leased<T>(std::move(axis), std::move(requester), std::move(guarded), std::move(callback), name);
 }
 
 Result<void> DriveAccessService::check_bus_rests(const Axis& axis) const {
@@ -86,29 +102,30 @@ void DriveAccessService::read_parameters(std::string axis, std::vector<std::uint
 }
 
 void DriveAccessService::write_parameters(std::string axis, std::vector<ParameterValue> values,
-                                          std::string client, ValuesCallback callback) {
-  audit(client, axis, fmt::format("writes {} parameters", values.size()));
-  run<std::vector<ParameterValue>>(
-      std::move(axis),
+                                          Requester requester, ValuesCallback callback) {
+  audit(requester.client, axis, fmt::format("writes {} parameters", values.size()));
+  run_leased<std::vector<ParameterValue>>(
+      std::move(axis), std::move(requester),
       [values = std::move(values)](const DriveOperations& drive) { return drive.write_parameters(values); },
       std::move(callback), "write parameters");
 }
 
-void DriveAccessService::save_parameters(std::string axis, std::string client,
+void DriveAccessService::save_parameters(std::string axis, Requester requester,
                                          std::function<void(Result<void>)> callback) {
-  audit(client, axis, "saves all parameters to the EEPROM");
+  audit(requester.client, axis, "saves all parameters to the EEPROM");
   run_at_rest<void>(
-      std::move(axis), [](const DriveOperations& drive) { return drive.save_parameters(); },
-      std::move(callback), "save parameters");
+      std::move(axis), std::move(requester),
+      [](const DriveOperations& drive) { return drive.save_parameters(); }, std::move(callback),
+      "save parameters");
 }
 
-void DriveAccessService::restore_factory(std::string axis, std::string client,
+void DriveAccessService::restore_factory(std::string axis, Requester requester,
                                          std::function<void(Result<std::string>)> callback) {
-  audit(client, axis, "restores the factory settings");
+  audit(requester.client, axis, "restores the factory settings");
   const auto* found = machine_->find(axis);  // axes never change, nor do their settings
   auto taken = found == nullptr ? std::vector<std::uint8_t>{} : others_on_bus(*found);
   run_at_rest<std::string>(
-      std::move(axis),
+      std::move(axis), std::move(requester),
       [taken = std::move(taken)](const DriveOperations& drive) { return drive.restore_factory(taken); },
       std::move(callback), "restore factory settings");
 }
@@ -119,11 +136,11 @@ void DriveAccessService::read_segments(std::string axis, SegmentsCallback callba
       std::move(callback), "read segments");
 }
 
-void DriveAccessService::write_segments(std::string axis, SegmentSettings segments, std::string client,
+void DriveAccessService::write_segments(std::string axis, SegmentSettings segments, Requester requester,
                                         SegmentsCallback callback) {
-  audit(client, axis, "writes the segment table");
-  run<SegmentSettings>(
-      std::move(axis),
+  audit(requester.client, axis, "writes the segment table");
+  run_leased<SegmentSettings>(
+      std::move(axis), std::move(requester),
       [segments = std::move(segments)](const DriveOperations& drive) {
         return drive.write_segments(segments);
       },
@@ -131,24 +148,26 @@ void DriveAccessService::write_segments(std::string axis, SegmentSettings segmen
 }
 
 std::shared_ptr<void> DriveAccessService::change_serial(std::string axis, SerialChange change,
-                                                        std::string client, SerialCallback callback) {
-  audit(client, axis, "changes address or serial settings");
+                                                        Requester requester, SerialCallback callback) {
+  audit(requester.client, axis, "changes address or serial settings");
   auto token = std::make_shared<int>(0);
-  post(executor_, [this, axis = std::move(axis), change, callback = std::move(callback),
-                   alive = std::weak_ptr<void>(token)]() mutable {
+  post(executor_, [this, axis = std::move(axis), requester = std::move(requester), change,
+                   callback = std::move(callback), alive = std::weak_ptr<void>(token)]() mutable {
     auto* found = machine_->find(axis);
     if (found == nullptr) return callback(fail(no_such_axis(axis)));
-    machine_->launch(run_serial_change(*found, change, std::move(alive), std::move(callback)),
-                     "change address");
+    machine_->launch(
+        run_serial_change(*found, std::move(requester), change, std::move(alive), std::move(callback)),
+        "change address");
   });
   return token;
 }
 
-Task<> DriveAccessService::run_serial_change(Axis& axis, SerialChange change, std::weak_ptr<void> alive,
-                                             SerialCallback callback) {
+Task<> DriveAccessService::run_serial_change(Axis& axis, Requester requester, SerialChange change,
+                                             std::weak_ptr<void> alive, SerialCallback callback) {
   const auto tell = [&](Result<SerialProgress> progress) {
     if (const auto held = alive.lock()) callback(std::move(progress));
   };
+  if (const auto allowed = axis.check_lease(requester); !allowed) co_return tell(fail(allowed.error()));
   if (const auto possible = check_serial(axis, change); !possible) co_return tell(fail(possible.error()));
   const auto written = co_await DriveOperations(axis).change_serial(change, others_on_bus(axis));
   if (!written) co_return tell(fail(written.error()));

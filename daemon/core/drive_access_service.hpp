@@ -25,16 +25,16 @@ class DriveAccessService final : public DriveAccess {
   void drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) override;
   void read_parameters(std::string axis, std::vector<std::uint32_t> addresses,
                        ValuesCallback callback) override;
-  void write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+  void write_parameters(std::string axis, std::vector<ParameterValue> values, Requester requester,
                         ValuesCallback callback) override;
-  void save_parameters(std::string axis, std::string client,
+  void save_parameters(std::string axis, Requester requester,
                        std::function<void(Result<void>)> callback) override;
-  void restore_factory(std::string axis, std::string client,
+  void restore_factory(std::string axis, Requester requester,
                        std::function<void(Result<std::string>)> callback) override;
   void read_segments(std::string axis, SegmentsCallback callback) override;
-  void write_segments(std::string axis, SegmentSettings segments, std::string client,
+  void write_segments(std::string axis, SegmentSettings segments, Requester requester,
                       SegmentsCallback callback) override;
-  std::shared_ptr<void> change_serial(std::string axis, SerialChange change, std::string client,
+  std::shared_ptr<void> change_serial(std::string axis, SerialChange change, Requester requester,
                                       std::function<void(Result<SerialProgress>)> callback) override;
 
  private:
@@ -42,12 +42,18 @@ class DriveAccessService final : public DriveAccess {
   /// Runs `operation` on the axis as a sequence of the machine and calls back with its result. By reference:
   /// the sequence keeps the object that its coroutine is a member of.
   template <class T>
-  void run_at_rest(std::string axis, std::function<Task<Result<T>>(const DriveOperations&)> operation,
+  void run_at_rest(std::string axis, Requester requester,
+                   std::function<Task<Result<T>>(const DriveOperations&)> operation,
                    std::function<void(Result<T>)> callback, const char* name);
+  /// The same for who may command the axis.
+  template <class T>
+  void run_leased(std::string axis, Requester requester,
+                  std::function<Task<Result<T>>(const DriveOperations&)> operation,
+                  std::function<void(Result<T>)> callback, const char* name);
   template <class T>
   void run(std::string axis, std::function<Task<Result<T>>(const DriveOperations&)> operation,
            std::function<void(Result<T>)> callback, const char* name);
-  Task<> run_serial_change(Axis& axis, SerialChange change, std::weak_ptr<void> alive,
+  Task<> run_serial_change(Axis& axis, Requester requester, SerialChange change, std::weak_ptr<void> alive,
                            SerialCallback callback);
   [[nodiscard]] Result<void> check_serial(const Axis& axis, const SerialChange& change) const;
   /// A search for the drive where it will be after its power cycle.

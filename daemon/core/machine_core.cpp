@@ -51,7 +51,12 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
       flight_recorder_(*parts_.clock, parts_.flight_records,
                        [this](const std::string& axis, const FlightRecordWritten& record) {
                          events_.record(parts_.clock->wall(parts_.clock->now()), axis, record);
-                       }) {
+                       }),
+      leases_(
+          *parts_.clock, configuration.leases,
+          parts_.persistence == nullptr ? 0 : parts_.persistence->loaded().start_count,
+          [this](std::string_view axis) { return find(axis); },
+          [this](const std::string& axis, EventContent content) { on_event(axis, std::move(content)); }) {
   const auto memory = static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024;
   if (parts_.persistence != nullptr) {
     const auto& inhibit = parts_.persistence->loaded().inhibit;
@@ -99,6 +104,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                                                            .bus = bus,
                                                            .book = &book_,
                                                            .persistence = parts_.persistence,
+                                                           .leases = &leases_.table(),
                                                            .inhibited = &inhibited_,
                                                            .published = parts_.published,
                                                            .event = record},
@@ -303,6 +309,7 @@ bool MachineCore::at_rest() const {
 void MachineCore::close() {
   closing_ = true;
   flight_recorder_.close();
+  leases_.close();
   for (const auto& axis : axes_) axis->close();
   for (const auto& device : devices_) device->close();
   for (const auto& cycler : cyclers_) cycler->close();

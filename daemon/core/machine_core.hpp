@@ -13,6 +13,7 @@
 #include "daemon/core/bus_recorder.hpp"
 #include "daemon/core/event_log.hpp"
 #include "daemon/core/flight_recorder.hpp"
+#include "daemon/core/lease_keeper.hpp"
 #include "daemon/core/link_cycler.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
@@ -65,6 +66,7 @@ class MachineCore {
   [[nodiscard]] const std::vector<std::unique_ptr<Device>>& devices() const { return devices_; }
   [[nodiscard]] CommandBook& book() { return book_; }
   [[nodiscard]] EventLog& events() { return events_; }
+  [[nodiscard]] LeaseKeeper& leases() { return leases_; }
 
   Result<CommandPtr> submit(const std::string& axis, const Action& action, const CommandOptions& options);
   /// Latches the inhibit first, then stops every axis, moving ones first (M14).
@@ -106,6 +108,7 @@ class MachineCore {
   EventLog events_;
   std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before these, which tell them
   FlightRecorder flight_recorder_;
+  LeaseKeeper leases_;
   bool inhibited_ = false;
   int latches_ = 0;  ///< StopAlls so far
   boost::atomic_shared_ptr<const std::string> inhibited_by_;

@@ -32,6 +32,7 @@ MachineService::MachineService(CoreLoop& loop, MachineCore& machine, std::string
       drive_access_(loop.executor(), loop.clock(), machine),
       bus_access_(loop.executor(), loop.clock(), machine),
       bus_watch_(loop.executor(), loop.clock(), machine),
+      lease_access_(loop.executor(), machine.leases()),
       name_(std::move(name)),
       instance_id_(std::move(instance_id)) {
   for (const auto& axis : machine.axes()) {

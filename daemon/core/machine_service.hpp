@@ -9,6 +9,7 @@
 #include "daemon/core/bus_watch_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/drive_access_service.hpp"
+#include "daemon/core/lease_access_service.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/machine.hpp"
 
@@ -37,6 +38,7 @@ class MachineService final : public Machine {
   [[nodiscard]] DriveAccess& drive_access() override { return drive_access_; }
   [[nodiscard]] BusAccess& bus_access() override { return bus_access_; }
   [[nodiscard]] BusWatch& bus_watch() override { return bus_watch_; }
+  [[nodiscard]] LeaseAccess& lease_access() override { return lease_access_; }
   [[nodiscard]] EventSource& events() override { return machine_->events(); }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override { return loop_->clock().wall(t); }
@@ -56,6 +58,7 @@ class MachineService final : public Machine {
   DriveAccessService drive_access_;
   BusAccessService bus_access_;
   BusWatchService bus_watch_;
+  LeaseAccessService lease_access_;
   std::string name_;
   std::string instance_id_;
   std::atomic<bool> closing_{false};

@@ -40,6 +40,7 @@
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
 #include "devices/event.hpp"
+#include "devices/lease/lease_table.hpp"
 #include "devices/persistence.hpp"
 
 namespace axisd {
@@ -51,6 +52,7 @@ struct AxisEnvironment {
   Bus* bus = nullptr;
   CommandBook* book = nullptr;
   Persistence* persistence = nullptr;
+  const LeaseTable* leases = nullptr;
   const bool* inhibited = nullptr;  ///< StopAll is latched
   std::function<void()> published;  ///< after each new snapshot
   std::function<void(const std::string& axis, EventContent)> event{};
@@ -76,7 +78,14 @@ class Axis {
   Result<CommandPtr> release_stop();
   /// Halts the axis if `command` is being executed.
   Result<CommandPtr> cancel(const CommandPtr& command);
-  /// A flag outside changed (inhibit): publish again.
+  /// The lease under which the axis was commanded is over, and the gate knows it: does what the
+  /// configuration says (M16). Motion that has not started by then never does.
+  void lease_lost(const Error& cause);
+  /// What is being executed, if it was given without a lease and needs one where there is one; else nullptr.
+  [[nodiscard]] const Command* commanded_without_lease() const;
+  /// Errors: lease_required, lease_lost.
+  [[nodiscard]] Result<void> check_lease(const Requester& requester) const;
+  /// A flag outside changed (inhibit, lease): publish again.
   void refresh() { publish(); }
   /// The bus could not send for a while, however short: what the axis was doing ends, and a drive that may
   /// move gets a stop first (M4, M26).
@@ -264,7 +273,7 @@ class Axis {
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
   [[nodiscard]] std::string_view homing_switch() const;
 
-  // axis_stop.cpp
+  // axis_stop.cpp; axis_lease.cpp: lease_lost() and what stands beside it
   void supersede(const Error& cause);
   void begin_stop(StopKind kind, bool hold, CommandPtr command);
   Task<> run_stop();

@@ -29,10 +29,11 @@ bool Axis::current(const Activity& activity) const {
 }
 
 MotionGuard Axis::guard(const Activity& activity) const {
+  const bool anybody = activity.command->value().kind == CommandKind::disable;
   // What nobody holds any more does not start, either.
   return {.gate = gate_,
           .epoch = activity.epoch,
-          .fencing_token = activity.options.lease_token,
+          .fencing_token = anybody ? MotionGuard::needs_no_lease : activity.options.lease_token,
           .not_after = std::min(activity.options.not_after, activity.hold_until.value_or(TimePoint::max()))};
 }
 

@@ -105,6 +105,7 @@ void Axis::publish() {
   next->drift = drift_;
   next->eeprom_writes = eeprom_writes_;
   next->motion_cause = motion_cause();
+  if (const auto* lease = env_.leases->find(settings_.name)) next->lease_holder = lease->holder();
   next->revision = ++revision_;
   next->positive_direction = last_positive_;
   if (activity_) {

@@ -36,10 +36,7 @@ Result<void> Axis::check_common(const CommandOptions& options) const {
   if (options.not_after <= env_.clock->now())
     return fail(
         error(Reason::expired, "the request's validity has passed", "repeat it with a later not_after"));
-  if (options.lease_token != gate_->fencing_token())
-    return fail(
-        error(Reason::lease_lost, "the lease token does not fit", "acquire a lease, or leave the token out"));
-  return {};
+  return check_lease({.client = options.client, .lease_token = options.lease_token});
 }
 
 Result<void> Axis::check_online() const {
@@ -280,7 +277,7 @@ bool Axis::renewed(const Action& action, const CommandOptions& options, Duration
       },
       action);
   if (known.kind != kind_of(action) || known.asked.velocity != velocity ||
-      activity_->options.client != options.client)
+      activity_->options.client != options.client || activity_->options.lease_token != options.lease_token)
     return false;
   activity_->hold_until = env_.clock->now() + hold;
   // Should this very call be repeated later, it belongs to this command, too, and starts nothing.

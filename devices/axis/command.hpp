@@ -62,9 +62,9 @@ struct Command {
 enum class BufferMode : std::uint8_t { aborting, buffered };
 
 struct CommandOptions {
-  std::string client;      ///< identity that request_id is scoped to
-  std::string request_id;  ///< required for motion
-  std::uint64_t lease_token = 0;
+  std::string client;             ///< identity that request_id is scoped to
+  std::string request_id;         ///< required for motion
+  std::uint64_t lease_token = 0;  ///< 0: under no lease
   TimePoint not_after = TimePoint::max();
   TimePoint arrived{};  ///< at the server; not set: the daemon's own
   BufferMode buffer_mode = BufferMode::aborting;

@@ -87,6 +87,14 @@ struct HomingSettings {
   Duration timeout = std::chrono::seconds(60);
 };
 
+/// What an axis does when the lease under which it is commanded ends (M16).
+enum class LeaseLoss : std::uint8_t {
+  halt,
+  stop,
+  disable,  ///< stop, confirm standstill, release the power stage
+  finish    ///< lets a move or homing that has started end; anything else halts
+};
+
 /// Value of a model-specific setting, after the descriptor's schema was applied.
 using SettingValue = std::variant<bool, std::int64_t, double, std::string>;
 
@@ -106,7 +114,8 @@ struct AxisSettings {
   LimitSettings limits{};
   std::optional<HomingSettings> homing{};
   std::vector<TerminalSettings> inputs{}, outputs{};
-  bool vertical = false;                 ///< `load: vertical` (M2)
+  bool vertical = false;  ///< `load: vertical` (M2)
+  LeaseLoss on_lease_loss = LeaseLoss::halt;
   bool stop_escalation_release = false;  ///< `stop_escalation: release` (M13)
   bool require_trust = true;             ///< absolute moves need a trusted position
   double jog_travel = 0;          ///< user units; longest jog of an axis whose position is unknown (M16)

@@ -91,6 +91,7 @@ struct AxisSnapshot {
   TimePoint sampled_before{};
   WallTime measured_at{};
   std::string command_id{};    ///< current command, if any
+  std::string lease_holder{};  ///< who leases the axis; empty: nobody
   std::uint64_t revision = 0;  ///< rises with every publication
 };
 /// boost's pointer: libstdc++ 12's atomic shared_ptr is a data race to ThreadSanitizer.

@@ -13,6 +13,7 @@ import grpc.aio
 from google.protobuf import duration_pb2
 from fake_axis import ENDS, STEP, FakeAxis, offline_detail, refuse  # makes axisd importable
 from fake_drives import SERVICES, FakeDrives, FakeEvents, FakeNodes
+from fake_leases import SERVICES as LEASE_SERVICES, FakeLeases
 from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes_rpc,
                       budget_pb2 as budget_pb, bus_service_pb2 as bus_pb, bus_service_pb2_grpc as bus_rpc,
                       command_service_pb2 as command_pb, command_service_pb2_grpc as command_rpc,
@@ -21,13 +22,14 @@ from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes
 GRANTED_STEP = 3.0
 
 
-class FakeMachine(FakeDrives, FakeNodes, FakeEvents, axes_rpc.AxisServiceServicer,
+class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeLeases, axes_rpc.AxisServiceServicer,
                   command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer, system_rpc.SystemServiceServicer):
     """All services. `calls` records (method, request, peer) of every call, for assertions."""
 
     def __init__(self):
         FakeDrives.__init__(self)
         FakeEvents.__init__(self)
+        FakeLeases.__init__(self)
         self.inhibited = False
         self.calls = []
         self.commands = {}
@@ -346,7 +348,8 @@ async def serve(machine, addresses):
     server = grpc.aio.server(options=(("grpc.http2.min_recv_ping_interval_without_data_ms", 900),
                                       ("grpc.http2.max_ping_strikes", 0)))
     for add in (axes_rpc.add_AxisServiceServicer_to_server, command_rpc.add_CommandServiceServicer_to_server,
-                bus_rpc.add_BusServiceServicer_to_server, system_rpc.add_SystemServiceServicer_to_server, *SERVICES):
+                bus_rpc.add_BusServiceServicer_to_server, system_rpc.add_SystemServiceServicer_to_server, *SERVICES,
+                *LEASE_SERVICES):
         add(machine, server)
     ports = [server.add_insecure_port(address) for address in addresses]
     await server.start()

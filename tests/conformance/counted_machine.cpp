@@ -32,38 +32,40 @@ class CountedDrives final : public DriveAccess {
       inner_->read_parameters(axis, addresses, ledger_->answer(ticket, callback));
     });
   }
-  void write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+  void write_parameters(std::string axis, std::vector<ParameterValue> values, Requester requester,
                         ValuesCallback callback) override {
     ledger_->enter([=, this](auto ticket) {
-      inner_->write_parameters(axis, values, client, ledger_->answer(ticket, callback));
+      inner_->write_parameters(axis, values, requester, ledger_->answer(ticket, callback));
     });
   }
-  void save_parameters(std::string axis, std::string client,
+  void save_parameters(std::string axis, Requester requester,
                        std::function<void(Result<void>)> callback) override {
-    ledger_->enter(
-        [=, this](auto ticket) { inner_->save_parameters(axis, client, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](auto ticket) {
+      inner_->save_parameters(axis, requester, ledger_->answer(ticket, callback));
+    });
   }
-  void restore_factory(std::string axis, std::string client,
+  void restore_factory(std::string axis, Requester requester,
                        std::function<void(Result<std::string>)> callback) override {
-    ledger_->enter(
-        [=, this](auto ticket) { inner_->restore_factory(axis, client, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](auto ticket) {
+      inner_->restore_factory(axis, requester, ledger_->answer(ticket, callback));
+    });
   }
   void read_segments(std::string axis, SegmentsCallback callback) override {
     ledger_->enter(
         [=, this](auto ticket) { inner_->read_segments(axis, ledger_->answer(ticket, callback)); });
   }
-  void write_segments(std::string axis, SegmentSettings segments, std::string client,
+  void write_segments(std::string axis, SegmentSettings segments, Requester requester,
                       SegmentsCallback callback) override {
     ledger_->enter([=, this](auto ticket) {
-      inner_->write_segments(axis, segments, client, ledger_->answer(ticket, callback));
+      inner_->write_segments(axis, segments, requester, ledger_->answer(ticket, callback));
     });
   }
   /// Counts until the first phase is reported: what follows waits for somebody to switch the drive off and
   /// on.
-  Token change_serial(std::string axis, SerialChange change, std::string client,
+  Token change_serial(std::string axis, SerialChange change, Requester requester,
                       std::function<void(Result<SerialProgress>)> callback) override {
     return deferred(*ledger_, [=, this](auto ticket) {
-      return inner_->change_serial(axis, change, client, ledger_->answer(ticket, callback));
+      return inner_->change_serial(axis, change, requester, ledger_->answer(ticket, callback));
     });
   }
 
@@ -143,6 +145,28 @@ class CountedWatch final : public BusWatch {
   CallLedger* ledger_;
 };
 
+class CountedLeases final : public LeaseAccess {
+ public:
+  CountedLeases(LeaseAccess& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
+
+  void acquire(LeaseRequest request, std::function<void(Result<LeaseGrant>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->acquire(request, ledger_->answer(ticket, callback)); });
+  }
+  void renew(Requester holder, std::function<void(Result<Lease>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->renew(holder, ledger_->answer(ticket, callback)); });
+  }
+  void release(Requester holder, std::function<void(Result<void>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->release(holder, ledger_->answer(ticket, callback)); });
+  }
+  void list(std::function<void(std::vector<Lease>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->list(ledger_->answer(ticket, callback)); });
+  }
+
+ private:
+  LeaseAccess* inner_;
+  CallLedger* ledger_;
+};
+
 class CountedMachine final : public Machine {
  public:
   CountedMachine(Machine& inner, CallLedger& ledger)
@@ -150,7 +174,8 @@ class CountedMachine final : public Machine {
         ledger_(&ledger),
         drives_(inner.drive_access(), ledger),
         buses_(inner.bus_access(), ledger),
-        watch_(inner.bus_watch(), ledger) {}
+        watch_(inner.bus_watch(), ledger),
+        leases_(inner.lease_access(), ledger) {}
 
   [[nodiscard]] std::vector<std::string> axis_names() const override { return inner_->axis_names(); }
   [[nodiscard]] AxisSnapshotPtr snapshot(std::string_view axis) const override {
@@ -195,6 +220,7 @@ class CountedMachine final : public Machine {
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }
   [[nodiscard]] BusWatch& bus_watch() override { return watch_; }
+  [[nodiscard]] LeaseAccess& lease_access() override { return leases_; }
   [[nodiscard]] EventSource& events() override { return inner_->events(); }
   void on_published(std::function<void()> notify) override { inner_->on_published(std::move(notify)); }
   [[nodiscard]] WallTime wall(TimePoint t) const override { return inner_->wall(t); }
@@ -206,6 +232,7 @@ class CountedMachine final : public Machine {
   CountedDrives drives_;
   CountedBuses buses_;
   CountedWatch watch_;
+  CountedLeases leases_;
 };
 
 }  // namespace

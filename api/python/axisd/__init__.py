@@ -10,9 +10,10 @@ from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
 from .drive import Drive
 from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
-                     LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress, StateChange,
-                     TerminalCapability, TerminalEdge, VelocitySegment)
-from .errors import AxisdError, MotionError, RefusedError, UnreachableError
+                     LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
+                     StateChange, TerminalCapability, TerminalEdge, VelocitySegment)
+from .errors import AxisdError, LeaseLostError, MotionError, RefusedError, UnreachableError
+from .lease import Lease, LeaseInfo
 from .machine import Machine, connect
 from .traffic import (BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, Quarantine, TracedFrame,
                       UnknownOutcomes)
@@ -22,8 +23,9 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 __all__ = [
     "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
     "ClassStatistics", "Command", "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
-    "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Link",
-    "LinkChange", "Machine", "MotionCause", "MotionError", "MotionValues", "Network", "NetworkLink", "NodeStatistics",
+    "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Lease",
+    "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
+    "MotionValues", "Network", "NetworkLink", "NodeStatistics",
     "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "RefusedError", "ScanProgress", "Segments",
     "SerialProgress", "State", "StateChange", "StopBudget", "StopResult", "Terminal", "TerminalCapability",
     "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",

@@ -23,15 +23,17 @@ class Axis:
     wait=False they return once it is accepted (then: Machine.wait). Cancelling such a call in Python does not end the
     motion: halt() or stop() does. `request_id` repeats an earlier call without moving twice."""
 
-    def __init__(self, machine: Machine, name: str) -> None:
+    def __init__(self, machine: Machine, name: str, lease_token: int = 0) -> None:
         self._machine = machine
+        self._lease_token = lease_token
         self.name = name
-        self.drive = Drive(machine, name)
+        self.drive = Drive(machine, name, lease_token)
 
     def __repr__(self) -> str:
         return f"Axis({self.name!r} at {self._machine.server})"
 
     async def _command(self, method: Any, request: Any, wait: bool) -> Command:
+        request.options.lease_token = self._lease_token
         return done(Command.of((await self._machine._call(method, request, self.name, wait)).command))
 
     async def state(self) -> AxisState:

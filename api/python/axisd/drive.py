@@ -21,8 +21,9 @@ class Drive:
     """Parameters, segments and address of a drive; made as Axis.drive. What changes the drive's memory needs standstill
     and the power stage off."""
 
-    def __init__(self, machine: Machine, axis: str) -> None:
+    def __init__(self, machine: Machine, axis: str, lease_token: int = 0) -> None:
         self._machine = machine
+        self._lease_token = lease_token
         self.axis = axis
 
     def __repr__(self) -> str:
@@ -56,17 +57,20 @@ class Drive:
         """Writes all or, if any is refused by the checks, none; returns what was read back."""
         request = drive_service_pb2.WriteParametersRequest(
             axis=self.axis,
-            values=[drive_service_pb2.ParameterValue(name=name, value=value) for name, value in values.items()])
+            values=[drive_service_pb2.ParameterValue(name=name, value=value) for name, value in values.items()],
+            lease_token=self._lease_token)
         return {value.name: value.value for value in (await self._call("WriteParameters", request)).values}
 
     async def save(self, *, confirm: str) -> None:
         """Saves all parameters in the drive's EEPROM. `confirm`: the axis's name again, since this wears it."""
-        await self._memory_call("SaveParameters", drive_service_pb2.SaveParametersRequest(axis=self.axis,
-                                                                                          confirm=confirm))
+        request = drive_service_pb2.SaveParametersRequest(axis=self.axis, confirm=confirm,
+                                                          lease_token=self._lease_token)
+        await self._memory_call("SaveParameters", request)
 
     async def restore_factory(self, *, confirm: str) -> str:
         """Restores the factory settings; returns which address and serial settings apply after the next power-up."""
-        request = drive_service_pb2.RestoreFactoryRequest(axis=self.axis, confirm=confirm)
+        request = drive_service_pb2.RestoreFactoryRequest(axis=self.axis, confirm=confirm,
+                                                          lease_token=self._lease_token)
         return (await self._memory_call("RestoreFactory", request)).after_power_cycle
 
     async def segments(self) -> Segments:
@@ -76,7 +80,8 @@ class Drive:
 
     async def write_segments(self, segments: Segments) -> Segments:
         """Replaces the whole table; returns what was read back."""
-        request = drive_service_pb2.WriteSegmentsRequest(axis=self.axis, segments=segments.message())
+        request = drive_service_pb2.WriteSegmentsRequest(axis=self.axis, segments=segments.message(),
+                                                         lease_token=self._lease_token)
         return Segments.of((await self._call("WriteSegments", request)).segments)
 
     async def readdress(self, node: int, *, confirm: str,
@@ -101,6 +106,7 @@ class Drive:
             time = Duration()
             time.FromTimedelta(datetime.timedelta(seconds=verify))
             request.verify.CopyFrom(time)
+        request.lease_token = self._lease_token
         method = getattr(self._machine._drives, name)
         async with contextlib.aclosing(self._machine._stream(method, request, self.axis)) as stream:
             async for progress in stream:

@@ -228,7 +228,16 @@ class FlightRecordWritten:
     reason: str
 
 
-Content = TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten
+@dataclasses.dataclass(frozen=True)
+class LeaseChange:
+    """Who may command the axis from now on, and until now; empty: nobody. `kind`: "acquired", "released", "expired" or
+    "taken"."""
+    kind: str
+    holder: str
+    before: str
+
+
+Content = TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -248,6 +257,9 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
         return ConfigurationDrift(content.text)
     if kind == "flight_record":
         return FlightRecordWritten(content.bus, content.name, content.reason)
+    if kind == "lease_change":
+        name = event_service_pb2.LeaseChangeKind.Name(content.kind)
+        return LeaseChange(name.removeprefix("LEASE_CHANGE_KIND_").lower(), content.holder, content.before)
     return None
 
 

@@ -45,6 +45,11 @@ class RefusedError(AxisdError):
         return self.detail.remedy if self.detail else ""
 
 
+class LeaseLostError(AxisdError):
+    """The lease ended inside its block: it was not renewed in time, or somebody took it. The text says who has the axes
+    now; moving ones do what their `on_lease_loss` says."""
+
+
 class MotionError(AxisdError):
     """A motion was accepted and ended Aborted, Error or Unknown. `command` is how it ended."""
 

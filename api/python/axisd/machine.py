@@ -16,11 +16,12 @@ from .budget import BusBudget
 from .calls import Seconds, done, duration
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, translate
+from .lease import Lease, LeaseInfo
 from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
                  command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
-                 system_service_pb2, system_service_pb2_grpc, types_pb2)
+                 lease_service_pb2, lease_service_pb2_grpc, system_service_pb2, system_service_pb2_grpc, types_pb2)
 
 _OPTIONS = (
     # The daemon permits one ping per second.
@@ -75,6 +76,7 @@ class Machine:
         self._buses = bus_service_pb2_grpc.BusServiceStub(ordinary)
         self._drives = drive_service_pb2_grpc.DriveServiceStub(ordinary)
         self._events = event_service_pb2_grpc.EventServiceStub(ordinary)
+        self._leases = lease_service_pb2_grpc.LeaseServiceStub(ordinary)
         self._system = system_service_pb2_grpc.SystemServiceStub(ordinary)
         self._system_stops = system_service_pb2_grpc.SystemServiceStub(stops)
         return self
@@ -111,6 +113,16 @@ class Machine:
     def axis(self, name: str) -> Axis:
         """An axis by its name. Asks nothing: an unknown name shows with the first call."""
         return Axis(self, name)
+
+    def lease(self, *axes: str, ttl: Seconds | None = None, label: str = "", take: bool = False) -> Lease:
+        """The exclusive right to command these axes inside an `async with` block, renewed as long as it runs. `ttl`:
+        seconds from each renewal (default: the daemon's). `take`: also from others."""
+        return Lease(self, axes, ttl, label, take)
+
+    async def leases(self) -> list[LeaseInfo]:
+        """Who leases what, oldest first."""
+        response = await self._call(self._leases.ListLeases, lease_service_pb2.ListLeasesRequest(), "")
+        return [LeaseInfo.of(lease) for lease in response.leases]
 
     async def axes(self) -> dict[str, AxisState]:
         """All axes with their states."""

@@ -180,6 +180,7 @@ class AxisState:
     drift: str
     eeprom_writes: int
     link_note: str
+    lease_holder: str
     raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -198,7 +199,8 @@ class AxisState:
             measured_at=_optional_time(raw, "measured_at"), age=_optional_seconds(raw, "age"),
             simulated=raw.simulated, command_id=raw.command_id, model=raw.model, bus=raw.bus, node=raw.node,
             motion_cause=_member(MotionCause, types_pb2.MotionCause.DESCRIPTOR, "MOTION_CAUSE_", raw.motion_cause),
-            drift=raw.drift, eeprom_writes=raw.eeprom_writes, link_note=raw.link_note, raw=raw)
+            drift=raw.drift, eeprom_writes=raw.eeprom_writes, link_note=raw.link_note,
+            lease_holder=raw.lease_holder, raw=raw)
 
 
 @dataclasses.dataclass(frozen=True)

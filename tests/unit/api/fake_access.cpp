@@ -11,6 +11,16 @@ namespace axisd::testing {
 
 using namespace std::chrono_literals;
 
+namespace {
+
+/// "local:unix", "local:unix under 7".
+std::string text_of(const Requester& requester) {
+  return requester.lease_token == 0 ? requester.client
+                                    : fmt::format("{} under {}", requester.client, requester.lease_token);
+}
+
+}  // namespace
+
 void FakeAccess::refuse_with(std::optional<Error> error) {
   const std::lock_guard lock(mutex_);
   refusal_ = std::move(error);
@@ -62,23 +72,23 @@ void FakeDrives::read_parameters(std::string axis, std::vector<std::uint32_t> ad
   answer<std::vector<ParameterValue>>(callback, std::move(values));
 }
 
-void FakeDrives::write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+void FakeDrives::write_parameters(std::string axis, std::vector<ParameterValue> values, Requester requester,
                                   ValuesCallback callback) {
-  std::string line = fmt::format("write_parameters {} by {}", axis, client);
+  std::string line = fmt::format("write_parameters {} by {}", axis, text_of(requester));
   for (const auto& value : values) line += fmt::format(" {:#x}={}", value.address, value.value);
   note(std::move(line));
   answer<std::vector<ParameterValue>>(callback, std::move(values));
 }
 
-void FakeDrives::save_parameters(std::string axis, std::string client,
+void FakeDrives::save_parameters(std::string axis, Requester requester,
                                  std::function<void(Result<void>)> callback) {
-  note(fmt::format("save_parameters {} by {}", axis, client));
+  note(fmt::format("save_parameters {} by {}", axis, text_of(requester)));
   answer<void>(callback, {});
 }
 
-void FakeDrives::restore_factory(std::string axis, std::string client,
+void FakeDrives::restore_factory(std::string axis, Requester requester,
                                  std::function<void(Result<std::string>)> callback) {
-  note(fmt::format("restore_factory {} by {}", axis, client));
+  note(fmt::format("restore_factory {} by {}", axis, text_of(requester)));
   answer<std::string>(callback, std::string("node by its switches, 9600 8N1"));
 }
 
@@ -87,10 +97,10 @@ void FakeDrives::read_segments(std::string axis, SegmentsCallback callback) {
   answer<SegmentSettings>(callback, segments_);
 }
 
-void FakeDrives::write_segments(std::string axis, SegmentSettings segments, std::string client,
+void FakeDrives::write_segments(std::string axis, SegmentSettings segments, Requester requester,
                                 SegmentsCallback callback) {
-  std::string line =
-      fmt::format("write_segments {} by {}{}", axis, client, segments.absolute ? " absolute" : "");
+  std::string line = fmt::format("write_segments {} by {}{}", axis, text_of(requester),
+                                 segments.absolute ? " absolute" : "");
   for (const auto& row : segments.positions)
     line += fmt::format(" {}:{}:{}:{}", row.number, row.target, row.velocity, row.acceleration_time / 1ms);
   for (const auto& row : segments.velocities)
@@ -99,10 +109,10 @@ void FakeDrives::write_segments(std::string axis, SegmentSettings segments, std:
   answer<SegmentSettings>(callback, std::move(segments));
 }
 
-std::shared_ptr<void> FakeDrives::change_serial(std::string axis, SerialChange change, std::string client,
+std::shared_ptr<void> FakeDrives::change_serial(std::string axis, SerialChange change, Requester requester,
                                                 std::function<void(Result<SerialProgress>)> callback) {
-  note(fmt::format("change_serial {} by {} node {} baud {} verify {}", axis, client, change.node.value_or(0),
-                   change.baud.value_or(0), change.verify / 1s));
+  note(fmt::format("change_serial {} by {} node {} baud {} verify {}", axis, text_of(requester),
+                   change.node.value_or(0), change.baud.value_or(0), change.verify / 1s));
   return begin_work([&] { progress_ = std::move(callback); });
 }
 
@@ -253,6 +263,46 @@ void FakeWatch::write_flight_record(std::string bus, std::string client,
                                     std::function<void(Result<std::string>)> callback) {
   note("write_flight_record " + bus + " " + client);
   answer(callback, Result<std::string>("line-a-2.wire"));
+}
+
+void FakeLeases::acquire(LeaseRequest request, std::function<void(Result<LeaseGrant>)> callback) {
+  note(fmt::format("acquire {} by {} as '{}' ttl {} take {} id '{}'", fmt::join(request.axes, "+"),
+                   request.client, request.label, request.ttl.value_or(0s) / 1ms, request.take,
+                   request.request_id));
+  LeaseGrant grant{.lease = {.token = 7,
+                             .client = request.client,
+                             .label = request.label,
+                             .axes = request.axes,
+                             .ttl = 2s,
+                             .acquired = TimePoint(1h),
+                             .expires = TimePoint(1h + 1s)}};
+  {
+    const std::lock_guard lock(mutex_);
+    lease_ = grant.lease;
+  }
+  if (request.take)
+    grant.taken = {{.lease = {.token = 6, .client = "other", .axes = {"feeder"}}, .end = LeaseEnd::taken},
+                   {.lease = {.token = 5, .client = "late", .axes = {"feeder"}}, .end = LeaseEnd::expired}};
+  answer<LeaseGrant>(callback, grant);
+}
+
+void FakeLeases::renew(Requester holder, std::function<void(Result<Lease>)> callback) {
+  note("renew by " + text_of(holder));
+  answer<Lease>(callback, lease());
+}
+
+void FakeLeases::release(Requester holder, std::function<void(Result<void>)> callback) {
+  note("release by " + text_of(holder));
+  answer<void>(callback, {});
+}
+
+void FakeLeases::list(std::function<void(std::vector<Lease>)> callback) {
+  post_([callback, all = std::vector{lease()}] { callback(all); });
+}
+
+Lease FakeLeases::lease() const {
+  const std::lock_guard lock(mutex_);
+  return lease_;
 }
 
 void FakeEvents::add(std::string axis, EventContent content) {

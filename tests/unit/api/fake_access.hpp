@@ -56,16 +56,16 @@ class FakeDrives final : public FakeAccess, public DriveAccess {
   void drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) override;
   void read_parameters(std::string axis, std::vector<std::uint32_t> addresses,
                        ValuesCallback callback) override;
-  void write_parameters(std::string axis, std::vector<ParameterValue> values, std::string client,
+  void write_parameters(std::string axis, std::vector<ParameterValue> values, Requester requester,
                         ValuesCallback callback) override;
-  void save_parameters(std::string axis, std::string client,
+  void save_parameters(std::string axis, Requester requester,
                        std::function<void(Result<void>)> callback) override;
-  void restore_factory(std::string axis, std::string client,
+  void restore_factory(std::string axis, Requester requester,
                        std::function<void(Result<std::string>)> callback) override;
   void read_segments(std::string axis, SegmentsCallback callback) override;
-  void write_segments(std::string axis, SegmentSettings segments, std::string client,
+  void write_segments(std::string axis, SegmentSettings segments, Requester requester,
                       SegmentsCallback callback) override;
-  std::shared_ptr<void> change_serial(std::string axis, SerialChange change, std::string client,
+  std::shared_ptr<void> change_serial(std::string axis, SerialChange change, Requester requester,
                                       std::function<void(Result<SerialProgress>)> callback) override;
 
  private:
@@ -125,6 +125,23 @@ class FakeWatch final : public FakeAccess, public BusWatch {
   std::function<void(Result<TraceBatch>)> traced_;
   std::function<void(Result<StatisticsTick>)> watched_;
   std::weak_ptr<StreamToken> token_;
+};
+
+/// Gives every lease, with the token 7.
+class FakeLeases final : public FakeAccess, public LeaseAccess {
+ public:
+  using FakeAccess::FakeAccess;
+
+  void acquire(LeaseRequest request, std::function<void(Result<LeaseGrant>)> callback) override;
+  void renew(Requester holder, std::function<void(Result<Lease>)> callback) override;
+  void release(Requester holder, std::function<void(Result<void>)> callback) override;
+  void list(std::function<void(std::vector<Lease>)> callback) override;
+
+  /// That of the last request; half of its time is over at the machine's first moment.
+  [[nodiscard]] Lease lease() const;
+
+ private:
+  Lease lease_{.token = 7};
 };
 
 class FakeEvents final : public EventSource {

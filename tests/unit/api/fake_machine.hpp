@@ -43,6 +43,7 @@ class FakeMachine final : public Machine {
   FakeDrives& drives() { return drives_; }
   FakeBuses& nodes() { return buses_; }
   FakeWatch& watch() { return watch_; }
+  FakeLeases& leases() { return leases_; }
   FakeEvents& event_log() { return events_; }
 
   [[nodiscard]] std::vector<Submitted> submitted() const;
@@ -68,6 +69,7 @@ class FakeMachine final : public Machine {
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }
   [[nodiscard]] BusWatch& bus_watch() override { return watch_; }
+  [[nodiscard]] LeaseAccess& lease_access() override { return leases_; }
   [[nodiscard]] EventSource& events() override { return events_; }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override;
@@ -94,6 +96,7 @@ class FakeMachine final : public Machine {
   FakeDrives drives_{[this](Job job) { post(std::move(job)); }};
   FakeBuses buses_{[this](Job job) { post(std::move(job)); }};
   FakeWatch watch_{[this](Job job) { post(std::move(job)); }};
+  FakeLeases leases_{[this](Job job) { post(std::move(job)); }};
   FakeEvents events_{[this](Job job) { post(std::move(job)); }};
   std::thread core_;
 };

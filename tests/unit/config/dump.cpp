@@ -127,6 +127,7 @@ void dump_axis(Dump& dump, const AxisSettings& axis) {
   dump_terminals(dump, "inputs", axis.inputs);
   dump_terminals(dump, "outputs", axis.outputs);
   dump.field("vertical", axis.vertical);
+  dump.field("on_lease_loss", axis.on_lease_loss);
   dump.field("stop_escalation_release", axis.stop_escalation_release);
   dump.field("require_trust", axis.require_trust);
   dump.field("jog_travel", axis.jog_travel);
@@ -153,6 +154,10 @@ std::string dump(const Configuration& configuration) {
   dump.field("state_directory", configuration.state_directory);
   dump.field("flight_recorder.memory", configuration.flight_recorder.memory);
   dump.field("flight_recorder.files", configuration.flight_recorder.files);
+  dump.field("leases.required", configuration.leases.required);
+  dump.field("leases.shortest_ttl", configuration.leases.shortest_ttl);
+  dump.field("leases.default_ttl", configuration.leases.default_ttl);
+  dump.field("leases.longest_ttl", configuration.leases.longest_ttl);
   dump.field("listen", configuration.server.listen);
   if (const auto& tls = configuration.server.tls) {
     dump.field("tls", fmt::format("{} {} {}", tls->certificate, tls->key, tls->client_ca));
