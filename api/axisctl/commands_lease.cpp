@@ -176,10 +176,12 @@ void add_lease_commands(CLI::App& app, Invocation& invocation) {
       "hold",
       "Lease axes while a program runs, with its token in AXISD_LEASE; status: the program's, or 4 if the "
       "lease was lost");
-  hold_command->add_option("AXIS", holding->axes, "Names of axes, with commas between")
-      ->required()
-      ->expected(1)
-      ->delimiter(',');
+  // One word: a list would swallow the program's words.
+  hold_command
+      ->add_option_function<std::string>(
+          "AXIS", [holding](const std::string& names) { holding->axes = CLI::detail::split(names, ','); },
+          "Names of axes, with commas between")
+      ->required();
   hold_command->add_option("COMMAND", holding->command, "The program and its arguments, after --")
       ->required();
   add_acquiring(*hold_command, *holding);

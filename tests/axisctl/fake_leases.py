@@ -20,7 +20,7 @@ class FakeLeases(rpc.LeaseServiceServicer):
     def lose(self, token):
         self.leases.pop(token, None)
 
-    def lease(self, token):
+    def lease_of(self, token):
         lease, ends = self.leases[token]
         lease.remaining.FromNanoseconds(max(0, round((ends - time.monotonic()) * 1e9)))
         return lease
@@ -38,9 +38,9 @@ class FakeLeases(rpc.LeaseServiceServicer):
         lease = pb.Lease(client="test", label=request.label, axes=request.axes)
         lease.ttl.FromNanoseconds(request.ttl.ToNanoseconds() or 2_000_000_000)
         self.leases[self.last_token] = (lease, time.monotonic() + lease.ttl.ToNanoseconds() / 1e9)
-        return pb.AcquireLeaseResponse(lease=self.lease(self.last_token), lease_token=self.last_token, taken=lost)
+        return pb.AcquireLeaseResponse(lease=self.lease_of(self.last_token), lease_token=self.last_token, taken=lost)
 
-    async def known(self, request, context):
+    async def known_lease(self, request, context):
         lease, ends = self.leases.get(request.lease_token, (None, 0))
         if ends <= time.monotonic():
             await refuse(context, grpc.StatusCode.ABORTED, error_pb2.ErrorDetail(
@@ -50,17 +50,17 @@ class FakeLeases(rpc.LeaseServiceServicer):
 
     async def RenewLease(self, request, context):
         self.note("RenewLease", request, context)
-        lease = await self.known(request, context)
+        lease = await self.known_lease(request, context)
         self.leases[request.lease_token] = (lease, time.monotonic() + lease.ttl.ToNanoseconds() / 1e9)
         await asyncio.sleep(0)
-        return pb.RenewLeaseResponse(lease=self.lease(request.lease_token))
+        return pb.RenewLeaseResponse(lease=self.lease_of(request.lease_token))
 
     async def ReleaseLease(self, request, context):
         self.note("ReleaseLease", request, context)
-        await self.known(request, context)
+        await self.known_lease(request, context)
         self.leases.pop(request.lease_token)
         return pb.ReleaseLeaseResponse()
 
     async def ListLeases(self, request, context):
         self.note("ListLeases", request, context)
-        return pb.ListLeasesResponse(leases=[self.lease(token) for token in self.leases])
+        return pb.ListLeasesResponse(leases=[self.lease_of(token) for token in self.leases])
