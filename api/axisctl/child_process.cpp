@@ -40,6 +40,8 @@ ChildProcess::ChildProcess() {
 }
 
 ChildProcess::~ChildProcess() {
+  const auto set = forwarded();
+  pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
   close(signals_);
   if (ended_ >= 0) close(ended_);
 }

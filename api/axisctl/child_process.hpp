@@ -11,7 +11,7 @@
 
 namespace axisd::axisctl {
 
-/// From construction on SIGINT and SIGTERM no longer end this program: the terminal sends the one to the
+/// While it lives SIGINT and SIGTERM do not end this program: the terminal sends the one to the
 /// child by itself, the other is passed on. Threads that are made later take that over, so it comes before
 /// them.
 class ChildProcess {

@@ -19,6 +19,7 @@ LOADER_ONLY = {
     "homing_without_switch",
     "jog_travel",
     "limit_homing_without_switch",
+    "lease_ttl",
     "limits_beyond_counter",
     "listen_port",
     "merge_key",
