@@ -316,8 +316,8 @@ TEST_F(Calls, HealthAndReflectionAreServed) {
   const auto services =
       generic_call(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                    std::string("\x3a\x00", 2));  // list_services: ""
-  for (const auto* name :
-       {"AxisService", "CommandService", "SystemService", "BusService", "DriveService", "EventService"})
+  for (const auto* name : {"AxisService", "CommandService", "SystemService", "BusService", "DriveService",
+                           "EventService", "LeaseService"})
     EXPECT_THAT(services, HasSubstr(std::string("axisd.v1.") + name));
 }
 
