@@ -86,6 +86,7 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   snapshot.drift = "X1 has no function";
   snapshot.eeprom_writes = 5;
   snapshot.link_note = "state by SDO polling";
+  snapshot.lease_holder = "operator (panel 2)";
 
   v1::AxisState state;
   to_proto(snapshot, TimePoint(10s + 20ms), state);
