@@ -169,7 +169,7 @@ TEST_F(NetworkAccess, ADriveWithANewNodeIdIsLookedForThere) {
   std::vector<SerialProgress::Phase> phases;
   std::optional<Error> error;
   const auto token = drive_access_->change_serial("a1", {.node = 41, .baud = {}, .format = {}, .verify = 60s},
-                                                  "t", [&](Result<SerialProgress> progress) {
+                                                  {.client = "t"}, [&](Result<SerialProgress> progress) {
                                                     if (progress)
                                                       phases.push_back(progress->phase);
                                                     else
@@ -195,7 +195,8 @@ TEST_F(NetworkAccess, WhatACanNetworkCannotDoIsRefusedBeforeAnythingIsWritten) {
   world_.run_for(5s);
   const auto refused = [this](SerialChange change) {
     std::optional<Result<SerialProgress>> answer;
-    const auto token = drive_access_->change_serial("a1", change, "t", [&](auto result) { answer = result; });
+    const auto token =
+        drive_access_->change_serial("a1", change, {.client = "t"}, [&](auto result) { answer = result; });
     EXPECT_TRUE(world_.run_until([&] { return answer.has_value(); }, 10s));
     return answer->error();
   };
