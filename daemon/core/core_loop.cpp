@@ -7,6 +7,8 @@ namespace axisd::core {
 namespace {
 
 constexpr auto longest_sleep = std::chrono::seconds(1);
+/// Handlers that may run before input is looked for.
+constexpr int most_ready = 32;
 
 }  // namespace
 
@@ -38,7 +40,18 @@ CoreLoop::CoreLoop()
 CoreLoop::CoreLoop(Clock& clock)
     : work_(boost::asio::make_work_guard(io_)), clock_(&clock), lane_(io_.get_executor()) {}
 
+/// One of those that the core itself asked for. False: none, or it is time to look for input.
+bool CoreLoop::run_ready() {
+  if (ready_.empty() || ++since_input_ > most_ready) {
+    since_input_ = 0;
+    return false;
+  }
+  ready_.run_one();
+  return true;
+}
+
 void CoreLoop::run() {
+  const ReadyQueue::Here here(ready_);
   // At most a second asleep, so that the watchdog sees an idle loop alive.
   Clock::Timer beat;
   const std::function<void()> beats = [&] { beat = clock_->call_at(clock_->now() + longest_sleep, beats); };
@@ -50,13 +63,13 @@ void CoreLoop::run() {
     // What is due comes before handlers: frames that wait to be read can be read a little later, SYNC cannot
     // be sent late.
     const bool served = own_clock_->serve(began);
-    const bool ran = io_.poll_one() > 0;
+    const bool ran = run_ready() || io_.poll_one() > 0;
     if (served || ran) {
       const auto ended = monotonic_now();
       const auto took = (ended - std::exchange(began, ended)).count();
       if (took > longest_.load(std::memory_order_relaxed)) longest_.store(took, std::memory_order_relaxed);
     }
-    if (ran) continue;
+    if (ran || !ready_.empty()) continue;
     own_clock_->wake_in_time();
     io_.run_one();
     began = monotonic_now();
@@ -64,8 +77,11 @@ void CoreLoop::run() {
 }
 
 bool CoreLoop::step(bool wait) {
+  const ReadyQueue::Here here(ready_);
   lane_.drain();
-  return (wait ? io_.run_one() : io_.poll_one()) > 0;
+  if (run_ready()) return true;
+  if (io_.poll_one() > 0 || !ready_.empty()) return true;
+  return wait && io_.run_one() > 0;
 }
 
 void CoreLoop::stop() { io_.stop(); }

@@ -12,6 +12,7 @@
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
 #include "buses/task.hpp"
+#include "daemon/core/ready_queue.hpp"
 
 namespace axisd::core {
 
@@ -37,7 +38,7 @@ class CoreLoop {
   CoreLoop();
   /// With a time of its own, which must outlive the loop; whoever lets it pass calls step() instead of run().
   explicit CoreLoop(Clock& clock);
-  [[nodiscard]] Executor executor() { return io_.get_executor(); }
+  [[nodiscard]] Executor executor() { return CoreExecutor(ready_); }
   [[nodiscard]] Clock& clock() { return *clock_; }
   [[nodiscard]] StopLane& lane() { return lane_; }
 
@@ -57,8 +58,12 @@ class CoreLoop {
   }
 
  private:
+  bool run_ready();
+
   boost::asio::io_context io_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
+  ReadyQueue ready_{io_};
+  int since_input_ = 0;  ///< handlers since input was looked for
   std::optional<AsioClock> own_clock_;
   Clock* clock_;
   StopLane lane_;
