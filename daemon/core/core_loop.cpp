@@ -40,7 +40,9 @@ CoreLoop::CoreLoop()
 CoreLoop::CoreLoop(Clock& clock)
     : work_(boost::asio::make_work_guard(io_)), clock_(&clock), lane_(io_.get_executor()) {}
 
-/// One of those that the core itself asked for. False: none, or it is time to look for input.
+CoreLoop::~CoreLoop() { ready_.clear(); }
+
+/// One handler that is ready. False: there is none, or it is time to look for input.
 bool CoreLoop::run_ready() {
   if (ready_.empty() || ++since_input_ > most_ready) {
     since_input_ = 0;
@@ -63,15 +65,19 @@ void CoreLoop::run() {
     // What is due comes before handlers: frames that wait to be read can be read a little later, SYNC cannot
     // be sent late.
     const bool served = own_clock_->serve(began);
-    const bool ran = run_ready() || io_.poll_one() > 0;
+    const bool ran = run_ready();
     if (served || ran) {
       const auto ended = monotonic_now();
       const auto took = (ended - std::exchange(began, ended)).count();
       if (took > longest_.load(std::memory_order_relaxed)) longest_.store(took, std::memory_order_relaxed);
     }
-    if (ran || !ready_.empty()) continue;
-    own_clock_->wake_in_time();
-    io_.run_one();
+    if (ran) continue;
+    if (ready_.empty()) {
+      own_clock_->wake_in_time();
+      io_.run_one();
+    } else {
+      io_.poll_one();
+    }
     began = monotonic_now();
   }
 }

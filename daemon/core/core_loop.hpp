@@ -38,6 +38,8 @@ class CoreLoop {
   CoreLoop();
   /// With a time of its own, which must outlive the loop; whoever lets it pass calls step() instead of run().
   explicit CoreLoop(Clock& clock);
+  ~CoreLoop();
+  CoreLoop(const CoreLoop&) = delete;
   [[nodiscard]] Executor executor() { return CoreExecutor(ready_); }
   [[nodiscard]] Clock& clock() { return *clock_; }
   [[nodiscard]] StopLane& lane() { return lane_; }
@@ -45,8 +47,8 @@ class CoreLoop {
   /// Runs handlers until stop(), and what the clock has to call before each of them. Precondition: the clock
   /// is its own. Thread: becomes the core thread.
   void run();
-  /// Serves stops that wait and one handler that is ready; with `wait` one that is yet to come. False: there
-  /// was none, or stop() was called. Thread: becomes the core thread.
+  /// Serves stops that wait and one handler that is ready, or takes input; with `wait` for some that is yet
+  /// to come. False: there was nothing, or stop() was called. Thread: becomes the core thread.
   bool step(bool wait = false);
   /// Thread: any.
   void stop();
@@ -60,9 +62,9 @@ class CoreLoop {
  private:
   bool run_ready();
 
+  ReadyQueue ready_{io_};  ///< outlives what `io_` still holds at its end
   boost::asio::io_context io_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
-  ReadyQueue ready_{io_};
   int since_input_ = 0;  ///< handlers since input was looked for
   std::optional<AsioClock> own_clock_;
   Clock* clock_;

@@ -5,7 +5,7 @@ namespace axisd::core {
 thread_local const ReadyQueue* ReadyQueue::here_ = nullptr;
 
 /// A handler may own a sequence, and its end ask for something more.
-ReadyQueue::~ReadyQueue() {
+void ReadyQueue::clear() {
   while (!waiting_.empty()) {
     const auto last = std::move(waiting_.front());
     waiting_.pop_front();
@@ -15,7 +15,9 @@ ReadyQueue::~ReadyQueue() {
 void ReadyQueue::run_one() {
   auto next = std::move(waiting_.front());
   waiting_.pop_front();
+  in_handler_ = true;
   next();
+  in_handler_ = false;
 }
 
 }  // namespace axisd::core

@@ -9,17 +9,17 @@
 
 namespace axisd::core {
 
-/// What the core thread has asked itself to do later. An io_context would look for input before each of them,
-/// which costs a system call each time: a sequence that is resumed takes several steps.
+/// What the core thread has to do. An io_context would look for input before each handler, which costs a
+/// system call each time: a sequence that is resumed takes several steps. What comes in by the io_context is
+/// only entered here, so that each handler of the core runs in run_one(), one at a time.
 class ReadyQueue {
  public:
-  /// What other threads post goes to `io`, and wakes it.
+  /// What other threads ask for comes by `io`, and wakes it.
   explicit ReadyQueue(boost::asio::io_context& io) : io_(&io) {}
   ReadyQueue(const ReadyQueue&) = delete;
   ReadyQueue& operator=(const ReadyQueue&) = delete;
-  ~ReadyQueue();
 
-  /// Calls made by this thread until the end of its life are those of the core.
+  /// While it lives this thread is the core.
   class Here {
    public:
     explicit Here(const ReadyQueue& queue) : before_(std::exchange(here_, &queue)) {}
@@ -31,18 +31,22 @@ class ReadyQueue {
     const ReadyQueue* before_;
   };
 
-  /// This thread is the core, and between the begin and the end of a handler.
-  [[nodiscard]] bool here() const { return here_ == this; }
+  /// This thread is the core, and runs a handler.
+  [[nodiscard]] bool in_handler() const { return here_ == this && in_handler_; }
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
   /// Runs the oldest. Precondition: not empty. Thread: core.
   void run_one();
+  /// Runs nothing any more; what handlers ask for when they are dropped goes to the io_context.
+  void clear();
   /// Thread: any.
   template <class Function>
   void push(Function function) {
-    if (here())
+    if (here_ == this)
       waiting_.emplace_back(std::move(function));
     else
-      boost::asio::post(*io_, std::move(function));
+      boost::asio::post(*io_, [this, entered = std::move(function)]() mutable {
+        waiting_.emplace_back(std::move(entered));
+      });
   }
   [[nodiscard]] boost::asio::io_context& io() const { return *io_; }
 
@@ -50,6 +54,7 @@ class ReadyQueue {
   static thread_local const ReadyQueue* here_;
   boost::asio::io_context* io_;
   std::deque<std::move_only_function<void()>> waiting_;
+  bool in_handler_ = false;
 };
 
 /// The executor of the core thread, as Asio's executors are. Thread: any.
@@ -59,7 +64,7 @@ class CoreExecutor {
 
   template <class Function>
   void execute(Function&& function) const {
-    if (!later_ && queue_->here())
+    if (!later_ && queue_->in_handler())
       std::forward<Function>(function)();
     else
       queue_->push(std::forward<Function>(function));
