@@ -278,6 +278,7 @@ void RtuBus::note_late_read(const Request& request, const ExchangeResult& result
     case ExchangeStatus::timeout:
     case ExchangeStatus::cut:
     case ExchangeStatus::corrupt:
+    case ExchangeStatus::io_error:
       if (request.function == Function::read_holding_registers)
         late_reads_[request.node][request.count] = clock_->now() + latest_reply;
       break;
@@ -297,7 +298,7 @@ void RtuBus::on_port(const PortStatus& status) {
   if (closed_ && status.open) return;
   port_ = status;
   if (port_.error) port_.error->where.bus = settings_.name;
-  late_reads_.clear();
+  // What may come late may still come: late_reads_ stays.
   quarantine_.forget();
   if (!port_.open) {
     // What is under way gets its own result from the line; what waits can no longer be sent in time.

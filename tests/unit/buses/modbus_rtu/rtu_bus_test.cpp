@@ -68,6 +68,27 @@ TEST(RtuBus, TheEchoOfARepeatedWriteDoesNotProveThatAReadIsNoLongerLate) {
   }
 }
 
+/// A reply that is late may still be on its way when the port was lost and is open again.
+TEST(RtuBus, ALateReplyNeverAnswersAReadAfterThePortWasOpenedAgain) {
+  for (int delay = 30; delay < 120; delay += 2) {
+    BusRig rig;
+    rig.line->network().node(1)->poke(0x0020, 111);
+    rig.line->network().node(1)->poke(0x0032, 222);
+    rig.line->network().faults().add({.kind = FaultKind::delay_reply,
+                                      .node = 1,
+                                      .function = 3,
+                                      .delay = std::chrono::milliseconds(delay)});
+    rig.read("late", 0x0020, 4);
+    rig.world.run_for(40ms);
+    rig.line->set_open(false);
+    rig.line->set_open(true);
+    rig.read("next", 0x0032, 4);
+    rig.world.run_for(500ms);
+    ASSERT_EQ(rig.results.size(), 2U);
+    if (const auto& next = rig.results.at("next")) EXPECT_EQ(next->registers.at(0), 222) << delay;
+  }
+}
+
 TEST(RtuBus, OneSilentNodeDoesNotDisturbItsNeighbour) {
   BusRig rig;
   rig.line->network().node(1)->set_power(false);
