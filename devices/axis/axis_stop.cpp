@@ -115,6 +115,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     silent = 0;
     // Replies may be lost where the stop itself is not: what counts is the motor, so go on and look at it.
     if (!sent && sent.error().reason != Reason::refused && (!no_reply || link_ == LinkState::offline)) {
+      if (requests != stopping_.requests) continue;  // each gets a frame of its own, also by a silent node
       auto cause = error(Reason::not_confirmed, "the stop was not acknowledged: " + to_string(sent.error()),
                          "look at the machine; a stop is sent as soon as the drive answers");
       cause.outcome = Outcome::unknown;
@@ -129,7 +130,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const bool rests =
         polled ? co_await standstill_by(since, since + patience, requests)
                : (sent || link_ != LinkState::offline) && co_await standstill_unpolled(since + patience);
-    if (requests != stopping_.requests) continue;  // each gets a frame of its own, also by a silent node
+    if (requests != stopping_.requests) continue;  // each gets a frame of its own
     if (rests && no_reply && ++rounds < unacknowledged_rounds) continue;
     if (rests) co_return Result<void>{};
     if (link_ == LinkState::offline) {

@@ -131,18 +131,19 @@ Result<CommandPtr> CommandBook::find_repeat(const std::string& axis, const Actio
 
 CommandPtr CommandBook::open(const std::string& axis, const Action& action, const CommandOptions& options) {
   forget_old();
+  const auto now = clock_->now();
   Command command{.id = fmt::format("{}-{}", instance_id_, ++last_),
                   .axis = axis,
                   .request_id = options.request_id,
                   .client = options.client,
                   .kind = kind_of(action),
                   .asked = std::visit(AskedOf{}, action),
-                  .accepted_at = clock_->wall(clock_->now())};
+                  .accepted_at = clock_->wall(options.arrived == TimePoint{} ? now : options.arrived)};
   auto entry =
       std::make_shared<Entry>(Entry{.command = std::make_shared<CommandRecord>(std::move(command), *clock_),
                                     .digest = digest(axis, action),
                                     .request_key = options.client + "\n" + options.request_id,
-                                    .entered = clock_->now()});
+                                    .entered = now});
   by_id_.emplace(entry->command->value().id, entry);
   if (!options.request_id.empty()) by_request_.insert_or_assign(entry->request_key, entry);
   order_.push_back(entry);

@@ -4,9 +4,8 @@
 //   bench_rpc_client TARGET get SECONDS     GetAxis, one after the other; prints how long each took
 //   bench_rpc_client TARGET watch N SECONDS N streams, a batch each 10 ms; prints when each came, by stream
 //   bench_rpc_client TARGET stall N SECONDS the same, but after its first batch nobody reads
-//   bench_rpc_client TARGET stop N          Stop at random moments, of the axes that are online in turn;
-//   prints
-//                                           when each was called and answered, and for which axis
+//   bench_rpc_client TARGET stop N          Stop at random moments, of the axes that are online in turn; prints
+//                                           when each was called, when it arrived, and for which axis
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
@@ -108,6 +107,13 @@ void watch(Stub& stub, int streams, std::chrono::seconds duration, std::size_t l
     for (const auto at : watchers[i]->came()) std::printf("%zu %lld\n", i, at);
 }
 
+/// A time of the daemon, which runs on this computer.
+long long monotonic(const google::protobuf::Timestamp& wall) {
+  const auto ahead = std::chrono::system_clock::now().time_since_epoch() - std::chrono::nanoseconds(now());
+  const auto at = std::chrono::seconds(wall.seconds()) + std::chrono::nanoseconds(wall.nanos());
+  return std::chrono::nanoseconds(at - ahead).count();
+}
+
 void stop(Stub& stub, int count) {
   std::vector<std::string> axes;
   for (const auto& axis : list(stub).axes())
@@ -123,7 +129,7 @@ void stop(Stub& stub, int count) {
     request.mutable_options()->set_request_id("bench-" + std::to_string(now()));
     const auto begin = now();
     must(stub.Stop(&context, request, &response), "Stop");
-    std::printf("%lld %lld %s\n", begin, now(), request.axis().c_str());
+    std::printf("%lld %lld %s\n", begin, monotonic(response.command().accepted_at()), request.axis().c_str());
   }
 }
 

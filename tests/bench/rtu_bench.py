@@ -182,6 +182,8 @@ def stops(build, given, rows):
         for name, share, bar in (("p50", 0.5, 200), ("p99", 0.99, 1000), ("p99.9", 0.999, None), ("maximum", 1, None)):
             figure = percentile(found.excess, share)
             rows.say(f"{title}{name}, us", f"{figure:.0f}", f"<= {bar}" if bar else "", figure <= bar if bar else None)
+        for name, share in (("p50", 0.5), ("p99", 0.99)):
+            rows.say(f"{title}{name} from the client's call, us", f"{percentile(found.from_call, share):.0f}")
         rows.say(f"{title}longest to its last byte, ms", f"{found.longest:.1f}",
                  f"<= {found.bound:.1f} (published)", found.longest <= found.bound)
 

@@ -1,5 +1,6 @@
-"""Stops at random moments on a saturated line, for rtu_bench.py: how long after the call the frame begins, beyond what
-had to be waited for, and the longest beside the bound that axisd publishes."""
+"""Stops at random moments on a saturated line, for rtu_bench.py: how long after its arrival at the daemon (and after the
+client's call) the frame begins, beyond what had to be waited for, and the longest beside the bound that axisd
+publishes."""
 import dataclasses
 import tempfile
 import time
@@ -13,7 +14,8 @@ TURNAROUND_MAX = 20e-3  # s, the default: from then on a stop cuts the wait for 
 
 @dataclasses.dataclass
 class Found:
-    excess: list  # of each stop, us
+    excess: list  # of each stop from its arrival, us
+    from_call: list  # the same from the client's call
     longest: float  # from the call to the last byte, ms
     bound: float  # of that, ms
 
@@ -45,12 +47,14 @@ def measure(build, nodes, silent, count):
             calls = Client(build, SERVER).run("stop", count)
             time.sleep(0.5)  # the last was answered, its frame may be still to come
             frames = line.frames(begin, time.monotonic())
-            found = Found([], 0, bound(cell))
-    for called, _, axis in calls:
-        called, node = int(called) / 1e9, int(axis.rsplit("-", 1)[1])
+            found = Found([], [], 0, bound(cell))
+    for called, arrived, axis in calls:
+        called, arrived, node = int(called) / 1e9, int(arrived) / 1e9, int(axis.rsplit("-", 1)[1])
         index = next(i for i, (at, asked, frame) in enumerate(frames)
                      if asked and at > called and frame.startswith(f"{node:02X}{STOP}"))
         sent, _, frame = frames[index]
-        found.excess.append((sent - earliest(line, frames[max(0, index - 8):index + 1], called)) * 1e6)
+        before = frames[max(0, index - 8):index + 1]
+        found.excess.append((sent - earliest(line, before, arrived)) * 1e6)
+        found.from_call.append((sent - earliest(line, before, called)) * 1e6)
         found.longest = max(found.longest, (sent + line.wire(len(frame) // 2) - called) * 1e3)
     return found

@@ -136,6 +136,32 @@ TEST(M15, RepeatedStopsToSilentNodesCostLittle) {
   ASSERT_TRUE(line.world.run_until([&] { return !line.line->network().node(16)->shaft_moving(); }, 5s));
 }
 
+/// A stop that is asked for while an earlier one's frame waits in vain gets a frame of its own.
+TEST(M13, AStopToASilentNodeIsNotTakenForTheOneBefore) {
+  SharedLine line(1, 115200);
+  const auto link_is = [&](LinkState link) {
+    return line.world.run_until(
+        [&] { return line.all([&](const AxisSnapshot& axis) { return axis.link == link; }); }, 20s);
+  };
+  ASSERT_TRUE(link_is(LinkState::online));
+  line.line->network().node(1)->set_power(false);
+  ASSERT_TRUE(link_is(LinkState::offline));
+  for (const auto within : {1ms, 5ms, 10ms, 15ms, 20ms, 25ms}) {
+    line.world.run_for(5s);
+    line.line->forget_wire();
+    const auto sent = [&] {
+      return std::ranges::any_of(line.line->wire(), [](const auto& entry) { return entry.address() == 0x0028; });
+    };
+    line.submit(1, StopRequest{});
+    ASSERT_TRUE(line.world.run_until(sent, 1s));
+    line.world.run_for(within);
+    line.line->forget_wire();
+    const auto second = line.submit(1, StopRequest{});
+    ASSERT_TRUE(line.world.run_until([&] { return second->has_ended(); }, 1s));
+    EXPECT_TRUE(sent()) << within.count() << " ms after the first";
+  }
+}
+
 /// What is owed does not wait for its turn once anything is heard of the node.
 TEST(M4, AnOwedStopFollowsTheFirstReplyAtOnce) {
   SharedLine line(2, 115200);
