@@ -122,16 +122,14 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   }
   Result<void> result;
   std::int64_t base = 0;
+  bool there = false;
   {
     const Chain chain(*this);
     result = co_await make_room(activity);
     if (!current(*activity)) co_return false;
     base = tracker_.counter();
-    if (result && activity->plan.target_counter == base) {  // nothing to do, and nothing is sent
-      activity->command->activate();
-      co_return true;
-    }
-    if (result) {
+    there = result && activity->plan.target_counter == base;
+    if (result && !there) {
       // From where it really starts: a motion before it may have ended anywhere.
       const auto distance = activity->plan.target_counter - base;
       activity->plan.positive = (distance >= 0) != settings_.scale.invert;
@@ -145,13 +143,17 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     }
   }
   const auto since = env_.clock->now();
-  if (!co_await started(activity, std::move(result), base, since)) co_return false;
-  if (!co_await follow(activity, base, since)) co_return false;
+  if (there) {  // nothing to do, and nothing is sent
+    activity->command->activate();
+  } else {
+    if (!co_await started(activity, std::move(result), base, since)) co_return false;
+    if (!co_await follow(activity, base, since)) co_return false;
+  }
   co_return co_await is_no_reboot(activity);
 }
 
-/// A drive that was restarted on the way shows the counter 0: only where that is the target, too, it has to
-/// prove that it is the same one.
+/// A drive that was restarted, on the way or before, shows the counter 0: only where that is the target, too,
+/// it has to prove that it is the same one.
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
   if (std::abs(activity->plan.target_counter) > target_tolerance()) co_return true;
   co_return co_await proven_continuous(activity);

@@ -96,6 +96,27 @@ TEST(M07, PowerCycleBetweenTwoPollsThenAnIdenticalMove) {
   });
 }
 
+/// A drive that was restarted shows the counter 0, and rests: a move to just there has nothing to do, but is
+/// not done.
+TEST(M10, PowerCycleThenAMoveToTheCountersZero) {
+  both_directions({}, [](const RigOptions& base) {
+    auto options = base;
+    options.adjust_drive = [](auto& node) { node.boot_time = 101ms; };
+    Rig rig(options);
+    rig.ready();
+    EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
+    rig.run_until([&, checked = rig.state()->sampled_after] { return rig.state()->sampled_after != checked; },
+                  1s);
+    rig.cycle_power();
+    ASSERT_TRUE(rig.run_until([&] { return rig.state()->position == 0; }, 900ms)) << "noticed before";
+    const auto move = rig.complete(MoveAbsoluteRequest{.position = 0});
+    EXPECT_NE(move.state, CommandState::done);
+    EXPECT_EQ(move.cause->reason, Reason::rebooted) << describe(move);
+    EXPECT_EQ(rig.load_mm(), 10);
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+  });
+}
+
 /// Power fails at every millisecond of the chain and of the move itself. Whatever happens, the shaft is only
 /// ever somewhere between the commanded ends, and Done means that it is there.
 TEST(M07, PowerCycleAtEveryPointOfAStart) {

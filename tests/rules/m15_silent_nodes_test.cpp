@@ -150,7 +150,8 @@ TEST(M13, AStopToASilentNodeIsNotTakenForTheOneBefore) {
     line.world.run_for(5s);
     line.line->forget_wire();
     const auto sent = [&] {
-      return std::ranges::any_of(line.line->wire(), [](const auto& entry) { return entry.address() == 0x0028; });
+      return std::ranges::any_of(line.line->wire(),
+                                 [](const auto& entry) { return entry.address() == 0x0028; });
     };
     line.submit(1, StopRequest{});
     ASSERT_TRUE(line.world.run_until(sent, 1s));
