@@ -55,7 +55,7 @@ struct Command {
   MotionValues asked{}, granted{};
   CommandState state = CommandState::accepted;
   std::optional<Error> cause{};  ///< why it was aborted, failed or is unknown
-  WallTime accepted_at{};  ///< when the request arrived at the server
+  WallTime accepted_at{};        ///< when the request arrived at the server
   std::optional<WallTime> started_at{}, ended_at{};
 };
 

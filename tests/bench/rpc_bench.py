@@ -85,7 +85,7 @@ def overload(client, given):
         with client.start("stall", 50, given.seconds + 20) as stalled:
             time.sleep(1)
             calls += [int(each) / 1e6 for each, in client.run("get", given.seconds)]
-            stops += [(int(answered) - int(called)) / 1e6 for called, answered, _ in client.run("stop", 64)]
+            stops += [(int(answered) - int(called)) / 1e6 for called, _, answered, _ in client.run("stop", 64)]
             stalled.terminate()
     print("\nbeside 50 streams that nobody reads, ms")
     table([["", "p50", "99 %"]] + [[name, f"{statistics.median(each):.2f}", f"{percentile(each, 0.99):.2f}"]

@@ -4,8 +4,10 @@
 //   bench_rpc_client TARGET get SECONDS     GetAxis, one after the other; prints how long each took
 //   bench_rpc_client TARGET watch N SECONDS N streams, a batch each 10 ms; prints when each came, by stream
 //   bench_rpc_client TARGET stall N SECONDS the same, but after its first batch nobody reads
-//   bench_rpc_client TARGET stop N          Stop at random moments, of the axes that are online in turn; prints
-//                                           when each was called, when it arrived, and for which axis
+//   bench_rpc_client TARGET stop N          Stop at random moments, of the axes that are online in turn;
+//   prints
+//                                           when each was called, arrived and was answered, and for which
+//                                           axis
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
@@ -129,7 +131,8 @@ void stop(Stub& stub, int count) {
     request.mutable_options()->set_request_id("bench-" + std::to_string(now()));
     const auto begin = now();
     must(stub.Stop(&context, request, &response), "Stop");
-    std::printf("%lld %lld %s\n", begin, monotonic(response.command().accepted_at()), request.axis().c_str());
+    std::printf("%lld %lld %lld %s\n", begin, monotonic(response.command().accepted_at()), now(),
+                request.axis().c_str());
   }
 }
 

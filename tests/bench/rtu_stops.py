@@ -48,7 +48,7 @@ def measure(build, nodes, silent, count):
             time.sleep(0.5)  # the last was answered, its frame may be still to come
             frames = line.frames(begin, time.monotonic())
             found = Found([], [], 0, bound(cell))
-    for called, arrived, axis in calls:
+    for called, arrived, _, axis in calls:
         called, arrived, node = int(called) / 1e9, int(arrived) / 1e9, int(axis.rsplit("-", 1)[1])
         index = next(i for i, (at, asked, frame) in enumerate(frames)
                      if asked and at > called and frame.startswith(f"{node:02X}{STOP}"))
