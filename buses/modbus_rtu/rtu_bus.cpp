@@ -257,34 +257,53 @@ void RtuBus::reap(TimePoint now) {
 void RtuBus::on_result(const ExchangeResult& result) {
   auto ended = std::exchange(current_, nullptr);
   if (!ended) return;
-  note_late_read(ended->exchange.request, result);
+  note_late(ended->exchange.request, result);
   note_garbled(ended->exchange.request, result);
   note_silence(*ended, result);
   end(std::move(ended), result);
   pump();
 }
 
-void RtuBus::note_late_read(const Request& request, const ExchangeResult& result) {
+/// Replies come in order: nothing older than that to a read can follow. But the echo of a write may be that
+/// of the same write before, which was late, and an exception that of any read before: its own may still come
+/// then.
+void RtuBus::note_late(const Request& request, const ExchangeResult& result) {
   switch (result.status) {
     case ExchangeStatus::replied:
-      // Replies come in order: nothing older can follow. But the echo of a write may be that of the same
-      // write before, which was late, and an exception that of any read before: its own may still come then.
-      if (request.function != Function::read_holding_registers) break;
-      if (result.reply.kind == ReplyKind::match)
+      if (request.function != Function::read_holding_registers) {
+        if (echo_may_be_late(request)) expect_late(request);
+      } else if (result.reply.kind == ReplyKind::match) {
         late_reads_.erase(request.node);
-      else if (late_reads_.contains(request.node))
-        late_reads_[request.node][request.count] = clock_->now() + latest_reply;
+        late_echoes_.erase(request.node);
+      } else if (late_reads_.contains(request.node)) {
+        expect_late(request);
+      }
       break;
     case ExchangeStatus::timeout:
     case ExchangeStatus::cut:
     case ExchangeStatus::corrupt:
     case ExchangeStatus::io_error:
-      if (request.function == Function::read_holding_registers)
-        late_reads_[request.node][request.count] = clock_->now() + latest_reply;
+      expect_late(request);
       break;
     default:
       break;
   }
+}
+
+void RtuBus::expect_late(const Request& request) {
+  const auto until = clock_->now() + latest_reply;
+  if (request.function == Function::read_holding_registers)
+    late_reads_[request.node][request.count] = until;
+  else if (request.function == Function::write_single_register)
+    late_echoes_[request.node][{request.address, request.values.front()}] = until;
+}
+
+bool RtuBus::echo_may_be_late(const Request& request) const {
+  if (request.function != Function::write_single_register) return false;
+  const auto late = late_echoes_.find(request.node);
+  if (late == late_echoes_.end()) return false;
+  const auto echo = late->second.find({request.address, request.values.front()});
+  return echo != late->second.end() && echo->second >= clock_->now();
 }
 
 void RtuBus::close() {
@@ -298,7 +317,7 @@ void RtuBus::on_port(const PortStatus& status) {
   if (closed_ && status.open) return;
   port_ = status;
   if (port_.error) port_.error->where.bus = settings_.name;
-  // What may come late may still come: late_reads_ stays.
+  // What may come late may still come: late_reads_ and late_echoes_ stay.
   quarantine_.forget();
   if (!port_.open) {
     // What is under way gets its own result from the line; what waits can no longer be sent in time.

@@ -25,6 +25,9 @@ struct Answer {
   TimePoint sent_at;                     ///< first byte of the request on the wire
   TimePoint request_end;                 ///< last byte of the request
   TimePoint answered_at;                 ///< last byte of the reply
+  /// False: the reply may be that of the same write of one register before, which was late. It does not show
+  /// that the node got this one.
+  bool certain = true;
 };
 
 /// Told how each transaction ended, sent or not, for traces. Called on the core thread; must not block.
@@ -92,7 +95,9 @@ class RtuBus final : public Bus {
   void reap(TimePoint now);
   void drop(TransactionPtr transaction, TimePoint now);
   void end(TransactionPtr transaction, const ExchangeResult& result);
-  void note_late_read(const Request& request, const ExchangeResult& result);
+  void note_late(const Request& request, const ExchangeResult& result);
+  void expect_late(const Request& request);
+  [[nodiscard]] bool echo_may_be_late(const Request& request) const;
   void note_garbled(const Request& request, const ExchangeResult& result);
   [[nodiscard]] Result<Answer> answer(const Transaction& transaction, const ExchangeResult& result) const;
   [[nodiscard]] Error error_of(const Exchange& exchange, const ExchangeResult& result) const;
@@ -109,6 +114,8 @@ class RtuBus final : public Bus {
   /// Lengths of reads that timed out, by node, and until when their replies may still come: an FC03 reply
   /// does not say which registers it carries.
   std::map<std::uint8_t, std::map<std::uint16_t, TimePoint>> late_reads_;
+  /// Until when the echo of a write of (register, value) may come late.
+  std::map<std::uint8_t, std::map<std::pair<std::uint16_t, std::uint16_t>, TimePoint>> late_echoes_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Quarantine quarantine_;
   Clock::Timer expiry_, release_;

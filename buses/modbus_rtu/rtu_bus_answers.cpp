@@ -69,7 +69,8 @@ Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResu
     return Answer{.registers = result.reply.registers,
                   .sent_at = result.request_begin,
                   .request_end = result.request_end,
-                  .answered_at = result.reply_end};
+                  .answered_at = result.reply_end,
+                  .certain = !echo_may_be_late(request)};
   auto error = error_of(transaction.exchange, result);
   error.where.bus = settings_.name;
   error.where.node = request.node;

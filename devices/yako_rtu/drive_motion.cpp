@@ -188,7 +188,11 @@ Task<Result<void>> YakoRtuDrive::send_stop(StopKind kind, bool patient) {
         reg::stop, value, {.transaction_class = TransactionClass::stop, .patient = patient});
     if (written) {
       stop_sent_at_ = written->request_end;
-      co_return Result<void>{};
+      if (written->certain) co_return Result<void>{};
+      // After the reply to a read no older one can follow: the next echo is its own.
+      const auto read = co_await node_.read(reg::moving, 1, {.transaction_class = TransactionClass::motion});
+      if (!read) co_return failed(read.error());
+      continue;
     }
     // A refusal mostly means that the frame was damaged (01, which some firmware answers): at once again.
     if (written.error().reason != Reason::refused || attempt == stop_attempts)

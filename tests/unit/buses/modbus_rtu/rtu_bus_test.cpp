@@ -68,6 +68,32 @@ TEST(RtuBus, TheEchoOfARepeatedWriteDoesNotProveThatAReadIsNoLongerLate) {
   }
 }
 
+/// The echo of a write that was late would say of the next such write that it was executed.
+TEST(RtuBus, AnEchoThatMayBeAnOldOneIsNotCertain) {
+  BusRig rig;
+  auto& faults = rig.line->network().faults();
+  const auto stop = [&](const std::string& name, std::uint16_t value) {
+    rig.transact(
+        name, {.node = 1, .function = Function::write_single_register, .address = 0x0028, .values = {value}});
+    rig.world.run_for(60ms);
+    return rig.results.at(name);
+  };
+  ASSERT_TRUE(stop("first", 0));
+  EXPECT_TRUE(stop("first", 0)->certain);
+  faults.add({.kind = FaultKind::delay_reply, .node = 1, .delay = 70ms});
+  EXPECT_FALSE(stop("late", 0));
+  faults.add({.kind = FaultKind::drop_request, .node = 1});
+  const auto lost = stop("lost", 0);
+  ASSERT_TRUE(lost) << "the echo of the one before did not come";
+  EXPECT_FALSE(lost->certain);
+  EXPECT_TRUE(stop("another", 1)->certain);
+  EXPECT_FALSE(stop("again", 0)->certain);
+  rig.read("read", 0x0004, 1);
+  rig.world.run_for(60ms);
+  ASSERT_TRUE(rig.results.at("read"));
+  EXPECT_TRUE(stop("after a read", 0)->certain);
+}
+
 /// A reply that is late may still be on its way when the port was lost and is open again.
 TEST(RtuBus, ALateReplyNeverAnswersAReadAfterThePortWasOpenedAgain) {
   for (int delay = 30; delay < 120; delay += 2) {
