@@ -246,6 +246,7 @@ class Axis {
   Task<Result<void>> make_room(ActivityPtr activity);
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
+  static void tell_part(const Activity& activity, Error& cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
   Task<bool> is_no_reboot(ActivityPtr activity);

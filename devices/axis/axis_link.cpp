@@ -15,6 +15,8 @@ constexpr auto first_backoff = milliseconds(100);
 constexpr auto longest_backoff = milliseconds(1000);
 constexpr int attempts_before_offline = 3;
 constexpr auto continuity_latest = milliseconds(950);
+/// More than a reading waits for on a line that is only slow.
+constexpr auto continuity_forgotten = milliseconds(2000);
 
 }  // namespace
 
@@ -289,10 +291,11 @@ Task<bool> Axis::poll_once(int& failures) {
   if (result) {
     const auto sample =
         co_await drive_->read_state(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
-    if (sample)
-      on_sample(*sample);
-    else
-      result = fail(sample.error());
+    if (!sample) result = fail(sample.error());
+    // Its node was held back: what was proven before that says nothing of it.
+    else if (sample->asked_at - continuity_checked_ > continuity_forgotten)
+      result = co_await drive_->check_continuity(TransactionClass::moving_state);
+    if (result) on_sample(*sample);
     if (!result && result.error().reason == Reason::rebooted) {
       if (link_ == LinkState::online) on_reboot(result.error());
       co_return false;

@@ -220,6 +220,13 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
   co_await follow(activity, base, since);
 }
 
+/// A start that fails does not undo what was executed before it: homing backs off first.
+void Axis::tell_part(const Activity& activity, Error& cause) {
+  if (activity.command->value().state != CommandState::active) return;
+  cause.outcome = Outcome::unknown;
+  cause.message = "executed in part: " + cause.message;
+}
+
 /// What became of a start. True: it was executed. A trigger without a reply is never sent again: the drive is
 /// read back until it shows what it did (M8).
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
@@ -239,6 +246,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
     co_return false;
   }
   if (cause.outcome != Outcome::unknown) {
+    tell_part(*activity, cause);
     const bool aborted = cause.reason == Reason::expired || cause.reason == Reason::lease_lost;
     finish(*activity, [&](CommandRecord& command) { aborted ? command.abort(cause) : command.error(cause); });
     co_return false;
@@ -268,6 +276,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   cause.outcome = Outcome::not_executed;
   cause.message = fmt::format("{}: the start frame got no reply, and the drive did not move: {}",
                               settings_.name, cause.message);
+  tell_part(*activity, cause);
   fail_with_stop(*activity, std::move(cause));
   co_return false;
 }

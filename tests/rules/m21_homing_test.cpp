@@ -128,6 +128,26 @@ TEST(M21, BacksOffABoundedWay) {
   });
 }
 
+/// What was executed of it is not denied by what was not.
+TEST(M21, AHomingThatBackedOffAndCouldNotStartSaysSo) {
+  both_directions({}, [](const RigOptions& options) {
+    Rig rig(options);
+    rig.enable();
+    rig.set_input("X0", true);
+    rig.run(500ms);
+    const auto home = rig.submit(HomeRequest{});
+    ASSERT_TRUE(rig.run_until([&] { return rig.drive->shaft_moving(); }, 5s));
+    rig.set_input("X0", false);
+    rig.fault({.kind = simulation::FaultKind::corrupt_reply, .register_address = 0x0031, .count = -1});
+    ASSERT_TRUE(rig.run_until([&] { return home->has_ended(); }, 30s));
+    EXPECT_EQ(home->value().state, CommandState::error);
+    EXPECT_EQ(home->value().cause->outcome, Outcome::unknown);
+    EXPECT_NE(home->value().cause->message.find("executed in part"), std::string::npos)
+        << describe(home->value());
+    EXPECT_EQ(rig.writes_of(0x0030), 0);
+  });
+}
+
 TEST(M21, ASwitchThatIsNeverFoundEndsInTime) {
   for (const bool travel : {false, true}) {
     for_each_switch({.adjust =
