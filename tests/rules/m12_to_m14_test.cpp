@@ -162,7 +162,8 @@ TEST(M13, AStopToADriveAtRestIsSentUntilItArrives) {
   const auto stop = rig.submit(StopRequest{});
   EXPECT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 10s));
   EXPECT_EQ(stop->value().state, CommandState::done) << describe(stop->value());
-  EXPECT_EQ(arrived, 2) << "the first echo may be that of one before, which was late: once more after a reading";
+  EXPECT_EQ(arrived, 2)
+      << "the first echo may be that of one before, which was late: once more after a reading";
 }
 
 TEST(M13, StopWithActiveStopTerminalsAndInPtPv) {
