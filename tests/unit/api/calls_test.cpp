@@ -336,7 +336,7 @@ TEST_F(Calls, OversizedRequestsAreRefusedAndTheConnectionLives) {
   serve();
   Call context;
   v1::GetAxisRequest request;
-  request.set_axis(std::string(300 * 1024, 'a'));
+  request.set_axis(std::string(std::size_t{300} * 1024, 'a'));
   v1::GetAxisResponse response;
   EXPECT_EQ(axes_->GetAxis(&context, request, &response).error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_TRUE(call(&Stub::Stop).ok());
