@@ -17,7 +17,6 @@ using namespace std::chrono_literals;
 constexpr std::size_t longest_axis_name = 64;
 constexpr std::size_t longest_id = 128;
 constexpr Duration default_validity = 60s;
-constexpr Duration longest_validity = 10min;
 constexpr Duration default_hold = 300ms;
 constexpr Duration longest_hold = 2s;  // M16: these drives have no communication watchdog
 constexpr Duration longest_time =

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <charconv>
 #include <optional>
 #include <utility>
+
+#include "daemon/store/line_text.hpp"
 
 namespace axisd::store {
 namespace {
@@ -15,73 +15,25 @@ constexpr std::string_view version_line = "axisd-state 1\n";
 constexpr std::string_view trailer = "crc32 ";
 constexpr std::size_t trailer_size = trailer.size() + 8 + 1;  // eight hexadecimal digits, end of line
 
-constexpr std::array<std::uint32_t, 256> crc_table = [] {
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t i = 0; i < table.size(); ++i) {
-    std::uint32_t value = i;
-    for (int bit = 0; bit < 8; ++bit) value = (value >> 1U) ^ ((value & 1U) != 0 ? 0xEDB88320U : 0U);
-    table[i] = value;
+/// The words of the file format; independent of what the API prints.
+std::string_view trust_word(PositionTrust trust) {
+  switch (trust) {
+    case PositionTrust::unknown:
+      return "unknown";
+    case PositionTrust::set:
+      return "set";
+    case PositionTrust::homed:
+      return "homed";
+    case PositionTrust::restored:
+      return "restored";
   }
-  return table;
-}();
-
-bool plain(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-         std::string_view("_-.:@/").contains(c);
+  return "unknown";
 }
 
-/// Client identities are free text: whatever could end a word or a line is written as %XX.
-std::string escape(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    if (plain(c))
-      out += c;
-    else
-      out += fmt::format("%{:02x}", static_cast<unsigned char>(c));
-  }
-  return out;
-}
-
-/// Reads the text from the front; after the first mismatch everything fails.
-class Reader {
+class Reader : public LineReader {
  public:
-  explicit Reader(std::string_view rest) : rest_(rest) {}
+  using LineReader::LineReader;
 
-  bool literal(std::string_view text) {
-    if (!rest_.starts_with(text)) return false;
-    rest_.remove_prefix(text.size());
-    return true;
-  }
-  template <class Integer>
-  bool number(Integer& value, int base = 10) {
-    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value, base);
-    if (error != std::errc{}) return false;
-    rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
-    return true;
-  }
-  bool flag(bool& value) {
-    unsigned digit = 0;
-    if (!number(digit) || digit > 1) return false;
-    value = digit == 1;
-    return true;
-  }
-  bool word(std::string& value) {
-    value.clear();
-    while (!rest_.empty() && (plain(rest_.front()) || rest_.front() == '%')) {
-      if (!literal("%")) {
-        value += rest_.front();
-        rest_.remove_prefix(1);
-        continue;
-      }
-      unsigned char byte = 0;
-      const auto digits = rest_.substr(0, 2);
-      const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
-      if (error != std::errc{} || end != digits.data() + 2) return false;
-      value += static_cast<char>(byte);
-      rest_.remove_prefix(2);
-    }
-    return true;
-  }
   bool trust(PositionTrust& value) {
     for (const auto candidate :
          {PositionTrust::unknown, PositionTrust::set, PositionTrust::homed, PositionTrust::restored}) {
@@ -90,25 +42,6 @@ class Reader {
     }
     return false;
   }
-  [[nodiscard]] bool at_end() const { return rest_.empty(); }
-
-  /// The words of the file format; independent of what the API prints.
-  static std::string_view trust_word(PositionTrust trust) {
-    switch (trust) {
-      case PositionTrust::unknown:
-        return "unknown";
-      case PositionTrust::set:
-        return "set";
-      case PositionTrust::homed:
-        return "homed";
-      case PositionTrust::restored:
-        return "restored";
-    }
-    return "unknown";
-  }
-
- private:
-  std::string_view rest_;
 };
 
 bool read_inhibit(Reader& reader, InhibitRecord& inhibit) {
@@ -169,12 +102,6 @@ std::optional<std::string_view> intact_body(std::string_view text) {
 
 }  // namespace
 
-std::uint32_t crc32(std::string_view bytes) {
-  std::uint32_t crc = 0xFFFFFFFFU;
-  for (const char c : bytes) crc = (crc >> 8U) ^ crc_table[(crc ^ static_cast<unsigned char>(c)) & 0xFFU];
-  return ~crc;
-}
-
 std::string encode(const Generation& generation) {
   const auto& [number, state] = generation;
   const auto since =
@@ -187,7 +114,7 @@ std::string encode(const Generation& generation) {
     if (!axis.offset) continue;
     const auto& offset = *axis.offset;
     text += fmt::format("offset pulses={} trust={} last={} per_rev={} invert={:d} canary={:04x}\n",
-                        offset.offset_pulses, Reader::trust_word(offset.trust), offset.last_position_pulses,
+                        offset.offset_pulses, trust_word(offset.trust), offset.last_position_pulses,
                         offset.pulses_per_revolution, offset.invert, fmt::join(offset.canary, "."));
   }
   return text + checksum_line(text);

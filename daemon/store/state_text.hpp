@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "buses/error.hpp"
+#include "daemon/store/line_text.hpp"
 #include "devices/persistence.hpp"
 
 namespace axisd::store {
@@ -16,9 +17,6 @@ struct Generation {
   StoredState state;
   bool operator==(const Generation&) const = default;
 };
-
-/// CRC-32 as in IEEE 802.3: finds every error burst of up to 32 bits, so every flipped bit.
-std::uint32_t crc32(std::string_view bytes);
 
 std::string encode(const Generation& generation);
 

@@ -59,6 +59,9 @@ struct Command {
   std::optional<WallTime> started_at{}, ended_at{};
 };
 
+/// Nothing that a client asks for may be sent later than this after its request.
+inline constexpr Duration longest_validity = std::chrono::minutes(10);
+
 enum class BufferMode : std::uint8_t { aborting, buffered };
 
 struct CommandOptions {

@@ -1,0 +1,110 @@
+#include "daemon/store/journal_disk.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+#include <utility>
+
+namespace axisd::store {
+namespace {
+
+constexpr auto newest = "journal.v1";
+constexpr auto unfinished = "journal.v1.new";
+constexpr auto damaged = "journal.v1.damaged";
+
+class FileDisk final : public JournalDisk {
+ public:
+  FileDisk(std::filesystem::path path, FileDescriptor directory)
+      : path_(std::move(path)), directory_(std::move(directory)) {}
+
+  Result<std::optional<std::string>> read() override {
+    const FileDescriptor file(openat(directory_.get(), newest, O_RDONLY | O_CLOEXEC));
+    if (file.get() < 0) {
+      if (errno == ENOENT) return std::nullopt;
+      return failed("open", newest, errno);
+    }
+    std::string text;
+    std::array<char, 65536> chunk{};
+    for (;;) {
+      const auto got = ::read(file.get(), chunk.data(), chunk.size());
+      if (got == 0) return text;
+      if (got > 0)
+        text.append(chunk.data(), static_cast<std::size_t>(got));
+      else if (errno != EINTR)
+        return failed("read", newest, errno);
+    }
+  }
+
+  Result<void> append(std::string_view text) override {
+    const auto before = lseek(file_.get(), 0, SEEK_END);
+    auto written = write_all(file_.get(), newest, text);
+    // Half a line would be taken for damage. Should this fail, too, it is.
+    if (!written && before >= 0) (void)!ftruncate(file_.get(), before);
+    return written;
+  }
+
+  Result<void> sync() override {
+    if (fdatasync(file_.get()) != 0) return failed("write", newest, errno);
+    return {};
+  }
+
+  Result<void> replace(std::string_view text) override {
+    const int at = directory_.get();
+    FileDescriptor file(openat(at, unfinished, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0640));
+    if (file.get() < 0) return failed("create", unfinished, errno);
+    if (auto written = write_all(file.get(), unfinished, text); !written) return written;
+    if (fsync(file.get()) != 0) return failed("write", unfinished, errno);
+    if (renameat(at, unfinished, at, newest) != 0) return failed("replace", newest, errno);
+    if (fsync(at) != 0) return failed("write", ".", errno);
+    file_ = std::move(file);
+    return {};
+  }
+
+  Result<void> keep_damaged() override {
+    const int at = directory_.get();
+    if (unlinkat(at, damaged, 0) != 0 && errno != ENOENT) return failed("remove", damaged, errno);
+    if (linkat(at, newest, at, damaged, 0) != 0) return failed("keep", newest, errno);
+    return {};
+  }
+
+ private:
+  [[nodiscard]] std::unexpected<Error> failed(std::string_view what, std::string_view name, int error) const {
+    return fail({.reason = Reason::storage,
+                 .message = fmt::format("cannot {} {}: {}", what, (path_ / name).string(),
+                                        std::generic_category().message(error)),
+                 .remedy = "free space on the disk, and check it and the directory's permissions",
+                 .where = {.native_code = static_cast<std::uint32_t>(error)}});
+  }
+  [[nodiscard]] Result<void> write_all(int file, const char* name, std::string_view text) const {
+    while (!text.empty()) {
+      const auto put = ::write(file, text.data(), text.size());
+      if (put >= 0)
+        text.remove_prefix(static_cast<std::size_t>(put));
+      else if (errno != EINTR)
+        return failed("write", name, errno);
+    }
+    return {};
+  }
+
+  std::filesystem::path path_;
+  FileDescriptor directory_, file_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<JournalDisk>> open_journal_disk(const std::filesystem::path& directory) {
+  FileDescriptor opened(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (opened.get() < 0)
+    return fail(Reason::storage,
+                fmt::format("cannot use state directory {}: {}", directory.string(),
+                            std::generic_category().message(errno)),
+                "create it for the daemon's user, or name another one with --state-directory");
+  return std::make_unique<FileDisk>(directory, std::move(opened));
+}
+
+}  // namespace axisd::store

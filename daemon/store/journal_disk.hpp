@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "buses/error.hpp"
+#include "buses/file_descriptor.hpp"
+
+namespace axisd::store {
+
+/// The file behind the command journal. Thread: one at a time.
+class JournalDisk {
+ public:
+  virtual ~JournalDisk() = default;
+  /// Nothing: there is none. Errors: storage.
+  [[nodiscard]] virtual Result<std::optional<std::string>> read() = 0;
+  /// Appends; survives the end of the daemon, and that of the computer once sync() has returned. Errors:
+  /// storage: what is at the end of the file is not known then.
+  [[nodiscard]] virtual Result<void> append(std::string_view text) = 0;
+  [[nodiscard]] virtual Result<void> sync() = 0;
+  /// Durably replaces the whole file: at no moment is there none. Errors: storage: it is the old one or the
+  /// new one.
+  [[nodiscard]] virtual Result<void> replace(std::string_view text) = 0;
+  /// Keeps a second name for the present file, which a person may want to look at.
+  [[nodiscard]] virtual Result<void> keep_damaged() = 0;
+};
+
+/// `journal.v1` in a directory, which the caller has locked. Errors: storage.
+Result<std::unique_ptr<JournalDisk>> open_journal_disk(const std::filesystem::path& directory);
+
+}  // namespace axisd::store

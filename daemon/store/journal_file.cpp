@@ -1,0 +1,147 @@
+#include "daemon/store/journal_file.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "daemon/store/thread.hpp"
+
+namespace axisd::store {
+namespace {
+
+/// A disk that failed is tried again so often.
+constexpr auto retry = std::chrono::seconds(1);
+/// The file is written anew when it has grown to twice what it was, and to this at least.
+constexpr std::size_t smallest_rewrite = std::size_t{1} << 20U;
+
+}  // namespace
+
+Result<std::unique_ptr<JournalFile>> JournalFile::open(std::unique_ptr<JournalDisk> disk, WallTime now,
+                                                       Executor core) {
+  std::unique_ptr<JournalFile> journal(new JournalFile(std::move(disk), std::move(core)));
+  const auto text = journal->disk_->read();
+  if (!text) return fail(text.error());
+  if (*text) {
+    auto load = load_journal(**text, monotonic_now());
+    if (load.newer_format)
+      return fail(Reason::storage, "the command journal was written by a newer axisd",
+                  "run that version, or move journal.v1 away 10 minutes after the last command");
+    journal->model_ = std::move(load.model);
+    if (!load.damage.empty()) {
+      journal->model_.apply(DoubtLine{.until = now + longest_validity, .damage = load.damage},
+                            monotonic_now());
+      if (auto kept = journal->disk_->keep_damaged(); !kept) return fail(kept.error());
+    }
+    // A clock that was set back meanwhile does not make the doubt longer than it was.
+    auto content = journal->model_.content();
+    if (content.doubtful_until)
+      content.doubtful_until = std::min(*content.doubtful_until, WallTime(now + longest_validity));
+    if (content.doubtful_until && *content.doubtful_until <= now) {
+      content.doubtful_until.reset();
+      journal->model_.doubt_is_over();
+    }
+    journal->loaded_ = std::move(content);
+  }
+  if (auto written = journal->rewrite(); !written) return fail(written.error());
+  journal->thread_ = start_thread([self = journal.get()] { self->run(); });
+  return journal;
+}
+
+JournalFile::JournalFile(std::unique_ptr<JournalDisk> disk, Executor core)
+    : core_(std::move(core)), disk_(std::move(disk)) {}
+
+JournalFile::~JournalFile() {
+  if (!thread_.joinable()) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    closing_ = true;
+  }
+  wake_.notify_one();
+  thread_.join();
+}
+
+void JournalFile::accepted(const Command& command, std::string digest) {
+  enqueue({.line = AcceptedLine{.command = command, .digest = std::move(digest)}});
+}
+
+void JournalFile::attached(const std::string& command, RequestKey request, Callback done) {
+  enqueue({.line = AttachedLine{.command = command, .request = std::move(request)}, .done = std::move(done)});
+}
+
+void JournalFile::sending(const Command& command, SendingNote note, Callback done) {
+  enqueue({.line = SendingLine{.command = command, .note = std::move(note)},
+           .durable = true,
+           .done = std::move(done)});
+}
+
+void JournalFile::ended(const Command& command) {
+  enqueue({.line = EndedLine{.command = command}, .durable = true});
+}
+
+void JournalFile::enqueue(Pending pending) {
+  {
+    // Held by the writer only for a swap: the core does not wait for the disk.
+    const std::scoped_lock lock(mutex_);
+    pending_.push_back(std::move(pending));
+  }
+  wake_.notify_one();
+}
+
+void JournalFile::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    const auto something = [this] { return closing_ || !pending_.empty(); };
+    if (broken_)
+      wake_.wait_for(lock, retry, something);
+    else
+      wake_.wait(lock, something);
+    auto batch = std::exchange(pending_, {});
+    const bool last = closing_ && batch.empty();
+    lock.unlock();
+    if (!batch.empty() || broken_) commit(std::move(batch));
+    if (last) return;
+    lock.lock();
+  }
+}
+
+void JournalFile::commit(std::vector<Pending> batch) {
+  const auto now = monotonic_now();
+  for (const auto& pending : batch) model_.apply(pending.line, now);
+  const bool was_broken = broken_;
+  // What a failed write left at the end of the file is not known, nor what a failed sync left out.
+  const auto written = was_broken ? rewrite() : write(batch);
+  broken_ = !written;
+  for (auto& pending : batch)
+    if (pending.done) post(core_, [done = std::move(pending.done), written] { done(written); });
+  if (!written) return tell(written.error());
+  if (was_broken) tell(std::nullopt);
+  if (size_ < std::max(smallest_rewrite, 2 * size_when_rewritten_)) return;
+  model_.forget_before(monotonic_now() - remembered);
+  if (const auto shortened = rewrite(); !shortened) {
+    broken_ = true;
+    tell(shortened.error());
+  }
+}
+
+Result<void> JournalFile::write(const std::vector<Pending>& batch) {
+  std::string text;
+  for (const auto& pending : batch) text += encode_line(++last_number_, pending.line);
+  if (auto appended = disk_->append(text); !appended) return appended;
+  size_ += text.size();
+  if (std::ranges::none_of(batch, &Pending::durable)) return {};
+  return disk_->sync();
+}
+
+Result<void> JournalFile::rewrite() {
+  std::string text(journal_header);
+  for (const auto& line : model_.lines()) text += encode_line(++last_number_, line);
+  if (auto replaced = disk_->replace(text); !replaced) return replaced;
+  size_ = size_when_rewritten_ = text.size();
+  return {};
+}
+
+void JournalFile::tell(const std::optional<Error>& trouble) {
+  post(core_, [state = trouble_, trouble] { *state = trouble; });
+}
+
+}  // namespace axisd::store

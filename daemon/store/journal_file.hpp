@@ -1,0 +1,71 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "buses/task.hpp"
+#include "daemon/store/journal_disk.hpp"
+#include "daemon/store/journal_model.hpp"
+#include "devices/axis/command_journal.hpp"
+
+namespace axisd::store {
+
+/// The command journal in a file, written by a thread of its own: what is told while the disk is busy goes
+/// into the next write together. Thread: core (created and destroyed there, too).
+class JournalFile final : public CommandJournal {
+ public:
+  /// Loads the journal and durably begins a new one with what is still needed. Blocks on the disk. Errors:
+  /// storage, with what to do.
+  static Result<std::unique_ptr<JournalFile>> open(std::unique_ptr<JournalDisk> disk, WallTime now,
+                                                   Executor core);
+  JournalFile(const JournalFile&) = delete;
+  /// Writes what is still pending. Callbacks are posted, which no longer run if the core has ended.
+  ~JournalFile() override;
+
+  [[nodiscard]] JournalContent take_loaded() override { return std::move(loaded_); }
+  [[nodiscard]] std::optional<Error> trouble() const override { return *trouble_; }
+  void accepted(const Command& command, std::string digest) override;
+  void attached(const std::string& command, RequestKey request, Callback done) override;
+  void sending(const Command& command, SendingNote note, Callback done) override;
+  void ended(const Command& command) override;
+
+ private:
+  struct Pending {
+    JournalLine line;
+    bool durable = false;
+    Callback done{};
+  };
+  JournalFile(std::unique_ptr<JournalDisk> disk, Executor core);
+  void enqueue(Pending pending);
+  void run();
+  void commit(std::vector<Pending> batch);
+  [[nodiscard]] Result<void> write(const std::vector<Pending>& batch);
+  [[nodiscard]] Result<void> rewrite();
+  void tell(const std::optional<Error>& trouble);
+
+  Executor core_;
+  JournalContent loaded_;
+  /// Of the core, which alone reads and writes it; outlives this with the handlers that were posted.
+  std::shared_ptr<std::optional<Error>> trouble_ = std::make_shared<std::optional<Error>>();
+
+  // Of the writing thread, once it runs.
+  std::unique_ptr<JournalDisk> disk_;
+  JournalModel model_;
+  std::uint64_t last_number_ = 0;
+  std::size_t size_ = 0, size_when_rewritten_ = 0;  ///< of the file, bytes
+  bool broken_ = false;  ///< the last write failed: what the file ends with is not known
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::vector<Pending> pending_;  // guarded by mutex_
+  bool closing_ = false;          // guarded by mutex_
+  std::thread thread_;
+};
+
+}  // namespace axisd::store

@@ -1,0 +1,53 @@
+// The command journal as lines of text: pure functions, no files.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "devices/axis/command_journal.hpp"
+
+namespace axisd::store {
+
+struct AcceptedLine {
+  Command command;  ///< without what follows from its execution
+  std::string digest;
+};
+/// A further request was taken into the command.
+struct AttachedLine {
+  std::string command;
+  RequestKey request;
+};
+/// Its start may have been sent from here on.
+struct SendingLine {
+  Command command;  ///< id, axis, kind and what was granted
+  SendingNote note;
+};
+struct EndedLine {
+  Command command;           ///< as SendingLine, and how it ended
+  bool awaits_reset = true;  ///< an unknown outcome of which the axis was not reset since
+};
+/// The journal was damaged: what it does not know may have been in it.
+struct DoubtLine {
+  WallTime until{};
+  std::string damage;
+};
+using JournalLine = std::variant<AcceptedLine, AttachedLine, SendingLine, EndedLine, DoubtLine>;
+
+inline constexpr std::string_view journal_header = "axisd-journal 1\n";
+inline constexpr std::string_view journal_header_any = "axisd-journal ";
+
+/// With its end of line. Lines are numbered without a gap, so that a lost one shows.
+std::string encode_line(std::uint64_t number, const JournalLine& line);
+
+struct NumberedLine {
+  std::uint64_t number = 0;
+  JournalLine line;
+};
+/// Without its end of line. Nothing: damaged.
+std::optional<NumberedLine> decode_line(std::string_view text);
+
+}  // namespace axisd::store

@@ -1,0 +1,63 @@
+#include "daemon/store/line_text.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+namespace axisd::store {
+namespace {
+
+constexpr std::array<std::uint32_t, 256> crc_table = [] {
+  std::array<std::uint32_t, 256> table{};
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    std::uint32_t value = i;
+    for (int bit = 0; bit < 8; ++bit) value = (value >> 1U) ^ ((value & 1U) != 0 ? 0xEDB88320U : 0U);
+    table[i] = value;
+  }
+  return table;
+}();
+
+}  // namespace
+
+std::uint32_t crc32(std::string_view bytes) {
+  std::uint32_t crc = 0xFFFFFFFFU;
+  for (const char c : bytes) crc = (crc >> 8U) ^ crc_table[(crc ^ static_cast<unsigned char>(c)) & 0xFFU];
+  return ~crc;
+}
+
+bool plain(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+         std::string_view("_-.:@/").contains(c);
+}
+
+std::string escape(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  for (const char c : text) {
+    if (plain(c))
+      out += c;
+    else
+      out += fmt::format("%{:02x}", static_cast<unsigned char>(c));
+  }
+  return out;
+}
+
+bool LineReader::word(std::string& value) {
+  value.clear();
+  while (!rest_.empty() && (plain(rest_.front()) || rest_.front() == '%')) {
+    if (!literal("%")) {
+      value += rest_.front();
+      rest_.remove_prefix(1);
+      continue;
+    }
+    unsigned char byte = 0;
+    const auto digits = rest_.substr(0, 2);
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
+    if (error != std::errc{} || end != digits.data() + 2) return false;
+    value += static_cast<char>(byte);
+    rest_.remove_prefix(2);
+  }
+  return true;
+}
+
+}  // namespace axisd::store

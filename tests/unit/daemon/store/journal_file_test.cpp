@@ -1,0 +1,252 @@
+#include "daemon/store/journal_file.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <csignal>
+
+#include "tests/support/temporary_directory.hpp"
+
+namespace axisd::store {
+namespace {
+
+using testing::HasSubstr;
+
+/// A disk that can be full.
+struct Faults {
+  std::atomic<bool> append{false}, sync{false}, replace{false};
+};
+class FaultyDisk final : public JournalDisk {
+ public:
+  FaultyDisk(std::unique_ptr<JournalDisk> disk, std::shared_ptr<Faults> faults)
+      : disk_(std::move(disk)), faults_(std::move(faults)) {}
+  Result<std::optional<std::string>> read() override { return disk_->read(); }
+  Result<void> append(std::string_view text) override {
+    if (!faults_->append) return disk_->append(text);
+    (void)disk_->append(text.substr(0, text.size() / 2));
+    return full();
+  }
+  Result<void> sync() override { return faults_->sync ? full() : disk_->sync(); }
+  Result<void> replace(std::string_view text) override {
+    return faults_->replace ? full() : disk_->replace(text);
+  }
+  Result<void> keep_damaged() override { return disk_->keep_damaged(); }
+
+ private:
+  static Result<void> full() { return fail(Reason::storage, "cannot write journal.v1: full", "free space"); }
+  std::unique_ptr<JournalDisk> disk_;
+  std::shared_ptr<Faults> faults_;
+};
+
+Command command(const std::string& id, const std::string& axis = "x") {
+  return {.id = id, .axis = axis, .request_id = "r" + id, .client = "c", .kind = CommandKind::move_relative};
+}
+Command done(const std::string& id) {
+  auto command = axisd::store::command(id);
+  command.state = CommandState::done;
+  return command;
+}
+
+class JournalFileTest : public testing::Test {
+ protected:
+  std::unique_ptr<JournalFile> open(WallTime now = WallTime(std::chrono::hours(1))) {
+    auto disk = open_journal_disk(temporary_.path());
+    if (!disk) ADD_FAILURE() << to_string(disk.error());
+    auto journal =
+        JournalFile::open(std::make_unique<FaultyDisk>(std::move(*disk), faults_), now, core_.get_executor());
+    if (!journal) {
+      ADD_FAILURE() << to_string(journal.error());
+      return nullptr;
+    }
+    return *std::move(journal);
+  }
+  CommandJournal::Callback record() {
+    return [this](Result<void> result) { results_.push_back(std::move(result)); };
+  }
+  void wait_for(std::size_t count) {
+    while (results_.size() < count) core_.run_one();
+  }
+  /// Until the journal tells of trouble, or of its end.
+  void wait_for_trouble(const JournalFile& journal, bool trouble) {
+    while (journal.trouble().has_value() != trouble) core_.run_one_for(std::chrono::seconds(5));
+  }
+  std::string text() const { return temporary_.read("journal.v1"); }
+
+  test::TemporaryDirectory temporary_;
+  std::shared_ptr<Faults> faults_ = std::make_shared<Faults>();
+  boost::asio::io_context core_;
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> running_ =
+      boost::asio::make_work_guard(core_);
+  std::vector<Result<void>> results_;
+};
+
+TEST_F(JournalFileTest, CommandsAreKnownAfterARestart) {
+  {
+    const auto journal = open();
+    EXPECT_TRUE(journal->take_loaded().commands.empty());
+    journal->accepted(command("1"), "one");
+    journal->sending(command("1"), {.start_pulses = 5, .target_pulses = 6}, record());
+    wait_for(1);
+    EXPECT_TRUE(results_[0]);
+    EXPECT_THAT(text(), HasSubstr("sending id=1")) << "before it is told";
+    journal->ended(done("1"));
+    journal->accepted(command("2"), "two");
+    journal->attached("2", {"c", "more", "two"}, record());
+    wait_for(2);
+  }
+  for (int start = 0; start < 3; ++start) {
+    const auto content = open()->take_loaded();
+    ASSERT_EQ(content.commands.size(), 2);
+    EXPECT_EQ(content.commands[0].command.state, CommandState::done);
+    EXPECT_EQ(content.commands[0].digest, "one");
+    EXPECT_TRUE(content.commands[0].sent);
+    EXPECT_FALSE(content.commands[1].sent);
+    EXPECT_EQ(content.commands[1].attached, (std::vector<RequestKey>{{"c", "more", "two"}}));
+    EXPECT_FALSE(content.doubtful_until);
+  }
+}
+
+TEST_F(JournalFileTest, AFullDiskFailsWhatIsToBeSentUntilThereIsSpaceAgain) {
+  const auto journal = open();
+  for (auto* fault : {&faults_->append, &faults_->sync}) {
+    *fault = true;
+    faults_->replace = true;
+    journal->accepted(command("1"), "one");
+    journal->sending(command("1"), {}, record());
+    wait_for(1);
+    EXPECT_EQ(results_[0].error().reason, Reason::storage);
+    wait_for_trouble(*journal, true);
+    EXPECT_THAT(journal->trouble()->message, HasSubstr("full"));
+    journal->sending(command("2"), {}, record());
+    wait_for(2);
+    EXPECT_FALSE(results_[1]) << "nothing is taken for durable on a disk that failed";
+    *fault = false;
+    faults_->replace = false;
+    wait_for_trouble(*journal, false);  // by itself
+    journal->sending(command("3"), {}, record());
+    wait_for(3);
+    EXPECT_TRUE(results_[2]);
+    results_.clear();
+  }
+}
+
+TEST_F(JournalFileTest, AfterAFailedWriteTheFileIsWholeAgain) {
+  {
+    const auto journal = open();
+    faults_->append = true;
+    journal->accepted(command("1"), "one");
+    journal->sending(command("1"), {}, record());
+    wait_for(1);
+    EXPECT_FALSE(results_[0]);
+    faults_->append = false;
+    wait_for_trouble(*journal, true);
+    wait_for_trouble(*journal, false);
+    journal->sending(command("2"), {}, record());
+    wait_for(2);
+    EXPECT_TRUE(results_[1]);
+  }
+  const auto content = open()->take_loaded();
+  EXPECT_FALSE(content.doubtful_until) << content.damage;
+  EXPECT_EQ(content.commands.size(), 2);
+}
+
+TEST_F(JournalFileTest, DamageIsRememberedForAsLongAsARequestIsValid) {
+  const WallTime start(std::chrono::hours(1));
+  {
+    const auto journal = open(start);
+    journal->accepted(command("1"), "one");
+    journal->sending(command("1"), {}, record());
+    wait_for(1);
+  }
+  temporary_.write("journal.v1", text().substr(0, text().size() - 10));
+  const auto torn = text();
+  for (const auto minutes : {0, 1, 9}) {
+    const auto content = open(start + std::chrono::minutes(minutes))->take_loaded();
+    ASSERT_TRUE(content.doubtful_until) << minutes;
+    EXPECT_EQ(*content.doubtful_until, start + longest_validity);
+    EXPECT_THAT(content.damage, HasSubstr("line "));
+    EXPECT_EQ(content.commands.size(), 1);
+  }
+  EXPECT_EQ(temporary_.read("journal.v1.damaged"), torn);
+  EXPECT_TRUE(open(start - std::chrono::hours(1))->take_loaded().doubtful_until) << "the clock was set back";
+  EXPECT_FALSE(open(start + longest_validity)->take_loaded().doubtful_until);
+  EXPECT_FALSE(open(start)->take_loaded().doubtful_until) << "it is over for good";
+}
+
+TEST_F(JournalFileTest, ItDoesNotGrowWithoutEndAndKeepsWhatIsStillNeeded) {
+  const auto journal = open();
+  journal->accepted(command("open"), std::string(100, 'd'));
+  for (int i = 0; i < 40; ++i) {
+    for (int k = 0; k < 200; ++k) {
+      auto ended = command("same");
+      ended.state = CommandState::error;
+      ended.cause = Error{.message = std::string(200, 'm')};
+      journal->ended(ended);
+    }
+    journal->sending(command("same"), {}, record());
+    wait_for(static_cast<std::size_t>(i) + 1);
+  }
+  EXPECT_LT(text().size(), std::size_t{2} << 20U);
+  const auto load = load_journal(text(), {});
+  EXPECT_EQ(load.damage, "");
+  EXPECT_EQ(load.model.content().commands.front().command.id, "open");
+}
+
+TEST_F(JournalFileTest, ANewerFormatIsNotTakenForDamage) {
+  temporary_.write("journal.v1", "axisd-journal 2\nwhatever\n");
+  auto disk = open_journal_disk(temporary_.path());
+  const auto journal = JournalFile::open(std::move(*disk), WallTime(), core_.get_executor());
+  ASSERT_FALSE(journal);
+  EXPECT_THAT(journal.error().message, HasSubstr("newer"));
+  EXPECT_EQ(text(), "axisd-journal 2\nwhatever\n");
+}
+
+/// What was told to be durable is there when the process is killed at any moment.
+TEST_F(JournalFileTest, WhatWasDurableSurvivesAKill) {
+  for (int round = 0; round < 15; ++round) {
+    std::array<int, 2> pipes{};
+    ASSERT_EQ(pipe(pipes.data()), 0);
+    const auto child = fork();
+    if (child == 0) {
+      boost::asio::io_context core;
+      auto disk = open_journal_disk(temporary_.path());
+      auto journal =
+          JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), core.get_executor());
+      if (!journal) _exit(1);
+      for (unsigned char i = 0; i < 200; ++i) {
+        const auto id = std::to_string(round) + "-" + std::to_string(i);
+        (*journal)->accepted(command(id), "d");
+        bool durable = false;
+        (*journal)->sending(command(id), {},
+                            [&](const Result<void>& result) { durable = result.has_value(); });
+        auto work = boost::asio::make_work_guard(core);
+        core.restart();
+        core.run_one();
+        if (!durable || write(pipes[1], &i, 1) != 1) _exit(1);
+      }
+      _exit(0);
+    }
+    close(pipes[1]);
+    int told = -1;
+    unsigned char number = 0;
+    while (told < 3 * round && read(pipes[0], &number, 1) == 1) told = number;
+    kill(child, SIGKILL);
+    while (read(pipes[0], &number, 1) == 1) told = number;
+    close(pipes[0]);
+    int status = 0;
+    waitpid(child, &status, 0);
+    const auto content = open()->take_loaded();
+    EXPECT_FALSE(content.doubtful_until) << content.damage;
+    int found = 0;
+    for (const auto& journalled : content.commands)
+      found += journalled.command.id.starts_with(std::to_string(round) + "-") && journalled.sent ? 1 : 0;
+    EXPECT_GE(found, told + 1);
+  }
+}
+
+}  // namespace
+}  // namespace axisd::store
