@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 
@@ -82,6 +83,15 @@ class Recording {
   std::optional<double> moved_at_;  ///< last sample in motion
 };
 
+/// Before anything is recorded: a motion cannot be had a second time. Leaves no file behind.
+void check_writable(const std::string& path) {
+  if (path == "-") return;
+  const bool existed = std::filesystem::exists(path);
+  if (!std::ofstream(path, std::ios::binary | std::ios::app))
+    throw Failure(ExitCode::usage, fmt::format("cannot write '{}': give another --output", path));
+  if (!existed) std::filesystem::remove(path);
+}
+
 void write(const std::string& path, const std::string& text) {
   if (path == "-") return print(text);
   std::ofstream file(path, std::ios::binary);
@@ -91,6 +101,8 @@ void write(const std::string& path, const std::string& text) {
 }
 
 void plot(Invocation& invocation, const PlotArguments& arguments) {
+  const auto path = arguments.output.empty() ? arguments.axis + ".svg" : arguments.output;
+  check_writable(path);
   v1::WatchAxesRequest request;
   request.add_axes(arguments.axis);
   set(*request.mutable_period(), parse_duration(arguments.period, "--period"));
@@ -102,7 +114,6 @@ void plot(Invocation& invocation, const PlotArguments& arguments) {
     throw Failure(ExitCode::interrupted,
                   fmt::format("{}: it did not move; nothing was written", arguments.axis));
   const auto result = recording.plot(arguments.axis);
-  const auto path = arguments.output.empty() ? arguments.axis + ".svg" : arguments.output;
   write(path, svg(result));
   if (path != "-")
     print_line(fmt::format("{}: {} samples within {}", path, result.samples.size(),

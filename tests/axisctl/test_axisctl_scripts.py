@@ -125,6 +125,11 @@ class Plot(FileTest):
     def test_unknown_axis(self):
         self.assertIn("no axis 'nobody'", self.fails(4, "plot", "nobody"))
 
+    def test_a_file_that_cannot_be_written_costs_no_motion(self):
+        complaint = self.fails(2, "plot", "feeder", "--output", "/nonexistent/x.svg")
+        self.assertIn("cannot write '/nonexistent/x.svg'", complaint)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
 
 class Manual(AxisctlTest):
     def test_is_sound_roff(self):
