@@ -112,7 +112,10 @@ void hold(Invocation& invocation, const Arguments& arguments) {
                 {{"AXISD_LEASE", std::to_string(token)}, {"AXISD_SERVER", invocation.connection.server}});
     status = hold_while(invocation, child, token, ttl_of(response.lease()), lost);
   } catch (...) {
-    release(invocation, token);
+    try {
+      release(invocation, token);
+    } catch (const Failure&) {  // it ends by itself; what came first is to be told
+    }
     throw;
   }
   if (!lost) release(invocation, token);
