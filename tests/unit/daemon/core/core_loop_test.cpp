@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace axisd::core {
@@ -65,6 +66,49 @@ TEST(CoreLoop, WhatIsDueAgainAndAgainStarvesNoHandler) {
   again();
   post(loop.executor(), [&] { loop.stop(); });
   loop.run();
+}
+
+/// Handlers that ask for more leave what comes from outside its turn.
+TEST(CoreLoop, HandlersThatAskForMoreStarveNoInput) {
+  CoreLoop loop;
+  std::function<void()> again = [&] { post(loop.executor(), again); };
+  bool begun = false;
+  post(loop.executor(), [&] {
+    begun = true;
+    again();
+  });
+  std::thread outside([&] { post(loop.executor(), [&] { loop.stop(); }); });
+  loop.run();
+  outside.join();
+  EXPECT_TRUE(begun);
+}
+
+TEST(CoreLoop, AStopGoesBetweenTwoHandlersThatAreReady) {
+  CoreLoop loop;
+  AxisGate gate;
+  Texts order;
+  post(loop.executor(), [&] {
+    post(loop.executor(), [&] {
+      order.emplace_back("first");
+      std::thread([&] { loop.lane().request(gate, [&] { order.emplace_back("stop"); }); }).join();
+    });
+    post(loop.executor(), [&] { order.emplace_back("second"); });
+    post(loop.executor(), [&] { loop.stop(); });
+  });
+  loop.run();
+  EXPECT_EQ(order, (Texts{"first", "stop", "second"}));
+}
+
+TEST(CoreLoop, AHandlerIsNeverRunWithinAnother) {
+  CoreLoop loop;
+  Texts order;
+  post(loop.executor(), [&] {
+    post(loop.executor(), [&] { order.emplace_back("asked for"); });
+    order.emplace_back("asking");
+  });
+  post(loop.executor(), [&] { loop.stop(); });
+  loop.run();
+  EXPECT_EQ(order.front(), "asking");
 }
 
 }  // namespace
