@@ -181,6 +181,7 @@ class Axis {
   Task<Result<void>> prove_or_configure();
   Task<> poll();
   Task<bool> poll_once(int& failures);
+  Task<Result<void>> prove_continuity(TransactionClass priority);
   /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
   void poll_fast(TimePoint from, Duration longest);
   [[nodiscard]] TimePoint next_poll(TimePoint began) const;

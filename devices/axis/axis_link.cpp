@@ -17,6 +17,9 @@ constexpr int attempts_before_offline = 3;
 constexpr auto continuity_latest = milliseconds(950);
 /// More than a reading waits for on a line that is only slow.
 constexpr auto continuity_forgotten = milliseconds(2000);
+/// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
+/// trusted meanwhile.
+constexpr auto continuity_longest = milliseconds(2500);
 
 }  // namespace
 
@@ -273,6 +276,13 @@ void Axis::reconfigure(const std::string& why, bool position_lost) {
   wake_.notify_all();
 }
 
+/// The drive was not restarted since its parameters were last written.
+Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
+  auto proof = co_await drive_->check_continuity(priority);
+  if (proof) continuity_checked_ = env_.clock->now();
+  co_return proof;
+}
+
 /// False: the link is gone.
 Task<bool> Axis::poll_once(int& failures) {
   Result<void> result;
@@ -280,9 +290,8 @@ Task<bool> Axis::poll_once(int& failures) {
   // Where an end is awaited the canary waits as long as it may.
   const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
   if (now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
-    result = co_await drive_->check_continuity(busy() ? TransactionClass::moving_state
-                                                      : TransactionClass::idle_state);
-    if (result) continuity_checked_ = env_.clock->now();
+    result =
+        co_await prove_continuity(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
     if (!result && result.error().reason == Reason::rebooted) {
       on_reboot(result.error());
       co_return false;
@@ -294,7 +303,7 @@ Task<bool> Axis::poll_once(int& failures) {
     if (!sample) result = fail(sample.error());
     // Its node was held back: what was proven before that says nothing of it.
     else if (sample->asked_at - continuity_checked_ > continuity_forgotten)
-      result = co_await drive_->check_continuity(TransactionClass::moving_state);
+      result = co_await prove_continuity(TransactionClass::moving_state);
     if (result) on_sample(*sample);
     if (!result && result.error().reason == Reason::rebooted) {
       if (link_ == LinkState::online) on_reboot(result.error());
@@ -306,7 +315,8 @@ Task<bool> Axis::poll_once(int& failures) {
     failures = 0;
     co_return true;
   }
-  if (result.error().reason == Reason::bus_down || ++failures >= attempts_before_offline) {
+  const bool unproven = env_.clock->now() - continuity_checked_ > continuity_longest;
+  if (result.error().reason == Reason::bus_down || ++failures >= attempts_before_offline || unproven) {
     go_offline(result.error());
     co_return false;
   }
