@@ -44,11 +44,11 @@ class AxisGate {
   [[nodiscard]] std::uint64_t fencing_token() const { return fencing_token_.load(std::memory_order_acquire); }
   [[nodiscard]] TimePoint lease_expires() const { return lease_expires_.load(std::memory_order_acquire); }
   /// Motion that was given under another token, and any under this one from `expires` on, is not sent: the
-  /// latter also if the core is late to end the lease. First the time, then the token: a frame under the new
-  /// token never meets the old time.
+  /// latter also if the core is late to end the lease. First the token, then the time, and they are read the
+  /// other way round: a frame under the old token never meets the new time.
   void set_fencing_token(std::uint64_t token, TimePoint expires = TimePoint::max()) {
-    lease_expires_.store(expires, std::memory_order_release);
     fencing_token_.store(token, std::memory_order_release);
+    lease_expires_.store(expires, std::memory_order_release);
   }
 
  private:
@@ -62,6 +62,8 @@ class AxisGate {
 struct MotionGuard {
   /// As fencing_token: of what everybody may do whoever leases the axis (disable it).
   static constexpr std::uint64_t needs_no_lease = ~std::uint64_t{0};
+  /// As fencing_token: of what goes on after its lease, and starts nothing more. No gate ever has it.
+  static constexpr std::uint64_t lease_is_over = needs_no_lease - 1;
 
   std::shared_ptr<const AxisGate> gate;  ///< null: not a motion frame, always sendable
   std::uint64_t epoch = 0;
@@ -77,8 +79,9 @@ inline Verdict may_send(const MotionGuard& guard, TimePoint now) {
   if (guard.gate->epoch() != guard.epoch) return Verdict::superseded;
   if (now > guard.not_after) return Verdict::expired;
   if (guard.fencing_token == MotionGuard::needs_no_lease) return Verdict::send;
+  const auto expires = guard.gate->lease_expires();
   if (guard.gate->fencing_token() != guard.fencing_token) return Verdict::lease_lost;
-  if (guard.fencing_token != 0 && now >= guard.gate->lease_expires()) return Verdict::lease_lost;
+  if (guard.fencing_token != 0 && now >= expires) return Verdict::lease_lost;
   return Verdict::send;
 }
 

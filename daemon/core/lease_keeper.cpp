@@ -63,16 +63,22 @@ Result<LeaseGrant> LeaseKeeper::acquire(const LeaseRequest& request) {
   if (!grant->repeated) {
     spdlog::info("{} leases {}", lease.holder(), fmt::join(lease.axes, ", "));
     for (const auto& name : lease.axes) {
-      auto* axis = find_(name);
-      if (axis->commanded_without_lease() != nullptr)
-        axis->lease_lost({.reason = Reason::lease_lost,
-                          .message = fmt::format("{} took the axis over", lease.holder()),
-                          .remedy = "acquire a lease"});
       const bool was_taken = std::ranges::any_of(grant->taken, [&](const EndedLease& over) {
         return over.end == LeaseEnd::taken &&
                std::ranges::find(over.lease.axes, name) != over.lease.axes.end();
       });
-      if (!was_taken) tell_(name, LeaseChange{.what = LeaseChange::What::acquired, .holder = lease.holder()});
+      auto change = LeaseChange{.what = LeaseChange::What::acquired, .holder = lease.holder()};
+      auto* axis = find_(name);
+      if (const auto* command = axis->commanded_without_lease(); command != nullptr) {
+        change.what = LeaseChange::What::taken;
+        change.before = command->client;
+        spdlog::warn("{}: {} takes the axis over from {} {} of {}", name, lease.holder(),
+                     to_string(command->kind), command->id, command->client);
+        axis->lease_lost({.reason = Reason::lease_lost,
+                          .message = fmt::format("{} took the axis over", lease.holder()),
+                          .remedy = "acquire a lease"});
+      }
+      if (!was_taken) tell_(name, std::move(change));
       axis->refresh();
     }
   }

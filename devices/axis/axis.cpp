@@ -133,6 +133,7 @@ void Axis::on_sample(const DriveSample& sample) {
   }
   if (sample.moving && !activity_ && !stopping_.running && link_ == LinkState::online)
     on_unexplained_motion(sample, before);
+  release_as_owed();
   publish();
   sampled_.notify_all();
 }

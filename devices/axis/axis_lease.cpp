@@ -1,9 +1,14 @@
 // Who may command the axis, and what it does when the lease that it was commanded under ends.
+#include <spdlog/spdlog.h>
+
 #include "devices/axis/axis.hpp"
 
 namespace axisd {
 
 namespace {
+
+/// As long as run_enable() waits for it.
+constexpr auto enable_shows_within = std::chrono::seconds(1);
 
 /// Ends by itself, where its request said.
 bool is_bounded(CommandKind kind) {
@@ -25,28 +30,57 @@ const Command* Axis::commanded_without_lease() const {
   return command.kind == CommandKind::disable ? nullptr : &command;
 }
 
-/// What `finish` lets go on is past its start: the drive moves by itself, and whatever would have to be sent
-/// for it carries a token that the gate no longer knows (the search after a homing's back-off, say).
+/// What `finish` lets go on is past its start: the drive moves by itself, and nothing more is sent for it
+/// (the search after a homing's back-off, say).
 void Axis::lease_lost(const Error& cause) {
   const auto* command = activity_ ? &activity_->command->value() : nullptr;
-  if (command != nullptr && command->kind == CommandKind::disable) return;  // it needs no lease
   auto policy = settings_.on_lease_loss;
   if (policy == LeaseLoss::finish) {
     if (command == nullptr) return;
-    if (is_bounded(command->kind) && command->state == CommandState::active) return;
+    if (is_bounded(command->kind) && command->state == CommandState::active) {
+      activity_->lease_over = true;
+      return;
+    }
     policy = LeaseLoss::halt;
   }
-  const bool rests = at_rest();
-  const auto shown = activity_ ? activity_->state : AxisState::standstill;
-  accept_epoch_ = gate_->epoch();
+  if (policy == LeaseLoss::disable) {
+    // An enable may be on its way to the drive, which then shows it some time later.
+    const bool enabling = command != nullptr && command->kind == CommandKind::enable;
+    release_owed_ = env_.clock->now() + (enabling ? enable_shows_within : Duration{});
+  }
+  if (command != nullptr && command->kind == CommandKind::disable) return;  // it needs no lease
+  const bool motion = activity_ && activity_->state != AxisState::standstill;
+  // What a terminal moves was not commanded under the lease.
+  const bool moves =
+      motion || stopping_.running || stop_owed_ || (sample_ && sample_->moving && !terminal_motion_);
+  const auto shown = motion ? activity_->state : stopping_.shown;
   supersede(error(cause.reason, cause.message, cause.remedy));
-  if (policy == LeaseLoss::disable && sample_ && sample_->enabled && link_ != LinkState::offline) {
-    (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});
-  } else if (!rests) {
+  release_as_owed();
+  if (moves && !activity_) {
     stopping_.shown = shown;
     begin_stop(policy == LeaseLoss::halt ? StopKind::halt : StopKind::stop, false, nullptr);
   }
   publish();
+}
+
+/// `on_lease_loss: disable` is done once the drive shows that it is released: whatever comes between (a stop,
+/// silence, an enable that was on its way) only puts it off.
+void Axis::release_as_owed() {
+  if (!release_owed_ || link_ != LinkState::online || activity_ || stop_owed_ || !sample_) return;
+  if (sample_->enabled) {
+    accept_epoch_ = gate_->epoch();
+    (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});
+  } else if (sample_->asked_at >= *release_owed_) {
+    release_owed_.reset();
+  }
+}
+
+/// The drive took part, and is not released: trying again and again would help nobody.
+void Axis::give_up_release(const Error& cause) {
+  if (!release_owed_ || cause.outcome == Outcome::unknown) return;
+  release_owed_.reset();
+  spdlog::error("{}: the lease ended, and the drive was not released: {}", settings_.name, to_string(cause));
+  if (!fault_) fault_ = cause;
 }
 
 }  // namespace axisd

@@ -29,11 +29,13 @@ bool Axis::current(const Activity& activity) const {
 }
 
 MotionGuard Axis::guard(const Activity& activity) const {
-  const bool anybody = activity.command->value().kind == CommandKind::disable;
+  auto token = activity.options.lease_token;
+  if (activity.lease_over) token = MotionGuard::lease_is_over;
+  if (activity.command->value().kind == CommandKind::disable) token = MotionGuard::needs_no_lease;
   // What nobody holds any more does not start, either.
   return {.gate = gate_,
           .epoch = activity.epoch,
-          .fencing_token = anybody ? MotionGuard::needs_no_lease : activity.options.lease_token,
+          .fencing_token = token,
           .not_after = std::min(activity.options.not_after, activity.hold_until.value_or(TimePoint::max()))};
 }
 
@@ -164,13 +166,10 @@ Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
 Task<bool> Axis::proven_continuous(ActivityPtr activity) {
   Result<void> proof;
   do {
-    proof = co_await drive_->check_continuity(TransactionClass::moving_state);
+    proof = co_await prove_continuity(TransactionClass::moving_state);
     if (!current(*activity)) co_return false;  // offline, too
   } while (!proof && proof.error().reason == Reason::no_reply);
-  if (proof) {
-    continuity_checked_ = env_.clock->now();
-    co_return true;
-  }
+  if (proof) co_return true;
   if (proof.error().reason == Reason::rebooted) {
     on_reboot(proof.error());
   } else {
@@ -227,6 +226,12 @@ void Axis::tell_part(const Activity& activity, Error& cause) {
   cause.message = "executed in part: " + cause.message;
 }
 
+/// What the gate no longer let out was overtaken by time or by another client: nobody's error.
+void Axis::end_unsent(Activity& activity, const Error& cause) {
+  const bool aborted = cause.reason == Reason::expired || cause.reason == Reason::lease_lost;
+  finish(activity, [&](CommandRecord& command) { aborted ? command.abort(cause) : command.error(cause); });
+}
+
 /// What became of a start. True: it was executed. A trigger without a reply is never sent again: the drive is
 /// read back until it shows what it did (M8).
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
@@ -247,8 +252,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   }
   if (cause.outcome != Outcome::unknown) {
     tell_part(*activity, cause);
-    const bool aborted = cause.reason == Reason::expired || cause.reason == Reason::lease_lost;
-    finish(*activity, [&](CommandRecord& command) { aborted ? command.abort(cause) : command.error(cause); });
+    end_unsent(*activity, cause);
     co_return false;
   }
   const auto deadline = since + start_window;

@@ -40,7 +40,7 @@ Task<> Axis::run_enable(ActivityPtr activity) {
   // Whether an enable without a reply was executed shows in the next samples.
   const bool uncertain = !result && result.error().outcome == Outcome::unknown;
   if (!result && !uncertain) {
-    finish(*activity, [&](CommandRecord& command) { command.error(result.error()); });
+    end_unsent(*activity, result.error());
     co_return;
   }
   activity->command->activate();
@@ -95,14 +95,15 @@ Task<> Axis::run_disable(ActivityPtr activity) {
     co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + settings_.brake.engage_time);
     if (!current(*activity)) co_return;
   }
-  finish(*activity, [&](CommandRecord& command) {
-    if (sample && !sample->enabled)
-      command.done();
-    else
-      command.error(
-          sample ? error(Reason::not_confirmed, "the drive still reports its power stage as on", "try again")
-                 : sample.error());
-  });
+  if (sample && !sample->enabled) {
+    finish(*activity, [](CommandRecord& command) { command.done(); });
+    co_return;
+  }
+  const auto cause =
+      sample ? error(Reason::not_confirmed, "the drive still reports its power stage as on", "try again")
+             : sample.error();
+  give_up_release(cause);
+  end_unsent(*activity, cause);
 }
 
 Task<> Axis::run_reset(ActivityPtr activity) {
@@ -111,7 +112,7 @@ Task<> Axis::run_reset(ActivityPtr activity) {
     const auto cleared = co_await drive_->clear_alarm(guard(*activity));
     if (!current(*activity)) co_return;
     if (!cleared) {
-      finish(*activity, [&](CommandRecord& command) { command.error(cleared.error()); });
+      end_unsent(*activity, cleared.error());
       co_return;
     }
   }

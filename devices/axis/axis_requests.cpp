@@ -72,6 +72,7 @@ Result<void> Axis::check_ready(const CommandOptions& options) const {
     return fail(std::move(cause));
   }
   if (auto free = check_maintenance(); !free) return free;
+  if (auto kept = check_release(); !kept) return kept;
   if (!drift_.empty())
     return fail(error(Reason::misconfigured, "the drive no longer holds its configuration: " + drift_,
                       "disable the axis: the configuration is then applied again"));
@@ -81,6 +82,11 @@ Result<void> Axis::check_ready(const CommandOptions& options) const {
 Result<void> Axis::check_maintenance() const {
   if (maintenance_.expired()) return {};
   return fail(error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
+}
+
+Result<void> Axis::check_release() const {
+  if (!release_owed_) return {};
+  return fail(error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
 }
 
 Result<void> Axis::check_motion(const CommandOptions& options) const {
@@ -130,8 +136,8 @@ Axis::ActivityPtr Axis::begin(const Action& action, const CommandOptions& option
 
 Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptions& options) {
   if (auto allowed = check_ready(options); !allowed) return fail(allowed.error());
-  if (activity_ && activity_->state != AxisState::standstill)
-    return fail(error(Reason::moving, "the axis moves", "it is enabled already"));
+  // A drive that turns while it is being enabled was moved by that, as far as can be told.
+  if (!at_rest()) return fail(error(Reason::moving, "the axis moves", "wait for standstill"));
   if (activity_) return fail(error(Reason::busy, "another command is being executed", "wait for it"));
   env_.bus->about_to_energise();
   const auto activity = begin(request, options, AxisState::standstill, {});

@@ -1,7 +1,7 @@
 // Leases: who may command an axis, and what it does when the lease that it is commanded under ends (M16).
 #include <gmock/gmock.h>
 
-#include "tests/support/rig.hpp"
+#include "tests/rules/leased_rig.hpp"
 
 namespace axisd::test {
 namespace {
@@ -9,60 +9,6 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-/// A rig whose clients are "a" and "b".
-class LeasedRig : public Rig {
- public:
-  explicit LeasedRig(LeaseLoss on_loss = LeaseLoss::halt, RigOptions options = {})
-      : Rig([&] {
-          options.adjust = [on_loss](AxisSettings& axis) { axis.on_lease_loss = on_loss; };
-          return std::move(options);
-        }()) {
-    ready();
-  }
-
-  std::uint64_t lease(std::string client, bool take = false, Duration ttl = 2s) {
-    const auto grant = machine->leases().acquire(
-        {.client = std::move(client), .axes = {"feeder"}, .ttl = ttl, .take = take});
-    EXPECT_TRUE(grant) << (grant ? "" : to_string(grant.error()));
-    return grant ? grant->lease.token : 0;
-  }
-  void renew(std::string client, std::uint64_t token) {
-    EXPECT_TRUE(machine->leases().renew({.client = std::move(client), .lease_token = token}));
-  }
-  /// A move of 390 mm under a new lease of "a", under way.
-  CommandPtr move_under_lease(std::uint64_t& token) {
-    token = lease("a");
-    auto move = submit(MoveAbsoluteRequest{.position = 390}, {.client = "a", .lease_token = token});
-    run(500ms);
-    EXPECT_EQ(move->value().state, CommandState::active);
-    line->forget_wire();
-    return move;
-  }
-  [[nodiscard]] Reason refused(const Action& action, const CommandOptions& options) {
-    const auto command = try_submit(action, options);
-    EXPECT_FALSE(command);
-    return command ? Reason::internal : command.error().reason;
-  }
-  [[nodiscard]] bool was_stopping() const {
-    return std::ranges::any_of(machine->events().events_after(0, 1000).events, [](const Event& event) {
-      const auto* change = std::get_if<StateChange>(&event.content);
-      return change != nullptr && change->to == AxisState::stopping;
-    });
-  }
-  [[nodiscard]] std::vector<LeaseChange> lease_events() const {
-    std::vector<LeaseChange> all;
-    for (const auto& event : machine->events().events_after(0, 1000).events)
-      if (const auto* change = std::get_if<LeaseChange>(&event.content)) all.push_back(*change);
-    return all;
-  }
-};
-
-void expect_lost(const CommandPtr& command) {
-  EXPECT_EQ(command->value().state, CommandState::aborted) << describe(command->value());
-  ASSERT_TRUE(command->value().cause);
-  EXPECT_EQ(command->value().cause->reason, Reason::lease_lost);
-}
 
 TEST(M16Lease, EverythingThatMovesNeedsItWhileSomebodyHasIt) {
   LeasedRig rig;
