@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <memory>
 
 #include "api/axisctl/child_process.hpp"
@@ -112,9 +113,12 @@ void hold(Invocation& invocation, const Arguments& arguments) {
                 {{"AXISD_LEASE", std::to_string(token)}, {"AXISD_SERVER", invocation.connection.server}});
     status = hold_while(invocation, child, token, ttl_of(response.lease()), lost);
   } catch (...) {
+    // Should the release fail, too, the lease ends by itself; what came first is to be told.
+    const auto first = std::current_exception();
     try {
       release(invocation, token);
-    } catch (const Failure&) {  // it ends by itself; what came first is to be told
+    } catch (const Failure&) {
+      std::rethrow_exception(first);
     }
     throw;
   }

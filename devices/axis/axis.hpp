@@ -331,11 +331,11 @@ class Axis {
 
   ActivityPtr activity_;
   Stopping stopping_;
+  /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
+  std::optional<TimePoint> release_owed_;
   ObservedTimes observed_;
   std::optional<Error> bus_loss_;  ///< not yet acted upon
   bool stop_owed_ = false;         ///< M4: to a silent node, until standstill is confirmed
-  /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
-  std::optional<TimePoint> release_owed_;
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed
