@@ -17,6 +17,13 @@ struct PortStatus {
   std::optional<Error> error;  ///< why it is not open, or what is wrong though it is
 };
 
+/// A node that does not answer is asked only now and then, so that its neighbours do not wait for it.
+struct QuarantinedNode {
+  TimePoint since{};         ///< when it was put there
+  TimePoint next{};          ///< not asked before; may have passed
+  std::uint64_t probes = 0;  ///< in vain since then
+};
+
 /// Thread: core, unless said otherwise.
 class Bus {
  public:
@@ -34,6 +41,10 @@ class Bus {
   virtual void hasten(std::uint8_t node, TransactionClass to) = 0;
   /// Requests to this node wait for their turn, because it does not answer.
   [[nodiscard]] virtual bool holds_back(std::uint8_t /*node*/) const { return false; }
+  /// nullopt: it is asked whenever there is something to ask.
+  [[nodiscard]] virtual std::optional<QuarantinedNode> quarantined(std::uint8_t /*node*/) const {
+    return std::nullopt;
+  }
   /// A node of this bus is about to be energised: what would be noise to it ends as superseded, unless it has
   /// gone out.
   virtual void about_to_energise() = 0;

@@ -12,6 +12,7 @@
 #include "buses/canopen/master.hpp"
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "devices/axis/command.hpp"
+#include "devices/axis/obstacles.hpp"
 #include "devices/axis/snapshot.hpp"
 #include "devices/budget.hpp"
 #include "devices/bus_access.hpp"
@@ -77,6 +78,11 @@ class Machine {
                       CommandCallback callback) = 0;
   /// Extends the hold of the axis's current jog or held velocity command (by repeating it); part of
   /// submit(Jog).
+
+  /// Everything that stands in the way of `action` now, in the order in which submit() would refuse it;
+  /// without one, of motion in general. Touches nothing. Errors: unknown_axis.
+  virtual void explain(std::string axis, std::optional<Action> action, CommandOptions options,
+                       std::function<void(Result<std::vector<Obstacle>>)> callback) = 0;
 
   /// Ends Stopping with hold (MC_Stop with Execute going false).
   virtual void release_stop(std::string axis, CommandCallback callback) = 0;

@@ -35,12 +35,7 @@ v1::JogRequest jog_request(const JogArguments& arguments, const std::string& uni
   request.set_axis(arguments.axis());
   request.set_velocity(parse_value(arguments.value, unit + "/s", "velocity"));
   set(*request.mutable_hold(), hold);
-  if (!arguments.acceleration_time.empty())
-    set(*request.mutable_acceleration_time(),
-        parse_duration(arguments.acceleration_time, "--acceleration-time"));
-  if (!arguments.deceleration_time.empty())
-    set(*request.mutable_deceleration_time(),
-        parse_duration(arguments.deceleration_time, "--deceleration-time"));
+  set_ramps(request, arguments);
   *request.mutable_options() = command_options(arguments);
   return request;
 }

@@ -22,22 +22,6 @@ void finish(Invocation& invocation, const MotionArguments& arguments,
       {.unit = before.unit(), .start = before.position(), .halt_on_interrupt = arguments.halt_on_interrupt});
 }
 
-/// Fills what all requests with a velocity profile share.
-void set_ramps(auto& request, const MotionArguments& arguments) {
-  if (!arguments.acceleration_time.empty())
-    set(*request.mutable_acceleration_time(),
-        parse_duration(arguments.acceleration_time, "--acceleration-time"));
-  if (!arguments.deceleration_time.empty())
-    set(*request.mutable_deceleration_time(),
-        parse_duration(arguments.deceleration_time, "--deceleration-time"));
-}
-
-void set_profile(auto& request, const MotionArguments& arguments, const std::string& unit) {
-  if (!arguments.velocity.empty())
-    request.set_velocity(parse_value(arguments.velocity, unit + "/s", "--velocity"));
-  set_ramps(request, arguments);
-}
-
 void move(Invocation& invocation, const MotionArguments& arguments, bool relative) {
   const auto before = invocation.state(arguments.axis());
   const double value = parse_value(arguments.value, before.unit(), relative ? "distance" : "position");

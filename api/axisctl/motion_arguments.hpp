@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "api/axisctl/duration.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/quantity.hpp"
 
 namespace axisd::axisctl {
 
@@ -27,6 +29,23 @@ void add_wait(CLI::App& command, MotionArguments& arguments);
 /// What the wire wants of them. Without --request-id each axis gets a fresh one, stored back into
 /// `arguments`. Throws Failure (usage).
 v1::CommandOptions command_options(const MotionArguments& arguments);
+
+/// Fills what all requests with a velocity profile share.
+void set_ramps(auto& request, const MotionArguments& arguments) {
+  if (!arguments.acceleration_time.empty())
+    set(*request.mutable_acceleration_time(),
+        parse_duration(arguments.acceleration_time, "--acceleration-time"));
+  if (!arguments.deceleration_time.empty())
+    set(*request.mutable_deceleration_time(),
+        parse_duration(arguments.deceleration_time, "--deceleration-time"));
+}
+
+/// The same, of requests whose velocity is an option.
+void set_profile(auto& request, const MotionArguments& arguments, const std::string& unit) {
+  if (!arguments.velocity.empty())
+    request.set_velocity(parse_value(arguments.velocity, unit + "/s", "--velocity"));
+  set_ramps(request, arguments);
+}
 
 /// Sends one motion call. A failure that leaves open whether the call arrived names the request id to repeat
 /// it with.

@@ -12,6 +12,7 @@
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/validate.hpp"
+#include "api/server/value_reply.hpp"
 
 namespace axisd::server {
 namespace {
@@ -81,6 +82,29 @@ grpc::ServerUnaryReactor* SystemServiceImpl::ReleaseStopAll(Context* context,
                                         error ? to_string(*error) : "done");
                          });
         });
+      });
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::Explain(Context* context, const v1::ExplainRequest* request,
+                                                     v1::ExplainResponse* response) {
+  const auto client = client_of(*context);
+  if (auto axis = find_axis(services_.machine, request->axis()); !axis)
+    return answer(context, to_status(axis.error()));
+  auto question = question_of(*request, client, services_.machine);
+  if (!question) return answer(context, to_status(question.error()));
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.machine.explain(
+            request->axis(), std::move(question->action), std::move(question->options),
+            reply_with_value<std::vector<Obstacle>>(call, [response](const std::vector<Obstacle>& found) {
+              for (const auto& obstacle : found) {
+                auto& entry = *response->add_obstacles();
+                entry.set_blocking(obstacle.blocking);
+                to_proto(obstacle.error, *entry.mutable_detail());
+              }
+            }));
       });
 }
 

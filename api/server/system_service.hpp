@@ -17,6 +17,8 @@ class SystemServiceImpl final : public v1::SystemService::CallbackService {
                                     v1::StopAllResponse* response) override;
   grpc::ServerUnaryReactor* ReleaseStopAll(Context* context, const v1::ReleaseStopAllRequest* request,
                                            v1::ReleaseStopAllResponse* response) override;
+  grpc::ServerUnaryReactor* Explain(Context* context, const v1::ExplainRequest* request,
+                                    v1::ExplainResponse* response) override;
 
  private:
   const Services services_;

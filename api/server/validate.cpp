@@ -189,6 +189,63 @@ Result<Submission> motion_options(const v1::CommandOptions& from, std::string cl
                     .until = *until};
 }
 
+namespace {
+
+template <class Request>
+Result<Question> question_about(const Request& request, const v1::ExplainRequest& from, std::string client,
+                                const Machine& machine) {
+  if (!request.axis().empty() && request.axis() != from.axis())
+    return fail(
+        Reason::invalid_argument,
+        fmt::format("the command names another axis, {:?}", request.axis().substr(0, longest_axis_name)),
+        "leave the axis of the command out, or name the same");
+  auto action = to_action(request);
+  if (!action) return fail(action.error());
+  if constexpr (std::is_same_v<Request, v1::DisableRequest>) {
+    return Question{.action = *std::move(action),
+                    .options = stop_options(request.options(), std::move(client)).options};
+  } else {
+    auto options = request.options();
+    if (options.request_id().empty()) options.set_request_id("explain");
+    if (options.lease_token() == 0) options.set_lease_token(from.lease_token());
+    auto submission = motion_options(options, std::move(client), machine);
+    if (!submission) return fail(submission.error());
+    return Question{.action = *std::move(action), .options = std::move(submission->options)};
+  }
+}
+
+}  // namespace
+
+Result<Question> question_of(const v1::ExplainRequest& from, std::string client, const Machine& machine) {
+  using Command = v1::ExplainRequest::CommandCase;
+  const auto about = [&](const auto& request) {
+    return question_about(request, from, std::move(client), machine);
+  };
+  switch (from.command_case()) {
+    case Command::kEnable:
+      return about(from.enable());
+    case Command::kDisable:
+      return about(from.disable());
+    case Command::kHome:
+      return about(from.home());
+    case Command::kMoveAbsolute:
+      return about(from.move_absolute());
+    case Command::kMoveRelative:
+      return about(from.move_relative());
+    case Command::kMoveVelocity:
+      return about(from.move_velocity());
+    case Command::kJog:
+      return about(from.jog());
+    case Command::kReset:
+      return about(from.reset());
+    case Command::kSetPosition:
+      return about(from.set_position());
+    case Command::COMMAND_NOT_SET:
+      break;
+  }
+  return Question{.action = {}, .options = {.client = std::move(client), .lease_token = from.lease_token()}};
+}
+
 Submission stop_options(const v1::CommandOptions& from, std::string client) {
   Submission submission{.options = {.client = std::move(client)},
                         .until = wait_until(from.wait_until()).value_or(WaitUntil::accepted)};

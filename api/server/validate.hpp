@@ -2,6 +2,7 @@
 // state) is checked there; here is what makes a request malformed.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -37,6 +38,16 @@ struct Submission {
 /// lease and an unknown wait_until are ignored (the call then answers at acceptance), and so is an unusable
 /// request_id.
 [[nodiscard]] Submission stop_options(const v1::CommandOptions& from, std::string client);
+
+/// What Explain is asked about.
+struct Question {
+  std::optional<Action> action;  ///< nullopt: motion in general
+  CommandOptions options;
+};
+/// As to_action() and motion_options() of the command in it, which needs no request_id and need not repeat
+/// the axis.
+[[nodiscard]] Result<Question> question_of(const v1::ExplainRequest& from, std::string client,
+                                           const Machine& machine);
 
 /// ACCEPTED (also unspecified) or DONE. Anything else counts as ACCEPTED: a StopAll is never refused for it.
 [[nodiscard]] WaitUntil stop_all_wait(v1::WaitUntil from);

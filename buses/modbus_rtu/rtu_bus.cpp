@@ -334,4 +334,11 @@ void RtuBus::end(TransactionPtr transaction, const ExchangeResult& result) {
   for (const auto& tell : transaction->on_end) tell(*transaction, result);
 }
 
+std::optional<QuarantinedNode> RtuBus::quarantined(std::uint8_t node) const {
+  const auto found = quarantine_.nodes().find(node);
+  if (found == quarantine_.nodes().end() || !found->second.quarantined()) return std::nullopt;
+  return QuarantinedNode{
+      .since = found->second.since, .next = found->second.next, .probes = found->second.probes};
+}
+
 }  // namespace axisd::modbus_rtu

@@ -55,6 +55,7 @@ class RtuBus final : public Bus {
   [[nodiscard]] bool holds_back(std::uint8_t node) const override {
     return quarantine_.ready_at(node) > clock_->now();
   }
+  [[nodiscard]] std::optional<QuarantinedNode> quarantined(std::uint8_t node) const override;
   void close() override;
   [[nodiscard]] bool idle() const override { return current_ == nullptr && queue_.size() == 0; }
 

@@ -88,6 +88,17 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
     post(loop_->executor(), std::move(serve));
 }
 
+void MachineService::explain(std::string axis, std::optional<Action> action, CommandOptions options,
+                             std::function<void(Result<std::vector<Obstacle>>)> callback) {
+  post(loop_->executor(), [this, axis = std::move(axis), action = std::move(action),
+                           options = std::move(options), callback = std::move(callback)] {
+    const auto* found = machine_->find(axis);
+    if (found == nullptr)
+      return callback(fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis)));
+    callback(found->explain(action, options));
+  });
+}
+
 void MachineService::release_stop(std::string axis, CommandCallback callback) {
   post(loop_->executor(), [this, axis = std::move(axis), callback = std::move(callback)]() mutable {
     auto* found = machine_->find(axis);

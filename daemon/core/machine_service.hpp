@@ -26,6 +26,8 @@ class MachineService final : public Machine {
   [[nodiscard]] MachineInfo info() const override;
   void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
               CommandCallback callback) override;
+  void explain(std::string axis, std::optional<Action> action, CommandOptions options,
+               std::function<void(Result<std::vector<Obstacle>>)> callback) override;
   void release_stop(std::string axis, CommandCallback callback) override;
   void stop_all(std::string client, WaitUntil until,
                 std::function<void(std::vector<Result<Command>>)> callback) override;

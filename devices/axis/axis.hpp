@@ -22,7 +22,9 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "buses/bus.hpp"
@@ -32,6 +34,7 @@
 #include "buses/task.hpp"
 #include "devices/axis/command_book.hpp"
 #include "devices/axis/observed_times.hpp"
+#include "devices/axis/obstacles.hpp"
 #include "devices/axis/planner.hpp"
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
@@ -76,6 +79,10 @@ class Axis {
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
   Result<CommandPtr> release_stop();
+  /// Everything that stands in the way of a request now: submit() would refuse it with the first that blocks
+  /// (a repeat of an accepted request is never refused, though). Nothing: of motion in general. Only looks.
+  [[nodiscard]] std::vector<Obstacle> explain(const std::optional<Action>& action,
+                                              const CommandOptions& options) const;
   /// Halts the axis if `command` is being executed.
   Result<CommandPtr> cancel(const CommandPtr& command);
   /// The lease under which the axis was commanded is over, and the gate knows it: does what the
@@ -218,13 +225,8 @@ class Axis {
 
   // axis_requests.cpp: acceptance
   void renew_hold(const CommandPtr& command);
-  [[nodiscard]] Result<void> check_common(const CommandOptions& options) const;
-  /// Holds for everything but stops; StopAll does not forbid what moves nothing.
-  [[nodiscard]] Result<void> check_ready(const CommandOptions& options) const;
-  [[nodiscard]] Result<void> check_maintenance() const;
-  [[nodiscard]] Result<void> check_release() const;
-  [[nodiscard]] Result<void> check_motion(const CommandOptions& options) const;
-  [[nodiscard]] Result<void> check_direction(bool positive) const;
+  template <class Request>
+  [[nodiscard]] Result<void> permit(const Request& request, const CommandOptions& options) const;
   Result<CommandPtr> accept(const EnableRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const DisableRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const HomeRequest& request, const CommandOptions& options);
@@ -235,10 +237,44 @@ class Axis {
   Result<CommandPtr> accept(const StopRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const ResetRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const SetPositionRequest& request, const CommandOptions& options);
+  [[nodiscard]] double velocity_of(const MotionValues& with) const;
+  [[nodiscard]] PositionTracker::Target target_of(const MoveAbsoluteRequest& request) const;
   [[nodiscard]] Result<Plan> plan_move(const PositionTracker::Target& target, const MotionValues& with) const;
-  Result<Plan> plan_velocity(double velocity, const MotionValues& with, bool jog);
-  bool renewed(const Action& action, const CommandOptions& options, Duration hold);
+  [[nodiscard]] Result<Plan> plan_velocity(double velocity, const MotionValues& with, bool jog) const;
+  /// Where a motion at a velocity ends if nobody ends it; nullopt: nowhere. Errors: soft_limit, not_trusted.
+  [[nodiscard]] Result<std::optional<PositionTracker::Target>> end_of_velocity(bool positive, bool jog) const;
+  [[nodiscard]] bool renews(const Action& action, const CommandOptions& options) const;
+  CommandPtr renew(const Action& action, const CommandOptions& options, Duration hold);
   ActivityPtr begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan);
+
+  // axis_preconditions.cpp: what does not hold of what each request needs, in the order of refusals
+  void look_at(const EnableRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const DisableRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const HomeRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const MoveAbsoluteRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const MoveRelativeRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const MoveVelocityRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const JogRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const StopRequest&, const CommandOptions&, Obstacles&) const {}  ///< never refused
+  void look_at(const ResetRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const;
+  void look_at_options(const CommandOptions& options, Obstacles& found) const;
+  void look_at_link(Obstacles& found) const;
+  void look_at_fault(Obstacles& found) const;
+  void look_at_maintenance(Obstacles& found) const;
+  /// Of everything but stops and Reset; StopAll does not forbid what moves nothing.
+  void look_at_readiness(const CommandOptions& options, Obstacles& found) const;
+  /// Of every motion.
+  void look_at_motion(const CommandOptions& options, Obstacles& found) const;
+  void look_at_direction(bool positive, Obstacles& found) const;
+  void look_at_target(const PositionTracker::Target& target, Obstacles& found) const;
+  void look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const;
+  void look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const;
+  void look_at_present_motion(Obstacles& found) const;
+  void look_at_what_forbids_some(Obstacles& found) const;
+  [[nodiscard]] std::string shell(std::string_view command, std::string_view rest = {}) const;
+  [[nodiscard]] Error not_trusted(std::string message) const;
+  [[nodiscard]] Error direction_blocked(bool positive) const;
 
   // axis_motion.cpp: sequences; axis_rezero.cpp: make_room()
   [[nodiscard]] bool current(const Activity& activity) const;

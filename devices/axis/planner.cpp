@@ -12,11 +12,11 @@ namespace axisd {
 
 namespace {
 
-std::unexpected<Error> out_of_range(std::string message, double minimum, double maximum, std::string unit) {
-  return fail(Error{.reason = Reason::out_of_range,
-                    .message = std::move(message),
-                    .remedy = "choose a value in the permitted range",
-                    .permitted = Range{.minimum = minimum, .maximum = maximum, .unit = std::move(unit)}});
+Error out_of_range(std::string message, double minimum, double maximum, std::string unit) {
+  return {.reason = Reason::out_of_range,
+          .message = std::move(message),
+          .remedy = "choose a value in the permitted range",
+          .permitted = Range{.minimum = minimum, .maximum = maximum, .unit = std::move(unit)}};
 }
 
 int milliseconds_of(Duration time) {
@@ -52,17 +52,22 @@ double Planner::minimum_velocity() const {
       scale_->velocity_to_units(std::max(capabilities_->minimum_rpm, capabilities_->minimum_start_rpm)));
 }
 
-Result<Duration> Planner::ramp(std::optional<Duration> asked, Duration fallback, const char* name) const {
-  const auto time = asked.value_or(fallback);
+Planner::Ramps Planner::ramps(const MotionValues& asked) const {
+  const auto& limits = settings_->limits;
+  return {.acceleration = asked.acceleration_time.value_or(limits.acceleration_time),
+          .deceleration = asked.deceleration_time.value_or(
+              asked.acceleration_time.value_or(limits.deceleration_time.value_or(limits.acceleration_time)))};
+}
+
+void Planner::check_ramp(Duration time, const char* name, Obstacles& found) const {
   const auto low = milliseconds(capabilities_->minimum_time_ms);
   const auto high = milliseconds(capabilities_->maximum_time_ms);
   if (time < low || time > high)
-    return out_of_range(fmt::format("{} of {} ms", name, milliseconds_of(time)), milliseconds_of(low),
-                        milliseconds_of(high), "ms");
-  return milliseconds(milliseconds_of(time));
+    found.block(out_of_range(fmt::format("{} of {} ms", name, milliseconds_of(time)), milliseconds_of(low),
+                             milliseconds_of(high), "ms"));
 }
 
-Result<Plan> Planner::profile(double velocity, const MotionValues& asked) const {
+void Planner::check_profile(double velocity, const MotionValues& asked, Obstacles& found) const {
   const auto speed = std::abs(velocity);
   const auto unit = settings_->scale.unit + "/s";
   // A little beyond the limit is the limit, written with fewer digits.
@@ -70,29 +75,32 @@ Result<Plan> Planner::profile(double velocity, const MotionValues& asked) const 
   const bool negative_in_move = asked.velocity && *asked.velocity < 0;
   if (!std::isfinite(velocity) || negative_in_move || speed > maximum_velocity() * (1 + 1e-9) ||
       speed < minimum_velocity() * (1 - 1e-9))
-    return out_of_range(fmt::format("velocity {} {}", negative_in_move ? velocity : speed, unit),
-                        minimum_velocity(), maximum_velocity(), unit);
-  const auto& limits = settings_->limits;
-  const auto acceleration = ramp(asked.acceleration_time, limits.acceleration_time, "acceleration time");
-  if (!acceleration) return fail(acceleration.error());
-  const auto deceleration =
-      ramp(asked.deceleration_time,
-           asked.acceleration_time.value_or(limits.deceleration_time.value_or(limits.acceleration_time)),
-           "deceleration time");
-  if (!deceleration) return fail(deceleration.error());
+    found.block(out_of_range(fmt::format("velocity {} {}", negative_in_move ? velocity : speed, unit),
+                             minimum_velocity(), maximum_velocity(), unit));
+  const auto [acceleration, deceleration] = ramps(asked);
+  check_ramp(acceleration, "acceleration time", found);
+  check_ramp(deceleration, "deceleration time", found);
+}
 
+Result<Plan> Planner::profile(double velocity, const MotionValues& asked) const {
+  Obstacles found;
+  check_profile(velocity, asked, found);
+  if (auto allowed = found.verdict(); !allowed) return fail(allowed.error());
+  const auto& limits = settings_->limits;
+  const auto whole_ms = [](Duration time) { return milliseconds(milliseconds_of(time)); };
+  const auto [acceleration, deceleration] = ramps(asked);
   Plan plan;
   // Never faster than asked: rounded down, except where the request is that very speed.
-  const auto rpm = std::abs(scale_->velocity_to_rpm(speed));
+  const auto rpm = std::abs(scale_->velocity_to_rpm(velocity));
   plan.velocity_rpm = std::min(maximum_rpm(), static_cast<int>(std::floor(rpm + 1e-6)));
   plan.velocity_rpm = std::max(plan.velocity_rpm, capabilities_->minimum_start_rpm);
   plan.start_rpm = std::clamp(std::min(limits.start_speed_rpm, plan.velocity_rpm),
                               capabilities_->minimum_start_rpm, capabilities_->maximum_start_rpm);
-  plan.acceleration_time = *acceleration;
-  plan.deceleration_time = *deceleration;
+  plan.acceleration_time = whole_ms(acceleration);
+  plan.deceleration_time = whole_ms(deceleration);
   plan.granted.velocity = std::abs(scale_->velocity_to_units(plan.velocity_rpm));
-  plan.granted.acceleration_time = *acceleration;
-  plan.granted.deceleration_time = *deceleration;
+  plan.granted.acceleration_time = plan.acceleration_time;
+  plan.granted.deceleration_time = plan.deceleration_time;
   return plan;
 }
 
@@ -115,23 +123,33 @@ Result<void> Planner::check_soft_limits(double target, double from) const {
                          .unit = settings_->scale.unit}});
 }
 
-Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
-                           const PositionTracker& tracker) const {
+void Planner::check_move(const PositionTracker::Target& target, const PositionTracker& tracker,
+                         Obstacles& found) const {
   // Without trust the numbers mean nothing; what bounds such moves then is jog_travel, or a waiver in the
   // YAML.
   if (tracker.trust() != PositionTrust::unknown || !settings_->require_trust)
-    if (const auto allowed = check_soft_limits(target.position, tracker.position()); !allowed)
-      return fail(allowed.error());
+    found.block_on(check_soft_limits(target.position, tracker.position()));
   const auto distance = static_cast<double>(target.counter) - static_cast<double>(tracker.counter());
   if (std::abs(distance) > static_cast<double>(longest_move())) {
     const auto reach = static_cast<double>(longest_move()) / std::abs(scale_->pulses_per_unit());
-    return out_of_range(fmt::format("target {:.6g} {}", target.position, settings_->scale.unit),
-                        tracker.position() - reach, tracker.position() + reach, settings_->scale.unit);
+    found.block(out_of_range(fmt::format("target {:.6g} {}", target.position, settings_->scale.unit),
+                             tracker.position() - reach, tracker.position() + reach, settings_->scale.unit));
   }
+}
+
+bool Planner::positive(const PositionTracker::Target& target, const PositionTracker& tracker) const {
+  return (target.counter >= tracker.counter()) != settings_->scale.invert;
+}
+
+Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
+                           const PositionTracker& tracker) const {
+  Obstacles found;
+  check_move(target, tracker, found);
+  if (auto allowed = found.verdict(); !allowed) return fail(allowed.error());
   plan.target = target.position;
   plan.target_counter = target.counter;
   plan.exact_target = target.exact;
-  plan.positive = (distance >= 0) != settings_->scale.invert;
+  plan.positive = positive(target, tracker);
   plan.granted.position = scale_->to_units(target.counter + tracker.offset());
   return plan;
 }
@@ -159,16 +177,16 @@ Result<std::optional<HomingProfile>> Planner::homing() const {
                         .offset_pulses = static_cast<std::int32_t>(std::clamp<std::int64_t>(
                             scale_->to_pulses(homing.offset), -1'000'000'000, 1'000'000'000))};
   if (profile.velocity_rpm < capabilities_->minimum_homing_rpm || profile.velocity_rpm > highest)
-    return out_of_range(fmt::format("homing velocity {} {}", homing.velocity, unit),
-                        units(capabilities_->minimum_homing_rpm), units(highest), unit);
+    return fail(out_of_range(fmt::format("homing velocity {} {}", homing.velocity, unit),
+                             units(capabilities_->minimum_homing_rpm), units(highest), unit));
   if (profile.search_velocity_rpm < capabilities_->minimum_search_rpm ||
       profile.search_velocity_rpm > highest_search)
-    return out_of_range(fmt::format("homing search_velocity {} {}", homing.search_velocity, unit),
-                        units(capabilities_->minimum_search_rpm), units(highest_search), unit);
+    return fail(out_of_range(fmt::format("homing search_velocity {} {}", homing.search_velocity, unit),
+                             units(capabilities_->minimum_search_rpm), units(highest_search), unit));
   if (std::abs(profile.offset_pulses) > capabilities_->maximum_homing_offset_pulses) {
     const auto reach = capabilities_->maximum_homing_offset_pulses / std::abs(scale_->pulses_per_unit());
-    return out_of_range(fmt::format("homing offset {} {}", homing.offset, settings_->scale.unit), -reach,
-                        reach, settings_->scale.unit);
+    return fail(out_of_range(fmt::format("homing offset {} {}", homing.offset, settings_->scale.unit), -reach,
+                             reach, settings_->scale.unit));
   }
   return profile;
 }

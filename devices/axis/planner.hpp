@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "devices/axis/command.hpp"
+#include "devices/axis/obstacles.hpp"
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/descriptor.hpp"
@@ -36,6 +37,12 @@ class Planner {
   /// Completes a profile for a move to `target`. Errors: out_of_range, soft_limit.
   [[nodiscard]] Result<Plan> move(Plan plan, const PositionTracker::Target& target,
                                   const PositionTracker& tracker) const;
+  /// All that forbids what profile() and move() are asked for: they fail with the first.
+  void check_profile(double velocity, const MotionValues& asked, Obstacles& found) const;
+  void check_move(const PositionTracker::Target& target, const PositionTracker& tracker,
+                  Obstacles& found) const;
+  /// In which direction of the axis a move to `target` goes.
+  [[nodiscard]] bool positive(const PositionTracker::Target& target, const PositionTracker& tracker) const;
   /// How long a profile takes over `pulses`.
   [[nodiscard]] Duration duration(const Plan& plan, std::int64_t pulses) const;
   [[nodiscard]] Result<void> check_soft_limits(double target, double from) const;
@@ -54,8 +61,11 @@ class Planner {
   [[nodiscard]] Result<std::optional<HomingProfile>> homing() const;
 
  private:
-  [[nodiscard]] Result<Duration> ramp(std::optional<Duration> asked, Duration fallback,
-                                      const char* name) const;
+  struct Ramps {
+    Duration acceleration, deceleration;
+  };
+  [[nodiscard]] Ramps ramps(const MotionValues& asked) const;
+  void check_ramp(Duration time, const char* name, Obstacles& found) const;
 
   const AxisSettings* settings_;
   const Capabilities* capabilities_;

@@ -13,6 +13,7 @@ import grpc.aio
 from google.protobuf import duration_pb2
 from fake_axis import ENDS, STEP, FakeAxis, offline_detail, refuse  # makes axisd importable
 from fake_drives import SERVICES, FakeDrives, FakeEvents, FakeNodes
+from fake_explain import FakeExplain
 from fake_leases import SERVICES as LEASE_SERVICES, FakeLeases
 from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes_rpc,
                       budget_pb2 as budget_pb, bus_service_pb2 as bus_pb, bus_service_pb2_grpc as bus_rpc,
@@ -22,7 +23,7 @@ from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes
 GRANTED_STEP = 3.0
 
 
-class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeLeases, axes_rpc.AxisServiceServicer,
+class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeLeases, FakeExplain, axes_rpc.AxisServiceServicer,
                   command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer, system_rpc.SystemServiceServicer):
     """All services. `calls` records (method, request, peer) of every call, for assertions."""
 

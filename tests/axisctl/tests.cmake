@@ -15,7 +15,9 @@ if(AXISD_GRPC)
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_python_client.py)
   add_test(NAME leases.against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_leases.py)
+  add_test(NAME explain.against_fake_daemon
+           COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_explain.py)
   set_tests_properties(axisctl.against_fake_daemon axisctl.drives_against_fake_daemon
-                       axisctl.scripts_and_plots leases.against_fake_daemon python_client.against_fake_daemon PROPERTIES
+                       axisctl.scripts_and_plots explain.against_fake_daemon leases.against_fake_daemon python_client.against_fake_daemon PROPERTIES
                        ENVIRONMENT "AXISCTL=$<TARGET_FILE:axisctl>" TIMEOUT 600)
 endif()

@@ -189,6 +189,12 @@ class CountedMachine final : public Machine {
       inner_->submit(axis, action, options, until, ledger_->answer(ticket, callback));
     });
   }
+  void explain(std::string axis, std::optional<Action> action, CommandOptions options,
+               std::function<void(Result<std::vector<Obstacle>>)> callback) override {
+    ledger_->enter([=, this](auto ticket) {
+      inner_->explain(axis, action, options, ledger_->answer(ticket, callback));
+    });
+  }
   void release_stop(std::string axis, CommandCallback callback) override {
     ledger_->enter([=, this](auto ticket) { inner_->release_stop(axis, ledger_->answer(ticket, callback)); });
   }

@@ -18,14 +18,14 @@ from .machine import Machine, connect
 from .traffic import (BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, Quarantine, TracedFrame,
                       UnknownOutcomes)
 from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
-                    Network, NetworkLink, PermittedRange, State, StopResult, Terminal, Tick, Trust)
+                    Network, NetworkLink, Obstacle, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
     "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
     "ClassStatistics", "Command", "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
-    "MotionValues", "Network", "NetworkLink", "NodeStatistics",
+    "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle",
     "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "RefusedError", "ScanProgress", "Segments",
     "SerialProgress", "State", "StateChange", "StopBudget", "StopResult", "Terminal", "TerminalCapability",
     "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",

@@ -6,16 +6,18 @@ import contextlib
 import uuid
 from collections.abc import AsyncGenerator
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from .calls import Seconds, command_options, done, duration
 from .drive import Drive
 from .errors import AxisdError, MotionError
-from .types import AxisState, Command, Link
-from .v1 import axis_service_pb2
+from .types import AxisState, Command, Link, Obstacle
+from .v1 import axis_service_pb2, system_service_pb2
 
 if TYPE_CHECKING:
     from .machine import Machine
+
+Explainable = Literal["enable", "disable", "home", "move", "move_relative", "velocity", "jog", "reset", "set_position"]
 
 
 class Axis:
@@ -123,6 +125,35 @@ class Axis:
         """Ends a stop with `hold`."""
         request = axis_service_pb2.ReleaseStopRequest(axis=self.name)
         await self._machine._call(self._machine._axes.ReleaseStop, request, self.name)
+
+    async def explain(self, command: Explainable | None = None, value: float | None = None, *,
+                      velocity: float | None = None, hold: Seconds | None = None,
+                      acceleration_time: Seconds | None = None,
+                      deceleration_time: Seconds | None = None) -> list[Obstacle]:
+        """Why the axis cannot move, or a command would be refused, now: everything in its way, in the order of the
+        refusals. `command` is the name of a method of this class (stops are never refused); `value` is what that takes:
+        a position, a distance or a velocity. Asks no drive."""
+        request = system_service_pb2.ExplainRequest(axis=self.name, lease_token=self._lease_token)
+        ramps = {"acceleration_time": duration(acceleration_time), "deceleration_time": duration(deceleration_time)}
+        if command == "move":
+            request.move_absolute.CopyFrom(
+                axis_service_pb2.MoveAbsoluteRequest(position=value, velocity=velocity, **ramps))
+        elif command == "move_relative":
+            request.move_relative.CopyFrom(
+                axis_service_pb2.MoveRelativeRequest(distance=value, velocity=velocity, **ramps))
+        elif command == "velocity":
+            request.move_velocity.CopyFrom(
+                axis_service_pb2.MoveVelocityRequest(velocity=value, hold=duration(hold), **ramps))
+        elif command == "jog":
+            request.jog.CopyFrom(axis_service_pb2.JogRequest(velocity=value, hold=duration(hold), **ramps))
+        elif command == "set_position":
+            request.set_position.CopyFrom(axis_service_pb2.SetPositionRequest(position=value))
+        elif command in ("enable", "disable", "home", "reset"):
+            getattr(request, command).SetInParent()
+        elif command is not None:
+            raise ValueError(f"{command!r} is none of {', '.join(get_args(Explainable))}")
+        response = await self._machine._call(self._machine._system.Explain, request, self.name)
+        return [Obstacle.of(obstacle) for obstacle in response.obstacles]
 
     async def reset(self, *, wait: bool = True, request_id: str | None = None) -> Command:
         """Leaves ErrorStop if the cause is gone. Never moves."""

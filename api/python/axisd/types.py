@@ -134,6 +134,26 @@ class ErrorDetail:
         return f"{text}; {self.remedy}" if self.remedy else text
 
 
+@dataclasses.dataclass(frozen=True)
+class Obstacle:
+    """Something that stands in the way of a command, with what to do about it. Not `blocking`: the command is not refused
+    for it, but would wait for it, end it, or may be ended by it."""
+    blocking: bool
+    reason: str
+    message: str
+    remedy: str
+    permitted: PermittedRange | None
+    raw: system_service_pb2.Obstacle = dataclasses.field(repr=False, compare=False)
+
+    @classmethod
+    def of(cls, raw: system_service_pb2.Obstacle) -> Obstacle:
+        detail = ErrorDetail.of(raw.detail)
+        return cls(raw.blocking, detail.reason, detail.message, detail.remedy, detail.permitted, raw)
+
+    def __str__(self) -> str:
+        return str(ErrorDetail.of(self.raw.detail))
+
+
 def _optional_error(message: Any, field: str) -> ErrorDetail | None:
     return ErrorDetail.of(getattr(message, field)) if message.HasField(field) else None
 

@@ -1,5 +1,7 @@
 #include "tests/unit/api/fake_machine.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/smart_ptr/make_shared.hpp>
 #include <utility>
@@ -147,6 +149,19 @@ void FakeMachine::submit(std::string axis, Action action, CommandOptions options
     submitted_.push_back({std::move(axis), std::move(action), std::move(options), until});
   }
   answer(callback, std::move(result));
+}
+
+void FakeMachine::explain(std::string axis, std::optional<Action> action, CommandOptions options,
+                          std::function<void(Result<std::vector<Obstacle>>)> callback) {
+  note(fmt::format("explain {} {} by {} token {}", axis, action ? to_string(kind_of(*action)) : "motion",
+                   options.client, options.lease_token));
+  const std::vector<Obstacle> found = {
+      {.error = {.reason = Reason::soft_limit,
+                 .message = "too far",
+                 .remedy = "stay within",
+                 .permitted = Range{.minimum = 0, .maximum = 400, .unit = "mm"}}},
+      {.error = {.reason = Reason::moving, .message = "it moves"}, .blocking = false}};
+  post([callback = std::move(callback), found] { callback(found); });
 }
 
 void FakeMachine::release_stop(std::string axis, CommandCallback callback) {

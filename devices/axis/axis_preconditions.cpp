@@ -1,0 +1,340 @@
+// Preconditions of requests: each is looked at in one place, for refusals and for explanations. Nothing here
+// waits or touches the wire.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+double seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+/// A drive that takes no enable, or does not start or ends what it started, while one of these is active.
+constexpr std::string_view holding_functions[] = {"stop", "quick_stop", "motor_free"};
+
+}  // namespace
+
+std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
+                                    const CommandOptions& options) const {
+  Obstacles found;
+  if (action) {
+    std::visit([&](const auto& request) { look_at(request, options, found); }, *action);
+  } else {
+    look_at_motion(options, found);
+    look_at_what_forbids_some(found);
+  }
+  return std::move(found).all();
+}
+
+/// "axisctl enable feeder": what a person can do about it.
+std::string Axis::shell(std::string_view command, std::string_view rest) const {
+  return fmt::format("axisctl {} {}{}{}", command, settings_.name, rest.empty() ? "" : " ", rest);
+}
+
+void Axis::look_at_options(const CommandOptions& options, Obstacles& found) const {
+  if (options.buffer_mode == BufferMode::buffered)
+    found.block(error(Reason::not_supported, "buffered commands are not supported",
+                      "wait for the command to end, or use aborting"));
+  if (options.not_after <= env_.clock->now())
+    found.block(
+        error(Reason::expired, "the request's validity has passed", "repeat it with a later not_after"));
+  found.block_on(check_lease({.client = options.client, .lease_token = options.lease_token}));
+}
+
+void Axis::look_at_link(Obstacles& found) const {
+  if (link_ == LinkState::configuring) {
+    auto cause = error(Reason::configuring, "the drive is being identified and configured", "wait");
+    if (link_error_) {
+      cause = *link_error_;
+      cause.message = fmt::format("{}: not configured: {}", settings_.name, link_error_->message);
+      if (cause.reason != Reason::wrong_model && cause.reason != Reason::misconfigured)
+        cause.reason = Reason::configuring;
+      cause.outcome = Outcome::not_sent;
+    }
+    found.block(std::move(cause));
+  }
+  if (link_ != LinkState::offline) return;
+  found.block(error(Reason::offline, link_error_ ? "offline: " + to_string(*link_error_) : "offline",
+                    "check power and wiring; it is retried by itself"));
+  if (const auto& port = env_.bus->port(); !port.open) {
+    auto cause = port.error.value_or(Error{
+        .reason = Reason::bus_down, .message = "the port is not open", .where = {.bus = settings_.bus}});
+    if (cause.remedy.empty()) cause.remedy = "it is opened as soon as it can be";
+    found.block(std::move(cause));
+  }
+  if (const auto held = env_.bus->quarantined(settings_.node)) {
+    const auto now = env_.clock->now();
+    found.block(error(
+        Reason::no_reply,
+        fmt::format(
+            "node {} is in quarantine for {:.1f} s, {} requests in vain; it is asked again in {:.1f} s",
+            settings_.node, seconds(now - held->since), held->probes,
+            seconds(std::max(held->next - now, Duration::zero()))),
+        fmt::format("check its power, address and serial settings; look who answers: axisctl bus scan {}",
+                    settings_.bus)));
+  }
+  if (stop_owed_)
+    found.note(error(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
+                     "look at the machine; the stop is the first that the drive gets when it answers"));
+}
+
+Result<void> Axis::check_online() const {
+  Obstacles found;
+  look_at_link(found);
+  return found.verdict();
+}
+
+void Axis::look_at_fault(Obstacles& found) const {
+  if (!fault_) return;
+  auto cause = *fault_;
+  cause.message = fmt::format("{}: in ErrorStop: {}", settings_.name, fault_->message);
+  cause.reason = fault_->reason == Reason::alarm ? Reason::alarm : Reason::fault;
+  if (fault_->outcome == Outcome::unknown) cause.message += "; what the drive did of it is unknown";
+  const auto reset =
+      fault_->outcome == Outcome::unknown ? shell("reset") + ", which reads the drive back" : shell("reset");
+  const bool said = cause.remedy.find("reset the axis") != cause.remedy.npos;
+  if (said)
+    cause.remedy += fmt::format(" ({})", reset);
+  else
+    cause.remedy += fmt::format("{}reset the axis: {}", cause.remedy.empty() ? "" : "; then ", reset);
+  cause.outcome = Outcome::not_sent;
+  found.block(std::move(cause));
+}
+
+void Axis::look_at_maintenance(Obstacles& found) const {
+  if (!maintenance_.expired())
+    found.block(error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
+}
+
+void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
+  look_at_options(options, found);
+  // A stop that the core has not seen yet comes before everything that is accepted now.
+  if (stopping_.hold)
+    found.block(error(Reason::stopping, "a stop is held", "release it: " + shell("release-stop")));
+  else if (gate_->stop_pending() || (stopping_.running && stopping_.kind > StopKind::halt))
+    found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
+  look_at_fault(found);
+  look_at_maintenance(found);
+  if (release_owed_)
+    found.block(error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
+  if (!drift_.empty())
+    found.block(error(
+        Reason::misconfigured, "the drive no longer holds its configuration: " + drift_,
+        fmt::format("disable the axis ({}): the configuration is then applied again", shell("disable"))));
+  look_at_link(found);
+}
+
+void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const {
+  if (env_.inhibited != nullptr && *env_.inhibited)
+    found.block(
+        error(Reason::inhibited, "StopAll holds the machine", "release it: axisctl release-stop --all"));
+  look_at_readiness(options, found);
+  const auto executed = activity_ ? std::optional(activity_->command->value().kind) : std::nullopt;
+  if (executed == CommandKind::enable)
+    found.block(error(Reason::disabled, "the axis is being enabled", "wait for the command to end"));
+  else if (executed == CommandKind::disable)
+    found.block(
+        error(Reason::disabled, "the axis is being disabled", "enable it afterwards: " + shell("enable")));
+  else if (!sample_)
+    found.block(error(Reason::disabled, "the power stage is not known to be on",
+                      "enable the axis once the drive answers: " + shell("enable")));
+  else if (!sample_->enabled)
+    found.block(
+        error(Reason::disabled, "the power stage is off", "enable the axis first: " + shell("enable")));
+  if (terminal_motion_)
+    found.block(error(Reason::terminal, "a terminal of the drive moves it",
+                      fmt::format("wait, or stop it: {}", shell("stop"))));
+  look_at_holding_terminals(holding_functions, found);
+}
+
+/// The drive decides what an active terminal does to a start: worth knowing, but not refused for.
+void Axis::look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const {
+  if (!sample_ || link_ != LinkState::online) return;
+  for (const auto& input : settings_.inputs)
+    if (std::ranges::find(functions, input.function) != functions.end() && active_in(*sample_, input))
+      found.note(error(Reason::terminal,
+                       fmt::format("terminal {} ({}) is active: the drive may not start, or stop at once",
+                                   input.terminal, input.function),
+                       "release the terminal, or check its active level in the YAML"));
+}
+
+/// What forbids some motions and permits others.
+void Axis::look_at_what_forbids_some(Obstacles& found) const {
+  if (tracker_.trust() == PositionTrust::unknown &&
+      (settings_.require_trust || settings_.limits.position_minimum))
+    found.note(not_trusted("the position is unknown: absolute moves are refused, and limits cannot be kept"));
+  for (const bool positive : {true, false})
+    if (limit_active(positive)) found.note(direction_blocked(positive));
+}
+
+Error Axis::not_trusted(std::string message) const {
+  const auto set = shell("set-position", "VALUE");
+  return error(Reason::not_trusted, std::move(message),
+               settings_.homing
+                   ? fmt::format("home the axis: {}, or set its position: {}", shell("home"), set)
+                   : fmt::format("set its position: {}", set));
+}
+
+Error Axis::direction_blocked(bool positive) const {
+  return error(Reason::limit_switch,
+               fmt::format("the {} limit switch is active", positive ? "positive" : "negative"),
+               "move away from it: " + shell("jog", positive ? "-VELOCITY" : "VELOCITY"));
+}
+
+void Axis::look_at_direction(bool positive, Obstacles& found) const {
+  if (limit_active(positive)) found.block(direction_blocked(positive));
+}
+
+/// M9: a start that is accepted waits for the end of what moves.
+void Axis::look_at_present_motion(Obstacles& found) const {
+  if (found.blocked()) return;
+  const bool moves = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
+                     (sample_ && sample_->moving && !terminal_motion_);
+  const auto executed = activity_ ? fmt::format("{} {}", to_string(activity_->command->value().kind),
+                                                activity_->command->value().id)
+                                  : std::string();
+  if (moves)
+    found.note(error(Reason::moving, activity_ ? "the axis moves: " + executed : "the axis moves",
+                     activity_ ? "that is halted and ends Aborted; the start waits for standstill"
+                               : "the start waits for standstill"));
+  else if (activity_)
+    found.note(error(Reason::busy, "another command is being executed: " + executed, "it ends Aborted"));
+}
+
+void Axis::look_at_target(const PositionTracker::Target& target, Obstacles& found) const {
+  planner_.check_move(target, tracker_, found);
+  if (target.counter != tracker_.counter()) look_at_direction(planner_.positive(target, tracker_), found);
+}
+
+void Axis::look_at(const EnableRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
+  look_at_readiness(options, found);
+  // A drive that turns while it is being enabled was moved by that, as far as can be told.
+  if (!at_rest()) found.block(error(Reason::moving, "the axis moves", "wait for standstill"));
+  if (activity_ && activity_->state == AxisState::standstill)
+    found.block(error(Reason::busy, "another command is being executed", "wait for it"));
+  static constexpr std::string_view releasing[] = {"motor_free"};
+  look_at_holding_terminals(releasing, found);
+}
+
+/// Also while the drive is not configured: some of its configuration is only written while it is released.
+void Axis::look_at(const DisableRequest& /*request*/, const CommandOptions& /*options*/,
+                   Obstacles& found) const {
+  if (link_ == LinkState::offline) look_at_link(found);
+}
+
+void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
+  look_at_motion(options, found);
+  if (!settings_.homing) {
+    found.block(
+        error(Reason::not_supported, "no homing is configured", "add homing: to the axis in the YAML"));
+  } else if (input_active(homing_switch()) && !settings_.homing->backoff) {
+    found.block(error(Reason::limit_switch, fmt::format("the {} switch is already active", homing_switch()),
+                      "move away from it, or configure homing: { backoff: ... }"));
+  }
+  look_at_present_motion(found);
+}
+
+/// A rotary axis goes the shorter way round.
+PositionTracker::Target Axis::target_of(const MoveAbsoluteRequest& request) const {
+  auto position = request.position;
+  if (settings_.scale.modulo)
+    position = tracker_.position() + std::remainder(position - tracker_.position(), *settings_.scale.modulo);
+  return tracker_.plan_absolute(position);
+}
+
+void Axis::look_at(const MoveAbsoluteRequest& request, const CommandOptions& options,
+                   Obstacles& found) const {
+  look_at_motion(options, found);
+  const bool number = std::isfinite(request.position);
+  if (!number)
+    found.block(error(Reason::invalid_argument, "the position is not a number", "give a finite position"));
+  const bool lost = settings_.require_trust && tracker_.trust() == PositionTrust::unknown;
+  if (lost) found.block(not_trusted("the position is unknown"));
+  planner_.check_profile(velocity_of(request.with), request.with, found);
+  if (number && !lost) look_at_target(target_of(request), found);
+  look_at_present_motion(found);
+}
+
+void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& options,
+                   Obstacles& found) const {
+  look_at_motion(options, found);
+  const bool number = std::isfinite(request.distance);
+  if (!number)
+    found.block(error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
+  if ((activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
+      (sample_ && sample_->moving))
+    found.block(error(Reason::moving, "a relative move needs standstill: its base would be uncertain",
+                      "wait for standstill, or move to an absolute position"));
+  const bool limited = settings_.limits.position_minimum.has_value();
+  if (number && limited && tracker_.trust() == PositionTrust::unknown &&
+      std::abs(request.distance) > settings_.jog_travel) {
+    auto lost = not_trusted("the position is unknown, so limits cannot be kept");
+    lost.remedy += "; shorter moves are bounded by jog_travel";
+    lost.permitted = Range{
+        .minimum = -settings_.jog_travel, .maximum = settings_.jog_travel, .unit = settings_.scale.unit};
+    found.block(std::move(lost));
+  }
+  planner_.check_profile(velocity_of(request.with), request.with, found);
+  if (number) look_at_target(tracker_.plan_relative(request.distance), found);
+}
+
+void Axis::look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const {
+  planner_.check_profile(velocity, with, found);
+  if (!std::isfinite(velocity) || velocity == 0) return;
+  look_at_direction(velocity > 0, found);
+  const auto end = end_of_velocity(velocity > 0, jog);
+  found.block_on(end);
+  if (end && *end) planner_.check_move(**end, tracker_, found);
+}
+
+void Axis::look_at(const MoveVelocityRequest& request, const CommandOptions& options,
+                   Obstacles& found) const {
+  look_at_motion(options, found);
+  if (request.hold && renews(request, options)) return;
+  look_at_velocity(request.velocity, request.with, false, found);
+  look_at_present_motion(found);
+}
+
+void Axis::look_at(const JogRequest& request, const CommandOptions& options, Obstacles& found) const {
+  look_at_motion(options, found);
+  if (renews(request, options)) return;
+  look_at_velocity(request.velocity, request.with, true, found);
+  look_at_present_motion(found);
+}
+
+void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
+  look_at_options(options, found);
+  look_at_link(found);
+  look_at_maintenance(found);
+  if (stopping_.running) found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
+  if (activity_) found.block(error(Reason::busy, "another command is being executed", "wait for it"));
+  if (!sample_ || sample_->alarm_code == 0) return;
+  // All others may have lost their cause and wait for this: the drive says whether they have.
+  const auto* spec = find_alarm(*descriptor_, sample_->alarm_code);
+  if (spec != nullptr && spec->reset == AlarmReset::power_cycle)
+    found.block(alarm_error(sample_->alarm_code, "only a power cycle ends"));
+}
+
+void Axis::look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const {
+  look_at_readiness(options, found);
+  if (activity_ || stopping_.running || (sample_ && sample_->moving))
+    found.block(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
+  const bool number = scale_.checked_pulses(request.position).has_value();
+  if (number && absolute_segments_ && tracker_.offset_for(request.position) != home_offset())
+    found.block(error(Reason::not_supported,
+                      "the drive's absolute segments count from home: another position would not move them",
+                      "home the axis instead: " + shell("home")));
+  // A released open-loop motor can be turned by hand: its position would be lost again at once (M20).
+  if (sample_ && !sample_->enabled && !drive_->closed_loop())
+    found.block(error(Reason::disabled, "the power stage is off, so the position would not hold",
+                      "enable the axis first: " + shell("enable")));
+  if (!number)
+    found.block(
+        error(Reason::invalid_argument, "the position is not a usable number", "give a finite position"));
+}
+
+}  // namespace axisd
