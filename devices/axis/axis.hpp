@@ -19,6 +19,7 @@
 #pragma once
 
 #include <boost/smart_ptr/atomic_shared_ptr.hpp>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -147,6 +148,14 @@ class Axis {
   };
   using ActivityPtr = std::shared_ptr<Activity>;
 
+  /// Accepted to start when what is before it is done.
+  struct Buffered {
+    CommandPtr command;
+    Action action;
+    CommandOptions options;
+    PositionTracker end;  ///< as it will be when this is done
+  };
+
   /// Stops in progress; one sequence serves all that arrive meanwhile.
   struct Stopping {
     bool running = false;
@@ -238,7 +247,8 @@ class Axis {
   Result<CommandPtr> accept(const ResetRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const SetPositionRequest& request, const CommandOptions& options);
   [[nodiscard]] double velocity_of(const MotionValues& with) const;
-  [[nodiscard]] PositionTracker::Target target_of(const MoveAbsoluteRequest& request) const;
+  [[nodiscard]] PositionTracker::Target target_of(const MoveAbsoluteRequest& request,
+                                                  const PositionTracker& from) const;
   [[nodiscard]] Result<Plan> plan_move(const PositionTracker::Target& target, const MotionValues& with) const;
   [[nodiscard]] Result<Plan> plan_velocity(double velocity, const MotionValues& with, bool jog) const;
   /// Where a motion at a velocity ends if nobody ends it; nullopt: nowhere. Errors: soft_limit, not_trusted.
@@ -246,6 +256,14 @@ class Axis {
   [[nodiscard]] bool renews(const Action& action, const CommandOptions& options) const;
   CommandPtr renew(const Action& action, const CommandOptions& options, Duration hold);
   ActivityPtr begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan);
+
+  // axis_buffer.cpp: commands that wait for the one before them
+  Result<CommandPtr> accept_buffered(const Action& action, const CommandOptions& options);
+  [[nodiscard]] std::optional<PositionTracker> expected_end() const;
+  [[nodiscard]] Result<Plan> plan_behind(const Action& action, const PositionTracker& from) const;
+  void start_next();
+  void drop_buffer(const Error& cause);
+  bool cancel_buffered(const CommandPtr& command);
 
   // axis_preconditions.cpp: what does not hold of what each request needs, in the order of refusals
   void look_at(const EnableRequest& request, const CommandOptions& options, Obstacles& found) const;
@@ -366,6 +384,8 @@ class Axis {
   bool closing_ = false;
 
   ActivityPtr activity_;
+  std::deque<Buffered> buffer_;  ///< nothing waits where nothing is executed
+  CommandPtr next_;              ///< of the buffer, while it is being started
   Stopping stopping_;
   /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
   std::optional<TimePoint> release_owed_;

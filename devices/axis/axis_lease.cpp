@@ -39,6 +39,7 @@ void Axis::lease_lost(const Error& cause) {
     if (command == nullptr) return;
     if (is_bounded(command->kind) && command->state == CommandState::active) {
       activity_->lease_over = true;
+      drop_buffer(error(cause.reason, cause.message, cause.remedy));
       return;
     }
     policy = LeaseLoss::halt;

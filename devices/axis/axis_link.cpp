@@ -348,7 +348,8 @@ void Axis::go_offline(const Error& cause) {
     unknown.outcome = Outcome::unknown;
     if (activity->state != AxisState::standstill && !fault_) fault_ = unknown;
     keep_deceleration(*activity);
-    activity->command->unknown(std::move(unknown));
+    activity->command->unknown(unknown);
+    drop_buffer(unknown);
   }
   if (moved) tracker_.forget_target();
   terminal_motion_ = false;

@@ -43,6 +43,11 @@ void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>&
   if (activity_.get() != &activity) return;
   const auto keep = std::exchange(activity_, nullptr);
   how(*keep->command);
+  const auto& command = keep->command->value();
+  if (command.state == CommandState::done)
+    start_next();
+  else
+    drop_buffer(*command.cause);
   publish();
 }
 
@@ -77,7 +82,8 @@ void Axis::enter_error_stop(Error cause) {
   }
   if (auto activity = std::exchange(activity_, nullptr)) {
     keep_deceleration(*activity);
-    activity->command->error(std::move(cause));
+    activity->command->error(cause);
+    drop_buffer(cause);
   }
   tracker_.forget_target();
 }

@@ -36,9 +36,6 @@ std::string Axis::shell(std::string_view command, std::string_view rest) const {
 }
 
 void Axis::look_at_options(const CommandOptions& options, Obstacles& found) const {
-  if (options.buffer_mode == BufferMode::buffered)
-    found.block(error(Reason::not_supported, "buffered commands are not supported",
-                      "wait for the command to end, or use aborting"));
   if (options.not_after <= env_.clock->now())
     found.block(
         error(Reason::expired, "the request's validity has passed", "repeat it with a later not_after"));
@@ -239,11 +236,12 @@ void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options
 }
 
 /// A rotary axis goes the shorter way round.
-PositionTracker::Target Axis::target_of(const MoveAbsoluteRequest& request) const {
+PositionTracker::Target Axis::target_of(const MoveAbsoluteRequest& request,
+                                        const PositionTracker& from) const {
   auto position = request.position;
   if (settings_.scale.modulo)
-    position = tracker_.position() + std::remainder(position - tracker_.position(), *settings_.scale.modulo);
-  return tracker_.plan_absolute(position);
+    position = from.position() + std::remainder(position - from.position(), *settings_.scale.modulo);
+  return from.plan_absolute(position);
 }
 
 void Axis::look_at(const MoveAbsoluteRequest& request, const CommandOptions& options,
@@ -255,7 +253,7 @@ void Axis::look_at(const MoveAbsoluteRequest& request, const CommandOptions& opt
   const bool lost = settings_.require_trust && tracker_.trust() == PositionTrust::unknown;
   if (lost) found.block(not_trusted("the position is unknown"));
   planner_.check_profile(velocity_of(request.with), request.with, found);
-  if (number && !lost) look_at_target(target_of(request), found);
+  if (number && !lost) look_at_target(target_of(request, tracker_), found);
   look_at_present_motion(found);
 }
 

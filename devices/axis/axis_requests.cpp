@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "devices/axis/axis.hpp"
 
@@ -20,6 +21,7 @@ Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& opti
   auto repeat = env_.book->find_repeat(settings_.name, action, options);
   if (repeat && *repeat != nullptr) renew_hold(*repeat);
   if (!repeat || *repeat != nullptr) return repeat;
+  if (options.buffer_mode == BufferMode::buffered) return accept_buffered(action, options);
   return std::visit([&](const auto& request) { return accept(request, options); }, action);
 }
 
@@ -40,7 +42,7 @@ Result<void> Axis::permit(const Request& request, const CommandOptions& options)
 /// halted.
 Axis::ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, AxisState state,
                               Plan plan) {
-  auto command = env_.book->open(settings_.name, action, options);
+  auto command = next_ ? std::exchange(next_, nullptr) : env_.book->open(settings_.name, action, options);
   const auto replaced = activity_;
   const bool moving = (replaced && replaced->state != AxisState::standstill) || (sample_ && sample_->moving);
   if (replaced)
@@ -100,7 +102,7 @@ Result<Plan> Axis::plan_move(const PositionTracker::Target& target, const Motion
 
 Result<CommandPtr> Axis::accept(const MoveAbsoluteRequest& request, const CommandOptions& options) {
   if (auto permitted = permit(request, options); !permitted) return fail(permitted.error());
-  auto plan = plan_move(target_of(request), request.with);
+  auto plan = plan_move(target_of(request, tracker_), request.with);
   if (!plan) return fail(plan.error());
   plan->trusted = settings_.require_trust;
   const auto activity = begin(request, options, AxisState::discrete_motion, *plan);
@@ -250,7 +252,9 @@ Result<CommandPtr> Axis::release_stop() {
 }
 
 Result<CommandPtr> Axis::cancel(const CommandPtr& command) {
-  if (activity_ && activity_->command == command) {
+  if (cancel_buffered(command)) {
+    publish();
+  } else if (activity_ && activity_->command == command) {
     if (activity_->state != AxisState::standstill) stopping_.shown = activity_->state;
     supersede(error(Reason::cancelled, "cancelled by a client"));
     begin_stop(StopKind::halt, false, nullptr);

@@ -28,6 +28,7 @@ void Axis::supersede(const Error& cause) {
     keep_deceleration(*activity);
     if (activity->state != AxisState::standstill) tracker_.forget_target();
     activity->command->abort(cause);
+    drop_buffer(cause);
   }
 }
 

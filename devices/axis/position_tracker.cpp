@@ -80,6 +80,13 @@ PositionTracker::Target PositionTracker::plan_relative(double distance) const {
   return plan({base + Exact(distance)});
 }
 
+PositionTracker PositionTracker::after(const Target& target) const {
+  auto then = *this;
+  then.counter_ = target.counter;
+  then.commanded_ = target.exact;
+  return then;
+}
+
 void PositionTracker::reached(std::shared_ptr<const Exactly> target) { commanded_ = std::move(target); }
 
 }  // namespace axisd

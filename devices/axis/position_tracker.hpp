@@ -48,6 +48,8 @@ class PositionTracker {
   /// standstill, or the present position after anything that ended elsewhere. Precondition: finite numbers.
   [[nodiscard]] Target plan_absolute(double position) const;
   [[nodiscard]] Target plan_relative(double distance) const;
+  /// How it will be once that target is reached: what is planned behind a move starts from there.
+  [[nodiscard]] PositionTracker after(const Target& target) const;
   /// That target was reached and is the base of the next relative move.
   void reached(std::shared_ptr<const Exactly> target);
   /// The axis came to rest elsewhere.

@@ -20,6 +20,7 @@ std::string next_id() {
 template <class Request>
 void set_profile(const Motion& with, Request& request) {
   if (with.velocity) request.set_velocity(*with.velocity);
+  if (with.buffered) request.mutable_options()->set_buffer_mode(v1::BUFFER_MODE_BUFFERED);
   if (with.acceleration_time) to_proto(*with.acceleration_time, *request.mutable_acceleration_time());
   if (with.deceleration_time) to_proto(*with.deceleration_time, *request.mutable_deceleration_time());
 }

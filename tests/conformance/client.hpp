@@ -38,6 +38,7 @@ std::string describe(const v1::Command& command);
 struct Motion {
   std::optional<double> velocity{};
   std::optional<Duration> acceleration_time{}, deceleration_time{}, hold{};
+  bool buffered = false;
 };
 
 void to_proto(Duration from, google::protobuf::Duration& to);

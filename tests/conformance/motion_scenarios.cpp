@@ -140,6 +140,31 @@ std::string replaced_moves(const Setup& setup) {
   return "yes";
 }
 
+std::string buffered_moves(const Setup& setup) {
+  Bench bench(setup);
+  bench.ready();
+  const auto first = bench.client.move_to(60, {}, v1::WAIT_UNTIL_ACCEPTED);
+  const auto second = bench.client.move_to(20, {.buffered = true}, v1::WAIT_UNTIL_ACCEPTED);
+  const auto third = bench.client.move_by(30, {.buffered = true}, v1::WAIT_UNTIL_ACCEPTED);
+  expect_command(bench.client.look_up(second.response), v1::COMMAND_STATE_ACCEPTED);
+  EXPECT_NEAR(third->granted().position(), 50, close) << "its base is the target of the one before";
+  const auto last = expect_done(bench.client.move_by(10, {.buffered = true}));
+  for (const auto& done : {first, second, third})
+    expect_command(bench.client.look_up(done.response), v1::COMMAND_STATE_DONE);
+  EXPECT_GE(from_proto(last.started_at()), from_proto(bench.client.look_up(third.response).ended_at()));
+  EXPECT_NEAR(bench.shaft().mm, 60, close);
+  // A stop ends all of it.
+  bench.under_way(bench.client.move_to(300, {}, v1::WAIT_UNTIL_STARTED));
+  const auto waiting = bench.client.move_to(0, {.buffered = true}, v1::WAIT_UNTIL_ACCEPTED);
+  expect_done(bench.client.stop());
+  expect_command(bench.client.look_up(waiting.response), v1::COMMAND_STATE_ABORTED, v1::REASON_SUPERSEDED);
+  expect_refused(bench.client.jog(5, {.buffered = true}), v1::REASON_NOT_SUPPORTED);
+  bench.pass(3s);
+  expect_state(bench.state(), v1::STATE_STANDSTILL);
+  bench.finish(5);
+  return "yes";
+}
+
 constexpr Scenario scenarios[] = {
     {"absolute_moves", "absolute moves in user units, software limits", &absolute_moves},
     {"relative_moves", "relative moves without drift", &relative_moves},
@@ -149,6 +174,7 @@ constexpr Scenario scenarios[] = {
     {"jogging", "jog while renewed", &jogging},
     {"jogging_untrusted", "bounded jog without a known position", &jogging_untrusted},
     {"replaced_moves", "a move replaces another", &replaced_moves},
+    {"buffered_moves", "moves wait for the one before", &buffered_moves},
 };
 
 }  // namespace

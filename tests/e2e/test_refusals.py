@@ -100,7 +100,7 @@ class Requests(Scenario):
             self.range_of(client, "OUT_OF_RANGE", "Jog", "feeder", velocity=5.0, hold=value)
 
     def preconditions(self, client):
-        self.refused("UNIMPLEMENTED", "NOT_SUPPORTED", client.motion, "MoveAbsolute", "feeder", position=5.0,
+        self.refused("UNIMPLEMENTED", "NOT_SUPPORTED", client.motion, "Jog", "feeder", velocity=5.0,
                      options={"buffer_mode": pb.BUFFER_MODE_BUFFERED})
         self.refused("UNIMPLEMENTED", "NOT_SUPPORTED", client.motion, "Home", "spinner")
         self.refused("FAILED_PRECONDITION", "NOT_TRUSTED", client.motion, "MoveAbsolute", "spinner", position=5.0)

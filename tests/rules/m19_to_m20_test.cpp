@@ -121,6 +121,25 @@ TEST(M19, EndlessAxesRezeroAtStandstill) {
   }
 }
 
+/// What waits was planned before the counter was zeroed.
+TEST(M19, BufferedMovesGoOnOverARezeroedCounter) {
+  both_directions(rotary(), [](const RigOptions& options) {
+    Rig rig(options);
+    rig.ready();
+    const double nearly = ((1 << 30) - 500) / 4000.0 * 360;
+    ASSERT_EQ(rig.complete(MoveRelativeRequest{.distance = nearly, .with = {.velocity = 18000}}, 100h).state,
+              CommandState::done);
+    const auto before = rig.drive->shaft_pulses();
+    rig.submit(MoveRelativeRequest{.distance = 360});
+    rig.submit(MoveRelativeRequest{.distance = 120}, {.buffer_mode = BufferMode::buffered});
+    const auto last = rig.submit(MoveRelativeRequest{.distance = 240}, {.buffer_mode = BufferMode::buffered});
+    rig.run_until([&] { return last->has_ended(); }, 60s);
+    EXPECT_EQ(last->value().state, CommandState::done) << describe(last->value());
+    EXPECT_EQ(rig.writes_of(0x002C), 1);
+    EXPECT_EQ(rig.drive->shaft_pulses(), before + (options.invert ? -8000 : 8000));
+  });
+}
+
 TEST(M19, TheCounterMayWrap) {
   both_directions(rotary(), [](const RigOptions& options) {
     Rig rig(options);

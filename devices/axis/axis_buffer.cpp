@@ -1,0 +1,165 @@
+// BufferMode Buffered (PLCopen part 1): what waits for the command before it, and starts when that is done.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// Commands that may wait at one axis.
+constexpr std::size_t most_buffered = 16;
+
+bool can_wait(CommandKind kind) {
+  return kind == CommandKind::home || kind == CommandKind::move_absolute ||
+         kind == CommandKind::move_relative || kind == CommandKind::move_velocity;
+}
+
+}  // namespace
+
+/// Where the axis will stand when everything that is accepted is done; nothing: that has no end of its own,
+/// or moves nothing.
+std::optional<PositionTracker> Axis::expected_end() const {
+  if (!buffer_.empty()) {
+    if (kind_of(buffer_.back().action) == CommandKind::move_velocity) return std::nullopt;
+    return buffer_.back().end;
+  }
+  const auto& plan = activity_->plan;
+  switch (activity_->command->value().kind) {
+    case CommandKind::home: {
+      auto end = tracker_;
+      end.set_position(settings_.homing->position, PositionTrust::homed);
+      return end;
+    }
+    case CommandKind::move_absolute:
+    case CommandKind::move_relative:
+      return tracker_.after(
+          {.position = plan.target, .counter = plan.target_counter, .exact = plan.exact_target});
+    default:
+      return std::nullopt;
+  }
+}
+
+/// What it will be, as far as can be told before its turn. Errors: those of a command that starts at once,
+/// from there.
+Result<Plan> Axis::plan_behind(const Action& action, const PositionTracker& from) const {
+  const auto plan_to = [&](const PositionTracker::Target& target, const MotionValues& with) -> Result<Plan> {
+    auto profile = planner_.profile(velocity_of(with), with);
+    if (!profile) return profile;
+    return planner_.move(*std::move(profile), target, from);
+  };
+  if (const auto* request = std::get_if<MoveAbsoluteRequest>(&action)) {
+    if (!std::isfinite(request->position))
+      return fail(error(Reason::invalid_argument, "the position is not a number", "give a finite position"));
+    if (settings_.require_trust && from.trust() == PositionTrust::unknown)
+      return fail(not_trusted("the position is unknown"));
+    return plan_to(target_of(*request, from), request->with);
+  }
+  if (const auto* request = std::get_if<MoveRelativeRequest>(&action)) {
+    if (!std::isfinite(request->distance))
+      return fail(error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
+    auto plan = plan_to(from.plan_relative(request->distance), request->with);
+    if (plan) plan->granted.distance = *plan->granted.position - from.position();
+    return plan;
+  }
+  if (const auto* request = std::get_if<MoveVelocityRequest>(&action)) {
+    if (request->hold)
+      return fail(error(Reason::not_supported, "a hold begins at once, so it cannot wait", "leave out hold"));
+    auto plan = planner_.profile(request->velocity, request->with);
+    if (plan) plan->granted.velocity = std::copysign(*plan->granted.velocity, request->velocity);
+    return plan;
+  }
+  if (!settings_.homing)
+    return fail(
+        error(Reason::not_supported, "no homing is configured", "add homing: to the axis in the YAML"));
+  const auto& homing = *settings_.homing;
+  Plan plan;
+  plan.granted.velocity = homing.velocity;
+  plan.granted.search_velocity = homing.search_velocity;
+  plan.granted.acceleration_time = homing.acceleration_time;
+  return plan;
+}
+
+/// What can be decided now is decided now; the rest in its turn.
+Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOptions& options) {
+  if (!can_wait(kind_of(action)))
+    return fail(error(Reason::not_supported, fmt::format("{} cannot be buffered", to_string(kind_of(action))),
+                      "send it with the buffer mode aborting"));
+  if (!activity_) return std::visit([&](const auto& request) { return accept(request, options); }, action);
+  Obstacles found;
+  look_at_motion(options, found);
+  if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
+  const auto& before = buffer_.empty() ? activity_->command->value() : buffer_.back().command->value();
+  const auto from = expected_end();
+  if (!from)
+    return fail(error(Reason::busy,
+                      fmt::format("nothing can wait for {} {}", to_string(before.kind), before.id),
+                      "wait for its end, or send this with the buffer mode aborting"));
+  if (buffer_.size() >= most_buffered)
+    return fail(error(Reason::busy, fmt::format("{} commands wait already", buffer_.size()),
+                      "send it when some of them are done"));
+  auto plan = plan_behind(action, *from);
+  if (!plan) return fail(plan.error());
+  auto end = *from;
+  if (plan->exact_target)
+    end =
+        from->after({.position = plan->target, .counter = plan->target_counter, .exact = plan->exact_target});
+  if (kind_of(action) == CommandKind::home)
+    end.set_position(settings_.homing->position, PositionTrust::homed);
+  auto command = env_.book->open(settings_.name, action, options);
+  command->grant(plan->granted);
+  buffer_.push_back({.command = command, .action = action, .options = options, .end = std::move(end)});
+  return command;
+}
+
+/// What waits next becomes what is executed, if nothing forbids it by now: then it ends, and all behind it.
+void Axis::start_next() {
+  if (buffer_.empty() || activity_) return;
+  const auto next = std::move(buffer_.front());
+  buffer_.pop_front();
+  // Before anything is looked at: a stop that comes meanwhile makes it old.
+  accept_epoch_ = gate_->epoch();
+  next_ = next.command;
+  const auto begun =
+      std::visit([&](const auto& request) { return accept(request, next.options); }, next.action);
+  next_ = nullptr;
+  if (begun) return;
+  const auto& cause = begun.error();
+  const bool overtaken = cause.reason == Reason::expired || cause.reason == Reason::lease_lost ||
+                         cause.reason == Reason::lease_required || cause.reason == Reason::stopping ||
+                         cause.reason == Reason::inhibited;
+  overtaken ? next.command->abort(cause) : next.command->error(cause);
+  drop_buffer(cause);
+}
+
+/// What was planned from where the command before it ends has no base without it.
+void Axis::drop_buffer(const Error& cause) {
+  for (const auto& waiting : std::exchange(buffer_, {})) {
+    auto told = error(Reason::superseded, "what it waited for was not done: " + cause.message,
+                      "send it again, if it is still wanted");
+    if (cause.reason == Reason::lease_lost) told.reason = cause.reason;
+    told.outcome = Outcome::not_sent;
+    waiting.command->abort(std::move(told));
+  }
+}
+
+/// Ends one that waits, and those behind it. False: it does not wait.
+bool Axis::cancel_buffered(const CommandPtr& command) {
+  const auto found = std::ranges::find(buffer_, command, &Buffered::command);
+  if (found == buffer_.end()) return false;
+  std::deque<Buffered> behind(std::next(found), buffer_.end());
+  buffer_.erase(found, buffer_.end());
+  auto cause = error(Reason::cancelled, "cancelled by a client");
+  cause.outcome = Outcome::not_sent;
+  auto kept = std::exchange(buffer_, std::move(behind));
+  command->abort(cause);
+  drop_buffer(cause);
+  buffer_ = std::move(kept);
+  return true;
+}
+
+}  // namespace axisd
