@@ -317,10 +317,10 @@ class Axis {
   void finish(Activity& activity, const std::function<void(CommandRecord&)>& how);
   void fail_with_stop(Activity& activity, Error cause);
   void abort_at_rest(Activity& activity, Error cause);
-  void enter_error_stop(Error cause);
+  void enter_error_stop(const Error& cause);
 
   // axis_power.cpp: sequences that move nothing
-  void on_turned_by_power(Error cause);
+  void on_turned_by_power(const Error& cause);
   Task<> run_enable(ActivityPtr activity);
   Task<> run_disable(ActivityPtr activity);
   Task<> run_reset(ActivityPtr activity);

@@ -112,7 +112,7 @@ Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOpti
     end.set_position(settings_.homing->position, PositionTrust::homed);
   auto command = env_.book->open(settings_.name, action, options);
   command->grant(plan->granted);
-  buffer_.push_back({.command = command, .action = action, .options = options, .end = std::move(end)});
+  buffer_.push_back({.command = command, .action = action, .options = options, .end = end});
   return command;
 }
 

@@ -73,7 +73,7 @@ void Axis::abort_at_rest(Activity& activity, Error cause) {
   finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
 
-void Axis::enter_error_stop(Error cause) {
+void Axis::enter_error_stop(const Error& cause) {
   gate_->raise();
   env_.bus->purge_superseded(settings_.node, *gate_);
   if (!fault_ || fault_->reason != cause.reason || fault_->where.native_code != cause.where.native_code) {

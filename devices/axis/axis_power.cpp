@@ -16,8 +16,8 @@ constexpr auto sample_patience = std::chrono::seconds(5);
 }  // namespace
 
 /// M1, M23: power, or the end of a halt, never moves. Whatever this is, it ends here.
-void Axis::on_turned_by_power(Error cause) {
-  enter_error_stop(std::move(cause));
+void Axis::on_turned_by_power(const Error& cause) {
+  enter_error_stop(cause);
   begin_stop(StopKind::stop, false, nullptr);
   publish();
 }
