@@ -30,15 +30,23 @@ void list(Invocation& invocation, bool names) {
   axis_table(response.axes()).print(use_colour());
 }
 
-std::vector<std::string> lines_of(const v1::WatchAxesResponse& batch) {
-  auto lines = axis_table(batch.axes()).lines(use_colour(), terminal_columns());
+std::vector<std::string> lines_of(const v1::WatchAxesResponse& batch,
+                                  const std::vector<std::string>& fields) {
+  const auto table = fields.empty() ? axis_table(batch.axes()) : field_table(batch.axes(), fields);
+  auto lines = table.lines(use_colour(), terminal_columns());
   if (batch.dropped() > 0)
     lines.push_back(fmt::format("({} ticks came too fast for this terminal)", batch.dropped()));
   return lines;
 }
 
+std::string line_of(const v1::WatchAxesResponse& batch, const std::vector<std::string>& fields,
+                    bool as_json) {
+  if (fields.empty()) return as_json ? json(batch) : tick_line(batch);
+  return as_json ? field_json(batch, fields) : field_line(batch, fields);
+}
+
 struct WatchArguments {
-  std::vector<std::string> axes;
+  std::vector<std::string> axes, fields;
   std::string period = "200ms";
   std::uint64_t count = 0;  ///< 0: without end
 };
@@ -46,6 +54,7 @@ struct WatchArguments {
 void watch(Invocation& invocation, const WatchArguments& arguments) {
   v1::WatchAxesRequest request;
   for (const auto& axis : arguments.axes) request.add_axes(axis);
+  for (const auto& field : arguments.fields) request.mutable_fields()->add_paths(field);
   set(*request.mutable_period(), parse_duration(arguments.period, "--period"));
   std::optional<LiveView> live;
   if (!invocation.json && is_terminal(STDOUT_FILENO)) live.emplace();
@@ -54,9 +63,9 @@ void watch(Invocation& invocation, const WatchArguments& arguments) {
                                 arguments.axes.size() == 1 ? arguments.axes.front() : "",
                                 [&](const v1::WatchAxesResponse& batch) {
                                   if (live) {
-                                    live->show(lines_of(batch));
+                                    live->show(lines_of(batch, arguments.fields));
                                   } else {
-                                    print_line(invocation.json ? json(batch) : tick_line(batch));
+                                    print_line(line_of(batch, arguments.fields, invocation.json));
                                   }
                                   return ++seen != arguments.count;
                                 });
@@ -85,6 +94,12 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
   watch_command->add_option("--period", arguments->period, "Time between ticks, 10ms to 60s")
       ->type_name("TIME")
       ->capture_default_str();
+  watch_command
+      ->add_option("--fields", arguments->fields,
+                   "Only these fields of AxisState, as in the reference: position,velocity,fault.message")
+      ->delimiter(',')
+      ->allow_extra_args(false)  // the words behind are axes
+      ->type_name("FIELD,...");
   watch_command->add_option("--count", arguments->count, "End after so many ticks")->type_name("N");
   watch_command->callback([&invocation, arguments] { watch(invocation, *arguments); });
 }

@@ -95,11 +95,15 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* AxisServiceImpl::WatchAxes(Context* 
   if (!axes) return new RefusedStream<grpc::ByteBuffer>(to_status(axes.error()));
   const auto period = watch_period(parsed);
   if (!period) return new RefusedStream<grpc::ByteBuffer>(to_status(period.error()));
+  auto fields = watched_fields(parsed);
+  if (!fields) return new RefusedStream<grpc::ByteBuffer>(to_status(fields.error()));
   const auto client = client_of(*context);
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
   if (!ticket) return new RefusedStream<grpc::ByteBuffer>(to_status(ticket.error()));
   spdlog::debug("{}: watches {} axes", client, axes->size());
-  auto* stream = services_.hub.open(services_, context, *std::move(ticket), *std::move(axes), *period);
+  auto* stream =
+      services_.hub.open(services_, context, *std::move(ticket),
+                         {.axes = *std::move(axes), .period = *period, .fields = *std::move(fields)});
   return stream != nullptr ? stream : new RefusedStream<grpc::ByteBuffer>(shutting_down());
 }
 

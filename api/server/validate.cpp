@@ -1,6 +1,7 @@
 #include "api/server/validate.hpp"
 
 #include <fmt/format.h>
+#include <google/protobuf/util/field_mask_util.h>
 
 #include <algorithm>
 #include <chrono>
@@ -336,6 +337,26 @@ Result<std::vector<std::string>> watched_axes(const v1::WatchAxesRequest& from, 
   std::erase_if(names,
                 [&](const auto& name) { return std::ranges::find(from.axes(), name) == from.axes().end(); });
   return names;
+}
+
+Result<google::protobuf::FieldMask> watched_fields(const v1::WatchAxesRequest& from) {
+  using google::protobuf::util::FieldMaskUtil;
+  google::protobuf::FieldMask fields;
+  if (from.fields().paths().empty()) return fields;
+  for (const auto& path : from.fields().paths())
+    if (path.empty() || !FieldMaskUtil::IsValidPath<v1::AxisState>(path)) {
+      const auto* state = v1::AxisState::descriptor();
+      std::vector<std::string> known;
+      for (int i = 0; i < state->field_count(); ++i) known.push_back(state->field(i)->name());
+      return fail(Reason::invalid_argument,
+                  fmt::format("fields: AxisState has no field {:?}", path.substr(0, longest_axis_name)),
+                  fmt::format("known are {}", fmt::join(known, ", ")));
+    }
+  auto named = from.fields();
+  named.add_paths("axis");
+  // Streams of the same fields share their batches, in whatever order they were named.
+  FieldMaskUtil::ToCanonicalForm(named, &fields);
+  return fields;
 }
 
 Result<AxisSnapshotPtr> find_axis(const Machine& machine, const std::string& name) {

@@ -73,6 +73,9 @@ struct Question {
 /// The axes to watch, in the machine's order and without repetitions. Errors: invalid_argument, unknown_axis.
 [[nodiscard]] Result<std::vector<std::string>> watched_axes(const v1::WatchAxesRequest& from,
                                                             const Machine& machine);
+/// What of AxisState is to be sent, in one form for all ways to say it: `axis` and the fields asked for;
+/// empty: all. Errors: invalid_argument, naming the field and all that there are.
+[[nodiscard]] Result<google::protobuf::FieldMask> watched_fields(const v1::WatchAxesRequest& from);
 /// Errors: invalid_argument, unknown_axis.
 [[nodiscard]] Result<AxisSnapshotPtr> find_axis(const Machine& machine, const std::string& name);
 

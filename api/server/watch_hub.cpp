@@ -1,5 +1,7 @@
 #include "api/server/watch_hub.hpp"
 
+#include <google/protobuf/util/field_mask_util.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -21,33 +23,31 @@ TimePoint next_tick(TimePoint now, Duration period) {
   return TimePoint((now.time_since_epoch() / period + 1) * period);
 }
 
+bool same(const WatchScope& a, const WatchScope& b) {
+  return a.period == b.period && a.axes == b.axes && std::ranges::equal(a.fields.paths(), b.fields.paths());
+}
+
 }  // namespace
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* WatchHub::open(const Services& services,
                                                            grpc::CallbackServerContext* context,
-                                                           Admission::Ticket ticket,
-                                                           std::vector<std::string> axes, Duration period) {
+                                                           Admission::Ticket ticket, WatchScope scope) {
   const auto stream =
       std::make_shared<WatchStream>(services, context, std::move(ticket), machine_.info().instance_id,
                                     [this](const std::shared_ptr<WatchStream>& ready) { pay(ready); });
   if (!stream->open()) return nullptr;
-  reply_->post(
-      [this, stream, axes = std::move(axes), period]() mutable { add(stream, std::move(axes), period); });
+  reply_->post([this, stream, scope = std::move(scope)]() mutable { add(stream, std::move(scope)); });
   return stream.get();
 }
 
-void WatchHub::add(const std::shared_ptr<WatchStream>& stream, std::vector<std::string> axes,
-                   Duration period) {
+void WatchHub::add(const std::shared_ptr<WatchStream>& stream, WatchScope scope) {
   if (stream->ended()) return;
   const auto now = monotonic_now();
-  auto found = std::ranges::find_if(
-      groups_, [&](const auto& group) { return group->period == period && group->axes == axes; });
+  auto found = std::ranges::find_if(groups_, [&](const auto& group) { return same(group->scope, scope); });
   if (found == groups_.end()) {
-    groups_.push_back(std::make_unique<Group>(Group{.axes = std::move(axes),
-                                                    .period = period,
-                                                    .due = next_tick(now, period),
-                                                    .streams = {},
-                                                    .batch = {}}));
+    const auto due = next_tick(now, scope.period);
+    groups_.push_back(
+        std::make_unique<Group>(Group{.scope = std::move(scope), .due = due, .streams = {}, .batch = {}}));
     found = groups_.end() - 1;
   }
   auto& group = **found;
@@ -68,7 +68,7 @@ TimePoint WatchHub::tick(TimePoint now) {
 }
 
 void WatchHub::run(Group& group, TimePoint now) {
-  group.due = next_tick(now, group.period);
+  group.due = next_tick(now, group.scope.period);
   std::erase_if(group.streams, [](const auto& stream) { return stream->ended(); });
   bool made = false;
   for (const auto& stream : group.streams) {
@@ -102,8 +102,13 @@ void WatchHub::serialise(Group& group, TimePoint now) {
   group.batch_made = now;
   scratch_.Clear();
   const auto machine_now = machine_.now();
-  for (const auto& axis : group.axes)
-    if (const auto snapshot = machine_.snapshot(axis)) to_proto(*snapshot, machine_now, *scratch_.add_axes());
+  const auto& fields = group.scope.fields;
+  for (const auto& axis : group.scope.axes)
+    if (const auto snapshot = machine_.snapshot(axis)) {
+      auto& state = *scratch_.add_axes();
+      to_proto(*snapshot, machine_now, state);
+      if (!fields.paths().empty()) google::protobuf::util::FieldMaskUtil::TrimMessage(fields, &state);
+    }
   // Serialised straight into the slice's own memory, which nobody else has seen yet.
   const grpc::Slice slice(scratch_.ByteSizeLong());
   scratch_.SerializeWithCachedSizesToArray(const_cast<std::uint8_t*>(slice.begin()));

@@ -1,6 +1,8 @@
 // One tick for all watchers.
 #pragma once
 
+#include <google/protobuf/field_mask.pb.h>
+
 #include <atomic>
 #include <memory>
 #include <string>
@@ -11,8 +13,15 @@
 
 namespace axisd::server {
 
-/// Sends every WatchAxes stream its batches. Streams of the same axes and period form a group: each of its
-/// batches is serialised once and shared. Ticks lie on multiples of the period, so that groups wake the
+/// What a stream carries, and how often. Streams of the same make share their batches.
+struct WatchScope {
+  std::vector<std::string> axes;  ///< in the machine's order
+  Duration period;
+  google::protobuf::FieldMask fields{};  ///< of AxisState, in canonical form; empty: all
+};
+
+/// Sends every WatchAxes stream its batches. Streams of the same scope form a group: each of its batches is
+/// serialised once and shared. Ticks lie on multiples of the period, so that groups wake the
 /// thread together.
 ///
 /// Thread: reply, except open() and published().
@@ -21,12 +30,10 @@ class WatchHub {
   WatchHub(Machine& machine, std::shared_ptr<ReplyThread> reply, Duration stalled_reader_limit)
       : machine_(machine), reply_(std::move(reply)), stalled_reader_limit_(stalled_reader_limit) {}
 
-  /// Begins a stream; its first batch is sent at once. `axes` in the machine's order. nullptr: the server is
-  /// shutting down. Thread: gRPC.
+  /// Begins a stream; its first batch is sent at once. nullptr: the server is shutting down. Thread: gRPC.
   grpc::ServerWriteReactor<grpc::ByteBuffer>* open(const Services& services,
                                                    grpc::CallbackServerContext* context,
-                                                   Admission::Ticket ticket, std::vector<std::string> axes,
-                                                   Duration period);
+                                                   Admission::Ticket ticket, WatchScope scope);
 
   /// New snapshots exist: a batch made before is not given to a stream that begins now. Thread: any.
   void published() { published_.fetch_add(1, std::memory_order_release); }
@@ -39,8 +46,7 @@ class WatchHub {
 
  private:
   struct Group {
-    std::vector<std::string> axes;
-    Duration period;
+    WatchScope scope;
     TimePoint due;
     std::vector<std::shared_ptr<WatchStream>> streams;
     grpc::Slice batch;  ///< the AxisStates of a WatchAxesResponse
@@ -48,7 +54,7 @@ class WatchHub {
     std::uint64_t batch_published = 0;
   };
 
-  void add(const std::shared_ptr<WatchStream>& stream, std::vector<std::string> axes, Duration period);
+  void add(const std::shared_ptr<WatchStream>& stream, WatchScope scope);
   void run(Group& group, TimePoint now);
   void pay(const std::shared_ptr<WatchStream>& stream);
   void refresh(Group& group, TimePoint now);

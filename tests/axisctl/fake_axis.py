@@ -5,6 +5,7 @@ import sys
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
+from google.protobuf import field_mask_pb2  # noqa: E402
 from client import package  # noqa: E402
 
 package.load()
@@ -41,13 +42,17 @@ class FakeAxis:
             self.state.link = types_pb2.LINK_STATE_OFFLINE
             self.state.link_error.CopyFrom(offline_detail())
 
-    def snapshot(self):
+    def snapshot(self, fields=()):
         state = types_pb2.AxisState()
         state.CopyFrom(self.state)
         state.measured_at.GetCurrentTime()
         state.age.FromMilliseconds(5)
         state.inhibited = self.machine.inhibited
-        return state
+        if not fields:
+            return state
+        chosen = types_pb2.AxisState()
+        field_mask_pb2.FieldMask(paths=["axis", *fields]).MergeMessage(state, chosen)
+        return chosen
 
     def end(self, state, cause=None):
         """Ends the current command, and with it the motion."""

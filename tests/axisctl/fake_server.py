@@ -132,7 +132,8 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeLeases, FakeExplain, ax
         tick = 0
         while True:
             tick += 1
-            yield axes_pb.WatchAxesResponse(instance_id="fake", tick=tick, axes=[axis.snapshot() for axis in axes])
+            states = [axis.snapshot(request.fields.paths) for axis in axes]
+            yield axes_pb.WatchAxesResponse(instance_id="fake", tick=tick, axes=states)
             await asyncio.sleep(request.period.ToTimedelta().total_seconds() or 0.1)
 
     async def Enable(self, request, context):

@@ -47,6 +47,20 @@ class Reading(AxisctlTest):
         self.assertEqual(self.server.calls("WatchAxes")[0].period.nanos, 10_000_000)
         self.assertEqual(len(self.json("watch", "--period", "10ms", "--count", "2")), 2)
 
+    def test_watch_of_chosen_fields(self):
+        words = ("watch", "--period", "10ms", "--count", "1", "--fields", "state,position,link_error.reason", "feeder", "ghost")
+        self.assertEqual(self.ok(*words),
+                         "1  feeder state=STATE_STANDSTILL position=0 link_error.reason=-"
+                         "  ghost state=STATE_DISABLED position=0 link_error.reason=REASON_OFFLINE\n")
+        self.assertEqual(list(self.server.calls("WatchAxes")[0].fields.paths), ["state", "position", "link_error.reason"])
+        (batch,) = self.json(*words)
+        self.assertEqual(batch["axes"][1], {"axis": "ghost", "state": "STATE_DISABLED", "position": 0,
+                                            "link_error": {"reason": "REASON_OFFLINE"}})
+        self.assertEqual(batch["tick"], "1")
+        status, shown = self.on_terminal("watch", "--period", "20ms", "--fields", "unit", interrupt_at=r"turntable +deg")
+        self.assertEqual(status, 0, shown)
+        self.assertRegex(shown, r"(?s)AXIS.*unit.*turntable  deg")
+
     def test_watch_redraws_in_place_on_a_terminal_and_ends_with_ctrl_c(self):
         status, shown = self.on_terminal("watch", "--period", "20ms", interrupt_at=r"\x1b\[5A.*\x1b\[5A")
         self.assertEqual(status, 0, shown)

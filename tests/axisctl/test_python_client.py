@@ -181,6 +181,10 @@ class WholeMachine(ClientTest):
             if len(ticks) == 3:
                 break
         self.assertEqual([tick.tick for tick in ticks], [1, 2, 3])
+        async for state in self.feeder.watch(0.01, fields=["unit"]):
+            self.assertEqual((state.axis, state.unit, state.model, state.measured_at), ("feeder", "mm", "", None))
+            break
+        self.assertEqual(list(self.calls("WatchAxes")[-1].fields.paths), ["unit"])
         async for state in self.feeder.watch(0.01):
             self.assertEqual(state.axis, "feeder")
             break

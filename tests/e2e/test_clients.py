@@ -153,6 +153,17 @@ class Commands(Scenario):
         self.assertLess(machine.sim.shaft().position, 0)
 
 
+class Watching(Scenario):
+    def test_chosen_fields(self):
+        machine = self.machine({"feeder": feeder()}).start()
+        done = machine.axisctl("watch", "--count", "2", "--fields", "link,fault.message,position")
+        self.assertEqual(done.stdout, "1  feeder link=LINK_STATE_ONLINE fault.message=- position=0\n"
+                                      "2  feeder link=LINK_STATE_ONLINE fault.message=- position=0\n")
+        done = machine.axisctl("watch", "--fields", "position,speed")
+        self.assertEqual((done.returncode, done.stdout), (4, ""))
+        self.assertRegex(done.stderr, 'AxisState has no field "speed"; known are axis, unit, state, .*, lease_holder')
+
+
 class StandardServices(Scenario):
     def test_health_and_reflection(self):
         machine = self.machine({"feeder": feeder()}).start()

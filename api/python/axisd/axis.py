@@ -4,7 +4,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import uuid
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -43,9 +43,9 @@ class Axis:
         request = axis_service_pb2.GetAxisRequest(axis=self.name)
         return AxisState.of((await self._machine._call(self._machine._axes.GetAxis, request, self.name)).state)
 
-    async def watch(self, period: Seconds = 0.1) -> AsyncGenerator[AxisState, None]:
-        """The latest state at a steady rate."""
-        async with contextlib.aclosing(self._machine.watch([self.name], period)) as ticks:
+    async def watch(self, period: Seconds = 0.1, fields: Iterable[str] = ()) -> AsyncGenerator[AxisState, None]:
+        """The latest state at a steady rate; `fields` as of Machine.watch()."""
+        async with contextlib.aclosing(self._machine.watch([self.name], period, fields)) as ticks:
             async for tick in ticks:
                 yield tick.axes[self.name]
 

@@ -16,8 +16,9 @@ using ::testing::ElementsAre;
 /// An open WatchAxes stream.
 struct Watch {
   Watch(v1::AxisService::Stub& stub, std::chrono::milliseconds period,
-        const std::vector<std::string>& axes = {}) {
+        const std::vector<std::string>& axes = {}, const std::vector<std::string>& fields = {}) {
     v1::WatchAxesRequest request;
+    for (const auto& field : fields) request.mutable_fields()->add_paths(field);
     for (const auto& axis : axes) request.add_axes(axis);
     request.mutable_period()->set_seconds(period.count() / 1000);
     request.mutable_period()->set_nanos(static_cast<int>(period.count() % 1000 * 1'000'000));
@@ -109,6 +110,56 @@ TEST_F(Streams, RefusesUnknownAxesAndPeriods) {
   Watch fast(*axes_, 1ms);
   EXPECT_FALSE(fast.read());
   EXPECT_EQ(detail_of(fast.reader->Finish()).reason(), v1::REASON_OUT_OF_RANGE);
+}
+
+TEST_F(Streams, OnlyTheFieldsAskedForAreSent) {
+  serve();
+  AxisSnapshot snapshot{.name = "feeder", .unit = "mm"};
+  snapshot.position = 12;
+  snapshot.velocity = 3;
+  snapshot.fault = Error{.reason = Reason::alarm, .message = "overcurrent"};
+  machine_.publish(snapshot);
+  Watch watch(*axes_, 60s, {"feeder"}, {"velocity", "fault.message", "velocity"});
+  ASSERT_TRUE(watch.read());
+  EXPECT_EQ(watch.batch.instance_id(), "i-1");
+  EXPECT_EQ(watch.batch.tick(), 1U);
+  v1::AxisState expected;
+  expected.set_axis("feeder");
+  expected.set_velocity(3);
+  expected.mutable_fault()->set_message("overcurrent");
+  EXPECT_EQ(watch.batch.axes(0).SerializeAsString(), expected.SerializeAsString());
+}
+
+TEST_F(Streams, UnknownFieldsAreRefusedWithTheKnownOnes) {
+  serve();
+  for (const auto* path : {"speed", "", "fault.nothing", "inputs.name", "position.x"}) {
+    Watch watch(*axes_, 100ms, {}, {"position", path});
+    EXPECT_FALSE(watch.read());
+    const auto status = watch.reader->Finish();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << path;
+    EXPECT_THAT(detail_of(status).message(), ::testing::HasSubstr(std::string("\"") + path + "\""));
+    EXPECT_THAT(detail_of(status).remedy(), ::testing::HasSubstr("known are axis, unit, state, link,"));
+    EXPECT_THAT(detail_of(status).remedy(), ::testing::HasSubstr("lease_holder"));
+  }
+}
+
+TEST_F(Streams, StreamsOfTheSameFieldsShareTheirBatches) {
+  serve();
+  constexpr int streams = 8, batches = 20;
+  std::vector<std::unique_ptr<Watch>> watches;
+  for (int i = 0; i < streams; ++i) {
+    // Named in whatever order, and with the one that is always there.
+    watches.push_back(
+        std::make_unique<Watch>(*axes_, 50ms, std::vector<std::string>{},
+                                i % 2 == 0 ? std::vector<std::string>{"position", "velocity"}
+                                           : std::vector<std::string>{"velocity", "axis", "position"}));
+    ASSERT_TRUE(watches.back()->read());
+  }
+  const auto before = server_->batches_serialised();
+  for (int batch = 0; batch < batches; ++batch)
+    for (const auto& watch : watches) ASSERT_TRUE(watch->read());
+  EXPECT_LT(server_->batches_serialised() - before, streams * batches / 2)
+      << "as of EqualStreamsShareTheirBatches";
 }
 
 TEST_F(Streams, EqualStreamsShareTheirBatches) {
