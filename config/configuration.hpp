@@ -19,10 +19,19 @@ struct TlsSettings {
   std::string certificate, key, client_ca;  ///< PEM files
 };
 
+/// `limits:` of the server.
+struct ServerLimits {
+  int calls = 256;        ///< waiting, per client; stops are not counted
+  int streams = 64;       ///< open, per client
+  int connections = 256;  ///< of all clients
+  Duration stalled_reader = std::chrono::seconds(2);
+};
+
 struct ServerSettings {
   std::string listen =
       "localhost:7443";  ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
   std::optional<TlsSettings> tls;
+  ServerLimits limits;
 };
 
 /// `simulate:` of an axis on a simulated bus: the mechanics around its drive. User units, axis direction, on

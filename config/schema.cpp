@@ -38,6 +38,47 @@ constexpr KeySpec tls_keys[] = {
      .apply = [](Target& t, const Value& v) { t.configuration->server.tls->client_ca = v.text; }},
 };
 
+constexpr KeySpec limit_keys[] = {
+    {.key = "calls",
+     .kind = Kind::integer,
+     .description =
+         "Calls that one client may have waiting at a time. Stops, and renewals of leases, are not counted.",
+     .example = "32",
+     .default_value = "256",
+     .minimum = 1,
+     .maximum = 1000,
+     .apply = [](Target& t,
+                 const Value& v) { t.configuration->server.limits.calls = static_cast<int>(v.integer); }},
+    {.key = "streams",
+     .kind = Kind::integer,
+     .description = "Streams that one client may have open at a time.",
+     .example = "16",
+     .default_value = "64",
+     .minimum = 1,
+     .maximum = 500,
+     .apply = [](Target& t,
+                 const Value& v) { t.configuration->server.limits.streams = static_cast<int>(v.integer); }},
+    {.key = "connections",
+     .kind = Kind::integer,
+     .description = "Connections of all clients together, about; those beyond are closed at once.",
+     .example = "32",
+     .default_value = "256",
+     .minimum = 4,
+     .maximum = 10'000,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.configuration->server.limits.connections = static_cast<int>(v.integer);
+         }},
+    {.key = "stalled_reader",
+     .kind = Kind::duration,
+     .description = "A stream whose reader has not read for so long is cancelled.",
+     .example = "5 s",
+     .default_value = "2 s",
+     .minimum = 100,
+     .maximum = 60'000,
+     .apply = [](Target& t, const Value& v) { t.configuration->server.limits.stalled_reader = v.duration; }},
+};
+
 constexpr KeySpec server_keys[] = {
     {.key = "listen",
      .kind = Kind::text,
@@ -54,6 +95,10 @@ constexpr KeySpec server_keys[] = {
      .description = "Mutual TLS; required where the daemon can be reached from other machines.",
      .children = tls_keys,
      .apply = [](Target& t, const Value&) { t.configuration->server.tls.emplace(); }},
+    {.key = "limits",
+     .kind = Kind::section,
+     .description = "What clients may take of the daemon; refusals name the key.",
+     .children = limit_keys},
 };
 
 constexpr KeySpec flight_recorder_keys[] = {

@@ -104,7 +104,11 @@ bool stop_axes(core::CoreLoop& loop, core::MachineCore& machine) {
 }
 
 server::ServerOptions server_options(const config::ServerSettings& settings) {
-  server::ServerOptions options{.listen = {settings.listen}};
+  const auto& limits = settings.limits;
+  server::ServerOptions options{.listen = {settings.listen},
+                                .limits = {.calls = limits.calls, .streams = limits.streams},
+                                .connections = limits.connections,
+                                .stalled_reader_limit = limits.stalled_reader};
   if (settings.tls)
     options.tls = server::TlsFiles{.certificate = settings.tls->certificate,
                                    .key = settings.tls->key,

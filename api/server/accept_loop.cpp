@@ -84,7 +84,8 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   if (connection.get() >= first_refused_descriptor_) {
     connection = {};
     const auto count = ++refused_;
-    if (std::has_single_bit(count)) spdlog::warn("too many connections: {} turned away since start", count);
+    if (std::has_single_bit(count))
+      spdlog::warn("too many connections (server.limits.connections): {} turned away since start", count);
     return true;
   }
   if (entry.socket.unix_path.empty()) {

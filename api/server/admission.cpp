@@ -17,10 +17,13 @@ Result<Admission::Ticket> Admission::admit(const std::string& client, Kind kind)
       return Ticket(book_, client, kind);
     }
   }
-  return fail(Reason::busy,
-              fmt::format("{} has {} {} in progress, the most that one client may have", client, limit,
-                          kind == Kind::call ? "calls" : "streams"),
-              "wait for some of them to end, then retry; stops are not limited");
+  return fail(
+      Reason::busy,
+      fmt::format("{} has {} {} in progress, the most that one client may have", client, limit,
+                  kind == Kind::call ? "calls" : "streams"),
+      fmt::format("wait for some of them to end, then retry, or raise server.limits.{} in the configuration; "
+                  "stops are not limited",
+                  kind == Kind::call ? "calls" : "streams"));
 }
 
 void Admission::Ticket::release() {

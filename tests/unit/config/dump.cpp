@@ -159,6 +159,11 @@ std::string dump(const Configuration& configuration) {
   dump.field("leases.default_ttl", configuration.leases.default_ttl);
   dump.field("leases.longest_ttl", configuration.leases.longest_ttl);
   dump.field("listen", configuration.server.listen);
+  const auto& limits = configuration.server.limits;
+  dump.field("limits.calls", limits.calls);
+  dump.field("limits.streams", limits.streams);
+  dump.field("limits.connections", limits.connections);
+  dump.field("limits.stalled_reader", limits.stalled_reader);
   if (const auto& tls = configuration.server.tls) {
     dump.field("tls", fmt::format("{} {} {}", tls->certificate, tls->key, tls->client_ca));
   }
