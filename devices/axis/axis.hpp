@@ -276,6 +276,8 @@ class Axis {
   void look_at(const StopRequest&, const CommandOptions&, Obstacles&) const {}  ///< never refused
   void look_at(const ResetRequest& request, const CommandOptions& options, Obstacles& found) const;
   void look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const;
+  /// axis_buffer.cpp: of a request that may have to wait for others.
+  void look_at_buffered(const Action& action, const CommandOptions& options, Obstacles& found) const;
   void look_at_options(const CommandOptions& options, Obstacles& found) const;
   void look_at_link(Obstacles& found) const;
   void look_at_fault(Obstacles& found) const;

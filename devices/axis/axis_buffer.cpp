@@ -84,24 +84,33 @@ Result<Plan> Axis::plan_behind(const Action& action, const PositionTracker& from
   return plan;
 }
 
-/// What can be decided now is decided now; the rest in its turn.
-Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOptions& options) {
+void Axis::look_at_buffered(const Action& action, const CommandOptions& options, Obstacles& found) const {
   if (!can_wait(kind_of(action)))
-    return fail(error(Reason::not_supported, fmt::format("{} cannot be buffered", to_string(kind_of(action))),
-                      "send it with the buffer mode aborting"));
-  if (!activity_) return std::visit([&](const auto& request) { return accept(request, options); }, action);
-  Obstacles found;
+    return found.block(error(Reason::not_supported,
+                             fmt::format("{} cannot be buffered", to_string(kind_of(action))),
+                             "send it with the buffer mode aborting"));
+  if (!activity_) return std::visit([&](const auto& request) { look_at(request, options, found); }, action);
   look_at_motion(options, found);
-  if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
   const auto& before = buffer_.empty() ? activity_->command->value() : buffer_.back().command->value();
   const auto from = expected_end();
   if (!from)
-    return fail(error(Reason::busy,
+    found.block(error(Reason::busy,
                       fmt::format("nothing can wait for {} {}", to_string(before.kind), before.id),
                       "wait for its end, or send this with the buffer mode aborting"));
   if (buffer_.size() >= most_buffered)
-    return fail(error(Reason::busy, fmt::format("{} commands wait already", buffer_.size()),
+    found.block(error(Reason::busy, fmt::format("{} commands wait already", buffer_.size()),
                       "send it when some of them are done"));
+  if (from) found.block_on(plan_behind(action, *from));
+}
+
+/// What can be decided now is decided now; the rest in its turn.
+Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOptions& options) {
+  Obstacles found;
+  look_at_buffered(action, options, found);
+  if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
+  if (!activity_) return std::visit([&](const auto& request) { return accept(request, options); }, action);
+  const auto from = expected_end();
+  if (!from) return fail(error(Reason::internal, "there is nothing to wait for"));
   auto plan = plan_behind(action, *from);
   if (!plan) return fail(plan.error());
   auto end = *from;

@@ -21,7 +21,10 @@ constexpr std::string_view holding_functions[] = {"stop", "quick_stop", "motor_f
 std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
                                     const CommandOptions& options) const {
   Obstacles found;
-  if (action) {
+  const bool never_waits = action && std::holds_alternative<DisableRequest>(*action);
+  if (action && options.buffer_mode == BufferMode::buffered && !never_waits) {
+    look_at_buffered(*action, options, found);
+  } else if (action) {
     std::visit([&](const auto& request) { look_at(request, options, found); }, *action);
   } else {
     look_at_motion(options, found);

@@ -349,11 +349,25 @@ TEST(Explain, ATerminalThatHoldsTheDriveIsWorthKnowing) {
   EXPECT_THAT(rig.text(JogRequest{.velocity = 5}, Reason::terminal), HasSubstr("X3 (quick_stop) is active"));
 }
 
-TEST(Explain, ARequestThatIsTooOldOrToBeBufferedIsRefusedForThat) {
+TEST(Explain, ARequestThatIsTooOldIsRefusedForThat) {
   ExplainRig rig;
   rig.ready();
-  const CommandOptions options{.not_after = rig.world.now(), .buffer_mode = BufferMode::buffered};
-  EXPECT_THAT(rig.reasons(move, options), ElementsAre("not_supported", "expired"));
+  EXPECT_THAT(rig.reasons(move, {.not_after = rig.world.now()}), ElementsAre("expired"));
+}
+
+TEST(Explain, WhatMayWaitIsLookedAtFromWhereItWillStart) {
+  ExplainRig rig;
+  rig.ready();
+  const CommandOptions buffered{.buffer_mode = BufferMode::buffered};
+  EXPECT_THAT(rig.reasons(step, buffered), IsEmpty());
+  EXPECT_THAT(rig.reasons(JogRequest{.velocity = 5}, buffered), ElementsAre("not_supported"));
+  rig.submit(MoveAbsoluteRequest{.position = 398});
+  rig.run(500ms);
+  EXPECT_THAT(rig.reasons(MoveRelativeRequest{.distance = 1}, buffered), IsEmpty()) << "it waits";
+  EXPECT_THAT(rig.reasons(step, buffered), ElementsAre("soft_limit")) << "398 mm and 5 mm";
+  for (int i = 0; i < 16; ++i) rig.submit(MoveRelativeRequest{.distance = -1}, buffered);
+  EXPECT_THAT(rig.reasons(step, buffered), ElementsAre("busy"));
+  EXPECT_THAT(rig.text(step, Reason::busy, buffered), HasSubstr("16 commands wait already"));
 }
 
 TEST(Explain, ARenewalOfAJogIsNotANewStart) {
