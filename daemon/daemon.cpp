@@ -24,6 +24,7 @@
 #include "daemon/ports.hpp"
 #include "daemon/store/file_store.hpp"
 #include "daemon/store/flight_files.hpp"
+#include "daemon/store/journal_file.hpp"
 
 namespace axisd {
 
@@ -122,6 +123,14 @@ void log_budget(const BusBudgetReport& budget) {
     spdlog::warn("{}: {}; {}", budget.predicted.bus, text, remedy);
 }
 
+/// Precondition: the directory is locked.
+Result<std::unique_ptr<store::JournalFile>> open_journal(const std::string& state_directory,
+                                                         core::CoreLoop& loop) {
+  auto disk = store::open_journal_disk(state_directory);
+  if (!disk) return fail(disk.error());
+  return store::JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), loop.executor());
+}
+
 int give_up(const Error& error) {
   spdlog::critical("{}", to_string(error));
   end_logging();
@@ -133,13 +142,17 @@ int give_up(const Error& error) {
 int run_daemon(const Options& options, config::Configuration configuration) {
   const auto signals = ending_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  // Both are errors of a write, which are told where it is made.
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   start_logging(options.log_level);
 
   core::CoreLoop loop;
   auto store = store::FileStore::open(configuration.state_directory, loop.executor());
   if (!store) return give_up(store.error());
   if ((*store)->damage()) spdlog::error("{}", to_string(*(*store)->damage()));
+  auto journal = open_journal(configuration.state_directory, loop);
+  if (!journal) return give_up(journal.error());
   core::FrameObserver wire_log;
   if (!options.wire_log.empty()) {
     auto opened = open_wire_log(options.wire_log);
@@ -159,6 +172,7 @@ int run_daemon(const Options& options, config::Configuration configuration) {
   core::MachineCore machine({.executor = loop.executor(),
                              .clock = &loop.clock(),
                              .persistence = store->get(),
+                             .journal = journal->get(),
                              .instance_id = instance_id,
                              .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
                              .make_port = [&](const auto& network) { return (*ports)->make_port(network); },

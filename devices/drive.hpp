@@ -157,9 +157,12 @@ class Drive {
   [[nodiscard]] virtual bool closed_loop() const = 0;
 
   /// What the drive's memory holds now, if that is known; and, after a restart of the daemon, what it should
-  /// hold.
+  /// hold: one of these.
   [[nodiscard]] virtual std::optional<ContinuityMark> continuity_mark() const = 0;
-  virtual void expect_mark(const ContinuityMark& mark) = 0;
+  virtual void expect_marks(const std::vector<ContinuityMark>& marks) = 0;
+  /// What it may hold at any time from now until such a start was sent. Empty: not known.
+  [[nodiscard]] virtual std::vector<ContinuityMark> marks_until(const MoveProfile& start) const = 0;
+  [[nodiscard]] virtual std::vector<ContinuityMark> marks_until(const VelocityProfile& start) const = 0;
 
   /// Power stage. enable() includes a canary check. Errors as above; here and in the starts `terminal` means
   /// that the shaft turned though nothing was started (M23): ErrorStop.

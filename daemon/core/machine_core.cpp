@@ -47,7 +47,7 @@ void log_link(const canopen::CanopenBus& network, std::string& told) {
 
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
     : parts_(std::move(parts)),
-      book_(*parts_.clock, parts_.instance_id),
+      book_(*parts_.clock, parts_.instance_id, parts_.journal),
       flight_recorder_(*parts_.clock, parts_.flight_records,
                        [this](const std::string& axis, const FlightRecordWritten& record) {
                          events_.record(parts_.clock->wall(parts_.clock->now()), axis, record);
@@ -176,6 +176,7 @@ void MachineCore::start() {
   for (const auto& network : networks_) launch(watch(*network), "network watch");
   for (auto* bus : buses_) launch(watch_port(*bus), "port watch");
   for (const auto& axis : axes_) axis->start();
+  book_.give_up_unsettled();
   for (const auto& device : devices_) device->start();
 }
 

@@ -28,6 +28,7 @@ struct MachineParts {
   Executor executor;
   Clock* clock = nullptr;
   Persistence* persistence = nullptr;  ///< may be null: nothing is kept
+  CommandJournal* journal = nullptr;   ///< may be null: repeats are not known over a restart
   std::string instance_id;
   std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line;
   /// May be empty where the configuration has no CAN network.

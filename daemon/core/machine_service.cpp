@@ -20,7 +20,7 @@ std::unexpected<Error> closing() {
 
 std::unexpected<Error> unknown_command(const std::string& id) {
   return fail(Reason::unknown_command, fmt::format("there is no command '{}' (any more)", id),
-              "commands are remembered for 30 minutes, and not over a restart");
+              "commands are remembered for 30 minutes; those without a request_id not over a restart");
 }
 
 }  // namespace

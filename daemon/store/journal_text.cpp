@@ -5,6 +5,7 @@
 #include <array>
 
 #include "daemon/store/line_text.hpp"
+#include "devices/axis/names.hpp"
 
 namespace axisd::store {
 namespace {
@@ -13,10 +14,6 @@ constexpr std::size_t checksum_size = 8;  // hexadecimal digits
 
 constexpr std::array states = {CommandState::accepted, CommandState::active, CommandState::done,
                                CommandState::aborted,  CommandState::error,  CommandState::unknown};
-constexpr std::array kinds = {
-    CommandKind::enable,        CommandKind::disable,       CommandKind::home,  CommandKind::move_absolute,
-    CommandKind::move_relative, CommandKind::move_velocity, CommandKind::jog,   CommandKind::halt,
-    CommandKind::stop,          CommandKind::quick_stop,    CommandKind::reset, CommandKind::set_position};
 constexpr std::array<std::string_view, 4> outcomes = {"not_sent", "refused", "not_executed", "unknown"};
 
 std::int64_t in_ns(WallTime time) {
@@ -114,7 +111,14 @@ class Reader : public LineReader {
   }
   bool head(Command& c) {
     return literal("id=") && word(c.id) && literal(" axis=") && word(c.axis) && literal(" kind=") &&
-           one_of(kinds, c.kind, [](CommandKind kind) { return to_string(kind); });
+           kind(c.kind);
+  }
+  bool kind(CommandKind& value) {
+    std::string text;
+    if (!word(text)) return false;
+    const auto found = find_command_kind(text);
+    if (found) value = *found;
+    return found.has_value();
   }
 };
 

@@ -33,7 +33,10 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
 
 Axis::~Axis() = default;
 
-void Axis::start() { launch(run(), "link"); }
+void Axis::start() {
+  take_over();
+  launch(run(), "link");
+}
 
 void Axis::launch(Task<> sequence, const char* name) {
   ++sequences_;

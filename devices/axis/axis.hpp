@@ -145,6 +145,7 @@ class Axis {
     bool started = false;                   ///< the drive was seen moving for it
     bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
     bool lease_over = false;                ///< goes on without its lease, and starts nothing more
+    bool noted = false;                     ///< durably, or that is under way
   };
   using ActivityPtr = std::shared_ptr<Activity>;
 
@@ -208,6 +209,19 @@ class Axis {
   Task<> wait_for_port();
   void go_offline(const Error& cause);
   void on_reboot(const Error& cause);
+
+  // axis_journal.cpp: commands over restarts of the daemon
+  void take_over();
+  Task<Result<void>> settle_earlier();
+  void settle_positions_set();
+  void settle_as(const Unsettled& earlier, bool continuous);
+  void settle_as_unknown(const Unsettled& earlier, std::string_view why);
+  void give_up_settling();
+  [[nodiscard]] Error earlier_error(const Unsettled& earlier, std::string_view what, Outcome outcome) const;
+  [[nodiscard]] SendingNote note_of(const Activity& activity, std::vector<ContinuityMark> marks) const;
+  Task<bool> noted(ActivityPtr activity, SendingNote note);
+  [[nodiscard]] Result<void> check_journal() const;
+  Task<Result<void>> forget_saved_position();
 
   // axis.cpp: what the samples mean
   void on_sample(const DriveSample& sample);
@@ -305,6 +319,7 @@ class Axis {
   Task<Result<void>> make_room(ActivityPtr activity);
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
+  static MoveProfile profile_of(const Plan& plan);
   static void tell_part(const Activity& activity, Error& cause);
   void end_unsent(Activity& activity, const Error& cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
@@ -367,6 +382,9 @@ class Axis {
   std::optional<DriveIdentity> identity_;
   bool configured_ = false;  ///< in this power cycle of the drive
   bool restore_tried_ = false;
+  std::vector<Unsettled> unsettled_;  ///< of earlier runs of the daemon
+  bool position_unsettled_ = false;   ///< one of them may have changed what the counter means
+  TimePoint settle_by_{};
   int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
   TimePoint fast_from_{}, fast_until_{};  ///< of poll_fast()

@@ -32,6 +32,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
   }
   if (input_active(homing_switch()) && !co_await back_off(activity)) co_return;
 
+  if (!co_await noted(activity, note_of(*activity, {}))) co_return;
   lose_trust();
   const bool homed_before = sample_->homed;
   const auto base = tracker_.counter();

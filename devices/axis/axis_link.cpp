@@ -56,6 +56,7 @@ Task<> Axis::connect() {
     if (!link_error_ || link_error_->reason != connected.error().reason)
       spdlog::warn("{}: {}", settings_.name, to_string(connected.error()));
     link_error_ = connected.error();
+    if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
     publish();
     // What the bus holds back goes out as soon as anything of the node is heard: it should be there by then.
     const auto pause = env_.bus->holds_back(settings_.node) ? Duration(first_backoff) : backoff;
@@ -71,6 +72,7 @@ Task<> Axis::wait_for_port() {
     link_ = LinkState::offline;
     link_error_ = env_.bus->port().error.value_or(
         error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists"));
+    if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
     publish();
     co_await env_.bus->port_changed().wait_until(env_.clock->now() + longest_backoff);
   }
@@ -133,6 +135,7 @@ Task<Result<void>> Axis::settle_found_motion() {
 }
 
 Task<Result<void>> Axis::prove_or_configure() {
+  if (const auto settled = co_await settle_earlier(); !settled) co_return settled;
   const AxisRecord* stored = nullptr;
   if (!configured_ && !restore_tried_ && env_.persistence != nullptr) {
     const auto& axes = env_.persistence->loaded().axes;
@@ -142,11 +145,12 @@ Task<Result<void>> Axis::prove_or_configure() {
   bool restorable = false;
   if (stored != nullptr) {
     const auto& record = *stored->offset;
-    restorable = record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
+    restorable = !position_unsettled_ && record.trust != PositionTrust::unknown &&
+                 record.invert == settings_.scale.invert &&
                  record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
                  record.last_position_pulses == sample_->position_pulses &&
                  (sample_->enabled || drive_->closed_loop());
-    if (restorable) drive_->expect_mark(record.canary);
+    if (restorable) drive_->expect_marks({record.canary});
   }
   const auto void_record = [this] {  // what it says may come true again by chance, but never by right
     restore_tried_ = true;
@@ -181,6 +185,7 @@ Task<Result<void>> Axis::prove_or_configure() {
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
+  settle_positions_set();
   co_return Result<void>{};
 }
 

@@ -118,6 +118,14 @@ Task<> Axis::run_move(ActivityPtr activity) {
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
 
+MoveProfile Axis::profile_of(const Plan& plan) {
+  return {.target_pulses = static_cast<std::int32_t>(plan.target_counter),
+          .velocity_rpm = plan.velocity_rpm,
+          .start_rpm = plan.start_rpm,
+          .acceleration_time = plan.acceleration_time,
+          .deceleration_time = plan.deceleration_time};
+}
+
 /// One positioning motion to the plan's target. False: the activity has ended.
 Task<bool> Axis::positioned(ActivityPtr activity) {
   if (!co_await reach_standstill(activity)) co_return false;
@@ -135,6 +143,12 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     const Chain chain(*this);
     result = co_await make_room(activity);
     if (!current(*activity)) co_return false;
+  }
+  if (result &&
+      !co_await noted(activity, note_of(*activity, drive_->marks_until(profile_of(activity->plan)))))
+    co_return false;
+  {
+    const Chain chain(*this);
     base = tracker_.counter();
     there = result && activity->plan.target_counter == base;
     if (result && !there) {
@@ -142,12 +156,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
       const auto distance = activity->plan.target_counter - base;
       activity->plan.positive = (distance >= 0) != settings_.scale.invert;
       activity->plan.predicted = planner_.duration(activity->plan, distance);
-      const MoveProfile profile{.target_pulses = static_cast<std::int32_t>(activity->plan.target_counter),
-                                .velocity_rpm = activity->plan.velocity_rpm,
-                                .start_rpm = activity->plan.start_rpm,
-                                .acceleration_time = activity->plan.acceleration_time,
-                                .deceleration_time = activity->plan.deceleration_time};
-      result = co_await drive_->start_move(profile, guard(*activity));
+      result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
     }
   }
   const auto since = env_.clock->now();
@@ -210,14 +219,15 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
     co_return;
   }
   if (!co_await reach_standstill(activity)) co_return;
+  const VelocityProfile profile{.velocity_rpm = activity->plan.velocity_rpm,
+                                .start_rpm = activity->plan.start_rpm,
+                                .acceleration_time = activity->plan.acceleration_time,
+                                .deceleration_time = activity->plan.deceleration_time};
+  if (!co_await noted(activity, note_of(*activity, drive_->marks_until(profile)))) co_return;
   Result<void> result;
   const auto base = tracker_.counter();
   {
     const Chain chain(*this);
-    const VelocityProfile profile{.velocity_rpm = activity->plan.velocity_rpm,
-                                  .start_rpm = activity->plan.start_rpm,
-                                  .acceleration_time = activity->plan.acceleration_time,
-                                  .deceleration_time = activity->plan.deceleration_time};
     result = co_await drive_->start_velocity(profile, guard(*activity));
   }
   const auto since = env_.clock->now();

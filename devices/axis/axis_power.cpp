@@ -23,6 +23,7 @@ void Axis::on_turned_by_power(const Error& cause) {
 }
 
 Task<> Axis::run_enable(ActivityPtr activity) {
+  if (!co_await noted(activity, {})) co_return;
   Result<void> result;
   {
     const Chain chain(*this);
@@ -153,6 +154,7 @@ Task<> Axis::run_set_position(ActivityPtr activity) {
     });
     co_return;
   }
+  if (!co_await noted(activity, {})) co_return;
   // Journalled before it is used (M20): a restart must never meet a newer position with an older offset.
   const auto counter = tracker_.counter();
   const auto saved = co_await journal_offset(tracker_.offset_for(position), PositionTrust::set);

@@ -121,6 +121,7 @@ void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) co
   look_at_maintenance(found);
   if (release_owed_)
     found.block(error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
+  found.block_on(check_journal());
   if (!drift_.empty())
     found.block(error(
         Reason::misconfigured, "the drive no longer holds its configuration: " + drift_,

@@ -185,9 +185,13 @@ bool Axis::renews(const Action& action, const CommandOptions& options) const {
 }
 
 CommandPtr Axis::renew(const Action& action, const CommandOptions& options, Duration hold) {
-  activity_->hold_until = env_.clock->now() + hold;
-  // Should this very call be repeated later, it belongs to this command, too, and starts nothing.
-  env_.book->attach(activity_->command, settings_.name, action, options);
+  // Should this very call be repeated later, also after a crash, it belongs to this command, too, and starts
+  // nothing: it counts once that is known.
+  env_.book->attach(
+      activity_->command, settings_.name, action, options,
+      [activity = std::weak_ptr(activity_), until = env_.clock->now() + hold](const Result<void>& known) {
+        if (const auto held = activity.lock(); held && known) held->hold_until = until;
+      });
   return activity_->command;
 }
 

@@ -14,6 +14,9 @@ constexpr auto zeroing_poll = milliseconds(5);
 /// Zeroes the drive's counter before a target could leave its 32 bit, or what the drive takes (M19).
 Task<Result<void>> Axis::make_room(ActivityPtr activity) {
   if (planner_.reachable(activity->plan.target_counter)) co_return Result<void>{};
+  // After it the saved record speaks of another zero, and would fit again where the counter comes by (M20).
+  if (auto forgotten = co_await forget_saved_position(); !forgotten) co_return forgotten;
+  if (!current(*activity)) co_return fail(error(Reason::superseded, "superseded"));
   // A sample that was asked for meanwhile may show either counter: none is taken for a motion.
   rezeroing_ = true;
   auto cleared = co_await drive_->clear_position(guard(*activity));

@@ -27,7 +27,9 @@ void Axis::supersede(const Error& cause) {
   if (auto activity = std::exchange(activity_, nullptr)) {
     keep_deceleration(*activity);
     if (activity->state != AxisState::standstill) tracker_.forget_target();
-    activity->command->abort(cause);
+    auto told = cause;
+    if (activity->may_run) told.outcome = Outcome::unknown;  // its start may be under way
+    activity->command->abort(std::move(told));
     drop_buffer(cause);
   }
 }

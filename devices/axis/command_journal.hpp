@@ -23,7 +23,7 @@ static_assert(remembered > longest_validity);
 /// By what a drive that is read back tells whether it executed a start. In counts of its own counter.
 struct SendingNote {
   std::optional<std::int32_t> start_pulses{};   ///< where it stands; nothing: reading back tells nothing
-  std::optional<std::int32_t> target_pulses{};  ///< where it ends; nothing: not known before
+  std::optional<std::int32_t> target_pulses{};  ///< where it ends (of a homing: its compensation)
   std::int64_t tolerance_pulses = 0;            ///< so far from the target it may come to rest
   std::vector<ContinuityMark> marks{};          ///< one of them is found, unless its memory was lost
   bool operator==(const SendingNote&) const = default;

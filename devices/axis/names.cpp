@@ -1,17 +1,28 @@
 // Names of the axis vocabulary, as they appear in logs and on the command line.
+#include "devices/axis/names.hpp"
+
+#include <algorithm>
 #include <array>
 #include <utility>
 
-#include "devices/axis/command.hpp"
 #include "devices/axis/snapshot.hpp"
 
 namespace axisd {
 
-std::string_view to_string(CommandKind kind) {
-  static constexpr auto names = std::to_array<std::string_view>(
-      {"enable", "disable", "home", "move_absolute", "move_relative", "move_velocity", "jog", "halt", "stop",
-       "quick_stop", "reset", "set_position"});
-  return names.at(std::to_underlying(kind));
+namespace {
+
+constexpr auto kind_names = std::to_array<std::string_view>({"enable", "disable", "home", "move_absolute",
+                                                             "move_relative", "move_velocity", "jog", "halt",
+                                                             "stop", "quick_stop", "reset", "set_position"});
+
+}  // namespace
+
+std::string_view to_string(CommandKind kind) { return kind_names.at(std::to_underlying(kind)); }
+
+std::optional<CommandKind> find_command_kind(std::string_view name) {
+  const auto found = std::ranges::find(kind_names, name);
+  if (found == kind_names.end()) return std::nullopt;
+  return static_cast<CommandKind>(found - kind_names.begin());
 }
 
 std::string_view to_string(CommandState state) {

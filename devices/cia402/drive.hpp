@@ -56,7 +56,9 @@ class Cia402Drive final : public Drive {
   // drive_canary.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override;
-  void expect_mark(const ContinuityMark& mark) override;
+  void expect_marks(const std::vector<ContinuityMark>& marks) override;
+  [[nodiscard]] std::vector<ContinuityMark> marks_until(const MoveProfile& start) const override;
+  [[nodiscard]] std::vector<ContinuityMark> marks_until(const VelocityProfile& start) const override;
 
   // drive_power.cpp
   Task<Result<void>> enable(MotionGuard guard) override;
@@ -171,6 +173,7 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] MotionBlock fresh_neutral_block() const;
   /// Keeps a block off every content that a power-up could leave.
   [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
+  [[nodiscard]] std::vector<ContinuityMark> marks_until(const MotionBlock& block) const;
   /// A content that a power-up may leave: never a canary.
   void note_power_up_block(const MotionBlock& block);
   [[nodiscard]] bool is_expected(const MotionBlock& block) const;
@@ -333,8 +336,8 @@ class Cia402Drive final : public Drive {
 
   /// What the motion block may hold: one entry, two after a write whose reply was lost.
   std::vector<MotionBlock> expected_;
-  std::optional<ContinuityMark> expected_mark_;  ///< of an earlier run of the daemon
-  std::vector<MotionBlock> power_up_blocks_;     ///< what a power-up may leave; the newest last
+  std::vector<ContinuityMark> expected_marks_;  ///< of an earlier run of the daemon: one of them
+  std::vector<MotionBlock> power_up_blocks_;    ///< what a power-up may leave; the newest last
 
   std::optional<bool> saving_;        ///< the EEPROM switch, if it is known
   std::optional<bool> found_closed_;  ///< loop mode as it was before this power cycle's first write

@@ -39,7 +39,7 @@ Error Cia402Drive::lost_memory() const {
 
 void Cia402Drive::forget_power_cycle() {
   expected_.clear();
-  expected_mark_.reset();
+  expected_marks_.clear();
   forget_words();
   unsubscribe();  // its PDOs are what a power-up left of them
   halt_.reset();

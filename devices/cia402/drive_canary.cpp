@@ -26,12 +26,27 @@ ContinuityMark mark_of(const MotionBlock& block) {
 
 std::optional<ContinuityMark> Cia402Drive::continuity_mark() const {
   if (expected_.size() == 1) return mark_of(expected_.front());
-  return expected_mark_;
+  return expected_marks_.size() == 1 ? std::optional(expected_marks_.front()) : std::nullopt;
 }
 
-void Cia402Drive::expect_mark(const ContinuityMark& mark) {
+void Cia402Drive::expect_marks(const std::vector<ContinuityMark>& marks) {
   expected_.clear();
-  expected_mark_ = mark;
+  expected_marks_ = marks;
+}
+
+/// Its objects are written one after the other.
+std::vector<ContinuityMark> Cia402Drive::marks_until(const MotionBlock& block) const {
+  if (expected_.size() != 1) return {};
+  auto present = expected_.front();
+  std::vector<ContinuityMark> marks = {mark_of(present)};
+  for (std::size_t i = 0; i < present.size(); ++i) {
+    if (present.at(i) == block.at(i)) continue;
+    present.at(i) = block.at(i);
+    // Halfway it may look like after a power-up: then it proves nothing.
+    if (std::ranges::find(power_up_blocks_, present) == power_up_blocks_.end())
+      marks.push_back(mark_of(present));
+  }
+  return marks;
 }
 
 MotionBlock Cia402Drive::fresh_neutral_block() const {
@@ -68,7 +83,7 @@ void Cia402Drive::note_power_up_block(const MotionBlock& block) {
 
 bool Cia402Drive::is_expected(const MotionBlock& block) const {
   return std::ranges::find(expected_, block) != expected_.end() ||
-         (expected_mark_ && mark_of(block) == *expected_mark_);
+         std::ranges::find(expected_marks_, mark_of(block)) != expected_marks_.end();
 }
 
 Task<Result<MotionBlock>> Cia402Drive::read_block(SdoOptions options) {
@@ -95,7 +110,7 @@ Task<Result<TimePoint>> Cia402Drive::read_canary(SdoOptions options) {
     co_return fail(lost_memory());
   }
   expected_ = {*block};
-  expected_mark_.reset();
+  expected_marks_.clear();
   co_return asked;
 }
 
@@ -123,7 +138,7 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
     written.push_back(i);
   }
   expected_ = {block};
-  expected_mark_.reset();
+  expected_marks_.clear();
   for (const auto i : written) {
     const auto value = co_await read_object(objects[i], options);
     if (!value) co_return fail(value.error());

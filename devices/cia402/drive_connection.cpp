@@ -151,7 +151,7 @@ Task<Result<void>> Cia402Drive::configure() {
   const auto block = co_await read_block(patiently());
   if (!block) co_return fail(block.error());
   const bool known = is_expected(*block);
-  const bool restarted = !known && (!expected_.empty() || expected_mark_);
+  const bool restarted = !known && (!expected_.empty() || !expected_marks_.empty());
   if (!known) {
     forget_power_cycle();
     note_power_up_block(*block);

@@ -43,6 +43,15 @@ Task<Result<void>> Cia402Drive::start_velocity(VelocityProfile profile, MotionGu
                            {object::target_velocity, velocity}, std::move(guard));
 }
 
+std::vector<ContinuityMark> Cia402Drive::marks_until(const MoveProfile& start) const {
+  return marks_until(distinct(encode(*model_, setup_.pulses_per_revolution, start)));
+}
+
+std::vector<ContinuityMark> Cia402Drive::marks_until(const VelocityProfile& start) const {
+  if (expected_.empty()) return {};
+  return marks_until(distinct(encode(*model_, setup_.pulses_per_revolution, start, expected_.back())));
+}
+
 Task<Result<void>> Cia402Drive::start_homing(HomingProfile profile, MotionGuard guard) {
   // Homing uses objects of its own; the motion block is only the canary, and keeps what it holds.
   if (expected_.empty())

@@ -26,7 +26,7 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
   using Kind = canopen::NodeEvent::Kind;
   switch (event.kind) {
     case Kind::booted:
-      rebooted_ = rebooted_ || !expected_.empty() || expected_mark_;
+      rebooted_ = rebooted_ || !expected_.empty() || !expected_marks_.empty();
       forget_power_cycle();
       pending_alarm_ = 0;
       heartbeat_lost_ = false;

@@ -39,7 +39,13 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override {
     return expected_.size() == 1 ? std::optional(expected_.front()) : std::nullopt;
   }
-  void expect_mark(const ContinuityMark& mark) override { expected_ = {mark}; }
+  void expect_marks(const std::vector<ContinuityMark>& marks) override { expected_ = marks; }
+  [[nodiscard]] std::vector<ContinuityMark> marks_until(const MoveProfile& start) const override {
+    return marks_until(encode(start));
+  }
+  [[nodiscard]] std::vector<ContinuityMark> marks_until(const VelocityProfile& start) const override {
+    return marks_until(encode(start));
+  }
   Task<Result<void>> enable(MotionGuard guard) override;
   Task<Result<void>> disable(MotionGuard guard) override;
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
@@ -91,6 +97,7 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] bool saves_at_rest() const;
 
   // drive_motion.cpp
+  [[nodiscard]] std::vector<ContinuityMark> marks_until(const MotionBlock& block) const;
   Task<Result<void>> send_stop(StopKind kind, bool patient);
   Task<Result<void>> write_canary(MotionBlock block, TransactionOptions options);
   Task<Result<Answer>> read_canary(TransactionOptions options);

@@ -75,6 +75,12 @@ Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions op
   co_return answer;
 }
 
+std::vector<ContinuityMark> YakoRtuDrive::marks_until(const MotionBlock& block) const {
+  auto marks = expected_;
+  marks.push_back(distinct(block));
+  return marks;
+}
+
 Task<Result<void>> YakoRtuDrive::check_continuity(TransactionClass transaction_class) {
   const auto answer = co_await read_canary(in(transaction_class));
   if (!answer) co_return fail(answer.error());

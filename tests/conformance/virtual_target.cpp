@@ -13,6 +13,7 @@
 #include "tests/conformance/counted_machine.hpp"
 #include "tests/conformance/target.hpp"
 #include "tests/conformance/virtual_wire.hpp"
+#include "tests/support/fake_journal.hpp"
 #include "tests/support/fake_persistence.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/virtual_world.hpp"
@@ -118,6 +119,7 @@ class VirtualTarget final : public Target {
   std::unique_ptr<VirtualWire> wire_;
   test::TemporaryDirectory directory_;
   test::FakePersistence store_{world_.executor()};
+  test::FakeJournal journal_{world_.executor()};
   CallLedger ledger_{world_.executor()};
   Daemon daemon_;
   int starts_ = 0;
@@ -166,10 +168,12 @@ TimePoint VirtualTarget::time_may_pass_until() {
 void VirtualTarget::start() {
   on_core([this] {
     store_.restart();
+    journal_.restart(world_.clock().wall(world_.now()));
     const auto instance = fmt::format("c{}", ++starts_);
     core::MachineParts parts{.executor = world_.executor(),
                              .clock = &world_.clock(),
                              .persistence = &store_,
+                             .journal = &journal_,
                              .instance_id = instance,
                              .published = [this] {
                                if (daemon_.service) daemon_.service->published();

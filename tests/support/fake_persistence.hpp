@@ -13,25 +13,26 @@ class FakePersistence final : public Persistence {
   explicit FakePersistence(Executor executor) : executor_(std::move(executor)) {}
 
   bool failing = false;  ///< saves fail with Error `storage`
+  bool frozen = false;   ///< the process is dead: nothing is saved any more
   StoredState saved;     ///< what the file holds now
   /// What the next daemon finds when it starts.
   void restart() { loaded_ = saved; }
 
   [[nodiscard]] const StoredState& loaded() const override { return loaded_; }
   void save_offset(std::string axis, OffsetRecord offset, Callback done) override {
-    if (!failing) saved.axes[axis].offset = offset;
+    if (!failing && !frozen) saved.axes[axis].offset = offset;
     answer(std::move(done));
   }
   void forget_offset(std::string axis, Callback done) override {
-    if (!failing) saved.axes[axis].offset.reset();
+    if (!failing && !frozen) saved.axes[axis].offset.reset();
     answer(std::move(done));
   }
   void save_inhibit(InhibitRecord inhibit, Callback done) override {
-    if (!failing) saved.inhibit = std::move(inhibit);
+    if (!failing && !frozen) saved.inhibit = std::move(inhibit);
     answer(std::move(done));
   }
   void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) override {
-    if (!failing) saved.axes[axis].eeprom_writes += writes;
+    if (!failing && !frozen) saved.axes[axis].eeprom_writes += writes;
     answer(std::move(done));
   }
 

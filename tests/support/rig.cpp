@@ -1,5 +1,7 @@
 #include "tests/support/rig.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -52,7 +54,8 @@ simulation::SimulatedNodeSettings drive_of(const RigOptions& options) {
 
 }  // namespace
 
-Rig::Rig(RigOptions options) : store(world.executor()), options_(std::move(options)) {
+Rig::Rig(RigOptions options)
+    : store(world.executor()), journal(world.executor()), options_(std::move(options)) {
   configuration.machine = "test";
   configuration.lines.push_back({.name = "line-a", .port = "sim"});
   configuration.axes.push_back({.axis = feeder(options_)});
@@ -64,10 +67,12 @@ Rig::Rig(RigOptions options) : store(world.executor()), options_(std::move(optio
 
 void Rig::start_daemon(bool connect) {
   store.restart();
+  journal.restart(world.clock().wall(world.now()));
   auto parts = core::MachineParts{.executor = world.executor(),
                                   .clock = &world.clock(),
                                   .persistence = options_.persistence ? &store : nullptr,
-                                  .instance_id = "t",
+                                  .journal = options_.journal ? &journal : nullptr,
+                                  .instance_id = fmt::format("t{}", ++starts_),
                                   .make_line = [this](const modbus_rtu::LineSettings& settings) {
                                     auto made = std::make_unique<VirtualLine>(world, settings);
                                     line = made.get();
@@ -87,6 +92,14 @@ void Rig::stop_daemon() {
   run(std::chrono::milliseconds(100));  // what the line still had to deliver
   machine.reset();
   line = nullptr;
+}
+
+void Rig::kill_daemon() {
+  store.frozen = true;
+  journal.frozen = true;
+  stop_daemon();
+  store.frozen = false;
+  journal.frozen = false;
 }
 
 Rig::~Rig() {

@@ -12,6 +12,7 @@
 #include "daemon/core/machine_core.hpp"
 #include "devices/simulation/simulator.hpp"
 #include "tests/support/borrowed_node.hpp"
+#include "tests/support/fake_journal.hpp"
 #include "tests/support/fake_persistence.hpp"
 #include "tests/support/virtual_line.hpp"
 #include "tests/support/virtual_world.hpp"
@@ -26,6 +27,7 @@ struct RigOptions {
   bool limits = true;
   bool connect = true;       ///< wait until the axis is online
   bool persistence = false;  ///< keep state between restarts in Rig::store
+  bool journal = false;      ///< and commands in Rig::journal
   /// Called between the drive's power-up and the start of the daemon.
   std::function<void(simulation::SimulatedRtuNode&, VirtualWorld&)> before_start{};
 };
@@ -40,6 +42,7 @@ class Rig {
 
   VirtualWorld world;
   FakePersistence store;
+  FakeJournal journal;
   config::Configuration configuration;
   std::unique_ptr<simulation::SimulatedRtuNode> drive;
   VirtualLine* line = nullptr;
@@ -49,6 +52,8 @@ class Rig {
   void stop_daemon();
   /// Starts the daemon (again). The wire log is that of the newest daemon.
   void start_daemon(bool connect = true);
+  /// Ends the daemon as a kill does: what it has not yet kept by now is lost. The drive goes on.
+  void kill_daemon();
   /// Lets the drive alone pass time while there is no daemon.
   void idle(Duration duration);
 
@@ -88,6 +93,7 @@ class Rig {
 
  private:
   RigOptions options_;
+  int starts_ = 0;
 };
 
 /// Writes one register as a frame of the wire would.

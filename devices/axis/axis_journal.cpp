@@ -1,0 +1,190 @@
+// Commands over restarts of the daemon: what has to be known before something is sent, and what became of
+// what an earlier run may have sent.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+#include "devices/axis/settlement.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// A drive that was told to start moves within this, or not at all.
+constexpr auto start_window = milliseconds(500);
+/// A drive that cannot be read for so long does not tell any more what became of a command.
+constexpr auto settling_limit = std::chrono::seconds(15);
+
+bool moves(CommandKind kind) {
+  return kind != CommandKind::enable && kind != CommandKind::reset && kind != CommandKind::set_position;
+}
+
+}  // namespace
+
+/// What the run before this one left: a drive that may run, and outcomes that nobody has looked at (M4).
+void Axis::take_over() {
+  unsettled_ = env_.book->take_unsettled(settings_.name);
+  settle_by_ = env_.clock->now() + settling_limit;
+  for (const auto& earlier : unsettled_) {
+    const auto& command = earlier.command->value();
+    spdlog::warn("{}: the daemon ended while {} {} was being executed; asking the drive", settings_.name,
+                 to_string(command.kind), command.id);
+    if (moves(command.kind)) stop_owed_ = true;
+    if (command.kind == CommandKind::home) position_unsettled_ = true;
+  }
+  if (auto cause = env_.book->unknown_outcome(settings_.name)) {
+    spdlog::error("{}", to_string(*cause));
+    fault_ = std::move(cause);
+    stop_owed_ = true;
+  }
+  publish();
+}
+
+/// Asks a drive that rests what became of what may have been sent to it, before anything in it is changed.
+Task<Result<void>> Axis::settle_earlier() {
+  if (unsettled_.empty()) co_return Result<void>{};
+  bool continuous = false;
+  if (const auto& marks = unsettled_.back().note.marks; !marks.empty()) {
+    drive_->expect_marks(marks);
+    const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
+    if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
+    continuous = proof.has_value();
+  }
+  // The last frame of the run before may have gone out just now.
+  co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + start_window);
+  const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
+  if (!sample) co_return fail(sample.error());
+  on_sample(*sample);
+  if (closing_) co_return fail(error(Reason::cancelled, "the daemon ends"));
+  if (found_in_motion()) {
+    stop_owed_ = true;
+    co_return fail(error(Reason::moving, "it began to move; stopping it", "wait"));
+  }
+  for (const auto& earlier : unsettled_) settle_as(earlier, continuous);
+  std::erase_if(unsettled_, [](const Unsettled& earlier) { return earlier.command->has_ended(); });
+  co_return Result<void>{};
+}
+
+Error Axis::earlier_error(const Unsettled& earlier, std::string_view what, Outcome outcome) const {
+  const auto& command = earlier.command->value();
+  auto cause = error(
+      Reason::cancelled,
+      fmt::format("the daemon was restarted while {} was being executed: {}", to_string(command.kind), what),
+      outcome == Outcome::not_executed ? "send a new request" : "look at the machine");
+  cause.outcome = outcome;
+  return cause;
+}
+
+void Axis::settle_as_unknown(const Unsettled& earlier, std::string_view why) {
+  auto cause = earlier_error(earlier, why, Outcome::unknown);
+  cause.remedy = "look at the machine; then reset the axis";
+  if (!fault_) fault_ = cause;
+  earlier.command->unknown(std::move(cause));
+}
+
+void Axis::settle_as(const Unsettled& earlier, bool continuous) {
+  auto& command = *earlier.command;
+  const auto kind = command.value().kind;
+  if (kind == CommandKind::set_position) return;  // once it is known what the counter means
+  if (kind == CommandKind::reset)
+    return command.abort(earlier_error(earlier, "it moves nothing, so reset again", Outcome::unknown));
+  if (kind == CommandKind::enable) {
+    if (earlier.tellable && sample_->enabled) return command.done();
+    return command.abort(earlier_error(
+        earlier, sample_->enabled ? "the power stage is on" : "the power stage is off", Outcome::unknown));
+  }
+  if (!earlier.tellable)
+    return settle_as_unknown(earlier,
+                             "the command journal was damaged, and does not tell what came after it");
+  const auto at = tracker_.counter();
+  switch (settle(kind, earlier.note, sample_->position_pulses, continuous)) {
+    case Settlement::done:
+      return command.done();
+    case Settlement::not_executed:
+      return command.abort(earlier_error(earlier, "the drive did not move for it", Outcome::not_executed));
+    case Settlement::in_part:
+      return command.abort(earlier_error(
+          earlier, fmt::format("executed in part: the drive rests at its count {}", at), Outcome::unknown));
+    case Settlement::unknown:
+      return settle_as_unknown(
+          earlier, continuous ? "where the drive rests does not tell whether it has moved"
+                              : "the drive lost its memory since, or it does not tell whether it has moved");
+  }
+}
+
+/// Setting a position sends nothing: it was done if it is what the restart found saved.
+void Axis::settle_positions_set() {
+  for (const auto& earlier : std::exchange(unsettled_, {})) {
+    const auto position = earlier.command->value().asked.position.value_or(0);
+    const bool kept = tracker_.trust() == PositionTrust::restored;
+    if (kept && earlier.tellable && tracker_.offset_for(position) == tracker_.offset())
+      earlier.command->done();
+    else
+      earlier.command->abort(
+          earlier_error(earlier, kept ? "another position was kept" : "no position was kept",
+                        kept && earlier.tellable ? Outcome::not_executed : Outcome::unknown));
+  }
+}
+
+void Axis::give_up_settling() {
+  for (const auto& earlier : std::exchange(unsettled_, {}))
+    settle_as_unknown(earlier, "the drive could not be read since");
+}
+
+/// By what a restart tells whether the activity's start was executed.
+SendingNote Axis::note_of(const Activity& activity, std::vector<ContinuityMark> marks) const {
+  const auto raw = static_cast<std::int32_t>(tracker_.counter());
+  SendingNote note{.start_pulses = raw, .tolerance_pulses = target_tolerance(), .marks = std::move(marks)};
+  if (activity.command->value().kind == CommandKind::home) {
+    // Which way a compensation counts is the drive's business: one of both is enough to be careful.
+    const auto offset = scale_.to_pulses(settings_.homing ? settings_.homing->offset : 0);
+    note.target_pulses = static_cast<std::int32_t>((raw < 0) == (offset < 0) ? offset : -offset);
+    if (const auto mark = drive_->continuity_mark(); mark && note.marks.empty()) note.marks = {*mark};
+    return note;
+  }
+  if (!activity.plan.endless) note.target_pulses = static_cast<std::int32_t>(activity.plan.target_counter);
+  return note;
+}
+
+/// Makes the command known to a restart, before anything is sent for it that may move. False: the activity
+/// has ended, and nothing was sent.
+Task<bool> Axis::noted(ActivityPtr activity, SendingNote note) {
+  if (std::exchange(activity->noted, true)) co_return true;
+  const bool may_run = std::exchange(activity->may_run, false);  // not before it is known
+  // Shared: the answer may come after this sequence was left.
+  auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
+  env_.book->sending(activity->command, std::move(note),
+                     [answer](Result<void> result) { answer->set(std::move(result)); });
+  const auto durable = co_await answer->get();
+  if (!current(*activity)) co_return false;
+  activity->may_run = may_run;
+  if (durable) co_return true;
+  auto cause =
+      error(durable.error().reason, "nothing was sent: " + durable.error().message, durable.error().remedy);
+  cause.where.native_code = durable.error().where.native_code;
+  finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+  co_return false;
+}
+
+Result<void> Axis::check_journal() const {
+  const auto trouble = env_.book->trouble();
+  if (!trouble) return {};
+  auto cause = error(Reason::storage, "nothing new is started: " + trouble->message, trouble->remedy);
+  cause.where.native_code = trouble->where.native_code;
+  return fail(std::move(cause));
+}
+
+/// Returns once a restart finds no position for the axis.
+Task<Result<void>> Axis::forget_saved_position() {
+  if (env_.persistence == nullptr) co_return Result<void>{};
+  auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
+  env_.persistence->forget_offset(settings_.name,
+                                  [answer](Result<void> result) { answer->set(std::move(result)); });
+  co_return co_await answer->get();
+}
+
+}  // namespace axisd
