@@ -69,6 +69,7 @@ std::string field_text(const Message& message, std::string_view path) {
   const auto& reflection = *message.GetReflection();
   if (field->is_repeated()) {
     std::vector<std::string> values;
+    values.reserve(static_cast<std::size_t>(reflection.FieldSize(message, field)));
     for (int i = 0; i < reflection.FieldSize(message, field); ++i)
       values.push_back(value_text(message, *field, i));
     return values.empty() ? "-" : fmt::format("{}", fmt::join(values, " "));
@@ -89,6 +90,7 @@ Table field_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes,
   Table table(titles);
   for (const auto& state : axes) {
     std::vector<Cell> row{state.axis()};
+    row.reserve(fields.size() + 1);
     for (const auto& field : fields) row.emplace_back(field_text(state, field));
     table.add(std::move(row));
   }

@@ -347,6 +347,7 @@ Result<google::protobuf::FieldMask> watched_fields(const v1::WatchAxesRequest& f
     if (path.empty() || !FieldMaskUtil::IsValidPath<v1::AxisState>(path)) {
       const auto* state = v1::AxisState::descriptor();
       std::vector<std::string> known;
+      known.reserve(static_cast<std::size_t>(state->field_count()));
       for (int i = 0; i < state->field_count(); ++i) known.push_back(state->field(i)->name());
       return fail(Reason::invalid_argument,
                   fmt::format("fields: AxisState has no field {:?}", path.substr(0, longest_axis_name)),
