@@ -75,16 +75,6 @@ class Reader : public LineReader {
       }
     return false;
   }
-  bool real(double& value) {
-    const bool negative = literal("-");
-    if (!literal("0x")) return false;
-    const auto [end, error] =
-        std::from_chars(rest().data(), rest().data() + rest().size(), value, std::chars_format::hex);
-    if (error != std::errc{}) return false;
-    literal(std::string_view(rest().data(), static_cast<std::size_t>(end - rest().data())));
-    if (negative) value = -value;
-    return true;
-  }
   bool read(std::optional<double>& value) {
     if (literal("-,")) return true;  // a number has digits, or 0x, after its sign
     return real(value.emplace()) && literal(",");

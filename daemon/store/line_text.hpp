@@ -41,8 +41,18 @@ class LineReader {
     value = digit == 1;
     return true;
   }
+  /// As {:a} writes it.
+  bool real(double& value) {
+    const bool negative = literal("-");
+    if (!literal("0x")) return false;
+    const auto [end, error] =
+        std::from_chars(rest_.data(), rest_.data() + rest_.size(), value, std::chars_format::hex);
+    if (error != std::errc{}) return false;
+    rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
+    if (negative) value = -value;
+    return true;
+  }
   [[nodiscard]] bool at_end() const { return rest_.empty(); }
-  [[nodiscard]] std::string_view rest() const { return rest_; }
 
  private:
   std::string_view rest_;

@@ -382,11 +382,11 @@ class Axis {
   std::optional<DriveIdentity> identity_;
   bool configured_ = false;  ///< in this power cycle of the drive
   bool restore_tried_ = false;
-  std::vector<Unsettled> unsettled_;  ///< of earlier runs of the daemon
-  bool position_unsettled_ = false;   ///< one of them may have changed what the counter means
-  TimePoint settle_by_{};
+  bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
   int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
+  TimePoint settle_by_{};
+  std::vector<Unsettled> unsettled_;      ///< of earlier runs of the daemon
   TimePoint fast_from_{}, fast_until_{};  ///< of poll_fast()
   std::string drift_;                     ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;       ///< of begin_maintenance()
