@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
@@ -69,12 +70,14 @@ struct MotionGuard {
   std::uint64_t epoch = 0;
   std::uint64_t fencing_token = 0;         ///< 0: given without a lease
   TimePoint not_after = TimePoint::max();  ///< validity of the request
+  /// Of the other members of a group: what forbids one of them to start forbids it to this one, too (M22).
+  std::shared_ptr<const std::vector<MotionGuard>> with{};
 };
 
 enum class Verdict : std::uint8_t { send, superseded, expired, lease_lost };
 
-/// Decides, at the moment a frame would go out, whether it still may. Pure.
-inline Verdict may_send(const MotionGuard& guard, TimePoint now) {
+/// may_send() for one axis, whatever its group says. Pure.
+inline Verdict may_send_alone(const MotionGuard& guard, TimePoint now) {
   if (!guard.gate) return Verdict::send;
   if (guard.gate->epoch() != guard.epoch) return Verdict::superseded;
   if (now > guard.not_after) return Verdict::expired;
@@ -83,6 +86,15 @@ inline Verdict may_send(const MotionGuard& guard, TimePoint now) {
   if (guard.gate->fencing_token() != guard.fencing_token) return Verdict::lease_lost;
   if (guard.fencing_token != 0 && now >= expires) return Verdict::lease_lost;
   return Verdict::send;
+}
+
+/// Decides, at the moment a frame would go out, whether it still may. Pure.
+inline Verdict may_send(const MotionGuard& guard, TimePoint now) {
+  auto verdict = may_send_alone(guard, now);
+  if (!guard.gate || !guard.with) return verdict;
+  for (const auto& other : *guard.with)
+    if (verdict == Verdict::send) verdict = may_send_alone(other, now);
+  return verdict;
 }
 
 }  // namespace axisd

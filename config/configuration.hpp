@@ -11,6 +11,7 @@
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/generic/settings.hpp"
+#include "devices/group/group.hpp"
 #include "devices/lease/lease.hpp"
 
 namespace axisd::config {
@@ -65,6 +66,7 @@ struct Configuration {
   std::vector<canopen::NetworkSettings> networks;  ///< of the kind canopen
   std::vector<AxisEntry> axes;
   std::vector<DeviceSettings> devices;  ///< nodes that are not axes
+  std::vector<GroupSettings> groups;    ///< axes that are moved together
 };
 
 /// One finding in a configuration file.

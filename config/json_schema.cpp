@@ -73,7 +73,7 @@ std::string parts(std::string_view list) {
 /// What YAML makes of it: numbers and booleans as such, lists as they are written, the rest as text.
 std::string as_written(const KeySpec& spec, std::string_view text) {
   if (spec.kind == Kind::register_address) return std::to_string(std::stol(std::string(text), nullptr, 0));
-  if (spec.kind == Kind::parts && text.starts_with('[')) return parts(text);
+  if ((spec.kind == Kind::parts || spec.kind == Kind::names) && text.starts_with('[')) return parts(text);
   const bool bare = spec.kind == Kind::integer || spec.kind == Kind::number || spec.kind == Kind::boolean ||
                     spec.kind == Kind::parts || spec.kind == Kind::position_range ||
                     (spec.kind == Kind::position && parse_decimal(text));
@@ -177,6 +177,11 @@ Object type_of(const KeySpec& spec) {
       return result.text("type", "boolean");
     case Kind::choice:
       return result.raw("enum", choices_of(spec));
+    case Kind::names:
+      return result.text("type", "array")
+          .raw("items", Object().text("type", "string").text("pattern", whole(spec.pattern)).json())
+          .raw("minItems", "2")
+          .raw("uniqueItems", "true");
     case Kind::parts:
       return parts_of(spec.choices);
     case Kind::duration:

@@ -217,12 +217,26 @@ void check_leases(const LeaseSettings& leases, Diagnostics& diagnostics, const P
                   "write a default_ttl between the other two");
 }
 
+void check_groups(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+  std::vector<std::string_view> names;
+  for (const auto& entry : configuration.axes) names.emplace_back(entry.axis.name);
+  for (const auto& group : configuration.groups) {
+    const auto path = fmt::format("groups.{}.axes", group.name);
+    if (!places.usable(path)) continue;
+    for (const auto& axis : group.axes)
+      if (std::ranges::find(names, axis) == names.end())
+        diagnostics.add(places.mark(path), fmt::format("group '{}': there is no axis '{}'", group.name, axis),
+                        suggest(axis, names));
+  }
+}
+
 }  // namespace
 
 void check_machine(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   const auto all = buses(configuration);
   check_server(configuration, diagnostics, places);
   check_leases(configuration.leases, diagnostics, places);
+  check_groups(configuration, diagnostics, places);
   check_ports(all, diagnostics, places);
   check_bus_names(configuration, all, diagnostics, places);
   check_kinds(configuration, all, diagnostics, places);

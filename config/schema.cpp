@@ -151,6 +151,24 @@ constexpr KeySpec lease_keys[] = {
      .apply = [](Target& t, const Value& v) { t.configuration->leases.longest_ttl = v.duration; }},
 };
 
+constexpr KeySpec group_keys[] = {
+    {.key = "axes",
+     .kind = Kind::names,
+     .required = true,
+     .description = "Its members, on any bus.",
+     .example = "[lifter, pusher]",
+     .pattern = name_pattern,
+     .apply = [](Target& t, const Value& v) { t.group->axes = v.items; }},
+    {.key = "max_arrival_error",
+     .kind = Kind::duration,
+     .description =
+         "A move whose members are to arrive together is refused where they would be further apart.",
+     .example = "5 ms",
+     .minimum = 1,
+     .maximum = 60'000,
+     .apply = [](Target& t, const Value& v) { t.group->max_arrival_error = v.duration; }},
+};
+
 constexpr std::string_view budget_policies[] = {"warn", "refuse"};
 
 /// Of either kind of bus: `Bus` is the member of Target that points to it.
@@ -368,6 +386,15 @@ std::span<const KeySpec> schema() {
            [](Target& t, const Value& v) {
              t.device = &t.configuration->devices.emplace_back();
              t.device->name = v.text;
+           }},
+      {.key = "groups",
+       .kind = Kind::named_sections,
+       .description = "Axes that are moved and stopped together, by name.",
+       .children = group_keys,
+       .apply =
+           [](Target& t, const Value& v) {
+             t.group = &t.configuration->groups.emplace_back();
+             t.group->name = v.text;
            }},
   };
   return top_keys;

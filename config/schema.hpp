@@ -26,6 +26,7 @@ enum class Kind : std::uint8_t {
   number,             ///< "-0.1": a decimal number without unit, not 0
   boolean,
   choice,          ///< one of `choices`
+  names,           ///< a list of at least two names, each once
   parts,           ///< true (all `choices`), false (none), or a list of some of them
   duration,        ///< "150 ms"; minimum..maximum in ms
   motor_speed,     ///< "5 r/min"; whole numbers
@@ -43,7 +44,7 @@ struct Value {
   std::int64_t integer =
       0;  ///< integer, register_address, motor_speed (r/min), microstep; of a numbered section
   bool boolean = false;
-  std::vector<std::string> items = {};          ///< parts
+  std::vector<std::string> items = {};          ///< parts, names
   double number = 0;                            ///< number, position, velocity; first of a position_range
   double second = 0;                            ///< of a position_range
   std::int64_t numerator = 0, denominator = 1;  ///< ratio, travel
@@ -61,6 +62,7 @@ struct Target {
   PositionSegment* position_segment = nullptr;
   VelocitySegment* velocity_segment = nullptr;
   DeviceSettings* device = nullptr;
+  GroupSettings* group = nullptr;
   ValueSettings* device_value = nullptr;
 };
 

@@ -191,6 +191,29 @@ Parsed parse_position_range(const KeySpec& spec, const Node& node, std::string_v
   return result;
 }
 
+Parsed parse_names(const KeySpec& spec, const Node& node) {
+  const auto how = fmt::format("write a list of two or more, such as {}", spec.example);
+  if (node.kind != Node::Kind::list)
+    return wrong(node, fmt::format("'{}' must be a list, not {}", spec.key, kind_name(node)), how);
+  if (node.items.size() < 2)
+    return wrong(node,
+                 fmt::format("'{}' has {} in it", spec.key, node.items.empty() ? "nothing" : "only one name"),
+                 how);
+  Value result;
+  for (const auto& item : node.items) {
+    if (item->kind != Node::Kind::scalar || !matches(item->text, spec.pattern))
+      return wrong(*item,
+                   item->kind == Node::Kind::scalar
+                       ? fmt::format("'{}' cannot contain {}", spec.key, quoted(item->text))
+                       : fmt::format("'{}' must be a list of names, not of {}", spec.key, kind_name(*item)),
+                   how);
+    if (std::ranges::find(result.items, item->text) != result.items.end())
+      return wrong(*item, fmt::format("'{}' names {} twice", spec.key, quoted(item->text)), "once is enough");
+    result.items.push_back(item->text);
+  }
+  return result;
+}
+
 Parsed parse_parts(const KeySpec& spec, const Node& node) {
   const auto how = fmt::format("write true, false or a list, such as {}", spec.example);
   if (node.kind == Node::Kind::scalar && node.plain && node.text == "false") return Value{};
@@ -243,6 +266,7 @@ bool matches(std::string_view text, std::string_view pattern) {
 
 std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& node, std::string_view unit) {
   if (spec.kind == Kind::position_range) return parse_position_range(spec, node, unit);
+  if (spec.kind == Kind::names) return parse_names(spec, node);
   if (spec.kind == Kind::parts) return parse_parts(spec, node);
   if (node.kind != Node::Kind::scalar) {
     return wrong(node, fmt::format("'{}' must be a single value, not {}", spec.key, kind_name(node)),
@@ -277,6 +301,7 @@ std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& no
     case Kind::velocity:
       return parse_in_axis_unit(spec, node, unit);
     case Kind::position_range:
+    case Kind::names:
     case Kind::parts:
     case Kind::section:
     case Kind::named_sections:

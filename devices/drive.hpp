@@ -125,6 +125,21 @@ class PreparedMove {
   virtual Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others) = 0;
 };
 
+/// A positioning move of which all but the trigger stands in the drive, for a trigger of its own (M6, M22).
+/// Nothing of it waits there: dropping it leaves nothing behind. It does not outlive its drive. Thread: core.
+class LoadedMove {
+ public:
+  virtual ~LoadedMove() = default;
+  /// Reads that all of it stands there still, and that the drive kept its memory. Errors: rebooted;
+  /// superseded where something else was told meanwhile; as of start_move(), never `unknown`.
+  virtual Task<Result<void>> verify() = 0;
+  /// Sends the trigger, once: when the start frame had gone out, or was acknowledged where the bus does not
+  /// say. verify() is repeated where it has grown too old for that (M6). Errors: as of start_move().
+  virtual Task<Result<TimePoint>> trigger() = 0;
+  /// What the drive still has to be told once the motion has begun; guarded, and of no consequence to it.
+  virtual Task<> follow_up() { co_return; }
+};
+
 /// One drive. All sequences are coroutines of the core thread. Errors carry bus, node, register and native
 /// code; `outcome` says what is known about the execution. Thread: core.
 class Drive {
@@ -177,6 +192,8 @@ class Drive {
   virtual Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) = 0;
   virtual Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) = 0;
 
+  /// start_move() up to the trigger. Errors: as of that, never `unknown`.
+  virtual Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) = 0;
   /// Why this drive cannot start in the same instant as others on its bus; empty: it can, which was proven in
   /// this power cycle (M24).
   [[nodiscard]] virtual std::string no_common_start() const { return "its bus has no common trigger"; }

@@ -20,12 +20,10 @@
 #include "devices/bus_watch.hpp"
 #include "devices/drive_access.hpp"
 #include "devices/event.hpp"
+#include "devices/group/group.hpp"
 #include "devices/lease/lease.hpp"
 
 namespace axisd {
-
-/// How far a caller wants to follow a command before it gets its answer.
-enum class WaitUntil : std::uint8_t { accepted, started, done };
 
 /// What is known of a CAN network beside whether it is open. Counters since start.
 struct NetworkStatus {
@@ -106,6 +104,7 @@ class Machine {
   [[nodiscard]] virtual BusAccess& bus_access() = 0;
   [[nodiscard]] virtual BusWatch& bus_watch() = 0;
   [[nodiscard]] virtual LeaseAccess& lease_access() = 0;
+  [[nodiscard]] virtual GroupAccess& group_access() = 0;
   [[nodiscard]] virtual EventSource& events() = 0;
 
   /// Called on the core thread whenever any snapshot was published; set once before serving.

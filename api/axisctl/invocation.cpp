@@ -93,6 +93,7 @@ std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   add_stop_commands(*app, invocation);
   add_command_commands(*app, invocation);
   add_lease_commands(*app, invocation);
+  add_group_commands(*app, invocation);
   add_run_command(*app, invocation);
   add_plot_command(*app, invocation);
   add_drive_commands(*app, invocation);

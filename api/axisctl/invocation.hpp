@@ -40,6 +40,7 @@ void add_jog_command(CLI::App& app, Invocation& invocation);  ///< jog
 void add_stop_commands(CLI::App& app, Invocation& invocation);     ///< halt, stop, quick-stop, release-stop
 void add_command_commands(CLI::App& app, Invocation& invocation);  ///< command get|watch|cancel
 void add_lease_commands(CLI::App& app, Invocation& invocation);    ///< lease acquire|renew|release|list|hold
+void add_group_commands(CLI::App& app, Invocation& invocation);    ///< group list|move|show|halt|stop
 void add_drive_commands(CLI::App& app, Invocation& invocation);    ///< drive ...
 void add_bus_commands(CLI::App& app, Invocation& invocation);      ///< bus scan|read|write, device list|write
 void add_trace_command(CLI::App& app, Invocation& invocation);     ///< trace

@@ -25,7 +25,7 @@ static_assert(std::to_underlying(LinkState::online) + 1 == v1::LinkState_MAX);
 static_assert(std::to_underlying(PositionTrust::restored) + 1 == v1::PositionTrust_MAX);
 static_assert(std::to_underlying(PositionSource::encoder) == v1::PositionSource_MAX);
 static_assert(std::to_underlying(MotionCause::unknown) + 1 == v1::MotionCause_MAX);
-static_assert(std::to_underlying(CommandKind::set_position) + 1 == v1::CommandKind_MAX);
+static_assert(std::to_underlying(CommandKind::move_group) + 1 == v1::CommandKind_MAX);
 static_assert(std::to_underlying(CommandState::unknown) + 1 == v1::CommandState_MAX);
 
 void to_proto(const TerminalState& from, v1::Terminal& to) {

@@ -17,6 +17,7 @@
 #include "api/server/drive_service.hpp"
 #include "api/server/event_hub.hpp"
 #include "api/server/event_service.hpp"
+#include "api/server/group_service.hpp"
 #include "api/server/lease_service.hpp"
 #include "api/server/status.hpp"
 #include "api/server/system_service.hpp"
@@ -71,7 +72,8 @@ struct Server::Parts {
         bus(services),
         drive(services),
         event(services),
-        lease(services) {}
+        lease(services),
+        group(services) {}
 
   std::shared_ptr<ReplyThread> reply;
   std::shared_ptr<OpenCalls> calls;
@@ -87,6 +89,7 @@ struct Server::Parts {
   DriveServiceImpl drive;
   EventServiceImpl event;
   LeaseServiceImpl lease;
+  GroupServiceImpl group;
   std::unique_ptr<AcceptLoop::Acceptor> tcp_acceptor, unix_acceptor;
   std::unique_ptr<grpc::Server> server;
   AcceptLoop accept;
@@ -125,7 +128,7 @@ Result<int> Server::start() {
   limit_transport(builder);
   for (grpc::Service* service :
        std::initializer_list<grpc::Service*>{&parts_->axis, &parts_->command, &parts_->system, &parts_->bus,
-                                             &parts_->drive, &parts_->event, &parts_->lease})
+                                             &parts_->drive, &parts_->event, &parts_->lease, &parts_->group})
     builder.RegisterService(service);
   constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
   parts_->tcp_acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
@@ -153,7 +156,7 @@ Result<int> Server::start() {
   for (const auto* name : {v1::AxisService::service_full_name(), v1::CommandService::service_full_name(),
                            v1::SystemService::service_full_name(), v1::BusService::service_full_name(),
                            v1::DriveService::service_full_name(), v1::EventService::service_full_name(),
-                           v1::LeaseService::service_full_name()})
+                           v1::LeaseService::service_full_name(), v1::GroupService::service_full_name()})
     health->SetServingStatus(name, true);
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,

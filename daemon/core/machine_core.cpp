@@ -56,7 +56,14 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
           *parts_.clock, configuration.leases,
           parts_.persistence == nullptr ? 0 : parts_.persistence->loaded().start_count,
           [this](std::string_view axis) { return find(axis); },
-          [this](const std::string& axis, EventContent content) { on_event(axis, std::move(content)); }) {
+          [this](const std::string& axis, EventContent content) { on_event(axis, std::move(content)); }),
+      groups_({.executor = parts_.executor,
+               .clock = parts_.clock,
+               .book = &book_,
+               .instance_id = parts_.instance_id,
+               .find = [this](std::string_view axis) { return find(axis); },
+               .launch = [this](Task<> task, const char* name) { launch(std::move(task), name); }},
+              configuration.groups) {
   const auto memory = static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024;
   if (parts_.persistence != nullptr) {
     const auto& inhibit = parts_.persistence->loaded().inhibit;

@@ -13,6 +13,7 @@
 #include "daemon/core/bus_recorder.hpp"
 #include "daemon/core/event_log.hpp"
 #include "daemon/core/flight_recorder.hpp"
+#include "daemon/core/group_keeper.hpp"
 #include "daemon/core/lease_keeper.hpp"
 #include "daemon/core/link_cycler.hpp"
 #include "devices/axis/axis.hpp"
@@ -68,6 +69,7 @@ class MachineCore {
   [[nodiscard]] CommandBook& book() { return book_; }
   [[nodiscard]] EventLog& events() { return events_; }
   [[nodiscard]] LeaseKeeper& leases() { return leases_; }
+  [[nodiscard]] GroupKeeper& groups() { return groups_; }
 
   Result<CommandPtr> submit(const std::string& axis, const Action& action, const CommandOptions& options);
   /// Latches the inhibit first, then stops every axis, moving ones first (M14).
@@ -119,7 +121,8 @@ class MachineCore {
   std::vector<Bus*> buses_;
   std::vector<std::unique_ptr<Axis>> axes_;
   std::vector<std::unique_ptr<Device>> devices_;
-  int sequences_ = 0;  ///< launched ones that still run
+  GroupKeeper groups_;  ///< after the axes, which its moves are of
+  int sequences_ = 0;   ///< launched ones that still run
   bool closing_ = false;
   std::map<std::string, Axis*, std::less<>> by_name_;
 };

@@ -33,6 +33,7 @@ MachineService::MachineService(CoreLoop& loop, MachineCore& machine, std::string
       bus_access_(loop.executor(), loop.clock(), machine),
       bus_watch_(loop.executor(), loop.clock(), machine),
       lease_access_(loop.executor(), machine.leases()),
+      group_access_(loop, machine),
       name_(std::move(name)),
       instance_id_(std::move(instance_id)) {
   for (const auto& axis : machine.axes()) {

@@ -9,6 +9,7 @@
 #include "daemon/core/bus_watch_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/drive_access_service.hpp"
+#include "daemon/core/group_access_service.hpp"
 #include "daemon/core/lease_access_service.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/machine.hpp"
@@ -41,13 +42,17 @@ class MachineService final : public Machine {
   [[nodiscard]] BusAccess& bus_access() override { return bus_access_; }
   [[nodiscard]] BusWatch& bus_watch() override { return bus_watch_; }
   [[nodiscard]] LeaseAccess& lease_access() override { return lease_access_; }
+  [[nodiscard]] GroupAccess& group_access() override { return group_access_; }
   [[nodiscard]] EventSource& events() override { return machine_->events(); }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override { return loop_->clock().wall(t); }
   [[nodiscard]] TimePoint now() const override { return loop_->clock().now(); }
 
   /// From now on everything but stops is refused: the daemon is going down.
-  void close() { closing_ = true; }
+  void close() {
+    closing_ = true;
+    group_access_.close();
+  }
   /// Called by the core after each publication.
   void published() const;
 
@@ -61,6 +66,7 @@ class MachineService final : public Machine {
   BusAccessService bus_access_;
   BusWatchService bus_watch_;
   LeaseAccessService lease_access_;
+  GroupAccessService group_access_;
   std::string name_;
   std::string instance_id_;
   std::atomic<bool> closing_{false};

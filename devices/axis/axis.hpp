@@ -77,6 +77,17 @@ class Axis {
   void close();
   [[nodiscard]] bool closed() const { return closing_ && sequences_ == 0; }
 
+  /// The axis as a member of a group (member.hpp).
+  class Member;
+  /// What its part of a group move would be; nothing is begun yet. Errors: as of submit(); moving, busy (a
+  /// member has to rest).
+  Result<Plan> plan_member(const GroupMemberRequest& request, const CommandOptions& options);
+  [[nodiscard]] const Planner& planner() const { return planner_; }
+  /// Pulses from where it stands to the plan's target.
+  [[nodiscard]] std::int64_t way_of(const Plan& plan) const {
+    return plan.target_counter - tracker_.counter();
+  }
+
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
   Result<CommandPtr> release_stop();
@@ -263,6 +274,7 @@ class Axis {
   [[nodiscard]] double velocity_of(const MotionValues& with) const;
   [[nodiscard]] PositionTracker::Target target_of(const MoveAbsoluteRequest& request,
                                                   const PositionTracker& from) const;
+  Result<CommandPtr> accept(const GroupMemberRequest& request, const CommandOptions& options) const;
   [[nodiscard]] Result<Plan> plan_move(const PositionTracker::Target& target, const MotionValues& with) const;
   [[nodiscard]] Result<Plan> plan_velocity(double velocity, const MotionValues& with, bool jog) const;
   /// Where a motion at a velocity ends if nobody ends it; nullopt: nowhere. Errors: soft_limit, not_trusted.
@@ -292,6 +304,7 @@ class Axis {
   void look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const;
   /// axis_buffer.cpp: of a request that may have to wait for others.
   void look_at_buffered(const Action& action, const CommandOptions& options, Obstacles& found) const;
+  void look_at(const GroupMemberRequest& request, const CommandOptions& options, Obstacles& found) const;
   void look_at_options(const CommandOptions& options, Obstacles& found) const;
   void look_at_link(Obstacles& found) const;
   void look_at_fault(Obstacles& found) const;
@@ -335,6 +348,10 @@ class Axis {
   void fail_with_stop(Activity& activity, Error cause);
   void abort_at_rest(Activity& activity, Error cause);
   void enter_error_stop(const Error& cause);
+
+  // axis_group.cpp
+  Task<> run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
+                    std::shared_ptr<std::optional<TimePoint>> arrived);
 
   // axis_power.cpp: sequences that move nothing
   void on_turned_by_power(const Error& cause);

@@ -13,7 +13,7 @@ constexpr auto enable_shows_within = std::chrono::seconds(1);
 /// Ends by itself, where its request said.
 bool is_bounded(CommandKind kind) {
   return kind == CommandKind::home || kind == CommandKind::move_absolute ||
-         kind == CommandKind::move_relative;
+         kind == CommandKind::move_relative || kind == CommandKind::move_group;
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ enum class CommandKind : std::uint8_t {
   stop,
   quick_stop,
   reset,
-  set_position
+  set_position,
+  move_group
 };
 std::string_view to_string(CommandKind kind);
 
@@ -61,6 +62,9 @@ struct Command {
 
 /// Nothing that a client asks for may be sent later than this after its request.
 inline constexpr Duration longest_validity = std::chrono::minutes(10);
+
+/// How far a caller wants to follow a command before it gets its answer.
+enum class WaitUntil : std::uint8_t { accepted, started, done };
 
 enum class BufferMode : std::uint8_t { aborting, buffered };
 
@@ -104,10 +108,17 @@ struct ResetRequest {};
 struct SetPositionRequest {
   double position = 0;
 };
+/// One axis's part of a group move: submitted with all the others of its group, never alone.
+struct GroupMemberRequest {
+  std::optional<double> position{};  ///< target, or
+  std::optional<double> distance{};  ///< distance: exactly one of them
+  MotionValues with{};               ///< velocity and times only
+  std::string whole{};               ///< the request that it is part of, as text
+};
 
-using Action =
-    std::variant<EnableRequest, DisableRequest, HomeRequest, MoveAbsoluteRequest, MoveRelativeRequest,
-                 MoveVelocityRequest, JogRequest, StopRequest, ResetRequest, SetPositionRequest>;
+using Action = std::variant<EnableRequest, DisableRequest, HomeRequest, MoveAbsoluteRequest,
+                            MoveRelativeRequest, MoveVelocityRequest, JogRequest, StopRequest, ResetRequest,
+                            SetPositionRequest, GroupMemberRequest>;
 CommandKind kind_of(const Action& action);
 
 }  // namespace axisd

@@ -25,6 +25,7 @@ bool noted_before_start(CommandKind kind) {
     case CommandKind::move_absolute:
     case CommandKind::move_relative:
     case CommandKind::move_velocity:
+    case CommandKind::move_group:
     case CommandKind::jog:
     case CommandKind::set_position:
       return true;
@@ -67,6 +68,10 @@ struct DigestOf {
     return fmt::format("stop {} {}", std::to_underlying(r.kind), r.hold);
   }
   std::string operator()(const SetPositionRequest& r) const { return fmt::format("set {:a}", r.position); }
+  std::string operator()(const GroupMemberRequest& r) const {
+    return fmt::format("group {} {} {} of {}", text_of(r.position), text_of(r.distance), text_of(r.with),
+                       r.whole);
+  }
 };
 
 struct AskedOf {
@@ -91,6 +96,7 @@ struct AskedOf {
     return values;
   }
   MotionValues operator()(const SetPositionRequest& r) const { return {.position = r.position}; }
+  MotionValues operator()(const GroupMemberRequest& r) const { return with(r.with, r.position, r.distance); }
   template <class Other>
   MotionValues operator()(const Other&) const {
     return {};

@@ -11,9 +11,9 @@ namespace axisd {
 
 namespace {
 
-constexpr auto kind_names = std::to_array<std::string_view>({"enable", "disable", "home", "move_absolute",
-                                                             "move_relative", "move_velocity", "jog", "halt",
-                                                             "stop", "quick_stop", "reset", "set_position"});
+constexpr auto kind_names = std::to_array<std::string_view>(
+    {"enable", "disable", "home", "move_absolute", "move_relative", "move_velocity", "jog", "halt", "stop",
+     "quick_stop", "reset", "set_position", "move_group"});
 
 }  // namespace
 
@@ -68,6 +68,7 @@ CommandKind kind_of(const Action& action) {
     }
     CommandKind operator()(const ResetRequest&) const { return CommandKind::reset; }
     CommandKind operator()(const SetPositionRequest&) const { return CommandKind::set_position; }
+    CommandKind operator()(const GroupMemberRequest&) const { return CommandKind::move_group; }
   };
   return std::visit(Kind{}, action);
 }

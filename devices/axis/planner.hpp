@@ -45,6 +45,10 @@ class Planner {
   [[nodiscard]] bool positive(const PositionTracker::Target& target, const PositionTracker& tracker) const;
   /// How long a profile takes over `pulses`.
   [[nodiscard]] Duration duration(const Plan& plan, std::int64_t pulses) const;
+  /// A slower profile that takes `wanted` over `pulses`, as near as the drive's whole r/min and milliseconds
+  /// let it; never a shorter ramp. A motion too short for its velocity gets the one that it reaches first: it
+  /// ends when predicted.
+  [[nodiscard]] Plan stretched(Plan plan, std::int64_t pulses, Duration wanted) const;
   [[nodiscard]] Result<void> check_soft_limits(double target, double from) const;
 
   [[nodiscard]] double maximum_velocity() const;  ///< of limits and drive, user units per second
@@ -66,6 +70,8 @@ class Planner {
   };
   [[nodiscard]] Ramps ramps(const MotionValues& asked) const;
   void check_ramp(Duration time, const char* name, Obstacles& found) const;
+  [[nodiscard]] Plan at_speed(Plan plan, int rpm) const;
+  [[nodiscard]] Plan lengthened(Plan plan, std::int64_t pulses, Duration wanted) const;
 
   const AxisSettings* settings_;
   const Capabilities* capabilities_;

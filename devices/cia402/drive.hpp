@@ -78,6 +78,7 @@ class Cia402Drive final : public Drive {
   // drive_group_start.cpp
   [[nodiscard]] std::string no_common_start() const override { return no_common_start_; }
   Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile profile, MotionGuard guard) override;
+  Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
 
   // drive_configuration.cpp
   Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
@@ -97,6 +98,7 @@ class Cia402Drive final : public Drive {
   using Object = canopen::Object;
   using SdoOptions = canopen::SdoOptions;
   class Prepared;
+  class Loaded;
   struct Trigger {
     Object object;
     std::int64_t value = 0;
@@ -240,7 +242,7 @@ class Cia402Drive final : public Drive {
   Task<Result<std::string>> show_common_start(std::uint16_t held, SdoOptions options);
   Task<Result<bool>> shows(std::uint16_t word, bool stays, SdoOptions options);
   Task<Result<void>> let_wait(std::uint16_t word, SdoOptions options);
-  Task<Result<TimePoint>> check_prepared(MotionBlock block, SdoOptions options);
+  Task<Result<TimePoint>> check_prepared(MotionBlock block, bool by_sync, SdoOptions options);
   Task<Result<void>> confirm_started();
   [[nodiscard]] canopen::Bytes neutral_bytes() const;
   void note_move_began(TimePoint at);

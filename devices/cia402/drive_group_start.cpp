@@ -77,7 +77,7 @@ class Cia402Drive::Prepared final : public PreparedMove {
     auto& drive = *drive_;
     auto options = urgent();
     options.guard = guard_;
-    const auto canary = co_await drive.check_prepared(block_, options);
+    const auto canary = co_await drive.check_prepared(block_, true, options);
     auto guard = guard_;
     if (canary) guard.not_after = std::min(guard.not_after, *canary + drive.setup_.reboot_guard);
     const bool superseded = may_send(own(), drive.clock_->now()) != Verdict::send;
@@ -147,7 +147,7 @@ Task<Result<std::unique_ptr<PreparedMove>>> Cia402Drive::prepare_move(MoveProfil
 }
 
 /// All that prepare_move() left stands there still, and the motor at rest.
-Task<Result<TimePoint>> Cia402Drive::check_prepared(MotionBlock block, SdoOptions options) {
+Task<Result<TimePoint>> Cia402Drive::check_prepared(MotionBlock block, bool by_sync, SdoOptions options) {
   const auto word = co_await read_object(object::status_word, options);
   if (!word) co_return fail(word.error());
   const auto control = co_await read_object(object::control_word, options);
@@ -168,11 +168,12 @@ Task<Result<TimePoint>> Cia402Drive::check_prepared(MotionBlock block, SdoOption
   const bool listens = nmt == canopen::NmtState::operational || nmt == canopen::NmtState::unknown;
   const bool ready = moving == 0 && *control == control_word(Command::enable_operation) &&
                      *mode == std::to_underlying(OperationMode::profile_position);
-  if (ready && listens && start_pdo_ && expected_.front() == block) co_return canary;
-  co_return fail(error_at(Reason::superseded, object::control_word,
-                          fmt::format("not as it was prepared (control word {:04X}h, mode {}{}{})", *control,
-                                      *mode, moving != 0 ? ", moving" : "", listens ? "" : ", no PDOs"),
-                          "prepare it again"));
+  if (ready && (!by_sync || (listens && start_pdo_)) && expected_.front() == block) co_return canary;
+  co_return fail(
+      error_at(Reason::superseded, object::control_word,
+               fmt::format("not as it was prepared (control word {:04X}h, mode {}{}{})", *control, *mode,
+                           moving != 0 ? ", moving" : "", listens || !by_sync ? "" : ", no PDOs"),
+               "prepare it again"));
 }
 
 /// The SYNC was taken where the word stands that waited for it: bit 4 goes back only after this.

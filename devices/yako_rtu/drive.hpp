@@ -51,6 +51,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_velocity(VelocityProfile profile, MotionGuard guard) override;
   Task<Result<void>> start_homing(HomingProfile profile, MotionGuard guard) override;
+  Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<void>> stop(StopKind kind) override;
   Task<Result<void>> repeat_stop() override;
   [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stop_sent_at_; }
@@ -75,6 +76,7 @@ class YakoRtuDrive final : public Drive {
     std::uint16_t address;
     std::uint16_t value;
   };
+  class Loaded;
 
   // drive_connection.cpp
   Task<bool> has_register(std::uint16_t address, TransactionClass transaction_class) const;

@@ -167,6 +167,30 @@ class CountedLeases final : public LeaseAccess {
   CallLedger* ledger_;
 };
 
+class CountedGroups final : public GroupAccess {
+ public:
+  CountedGroups(GroupAccess& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
+
+  [[nodiscard]] const std::vector<GroupSettings>& groups() const override { return inner_->groups(); }
+  void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
+            std::function<void(Result<GroupMove>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->move(request, options, until, ledger_->answer(ticket, callback)); });
+  }
+  void get(std::string id, std::function<void(Result<GroupMove>)> callback) override {
+    ledger_->enter([=, this](auto ticket) { inner_->get(id, ledger_->answer(ticket, callback)); });
+  }
+  void stop(GroupStopRequest request, std::string client, WaitUntil until,
+            std::function<void(std::vector<GroupStopResult>)> callback) override {
+    ledger_->enter(
+        [=, this](auto ticket) { inner_->stop(request, client, until, ledger_->answer(ticket, callback)); });
+  }
+
+ private:
+  GroupAccess* inner_;
+  CallLedger* ledger_;
+};
+
 class CountedMachine final : public Machine {
  public:
   CountedMachine(Machine& inner, CallLedger& ledger)
@@ -175,7 +199,8 @@ class CountedMachine final : public Machine {
         drives_(inner.drive_access(), ledger),
         buses_(inner.bus_access(), ledger),
         watch_(inner.bus_watch(), ledger),
-        leases_(inner.lease_access(), ledger) {}
+        leases_(inner.lease_access(), ledger),
+        groups_(inner.group_access(), ledger) {}
 
   [[nodiscard]] std::vector<std::string> axis_names() const override { return inner_->axis_names(); }
   [[nodiscard]] AxisSnapshotPtr snapshot(std::string_view axis) const override {
@@ -227,6 +252,7 @@ class CountedMachine final : public Machine {
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }
   [[nodiscard]] BusWatch& bus_watch() override { return watch_; }
   [[nodiscard]] LeaseAccess& lease_access() override { return leases_; }
+  [[nodiscard]] GroupAccess& group_access() override { return groups_; }
   [[nodiscard]] EventSource& events() override { return inner_->events(); }
   void on_published(std::function<void()> notify) override { inner_->on_published(std::move(notify)); }
   [[nodiscard]] WallTime wall(TimePoint t) const override { return inner_->wall(t); }
@@ -239,6 +265,7 @@ class CountedMachine final : public Machine {
   CountedBuses buses_;
   CountedWatch watch_;
   CountedLeases leases_;
+  CountedGroups groups_;
 };
 
 }  // namespace

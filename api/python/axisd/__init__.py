@@ -13,6 +13,7 @@ from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event
                      LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
                      StateChange, TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import AxisdError, LeaseLostError, MotionError, RefusedError, UnreachableError
+from .group import Group, GroupMember, GroupMove
 from .lease import Lease, LeaseInfo
 from .machine import Machine, connect
 from .traffic import (BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, Quarantine, TracedFrame,
@@ -23,7 +24,8 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 __all__ = [
     "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
     "ClassStatistics", "Command", "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
-    "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Info", "Jog", "Latency", "Lease",
+    "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
+    "GroupMove", "Info", "Jog", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle",
     "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "RefusedError", "ScanProgress", "Segments",

@@ -17,12 +17,13 @@ from .budget import BusBudget
 from .calls import Seconds, done, duration
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, translate
+from .group import Group
 from .lease import Lease, LeaseInfo
 from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
                  command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
-                 lease_service_pb2, lease_service_pb2_grpc, system_service_pb2, system_service_pb2_grpc, types_pb2)
+                 group_service_pb2_grpc, lease_service_pb2, lease_service_pb2_grpc, system_service_pb2, system_service_pb2_grpc, types_pb2)
 
 _OPTIONS = (
     # The daemon permits one ping per second.
@@ -78,6 +79,8 @@ class Machine:
         self._drives = drive_service_pb2_grpc.DriveServiceStub(ordinary)
         self._events = event_service_pb2_grpc.EventServiceStub(ordinary)
         self._leases = lease_service_pb2_grpc.LeaseServiceStub(ordinary)
+        self._groups = group_service_pb2_grpc.GroupServiceStub(ordinary)
+        self._group_stops = group_service_pb2_grpc.GroupServiceStub(stops)
         self._system = system_service_pb2_grpc.SystemServiceStub(ordinary)
         self._system_stops = system_service_pb2_grpc.SystemServiceStub(stops)
         return self
@@ -114,6 +117,11 @@ class Machine:
     def axis(self, name: str) -> Axis:
         """An axis by its name. Asks nothing: an unknown name shows with the first call."""
         return Axis(self, name)
+
+    def group(self, name: str = "", *, axes: Iterable[str] = (), lease: Lease | None = None) -> Group:
+        """Axes that start and stop together: a group of the configuration by its name, or these axes. As an `async with`
+        block it stops them when the block ends by an error. `lease`: that its moves are given under."""
+        return Group(self, name, tuple(axes), lease.token if lease is not None else 0)
 
     def lease(self, *axes: str, ttl: Seconds | None = None, label: str = "", take: bool = False) -> Lease:
         """The exclusive right to command these axes inside an `async with` block, renewed as long as it runs. `ttl`:

@@ -4,7 +4,7 @@ from .can import (CanLog, Candump, CanSimulator, EndlessNode, LinkHelper, Peer, 
 from .can_case import CanScenario
 from .case import Scenario
 from .client import (ACCEPTED, DONE, ENDED, STARTED, CallFailed, Client, axis_pb, bus_pb, command_pb, error_pb,
-                     lease_pb, pb, system_pb)
+                     group_pb, lease_pb, pb, system_pb)
 from .demo import Demo
 from .machine import Axis, Machine, feeder, spinner, turntable
 from .programs import AXISCTL, AXISD, LIMIT, ROOT, Program, run, wait_for
@@ -13,5 +13,5 @@ from .wire import BLOCK, ENABLE, HOMING, START, STOP, crc, frame_bytes
 __all__ = ["ACCEPTED", "AXISCTL", "AXISD", "Axis", "BLOCK", "CallFailed", "CanLog", "CanScenario", "CanSimulator",
            "Candump", "Client", "DONE", "Demo", "ENABLE", "ENDED", "EndlessNode", "HOMING", "LIMIT", "LinkHelper", "Machine",
            "Peer", "Program", "ROOT", "START", "STARTED", "STOP", "Scenario", "SlcanAdapter", "axis_pb", "bus_pb",
-           "command_pb", "crc", "error_pb", "feeder", "frame_bytes", "heartbeat", "ip", "lease_pb", "pb", "run",
+           "command_pb", "crc", "error_pb", "feeder", "frame_bytes", "group_pb", "heartbeat", "ip", "lease_pb", "pb", "run",
            "sdo_reply", "sdo_request", "spinner", "system_pb", "turntable", "wait_for"]

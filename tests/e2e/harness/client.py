@@ -12,11 +12,12 @@ package.load()
 from axisd.v1 import (axis_service_pb2 as axis_pb, axis_service_pb2_grpc, bus_service_pb2 as bus_pb,  # noqa: E402
                       bus_service_pb2_grpc, command_service_pb2 as command_pb, command_service_pb2_grpc,
                       drive_service_pb2 as drive_pb, drive_service_pb2_grpc, error_pb2 as error_pb,
-                      event_service_pb2 as event_pb, event_service_pb2_grpc, lease_service_pb2 as lease_pb,
+                      event_service_pb2 as event_pb, event_service_pb2_grpc, group_service_pb2 as group_pb,
+                      group_service_pb2_grpc, lease_service_pb2 as lease_pb,
                       lease_service_pb2_grpc, system_service_pb2 as system_pb, system_service_pb2_grpc,
                       types_pb2 as pb)
 
-__all__ = ["Client", "CallFailed", "axis_pb", "bus_pb", "command_pb", "drive_pb", "error_pb", "event_pb", "lease_pb",
+__all__ = ["Client", "CallFailed", "axis_pb", "bus_pb", "command_pb", "drive_pb", "error_pb", "event_pb", "group_pb", "lease_pb",
            "pb", "system_pb"]
 
 ACCEPTED, STARTED, DONE = pb.WAIT_UNTIL_ACCEPTED, pb.WAIT_UNTIL_STARTED, pb.WAIT_UNTIL_DONE
@@ -66,6 +67,7 @@ class Client:
         self.bus = bus_service_pb2_grpc.BusServiceStub(self.channel)
         self.drive = drive_service_pb2_grpc.DriveServiceStub(self.channel)
         self.event = event_service_pb2_grpc.EventServiceStub(self.channel)
+        self.group = group_service_pb2_grpc.GroupServiceStub(self.channel)
         self.lease = lease_service_pb2_grpc.LeaseServiceStub(self.channel)
         self.system = system_service_pb2_grpc.SystemServiceStub(self.channel)
 

@@ -328,7 +328,7 @@ TEST_F(Calls, HealthAndReflectionAreServed) {
       generic_call(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                    std::string("\x3a\x00", 2));  // list_services: ""
   for (const auto* name : {"AxisService", "CommandService", "SystemService", "BusService", "DriveService",
-                           "EventService", "LeaseService"})
+                           "EventService", "LeaseService", "GroupService"})
     EXPECT_THAT(services, HasSubstr(std::string("axisd.v1.") + name));
 }
 

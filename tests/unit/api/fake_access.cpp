@@ -305,6 +305,49 @@ Lease FakeLeases::lease() const {
   return lease_;
 }
 
+void FakeGroups::move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
+                      std::function<void(Result<GroupMove>)> callback) {
+  std::string targets;
+  for (const auto& target : request.targets)
+    targets +=
+        fmt::format(" {}{}{}", target.axis,
+                    target.position ? "=" : "+=", target.position.value_or(target.distance.value_or(0)));
+  note(fmt::format("move {}{} together {} within {} by {} as {} until {}", request.group, targets,
+                   request.arrive_together, request.max_arrival_error.value_or(-1ms) / 1ms, options.client,
+                   options.request_id, static_cast<int>(until)));
+  answer<GroupMove>(callback, GroupMove{.id = "g-1",
+                                        .group = request.group,
+                                        .state = CommandState::done,
+                                        .members = {{.command = {.id = "c-1", .axis = "feeder"},
+                                                     .predicted = 1500ms,
+                                                     .by_sync = true,
+                                                     .note = "no",
+                                                     .started_after = 0ms,
+                                                     .arrived_after = 1503ms}},
+                                        .arrive_together = request.arrive_together,
+                                        .predicted_arrival_error = 1ms,
+                                        .start_skew = 5ms,
+                                        .arrival_error = 7ms});
+}
+
+void FakeGroups::get(std::string id, std::function<void(Result<GroupMove>)> callback) {
+  note("get " + id);
+  answer<GroupMove>(callback, GroupMove{.id = id});
+}
+
+void FakeGroups::stop(GroupStopRequest request, std::string client, WaitUntil until,
+                      std::function<void(std::vector<GroupStopResult>)> callback) {
+  note(fmt::format("stop {} {} kind {} hold {} by {} until {}", request.group, fmt::join(request.axes, "+"),
+                   static_cast<int>(request.kind), request.hold, client, static_cast<int>(until)));
+  std::vector<GroupStopResult> results;
+  for (const auto& axis : request.axes)
+    results.push_back({.axis = axis,
+                       .command = axis == "nobody"
+                                      ? Result<Command>(fail(Reason::unknown_axis, "there is no axis"))
+                                      : Result<Command>(Command{.id = "c-2", .axis = axis})});
+  post_([callback, results] { callback(results); });
+}
+
 void FakeEvents::add(std::string axis, EventContent content) {
   std::function<void()> notify;
   {

@@ -144,6 +144,23 @@ class FakeLeases final : public FakeAccess, public LeaseAccess {
   Lease lease_{.token = 7};
 };
 
+/// Has the group "gantry" of the axes feeder and table; every move is done at once, as "g-1".
+class FakeGroups final : public FakeAccess, public GroupAccess {
+ public:
+  using FakeAccess::FakeAccess;
+
+  [[nodiscard]] const std::vector<GroupSettings>& groups() const override { return groups_; }
+  void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
+            std::function<void(Result<GroupMove>)> callback) override;
+  void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
+  void stop(GroupStopRequest request, std::string client, WaitUntil until,
+            std::function<void(std::vector<GroupStopResult>)> callback) override;
+
+ private:
+  std::vector<GroupSettings> groups_{
+      {.name = "gantry", .axes = {"feeder", "table"}, .max_arrival_error = std::chrono::milliseconds(20)}};
+};
+
 class FakeEvents final : public EventSource {
  public:
   /// Keeps at most `kept` events.

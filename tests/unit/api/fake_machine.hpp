@@ -44,6 +44,7 @@ class FakeMachine final : public Machine {
   FakeBuses& nodes() { return buses_; }
   FakeWatch& watch() { return watch_; }
   FakeLeases& leases() { return leases_; }
+  FakeGroups& groups() { return groups_; }
   FakeEvents& event_log() { return events_; }
 
   [[nodiscard]] std::vector<Submitted> submitted() const;
@@ -72,6 +73,7 @@ class FakeMachine final : public Machine {
   [[nodiscard]] BusAccess& bus_access() override { return buses_; }
   [[nodiscard]] BusWatch& bus_watch() override { return watch_; }
   [[nodiscard]] LeaseAccess& lease_access() override { return leases_; }
+  [[nodiscard]] GroupAccess& group_access() override { return groups_; }
   [[nodiscard]] EventSource& events() override { return events_; }
   void on_published(std::function<void()> notify) override;
   [[nodiscard]] WallTime wall(TimePoint t) const override;
@@ -99,6 +101,7 @@ class FakeMachine final : public Machine {
   FakeBuses buses_{[this](Job job) { post(std::move(job)); }};
   FakeWatch watch_{[this](Job job) { post(std::move(job)); }};
   FakeLeases leases_{[this](Job job) { post(std::move(job)); }};
+  FakeGroups groups_{[this](Job job) { post(std::move(job)); }};
   FakeEvents events_{[this](Job job) { post(std::move(job)); }};
   std::thread core_;
 };

@@ -193,6 +193,11 @@ std::string dump(const Configuration& configuration) {
     dump.field("start_position", simulation.start_position);
   }
   for (const auto& device : configuration.devices) dump_device(dump, device);
+  for (const auto& group : configuration.groups) {
+    dump.enter(fmt::format("groups.{}", group.name));
+    dump.field("axes", fmt::format("{}", fmt::join(group.axes, " ")));
+    dump.field("max_arrival_error", group.max_arrival_error);
+  }
   return dump.text();
 }
 

@@ -15,6 +15,7 @@ LOADER_ONLY = {
     "device_same_address",
     "function_twice",
     "function_twice_inverted",
+    "group_axes",
     "home_approach",
     "homing_without_switch",
     "jog_travel",

@@ -1,0 +1,139 @@
+"""Axes that start and stop together."""
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import datetime
+import uuid
+from collections.abc import Mapping
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from .calls import Seconds, duration
+from .errors import AxisdError, MotionError
+from .types import Command, CommandState, ErrorDetail, _member, _optional_error
+from .v1 import group_service_pb2, types_pb2
+
+if TYPE_CHECKING:
+    from .machine import Machine
+
+
+def _seconds(raw: Any, name: str) -> float | None:
+    value: datetime.timedelta = getattr(raw, name).ToTimedelta()
+    return value.total_seconds() if raw.HasField(name) else None
+
+
+@dataclasses.dataclass(frozen=True)
+class GroupMember:
+    """One axis of a group move. Times in seconds."""
+
+    command: Command
+    predicted_duration: float
+    """From its start to its arrival; 0: it stands at its target."""
+    by_sync: bool
+    start_note: str
+    """Why it does not start by a SYNC, where its bus has one."""
+    started_after: float | None
+    """After the first start of the group."""
+    arrived_after: float | None
+    """First seen at its target, after the first start of the group."""
+
+
+@dataclasses.dataclass(frozen=True)
+class GroupMove:
+    """A move of several axes, as it stands. Times in seconds."""
+
+    id: str
+    group: str
+    state: CommandState
+    cause: ErrorDetail | None
+    """What ended it, at the member where that happened."""
+    members: dict[str, GroupMember]
+    predicted_arrival_error: float
+    start_skew: float | None
+    arrival_error: float | None
+
+    @classmethod
+    def of(cls, raw: group_service_pb2.GroupMove) -> GroupMove:
+        members = {
+            member.command.axis: GroupMember(
+                Command.of(member.command), member.predicted_duration.ToTimedelta().total_seconds(), member.by_sync,
+                member.start_note, _seconds(member, "started_after"), _seconds(member, "arrived_after"))
+            for member in raw.members}
+        state = _member(CommandState, types_pb2.CommandState.DESCRIPTOR, "COMMAND_STATE_", raw.state)
+        return cls(raw.id, raw.group, state, _optional_error(raw, "cause"), members,
+                   raw.predicted_arrival_error.ToTimedelta().total_seconds(), _seconds(raw, "start_skew"),
+                   _seconds(raw, "arrival_error"))
+
+    def _worst(self) -> Command:
+        order = (CommandState.UNKNOWN, CommandState.ERROR, CommandState.ABORTED)
+        commands = [member.command for member in self.members.values()]
+        return min(commands, key=lambda c: order.index(c.state) if c.state in order else len(order))
+
+
+class Group:
+    """A group of the configuration, or axes of this program's choice; made by Machine.group(). As an `async with` block
+    it stops its axes when the block ends by an error or is cancelled."""
+
+    def __init__(self, machine: Machine, name: str, axes: tuple[str, ...], lease_token: int) -> None:
+        self._machine = machine
+        self._axes = axes
+        self._lease_token = lease_token
+        self._targets: set[str] = set(axes)
+        self.name = name
+
+    async def __aenter__(self) -> Group:
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                        traceback: TracebackType | None) -> None:
+        if kind is None:
+            return
+        with contextlib.suppress(AxisdError):
+            await asyncio.shield(self.stop())
+
+    async def move(self, targets: Mapping[str, float], *, relative: bool = False, arrive_together: bool = False,
+                   max_arrival_error: Seconds | None = None, velocity: Mapping[str, float] | None = None,
+                   acceleration_time: Seconds | None = None, deceleration_time: Seconds | None = None,
+                   wait: bool = True, request_id: str | None = None) -> GroupMove:
+        """Moves axes, by name, to positions (or by distances). Waits until all members have ended, unless
+        `wait` is False. `velocity`: of single axes, in place of their limits. Raises RefusedError where it is refused,
+        MotionError with the command of the member that failed where the move ended otherwise than Done."""
+        request = group_service_pb2.MoveGroupRequest(
+            group=self.name, arrive_together=arrive_together, max_arrival_error=duration(max_arrival_error),
+            options=types_pb2.CommandOptions(
+                request_id=request_id or str(uuid.uuid4()), lease_token=self._lease_token,
+                wait_until=types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED))
+        for axis, value in targets.items():
+            target = request.targets.add(axis=axis, acceleration_time=duration(acceleration_time),
+                                         deceleration_time=duration(deceleration_time))
+            if relative:
+                target.distance = value
+            else:
+                target.position = value
+            if velocity is not None and axis in velocity:
+                target.velocity = velocity[axis]
+        if not self.name:
+            self._targets.update(targets)
+        response = await self._machine._call(self._machine._groups.MoveGroup, request, self.name, wait)
+        move = GroupMove.of(response.move)
+        if move.state.ended and move.state is not CommandState.DONE:
+            raise MotionError(move._worst())
+        return move
+
+    async def halt(self, wait: bool = True) -> None:
+        """Decelerates each axis. A new move may take over."""
+        request = group_service_pb2.GroupHaltRequest(group=self.name, axes=sorted(self._targets),
+                                                     wait_until=self._until(wait))
+        await self._machine._call(self._machine._group_stops.GroupHalt, request, self.name, wait)
+
+    async def stop(self, hold: bool = False, wait: bool = True) -> None:
+        """Stops each axis; nothing takes over before standstill, with `hold` before Axis.release_stop()."""
+        request = group_service_pb2.GroupStopRequest(group=self.name, axes=sorted(self._targets), hold=hold,
+                                                     wait_until=self._until(wait))
+        await self._machine._call(self._machine._group_stops.GroupStop, request, self.name, wait)
+
+    @staticmethod
+    def _until(wait: bool) -> types_pb2.WaitUntil.ValueType:
+        return types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED

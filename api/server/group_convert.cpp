@@ -1,0 +1,97 @@
+#include "api/server/group_convert.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "api/server/convert.hpp"
+#include "api/server/validate.hpp"
+
+namespace axisd::server {
+namespace {
+
+/// The values of a target, checked as those of a single axis's move.
+Result<GroupTarget> to_target(const v1::GroupTarget& from) {
+  if (auto valid = check_axis_name(from.axis()); !valid) return fail(valid.error());
+  GroupTarget target{.axis = from.axis()};
+  v1::MoveAbsoluteRequest single;
+  if (from.has_velocity()) single.set_velocity(from.velocity());
+  if (from.has_acceleration_time()) *single.mutable_acceleration_time() = from.acceleration_time();
+  if (from.has_deceleration_time()) *single.mutable_deceleration_time() = from.deceleration_time();
+  if (from.has_position()) {
+    target.position = from.position();
+    single.set_position(from.position());
+  } else if (from.has_distance()) {
+    target.distance = from.distance();
+    single.set_position(from.distance());
+  } else {
+    return fail(Reason::invalid_argument,
+                fmt::format("targets: {} has neither position nor distance", from.axis()),
+                "set one of them; 0 is a value too");
+  }
+  const auto action = to_action(single);
+  if (!action) {
+    auto error = action.error();
+    error.message = fmt::format("targets: {}: {}", from.axis(), error.message);
+    return fail(std::move(error));
+  }
+  target.with = std::get<MoveAbsoluteRequest>(*action).with;
+  return target;
+}
+
+}  // namespace
+
+Result<GroupMoveRequest> to_request(const v1::MoveGroupRequest& from) {
+  GroupMoveRequest request{.group = from.group(), .arrive_together = from.arrive_together()};
+  if (!from.group().empty())
+    if (auto valid = check_axis_name(from.group()); !valid)
+      return fail(Reason::invalid_argument, "group: " + valid.error().message, valid.error().remedy);
+  for (const auto& each : from.targets()) {
+    auto target = to_target(each);
+    if (!target) return fail(target.error());
+    request.targets.push_back(*std::move(target));
+  }
+  if (from.has_max_arrival_error()) {
+    request.max_arrival_error = from_proto(from.max_arrival_error());
+    if (!request.max_arrival_error || *request.max_arrival_error < Duration{})
+      return fail(Reason::invalid_argument, "max_arrival_error is not a valid duration",
+                  "give one of 0 or more");
+  }
+  return request;
+}
+
+void to_proto(const GroupSettings& from, v1::Group& to) {
+  to.set_name(from.name);
+  for (const auto& axis : from.axes) to.add_axes(axis);
+  if (from.max_arrival_error) to_proto(*from.max_arrival_error, *to.mutable_max_arrival_error());
+}
+
+void to_proto(const GroupMove& from, v1::GroupMove& to) {
+  to.set_id(from.id);
+  to.set_group(from.group);
+  to.set_state(to_proto(from.state));
+  if (from.cause) to_proto(*from.cause, *to.mutable_cause());
+  for (const auto& member : from.members) {
+    auto& entry = *to.add_members();
+    to_proto(member.command, *entry.mutable_command());
+    to_proto(member.predicted, *entry.mutable_predicted_duration());
+    entry.set_by_sync(member.by_sync);
+    entry.set_start_note(member.note);
+    if (member.started_after) to_proto(*member.started_after, *entry.mutable_started_after());
+    if (member.arrived_after) to_proto(*member.arrived_after, *entry.mutable_arrived_after());
+  }
+  to.set_arrive_together(from.arrive_together);
+  to_proto(from.predicted_arrival_error, *to.mutable_predicted_arrival_error());
+  if (from.start_skew) to_proto(*from.start_skew, *to.mutable_start_skew());
+  if (from.arrival_error) to_proto(*from.arrival_error, *to.mutable_arrival_error());
+}
+
+void to_proto(const GroupStopResult& from, v1::GroupStopResult& to) {
+  to.set_name(from.axis);
+  if (from.command)
+    to_proto(*from.command, *to.mutable_command());
+  else
+    to_proto(from.command.error(), *to.mutable_error());
+}
+
+}  // namespace axisd::server

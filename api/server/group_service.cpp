@@ -1,0 +1,105 @@
+#include "api/server/group_service.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "api/server/convert.hpp"
+#include "api/server/group_convert.hpp"
+#include "api/server/peer.hpp"
+#include "api/server/pending_call.hpp"
+#include "api/server/status.hpp"
+#include "api/server/validate.hpp"
+#include "api/server/value_reply.hpp"
+
+namespace axisd::server {
+
+GroupServiceImpl::Reactor* GroupServiceImpl::ListGroups(Context* context, const v1::ListGroupsRequest*,
+                                                        v1::ListGroupsResponse* response) {
+  for (const auto& group : services_.machine.group_access().groups())
+    to_proto(group, *response->add_groups());
+  return answer(context, grpc::Status::OK);
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::MoveGroup(Context* context, const v1::MoveGroupRequest* request,
+                                                       v1::MoveGroupResponse* response) {
+  const auto client = client_of(*context);
+  auto wanted = to_request(*request);
+  if (!wanted) return answer(context, to_status(wanted.error()));
+  auto submission = motion_options(request->options(), client, services_.machine);
+  if (!submission) return answer(context, to_status(submission.error()));
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.machine.group_access().move(
+            *std::move(wanted), std::move(submission->options), submission->until,
+            reply_with_value<GroupMove>(
+                call, [response](const GroupMove& move) { to_proto(move, *response->mutable_move()); },
+                fmt::format("{}: move_group {}", client, request->group())));
+      });
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::GetGroupMove(Context* context,
+                                                          const v1::GetGroupMoveRequest* request,
+                                                          v1::GetGroupMoveResponse* response) {
+  if (auto valid = check_command_id(request->id()); !valid) return answer(context, to_status(valid.error()));
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.machine.group_access().get(
+            request->id(), reply_with_value<GroupMove>(call, [response](const GroupMove& move) {
+              to_proto(move, *response->mutable_move());
+            }));
+      });
+}
+
+template <class Request, class Response>
+GroupServiceImpl::Reactor* GroupServiceImpl::stop(Context* context, const Request& request, StopKind kind,
+                                                  bool hold, Response* response) {
+  const auto client = client_of(*context);
+  GroupStopRequest wanted{.group = request.group(),
+                          .axes = {request.axes().begin(), request.axes().end()},
+                          .kind = kind,
+                          .hold = hold};
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    services_.machine.group_access().stop(
+        std::move(wanted), client, stop_all_wait(request.wait_until()),
+        [call, response, client, kind](std::vector<GroupStopResult> results) {
+          const auto shared = std::make_shared<const std::vector<GroupStopResult>>(std::move(results));
+          call->complete(
+              [response, shared]() -> grpc::Status {
+                for (const auto& result : *shared) to_proto(result, *response->add_results());
+                if (shared->empty())
+                  return to_status({.reason = Reason::invalid_argument,
+                                    .message = "neither a group nor an axis is named",
+                                    .remedy = "name one, or use StopAll"});
+                const bool nothing = std::ranges::all_of(*shared, [](const GroupStopResult& result) {
+                  return !result.command && result.command.error().reason == Reason::unknown_axis;
+                });
+                return nothing ? to_status(shared->front().command.error()) : grpc::Status::OK;
+              },
+              [client, kind, shared] {
+                spdlog::info("{}: group {} of {} axes", client, kind == StopKind::halt ? "halt" : "stop",
+                             shared->size());
+              });
+        });
+  });
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::GroupHalt(Context* context, const v1::GroupHaltRequest* request,
+                                                       v1::GroupHaltResponse* response) {
+  return stop(context, *request, StopKind::halt, false, response);
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::GroupStop(Context* context, const v1::GroupStopRequest* request,
+                                                       v1::GroupStopResponse* response) {
+  return stop(context, *request, StopKind::stop, request->hold(), response);
+}
+
+}  // namespace axisd::server

@@ -1,0 +1,34 @@
+#pragma once
+
+#include "api/server/services.hpp"
+#include "axisd/v1/group_service.grpc.pb.h"
+
+namespace axisd::server {
+
+/// GroupService: validates, converts, asks the machine. Stops are never limited, nor refused for anything in
+/// them that is not known. Thread: gRPC.
+class GroupServiceImpl final : public v1::GroupService::CallbackService {
+ public:
+  explicit GroupServiceImpl(const Services& services) : services_(services) {}
+
+  using Context = grpc::CallbackServerContext;
+  using Reactor = grpc::ServerUnaryReactor;
+  Reactor* ListGroups(Context* context, const v1::ListGroupsRequest* request,
+                      v1::ListGroupsResponse* response) override;
+  Reactor* MoveGroup(Context* context, const v1::MoveGroupRequest* request,
+                     v1::MoveGroupResponse* response) override;
+  Reactor* GetGroupMove(Context* context, const v1::GetGroupMoveRequest* request,
+                        v1::GetGroupMoveResponse* response) override;
+  Reactor* GroupHalt(Context* context, const v1::GroupHaltRequest* request,
+                     v1::GroupHaltResponse* response) override;
+  Reactor* GroupStop(Context* context, const v1::GroupStopRequest* request,
+                     v1::GroupStopResponse* response) override;
+
+ private:
+  template <class Request, class Response>
+  Reactor* stop(Context* context, const Request& request, StopKind kind, bool hold, Response* response);
+
+  const Services services_;
+};
+
+}  // namespace axisd::server

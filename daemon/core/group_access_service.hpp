@@ -1,0 +1,45 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "daemon/core/core_loop.hpp"
+#include "daemon/core/machine_core.hpp"
+#include "devices/group/group.hpp"
+
+namespace axisd::core {
+
+/// What the API can ask of groups: hands it to the core thread, stops through their lane. Thread: any, from
+/// construction (before the core runs) to destruction (after it ended).
+class GroupAccessService final : public GroupAccess {
+ public:
+  /// Both outlive it.
+  GroupAccessService(CoreLoop& loop, MachineCore& machine);
+
+  [[nodiscard]] const std::vector<GroupSettings>& groups() const override;
+  void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
+            std::function<void(Result<GroupMove>)> callback) override;
+  void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
+  void stop(GroupStopRequest request, std::string client, WaitUntil until,
+            std::function<void(std::vector<GroupStopResult>)> callback) override;
+
+  /// From now on only stops are accepted.
+  void close() { closing_ = true; }
+
+ private:
+  struct Gathering;
+  /// The axes that are known, each once, and results for the names that are not.
+  std::vector<Axis*> resolve(const GroupStopRequest& request, std::vector<GroupStopResult>& unknown) const;
+  void gather(const std::shared_ptr<Gathering>& gathering, std::size_t index,
+              const Result<CommandPtr>& command, WaitUntil until);
+
+  CoreLoop* loop_;
+  MachineCore* machine_;
+  std::map<std::string, Axis*, std::less<>> axes_;  ///< never changes; only gates are used off the core
+  std::atomic<bool> closing_{false};
+};
+
+}  // namespace axisd::core

@@ -1,0 +1,252 @@
+// An axis as a member of a group.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/axis/member.hpp"
+
+namespace axisd {
+
+namespace {
+
+constexpr int attempts = 3;
+
+}  // namespace
+
+Result<Plan> Axis::plan_member(const GroupMemberRequest& request, const CommandOptions& options) {
+  accept_epoch_ = gate_->epoch();
+  if (options.buffer_mode == BufferMode::buffered)
+    return fail(error(Reason::not_supported, "a group move cannot be buffered",
+                      "send it when its members rest, with the buffer mode aborting"));
+  Obstacles found;
+  look_at(request, options, found);
+  if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
+  const auto target = request.position
+                          ? target_of(MoveAbsoluteRequest{.position = *request.position}, tracker_)
+                          : tracker_.plan_relative(request.distance.value_or(0));
+  auto plan = plan_move(target, request.with);
+  if (!plan) return plan;
+  if (request.position)
+    plan->trusted = settings_.require_trust;
+  else
+    plan->granted.distance = *plan->granted.position - tracker_.position();
+  plan->predicted = planner_.duration(*plan, way_of(*plan));
+  return plan;
+}
+
+/// As a move of its own; and it has to rest.
+void Axis::look_at(const GroupMemberRequest& request, const CommandOptions& options, Obstacles& found) const {
+  if (request.position)
+    look_at(MoveAbsoluteRequest{.position = *request.position, .with = request.with}, options, found);
+  else
+    look_at(MoveRelativeRequest{.distance = request.distance.value_or(0), .with = request.with}, options,
+            found);
+  if (activity_ && activity_->state == AxisState::standstill)
+    found.block(error(Reason::busy, "another command is being executed", "wait for it"));
+  else if (activity_ || stopping_.running || (sample_ && sample_->moving))
+    found.block(
+        error(Reason::moving, "a member of a group move has to rest", "wait for standstill, or halt it"));
+}
+
+Result<CommandPtr> Axis::accept(const GroupMemberRequest&, const CommandOptions&) const {
+  return fail(error(Reason::not_supported, "this is a part of a group move", "send it with MoveGroup"));
+}
+
+Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
+                        std::shared_ptr<std::optional<TimePoint>> arrived) {
+  if (!there) {
+    if (!co_await follow(activity, base, since)) co_return;
+    *arrived = sample_->measured_at;
+  }
+  if (!co_await is_no_reboot(activity)) co_return;
+  tracker_.reached(activity->plan.exact_target);
+  remember_position();
+  finish(*activity, [](CommandRecord& command) { command.done(); });
+}
+
+Axis::Member::Member(Axis& axis, const GroupMemberRequest& request, const CommandOptions& options, Plan plan)
+    : axis_(&axis),
+      activity_(axis.begin(request, options, AxisState::synchronized_motion, std::move(plan))) {}
+
+Axis::Member::~Member() = default;
+
+bool Axis::Member::ready() const {
+  return current() && axis_->link_ == LinkState::online && !axis_->bus_loss_ &&
+         axis_->env_.bus->port().open && !axis_->fault_ &&
+         may_send_alone(guard(), axis_->env_.clock->now()) == Verdict::send;
+}
+
+void Axis::Member::tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after) {
+  all_ = std::move(all);
+  not_after_ = not_after;
+}
+
+MotionGuard Axis::Member::tied() const {
+  auto guard = this->guard();
+  guard.not_after = std::min(guard.not_after, not_after_);
+  guard.with = all_;
+  return guard;
+}
+
+/// What ended it, if it was not this. Its command says why.
+Error Axis::Member::gone() const {
+  const auto& command = activity_->command->value();
+  if (command.cause) return *command.cause;
+  const auto verdict = may_send_alone(guard(), axis_->env_.clock->now());
+  if (verdict == Verdict::lease_lost)
+    return axis_->error(Reason::lease_lost, "the lease is over", "acquire a lease again");
+  if (verdict == Verdict::expired)
+    return axis_->error(Reason::expired, "the request's validity has passed", "repeat it");
+  if (axis_->bus_loss_) return *axis_->bus_loss_;
+  if (!axis_->env_.bus->port().open)
+    return axis_->error(Reason::bus_down, "the port was lost before the start", "check the adapter");
+  return axis_->error(Reason::superseded, "a stop came before the start");
+}
+
+Task<Result<void>> Axis::Member::load() {
+  auto& axis = *axis_;
+  chain_ = std::make_unique<Chain>(axis);
+  if (!ready()) co_return axisd::fail(gone());
+  if (const auto room = co_await axis.make_room(activity_); !room) co_return room;
+  if (!ready()) co_return axisd::fail(gone());
+  // Durable before anything is sent for it; the axis is looked after meanwhile.
+  const auto profile = Axis::profile_of(activity_->plan);
+  chain_.reset();
+  if (!co_await axis.noted(activity_, axis.note_of(*activity_, axis.drive_->marks_until(profile))))
+    co_return axisd::fail(gone());
+  chain_ = std::make_unique<Chain>(axis);
+  if (!ready()) co_return axisd::fail(gone());
+  aim();
+  if (there_) co_return Result<void>{};
+  auto prepared = co_await axis.drive_->prepare_move(profile, tied());
+  if (prepared) {
+    prepared_ = std::move(*prepared);
+    co_return Result<void>{};
+  }
+  if (prepared.error().reason != Reason::not_supported) co_return axisd::fail(prepared.error());
+  start_note_ = axis.drive_->no_common_start();
+  auto loaded = co_await axis.drive_->load_move(profile, tied());
+  if (!loaded) co_return axisd::fail(loaded.error());
+  loaded_ = std::move(*loaded);
+  co_return Result<void>{};
+}
+
+/// From where it stands; a member that was there when it was loaded stays so.
+void Axis::Member::aim() {
+  auto& plan = activity_->plan;
+  base_ = axis_->tracker_.counter();
+  const auto distance = plan.target_counter - base_;
+  there_ = distance == 0 || (there_ && std::abs(distance) <= axis_->target_tolerance());
+  plan.positive = (distance >= 0) != axis_->settings_.scale.invert;
+  plan.predicted = axis_->planner_.duration(plan, distance);
+}
+
+Task<Result<DriveSample>> Axis::Member::read_state() {
+  for (int attempt = 1;; ++attempt) {
+    auto sample = co_await axis_->drive_->read_state(TransactionClass::motion);
+    if (sample || sample.error().reason != Reason::no_reply || attempt == attempts) {
+      if (!sample) sample.error().outcome = Outcome::not_executed;  // only read
+      co_return sample;
+    }
+  }
+}
+
+Task<Result<void>> Axis::Member::look() {
+  const auto sample = co_await read_state();
+  if (!sample) co_return axisd::fail(sample.error());
+  axis_->on_sample(*sample);
+  if (!ready()) co_return axisd::fail(gone());
+  const bool was_there = there_;
+  aim();
+  if (was_there && !there_)
+    co_return axisd::fail(
+        axis_->error(Reason::moving, "the axis left its position before the start", "repeat the move"));
+  co_return judge(*sample);
+}
+
+Result<void> Axis::Member::judge(const DriveSample& sample) const {
+  const auto& axis = *axis_;
+  if (!sample.enabled)
+    return axisd::fail(axis.error(Reason::disabled, "the power stage is off", "enable the axis first"));
+  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_motion_)
+    return axisd::fail(axis.error(Reason::moving, "the drive moves by itself", "check its terminals"));
+  if (axis.start_terminal_active(sample))
+    return axisd::fail(
+        axis.error(Reason::moving, "a terminal that starts motion is active", "check the terminals"));
+  if (activity_->plan.trusted && axis.tracker_.trust() == PositionTrust::unknown)
+    return axisd::fail(axis.error(Reason::not_trusted, "the position was lost before the move could start",
+                                  "home the axis, or set its position"));
+  if (!there_ && axis.limit_active(activity_->plan.positive))
+    return axisd::fail(axis.direction_blocked(activity_->plan.positive));
+  return {};
+}
+
+Task<Result<void>> Axis::Member::verify() {
+  if (!loaded_ || there_) co_return Result<void>{};
+  co_return co_await loaded_->verify();
+}
+
+Task<Result<TimePoint>> Axis::Member::trigger() { co_return co_await loaded_->trigger(); }
+
+void Axis::Member::started(TimePoint at) {
+  started_at_ = at;
+  activity_->command->activate();
+  axis_->publish();
+}
+
+void Axis::Member::follow() {
+  auto& axis = *axis_;
+  chain_.reset();
+  if (!current()) return;
+  if (there_) activity_->command->activate();
+  const auto since = started_at_.value_or(axis.env_.clock->now());
+  axis.launch(axis.run_member(activity_, base_, since, there_, arrived_), "group move");
+}
+
+Task<> Axis::Member::follow_up() {
+  if (loaded_ && started_at_) co_await loaded_->follow_up();
+}
+
+void Axis::Member::end_failed(Error cause) {
+  const bool aborted = cause.reason == Reason::expired || cause.reason == Reason::lease_lost ||
+                       cause.reason == Reason::superseded || cause.reason == Reason::cancelled;
+  end(std::move(cause), aborted);
+}
+
+void Axis::Member::end_aborted(Error cause) { end(std::move(cause), true); }
+
+void Axis::Member::end(Error cause, bool aborted) {
+  auto& axis = *axis_;
+  chain_.reset();
+  if (axis.activity_ != activity_) return;  // something else ended it, with what that needs
+  if (!aborted && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
+  if (!aborted && cause.reason == Reason::terminal) return axis.on_turned_by_power(std::move(cause));
+  const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->may_run;
+  if (activity_->may_run) {
+    // The stop of one that may move goes out whatever is known of its start.
+    axis.gate_->raise();
+    axis.env_.bus->purge_superseded(axis.settings_.node, *axis.gate_);
+    axis.tracker_.forget_target();
+    axis.keep_deceleration(*activity_);
+    axis.stopping_.shown = activity_->state;
+    if (unknown) {
+      ++axis.unknown_starts_.unresolved;
+      if (!axis.fault_) axis.fault_ = cause;
+    }
+    axis.begin_stop(StopKind::stop, false, nullptr);
+    tell_part(*activity_, cause);
+    cause.outcome = Outcome::unknown;  // also where nobody has heard yet whether it had started
+  } else {
+    axis.gate_->raise();
+    axis.env_.bus->purge_superseded(axis.settings_.node, *axis.gate_);
+  }
+  axis.finish(*activity_, [&](CommandRecord& command) {
+    if (unknown)
+      command.unknown(std::move(cause));
+    else
+      aborted ? command.abort(std::move(cause)) : command.error(std::move(cause));
+  });
+}
+
+}  // namespace axisd

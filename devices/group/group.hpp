@@ -1,0 +1,90 @@
+// Group moves as values: what is asked for, and how it stands. Shared by core, API and tests.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "buses/error.hpp"
+#include "devices/axis/command.hpp"
+
+namespace axisd {
+
+/// `groups:` of the configuration.
+struct GroupSettings {
+  std::string name;
+  std::vector<std::string> axes;  ///< at least two, each once
+  /// Between the first and the last arrival; more is refused where axes are to arrive together. Nothing: any.
+  std::optional<Duration> max_arrival_error{};
+};
+
+/// Where one axis is to go.
+struct GroupTarget {
+  std::string axis;
+  std::optional<double> position{}, distance{};  ///< exactly one of them; user units
+  MotionValues with{};                           ///< velocity and times only
+};
+
+struct GroupMoveRequest {
+  std::string group;                            ///< empty: the axes of the targets are one for this move
+  std::vector<GroupTarget> targets;             ///< at least one, each axis once
+  bool arrive_together = false;                 ///< faster axes are slowed down to the slowest
+  std::optional<Duration> max_arrival_error{};  ///< in place of the group's
+};
+
+/// One member of a group move, as it stands.
+struct GroupMember {
+  Command command;
+  Duration predicted{};                     ///< from its start to its arrival; 0: it stands at its target
+  bool by_sync = false;                     ///< started by a SYNC together with the others of its network
+  std::string note{};                       ///< why not, where its bus has SYNC
+  std::optional<Duration> started_after{};  ///< its start frame's end, after the first one's of the group
+  std::optional<Duration> arrived_after{};  ///< first seen at its target, after the group's first start
+};
+
+struct GroupMove {
+  std::string id;  ///< unique across restarts
+  std::string group;
+  CommandState state = CommandState::accepted;  ///< of all: active where all were started, done where all are
+  std::optional<Error> cause{};                 ///< what ended it, of the member that was the first
+  std::vector<GroupMember> members;             ///< by name of axis
+  bool arrive_together = false;
+  Duration predicted_arrival_error{};       ///< between the first and the last predicted arrival
+  std::optional<Duration> start_skew{};     ///< between the first and the last start frame
+  std::optional<Duration> arrival_error{};  ///< between the first and the last arrival seen
+};
+
+/// What is to be stopped: groups by name, axes, or both.
+struct GroupStopRequest {
+  std::string group;
+  std::vector<std::string> axes;
+  StopKind kind = StopKind::stop;  ///< halt or stop
+  bool hold = false;
+};
+
+/// What became of one axis (or of a name that there is not) of a stop.
+struct GroupStopResult {
+  std::string axis;
+  Result<Command> command;
+};
+
+/// Part of Machine. Thread: any; callbacks arrive on the core thread, exactly once.
+class GroupAccess {
+ public:
+  virtual ~GroupAccess() = default;
+  [[nodiscard]] virtual const std::vector<GroupSettings>& groups() const = 0;
+  /// Calls back with an error if nothing was accepted, else when all members have come as far as `until`, or
+  /// the move has ended. Errors: unknown_axis (also for groups), invalid_argument, out_of_range (the arrival
+  /// error), and those of each axis.
+  virtual void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
+                    std::function<void(Result<GroupMove>)> callback) = 0;
+  /// A known group move. Errors: unknown_command.
+  virtual void get(std::string id, std::function<void(Result<GroupMove>)> callback) = 0;
+  /// Stops what is known, and says what is not.
+  virtual void stop(GroupStopRequest request, std::string client, WaitUntil until,
+                    std::function<void(std::vector<GroupStopResult>)> callback) = 0;
+};
+
+}  // namespace axisd

@@ -1,0 +1,262 @@
+#include "devices/group/group_run.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/group/arrival.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// All members are started within this from the acceptance, or none is. A slow line takes some 150 ms each.
+constexpr auto assembly_limit = std::chrono::seconds(10);
+
+Error because_of(const Error& cause, const std::string& axis) {
+  auto text = cause.message;
+  if (!text.starts_with(axis)) text = fmt::format("{}: {}", axis, text);
+  return {.reason = Reason::superseded,
+          .message = "the group move ended: " + text,
+          .remedy = cause.remedy,
+          .outcome = Outcome::not_executed,
+          .where = cause.where};
+}
+
+std::string_view axis_of(const CommandPtr& command) { return command->value().axis; }
+
+}  // namespace
+
+GroupRun::GroupRun(Parts parts, std::vector<std::unique_ptr<Axis::Member>> members)
+    : parts_(std::move(parts)), members_(std::move(members)), by_sync_(members_.size()) {
+  auto guards = std::make_shared<std::vector<MotionGuard>>();
+  for (const auto& member : members_) {
+    commands_.push_back(member->command());
+    guards->push_back(member->guard());
+  }
+  for (const auto& member : members_) member->tie(guards, parts_.clock->now() + assembly_limit);
+}
+
+GroupRun::GroupRun(Parts parts, std::vector<CommandPtr> commands)
+    : parts_(std::move(parts)), commands_(std::move(commands)) {}
+
+void GroupRun::watch_members() {
+  for (std::size_t i = 0; i < commands_.size(); ++i)
+    commands_[i]->observe(weak_from_this(), [this, i](const Command&) {
+      // Later: whatever ends a member queues its own stop first.
+      post(parts_.executor, [self = weak_from_this(), i] {
+        if (const auto alive = self.lock()) alive->on_change(i);
+      });
+    });
+}
+
+void GroupRun::on_change(std::size_t member) {
+  const auto& command = commands_[member]->value();
+  if (ended(command.state) && command.state != CommandState::done && !members_.empty())
+    give_up({.member = member,
+             .cause = command.cause.value_or(
+                 Error{.reason = Reason::superseded, .message = fmt::format("{}: ended", command.axis)})});
+  tell();
+}
+
+Task<> GroupRun::run() {
+  const auto self = shared_from_this();
+  auto failure = co_await prepare();
+  if (!failure && !given_up_) failure = co_await start();
+  if (failure) give_up(std::move(*failure));
+  if (!given_up_)
+    for (const auto& member : members_) member->follow();
+  tell();
+  for (const auto& member : members_)
+    if (!given_up_) co_await member->follow_up();
+}
+
+/// A member that something else has ended meanwhile, or is about to end.
+GroupRun::MaybeFailure GroupRun::unready() const {
+  for (std::size_t i = 0; i < members_.size(); ++i)
+    if (!members_[i]->ready())
+      return Failure{.member = i,
+                     .cause = members_[i]->command()->value().cause.value_or(Error{
+                         .reason = Reason::superseded,
+                         .message = fmt::format("{}: it was stopped, or lost, before all members of the "
+                                                "group had started",
+                                                axis_of(commands_[i])),
+                         .remedy = "repeat the move"})};
+  return std::nullopt;
+}
+
+/// What was not sent at one member may have been forbidden by another.
+GroupRun::Failure GroupRun::attributed(std::size_t member, Error cause) const {
+  const bool not_sent = cause.outcome == Outcome::not_sent &&
+                        (cause.reason == Reason::superseded || cause.reason == Reason::lease_lost ||
+                         cause.reason == Reason::expired);
+  if (not_sent && members_[member]->ready())
+    if (auto other = unready()) return *std::move(other);
+  return {.member = member, .cause = std::move(cause)};
+}
+
+Task<GroupRun::MaybeFailure> GroupRun::prepare() {
+  using Step = Task<Result<void>> (Axis::Member::*)();
+  for (const Step step : {&Axis::Member::load, &Axis::Member::look, &Axis::Member::verify}) {
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      if (const auto done = co_await ((*members_[i]).*step)(); !done) co_return attributed(i, done.error());
+      if (given_up_) co_return std::nullopt;
+    }
+    if (auto lost = unready()) co_return lost;
+  }
+  co_return check_arrival();
+}
+
+/// Once more: where the members really stand decides.
+GroupRun::MaybeFailure GroupRun::check_arrival() const {
+  const auto allowed = parts_.request.max_arrival_error;
+  if (!parts_.request.arrive_together || !allowed) return std::nullopt;
+  std::vector<Duration> durations;
+  for (const auto& member : members_) durations.push_back(member->predicted());
+  if (arrival_error(durations) <= *allowed) return std::nullopt;
+  return Failure{.member = 0,
+                 .cause = {.reason = Reason::out_of_range,
+                           .message = "the members would not arrive together any more: one has moved",
+                           .remedy = "repeat the move"}};
+}
+
+std::vector<std::vector<std::size_t>> GroupRun::common_starts() const {
+  std::vector<std::vector<std::size_t>> sets;
+  const auto bus_of = [this](std::size_t i) { return members_[i]->axis().settings().bus; };
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    if (members_[i]->prepared() == nullptr || members_[i]->there()) continue;
+    const auto same =
+        std::ranges::find_if(sets, [&](const auto& set) { return bus_of(set.front()) == bus_of(i); });
+    if (same == sets.end())
+      sets.push_back({i});
+    else
+      same->push_back(i);
+  }
+  return sets;
+}
+
+Task<GroupRun::MaybeFailure> GroupRun::start() {
+  for (auto& together : common_starts())
+    if (auto failure = co_await start_by_sync(std::move(together)); failure || given_up_) co_return failure;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    auto& member = *members_[i];
+    if (member.there() || member.prepared() != nullptr) continue;
+    if (auto lost = unready()) co_return lost;
+    member.about_to_start();
+    const auto at = co_await member.trigger();
+    if (!at && at.error().outcome != Outcome::unknown) member.not_started();
+    if (given_up_) co_return std::nullopt;  // it got its stop then
+    if (!at) co_return attributed(i, at.error());
+    member.started(*at);
+  }
+  co_return std::nullopt;
+}
+
+Task<GroupRun::MaybeFailure> GroupRun::start_by_sync(std::vector<std::size_t> together) {
+  if (auto lost = unready()) co_return lost;
+  std::vector<PreparedMove*> others;
+  for (const auto i : together) {
+    members_[i]->about_to_start();
+    if (i != together.front()) others.push_back(members_[i]->prepared());
+  }
+  const auto at = co_await members_[together.front()]->prepared()->start_with(std::move(others));
+  if (!at && at.error().outcome != Outcome::unknown)
+    for (const auto i : together) members_[i]->not_started();
+  if (given_up_) co_return std::nullopt;
+  if (at) {
+    for (const auto i : together) {
+      by_sync_[i] = true;
+      members_[i]->started(*at);
+    }
+    co_return std::nullopt;
+  }
+  const auto culprit = member_at(at.error().where, together);
+  if (at.error().outcome == Outcome::unknown)
+    for (const auto i : together)  // of none of them is it known
+      if (i != culprit) members_[i]->end_failed(at.error());
+  co_return attributed(culprit, at.error());
+}
+
+std::size_t GroupRun::member_at(const Address& where, const std::vector<std::size_t>& among) const {
+  for (const auto i : among)
+    if (where.node && members_[i]->axis().settings().node == *where.node) return i;
+  return among.front();
+}
+
+/// Those that may move first, and at once: all of these stops are queued before anything else happens.
+void GroupRun::give_up(Failure failure) {
+  if (std::exchange(given_up_, true)) return;
+  const std::string axis(axis_of(commands_[failure.member]));
+  if (std::ranges::any_of(commands_, [](const auto& command) { return !command->has_ended(); }))
+    spdlog::warn("group move {} ends: {}", parts_.id, to_string(failure.cause));
+  cause_ = failure.cause;
+  const auto others = because_of(failure.cause, axis);
+  const bool culprit_may_run = members_[failure.member]->may_run();
+  if (culprit_may_run) members_[failure.member]->end_failed(failure.cause);
+  for (const bool moving : {true, false})
+    for (const auto& member : members_)
+      if (member != members_[failure.member] && member->may_run() == moving) member->end_aborted(others);
+  if (!culprit_may_run) members_[failure.member]->end_failed(failure.cause);
+}
+
+void GroupRun::observe(Observer observer) {
+  if (!observer(*this)) observers_.push_back(std::move(observer));
+}
+
+void GroupRun::tell() {
+  auto observers = std::exchange(observers_, {});
+  std::erase_if(observers, [this](const Observer& observer) { return observer(*this); });
+  observers_.insert(observers_.begin(), observers.begin(), observers.end());
+}
+
+CommandState GroupRun::state() const {
+  const auto any = [this](CommandState state) {
+    return std::ranges::any_of(commands_, [&](const auto& c) { return c->value().state == state; });
+  };
+  // While one has not ended, the move has not, either.
+  const bool over = std::ranges::all_of(commands_, [](const auto& command) { return command->has_ended(); });
+  if (!over) return any(CommandState::accepted) ? CommandState::accepted : CommandState::active;
+  for (const auto worst : {CommandState::unknown, CommandState::error, CommandState::aborted})
+    if (any(worst)) return worst;
+  return CommandState::done;
+}
+
+GroupMove GroupRun::value() const {
+  GroupMove move{.id = parts_.id,
+                 .group = parts_.request.group,
+                 .state = state(),
+                 .cause = cause_,
+                 .arrive_together = parts_.request.arrive_together};
+  std::vector<Duration> predicted;
+  std::vector<TimePoint> starts, arrivals;
+  bool all_arrived = !members_.empty();
+  for (const auto& member : members_) {
+    predicted.push_back(member->predicted());
+    if (member->started_at()) starts.push_back(*member->started_at());
+    if (member->arrived_at()) arrivals.push_back(*member->arrived_at());
+    all_arrived = all_arrived && (member->there() || member->arrived_at());
+  }
+  const auto first = starts.empty() ? TimePoint{} : std::ranges::min(starts);
+  for (std::size_t i = 0; i < commands_.size(); ++i) {
+    auto& entry = move.members.emplace_back(GroupMember{.command = commands_[i]->value()});
+    if (members_.empty()) continue;
+    const auto& member = *members_[i];
+    entry.predicted = member.predicted();
+    entry.by_sync = by_sync_[i];
+    entry.note = member.start_note();
+    if (member.started_at()) entry.started_after = *member.started_at() - first;
+    if (member.arrived_at()) entry.arrived_after = *member.arrived_at() - first;
+  }
+  move.predicted_arrival_error = arrival_error(predicted);
+  const bool all_started = !members_.empty() && std::ranges::all_of(members_, [](const auto& m) {
+    return m->there() || m->started_at();
+  });
+  if (all_started && !starts.empty()) move.start_skew = std::ranges::max(starts) - first;
+  if (all_arrived && !arrivals.empty())
+    move.arrival_error = std::ranges::max(arrivals) - std::ranges::min(arrivals);
+  return move;
+}
+
+}  // namespace axisd

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "buses/task.hpp"
+#include "devices/axis/member.hpp"
+#include "devices/group/group.hpp"
+
+namespace axisd {
+
+/// One group move, from its acceptance on. All members are loaded, read and judged before the first start
+/// frame; what starts by a SYNC starts first, since only that can still be called off by all; then each
+/// further start is sent when the one before is known to be good. Whatever fails, and whoever stops a member,
+/// stops all: those that may move first (M22). Thread: core.
+class GroupRun : public std::enable_shared_from_this<GroupRun> {
+ public:
+  struct Parts {
+    Executor executor;
+    Clock* clock = nullptr;
+    std::string id;
+    GroupMoveRequest request;
+  };
+  /// Called at each change; true: not again.
+  using Observer = std::function<bool(const GroupRun&)>;
+
+  GroupRun(Parts parts, std::vector<std::unique_ptr<Axis::Member>> members);
+  /// Of an earlier run of the daemon: what is left of it are its commands.
+  GroupRun(Parts parts, std::vector<CommandPtr> commands);
+  GroupRun(const GroupRun&) = delete;
+
+  /// Begins to look at its members' commands; then run() is to be run, once.
+  void watch_members();
+  Task<> run();
+
+  [[nodiscard]] const std::string& id() const { return parts_.id; }
+  [[nodiscard]] const std::vector<CommandPtr>& commands() const { return commands_; }
+  [[nodiscard]] GroupMove value() const;
+  [[nodiscard]] CommandState state() const;
+  void observe(Observer observer);
+
+ private:
+  struct Failure {
+    std::size_t member;
+    Error cause;
+  };
+  using MaybeFailure = std::optional<Failure>;
+
+  Task<MaybeFailure> prepare();
+  Task<MaybeFailure> start();
+  Task<MaybeFailure> start_by_sync(std::vector<std::size_t> together);
+  [[nodiscard]] std::vector<std::vector<std::size_t>> common_starts() const;
+  [[nodiscard]] MaybeFailure unready() const;
+  [[nodiscard]] Failure attributed(std::size_t member, Error cause) const;
+  [[nodiscard]] std::size_t member_at(const Address& where, const std::vector<std::size_t>& among) const;
+  [[nodiscard]] MaybeFailure check_arrival() const;
+  void on_change(std::size_t member);
+  void give_up(Failure failure);
+  void tell();
+
+  Parts parts_;
+  std::vector<std::unique_ptr<Axis::Member>> members_;
+  std::vector<CommandPtr> commands_;
+  std::vector<bool> by_sync_;
+  std::vector<Observer> observers_;
+  std::optional<Error> cause_;
+  bool given_up_ = false;
+};
+using GroupRunPtr = std::shared_ptr<GroupRun>;
+
+}  // namespace axisd

@@ -1,0 +1,91 @@
+// Moves that are loaded first and triggered later, back to back with those of other drives (M22).
+#include <algorithm>
+#include <utility>
+
+#include "devices/yako_rtu/drive.hpp"
+#include "devices/yako_rtu/registers.hpp"
+
+namespace axisd::yako_rtu {
+
+namespace {
+
+constexpr int attempts = 3;
+constexpr std::uint16_t absolute_move = 5;  // 7.6.1: bit 0 position mode, bit 2 absolute
+
+}  // namespace
+
+class YakoRtuDrive::Loaded final : public LoadedMove {
+ public:
+  Loaded(YakoRtuDrive& drive, MotionBlock block, MotionGuard guard)
+      : drive_(&drive), block_(block), guard_(std::move(guard)) {}
+
+  Task<Result<void>> verify() override {
+    for (int attempt = 1;; ++attempt) {
+      const auto canary = co_await drive_->read_canary(motion());
+      if (!canary && canary.error().reason == Reason::no_reply && attempt < attempts) continue;
+      if (!canary) {
+        auto error = canary.error();
+        if (error.outcome == Outcome::unknown) error.outcome = Outcome::not_executed;  // only read
+        co_return fail(std::move(error));
+      }
+      if (drive_->expected_.front() != block_)
+        co_return fail(drive_->error_at(Reason::superseded, reg::start_speed,
+                                        "the drive was given another motion meanwhile", "repeat the move"));
+      read_at_ = canary->sent_at;
+      co_return Result<void>{};
+    }
+  }
+
+  Task<Result<TimePoint>> trigger() override {
+    for (int attempt = 1;; ++attempt) {
+      // Half of the guard is left for what the line still has to do before this one.
+      if (drive_->clock_->now() > read_at_ + drive_->setup_.reboot_guard / 2)
+        if (const auto verified = co_await verify(); !verified) co_return fail(verified.error());
+      auto fresh = motion();
+      fresh.guard.not_after = std::min(guard_.not_after, read_at_ + drive_->setup_.reboot_guard);
+      const auto written = co_await drive_->node_.write(reg::start, absolute_move, fresh);
+      if (written && written->certain) co_return written->request_end;
+      if (written) {
+        auto error =
+            drive_->error_at(Reason::no_reply, reg::start,
+                             "the reply to the start may be that of an earlier one", "check the wiring");
+        error.outcome = Outcome::unknown;
+        co_return fail(std::move(error));
+      }
+      // Nothing was sent: what it rests on had grown too old.
+      const bool grown_old =
+          written.error().reason == Reason::expired && drive_->clock_->now() < guard_.not_after;
+      if (!grown_old || attempt == attempts) co_return drive_->failed(written.error());
+    }
+  }
+
+ private:
+  [[nodiscard]] TransactionOptions motion() const {
+    return {.transaction_class = TransactionClass::motion, .guard = guard_};
+  }
+
+  YakoRtuDrive* drive_;
+  MotionBlock block_;
+  MotionGuard guard_;
+  TimePoint read_at_{};
+};
+
+Task<Result<std::unique_ptr<LoadedMove>>> YakoRtuDrive::load_move(MoveProfile profile, MotionGuard guard) {
+  if (const auto mode = check_control_mode(); !mode) co_return fail(mode.error());
+  const TransactionOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
+  const auto block = distinct(encode(profile));
+  Result<void> loaded;
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    const auto canary = co_await read_canary(motion);
+    loaded = canary ? co_await write_canary(block, motion) : fail(canary.error());
+    if (loaded || loaded.error().reason != Reason::no_reply) break;
+  }
+  if (!loaded) {
+    auto error = loaded.error();
+    if (error.outcome == Outcome::unknown) error.outcome = Outcome::not_executed;  // only parameters
+    co_return fail(std::move(error));
+  }
+  co_return std::make_unique<Loaded>(*this, block, std::move(guard));
+}
+
+}  // namespace axisd::yako_rtu

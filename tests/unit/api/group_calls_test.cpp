@@ -1,0 +1,127 @@
+// GroupService through a real connection.
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "axisd/v1/group_service.grpc.pb.h"
+#include "tests/unit/api/serving.hpp"
+
+namespace axisd::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class GroupCalls : public Serving {
+ protected:
+  void SetUp() override {
+    serve();
+    groups_ = v1::GroupService::NewStub(channel_);
+    auto& target = *request_.add_targets();
+    target.set_axis("feeder");
+    target.set_position(0);
+    request_.mutable_options()->set_request_id("r-1");
+  }
+  grpc::Status move() {
+    Call context;
+    return groups_->MoveGroup(&context, request_, &response_);
+  }
+  void refused(std::string_view text) {
+    const auto status = move();
+    EXPECT_EQ(detail_of(status).reason(), v1::REASON_INVALID_ARGUMENT);
+    EXPECT_THAT(status.error_message(), HasSubstr(text));
+  }
+
+  std::unique_ptr<v1::GroupService::Stub> groups_;
+  v1::MoveGroupRequest request_;
+  v1::MoveGroupResponse response_;
+};
+
+TEST_F(GroupCalls, MoveCarriesEverythingBothWays) {
+  request_.set_group("gantry");
+  auto& other = *request_.add_targets();
+  other.set_axis("turntable");
+  other.set_distance(-5);
+  request_.set_arrive_together(true);
+  request_.mutable_max_arrival_error()->set_nanos(3'000'000);
+  request_.mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE);
+  ASSERT_TRUE(move().ok());
+  EXPECT_THAT(
+      machine_.groups().log(),
+      ElementsAre("move gantry feeder=0 turntable+=-5 together true within 3 by local:unix as r-1 until 2"));
+  const auto& got = response_.move();
+  EXPECT_EQ(got.id(), "g-1");
+  EXPECT_EQ(got.group(), "gantry");
+  EXPECT_EQ(got.state(), v1::COMMAND_STATE_DONE);
+  EXPECT_TRUE(got.arrive_together());
+  EXPECT_EQ(got.start_skew().nanos(), 5'000'000);
+  EXPECT_EQ(got.arrival_error().nanos(), 7'000'000);
+  EXPECT_EQ(got.predicted_arrival_error().nanos(), 1'000'000);
+  ASSERT_EQ(got.members_size(), 1);
+  EXPECT_EQ(got.members(0).command().axis(), "feeder");
+  EXPECT_TRUE(got.members(0).by_sync());
+  EXPECT_EQ(got.members(0).start_note(), "no");
+  EXPECT_TRUE(got.members(0).has_started_after());
+  EXPECT_EQ(got.members(0).arrived_after().seconds(), 1);
+}
+
+TEST_F(GroupCalls, MalformedRequestsAreRefusedHere) {
+  auto& target = *request_.mutable_targets(0);
+  target.clear_position();
+  refused("neither position nor distance");
+  target.set_position(std::numeric_limits<double>::quiet_NaN());
+  refused("finite");
+  target.set_position(1);
+  target.set_axis("No");
+  refused("No");
+  target.set_axis("feeder");
+  request_.mutable_max_arrival_error()->set_seconds(-1);
+  refused("max_arrival_error");
+  request_.clear_max_arrival_error();
+  request_.mutable_options()->clear_request_id();
+  refused("request_id");
+}
+
+TEST_F(GroupCalls, ListsAndGets) {
+  Call context;
+  v1::ListGroupsResponse listed;
+  ASSERT_TRUE(groups_->ListGroups(&context, {}, &listed).ok());
+  ASSERT_EQ(listed.groups_size(), 1);
+  EXPECT_EQ(listed.groups(0).name(), "gantry");
+  EXPECT_THAT(listed.groups(0).axes(), ElementsAre("feeder", "table"));
+  EXPECT_EQ(listed.groups(0).max_arrival_error().nanos(), 20'000'000);
+  Call second;
+  v1::GetGroupMoveRequest request;
+  request.set_id("g-9");
+  v1::GetGroupMoveResponse got;
+  ASSERT_TRUE(groups_->GetGroupMove(&second, request, &got).ok());
+  EXPECT_EQ(got.move().id(), "g-9");
+}
+
+TEST_F(GroupCalls, StopsTellOfEachNameAndNeverFailForOne) {
+  Call context;
+  v1::GroupStopRequest request;
+  request.set_group("gantry");
+  request.add_axes("feeder");
+  request.add_axes("nobody");
+  request.set_hold(true);
+  request.set_wait_until(v1::WAIT_UNTIL_DONE);
+  v1::GroupStopResponse response;
+  ASSERT_TRUE(groups_->GroupStop(&context, request, &response).ok());
+  EXPECT_THAT(machine_.groups().log(),
+              ElementsAre("stop gantry feeder+nobody kind 2 hold true by local:unix until 2"));
+  ASSERT_EQ(response.results_size(), 2);
+  EXPECT_EQ(response.results(0).command().axis(), "feeder");
+  EXPECT_EQ(response.results(1).error().reason(), v1::REASON_UNKNOWN_AXIS);
+
+  Call halting;
+  v1::GroupHaltRequest halt;
+  halt.add_axes("nobody");
+  v1::GroupHaltResponse halted;
+  EXPECT_EQ(detail_of(groups_->GroupHalt(&halting, halt, &halted)).reason(), v1::REASON_UNKNOWN_AXIS);
+  Call empty;
+  EXPECT_EQ(detail_of(groups_->GroupHalt(&empty, {}, &halted)).reason(), v1::REASON_INVALID_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace axisd::testing
