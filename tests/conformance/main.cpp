@@ -1,11 +1,13 @@
 // gtest's main, and:
 //   test_conformance --matrix                                  prints the capability matrix
+//   test_conformance --indexings COUNT [MODEL]                 moves by thirds of a unit: do they add up?
 //   test_conformance --vcan AXISD AXISD_SIM [NAME [PART OF]]   runs the scenarios against these programs, on
 //   vcan
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <cstdio>
 #include <span>
 #include <string>
@@ -26,6 +28,29 @@ int print_matrix() {
   return failures.empty() ? 0 : 1;
 }
 
+/// A model's load may rest a few pulses beside its target (closed loop), however many moves there were.
+int index_models(int count, std::string_view only) {
+  constexpr double close = 0.05;
+  spdlog::set_level(spdlog::level::off);
+  bool all_close = true;
+  for (const auto& model : models()) {
+    if (!only.empty() && model != only) continue;
+    const Manual manual(model);
+    try {
+      const Variant plain;
+      const double mm = index_by_thirds({.manual = manual, .variant = plain}, count);
+      fmt::print("{}: {} moves by 1/3 mm: {:.3f} mm, {:+.3f} mm from {:.3f} mm\n", model, count, mm,
+                 mm - (count / 3.0), count / 3.0);
+      all_close = all_close && std::abs(mm - (count / 3.0)) <= close;
+    } catch (const Broken& broken) {
+      fmt::print("{}: {}\n", model, broken.what());
+      all_close = false;
+    }
+    std::fflush(stdout);
+  }
+  return all_close ? 0 : 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -33,6 +58,8 @@ int main(int argc, char** argv) {
   const std::span<char*> arguments(argv, static_cast<std::size_t>(argc));
   const std::string_view mode = argc > 1 ? arguments[1] : "";
   if (mode == "--matrix") return print_matrix();
+  if (mode == "--indexings" && (argc == 3 || argc == 4))
+    return index_models(std::stoi(arguments[2]), argc == 4 ? arguments[3] : "");
   if (mode == "--vcan" && (argc == 4 || argc == 5 || argc == 7)) {
     Part part;
     if (argc == 7) part = {.part = std::stoul(arguments[5]), .of = std::stoul(arguments[6])};

@@ -1,4 +1,5 @@
 // Moves: absolute, relative, endless, jogging, and one that replaces another.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/conformance/scenario.hpp"
@@ -178,6 +179,21 @@ constexpr Scenario scenarios[] = {
 };
 
 }  // namespace
+
+double index_by_thirds(const Setup& setup, int count) {
+  Bench bench(
+      setup,
+      {.limits = false, .home_switch = false, .limit_switches = false, .mechanics = false, .homing = ""});
+  bench.ready();
+  for (int i = 0; i < count; ++i) {
+    const auto moved = bench.client.move_by(1.0 / 3);
+    if (!moved.ok() || moved->state() != v1::COMMAND_STATE_DONE)
+      throw Broken(fmt::format("move {} of {}: {}", i + 1, count,
+                               moved.ok() ? describe(moved.response) : moved.status.error_message()));
+  }
+  bench.finish(count);
+  return bench.shaft().mm;
+}
 
 std::span<const Scenario> motion_scenarios() { return scenarios; }
 

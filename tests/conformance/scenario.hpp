@@ -58,6 +58,10 @@ struct Finding {
 /// `failures`.
 std::string capability_matrix(std::vector<std::string>& failures);
 
+/// M19: so many relative moves by a third of a unit, on an axis without limits. Where the load stands then,
+/// mm. Throws Broken at a move that is not done.
+double index_by_thirds(const Setup& setup, int count);
+
 Finding run_scenario(const Scenario& scenario, const Manual& manual, const Variant& variant,
                      const TargetMaker& make_target = &make_virtual_target, bool brief = false);
 

@@ -84,6 +84,18 @@ TEST(Conformance, EveryModelHasASimulatorAndItsManual) {
   }
 }
 
+TEST(Conformance, ThirdsAddUpOnAxesWithoutEnd) {
+  spdlog::set_level(spdlog::level::off);
+  constexpr int count = 300;
+  for (const auto& model : models()) {
+    SCOPED_TRACE(model);
+    const Manual manual(model);
+    for (const bool invert : {false, true})
+      EXPECT_NEAR(index_by_thirds({.manual = manual, .variant = {.invert = invert}}, count), count / 3.0,
+                  0.05);
+  }
+}
+
 /// Each switch is flipped in some subject, also in a sampled run, plain and inverted ones among them.
 TEST(Conformance, EverySwitchIsFlippedSomewhere) {
   for (const auto& model : models())
