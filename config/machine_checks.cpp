@@ -221,6 +221,11 @@ void check_groups(const Configuration& configuration, Diagnostics& diagnostics, 
   std::vector<std::string_view> names;
   for (const auto& entry : configuration.axes) names.emplace_back(entry.axis.name);
   for (const auto& group : configuration.groups) {
+    // Where either may be named, a name has to say which.
+    if (const auto section = fmt::format("groups.{}", group.name);
+        std::ranges::find(names, group.name) != names.end() && places.usable(section))
+      diagnostics.add(places.mark(section), fmt::format("group '{}' has the name of an axis", group.name),
+                      "give one of the two another name");
     const auto path = fmt::format("groups.{}.axes", group.name);
     if (!places.usable(path)) continue;
     for (const auto& axis : group.axes)

@@ -167,7 +167,7 @@ void add_lease_commands(CLI::App& app, Invocation& invocation) {
   const auto acquiring = std::make_shared<Arguments>();
   auto* acquire_command = group->add_subcommand(
       "acquire", "Lease axes, all or none, and print the token; renew it before its time is over");
-  acquire_command->add_option("AXIS", acquiring->axes, "Names of one or more axes")->required();
+  acquire_command->add_option("AXIS", acquiring->axes, "Names of one or more axes, or of groups")->required();
   add_acquiring(*acquire_command, *acquiring);
   acquire_command->callback([&invocation, acquiring] {
     const auto response = acquire(invocation, *acquiring);
@@ -187,7 +187,7 @@ void add_lease_commands(CLI::App& app, Invocation& invocation) {
   hold_command
       ->add_option_function<std::string>(
           "AXIS", [holding](const std::string& names) { holding->axes = CLI::detail::split(names, ','); },
-          "Names of axes, with commas between")
+          "Names of axes, or of groups, with commas between")
       ->required();
   hold_command->add_option("COMMAND", holding->command, "The program and its arguments, after --")
       ->required();

@@ -33,19 +33,30 @@ bool usable_label(std::string_view label) {
          std::ranges::all_of(label, [](char c) { return c >= ' ' && c <= '~'; });
 }
 
-Result<std::vector<std::string>> axes_of(const v1::AcquireLeaseRequest& from, const Machine& machine) {
+/// No group has the name of an axis: the loader sees to that.
+Result<std::vector<std::string>> axes_of(const v1::AcquireLeaseRequest& from, Machine& machine) {
   if (from.axes().empty())
     return fail(Reason::invalid_argument, "axes is empty", "name the axes to lease; see ListAxes");
   std::vector<std::string> axes;
-  for (const auto& axis : from.axes()) {
-    if (auto known = find_axis(machine, axis); !known) return fail(known.error());
+  const auto add = [&axes](const std::string& axis) {
     if (std::ranges::find(axes, axis) == axes.end()) axes.push_back(axis);
+  };
+  const auto& groups = machine.group_access().groups();
+  for (const auto& name : from.axes()) {
+    const auto group = std::ranges::find(groups, name, &GroupSettings::name);
+    if (group != groups.end()) {
+      std::ranges::for_each(group->axes, add);
+    } else if (auto known = find_axis(machine, name); known) {
+      add(name);
+    } else {
+      return fail(known.error());
+    }
   }
   return axes;
 }
 
 Result<LeaseRequest> lease_request(const v1::AcquireLeaseRequest& from, std::string client,
-                                   const Machine& machine) {
+                                   Machine& machine) {
   auto axes = axes_of(from, machine);
   if (!axes) return fail(axes.error());
   LeaseRequest request{.client = std::move(client),

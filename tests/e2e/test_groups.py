@@ -98,7 +98,8 @@ class Groups(unittest.TestCase):
         other = Client(self.demo.server)
         self.addCleanup(other.close)
         grant = self.client.call(self.client.lease.AcquireLease, lease_pb.AcquireLeaseRequest(
-            axes=["feeder", "carousel"], ttl={"seconds": 30}))
+            axes=["transfer"], ttl={"seconds": 30}))
+        self.assertEqual(sorted(grant.lease.axes), sorted(TRANSFER))
         targets = {"feeder": {"distance": 5.0}, "carousel": {"distance": 5.0}}
         with self.assertRaises(CallFailed) as caught:
             self.move(targets, client=other)

@@ -124,8 +124,9 @@ class Machine:
         return Group(self, name, tuple(axes), lease.token if lease is not None else 0)
 
     def lease(self, *axes: str, ttl: Seconds | None = None, label: str = "", take: bool = False) -> Lease:
-        """The exclusive right to command these axes inside an `async with` block, renewed as long as it runs. `ttl`:
-        seconds from each renewal (default: the daemon's). `take`: also from others."""
+        """The exclusive right to command these axes (or all axes of the groups named) inside an `async with` block,
+        renewed as long as it runs. `ttl`: seconds from each renewal (default: the daemon's). `take`: also from
+        others."""
         return Lease(self, axes, ttl, label, take)
 
     async def leases(self) -> list[LeaseInfo]:

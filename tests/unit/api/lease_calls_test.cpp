@@ -47,6 +47,12 @@ TEST_F(LeaseCalls, AcquireCarriesEverythingAndGivesTheToken) {
   EXPECT_EQ(granted_.taken(0).client(), "other");
 }
 
+TEST_F(LeaseCalls, AGroupStandsForItsAxes) {
+  request_.add_axes("gantry");
+  ASSERT_TRUE(acquire().ok());
+  EXPECT_THAT(machine_.leases().log(), ElementsAre(HasSubstr("acquire feeder+table by")));
+}
+
 TEST_F(LeaseCalls, MalformedRequestsAreRefusedHere) {
   const auto refused = [this](v1::Reason reason, std::string_view text) {
     const auto status = acquire();
