@@ -82,6 +82,7 @@ std::string to_string(
 struct LoadResult {
   std::optional<Configuration> configuration;  ///< set if there is no diagnostic
   std::vector<Diagnostic> diagnostics;         ///< all errors at once, in the order of the file
+  std::string text{};                          ///< of load_file(): what was read
 };
 
 /// Reads and checks a file completely. Never throws.

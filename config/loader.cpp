@@ -69,7 +69,9 @@ LoadResult load_file(const std::string& path, const std::string& original) try {
             {{path, 0, 0, fmt::format("cannot be read: {}", text.error().message()),
               "check path and permissions"}}};
   }
-  return load_text(*text, original.empty() ? path : original);
+  auto result = load_text(*text, original.empty() ? path : original);
+  result.text = *text;
+  return result;
 } catch (const std::exception& error) {
   return {{}, {{path, 0, 0, fmt::format("cannot be read: {}", printable(error.what())), ""}}};
 }

@@ -16,6 +16,7 @@
 
 #include "api/server/server.hpp"
 #include "config/budget.hpp"
+#include "daemon/configuration_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
@@ -139,7 +140,7 @@ int give_up(const Error& error) {
 
 }  // namespace
 
-int run_daemon(const Options& options, config::Configuration configuration) {
+int run_daemon(const Options& options, config::Configuration configuration, const std::string& yaml) {
   const auto signals = ending_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   // Both are errors of a write, which are told where it is made.
@@ -187,7 +188,10 @@ int run_daemon(const Options& options, config::Configuration configuration) {
                             configuration);
   core::MachineService service(loop, machine, configuration.machine, instance_id);
   published_to = &service;
-  server::Server server(service, server_options(configuration.server));
+  const ConfigurationService served(options.config, yaml, std::chrono::system_clock::now());
+  auto serving = server_options(configuration.server);
+  serving.configuration = &served;
+  server::Server server(service, std::move(serving));
   machine.start();
   std::thread core_thread([&loop] {
     pthread_setname_np(pthread_self(), "axisd-core");

@@ -22,5 +22,5 @@ int main(int argc, char** argv) {
               << configuration.lines.size() + configuration.networks.size() << " buses)\n";
     return 0;
   }
-  return axisd::run_daemon(options, std::move(configuration));
+  return axisd::run_daemon(options, std::move(configuration), loaded.text);
 }

@@ -102,6 +102,7 @@ std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   add_event_commands(*app, invocation);
   add_system_commands(*app, invocation);
   add_explain_command(*app, invocation);
+  add_config_commands(*app, invocation);
   add_budget_command(*app, invocation);
   add_offline_commands(*app, invocation);
   return app;

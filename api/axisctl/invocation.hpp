@@ -48,6 +48,7 @@ void add_budget_command(CLI::App& app, Invocation& invocation);    ///< budget
 void add_event_commands(CLI::App& app, Invocation& invocation);    ///< events
 void add_system_commands(CLI::App& app, Invocation& invocation);   ///< buses, info
 void add_explain_command(CLI::App& app, Invocation& invocation);   ///< explain
+void add_config_commands(CLI::App& app, Invocation& invocation);   ///< config show|check
 void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, schema, completion, man
 void add_run_command(CLI::App& app, Invocation& invocation);       ///< run
 void add_plot_command(CLI::App& app, Invocation& invocation);      ///< plot

@@ -65,7 +65,7 @@ struct Server::Parts {
         admission(options.limits),
         hub(std::make_shared<WatchHub>(machine, reply, options.stalled_reader_limit)),
         events(std::make_shared<EventHub>(reply)),
-        services{machine, reply, calls, guard, admission, *hub, *events},
+        services{machine, reply, calls, guard, admission, *hub, *events, options.configuration},
         axis(services),
         command(services),
         system(services),

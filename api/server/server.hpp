@@ -9,6 +9,7 @@
 #include "api/server/admission.hpp"
 #include "api/server/tls.hpp"
 #include "buses/clock.hpp"
+#include "devices/configuration_access.hpp"
 #include "devices/machine.hpp"
 
 namespace axisd::server {
@@ -22,6 +23,8 @@ struct ServerOptions {
   int connections = 256;
   /// A stream whose reader has not read for so long is cancelled.
   Duration stalled_reader_limit = std::chrono::seconds(2);
+  /// What GetConfig and CheckConfig ask; outlives the server. nullptr: they are refused.
+  const ConfigurationAccess* configuration = nullptr;
 };
 
 /// Serves one machine. start() and shutdown() on one thread, which is not one of gRPC's.

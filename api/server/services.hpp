@@ -7,6 +7,7 @@
 #include "api/server/open_calls.hpp"
 #include "api/server/reply_thread.hpp"
 #include "api/server/stall_guard.hpp"
+#include "devices/configuration_access.hpp"
 #include "devices/machine.hpp"
 
 namespace axisd::server {
@@ -24,6 +25,7 @@ struct Services {
   Admission& admission;
   WatchHub& hub;
   EventHub& events;
+  const ConfigurationAccess* configuration;  ///< nullptr: there is none to show
 };
 
 }  // namespace axisd::server

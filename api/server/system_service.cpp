@@ -19,6 +19,12 @@ namespace {
 
 using Results = std::vector<Result<Command>>;
 
+Error no_configuration() {
+  return {.reason = Reason::not_supported,
+          .message = "this server was not started from a configuration file",
+          .remedy = "ask the daemon itself"};
+}
+
 void to_proto(const Results& results, const std::vector<std::string>& axes, v1::StopAllResponse& to) {
   for (std::size_t i = 0; i < results.size(); ++i) {
     auto& entry = *to.add_results();
@@ -106,6 +112,37 @@ grpc::ServerUnaryReactor* SystemServiceImpl::Explain(Context* context, const v1:
               }
             }));
       });
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::GetConfig(Context* context, const v1::GetConfigRequest*,
+                                                       v1::GetConfigResponse* response) {
+  const auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
+  const auto& served = services_.configuration->served();
+  response->set_yaml(served.yaml);
+  response->set_path(served.path);
+  response->set_revision(served.revision);
+  to_proto(served.served_since, *response->mutable_served_since());
+  return answer(context, grpc::Status::OK);
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::CheckConfig(Context* context,
+                                                         const v1::CheckConfigRequest* request,
+                                                         v1::CheckConfigResponse* response) {
+  const auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
+  const auto checked = services_.configuration->check(request->yaml());
+  for (const auto& found : checked.findings) {
+    auto& entry = *response->add_findings();
+    entry.set_line(found.line);
+    entry.set_column(found.column);
+    entry.set_message(found.message);
+    entry.set_suggestion(found.suggestion);
+  }
+  response->set_revision(checked.revision);
+  return answer(context, grpc::Status::OK);
 }
 
 }  // namespace axisd::server

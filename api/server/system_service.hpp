@@ -19,6 +19,10 @@ class SystemServiceImpl final : public v1::SystemService::CallbackService {
                                            v1::ReleaseStopAllResponse* response) override;
   grpc::ServerUnaryReactor* Explain(Context* context, const v1::ExplainRequest* request,
                                     v1::ExplainResponse* response) override;
+  grpc::ServerUnaryReactor* GetConfig(Context* context, const v1::GetConfigRequest* request,
+                                      v1::GetConfigResponse* response) override;
+  grpc::ServerUnaryReactor* CheckConfig(Context* context, const v1::CheckConfigRequest* request,
+                                        v1::CheckConfigResponse* response) override;
 
  private:
   const Services services_;

@@ -8,6 +8,7 @@
 """
 from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
+from .configuration import ConfigFinding, Configuration
 from .drive import Drive
 from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
@@ -23,7 +24,7 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 
 __all__ = [
     "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
-    "ClassStatistics", "Command", "CommandState", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
+    "ClassStatistics", "Command", "CommandState", "ConfigFinding", "Configuration", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "Jog", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",

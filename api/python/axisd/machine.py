@@ -15,6 +15,7 @@ from google.protobuf.field_mask_pb2 import FieldMask
 from .axis import Axis
 from .budget import BusBudget
 from .calls import Seconds, done, duration
+from .configuration import ConfigFinding, Configuration
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, translate
 from .group import Group
@@ -23,7 +24,8 @@ from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
                  command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
-                 group_service_pb2_grpc, lease_service_pb2, lease_service_pb2_grpc, system_service_pb2, system_service_pb2_grpc, types_pb2)
+                 group_service_pb2_grpc, lease_service_pb2, lease_service_pb2_grpc, system_service_pb2,
+                 system_service_pb2_grpc, types_pb2)
 
 _OPTIONS = (
     # The daemon permits one ping per second.
@@ -298,3 +300,13 @@ class Machine:
 
     async def info(self) -> Info:
         return Info.of(await self._call(self._system.GetInfo, system_service_pb2.GetInfoRequest(), ""))
+
+    async def configuration(self) -> Configuration:
+        """What the daemon was started with."""
+        return Configuration.of(await self._call(self._system.GetConfig, system_service_pb2.GetConfigRequest(), ""))
+
+    async def check_configuration(self, yaml: str) -> list[ConfigFinding]:
+        """What would keep the daemon from serving this text; nothing: it could. Changes nothing."""
+        request = system_service_pb2.CheckConfigRequest(yaml=yaml)
+        response = await self._call(self._system.CheckConfig, request, "check configuration")
+        return [ConfigFinding.of(found) for found in response.findings]
