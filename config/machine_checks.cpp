@@ -219,6 +219,7 @@ void check_leases(const LeaseSettings& leases, Diagnostics& diagnostics, const P
 
 void check_groups(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   std::vector<std::string_view> names;
+  names.reserve(configuration.axes.size());
   for (const auto& entry : configuration.axes) names.emplace_back(entry.axis.name);
   for (const auto& group : configuration.groups) {
     // Where either may be named, a name has to say which.

@@ -170,6 +170,8 @@ class Drive {
 
   /// The drive follows its position by an encoder, as it is configured.
   [[nodiscard]] virtual bool closed_loop() const = 0;
+  /// It has told by itself of an alarm or a restart, which the next reading will show.
+  [[nodiscard]] virtual bool in_trouble() const { return false; }
 
   /// What the drive's memory holds now, if that is known; and, after a restart of the daemon, what it should
   /// hold: one of these.

@@ -94,12 +94,14 @@ Result<GroupRunPtr> GroupKeeper::find_repeat(const GroupMoveRequest& request,
   });
   if (same != runs_.end()) return *same;
   // Of before a restart, or forgotten: what is known of it are its commands. Nothing of it starts any more.
-  return enter(
+  auto run = enter(
       std::make_shared<GroupRun>(GroupRun::Parts{.executor = parts_.executor,
                                                  .clock = parts_.clock,
                                                  .id = fmt::format("{}-g{}", parts_.instance_id, ++last_),
                                                  .request = request},
                                  std::move(known)));
+  run->watch_members();
+  return run;
 }
 
 Result<std::vector<Plan>> GroupKeeper::plan(const GroupMoveRequest& request,
@@ -140,6 +142,7 @@ Result<GroupRunPtr> GroupKeeper::move(GroupMoveRequest request, const CommandOpt
   if (const auto* group = find(request.group); group != nullptr && request.arrive_together)
     if (!request.max_arrival_error) request.max_arrival_error = group->max_arrival_error;
   std::vector<Action> actions;
+  actions.reserve(request.targets.size());
   for (const auto& target : request.targets)
     actions.emplace_back(GroupMemberRequest{
         .position = target.position, .distance = target.distance, .with = target.with, .whole = whole});
@@ -149,6 +152,7 @@ Result<GroupRunPtr> GroupKeeper::move(GroupMoveRequest request, const CommandOpt
   if (!plans) return fail(plans.error());
   // From here on it is accepted; nothing has been sent.
   std::vector<std::unique_ptr<Axis::Member>> members;
+  members.reserve(actions.size());
   for (std::size_t i = 0; i < actions.size(); ++i)
     members.push_back(std::make_unique<Axis::Member>(
         *parts_.find(request.targets[i].axis), std::get<GroupMemberRequest>(actions[i]),

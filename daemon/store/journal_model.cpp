@@ -49,7 +49,10 @@ void JournalModel::apply_line(const EndedLine& line, TimePoint now) {
   command.started_at = line.command.started_at;
   command.ended_at = line.command.ended_at;
   entry.touched = now;
-  if (command.state == CommandState::unknown && line.awaits_reset)
+  // As while the daemon runs: what moves nothing leaves no ErrorStop.
+  const bool moves = command.kind != CommandKind::enable && command.kind != CommandKind::disable &&
+                     command.kind != CommandKind::reset && command.kind != CommandKind::set_position;
+  if (command.state == CommandState::unknown && line.awaits_reset && moves)
     unknown_outcomes_[command.axis] = command.id;
   if (command.state == CommandState::done && command.kind == CommandKind::reset)
     unknown_outcomes_.erase(command.axis);

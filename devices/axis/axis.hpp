@@ -233,6 +233,7 @@ class Axis {
   Task<bool> noted(ActivityPtr activity, SendingNote note);
   [[nodiscard]] Result<void> check_journal() const;
   Task<Result<void>> forget_saved_position();
+  void correct_saved_position();
 
   // axis.cpp: what the samples mean
   void on_sample(const DriveSample& sample);
@@ -333,6 +334,7 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   static MoveProfile profile_of(const Plan& plan);
+  bool may_start(Activity& activity);
   static void tell_part(const Activity& activity, Error& cause);
   void end_unsent(Activity& activity, const Error& cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);

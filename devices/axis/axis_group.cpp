@@ -73,7 +73,7 @@ Axis::Member::~Member() = default;
 
 bool Axis::Member::ready() const {
   return current() && axis_->link_ == LinkState::online && !axis_->bus_loss_ &&
-         axis_->env_.bus->port().open && !axis_->fault_ &&
+         axis_->env_.bus->port().open && !axis_->fault_ && !axis_->drive_->in_trouble() &&
          may_send_alone(guard(), axis_->env_.clock->now()) == Verdict::send;
 }
 
@@ -104,21 +104,25 @@ Error Axis::Member::gone() const {
   return axis_->error(Reason::superseded, "a stop came before the start");
 }
 
-Task<Result<void>> Axis::Member::load() {
+/// Waits for the disk; the axis is looked after meanwhile.
+Task<Result<void>> Axis::Member::note() {
   auto& axis = *axis_;
-  chain_ = std::make_unique<Chain>(axis);
   if (!ready()) co_return axisd::fail(gone());
   if (const auto room = co_await axis.make_room(activity_); !room) co_return room;
   if (!ready()) co_return axisd::fail(gone());
-  // Durable before anything is sent for it; the axis is looked after meanwhile.
   const auto profile = Axis::profile_of(activity_->plan);
-  chain_.reset();
   if (!co_await axis.noted(activity_, axis.note_of(*activity_, axis.drive_->marks_until(profile))))
     co_return axisd::fail(gone());
-  chain_ = std::make_unique<Chain>(axis);
+  co_return Result<void>{};
+}
+
+Task<Result<void>> Axis::Member::load() {
+  auto& axis = *axis_;
   if (!ready()) co_return axisd::fail(gone());
+  chain_ = std::make_unique<Chain>(axis);
   aim();
   if (there_) co_return Result<void>{};
+  const auto profile = Axis::profile_of(activity_->plan);
   auto prepared = co_await axis.drive_->prepare_move(profile, tied());
   if (prepared) {
     prepared_ = std::move(*prepared);
@@ -184,13 +188,16 @@ Result<void> Axis::Member::judge(const DriveSample& sample) const {
 
 Task<Result<void>> Axis::Member::verify() {
   if (!loaded_ || there_) co_return Result<void>{};
-  co_return co_await loaded_->verify();
+  auto verified = co_await loaded_->verify();
+  if (verified) axis_->continuity_checked_ = axis_->env_.clock->now();
+  co_return verified;
 }
 
 Task<Result<TimePoint>> Axis::Member::trigger() { co_return co_await loaded_->trigger(); }
 
 void Axis::Member::started(TimePoint at) {
   started_at_ = at;
+  axis_->continuity_checked_ = axis_->env_.clock->now();  // the canary was part of its start
   activity_->command->activate();
   axis_->publish();
 }
@@ -205,7 +212,9 @@ void Axis::Member::follow() {
 }
 
 Task<> Axis::Member::follow_up() {
-  if (loaded_ && started_at_) co_await loaded_->follow_up();
+  // Not into what the axis was told after it.
+  const bool others = axis_->activity_ && axis_->activity_ != activity_;
+  if (loaded_ && started_at_ && !others) co_await loaded_->follow_up();
 }
 
 void Axis::Member::end_failed(Error cause) {
@@ -220,8 +229,9 @@ void Axis::Member::end(Error cause, bool aborted) {
   auto& axis = *axis_;
   chain_.reset();
   if (axis.activity_ != activity_) return;  // something else ended it, with what that needs
-  if (!aborted && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
-  if (!aborted && cause.reason == Reason::terminal) return axis.on_turned_by_power(std::move(cause));
+  const bool own = cause.where.bus == axis.settings_.bus && cause.where.node == axis.settings_.node;
+  if (!aborted && own && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
+  if (!aborted && own && cause.reason == Reason::terminal) return axis.on_turned_by_power(cause);
   const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->may_run;
   if (activity_->may_run) {
     // The stop of one that may move goes out whatever is known of its start.

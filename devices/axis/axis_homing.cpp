@@ -32,7 +32,16 @@ Task<> Axis::run_home(ActivityPtr activity) {
   }
   if (input_active(homing_switch()) && !co_await back_off(activity)) co_return;
 
+  // Before it can come true again: homing may end where the saved record says that the axis stood (M20).
+  auto forgotten = co_await forget_saved_position();
+  if (!current(*activity)) co_return;
+  if (!forgotten) {
+    tell_part(*activity, forgotten.error());
+    finish(*activity, [&](CommandRecord& command) { command.error(forgotten.error()); });
+    co_return;
+  }
   if (!co_await noted(activity, note_of(*activity, {}))) co_return;
+  if (!may_start(*activity)) co_return;
   lose_trust();
   const bool homed_before = sample_->homed;
   const auto base = tracker_.counter();
@@ -50,7 +59,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
   // Should the disk fail, the position holds for this run of the daemon; only a restart will not find it.
   const auto counter = tracker_.counter();
   (void)co_await journal_offset(tracker_.offset_for(position), PositionTrust::homed);
-  if (!current(*activity)) co_return;
+  if (!current(*activity)) co_return correct_saved_position();
   if (counter != tracker_.counter()) {
     fail_with_stop(*activity, error(Reason::moving, "the axis moved after it had reached home",
                                     "check terminals, and other masters on the bus; home again"));

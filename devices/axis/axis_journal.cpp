@@ -187,4 +187,10 @@ Task<Result<void>> Axis::forget_saved_position() {
   co_return co_await answer->get();
 }
 
+/// What was saved for a command that then came to nothing: the record says again what the axis goes by.
+void Axis::correct_saved_position() {
+  if (tracker_.trust() != PositionTrust::unknown) return remember_position();
+  if (env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
+}
+
 }  // namespace axisd

@@ -145,8 +145,9 @@ Task<Result<void>> Axis::prove_or_configure() {
   bool restorable = false;
   if (stored != nullptr) {
     const auto& record = *stored->offset;
-    restorable = !position_unsettled_ && record.trust != PositionTrust::unknown &&
-                 record.invert == settings_.scale.invert &&
+    // Nobody saw a homing that a terminal started meanwhile, which zeroes the counter.
+    restorable = !position_unsettled_ && !has_input("homing_start") &&
+                 record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
                  record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
                  record.last_position_pulses == sample_->position_pulses &&
                  (sample_->enabled || drive_->closed_loop());
@@ -331,6 +332,8 @@ Task<bool> Axis::poll_once(int& failures) {
 void Axis::bus_lost(Error cause) {
   if (link_ != LinkState::online) return;  // whatever is under way fails by itself, and is repeated
   bus_loss_ = std::move(cause);
+  // The others of its group look at its gate.
+  if (activity_ && activity_->state == AxisState::synchronized_motion) gate_->raise();
   wake_.notify_all();
 }
 

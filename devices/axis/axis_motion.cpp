@@ -126,27 +126,32 @@ MoveProfile Axis::profile_of(const Plan& plan) {
           .deceleration_time = plan.deceleration_time};
 }
 
+/// What was true at its acceptance, or before the disk was waited for, may have changed. False: the activity
+/// has ended, and nothing was sent.
+bool Axis::may_start(Activity& activity) {
+  auto cause = error(Reason::not_trusted, "the position was lost before the move could start",
+                     "home the axis, or set its position");
+  if (found_in_motion())
+    cause = error(Reason::moving, "the drive began to move before the start",
+                  "check its terminals, and other masters on the bus");
+  else if (!activity.plan.trusted || tracker_.trust() != PositionTrust::unknown)
+    return true;
+  tell_part(activity, cause);
+  finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+  return false;
+}
+
 /// One positioning motion to the plan's target. False: the activity has ended.
 Task<bool> Axis::positioned(ActivityPtr activity) {
-  if (!co_await reach_standstill(activity)) co_return false;
-  if (activity->plan.trusted && tracker_.trust() == PositionTrust::unknown) {
-    finish(*activity, [this](CommandRecord& command) {
-      command.error(error(Reason::not_trusted, "the position was lost before the move could start",
-                          "home the axis, or set its position"));
-    });
-    co_return false;
-  }
-  Result<void> result;
-  std::int64_t base = 0;
-  bool there = false;
-  {
-    const Chain chain(*this);
-    result = co_await make_room(activity);
-    if (!current(*activity)) co_return false;
-  }
+  if (!co_await reach_standstill(activity) || !may_start(*activity)) co_return false;
+  auto result = co_await make_room(activity);
+  if (!current(*activity)) co_return false;
   if (result &&
       !co_await noted(activity, note_of(*activity, drive_->marks_until(profile_of(activity->plan)))))
     co_return false;
+  if (!may_start(*activity)) co_return false;
+  std::int64_t base = 0;
+  bool there = false;
   {
     const Chain chain(*this);
     base = tracker_.counter();
@@ -224,6 +229,7 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
                                 .acceleration_time = activity->plan.acceleration_time,
                                 .deceleration_time = activity->plan.deceleration_time};
   if (!co_await noted(activity, note_of(*activity, drive_->marks_until(profile)))) co_return;
+  if (!may_start(*activity)) co_return;
   Result<void> result;
   const auto base = tracker_.counter();
   {

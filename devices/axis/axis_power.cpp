@@ -158,7 +158,7 @@ Task<> Axis::run_set_position(ActivityPtr activity) {
   // Journalled before it is used (M20): a restart must never meet a newer position with an older offset.
   const auto counter = tracker_.counter();
   const auto saved = co_await journal_offset(tracker_.offset_for(position), PositionTrust::set);
-  if (!current(*activity)) co_return;
+  if (!current(*activity)) co_return correct_saved_position();
   if (!saved || counter != tracker_.counter()) {
     lose_trust();
     finish(*activity, [&](CommandRecord& command) {

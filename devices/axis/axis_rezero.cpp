@@ -17,6 +17,8 @@ Task<Result<void>> Axis::make_room(ActivityPtr activity) {
   // After it the saved record speaks of another zero, and would fit again where the counter comes by (M20).
   if (auto forgotten = co_await forget_saved_position(); !forgotten) co_return forgotten;
   if (!current(*activity)) co_return fail(error(Reason::superseded, "superseded"));
+  // Not before: who waits for the disk is looked after meanwhile.
+  const Chain chain(*this);
   // A sample that was asked for meanwhile may show either counter: none is taken for a motion.
   rezeroing_ = true;
   auto cleared = co_await drive_->clear_position(guard(*activity));

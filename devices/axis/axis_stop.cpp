@@ -28,7 +28,8 @@ void Axis::supersede(const Error& cause) {
     keep_deceleration(*activity);
     if (activity->state != AxisState::standstill) tracker_.forget_target();
     auto told = cause;
-    if (activity->may_run) told.outcome = Outcome::unknown;  // its start may be under way
+    const bool enabling = activity->noted && activity->command->value().kind == CommandKind::enable;
+    if (activity->may_run || enabling) told.outcome = Outcome::unknown;  // its start may be under way
     activity->command->abort(std::move(told));
     drop_buffer(cause);
   }

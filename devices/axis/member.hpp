@@ -30,6 +30,8 @@ class Axis::Member {
 
   /// Nothing goes out any more where one of `all` forbids it, nor after `not_after`.
   void tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after);
+  /// Makes room at the drive, and the move known to a restart of the daemon, before anything of it is sent.
+  Task<Result<void>> note();
   /// Writes all but the trigger. The axis is not polled from here on until follow() or the end.
   Task<Result<void>> load();
   /// Reads the drive's state, now, and judges it.

@@ -53,6 +53,8 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] std::string link_note() const override { return link_note_; }
   void on_attention(const std::function<void()>& handler) override { attention_ = handler; }
 
+  [[nodiscard]] bool in_trouble() const override { return rebooted_ || pending_alarm_ != 0; }
+
   // drive_canary.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override;

@@ -25,6 +25,16 @@ Error because_of(const Error& cause, const std::string& axis) {
           .where = cause.where};
 }
 
+/// Of a common start that failed at another one: what became of this one's is not known, either.
+Error unknown_with(const Error& cause, const AxisSettings& axis) {
+  return {.reason = Reason::not_confirmed,
+          .message = fmt::format("{}: whether the common start was executed is not known: {}", axis.name,
+                                 cause.message),
+          .remedy = "look at the machine; then reset the axis",
+          .outcome = Outcome::unknown,
+          .where = {.bus = axis.bus, .node = axis.node}};
+}
+
 std::string_view axis_of(const CommandPtr& command) { return command->value().axis; }
 
 }  // namespace
@@ -65,7 +75,7 @@ Task<> GroupRun::run() {
   const auto self = shared_from_this();
   auto failure = co_await prepare();
   if (!failure && !given_up_) failure = co_await start();
-  if (failure) give_up(std::move(*failure));
+  if (failure) give_up(*failure);
   if (!given_up_)
     for (const auto& member : members_) member->follow();
   tell();
@@ -99,7 +109,8 @@ GroupRun::Failure GroupRun::attributed(std::size_t member, Error cause) const {
 
 Task<GroupRun::MaybeFailure> GroupRun::prepare() {
   using Step = Task<Result<void>> (Axis::Member::*)();
-  for (const Step step : {&Axis::Member::load, &Axis::Member::look, &Axis::Member::verify}) {
+  for (const Step step :
+       {&Axis::Member::note, &Axis::Member::load, &Axis::Member::look, &Axis::Member::verify}) {
     for (std::size_t i = 0; i < members_.size(); ++i) {
       if (const auto done = co_await ((*members_[i]).*step)(); !done) co_return attributed(i, done.error());
       if (given_up_) co_return std::nullopt;
@@ -114,6 +125,7 @@ GroupRun::MaybeFailure GroupRun::check_arrival() const {
   const auto allowed = parts_.request.max_arrival_error;
   if (!parts_.request.arrive_together || !allowed) return std::nullopt;
   std::vector<Duration> durations;
+  durations.reserve(members_.size());
   for (const auto& member : members_) durations.push_back(member->predicted());
   if (arrival_error(durations) <= *allowed) return std::nullopt;
   return Failure{.member = 0,
@@ -175,7 +187,7 @@ Task<GroupRun::MaybeFailure> GroupRun::start_by_sync(std::vector<std::size_t> to
   const auto culprit = member_at(at.error().where, together);
   if (at.error().outcome == Outcome::unknown)
     for (const auto i : together)  // of none of them is it known
-      if (i != culprit) members_[i]->end_failed(at.error());
+      if (i != culprit) members_[i]->end_failed(unknown_with(at.error(), members_[i]->axis().settings()));
   co_return attributed(culprit, at.error());
 }
 
@@ -186,7 +198,7 @@ std::size_t GroupRun::member_at(const Address& where, const std::vector<std::siz
 }
 
 /// Those that may move first, and at once: all of these stops are queued before anything else happens.
-void GroupRun::give_up(Failure failure) {
+void GroupRun::give_up(const Failure& failure) {
   if (std::exchange(given_up_, true)) return;
   const std::string axis(axis_of(commands_[failure.member]));
   if (std::ranges::any_of(commands_, [](const auto& command) { return !command->has_ended(); }))

@@ -59,7 +59,7 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   [[nodiscard]] std::size_t member_at(const Address& where, const std::vector<std::size_t>& among) const;
   [[nodiscard]] MaybeFailure check_arrival() const;
   void on_change(std::size_t member);
-  void give_up(Failure failure);
+  void give_up(const Failure& failure);
   void tell();
 
   Parts parts_;

@@ -142,7 +142,9 @@ def report(rounds, wire, cpu):
     bare = [each["cpu"] for each in cpu["bare loop"]]
     table([["", "CPU per frame", "ratio"]] + [
         [name, spread([each["cpu"] for each in found], 1),
-         spread([each["cpu"] / one for each, one in zip(found, bare)], 2)] for name, found in cpu.items()])
+         # A short round may take less than the resolution of the guest's accounting.
+         spread([each["cpu"] / one for each, one in zip(found, bare) if one > 0] or [0.0], 2)]
+        for name, found in cpu.items()])
 
 
 def call_time():

@@ -24,39 +24,40 @@ class CountedDrives final : public DriveAccess {
   CountedDrives(DriveAccess& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
 
   void drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->drive_info(axis, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->drive_info(axis, ledger_->answer(ticket, callback)); });
   }
   void read_parameters(std::string axis, std::vector<std::uint32_t> addresses,
                        ValuesCallback callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->read_parameters(axis, addresses, ledger_->answer(ticket, callback));
     });
   }
   void write_parameters(std::string axis, std::vector<ParameterValue> values, Requester requester,
                         ValuesCallback callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->write_parameters(axis, values, requester, ledger_->answer(ticket, callback));
     });
   }
   void save_parameters(std::string axis, Requester requester,
                        std::function<void(Result<void>)> callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->save_parameters(axis, requester, ledger_->answer(ticket, callback));
     });
   }
   void restore_factory(std::string axis, Requester requester,
                        std::function<void(Result<std::string>)> callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->restore_factory(axis, requester, ledger_->answer(ticket, callback));
     });
   }
   void read_segments(std::string axis, SegmentsCallback callback) override {
     ledger_->enter(
-        [=, this](auto ticket) { inner_->read_segments(axis, ledger_->answer(ticket, callback)); });
+        [=, this](const auto& ticket) { inner_->read_segments(axis, ledger_->answer(ticket, callback)); });
   }
   void write_segments(std::string axis, SegmentSettings segments, Requester requester,
                       SegmentsCallback callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->write_segments(axis, segments, requester, ledger_->answer(ticket, callback));
     });
   }
@@ -64,7 +65,7 @@ class CountedDrives final : public DriveAccess {
   /// on.
   Token change_serial(std::string axis, SerialChange change, Requester requester,
                       std::function<void(Result<SerialProgress>)> callback) override {
-    return deferred(*ledger_, [=, this](auto ticket) {
+    return deferred(*ledger_, [=, this](const auto& ticket) {
       return inner_->change_serial(axis, change, requester, ledger_->answer(ticket, callback));
     });
   }
@@ -80,16 +81,18 @@ class CountedBuses final : public BusAccess {
 
   void transact(TransactRequest request,
                 std::function<void(Result<std::vector<std::uint16_t>>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->transact(request, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->transact(request, ledger_->answer(ticket, callback)); });
   }
   void transact_object(ObjectRequest request,
                        std::function<void(Result<std::vector<std::uint8_t>>)> callback) override {
-    ledger_->enter(
-        [=, this](auto ticket) { inner_->transact_object(request, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->transact_object(request, ledger_->answer(ticket, callback));
+    });
   }
   /// Counts until it is finished, or nobody listens any more.
   Token scan(ScanRequest request, std::function<void(Result<ScanProgress>)> callback) override {
-    return deferred(*ledger_, [=, this](CallLedger::TicketPtr ticket) {
+    return deferred(*ledger_, [=, this](const CallLedger::TicketPtr& ticket) {
       return inner_->scan(request, [=](const Result<ScanProgress>& progress) {
         callback(progress);
         if (!progress || progress->finished) ticket->release();
@@ -99,7 +102,7 @@ class CountedBuses final : public BusAccess {
   [[nodiscard]] std::vector<DeviceSnapshotPtr> devices() const override { return inner_->devices(); }
   void write_device(std::string device, std::string name, double value,
                     std::function<void(Result<double>)> callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->write_device(device, name, value, ledger_->answer(ticket, callback));
     });
   }
@@ -115,7 +118,8 @@ class CountedWatch final : public BusWatch {
 
   void statistics(std::string bus,
                   std::function<void(Result<std::vector<BusStatistics>>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->statistics(bus, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->statistics(bus, ledger_->answer(ticket, callback)); });
   }
   /// Never counts, as trace(): it has no end of its own.
   std::shared_ptr<StreamToken> watch_statistics(
@@ -127,15 +131,16 @@ class CountedWatch final : public BusWatch {
     return inner_->trace(std::move(request), std::move(callback));
   }
   void flight_records(std::function<void(Result<std::vector<FlightRecord>>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->flight_records(ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->flight_records(ledger_->answer(ticket, callback)); });
   }
   void flight_record(std::string name, std::function<void(Result<std::string>)> callback) override {
     ledger_->enter(
-        [=, this](auto ticket) { inner_->flight_record(name, ledger_->answer(ticket, callback)); });
+        [=, this](const auto& ticket) { inner_->flight_record(name, ledger_->answer(ticket, callback)); });
   }
   void write_flight_record(std::string bus, std::string client,
                            std::function<void(Result<std::string>)> callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->write_flight_record(bus, client, ledger_->answer(ticket, callback));
     });
   }
@@ -150,16 +155,19 @@ class CountedLeases final : public LeaseAccess {
   CountedLeases(LeaseAccess& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
 
   void acquire(LeaseRequest request, std::function<void(Result<LeaseGrant>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->acquire(request, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->acquire(request, ledger_->answer(ticket, callback)); });
   }
   void renew(Requester holder, std::function<void(Result<Lease>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->renew(holder, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->renew(holder, ledger_->answer(ticket, callback)); });
   }
   void release(Requester holder, std::function<void(Result<void>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->release(holder, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->release(holder, ledger_->answer(ticket, callback)); });
   }
   void list(std::function<void(std::vector<Lease>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->list(ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) { inner_->list(ledger_->answer(ticket, callback)); });
   }
 
  private:
@@ -174,16 +182,18 @@ class CountedGroups final : public GroupAccess {
   [[nodiscard]] const std::vector<GroupSettings>& groups() const override { return inner_->groups(); }
   void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
             std::function<void(Result<GroupMove>)> callback) override {
-    ledger_->enter(
-        [=, this](auto ticket) { inner_->move(request, options, until, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->move(request, options, until, ledger_->answer(ticket, callback));
+    });
   }
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->get(id, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) { inner_->get(id, ledger_->answer(ticket, callback)); });
   }
   void stop(GroupStopRequest request, std::string client, WaitUntil until,
             std::function<void(std::vector<GroupStopResult>)> callback) override {
-    ledger_->enter(
-        [=, this](auto ticket) { inner_->stop(request, client, until, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->stop(request, client, until, ledger_->answer(ticket, callback));
+    });
   }
 
  private:
@@ -210,42 +220,47 @@ class CountedMachine final : public Machine {
 
   void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
               CommandCallback callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->submit(axis, action, options, until, ledger_->answer(ticket, callback));
     });
   }
   void explain(std::string axis, std::optional<Action> action, CommandOptions options,
                std::function<void(Result<std::vector<Obstacle>>)> callback) override {
-    ledger_->enter([=, this](auto ticket) {
+    ledger_->enter([=, this](const auto& ticket) {
       inner_->explain(axis, action, options, ledger_->answer(ticket, callback));
     });
   }
   void release_stop(std::string axis, CommandCallback callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->release_stop(axis, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->release_stop(axis, ledger_->answer(ticket, callback)); });
   }
   void stop_all(std::string client, WaitUntil until,
                 std::function<void(std::vector<Result<Command>>)> callback) override {
-    ledger_->enter(
-        [=, this](auto ticket) { inner_->stop_all(client, until, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->stop_all(client, until, ledger_->answer(ticket, callback));
+    });
   }
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override {
-    ledger_->enter(
-        [=, this](auto ticket) { inner_->release_inhibit(client, ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->release_inhibit(client, ledger_->answer(ticket, callback));
+    });
   }
   void get_command(std::string id, CommandCallback callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->get_command(id, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->get_command(id, ledger_->answer(ticket, callback)); });
   }
   Token watch_command(std::string id, CommandCallback callback) override {
     return inner_->watch_command(std::move(id), std::move(callback));
   }
   void cancel_command(std::string id, CommandCallback callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->cancel_command(id, ledger_->answer(ticket, callback)); });
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->cancel_command(id, ledger_->answer(ticket, callback)); });
   }
   void buses(std::function<void(std::vector<BusStatus>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->buses(ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) { inner_->buses(ledger_->answer(ticket, callback)); });
   }
   void budgets(std::function<void(std::vector<BusBudgetReport>)> callback) override {
-    ledger_->enter([=, this](auto ticket) { inner_->budgets(ledger_->answer(ticket, callback)); });
+    ledger_->enter([=, this](const auto& ticket) { inner_->budgets(ledger_->answer(ticket, callback)); });
   }
 
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }

@@ -340,6 +340,7 @@ void FakeGroups::stop(GroupStopRequest request, std::string client, WaitUntil un
   note(fmt::format("stop {} {} kind {} hold {} by {} until {}", request.group, fmt::join(request.axes, "+"),
                    static_cast<int>(request.kind), request.hold, client, static_cast<int>(until)));
   std::vector<GroupStopResult> results;
+  results.reserve(request.axes.size());
   for (const auto& axis : request.axes)
     results.push_back({.axis = axis,
                        .command = axis == "nobody"

@@ -369,9 +369,11 @@ TEST(Admission, CountsPerClientAndGivesBack) {
 }
 
 TEST(Peer, IdentityHasNoPort) {
-  EXPECT_EQ(peer_host("ipv4:127.0.0.1:50312"), "127.0.0.1");
-  EXPECT_EQ(peer_host("ipv6:%5B::1%5D:50312"), "::1");
-  EXPECT_EQ(peer_host("ipv6:[::1]:50312"), "::1");
+  for (const std::string one : {"ipv4:127.0.0.1:50312", "ipv6:%5B::1%5D:50312", "ipv6:[::1]:50312",
+                                "ipv4:127.0.1.1:50312", "ipv6:%5B::ffff:127.0.0.1%5D:50312"})
+    EXPECT_EQ(peer_host(one), "localhost") << one << ": the same client, by whichever family it came";
+  EXPECT_EQ(peer_host("ipv4:10.0.0.7:50312"), "10.0.0.7");
+  EXPECT_EQ(peer_host("ipv6:%5Bfe80::1%5D:50312"), "fe80::1");
   EXPECT_EQ(peer_host("unix:/run/axisd/axisd.sock"), "unix");
   EXPECT_EQ(peer_host("unix:"), "unix");
 }

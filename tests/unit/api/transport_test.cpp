@@ -58,7 +58,7 @@ TEST_F(Transport, TcpOnLoopback) {
   ASSERT_TRUE(port) << to_string(port.error());
   const auto [status, client] = stop(connect("127.0.0.1:" + std::to_string(*port)));
   EXPECT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(client, "local:127.0.0.1");
+  EXPECT_EQ(client, "local:localhost");
 }
 
 TEST_F(Transport, SecondDaemonOnTheSameAddressFails) {

@@ -33,6 +33,7 @@ struct OneAxis {
 
 Duration error_of(const std::vector<Arrival>& arrivals) {
   std::vector<Duration> durations;
+  durations.reserve(arrivals.size());
   for (const auto& arrival : arrivals) durations.push_back(arrival.plan.predicted);
   return arrival_error(durations);
 }
