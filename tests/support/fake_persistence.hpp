@@ -2,6 +2,7 @@
 #pragma once
 
 #include <utility>
+#include <vector>
 
 #include "devices/persistence.hpp"
 #include "tests/support/virtual_world.hpp"
@@ -14,9 +15,15 @@ class FakePersistence final : public Persistence {
 
   bool failing = false;  ///< saves fail with Error `storage`
   bool frozen = false;   ///< the process is dead: nothing is saved any more
+  bool slow = false;     ///< nothing is answered until release()
   StoredState saved;     ///< what the file holds now
   /// What the next daemon finds when it starts.
   void restart() { loaded_ = saved; }
+  /// The disk answers.
+  void release() {
+    slow = false;
+    for (auto& held : std::exchange(held_, {})) answer(std::move(held));
+  }
 
   [[nodiscard]] const StoredState& loaded() const override { return loaded_; }
   void save_offset(std::string axis, OffsetRecord offset, Callback done) override {
@@ -39,6 +46,10 @@ class FakePersistence final : public Persistence {
  private:
   void answer(Callback done) {
     if (!done) return;
+    if (slow) {
+      held_.push_back(std::move(done));
+      return;
+    }
     Result<void> result;
     if (failing) result = fail(Reason::storage, "the disk is full", "free some space");
     post(executor_, [done = std::move(done), result] { done(result); });
@@ -46,6 +57,7 @@ class FakePersistence final : public Persistence {
 
   Executor executor_;
   StoredState loaded_;
+  std::vector<Callback> held_;
 };
 
 }  // namespace axisd::test
