@@ -125,15 +125,13 @@ class Group:
     async def halt(self, wait: bool = True) -> None:
         """Decelerates each axis. A new move may take over."""
         request = group_service_pb2.GroupHaltRequest(group=self.name, axes=sorted(self._targets),
-                                                     wait_until=self._until(wait))
+                                                     wait_until=types_pb2.WAIT_UNTIL_DONE if wait
+                                                     else types_pb2.WAIT_UNTIL_ACCEPTED)
         await self._machine._call(self._machine._group_stops.GroupHalt, request, self.name, wait)
 
     async def stop(self, hold: bool = False, wait: bool = True) -> None:
         """Stops each axis; nothing takes over before standstill, with `hold` before Axis.release_stop()."""
         request = group_service_pb2.GroupStopRequest(group=self.name, axes=sorted(self._targets), hold=hold,
-                                                     wait_until=self._until(wait))
+                                                     wait_until=types_pb2.WAIT_UNTIL_DONE if wait
+                                                     else types_pb2.WAIT_UNTIL_ACCEPTED)
         await self._machine._call(self._machine._group_stops.GroupStop, request, self.name, wait)
-
-    @staticmethod
-    def _until(wait: bool) -> types_pb2.WaitUntil.ValueType:
-        return types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED
