@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t longest_identity = 128;
 
 // Identities appear in the log and in Command.client: a certificate must not be able to forge lines there.
-std::string printable(grpc::string_ref text) {
+std::string printable(const grpc::string_ref& text) {
   std::string result(text.data(), std::min(text.size(), longest_identity));
   std::ranges::replace_if(result, [](char c) { return c < ' ' || c > '~'; }, '?');
   return result;

@@ -8,7 +8,6 @@ namespace axisd::test {
 namespace {
 
 using namespace std::chrono_literals;
-using ::testing::HasSubstr;
 
 /// An axis whose terminal X4 starts a homing.
 RigOptions homed_by_a_terminal() {
