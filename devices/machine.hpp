@@ -74,8 +74,6 @@ class Machine {
   /// it reached `until` or ended. Ending the call early never changes the command. Stops take their own lane.
   virtual void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
                       CommandCallback callback) = 0;
-  /// Extends the hold of the axis's current jog or held velocity command (by repeating it); part of
-  /// submit(Jog).
 
   /// Everything that stands in the way of `action` now, in the order in which submit() would refuse it;
   /// without one, of motion in general. Touches nothing. Errors: unknown_axis.

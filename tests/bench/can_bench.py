@@ -6,6 +6,7 @@ simulated nodes, which answer all three alike. Runs in the guest (tests/guest/ru
 import argparse
 import contextlib
 import json
+import math
 import os
 import pathlib
 import select
@@ -143,7 +144,7 @@ def report(rounds, wire, cpu):
     table([["", "CPU per frame", "ratio"]] + [
         [name, spread([each["cpu"] for each in found], 1),
          # A short round may take less than the resolution of the guest's accounting.
-         spread([each["cpu"] / one for each, one in zip(found, bare) if one > 0] or [0.0], 2)]
+         spread([each["cpu"] / one for each, one in zip(found, bare) if one > 0] or [math.nan], 2)]
         for name, found in cpu.items()])
 
 
