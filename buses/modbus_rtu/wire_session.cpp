@@ -158,7 +158,8 @@ int WireSession::find_echo() {
 void WireSession::end(ExchangeResult& result, ExchangeStatus status, int native_error) {
   result.status = status;
   result.native_error = native_error;
-  result.reply_end = monotonic_now();
+  // Of a reply, when its last byte was read: the silence before the next request counts from there.
+  result.reply_end = status == ExchangeStatus::replied ? last_byte_ : monotonic_now();
 }
 
 /// After damage: the sender may not have finished. Its remaining bytes belong to no later request.

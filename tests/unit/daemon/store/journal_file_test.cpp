@@ -137,13 +137,14 @@ TEST_F(JournalFileTest, AFullDiskFailsWhatIsToBeSentUntilThereIsSpaceAgain) {
 TEST_F(JournalFileTest, AfterAFailedWriteTheFileIsWholeAgain) {
   {
     const auto journal = open();
-    faults_->append = true;
+    // Whether the two lines are written together or, as two attempts, the second by a rewrite.
+    faults_->append = faults_->replace = true;
     journal->accepted(command("1"), "one");
     journal->sending(command("1"), {}, record());
     wait_for(1);
     EXPECT_FALSE(results_[0]);
-    faults_->append = false;
     wait_for_trouble(*journal, true);
+    faults_->append = faults_->replace = false;
     wait_for_trouble(*journal, false);
     journal->sending(command("2"), {}, record());
     wait_for(2);
