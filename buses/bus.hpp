@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -45,6 +46,8 @@ class Bus {
   [[nodiscard]] virtual std::optional<QuarantinedNode> quarantined(std::uint8_t /*node*/) const {
     return std::nullopt;
   }
+  /// Where stops are announced before the core knows of them. May be null: the bus gains nothing by it.
+  [[nodiscard]] virtual std::shared_ptr<StopNotice> stop_notice() const { return nullptr; }
   /// A node of this bus is about to be energised: what would be noise to it ends as superseded, unless it has
   /// gone out.
   virtual void about_to_energise() = 0;

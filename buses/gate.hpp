@@ -4,10 +4,12 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
+#include "buses/stop_notice.hpp"
 
 namespace axisd {
 
@@ -20,6 +22,10 @@ enum class StopKind : std::uint8_t { none, halt, stop, quick_stop };
 /// that was prepared in an older epoch is never sent.
 class AxisGate {
  public:
+  AxisGate() = default;
+  /// `bus`: told of each stop that is requested; may be null.
+  explicit AxisGate(std::shared_ptr<StopNotice> bus) : bus_(std::move(bus)) {}
+
   [[nodiscard]] std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
   /// Makes every motion frame prepared until now unsendable. The new epoch.
   std::uint64_t raise() { return epoch_.fetch_add(1, std::memory_order_acq_rel) + 1; }
@@ -28,6 +34,7 @@ class AxisGate {
   /// caller must wake the core thread, which serves the stop. First the count, then the epoch: whoever still
   /// saw no pending stop has read an epoch that this makes old.
   void request_stop() {
+    if (bus_) bus_->give();
     pending_stops_.fetch_add(1, std::memory_order_acq_rel);
     raise();
   }
@@ -53,6 +60,7 @@ class AxisGate {
   }
 
  private:
+  std::shared_ptr<StopNotice> bus_;
   std::atomic<std::uint64_t> epoch_{1};
   std::atomic<std::uint64_t> fencing_token_{0};
   std::atomic<TimePoint> lease_expires_{TimePoint::max()};

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "buses/bus.hpp"
@@ -22,6 +23,7 @@ struct Exchange {
   Duration reply_timeout{};   ///< from the last byte of the request to the last byte of the reply
   Duration turnaround_max{};  ///< from the last byte of the request; after it a stop may cut the wait
   std::optional<SerialSettings> serial{};  ///< other settings than the line's, for this exchange alone
+  bool stop = false;                       ///< it waits for no stop that was announced
 };
 
 enum class ExchangeStatus : std::uint8_t {
@@ -66,6 +68,8 @@ class Line {
   virtual bool revoke() = 0;
   /// A stop waits: end the wait for a silent node as soon as its turnaround_max has passed without a byte.
   virtual void cut_wait() = 0;
+  /// Where stops are announced that the core does not know of yet. May be null.
+  [[nodiscard]] virtual std::shared_ptr<StopNotice> stop_notice() const { return nullptr; }
   /// Time of the last progress of the line's own thread (for the watchdog). Thread: any.
   [[nodiscard]] virtual TimePoint last_progress() const = 0;
 };

@@ -67,7 +67,8 @@ Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOp
           .deadline = options.deadline,
           .reply_timeout = turnaround + reply + reply_margin,
           .turnaround_max = std::min(turnaround, usual),
-          .serial = overrides ? options.serial : std::nullopt};
+          .serial = overrides ? options.serial : std::nullopt,
+          .stop = options.transaction_class == TransactionClass::stop};
 }
 
 Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {

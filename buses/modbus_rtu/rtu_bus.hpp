@@ -79,6 +79,7 @@ class RtuBus final : public Bus {
   /// Requests to such nodes that wait for the next probe; none of them is counted as waiting in its class.
   [[nodiscard]] std::size_t held_back() const;
   [[nodiscard]] TimePoint last_progress() const override { return line_->last_progress(); }
+  [[nodiscard]] std::shared_ptr<StopNotice> stop_notice() const override { return line_->stop_notice(); }
 
  private:
   [[nodiscard]] Exchange exchange_for(Request request, const Frame& frame, TransactionOptions options) const;

@@ -19,6 +19,8 @@ namespace {
 constexpr Duration first_back_off = std::chrono::milliseconds(100);
 constexpr Duration longest_back_off = std::chrono::seconds(1);
 constexpr Duration longest_idle = std::chrono::seconds(1);
+/// A stop needs some 0.1 ms from its arrival to the slot, when the core has nothing else to do.
+constexpr Duration longest_yield = std::chrono::milliseconds(1);
 
 /// Signals are the main thread's; those that a thread raises by its own fault must stay deliverable.
 sigset_t all_but_faults() {
@@ -67,6 +69,7 @@ void RtuWorker::start(ResultHandler on_result, PortHandler on_port) {
 
 void RtuWorker::arm(const Exchange& exchange) {
   wakeup_.cut.store(false, std::memory_order_release);  // a cut that came too late is not meant for this one
+  stop_armed_.store(exchange.stop);
   // Sequentially consistent on both sides: either the worker sees the slot, or we see that it sleeps.
   slot_.store(&exchange);
   if (idle_.load()) wakeup_.notify();
@@ -121,8 +124,10 @@ Error RtuWorker::serve(SerialPort port) {
     lost = session.find_echo();
     if (lost == 0) lost = session.keep_silence();
     if (lost != 0) break;
+    if (yield_to_stop()) continue;
     // The latest possible moment: until here a stop could take the exchange back.
     if (const auto* exchange = slot_.exchange(nullptr, std::memory_order_acq_rel)) {
+      yielded_ = false;
       bind(session, *exchange, lost);
     } else {
       idle(session, lost);
@@ -171,6 +176,21 @@ void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) 
     report(PortStatus{.open = false, .error = lost_error(settings_, session.path(), lost)});
   }
   report(result);
+}
+
+/// A stop that is on its way to the core is let in before whatever was armed without knowing of it. Once per
+/// exchange, so that no flood of stops keeps the others off the line. True: time has passed, which may have
+/// brought bytes.
+bool RtuWorker::yield_to_stop() {
+  const auto until = stop_notice_->given() + longest_yield;
+  if (yielded_ || stop_armed_.load() || monotonic_now() >= until) return false;
+  yielded_ = true;
+  for (auto now = monotonic_now(); now < until && !stop_armed_.load() && !quitting(); now = monotonic_now()) {
+    idle_.store(true);
+    if (!stop_armed_.load()) wakeup_.wait(until - now);
+    idle_.store(false);
+  }
+  return true;
 }
 
 void RtuWorker::idle(WireSession& session, int& lost) {

@@ -25,7 +25,8 @@ class WireSession;
 ///
 /// Between the threads stand a one-place atomic slot, the Wakeup and post(); there are no locks. A lost port
 /// is reported before the result of the exchange that it cost. `not_sent` with the verdict `send` means that
-/// the port was gone before a byte went out. An exchange with serial settings of its own has the port changed
+/// the port was gone before a byte went out. Where a stop was announced that the core has not armed yet, what
+/// is armed waits for it, at most 1 ms. An exchange with serial settings of its own has the port changed
 /// between the slot and its first byte, and so has the next one without; the gate is asked after that.
 class RtuWorker final : public Line {
  public:
@@ -43,6 +44,7 @@ class RtuWorker final : public Line {
   void arm(const Exchange& exchange) override;
   bool revoke() override;
   void cut_wait() override;
+  [[nodiscard]] std::shared_ptr<StopNotice> stop_notice() const override { return stop_notice_; }
   [[nodiscard]] TimePoint last_progress() const override;
 
  private:
@@ -58,6 +60,7 @@ class RtuWorker final : public Line {
   Error serve(SerialPort port);
   void bind(WireSession& session, const Exchange& exchange, int& lost);
   bool prepare(WireSession& session, const Exchange& exchange, int& lost);
+  bool yield_to_stop();
   void idle(WireSession& session, int& lost);
   void wait_closed(Duration duration, int native_error);
   void report(const ExchangeResult& result);
@@ -70,6 +73,9 @@ class RtuWorker final : public Line {
   PortPath port_path_;
   std::shared_ptr<Callbacks> callbacks_ = std::make_shared<Callbacks>();
   std::atomic<const Exchange*> slot_ = nullptr;
+  std::atomic<bool> stop_armed_ = false;  ///< what is in the slot, or was last, is a stop
+  std::shared_ptr<StopNotice> stop_notice_ = std::make_shared<StopNotice>();
+  bool yielded_ = false;            ///< of the worker: since the last exchange it has waited for a stop
   std::atomic<bool> idle_ = false;  ///< the worker sleeps (or is about to) and must be woken for the slot
   Wakeup wakeup_;
   std::atomic<TimePoint::rep> progress_;

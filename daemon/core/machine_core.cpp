@@ -116,7 +116,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                                                            .published = parts_.published,
                                                            .event = record},
                                            settings, *descriptor, std::move(drive),
-                                           std::make_shared<AxisGate>(), bus->simulated()));
+                                           std::make_shared<AxisGate>(bus->stop_notice()), bus->simulated()));
     by_name_.emplace(settings.name, axes_.back().get());
     const bool brake =
         std::ranges::any_of(settings.outputs, [](const auto& o) { return o.function == "brake"; });

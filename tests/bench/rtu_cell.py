@@ -107,17 +107,17 @@ buses:
         return text
 
     @contextlib.contextmanager
-    def run(self, **options):
-        """The process; it was just started."""
+    def run(self, *words, **options):
+        """The process; it was just started, with these words, too."""
         path = self.lines[0].directory / "bench.yaml"
         path.write_text(self.configuration(), encoding="utf-8")
-        with running(f"{self.build}/daemon/axisd", "--config", path, **options) as process:
+        with running(f"{self.build}/daemon/axisd", "--config", path, *words, **options) as process:
             yield process
 
     @contextlib.contextmanager
-    def online(self):
+    def online(self, *words):
         """Its id, when each drive that has power is online."""
-        with self.run() as process:
+        with self.run(*words) as process:
             self.wait_online(process)
             yield process.pid
 

@@ -20,16 +20,26 @@ class Found:
     bound: float  # of that, ms
 
 
-def earliest(line, frames, called):
-    """When a request that was called for at `called` may begin: after what is under way, and the silence."""
-    last = max(index for index, (begin, _, _) in enumerate(frames) if begin <= called)
-    (begin, asked, frame), (at, asked_again, reply) = frames[last:last + 2]
-    free = begin + line.wire(len(frame) // 2)
-    if asked and asked_again:  # a node that did not answer
+def requests_of(log):
+    """(time at which axisd gave it to the port in s, frame in hexadecimal) of each request in a wire log."""
+    found = []
+    for entry in log.read_text(encoding="ascii").splitlines():
+        stamp, _, direction, *words = entry.split()
+        if direction == "tx":
+            found.append((int(stamp) / 1e9, "".join(word for word in words if not word.startswith("@"))))
+    return found
+
+
+def earliest(line, given, frames, called):
+    """When a request that was called for at `called` may begin: after what is under way, and the silence. Under way is
+    what axisd had `given` to its port; what became of it is seen on the line."""
+    began, request = max(entry for entry in given if entry[0] <= called)
+    index = next(i for i, (at, asked, frame) in enumerate(frames) if asked and at >= began and frame == request)
+    (begin, _, _), (at, asked_again, reply) = frames[index:index + 2]
+    if asked_again:  # a node that did not answer
+        free = begin + line.wire(len(request) // 2)
         return max(called, free + TURNAROUND_MAX)
-    if asked:
-        free = at + line.wire(len(reply) // 2)
-    return max(called, free + silence(line.baud))
+    return max(called, at + line.wire(len(reply) // 2) + silence(line.baud))
 
 
 def bound(cell):
@@ -42,10 +52,12 @@ def measure(build, nodes, silent, count):
     with tempfile.TemporaryDirectory() as directory, \
             Line(build, directory, 115200, nodes, range(2, 2 + silent)).open() as line:
         cell = Cell(build, [line], POLL)
-        with cell.online():
+        log = line.directory / "wire.log"
+        with cell.online("--wire-log", log):
             begin = time.monotonic()
             calls = Client(build, SERVER).run("stop", count)
             time.sleep(0.5)  # the last was answered, its frame may be still to come
+            given = [request for request in requests_of(log) if request[0] >= begin]
             frames = line.frames(begin, time.monotonic())
             found = Found([], [], 0, bound(cell))
     for called, arrived, _, axis in calls:
@@ -54,7 +66,8 @@ def measure(build, nodes, silent, count):
                      if asked and at > called and frame.startswith(f"{node:02X}{STOP}"))
         sent, _, frame = frames[index]
         before = frames[max(0, index - 8):index + 1]
-        found.excess.append((sent - earliest(line, before, arrived)) * 1e6)
-        found.from_call.append((sent - earliest(line, before, called)) * 1e6)
+        asked = [request for request in given if before[0][0] <= request[0] <= sent]
+        found.excess.append((sent - earliest(line, asked, before, arrived)) * 1e6)
+        found.from_call.append((sent - earliest(line, asked, before, called)) * 1e6)
         found.longest = max(found.longest, (sent + line.wire(len(frame) // 2) - called) * 1e3)
     return found
