@@ -202,6 +202,23 @@ void Axis::Member::started(TimePoint at) {
   axis_->publish();
 }
 
+Duration Axis::Member::unseen_for() const {
+  if (!started_at_ || !current()) return {};
+  const auto seen = axis_->sample_ ? std::max(*started_at_, axis_->sample_->measured_at) : *started_at_;
+  return axis_->env_.clock->now() - seen;
+}
+
+Task<Result<void>> Axis::Member::look_after() {
+  const auto sample = co_await read_state();
+  if (!current()) co_return axisd::fail(gone());
+  if (sample)
+    axis_->on_sample(*sample);
+  else if (axis_->link_ == LinkState::online)
+    axis_->go_offline(sample.error());
+  if (!ready()) co_return axisd::fail(gone());
+  co_return Result<void>{};
+}
+
 void Axis::Member::follow() {
   auto& axis = *axis_;
   chain_.reset();

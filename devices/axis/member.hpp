@@ -52,6 +52,10 @@ class Axis::Member {
   Task<Result<TimePoint>> trigger();
   /// The start was executed.
   void started(TimePoint at);
+  /// How long ago its motion was last seen, or begun; 0 where it is none of these.
+  [[nodiscard]] Duration unseen_for() const;
+  /// Reads the drive while others are still being started: a fault then ends the command, as it does later.
+  Task<Result<void>> look_after();
   /// All members were started: watches the motion until it ends.
   void follow();
   /// What the drive has to be told after its start.

@@ -162,8 +162,22 @@ Task<GroupRun::MaybeFailure> GroupRun::start() {
     if (given_up_) co_return std::nullopt;  // it got its stop then
     if (!at) co_return attributed(i, at.error());
     member.started(*at);
+    if (auto failure = co_await look_after_the_started(); failure || given_up_) co_return failure;
   }
   co_return std::nullopt;
+}
+
+/// Between two starts, the one that nobody has looked at for longest, if that is longer than it would be
+/// alone: on a slow line many starts take seconds.
+Task<GroupRun::MaybeFailure> GroupRun::look_after_the_started() {
+  std::size_t member = 0;
+  for (std::size_t i = 1; i < members_.size(); ++i)
+    if (members_[i]->unseen_for() > members_[member]->unseen_for()) member = i;
+  auto& oldest = *members_[member];
+  if (oldest.unseen_for() <= oldest.axis().settings().poll_moving) co_return std::nullopt;
+  const auto seen = co_await oldest.look_after();
+  if (seen || given_up_) co_return std::nullopt;
+  co_return attributed(member, seen.error());
 }
 
 Task<GroupRun::MaybeFailure> GroupRun::start_by_sync(std::vector<std::size_t> together) {

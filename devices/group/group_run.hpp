@@ -15,8 +15,9 @@ namespace axisd {
 
 /// One group move, from its acceptance on. All members are loaded, read and judged before the first start
 /// frame; what starts by a SYNC starts first, since only that can still be called off by all; then each
-/// further start is sent when the one before is known to be good. Whatever fails, and whoever stops a member,
-/// stops all: those that may move first (M22). Thread: core.
+/// further start is sent when the one before is known to be good; between two of them, who moves already is
+/// looked at. Whatever fails, and whoever stops a member, stops all: those that may move first (M22). Thread:
+/// core.
 class GroupRun : public std::enable_shared_from_this<GroupRun> {
  public:
   struct Parts {
@@ -53,6 +54,7 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   Task<MaybeFailure> prepare();
   Task<MaybeFailure> start();
   Task<MaybeFailure> start_by_sync(std::vector<std::size_t> together);
+  Task<MaybeFailure> look_after_the_started();
   [[nodiscard]] std::vector<std::vector<std::size_t>> common_starts() const;
   [[nodiscard]] MaybeFailure unready() const;
   [[nodiscard]] Failure attributed(std::size_t member, Error cause) const;

@@ -26,7 +26,8 @@ using namespace std::chrono_literals;
 
 struct GroupRigOptions {
   int baud = 115200;
-  int can_axes = 1;  ///< z, and w beside it
+  int can_axes = 1;          ///< z, and w beside it
+  int more_serial_axes = 0;  ///< a, b, ... (nodes 11, 12, ...; ykd2405pr)
   Duration sync_period = 10ms;
   simulation::Switches can_switches{}, serial_switches{};
   LeaseLoss on_lease_loss = LeaseLoss::halt;
@@ -44,6 +45,9 @@ class GroupRig {
         {.name = "can0", .interface = "sim", .sync_period = options.sync_period});
     add_serial("x", 1, "ykd2405pr", options);
     add_serial("y", 2, "ess42-r", options);
+    for (int i = 0; i < options.more_serial_axes; ++i)
+      add_serial(std::string(1, static_cast<char>('a' + i)), static_cast<std::uint8_t>(11 + i), "ykd2405pr",
+                 options);
     for (int i = 0; i < options.can_axes; ++i)
       add_can(i == 0 ? "z" : "w", static_cast<std::uint8_t>(5 + i), options);
     run(1s);

@@ -219,6 +219,34 @@ TEST(M22Group, AFaultOnTheWayStopsAll) {
   EXPECT_LT(rig.load_mm("x"), 80);
 }
 
+/// On a slow line the starts take long: who moves already is looked at between them.
+TEST(M22Group, AFaultOfAStartedMemberEndsTheStartsOfTheOthers) {
+  for (const bool silent : {false, true}) {
+    SCOPED_TRACE(silent);
+    GroupRig rig({.baud = 9600, .more_serial_axes = 6});
+    rig.line->set_on_bind([&, armed = false](const WireEntry& entry) mutable {
+      if (entry.node() != 12 || !entry.is_write() || entry.address() != start_register || armed) return;
+      armed = true;
+      if (silent)
+        rig.faults().add({.kind = FaultKind::drop_request, .node = 11, .count = 12});
+      else
+        rig.serial(2).raise_alarm(1);
+    });
+    const auto move =
+        rig.complete(GroupRig::to({{"a", 300}, {"b", 300}, {"c", 300}, {"d", 300}, {"e", 300}, {"f", 300}}));
+    EXPECT_EQ(rig.starts("a") + rig.starts("b"), 2);
+    EXPECT_EQ(rig.starts("c") + rig.starts("d") + rig.starts("e") + rig.starts("f"), 0);
+    ASSERT_TRUE(move.cause);
+    EXPECT_EQ(move.cause->where.node, 11) << to_string(*move.cause);
+    EXPECT_EQ(member(move, "a").command.state, silent ? CommandState::unknown : CommandState::error)
+        << describe(member(move, "a").command);
+    EXPECT_EQ(member(move, "b").command.state, CommandState::aborted);
+    rig.run(3s);
+    EXPECT_TRUE(rig.rests(3s));
+    EXPECT_LT(rig.load_mm("b"), 60);
+  }
+}
+
 TEST(M22Group, ARestartBeforeTheStartStartsNobody) {
   GroupRig rig;
   rig.serial(0).advance(rig.world.now());
