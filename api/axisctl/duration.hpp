@@ -21,4 +21,11 @@ inline void set_ahead(google::protobuf::Timestamp& message, std::chrono::nanosec
       (std::chrono::duration_cast<std::chrono::nanoseconds>(then) % std::chrono::seconds(1)).count()));
 }
 
+/// By the wall clock.
+inline google::protobuf::Timestamp now() {
+  google::protobuf::Timestamp time;
+  set_ahead(time, std::chrono::nanoseconds(0));
+  return time;
+}
+
 }  // namespace axisd::axisctl

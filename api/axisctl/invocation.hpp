@@ -52,6 +52,7 @@ void add_config_commands(CLI::App& app, Invocation& invocation);   ///< config s
 void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, schema, completion, man
 void add_run_command(CLI::App& app, Invocation& invocation);       ///< run
 void add_plot_command(CLI::App& app, Invocation& invocation);      ///< plot
+void add_commission_command(CLI::App& app, Invocation& invocation);  ///< commission
 
 /// The command line with all its subcommands.
 std::unique_ptr<CLI::App> make_app(Invocation& invocation);

@@ -1,0 +1,203 @@
+#include "api/axisctl/commission/verdict.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "api/axisctl/error.hpp"
+#include "api/axisctl/format.hpp"
+
+namespace axisd::axisctl::commission {
+namespace {
+
+Judgement failed(std::string reason, std::string remedy = {}) {
+  return {.verdict = VERDICT_FAILED, .reason = std::move(reason), .remedy = std::move(remedy)};
+}
+
+std::string with_function(const std::string& terminal, const std::string& function) {
+  return function.empty() ? terminal : fmt::format("{} ({})", terminal, function);
+}
+
+std::string key_of(const ExpectedInput& input) {
+  return fmt::format("axes.{}.inputs.{}", input.axis, input.terminal);
+}
+
+/// "MoveRelative ended Aborted: the drive came to rest at 3 mm; check terminals".
+std::string end_of(const v1::Command& command) {
+  return fmt::format("{} ended {}{}", command_kind(command), command_state(command),
+                     command.has_cause() ? ": " + describe(command.cause(), command.axis()) : "");
+}
+
+bool done(const v1::Command& command) { return command.state() == v1::COMMAND_STATE_DONE; }
+
+double seconds_of(const google::protobuf::Timestamp& time) {
+  return static_cast<double>(google::protobuf::util::TimeUtil::TimestampToNanoseconds(time)) / 1e9;
+}
+
+}  // namespace
+
+Judgement judge_switch(const ExpectedInput& expected, const std::vector<v1::TerminalEdge>& edges) {
+  std::vector<v1::TerminalEdge> own;
+  std::vector<v1::TerminalEdge> others;
+  for (const auto& edge : edges) (edge.terminal() == expected.terminal ? own : others).push_back(edge);
+  const auto name = with_function(expected.terminal, expected.function);
+  if (own.empty() && others.empty())
+    return failed("no terminal changed", "check the switch, its supply and its wiring");
+  if (own.empty()) {
+    const auto& other = others.front();
+    return failed(fmt::format("{} changed, expected {}: swapped?",
+                              with_function(other.terminal(), other.function()), name),
+                  fmt::format("swap the wires, or give {} the function {} (axes.{}.inputs)", other.terminal(),
+                              expected.function, expected.axis));
+  }
+  if (!others.empty())
+    return failed(
+        fmt::format("{} changed, too", with_function(others.front().terminal(), others.front().function())),
+        "actuate one switch at a time; else look for a short between the wires");
+  if (!own.front().active()) return wrong_polarity(expected);
+  if (own.back().active())
+    return failed(fmt::format("{} stayed active", expected.terminal), "does the switch hang?");
+  return {};
+}
+
+Judgement wrong_polarity(const ExpectedInput& expected) {
+  if (expected.active.empty())
+    return failed("active at rest, inactive while actuated: the polarity is wrong",
+                  fmt::format("change `active` of {}", key_of(expected)));
+  const bool low = expected.active == "low";
+  return failed(fmt::format("active at rest: the polarity (active: {}) is wrong", expected.active),
+                fmt::format("{}: {{ function: {}, active: {} }}", key_of(expected), expected.function,
+                            low ? "high" : "low"));
+}
+
+Judgement judge_motion(const JogObservation& jog, const std::string& unit) {
+  if (!done(jog.command)) return failed(end_of(jog.command), fmt::format("axisctl explain {}", jog.axis));
+  if (std::abs(jog.travelled - jog.distance) > jog.tolerance)
+    return failed(fmt::format("the position changed by {} instead of {}", with_unit(jog.travelled, unit),
+                              with_unit(jog.distance, unit)),
+                  "look for what moved the axis beside this command");
+  return {};
+}
+
+Judgement judge_jog(const JogObservation& jog, const std::string& unit) {
+  if (auto judgement = judge_motion(jog, unit); judgement.verdict != VERDICT_PASSED) return judgement;
+  switch (jog.seen) {
+    case Seen::as_told:
+      return {};
+    case Seen::other_way:
+      return failed("it moved the other way",
+                    fmt::format("axes.{}.scale: {{ invert: {} }}", jog.axis, !jog.invert));
+    case Seen::other_distance:
+      return failed(
+          fmt::format("it moved another distance than {}", with_unit(std::abs(jog.distance), unit)),
+          fmt::format("compare axes.{}.scale (microstep, gear, travel) with the mechanics", jog.axis));
+    case Seen::nothing:
+      return failed("it did not move, though its position did",
+                    "check the motor's cable and current, and the coupling");
+  }
+  return failed("no verdict");
+}
+
+Judgement judge_limit_end(const LimitObservation& limit) {
+  const auto name = with_function(limit.input.terminal, limit.input.function);
+  if (limit.moving)
+    return failed(fmt::format("it still moves although {} is active", name), "look at the machine");
+  if (done(limit.command)) {
+    if (!limit.became_active)
+      return failed(fmt::format("{} did not become active on the way", name),
+                    "actuate the switch while the axis moves, or begin closer to it");
+    return failed(fmt::format("{} became active, and the axis went on", name),
+                  fmt::format("compare {} with the direction that the axis moves in", key_of(limit.input)));
+  }
+  const bool by_limit = limit.command.state() == v1::COMMAND_STATE_ABORTED &&
+                        limit.command.cause().reason() == v1::REASON_LIMIT_SWITCH;
+  if (by_limit) return {};
+  if (limit.became_active && limit.command.cause().reason() == v1::REASON_DID_NOT_START)
+    return failed(end_of(limit.command), "let it move before the switch is actuated");
+  return failed(end_of(limit.command), limit.became_active
+                                           ? fmt::format("was {} released too early?", limit.input.terminal)
+                                           : fmt::format("axisctl explain {}", limit.input.axis));
+}
+
+Judgement judge_limit(const LimitObservation& limit) {
+  if (auto judgement = judge_limit_end(limit); judgement.verdict != VERDICT_PASSED) return judgement;
+  if (blocked_by(limit.further, v1::REASON_LIMIT_SWITCH) == nullptr)
+    return failed("motion further in that direction is not refused", "keep the switch actuated meanwhile");
+  if (!limit.away)
+    return {
+        .verdict = VERDICT_SKIPPED, .reason = "motion away from it: " + limit.away_left_out, .remedy = {}};
+  if (!done(*limit.away)) return failed("motion away from it: " + end_of(*limit.away));
+  return {};
+}
+
+Judgement judge_stop(const StopObservation& stop) {
+  if (!done(stop.stop))
+    return failed("standstill is not confirmed: " + end_of(stop.stop), "look at the machine");
+  if (stop.moving) return failed("it still moves", "look at the machine");
+  if (stop.move.state() != v1::COMMAND_STATE_ABORTED)
+    return failed("the move was over before the stop: " + end_of(stop.move), "give a longer --distance");
+  if (stop.at_target)
+    return failed("it went on to its target: the stop did not end it", "look at the bus (axisctl trace)");
+  if (stop.bound && stop.time > *stop.bound)
+    return failed(fmt::format("standstill after {}, published bound {}", duration_text(stop.time),
+                              duration_text(*stop.bound)),
+                  "axisctl budget shows what the bound is made of");
+  if (stop.way_bound && stop.way > *stop.way_bound)
+    return failed(fmt::format("{} until it rested, by the published bound {}", with_unit(stop.way, stop.unit),
+                              with_unit(*stop.way_bound, stop.unit)),
+                  "check load and deceleration time");
+  if (!stop.held || blocked_by(stop.while_held, v1::REASON_STOPPING) == nullptr)
+    return failed("the axis was not held until ReleaseStop");
+  if (!stop.released) return failed("the axis is not at Standstill after ReleaseStop");
+  return {.reason = stop.bound ? "" : "the bus publishes no bound for it", .remedy = {}};
+}
+
+Judgement judge_soft_limits(const v1::ExplainResponse& above, const v1::ExplainResponse& below) {
+  for (const auto* response : {&above, &below}) {
+    if (blocked_by(*response, v1::REASON_SOFT_LIMIT) != nullptr) continue;
+    if (const auto* lost = blocked_by(*response, v1::REASON_NOT_TRUSTED))
+      return {.verdict = VERDICT_NOT_DONE,
+              .reason = "the position is unknown, so that soft limits do not count",
+              .remedy = lost->remedy()};
+    return failed(
+        fmt::format("a target {} the soft limits is not refused", response == &above ? "above" : "below"));
+  }
+  return {};
+}
+
+Judgement judge_homing(const v1::Command& command, const v1::AxisState& after) {
+  if (!done(command)) return failed(end_of(command), fmt::format("axisctl explain {} home", command.axis()));
+  if (after.trust() != v1::POSITION_TRUST_HOMED) return failed("it is not homed afterwards");
+  return {};
+}
+
+const v1::ErrorDetail* blocked_by(const v1::ExplainResponse& response, v1::Reason reason) {
+  for (const auto& obstacle : response.obstacles())
+    if (obstacle.blocking() && obstacle.detail().reason() == reason) return &obstacle.detail();
+  return nullptr;
+}
+
+double way_since(const google::protobuf::Timestamp& since, const std::vector<v1::AxisState>& samples,
+                 double rest) {
+  const double moment = seconds_of(since);
+  const v1::AxisState* before = nullptr;
+  const v1::AxisState* after = nullptr;
+  for (const auto& sample : samples) {
+    if (seconds_of(sample.measured_at()) <= moment) before = &sample;
+    if (seconds_of(sample.measured_at()) > moment && after == nullptr) after = &sample;
+  }
+  if (before == nullptr) return after == nullptr ? 0 : std::abs(rest - after->position());
+  double position = before->position();
+  if (after != nullptr) {
+    const double begin = seconds_of(before->measured_at());
+    const double share = (moment - begin) / (seconds_of(after->measured_at()) - begin);
+    position += share * (after->position() - before->position());
+  } else {
+    position += before->velocity() * (moment - seconds_of(before->measured_at()));
+  }
+  return std::abs(rest - position);
+}
+
+}  // namespace axisd::axisctl::commission

@@ -1,0 +1,291 @@
+"""axisctl commission with an operator who answers, and whose hand is at the simulated switches."""
+import json
+import pathlib
+import re
+import signal
+import subprocess
+import threading
+import unittest
+
+from harness import AXISCTL, ENABLE, HOMING, START, STOP, Scenario, feeder, pb, wait_for
+from harness.operator import ScriptedOperator
+
+#: Quicker than the default.
+QUICK = ("--velocity", "20mm/s", "--distance", "5mm")
+
+
+class Hand:
+    """Of an operator who does what is asked for. `reacts`: terminals that react in place of others."""
+
+    def __init__(self, machine, node=1, reacts=None):
+        self.machine, self.node, self.reacts = machine, node, reacts or {}
+
+    def level(self, terminal, level):
+        self.machine.sim.control(f"input {self.node} {self.reacts.get(terminal, terminal)} {level}")
+
+    def press(self, match):
+        self.level(match[1], "on")
+
+    def release(self, match):
+        self.machine.sim.control(f"input {self.node} {match[1]} auto")
+
+    def to_the_switch(self, match):
+        """Says yes, and actuates the switch once the axis is under way."""
+        start = self.machine.sim.shaft(self.node).position
+
+        def press():
+            wait_for(lambda: abs(self.machine.sim.shaft(self.node).position - start) > 100, "under way")
+            self.level(match[1], "on")
+        threading.Thread(target=press).start()
+        return "yes"
+
+    def rules(self):
+        return [(r"Actuate (\w+) \(\w+\) by hand", self.press), (r"(\w+) is active\. Release it", self.release),
+                (r"Release (\w+)\. ", self.release),
+                (r"Go to the switch at (\w+) [^?]*\? \[yes/skip/abort\] ", self.to_the_switch),
+                (r"again/go-on/abort\] ", "go-on"), (r"Why is it left out\? ", "no time"), (r"/abort\] ", "yes")]
+
+
+class Commission(Scenario):
+    def cell(self, **keys):
+        """The feeder stands 10 mm from its home switch; nothing is enabled."""
+        return self.machine({"feeder": feeder(**keys)}).start()
+
+    def person(self, machine, *rules, options=QUICK, hand=None):
+        """An operator who says yes and does what is asked for, but for `rules`."""
+        return ScriptedOperator(machine, "feeder", [*rules, *(hand or Hand(machine)).rules()], options)
+
+    def assert_verdicts(self, person, **expected):
+        """Of these steps, with _ for the blanks in their names."""
+        verdicts = {name.replace(" ", "_"): verdict for name, verdict in person.verdicts().items()}
+        self.assertEqual({name: verdicts.get(name) for name in expected}, expected, person.text)
+
+    def nothing_moved(self, machine):
+        self.assertEqual(machine.sim.shaft(), (0, False, 0))
+        for address in (START, HOMING):
+            self.assertEqual(machine.wire.writes(address), [])
+
+    def leases(self, machine):
+        return json.loads(machine.axisctl("--json", "lease", "list").stdout)["leases"]
+
+    def test_everything_passes(self):
+        machine = self.cell()
+        person = self.person(machine)
+        self.assertEqual(person.finish(), 0, person.text)
+        self.assert_verdicts(person, identity="PASSED", power_off="NOT_APPLICABLE", switch_X0="PASSED", switch_X1="PASSED",
+                             switch_X2="PASSED", power_on="PASSED", jog_positive="PASSED", jog_negative="PASSED",
+                             limit_positive="PASSED", limit_negative="PASSED", stop="PASSED", homing="PASSED",
+                             soft_limits="PASSED", power_off_again="PASSED")
+        record = person.record()
+        config = json.loads(machine.axisctl("--json", "config", "show").stdout)
+        self.assertEqual((record["verdict"], record["machine"], record["axis"], record["operator"], record["model"]),
+                         ("VERDICT_PASSED", "e2e", "feeder", "e2e", "ykd2405pr"))
+        self.assertEqual(record["configuration_revision"], config["revision"])
+        self.assertEqual(len(person.step("switch X0")["edges"]), 2)
+        figures = {figure["name"]: figure["value"] for figure in person.step("jog positive")["figures"]}
+        self.assertEqual((figures["asked"], figures["travelled"]), (5, 5))
+        figures = {figure["name"]: figure["value"] for figure in person.step("stop")["figures"]}
+        self.assertTrue(0 < figures["standstill_after"] < figures["published_bound"], figures)
+        self.assertGreaterEqual(figures["call_answered_after"], figures["standstill_after"])
+        self.assertTrue(0 < figures["way"] < figures["published_way"], figures)
+        state = machine.client.state("feeder")
+        self.assertEqual((state.enabled, state.lease_holder), (False, ""))
+        # Power came on after the switches, and was permitted; each start was permitted just before it.
+        self.assertLess(person.text.index("switch X2: passed"), person.text.index("Switch it on?"))
+        asked = len(re.findall(r"(?:Move|Home)\? \[yes/skip/abort\] yes", person.text))
+        self.assertEqual(len(machine.wire.writes(START)) + len(machine.wire.writes(HOMING)), asked)
+
+    def test_a_wrong_polarity_is_told_with_its_key(self):
+        # A switch that closes when it is actuated, and a configuration that says the contrary.
+        machine = self.cell(inputs="{ X0: home, X1: { function: positive_limit, active: low } }",
+                            simulated="home=-28000:-20000,positive_limit=900000,wire.X1=positive_limit")
+        person = self.person(machine, (r"X1 \(positive_limit\) is active now\.[^\]]*\] ", "no"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, switch_X0="PASSED", switch_X1="FAILED", limit_positive="NOT_DONE", stop="NOT_DONE",
+                             homing="NOT_DONE", power_off_again="PASSED")
+        step = person.step("switch X1")
+        self.assertIn("polarity (active: low) is wrong", step["reason"])
+        self.assertEqual(step["remedy"], "axes.feeder.inputs.X1: { function: positive_limit, active: high }")
+
+    def test_a_normally_closed_switch_is_right(self):
+        """Closed at rest, and configured so."""
+        inputs = "{ X0: { function: home, active: low } }"
+        machine = self.cell(inputs=inputs, simulated="wire.X0=home:nc,home=-28000:-20000")
+        hand = Hand(machine)
+        rules = ((r"Actuate (X0) ", lambda _: machine.sim.control("input 1 X0 off")),)
+        person = self.person(machine, *rules, (r"Switch it on\? [^\]]*\] ", "abort"), hand=hand)
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, switch_X0="PASSED", power_on="NOT_DONE")
+
+    def test_swapped_switches_are_named(self):
+        machine = self.cell()
+        hand = Hand(machine, reacts={"X0": "X2", "X2": "X0"})
+        person = self.person(machine, hand=hand)
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, switch_X0="FAILED", switch_X1="PASSED", switch_X2="FAILED", limit_positive="NOT_DONE",
+                             limit_negative="NOT_DONE", stop="NOT_DONE", homing="NOT_DONE")
+        self.assertEqual(person.step("switch X0")["reason"], "X2 (negative_limit) changed, expected X0 (home): swapped?")
+
+    def test_a_step_that_failed_can_be_tried_again(self):
+        machine = self.cell()
+        seen = []
+
+        def forget_once(match):
+            seen.append(match[0])
+            return None if len(seen) == 1 else Hand(machine).press(match)
+        person = self.person(machine, (r"Actuate (X0) ", forget_once), (r"again/go-on/abort\] ", "again"),
+                             (r"Actuate X1 ", "abort"), options=("--patience", "500ms"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assertIn("no terminal changed", person.text)
+        self.assertEqual((person.step("switch X0")["verdict"], person.step("switch X0")["attempts"]), ("VERDICT_PASSED", 2))
+        self.assertIn("aborted by the operator", person.record()["ended_early"])
+
+    def test_the_wrong_direction_ends_what_relies_on_it(self):
+        machine = self.cell()
+        person = self.person(machine, (r"in the positive direction\? [^\]]*\] ", "no"), (r"What did it do[^\]]*\] ", "o"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, jog_positive="FAILED", limit_positive="NOT_DONE", limit_negative="NOT_DONE",
+                             stop="NOT_DONE", homing="NOT_DONE")
+        self.assertEqual(person.step("jog positive")["remedy"], "axes.feeder.scale: { invert: true }")
+        self.assertEqual(machine.sim.shaft().starts, 2)
+
+    def stop_step(self, go, **keys):
+        """Why the stop failed, where an operator does `go` once the motion that is to be stopped is permitted."""
+        machine = self.cell(**keys)
+
+        def permit(_match):
+            go(machine)
+            return "yes"
+        person = self.person(machine, (r"about a third of it[^\]]*\] ", permit),
+                             (r"(Actuate|Go to the switch)[^\]]*(\] |abort\)\n)", "skip"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, jog_positive="PASSED", limit_positive="SKIPPED", stop="FAILED", homing="NOT_DONE")
+        self.assertEqual(person.step("limit positive")["reason"], "no time")
+        return person.step("stop")["reason"]
+
+    def test_a_stop_that_is_not_confirmed_fails(self):
+        """The cable is cut in mid-move."""
+        def cut(machine):
+            def later():
+                machine.sim.wait_moving()
+                machine.sim.control("cut")
+            threading.Thread(target=later).start()
+        self.assertIn("standstill is not confirmed", self.stop_step(cut))
+
+    def test_a_stop_that_ends_nothing_fails(self):
+        def deafen(machine):
+            machine.sim.control(f"fault drop_request register={STOP} count=-1")
+        self.assertIn("it went on to its target", self.stop_step(deafen))
+
+    def test_no_means_that_nothing_moves(self):
+        """Not the power stage, and with power no motion: an empty answer, and one that begins with yes in mind."""
+        machine = self.cell()
+        person = self.person(machine, (r"Switch it on\? [^\]]*\] ", "no"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, switch_X0="PASSED", power_on="SKIPPED", jog_positive="NOT_DONE", stop="NOT_DONE")
+        self.nothing_moved(machine)
+        self.assertEqual(machine.wire.writes(ENABLE), [])
+
+    def test_no_before_each_motion(self):
+        machine = self.cell()
+        answers = iter(["", "no"])
+        person = self.person(machine, (r"Move\? [^\]]*\] ", lambda _: next(answers)), (r"Actuate ", "skip"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, switch_X0="SKIPPED", power_on="PASSED", jog_positive="SKIPPED", jog_negative="SKIPPED",
+                             limit_positive="NOT_DONE", stop="NOT_DONE", homing="NOT_DONE", power_off_again="PASSED")
+        self.nothing_moved(machine)
+
+    def test_a_pipe_is_nobody(self):
+        machine = self.cell()
+        path = machine.path("piped.json")
+        done = subprocess.run([AXISCTL, "--server", f"unix:{machine.socket}", "--json", "commission", "feeder",
+                               "--record", path], input="yes\n" * 100, capture_output=True, text=True, timeout=60, check=False)
+        self.assertEqual(done.returncode, 1, done)
+        record = json.loads(done.stdout)
+        self.assertEqual(record, json.loads(pathlib.Path(path).read_text()))
+        self.assertEqual(record["steps"][0]["verdict"], "VERDICT_SKIPPED")
+        self.assertIn("nobody answered", record["steps"][0]["reason"])
+        self.nothing_moved(machine)
+        self.assertEqual(machine.wire.writes(ENABLE), [])
+
+    def jog(self, machine, then, options=("--velocity", "5mm/s", "--distance", "20mm")):
+        """An operator who does `then` while the axis jogs."""
+        def act(_match):
+            def later():
+                machine.sim.wait_moving()
+                wait_for(lambda: machine.sim.shaft().position > 1000, "in mid-move")
+                then(person)
+            threading.Thread(target=later).start()
+            return "yes"
+        person = self.person(machine, (r"Move\? [^\]]*\] ", act), (r"Actuate ", "skip"), options=options)
+        return person
+
+    def test_control_c_stops_a_jog(self):
+        machine = self.cell()
+        person = self.jog(machine, lambda person: person.interrupt())
+        self.assertEqual(person.finish(), 130, person.text)
+        shaft = machine.sim.shaft()
+        self.assertFalse(shaft.moving)
+        self.assertTrue(1000 < shaft.position < 30000, shaft)
+        self.assertTrue(machine.wire.writes(STOP, 0))
+        record = person.record()
+        self.assertIn("interrupted; standstill is confirmed", record["ended_early"])
+        self.assertIn("axisctl disable feeder", record["ended_early"])
+        self.assert_verdicts(person, power_on="PASSED", jog_positive="NOT_DONE", stop="OPEN")
+        self.assertEqual(self.leases(machine), [])
+
+    def test_enter_stops_a_jog(self):
+        machine = self.cell()
+        person = self.jog(machine, lambda person: person.type(""))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assertLess(machine.sim.shaft().position, 30000)
+        self.assert_verdicts(person, jog_positive="FAILED", jog_negative="FAILED", stop="NOT_DONE")
+        self.assertEqual(person.step("jog positive")["reason"], "stopped by the operator")
+
+    def test_if_it_is_killed_the_axis_halts_and_the_record_is_there(self):
+        machine = self.cell()
+        person = self.jog(machine, lambda person: person.process.kill())
+        self.assertEqual(person.finish(), -signal.SIGKILL, person.text)
+        machine.sim.wait_rest()
+        self.assertLess(machine.sim.shaft().position, 38000)  # the lease of 2 s ended it
+        self.assert_verdicts(person, power_on="PASSED", jog_positive="OPEN")
+
+    def test_an_axis_that_is_offline_says_what_to_do(self):
+        machine = self.cell()
+        machine.sim.control("power 1 off")
+        machine.client.wait_state("feeder", lambda s: s.link == pb.LINK_STATE_OFFLINE, "offline")
+        person = self.person(machine)
+        self.assertEqual(person.finish(), 1, person.text)
+        step = person.step("identity")
+        self.assertEqual(step["verdict"], "VERDICT_FAILED")
+        self.assertIn("offline", step["reason"])
+        self.assertIn("check power and wiring", step["remedy"])
+        self.assert_verdicts(person, switch_X0="NOT_DONE", power_on="NOT_DONE", jog_positive="NOT_DONE")
+
+    def test_an_axis_of_somebody_else_is_left_alone(self):
+        machine = self.cell()
+        # A local client of another identity is not at hand here: the inhibit stands for whatever forbids motion.
+        machine.axisctl("stop", "--all")
+        person = self.person(machine)
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assertEqual(person.step("identity")["remedy"], "axisctl release-stop --all")
+        self.nothing_moved(machine)
+
+    def test_power_that_is_on_goes_off_before_hands_are_asked_for(self):
+        machine = self.ready_feeder()
+        person = self.person(machine, (r"Actuate ", "abort"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, power_off="PASSED", switch_X0="NOT_DONE")
+        self.assertFalse(machine.client.state("feeder").enabled)
+
+    def test_a_record_is_not_replaced(self):
+        machine = self.cell()
+        path = pathlib.Path(machine.path("record.json"))
+        path.write_text("evidence")
+        done = machine.axisctl("commission", "feeder", "--record", str(path))
+        self.assertEqual((done.returncode, path.read_text()), (2, "evidence"), done)
+        self.assertIn("cannot write", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

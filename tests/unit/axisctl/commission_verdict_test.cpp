@@ -1,0 +1,224 @@
+#include <gmock/gmock.h>
+
+#include "api/axisctl/commission/verdict.hpp"
+
+namespace axisd::axisctl::commission {
+namespace {
+
+using testing::HasSubstr;
+
+v1::TerminalEdge edge(const char* terminal, bool active, const char* function = "") {
+  v1::TerminalEdge edge;
+  edge.set_terminal(terminal);
+  edge.set_function(function);
+  edge.set_active(active);
+  return edge;
+}
+
+v1::Command command(v1::CommandState state, v1::Reason cause = v1::REASON_UNSPECIFIED) {
+  v1::Command command;
+  command.set_axis("feeder");
+  command.set_kind(v1::COMMAND_KIND_MOVE_RELATIVE);
+  command.set_state(state);
+  if (cause != v1::REASON_UNSPECIFIED) command.mutable_cause()->set_reason(cause);
+  return command;
+}
+
+v1::ExplainResponse obstacle(v1::Reason reason, bool blocking = true) {
+  v1::ExplainResponse response;
+  auto& one = *response.add_obstacles();
+  one.set_blocking(blocking);
+  one.mutable_detail()->set_reason(reason);
+  return response;
+}
+
+const ExpectedInput home{.axis = "feeder", .terminal = "X0", .function = "home", .active = "high"};
+
+TEST(JudgeSwitch, PassesWhereItAloneWasActuatedAndReleased) {
+  EXPECT_EQ(judge_switch(home, {edge("X0", true), edge("X0", false)}).verdict, VERDICT_PASSED);
+}
+
+TEST(JudgeSwitch, NamesTheTerminalThatReactedInstead) {
+  const auto judgement = judge_switch(home, {edge("X2", true, "negative_limit"), edge("X2", false)});
+  EXPECT_EQ(judgement.verdict, VERDICT_FAILED);
+  EXPECT_EQ(judgement.reason, "X2 (negative_limit) changed, expected X0 (home): swapped?");
+  EXPECT_THAT(judgement.remedy, HasSubstr("give X2 the function home"));
+}
+
+TEST(JudgeSwitch, FailsWhereAnotherChangedToo) {
+  const auto judgement = judge_switch(home, {edge("X0", true), edge("X3", true), edge("X0", false)});
+  EXPECT_EQ(judgement.verdict, VERDICT_FAILED);
+  EXPECT_EQ(judgement.reason, "X3 changed, too");
+}
+
+TEST(JudgeSwitch, FailsWhereNothingChangedOrItHangs) {
+  EXPECT_EQ(judge_switch(home, {}).reason, "no terminal changed");
+  EXPECT_EQ(judge_switch(home, {edge("X0", true)}).reason, "X0 stayed active");
+}
+
+TEST(JudgeSwitch, TellsTheKeyOfAWrongPolarity) {
+  auto input = home;
+  EXPECT_EQ(judge_switch(input, {edge("X0", false), edge("X0", true)}).remedy,
+            "axes.feeder.inputs.X0: { function: home, active: low }");
+  input.active = "low";
+  EXPECT_EQ(wrong_polarity(input).remedy, "axes.feeder.inputs.X0: { function: home, active: high }");
+  EXPECT_THAT(wrong_polarity(input).reason, HasSubstr("(active: low) is wrong"));
+  input.active.clear();
+  EXPECT_EQ(wrong_polarity(input).remedy, "change `active` of axes.feeder.inputs.X0");
+}
+
+JogObservation jog() {
+  return {.axis = "feeder",
+          .command = command(v1::COMMAND_STATE_DONE),
+          .distance = -10,
+          .travelled = -9.95,
+          .tolerance = 0.1};
+}
+
+TEST(JudgeJog, PassesAsTold) { EXPECT_EQ(judge_jog(jog(), "mm").verdict, VERDICT_PASSED); }
+
+TEST(JudgeJog, FailsWhereTheMoveDid) {
+  auto seen = jog();
+  seen.command = command(v1::COMMAND_STATE_ABORTED, v1::REASON_ALARM);
+  EXPECT_EQ(judge_jog(seen, "mm").reason, "MoveRelative ended Aborted: alarm");
+  seen = jog();
+  seen.travelled = -9;
+  EXPECT_EQ(judge_jog(seen, "mm").reason, "the position changed by -9 mm instead of -10 mm");
+}
+
+TEST(JudgeJog, TellsTheKeyByWhatWasSeen) {
+  auto seen = jog();
+  seen.seen = Seen::other_way;
+  EXPECT_EQ(judge_jog(seen, "mm").remedy, "axes.feeder.scale: { invert: true }");
+  seen.invert = true;
+  EXPECT_EQ(judge_jog(seen, "mm").remedy, "axes.feeder.scale: { invert: false }");
+  seen.seen = Seen::other_distance;
+  EXPECT_THAT(judge_jog(seen, "mm").remedy, HasSubstr("axes.feeder.scale (microstep, gear, travel)"));
+  seen.seen = Seen::nothing;
+  EXPECT_EQ(judge_jog(seen, "mm").verdict, VERDICT_FAILED);
+}
+
+LimitObservation limit() {
+  return {.input = {.axis = "feeder", .terminal = "X1", .function = "positive_limit", .active = "high"},
+          .command = command(v1::COMMAND_STATE_ABORTED, v1::REASON_LIMIT_SWITCH),
+          .became_active = true,
+          .further = obstacle(v1::REASON_LIMIT_SWITCH),
+          .away = command(v1::COMMAND_STATE_DONE),
+          .away_left_out = {}};
+}
+
+TEST(JudgeLimit, PassesWhereItStoppedForbadeAndLetGo) {
+  EXPECT_EQ(judge_limit(limit()).verdict, VERDICT_PASSED);
+}
+
+TEST(JudgeLimit, FailsWhereTheAxisWentOn) {
+  auto seen = limit();
+  seen.command = command(v1::COMMAND_STATE_DONE);
+  EXPECT_EQ(judge_limit(seen).reason, "X1 (positive_limit) became active, and the axis went on");
+  seen.became_active = false;
+  EXPECT_EQ(judge_limit(seen).reason, "X1 (positive_limit) did not become active on the way");
+  seen = limit();
+  seen.moving = true;
+  EXPECT_EQ(judge_limit(seen).verdict, VERDICT_FAILED);
+  seen = limit();
+  seen.command = command(v1::COMMAND_STATE_ABORTED, v1::REASON_TERMINAL);
+  EXPECT_EQ(judge_limit(seen).reason, "MoveRelative ended Aborted: terminal");
+  EXPECT_EQ(judge_limit(seen).remedy, "was X1 released too early?");
+  seen.command = command(v1::COMMAND_STATE_ERROR, v1::REASON_DID_NOT_START);
+  EXPECT_EQ(judge_limit(seen).remedy, "let it move before the switch is actuated");
+}
+
+TEST(JudgeLimit, FailsWhereTheDirectionIsNotForbidden) {
+  auto seen = limit();
+  seen.further = obstacle(v1::REASON_LIMIT_SWITCH, false);
+  EXPECT_EQ(judge_limit(seen).verdict, VERDICT_FAILED);
+}
+
+TEST(JudgeLimit, NeedsTheWayBack) {
+  auto seen = limit();
+  seen.away = command(v1::COMMAND_STATE_ERROR, v1::REASON_DID_NOT_START);
+  EXPECT_EQ(judge_limit(seen).reason, "motion away from it: MoveRelative ended Error: did not start");
+  seen.away.reset();
+  seen.away_left_out = "no time";
+  EXPECT_EQ(judge_limit(seen).verdict, VERDICT_SKIPPED);
+}
+
+StopObservation stop() {
+  return {.move = command(v1::COMMAND_STATE_ABORTED, v1::REASON_SUPERSEDED),
+          .stop = command(v1::COMMAND_STATE_DONE),
+          .unit = "mm",
+          .time = 0.2,
+          .bound = 0.3,
+          .way = 1,
+          .way_bound = 1.5,
+          .held = true,
+          .while_held = obstacle(v1::REASON_STOPPING),
+          .released = true};
+}
+
+TEST(JudgeStop, PassesWithinItsBounds) { EXPECT_EQ(judge_stop(stop()).verdict, VERDICT_PASSED); }
+
+TEST(JudgeStop, FailsForEachReason) {
+  const auto reason_after = [](auto change) {
+    auto seen = stop();
+    change(seen);
+    const auto judgement = judge_stop(seen);
+    EXPECT_EQ(judgement.verdict, VERDICT_FAILED);
+    return judgement.reason;
+  };
+  EXPECT_THAT(
+      reason_after([](auto& s) { s.stop = command(v1::COMMAND_STATE_ERROR, v1::REASON_NOT_CONFIRMED); }),
+      HasSubstr("standstill is not confirmed"));
+  EXPECT_EQ(reason_after([](auto& s) { s.moving = true; }), "it still moves");
+  EXPECT_THAT(reason_after([](auto& s) { s.move = command(v1::COMMAND_STATE_DONE); }),
+              HasSubstr("the move was over before the stop"));
+  EXPECT_THAT(reason_after([](auto& s) { s.at_target = true; }), HasSubstr("went on to its target"));
+  EXPECT_EQ(reason_after([](auto& s) { s.time = 0.31; }), "standstill after 310 ms, published bound 300 ms");
+  EXPECT_THAT(reason_after([](auto& s) { s.way = 2; }), HasSubstr("2 mm until it rested"));
+  EXPECT_THAT(reason_after([](auto& s) { s.held = false; }), HasSubstr("not held"));
+  EXPECT_THAT(reason_after([](auto& s) { s.while_held.Clear(); }), HasSubstr("not held"));
+  EXPECT_THAT(reason_after([](auto& s) { s.released = false; }), HasSubstr("not at Standstill"));
+}
+
+TEST(JudgeSoftLimits, NeedsBothRefused) {
+  const auto refused = obstacle(v1::REASON_SOFT_LIMIT);
+  EXPECT_EQ(judge_soft_limits(refused, refused).verdict, VERDICT_PASSED);
+  EXPECT_EQ(judge_soft_limits(refused, {}).reason, "a target below the soft limits is not refused");
+  EXPECT_EQ(judge_soft_limits({}, refused).reason, "a target above the soft limits is not refused");
+  EXPECT_EQ(judge_soft_limits(obstacle(v1::REASON_NOT_TRUSTED), refused).verdict, VERDICT_NOT_DONE);
+}
+
+TEST(JudgeHoming, NeedsAPositionThatIsHomed) {
+  v1::AxisState state;
+  state.set_trust(v1::POSITION_TRUST_HOMED);
+  EXPECT_EQ(judge_homing(command(v1::COMMAND_STATE_DONE), state).verdict, VERDICT_PASSED);
+  EXPECT_EQ(judge_homing(command(v1::COMMAND_STATE_ERROR), state).verdict, VERDICT_FAILED);
+  state.set_trust(v1::POSITION_TRUST_UNKNOWN);
+  EXPECT_EQ(judge_homing(command(v1::COMMAND_STATE_DONE), state).verdict, VERDICT_FAILED);
+}
+
+google::protobuf::Timestamp at(std::int64_t seconds, int milliseconds) {
+  google::protobuf::Timestamp time;
+  time.set_seconds(seconds);
+  time.set_nanos(milliseconds * 1'000'000);
+  return time;
+}
+
+v1::AxisState sample(int milliseconds, double position) {
+  v1::AxisState state;
+  *state.mutable_measured_at() = at(1000, milliseconds);
+  state.set_position(position);
+  state.set_velocity(-100);
+  return state;
+}
+
+TEST(WaySince, LiesBetweenTheSamples) {
+  const std::vector<v1::AxisState> samples{sample(0, 0), sample(100, -10), sample(200, -18)};
+  EXPECT_NEAR(way_since(at(1000, 50), samples, -20), 15, 1e-5);
+  // Beyond the last sample it went on at its velocity; before the first nothing is known.
+  EXPECT_NEAR(way_since(at(1000, 210), samples, -20), 1, 1e-5);
+  EXPECT_NEAR(way_since(at(999, 0), samples, -20), 20, 1e-5);
+}
+
+}  // namespace
+}  // namespace axisd::axisctl::commission
