@@ -62,6 +62,8 @@ void set_position(Invocation& invocation, const MotionArguments& arguments) {
 template <class Request, class Response>
 void simple(Invocation& invocation, const MotionArguments& arguments,
             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  if (!arguments.request_id.empty() && arguments.axes.size() > 1)
+    throw Failure(ExitCode::usage, "--request-id belongs to one command: name one axis with it");
   std::vector<v1::Command> commands;
   v1::AxisState before;
   for (const auto& axis : arguments.axes) {

@@ -99,6 +99,10 @@ void to_proto(const Command& from, v1::Command& to) {
   if (from.ended_at) to_proto(*from.ended_at, *to.mutable_ended_at());
 }
 
+void set_age(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
+  to_proto(std::max(now - from.sampled_before, Duration::zero()), *to.mutable_age());
+}
+
 void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   to.set_axis(from.name);
   to.set_unit(from.unit);
@@ -128,7 +132,7 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   // age.
   if (from.sampled_before != TimePoint{}) {
     to_proto(from.measured_at, *to.mutable_measured_at());
-    to_proto(std::max(now - from.sampled_before, Duration::zero()), *to.mutable_age());
+    set_age(from, now, to);
   }
   to.set_simulated(from.simulated);
   to.set_command_id(from.command_id);

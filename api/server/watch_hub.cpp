@@ -96,22 +96,35 @@ void WatchHub::refresh(Group& group, TimePoint now) {
   serialise(group, now);
 }
 
+/// At a high rate few axes have changed since the last batch: of the others only the age has.
+void WatchHub::show(Shown& shown, AxisSnapshotPtr snapshot, const WatchScope& scope, TimePoint now) {
+  if (shown.snapshot == snapshot) {
+    if (shown.state->has_age()) set_age(*snapshot, now, *shown.state);
+    return;
+  }
+  shown.state->Clear();
+  to_proto(*snapshot, now, *shown.state);
+  if (!scope.fields.paths().empty())
+    google::protobuf::util::FieldMaskUtil::TrimMessage(scope.fields, shown.state);
+  shown.snapshot = std::move(snapshot);
+}
+
 void WatchHub::serialise(Group& group, TimePoint now) {
   group.batch_published =
       published_.load(std::memory_order_acquire);  // before the snapshots: at worst one too many
   group.batch_made = now;
-  scratch_.Clear();
+  auto& states = *group.message.mutable_axes();
   const auto machine_now = machine_.now();
-  const auto& fields = group.scope.fields;
+  std::size_t count = 0;
   for (const auto& axis : group.scope.axes)
-    if (const auto snapshot = machine_.snapshot(axis)) {
-      auto& state = *scratch_.add_axes();
-      to_proto(*snapshot, machine_now, state);
-      if (!fields.paths().empty()) google::protobuf::util::FieldMaskUtil::TrimMessage(fields, &state);
+    if (auto snapshot = machine_.snapshot(axis)) {
+      if (count == group.shown.size()) group.shown.push_back({.state = states.Add()});
+      show(group.shown[count++], std::move(snapshot), group.scope, machine_now);
     }
+  for (; group.shown.size() > count; group.shown.pop_back()) states.RemoveLast();
   // Serialised straight into the slice's own memory, which nobody else has seen yet.
-  const grpc::Slice slice(scratch_.ByteSizeLong());
-  scratch_.SerializeWithCachedSizesToArray(const_cast<std::uint8_t*>(slice.begin()));
+  const grpc::Slice slice(group.message.ByteSizeLong());
+  group.message.SerializeWithCachedSizesToArray(const_cast<std::uint8_t*>(slice.begin()));
   group.batch = slice;
   batches_.fetch_add(1, std::memory_order_relaxed);
 }

@@ -45,11 +45,17 @@ class WatchHub {
   [[nodiscard]] std::uint64_t batches_serialised() const { return batches_.load(std::memory_order_relaxed); }
 
  private:
+  struct Shown {
+    AxisSnapshotPtr snapshot{};
+    v1::AxisState* state = nullptr;  ///< made of it, in the group's message
+  };
   struct Group {
     WatchScope scope;
     TimePoint due;
     std::vector<std::shared_ptr<WatchStream>> streams;
-    grpc::Slice batch;  ///< the AxisStates of a WatchAxesResponse
+    v1::WatchAxesResponse message{};  ///< as of the last batch
+    std::vector<Shown> shown{};
+    grpc::Slice batch;  ///< its AxisStates, serialised
     TimePoint batch_made{};
     std::uint64_t batch_published = 0;
   };
@@ -58,6 +64,7 @@ class WatchHub {
   void run(Group& group, TimePoint now);
   void pay(const std::shared_ptr<WatchStream>& stream);
   void refresh(Group& group, TimePoint now);
+  static void show(Shown& shown, AxisSnapshotPtr snapshot, const WatchScope& scope, TimePoint now);
   void serialise(Group& group, TimePoint now);
   void look_for_stalls(TimePoint now);
 
@@ -68,7 +75,6 @@ class WatchHub {
   std::atomic<std::uint64_t> batches_{0};
   std::vector<std::unique_ptr<Group>> groups_;
   TimePoint next_stall_check_{};
-  v1::WatchAxesResponse scratch_;  ///< keeps its memory between batches
 };
 
 }  // namespace axisd::server

@@ -151,6 +151,8 @@ class Motion(AxisctlTest):
         first = self.json("move", "feeder", "--relative", "5", "--wait", "--request-id", "abc")
         second = self.json("move", "feeder", "--relative", "5", "--wait", "--request-id", "abc")
         self.assertEqual(first[0]["id"], second[0]["id"])
+        self.assertIn("one axis", self.fails(2, "home", "turntable", "feeder", "--request-id", "abc"))
+        self.assertEqual(self.server.calls("Home"), [])
 
     def test_options_reach_the_daemon(self):
         self.ok("move", "feeder", "1", "--buffered", "--valid-for", "5s", "--lease-token", "7")
