@@ -60,6 +60,7 @@ commission::Wishes wishes_of(const Arguments& arguments, const std::string& unit
 /// Leaves nothing behind that moves or is held: a stop that is confirmed, and the lease given back. The power
 /// stage stays as it is, because a load may hang on it.
 std::string come_to_rest(AxisAccess& axis) {
+  if (!axis.ours()) return "nothing was commanded";
   try {
     const auto stop = axis.stop(false);
     axis.end_hold();

@@ -36,6 +36,10 @@ void handle(void (*handler)(int)) {
   action.sa_flags = SA_RESETHAND | SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  // The terminal is gone. Whoever ignores that (nohup) goes on ignoring it.
+  struct sigaction present{};
+  if (sigaction(SIGHUP, nullptr, &present) == 0 && present.sa_handler != SIG_IGN)
+    sigaction(SIGHUP, &action, nullptr);
 }
 
 int new_eventfd() {

@@ -8,8 +8,9 @@
 
 namespace axisd::axisctl {
 
-/// While it lives, the first SIGINT or SIGTERM calls `action`, on a thread of its own; a second one ends the
-/// program as usual. At most one inside another (a command within a script); a signal is a request to both.
+/// While it lives, the first SIGINT, SIGTERM or SIGHUP calls `action`, on a thread of its own; a second one
+/// ends the program as usual. At most one inside another (a command within a script); a signal is a request
+/// to both.
 class Interrupt {
  public:
   explicit Interrupt(std::function<void()> action);

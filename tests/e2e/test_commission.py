@@ -5,45 +5,14 @@ import re
 import signal
 import subprocess
 import threading
+import time
 import unittest
 
 from harness import AXISCTL, ENABLE, HOMING, START, STOP, Scenario, feeder, pb, wait_for
-from harness.operator import ScriptedOperator
+from harness.operator import Hand, ScriptedOperator
 
 #: Quicker than the default.
 QUICK = ("--velocity", "20mm/s", "--distance", "5mm")
-
-
-class Hand:
-    """Of an operator who does what is asked for. `reacts`: terminals that react in place of others."""
-
-    def __init__(self, machine, node=1, reacts=None):
-        self.machine, self.node, self.reacts = machine, node, reacts or {}
-
-    def level(self, terminal, level):
-        self.machine.sim.control(f"input {self.node} {self.reacts.get(terminal, terminal)} {level}")
-
-    def press(self, match):
-        self.level(match[1], "on")
-
-    def release(self, match):
-        self.machine.sim.control(f"input {self.node} {match[1]} auto")
-
-    def to_the_switch(self, match):
-        """Says yes, and actuates the switch once the axis is under way."""
-        start = self.machine.sim.shaft(self.node).position
-
-        def press():
-            wait_for(lambda: abs(self.machine.sim.shaft(self.node).position - start) > 100, "under way")
-            self.level(match[1], "on")
-        threading.Thread(target=press).start()
-        return "yes"
-
-    def rules(self):
-        return [(r"Actuate (\w+) \(\w+\) by hand", self.press), (r"(\w+) is active\. Release it", self.release),
-                (r"Release (\w+)\. ", self.release),
-                (r"Go to the switch at (\w+) [^?]*\? \[yes/skip/abort\] ", self.to_the_switch),
-                (r"again/go-on/abort\] ", "go-on"), (r"Why is it left out\? ", "no time"), (r"/abort\] ", "yes")]
 
 
 class Commission(Scenario):
@@ -234,6 +203,25 @@ class Commission(Scenario):
         self.assert_verdicts(person, power_on="PASSED", jog_positive="NOT_DONE", stop="OPEN")
         self.assertEqual(self.leases(machine), [])
 
+    def test_the_end_of_the_terminal_stops_a_jog(self):
+        machine = self.cell()
+        person = self.jog(machine, lambda person: person.process.send_signal(signal.SIGHUP))
+        self.assertEqual(person.finish(), 130, person.text)
+        self.assertLess(machine.sim.shaft().position, 30000)
+        self.assertIn("standstill is confirmed", person.record()["ended_early"])
+
+    def test_what_was_typed_before_a_question_is_no_answer(self):
+        machine = self.cell()
+
+        def decline(_match):
+            time.sleep(0.5)
+            return "no"
+        person = self.person(machine, (r"in the positive direction\? [^\]]*\] ", "yes\nyes\nyes"),
+                             (r"moves -5 mm[^?]*\? [^\]]*\] ", decline), (r"(Go to the switch|a third)[^\]]*\] ", "abort"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, jog_positive="PASSED", jog_negative="SKIPPED")
+        self.assertEqual(machine.sim.shaft().starts, 1)
+
     def test_enter_stops_a_jog(self):
         machine = self.cell()
         person = self.jog(machine, lambda person: person.type(""))
@@ -250,6 +238,18 @@ class Commission(Scenario):
         self.assertLess(machine.sim.shaft().position, 38000)  # the lease of 2 s ended it
         self.assert_verdicts(person, power_on="PASSED", jog_positive="OPEN")
 
+    def test_an_axis_with_a_fault_says_what_to_do(self):
+        machine = self.cell()
+        machine.sim.control("alarm 1 1")
+        machine.client.wait_state("feeder", lambda s: s.state == pb.STATE_ERROR_STOP, "the alarm is seen")
+        person = self.person(machine)
+        self.assertEqual(person.finish(), 1, person.text)
+        step = person.step("identity")
+        self.assertEqual(step["verdict"], "VERDICT_FAILED")
+        self.assertIn("overcurrent", step["reason"])
+        self.assertTrue(step["remedy"], step)
+        self.assertIn("fault", person.text)
+
     def test_an_axis_that_is_offline_says_what_to_do(self):
         machine = self.cell()
         machine.sim.control("power 1 off")
@@ -263,8 +263,33 @@ class Commission(Scenario):
         self.assert_verdicts(person, switch_X0="NOT_DONE", power_on="NOT_DONE", jog_positive="NOT_DONE")
 
     def test_an_axis_of_somebody_else_is_left_alone(self):
+        """Ctrl-C stops nothing that this did not begin."""
+        machine = self.ready_feeder()
+        done = machine.axisctl("lease", "acquire", "feeder", "--ttl", "60s", "--label", "press line")
+        self.assertEqual(done.returncode, 0, done)
+        move = self.move_under_way(machine, velocity=20.0, options={"lease_token": int(done.stdout)})
+        since = time.monotonic_ns()
+        person = self.person(machine, (r"again/go-on/abort\] ", lambda _: person.interrupt()))
+        self.assertEqual(person.finish(), 130, person.text)
+        self.assert_verdicts(person, identity="FAILED", switch_X0="OPEN")
+        self.assertIn("press line", person.step("identity")["reason"])
+        self.assert_command(machine.client.get_command(move), "ACTIVE")
+        self.assertEqual(machine.wire.writes(STOP, since=since), [])
+
+    def test_a_lease_that_is_taken_ends_it(self):
+        """Also while hands are at the switches: somebody else may enable the axis then."""
         machine = self.cell()
-        # A local client of another identity is not at hand here: the inhibit stands for whatever forbids motion.
+
+        def take(_match):
+            done = machine.axisctl("lease", "acquire", "feeder", "--take")
+            self.assertEqual(done.returncode, 0, done)
+        person = self.person(machine, (r"Actuate X1 ", take))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assertIn("the lease is over", person.record()["ended_early"])
+        self.assert_verdicts(person, switch_X0="PASSED", switch_X1="NOT_DONE", power_on="OPEN")
+
+    def test_a_machine_that_is_stopped_says_what_to_do(self):
+        machine = self.cell()
         machine.axisctl("stop", "--all")
         person = self.person(machine)
         self.assertEqual(person.finish(), 1, person.text)

@@ -73,7 +73,9 @@ VelocityRange AxisAccess::velocities() {
 }
 
 void AxisAccess::acquire_lease(const std::string& label) {
-  if (!lease_) lease_ = std::make_unique<LeaseKeeper>(client(), axis_, label);
+  if (lease_) return;
+  lease_ = std::make_unique<LeaseKeeper>(client(), axis_, label);
+  ours_ = true;
 }
 
 v1::CommandOptions AxisAccess::options() const {
@@ -140,6 +142,7 @@ v1::Command AxisAccess::command(const std::string& id) {
 
 void AxisAccess::stop_at_once() noexcept {
   stopped_ = true;
+  if (!ours_) return;
   try {
     v1::StopRequest request;
     request.set_axis(axis_);

@@ -38,6 +38,8 @@ class AxisAccess {
   VelocityRange velocities();
 
   void acquire_lease(const std::string& label);
+  /// The lease was had at some time: what moves since then is ours to stop. Thread: any.
+  [[nodiscard]] bool ours() const { return ours_; }
   void release_lease() { lease_.reset(); }
   /// Why the lease is over; empty: it is held.
   [[nodiscard]] std::string lease_lost() const { return lease_ ? lease_->lost() : "it was released"; }
@@ -55,7 +57,8 @@ class AxisAccess {
   void end_hold();
   v1::Command command(const std::string& id);
 
-  /// Stops the axis and lets nothing start afterwards. Never throws. Thread: any.
+  /// Lets nothing start afterwards, and stops the axis if it is ours: what another client moves is left
+  /// alone. Never throws. Thread: any.
   void stop_at_once() noexcept;
   [[nodiscard]] bool stopped_at_once() const { return stopped_; }
 
@@ -68,6 +71,7 @@ class AxisAccess {
   std::string axis_;
   std::unique_ptr<LeaseKeeper> lease_;
   bool holds_ = false;  ///< a stop with hold was asked for, and not released since
+  std::atomic<bool> ours_ = false;
   std::atomic<bool> stopped_ = false;
   std::mutex starting_;  ///< held while a start is on its way to the daemon
 };

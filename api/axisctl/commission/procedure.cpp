@@ -29,6 +29,9 @@ void set_judgement(Step& step, const Judgement& judgement) {
 
 /// All that is of one attempt.
 void forget_attempt(Step& step) {
+  step.clear_verdict();
+  step.clear_reason();
+  step.clear_remedy();
   step.clear_figures();
   step.clear_edges();
   step.clear_commands();
@@ -48,7 +51,8 @@ void Procedure::run() {
     try {
       carry_out(steps_[i], step);
     } catch (const std::exception& end) {
-      set_judgement(step, {.verdict = VERDICT_NOT_DONE, .reason = end.what(), .remedy = {}});
+      if (step.verdict() == VERDICT_UNSPECIFIED)
+        set_judgement(step, {.verdict = VERDICT_NOT_DONE, .reason = end.what(), .remedy = {}});
       *step.mutable_ended_at() = now();
       throw;
     }
@@ -126,12 +130,15 @@ Judgement Procedure::attempt(const StepPlan& plan, Step& step) {
 
 void Procedure::permit(const std::string& question, Step& step) {
   auto permission = dialogue_.permit(question, step);
+  if (axis_.ours()) check_lease();
   if (!permission.granted) throw StepEnd(VERDICT_SKIPPED, std::move(permission.reason));
 }
 
+void Procedure::check_lease() const {
+  if (const auto lost = axis_.lease_lost(); !lost.empty()) throw Ended(false, "the lease is over: " + lost);
+}
+
 void Procedure::check_move(double distance, double velocity) {
-  if (auto lost = axis_.lease_lost(); !lost.empty())
-    throw StepEnd(VERDICT_FAILED, "the lease is over: " + lost);
   (void)settled();
   const auto response = axis_.explain_move(distance, velocity);
   if (!is_blocked(response)) return;
@@ -170,6 +177,7 @@ Procedure::Run Procedure::follow(v1::Command command, Step& step,
       *step.add_commands() = command;
       break;
     }
+    check_lease();
     if (watch && !watch(state)) break;
     if (!person_.line_within(sample_period)) continue;
     const auto stop = axis_.stop(false);
@@ -198,6 +206,7 @@ v1::AxisState Procedure::settled() {
 bool Procedure::wait_until(const std::function<bool()>& condition, Step& step) {
   for (auto left = wishes_.patience; !condition(); left -= sample_period) {
     if (left.count() <= 0) return false;
+    check_lease();
     const auto line = person_.line_within(sample_period);
     if (line && !line->empty() && (line->front() == 's' || line->front() == 'S')) {
       const auto reason = person_.ask("Why is it left out?").value_or("");

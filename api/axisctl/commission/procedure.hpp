@@ -83,6 +83,8 @@ class Procedure {
 
   /// Throws StepEnd (skipped) unless the operator says yes.
   void permit(const std::string& question, Step& step);
+  /// Throws Ended if the lease is over: somebody else may move the axis from now on.
+  void check_lease() const;
   /// Throws StepEnd if the daemon would refuse the move.
   void check_move(double distance, double velocity);
   /// "It moves +10 mm at 5 mm/s (2.2 s), from 0 mm to 10 mm".

@@ -182,7 +182,7 @@ Judgement Procedure::disable(Step& step) {
   const bool falls = settings_ && settings_->vertical;
   const auto permission =
       dialogue_.permit(fmt::format("Switch the power stage off again{}?",
-                                   falls ? "? The load hangs, and may fall without it" : ""),
+                                   falls ? "; the load hangs, and may fall without it" : ""),
                        step);
   if (!permission.granted)
     return {.verdict = VERDICT_NOT_APPLICABLE,

@@ -7,9 +7,10 @@ import re
 import select
 import signal
 import subprocess
+import threading
 import time
 
-from .programs import AXISCTL, LIMIT
+from .programs import AXISCTL, LIMIT, wait_for
 
 
 class ScriptedOperator:
@@ -78,3 +79,38 @@ class ScriptedOperator:
 
     def step(self, name):
         return next(step for step in self.record()["steps"] if step["name"] == name)
+
+
+class Hand:
+    """Of an operator who does what is asked for. `reacts`: terminals that react in place of others; `low`: those of
+    switches that open when they are actuated."""
+
+    def __init__(self, machine, node=1, reacts=None, low=()):
+        self.machine, self.node, self.reacts, self.low = machine, node, reacts or {}, low
+
+    def press(self, match):
+        terminal = self.reacts.get(match[1], match[1])
+        self.machine.sim.control(f"input {self.node} {terminal} {'off' if terminal in self.low else 'on'}")
+
+    def release(self, match):
+        self.machine.sim.control(f"input {self.node} {match[1]} auto")
+
+    def once_under_way(self, action):
+        """Some time after the motion began."""
+        start = self.machine.sim.shaft(self.node).position
+
+        def act():
+            wait_for(lambda: abs(self.machine.sim.shaft(self.node).position - start) > 100, "under way")
+            action()
+        threading.Thread(target=act).start()
+
+    def to_the_switch(self, match):
+        """Says yes, and actuates the switch once the axis is under way."""
+        self.once_under_way(lambda: self.press(match))
+        return "yes"
+
+    def rules(self):
+        return [(r"Actuate (\w+) \(\w+\) by hand", self.press), (r"(\w+) is active\. Release it", self.release),
+                (r"Release (\w+)\. ", self.release),
+                (r"Go to the switch at (\w+) [^?]*\? \[yes/skip/abort\] ", self.to_the_switch),
+                (r"again/go-on/abort\] ", "go-on"), (r"Why is it left out\? ", "no time"), (r"/abort\] ", "yes")]
