@@ -64,6 +64,28 @@ class Commission(Scenario):
         asked = len(re.findall(r"(?:Move|Home)\? \[yes/skip/abort\] yes", person.text))
         self.assertEqual(len(machine.wire.writes(START)) + len(machine.wire.writes(HOMING)), asked)
 
+    def test_other_models_and_a_motor_the_other_way_round_pass(self):
+        for keys in ({"model": "ssd2608pr"}, {"model": "ess42-r"},
+                     {"scale": "{ microstep: 10000 pulses/rev, travel: 5 mm/rev, invert: true }",
+                      "simulated": "home=20000:28000"}):
+            with self.subTest(**keys):
+                machine = self.cell(**keys)
+                person = self.person(machine)
+                self.assertEqual(person.finish(), 0, person.text)
+                self.assertEqual(person.record()["verdict"], "VERDICT_PASSED")
+
+    def test_a_limit_switch_on_the_wrong_side_is_named(self):
+        """Swapped after the switches were looked at by hand, where each answered to its name."""
+        machine = self.cell()
+        swapped = Hand(machine, reacts={"X1": "X2"})
+        person = self.person(machine, (r"Go to the switch at (X1) [^\]]*\] ", swapped.to_the_switch),
+                             (r"--- limit negative\n", lambda _: machine.sim.control("input 1 X2 auto") or None),
+                             options=("--velocity", "20mm/s", "--distance", "2mm"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, switch_X1="PASSED", limit_positive="FAILED", homing="NOT_DONE")
+        self.assertEqual(person.step("limit positive")["reason"],
+                         "X2 (negative_limit) became active on the way, not X1 (positive_limit): swapped?")
+
     def test_a_wrong_polarity_is_told_with_its_key(self):
         # A switch that closes when it is actuated, and a configuration that says the contrary.
         machine = self.cell(inputs="{ X0: home, X1: { function: positive_limit, active: low } }",
@@ -163,6 +185,14 @@ class Commission(Scenario):
         self.assert_verdicts(person, switch_X0="SKIPPED", power_on="PASSED", jog_positive="SKIPPED", jog_negative="SKIPPED",
                              limit_positive="NOT_DONE", stop="NOT_DONE", homing="NOT_DONE", power_off_again="PASSED")
         self.nothing_moved(machine)
+
+    def test_no_before_each_later_motion(self):
+        machine = self.cell()
+        person = self.person(machine, (r"Actuate ", "skip"), (r"(Go to the switch|a third|It homes)[^\]]*\] ", "no"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, jog_positive="PASSED", jog_negative="PASSED", limit_positive="SKIPPED",
+                             limit_negative="SKIPPED", stop="SKIPPED", homing="SKIPPED")
+        self.assertEqual((machine.sim.shaft(), machine.wire.writes(HOMING)), ((0, False, 2), []))
 
     def test_a_pipe_is_nobody(self):
         machine = self.cell()

@@ -44,6 +44,9 @@ Judgement Procedure::limit(const StepPlan& plan, Step& step) {
   const auto place = unwrapped(rest.position(), run.samples.back().position(), settings_);
   for (auto& edge : feed.take()) {
     if (edge.terminal() == plan.terminal && edge.active()) seen.became_active = true;
+    if (edge.terminal() != plan.terminal && edge.active() && seen.other.empty())
+      seen.other = edge.function().empty() ? edge.terminal()
+                                           : fmt::format("{} ({})", edge.terminal(), edge.function());
     *step.add_edges() = std::move(edge);
   }
   seen.became_active = seen.became_active || active_at.has_value();

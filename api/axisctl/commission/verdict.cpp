@@ -105,6 +105,9 @@ Judgement judge_limit_end(const LimitObservation& limit) {
   if (limit.moving)
     return failed(fmt::format("it still moves although {} is active", name), "look at the machine");
   if (done(limit.command)) {
+    if (!limit.became_active && !limit.other.empty())
+      return failed(fmt::format("{} became active on the way, not {}: swapped?", limit.other, name),
+                    fmt::format("swap the wires, or the functions in axes.{}.inputs", limit.input.axis));
     if (!limit.became_active)
       return failed(fmt::format("{} did not become active on the way", name),
                     "actuate the switch while the axis moves, or begin closer to it");

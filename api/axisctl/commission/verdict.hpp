@@ -52,6 +52,7 @@ struct LimitObservation {
   ExpectedInput input;
   v1::Command command;                ///< towards the switch, as it ended
   bool became_active = false;         ///< during the move
+  std::string other{};                ///< terminal that became active in its place, with its function
   bool moving = false;                ///< it still moves afterwards
   v1::ExplainResponse further;        ///< on in the same direction
   std::optional<v1::Command> away{};  ///< nothing: the operator left it out

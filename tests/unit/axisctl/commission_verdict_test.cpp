@@ -117,6 +117,9 @@ TEST(JudgeLimit, FailsWhereTheAxisWentOn) {
   EXPECT_EQ(judge_limit(seen).reason, "X1 (positive_limit) became active, and the axis went on");
   seen.became_active = false;
   EXPECT_EQ(judge_limit(seen).reason, "X1 (positive_limit) did not become active on the way");
+  seen.other = "X2 (negative_limit)";
+  EXPECT_EQ(judge_limit(seen).reason,
+            "X2 (negative_limit) became active on the way, not X1 (positive_limit): swapped?");
   seen = limit();
   seen.moving = true;
   EXPECT_EQ(judge_limit(seen).verdict, VERDICT_FAILED);
