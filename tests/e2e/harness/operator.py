@@ -10,7 +10,13 @@ import subprocess
 import threading
 import time
 
+from .case import Scenario
+from .machine import feeder
 from .programs import AXISCTL, LIMIT, wait_for
+from .wire import HOMING, START
+
+#: Quicker than the default.
+QUICK = ("--velocity", "20mm/s", "--distance", "5mm")
 
 
 class ScriptedOperator:
@@ -114,3 +120,25 @@ class Hand:
                 (r"Release (\w+)\. ", self.release),
                 (r"Go to the switch at (\w+) [^?]*\? \[yes/skip/abort\] ", self.to_the_switch),
                 (r"again/go-on/abort\] ", "go-on"), (r"Why is it left out\? ", "no time"), (r"/abort\] ", "yes")]
+
+
+class CommissionScenario(Scenario):
+    """Commissions the feeder."""
+
+    def cell(self, **keys):
+        """The feeder stands 10 mm from its home switch; nothing is enabled."""
+        return self.machine({"feeder": feeder(**keys)}).start()
+
+    def person(self, machine, *rules, options=QUICK, hand=None):
+        """An operator who says yes and does what is asked for, but for `rules`."""
+        return ScriptedOperator(machine, "feeder", [*rules, *(hand or Hand(machine)).rules()], options)
+
+    def assert_verdicts(self, person, **expected):
+        """Of these steps, with _ for the blanks in their names."""
+        verdicts = {name.replace(" ", "_"): verdict for name, verdict in person.verdicts().items()}
+        self.assertEqual({name: verdicts.get(name) for name in expected}, expected, person.text)
+
+    def nothing_moved(self, machine):
+        self.assertEqual(machine.sim.shaft(), (0, False, 0))
+        for address in (START, HOMING):
+            self.assertEqual(machine.wire.writes(address), [])
