@@ -7,9 +7,6 @@ namespace axisd::modbus_rtu {
 
 namespace {
 
-/// So long after its time a reply may still come: gateways and drives that save to their EEPROM.
-constexpr auto latest_reply = std::chrono::seconds(5);
-
 ExchangeResult not_sent(Verdict verdict, TimePoint now) {
   return {.status = ExchangeStatus::not_sent, .verdict = verdict, .request_begin = now, .request_end = now};
 }
@@ -30,17 +27,6 @@ void RtuBus::start(ExchangeObserver observer) {
   observer_ = std::move(observer);
   line_->start([this](const ExchangeResult& result) { on_result(result); },
                [this](const PortStatus& status) { on_port(status); });
-}
-
-bool RtuBus::may_come_late(std::uint8_t node, std::uint16_t count) const {
-  const auto late = late_reads_.find(node);
-  if (late == late_reads_.end()) return false;
-  const auto read = late->second.find(count);
-  return read != late->second.end() && read->second >= clock_->now();
-}
-
-bool RtuBus::needs_resync(const Request& request) const {
-  return request.function == Function::read_holding_registers && may_come_late(request.node, request.count);
 }
 
 LineStatistics RtuBus::statistics() const {
@@ -168,23 +154,32 @@ void RtuBus::arm_next() {
   }
   await_release();
   if (!current_) return;
-  if (current_->transaction_class != TransactionClass::stop && needs_resync(current_->exchange.request))
+  if (current_->transaction_class != TransactionClass::stop &&
+      late_.may_answer(current_->exchange.request, now))
     current_ = resync_before(std::move(current_));
   line_->arm(current_->exchange);
 }
 
-/// The quarantine of its node forbids sending it now.
+/// The quarantine of its node forbids sending it now, or no answer to it could be told from a late one.
 bool RtuBus::must_wait(const Transaction& transaction) const {
   using enum TransactionClass;
   const bool urgent = transaction.transaction_class == stop && !transaction.patient;
   if (urgent || transaction.transaction_class == scan || transaction.exchange.serial) return false;
-  return holds_back(transaction.exchange.request.node);
+  const auto& request = transaction.exchange.request;
+  const auto now = clock_->now();
+  return holds_back(request.node) || (transaction.transaction_class != stop &&
+                                      late_.may_answer(request, now) && !late_.distinct_read(request, now));
+}
+
+/// When what waits for this node may be looked at again.
+TimePoint RtuBus::ready_at(std::uint8_t node) const {
+  return holds_back(node) ? quarantine_.ready_at(node) : late_.distinct_at(node, clock_->now());
 }
 
 /// What was put aside is looked at again as soon as the first of it may be sent.
 void RtuBus::await_release() {
   auto next = TimePoint::max();
-  for (const auto node : queue_.held_nodes()) next = std::min(next, quarantine_.ready_at(node));
+  for (const auto node : queue_.held_nodes()) next = std::min(next, ready_at(node));
   release_ = next == TimePoint::max() ? Clock::Timer{} : clock_->call_at(next, [this] {
     release_ready();
     pump();
@@ -195,7 +190,7 @@ void RtuBus::await_release() {
 void RtuBus::release_ready() {
   const auto now = clock_->now();
   for (const auto node : queue_.held_nodes())
-    if (quarantine_.ready_at(node) <= now) queue_.release(node);
+    if (ready_at(node) <= now) queue_.release(node);
 }
 
 void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result) {
@@ -218,23 +213,20 @@ void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result
   }
 }
 
-/// Another length than any late reply's: those are then discarded as foreign, not taken for this answer.
-/// Shorter if there is such a length, else longer; an exception is as good an answer. Decided here and not
-/// when the read is queued: what it waits for may time out meanwhile.
+/// A read whose reply cannot be a late one goes first: older ones are then discarded as foreign. Decided here
+/// and not when the read is queued: what it waits for may time out meanwhile.
 TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
+  auto distinct = late_.distinct_read(waiting->exchange.request, clock_->now());
+  if (!distinct) return waiting;  // of a bus scan, which does not wait
   auto resync = std::make_unique<Transaction>();
   resync->transaction_class = waiting->transaction_class;
   resync->sequence = waiting->sequence;
   resync->reserved = waiting->reserved;
   resync->queued_at = waiting->queued_at;
   resync->exchange = waiting->exchange;
-  auto& request = resync->exchange.request;
-  while (request.count > 1 && needs_resync(request)) --request.count;
-  while (needs_resync(request)) ++request.count;
-  constexpr int addresses = 0x10000;
-  request.address = static_cast<std::uint16_t>(std::min<int>(request.address, addresses - request.count));
+  auto& request = resync->exchange.request = *std::move(distinct);
   const auto frame = encode(request);
-  if (!frame) return waiting;  // every length that there is was tried within latest_reply
+  if (!frame) return waiting;  // cannot be: it is of the lengths that there are
   resync->exchange.frame = *frame;
   resync->exchange.reply_timeout +=
       wire_time(resync->exchange.serial.value_or(settings_.serial()), reply_size(request)) -
@@ -258,53 +250,11 @@ void RtuBus::reap(TimePoint now) {
 void RtuBus::on_result(const ExchangeResult& result) {
   auto ended = std::exchange(current_, nullptr);
   if (!ended) return;
-  note_late(ended->exchange.request, result);
+  late_.note(ended->exchange.request, result, clock_->now());
   note_garbled(ended->exchange.request, result);
   note_silence(*ended, result);
   end(std::move(ended), result);
   pump();
-}
-
-/// Replies come in order: nothing older than that to a read can follow. But the echo of a write may be that
-/// of the same write before, which was late, and an exception that of any read before: its own may still come
-/// then.
-void RtuBus::note_late(const Request& request, const ExchangeResult& result) {
-  switch (result.status) {
-    case ExchangeStatus::replied:
-      if (request.function != Function::read_holding_registers) {
-        if (echo_may_be_late(request)) expect_late(request);
-      } else if (result.reply.kind == ReplyKind::match) {
-        late_reads_.erase(request.node);
-        late_echoes_.erase(request.node);
-      } else if (late_reads_.contains(request.node)) {
-        expect_late(request);
-      }
-      break;
-    case ExchangeStatus::timeout:
-    case ExchangeStatus::cut:
-    case ExchangeStatus::corrupt:
-    case ExchangeStatus::io_error:
-      expect_late(request);
-      break;
-    default:
-      break;
-  }
-}
-
-void RtuBus::expect_late(const Request& request) {
-  const auto until = clock_->now() + latest_reply;
-  if (request.function == Function::read_holding_registers)
-    late_reads_[request.node][request.count] = until;
-  else if (request.function == Function::write_single_register)
-    late_echoes_[request.node][{request.address, request.values.front()}] = until;
-}
-
-bool RtuBus::echo_may_be_late(const Request& request) const {
-  if (request.function != Function::write_single_register) return false;
-  const auto late = late_echoes_.find(request.node);
-  if (late == late_echoes_.end()) return false;
-  const auto echo = late->second.find({request.address, request.values.front()});
-  return echo != late->second.end() && echo->second >= clock_->now();
 }
 
 void RtuBus::close() {
@@ -318,7 +268,7 @@ void RtuBus::on_port(const PortStatus& status) {
   if (closed_ && status.open) return;
   port_ = status;
   if (port_.error) port_.error->where.bus = settings_.name;
-  // What may come late may still come: late_reads_ and late_echoes_ stay.
+  // What may come late may still come: late_ stays.
   quarantine_.forget();
   if (!port_.open) {
     // What is under way gets its own result from the line; what waits can no longer be sent in time.

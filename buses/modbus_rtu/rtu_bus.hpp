@@ -9,6 +9,7 @@
 
 #include "buses/bus.hpp"
 #include "buses/clock.hpp"
+#include "buses/modbus_rtu/late_replies.hpp"
 #include "buses/modbus_rtu/line.hpp"
 #include "buses/modbus_rtu/line_statistics.hpp"
 #include "buses/modbus_rtu/quarantine.hpp"
@@ -83,11 +84,10 @@ class RtuBus final : public Bus {
 
  private:
   [[nodiscard]] Exchange exchange_for(Request request, const Frame& frame, TransactionOptions options) const;
-  [[nodiscard]] bool needs_resync(const Request& request) const;
-  [[nodiscard]] bool may_come_late(std::uint8_t node, std::uint16_t count) const;
   void pump();
   void arm_next();
   [[nodiscard]] bool must_wait(const Transaction& transaction) const;
+  [[nodiscard]] TimePoint ready_at(std::uint8_t node) const;
   void await_release();
   void release_ready();
   void note_silence(const Transaction& ended, const ExchangeResult& result);
@@ -97,9 +97,6 @@ class RtuBus final : public Bus {
   void reap(TimePoint now);
   void drop(TransactionPtr transaction, TimePoint now);
   void end(TransactionPtr transaction, const ExchangeResult& result);
-  void note_late(const Request& request, const ExchangeResult& result);
-  void expect_late(const Request& request);
-  [[nodiscard]] bool echo_may_be_late(const Request& request) const;
   void note_garbled(const Request& request, const ExchangeResult& result);
   [[nodiscard]] Result<Answer> answer(const Transaction& transaction, const ExchangeResult& result) const;
   [[nodiscard]] Error error_of(const Exchange& exchange, const ExchangeResult& result) const;
@@ -113,11 +110,7 @@ class RtuBus final : public Bus {
   Signal port_changed_;
   TransactionQueue queue_;
   TransactionPtr current_;  ///< armed or under way
-  /// Lengths of reads that timed out, by node, and until when their replies may still come: an FC03 reply
-  /// does not say which registers it carries.
-  std::map<std::uint8_t, std::map<std::uint16_t, TimePoint>> late_reads_;
-  /// Until when the echo of a write of (register, value) may come late.
-  std::map<std::uint8_t, std::map<std::pair<std::uint16_t, std::uint16_t>, TimePoint>> late_echoes_;
+  LateReplies late_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Quarantine quarantine_;
   Clock::Timer expiry_, release_;

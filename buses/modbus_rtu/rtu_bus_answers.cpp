@@ -70,7 +70,7 @@ Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResu
                   .sent_at = result.request_begin,
                   .request_end = result.request_end,
                   .answered_at = result.reply_end,
-                  .certain = !echo_may_be_late(request)};
+                  .certain = !late_.may_echo(request, clock_->now())};
   auto error = error_of(transaction.exchange, result);
   error.where.bus = settings_.name;
   error.where.node = request.node;

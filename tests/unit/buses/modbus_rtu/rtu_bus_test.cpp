@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <random>
 
 #include "bus_rig.hpp"
 
@@ -112,6 +114,56 @@ TEST(RtuBus, ALateReplyNeverAnswersAReadAfterThePortWasOpenedAgain) {
     rig.world.run_for(500ms);
     ASSERT_EQ(rig.results.size(), 2U);
     if (const auto& next = rig.results.at("next")) EXPECT_EQ(next->registers.at(0), 222) << delay;
+  }
+}
+
+/// A drive has no register 0x0500: its refusal could be that of the read before, and so could the next.
+TEST(RtuBus, AReadThatIsRefusedCostsOneReadMoreAfterItsReplyWasLost) {
+  BusRig rig;
+  rig.read("state", 0x0003, 10);
+  rig.world.run_for(100ms);
+  rig.line->network().faults().add({.kind = FaultKind::drop_reply, .node = 1, .function = 3});
+  rig.read("lost", 0x0500, 1);
+  rig.read("again", 0x0500, 1);
+  rig.world.run_for(500ms);
+  EXPECT_EQ(rig.results.at("lost").error().reason, Reason::no_reply);
+  EXPECT_EQ(rig.results.at("again").error().reason, Reason::refused)
+      << to_string(rig.results.at("again").error());
+  const auto& wire = rig.line->wire();
+  ASSERT_EQ(wire.size(), 4);
+  EXPECT_EQ(wire[2].address(), 0x0003) << "known to be answered";
+  EXPECT_EQ(wire[2].value(), 2);
+  EXPECT_EQ(wire[3].address(), 0x0500);
+}
+
+/// Whatever is lost, late or refused: no read goes out while a late reply could be taken for its own.
+TEST(RtuBus, NoReadIsAnsweredByALateReplyHoweverManyAreLost) {
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    BusRig rig;
+    std::mt19937 dice(seed);
+    constexpr std::array<std::uint16_t, 4> places{0x0003, 0x0020, 0x0090, 0x0500};
+    for (std::uint16_t i = 0; i < 32; ++i) rig.line->network().node(1)->poke(0x0090 + i, 0x4000 + i);
+    constexpr std::array kinds{FaultKind::drop_reply, FaultKind::delay_reply, FaultKind::drop_request,
+                               FaultKind::corrupt_reply};
+    rig.line->set_on_bind([&](const test::WireEntry&) {
+      rig.line->network().faults().clear();
+      if (dice() % 10 < 8)
+        rig.line->network().faults().add(
+            {.kind = kinds.at(dice() % kinds.size()), .delay = std::chrono::milliseconds(dice() % 3000)});
+    });
+    for (int i = 0; i < 300; ++i) {
+      const auto place = places.at(dice() % places.size());
+      rig.read((place == 0x0090 ? "marked " : "other ") + std::to_string(i), place,
+               static_cast<std::uint16_t>(1 + dice() % 3));
+      rig.world.run_for(std::chrono::milliseconds(dice() % 200));
+    }
+    rig.line->set_on_bind({});
+    rig.line->network().faults().clear();
+    rig.world.run_for(20s);
+    EXPECT_EQ(rig.results.size(), 300) << "none is held for ever";
+    for (const auto& [name, result] : rig.results)
+      if (result && name.starts_with("marked")) EXPECT_EQ(result->registers.front(), 0x4000) << name;
   }
 }
 
