@@ -45,7 +45,6 @@ Task<> Axis::connect() {
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
-      continuity_checked_ = env_.clock->now();
       spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
                    identity_ ? identity_->version : "");
       break;
@@ -159,7 +158,7 @@ Task<Result<void>> Axis::prove_or_configure() {
   };
   if (stored != nullptr && !restorable) void_record();
   if (configured_ || restorable) {
-    const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
+    const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     if (!proof && configured_) on_reboot(proof.error());
     if (!proof && restorable) void_record();
@@ -173,6 +172,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
     if (!configured) co_return configured;
     configured_ = true;
+    continuity_checked_ = env_.clock->now();
     restore_tried_ = true;
     drift_checked_ = env_.clock->now();
     set_drift({});
@@ -185,6 +185,12 @@ Task<Result<void>> Axis::prove_or_configure() {
   }
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
+  // Where replies are lost all this may have taken long, and the drive may have been restarted meanwhile.
+  if (sample->asked_at - continuity_checked_ > continuity_forgotten) {
+    const auto proof = co_await prove_continuity(TransactionClass::parameters);
+    if (!proof && proof.error().reason == Reason::rebooted) on_reboot(proof.error());
+    if (!proof) co_return proof;
+  }
   on_sample(*sample);
   settle_positions_set();
   co_return Result<void>{};
