@@ -43,8 +43,9 @@ std::string_view to_string(Reason reason) {
                                                                  "bus_down",
                                                                  "storage",
                                                                  "cancelled",
-                                                                 "internal"});
-  static_assert(names.size() == std::to_underlying(Reason::internal) + 1U);
+                                                                 "internal",
+                                                                 "reloading"});
+  static_assert(names.size() == std::to_underlying(Reason::reloading) + 1U);
   return names.at(std::to_underlying(reason));
 }
 

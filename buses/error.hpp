@@ -48,6 +48,7 @@ enum class Reason : std::uint8_t {
   storage,              ///< The state directory cannot be written.
   cancelled,            ///< Ended by CancelCommand or by the daemon's shutdown.
   internal,             ///< A bug of axisd.
+  reloading,            ///< The configuration of the axis is being reloaded. Repeat it in a moment.
 };
 
 std::string_view to_string(Reason reason);

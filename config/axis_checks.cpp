@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -55,6 +58,13 @@ std::string AxisChecks::velocity_text(double value) const {
   return fmt::format("{} {}/s", format_number(value), axis_.scale.unit);
 }
 
+/// Of the content of a file; 0 for none that can be read.
+std::size_t content_of(const SettingValue& path) {
+  std::ifstream file(std::get<std::string>(path), std::ios::binary);
+  if (!file) return 0;
+  return std::hash<std::string>()(std::string(std::istreambuf_iterator<char>(file), {}));
+}
+
 void AxisChecks::specialise() {
   if (model_ == nullptr || model_->specialise == nullptr || !usable("drive")) return;
   for (const auto& setting : model_->settings) {
@@ -66,13 +76,15 @@ void AxisChecks::specialise() {
     return;
   }
   add_default_settings(axis_, *model_);
+  const auto file = std::ranges::find(model_->settings, "path", &SettingSpec::kind);
+  // Before it is read for good: what changes in between shows at the next look.
+  axis_.own_descriptor_source = content_of(axis_.model_settings.at(std::string(file->key)));
   const auto made = model_->specialise(*model_, axis_.model_settings);
   if (made) {
     axis_.own_descriptor = *made;
     model_ = made->get();
     return;
   }
-  const auto file = std::ranges::find(model_->settings, "path", &SettingSpec::kind);
   const auto mark = places_.mark(fmt::format("{}drive.{}", path_, file->key));
   std::string_view lines = made.error().message;
   while (!lines.empty()) {

@@ -75,8 +75,18 @@ bool wait_until(Condition condition, Duration limit) {
   return true;
 }
 
+void reload_at_a_signal(ConfigurationService& served) {
+  served.reload("SIGHUP", false, [](const Result<ConfigurationReload>& result) {
+    if (!result)
+      spdlog::warn("SIGHUP: not reloaded: {}", to_string(result.error()));
+    else if (!result->applied)
+      spdlog::warn(
+          "SIGHUP: not reloaded, and nothing was changed; axisctl config reload --dry-run tells why");
+  });
+}
+
 /// Tells systemd that core and workers make progress, until a signal asks for the end.
-void supervise(core::CoreLoop& loop, const core::MachineCore& machine) {
+void supervise(core::CoreLoop& loop, const core::MachineCore& machine, ConfigurationService& served) {
   const auto signals = ending_signals();
   std::uint64_t interval_us = 0;
   const bool watched = sd_watchdog_enabled(0, &interval_us) > 0;
@@ -84,7 +94,7 @@ void supervise(core::CoreLoop& loop, const core::MachineCore& machine) {
     const timespec period{.tv_sec = watched && interval_us < 4'000'000 ? 0 : 1,
                           .tv_nsec = watched ? 300'000'000 : 0};
     const int number = sigtimedwait(&signals, nullptr, &period);
-    if (number == SIGHUP) spdlog::warn("SIGHUP: reloading is not supported; restart the service");
+    if (number == SIGHUP) reload_at_a_signal(served);
     if (number == SIGTERM || number == SIGINT) return;
     const auto oldest = monotonic_now() - stalled_after;
     bool alive = loop.last_progress() > oldest;
@@ -140,6 +150,14 @@ int give_up(const Error& error) {
 
 }  // namespace
 
+config::LoadResult load_configuration(const Options& options) {
+  auto loaded = config::load_file(options.config);
+  if (!loaded.configuration) return loaded;
+  if (!options.state_directory.empty()) loaded.configuration->state_directory = options.state_directory;
+  if (!options.listen.empty()) loaded.configuration->server.listen = options.listen;
+  return loaded;
+}
+
 int run_daemon(const Options& options, config::Configuration configuration, const std::string& yaml) {
   const auto signals = ending_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
@@ -170,25 +188,37 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
   for (const auto& budget : budgets) log_budget(budget);
   const auto instance_id = make_instance_id((*store)->loaded().start_count);
   core::MachineService* published_to = nullptr;
-  core::MachineCore machine({.executor = loop.executor(),
-                             .clock = &loop.clock(),
-                             .persistence = store->get(),
-                             .journal = journal->get(),
-                             .instance_id = instance_id,
-                             .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
-                             .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
-                             .link_helper = (*ports)->link_helper(),
-                             .observer = std::move(wire_log),
-                             .flight_records = &flight_files,
-                             .budgets = budgets,
-                             .published =
-                                 [&published_to] {
-                                   if (published_to != nullptr) published_to->published();
-                                 }},
-                            configuration);
+  core::MachineCore machine(
+      {.executor = loop.executor(),
+       .clock = &loop.clock(),
+       .persistence = store->get(),
+       .journal = journal->get(),
+       .instance_id = instance_id,
+       .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
+       .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
+       .link_helper = (*ports)->link_helper(),
+       .observer = std::move(wire_log),
+       .flight_records = &flight_files,
+       .budgets = budgets,
+       .reconfigure_simulation = [&](const auto& next,
+                                     const auto& changes) { (*ports)->reconfigure(next, changes); },
+       .published =
+           [&published_to] {
+             if (published_to != nullptr) published_to->published();
+           }},
+      configuration);
   core::MachineService service(loop, machine, configuration.machine, instance_id);
   published_to = &service;
-  const ConfigurationService served(options.config, yaml, std::chrono::system_clock::now());
+  ConfigurationService served({.path = options.config,
+                               .yaml = yaml,
+                               .configuration = configuration,
+                               .since = std::chrono::system_clock::now(),
+                               .load = [&options] { return load_configuration(options); },
+                               .last_good = last_good(configuration.state_directory),
+                               .apply =
+                                   [&service](core::Reload reload, bool dry_run, core::ReloadDone done) {
+                                     service.reload(std::move(reload), dry_run, std::move(done));
+                                   }});
   auto serving = server_options(configuration.server);
   serving.configuration = &served;
   server::Server server(service, std::move(serving));
@@ -204,14 +234,12 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
   } else {
     wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },
                std::chrono::seconds(1));
-    std::error_code ignored;  // the copy is a convenience of --quiesce
-    std::filesystem::copy_file(options.config, last_good(configuration.state_directory),
-                               std::filesystem::copy_options::overwrite_existing, ignored);
+    served.keep_copy();
     spdlog::info("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration.machine,
                  *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
                  configuration.axes.size());
     sd_notify(0, "READY=1");
-    supervise(loop, machine);
+    supervise(loop, machine, served);
     sd_notify(0, "STOPPING=1");
     service.close();
     const bool rests = stop_axes(loop, machine);
@@ -220,6 +248,7 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
   }
 
   server.shutdown();
+  served.close();
   ask_core(loop, [&] {
     machine.close();
     return true;

@@ -7,6 +7,9 @@
 
 namespace axisd {
 
+/// Reads the file that `--config` names; what the command line says comes before what the file says.
+config::LoadResult load_configuration(const Options& options);
+
 /// Runs the daemon until a signal ends it. `yaml`: what the configuration was read from. Exit status.
 /// Precondition: called on the first thread, before any other was started.
 int run_daemon(const Options& options, config::Configuration configuration, const std::string& yaml);

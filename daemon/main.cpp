@@ -11,12 +11,10 @@ int main(int argc, char** argv) {
     return 0;
   }
   if (options.quiesce) return axisd::run_quiesce(options);
-  auto loaded = axisd::config::load_file(options.config);
+  auto loaded = axisd::load_configuration(options);
   for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
   if (!loaded.configuration) return 2;
   auto& configuration = *loaded.configuration;
-  if (!options.state_directory.empty()) configuration.state_directory = options.state_directory;
-  if (!options.listen.empty()) configuration.server.listen = options.listen;
   if (options.check) {
     std::cout << options.config << ": ok (" << configuration.axes.size() << " axes on "
               << configuration.lines.size() + configuration.networks.size() << " buses)\n";

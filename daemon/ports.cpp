@@ -36,6 +36,12 @@ std::unique_ptr<can::Port> Ports::make_port(const canopen::NetworkSettings& sett
   return std::make_unique<can::SocketCanPort>(loop_->executor(), loop_->clock(), std::move(port));
 }
 
+void Ports::reconfigure(const config::Configuration& configuration,
+                        const std::vector<ConfigurationChange>& changes) {
+  lines_->reconfigure(configuration, changes);
+  networks_->reconfigure(configuration, changes);
+}
+
 core::LinkHelper Ports::link_helper() {
   return {.cycle = [this](const std::string& interface,
                           core::LinkClient::Done done) { link_client_.cycle(interface, std::move(done)); },

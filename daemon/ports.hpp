@@ -27,6 +27,9 @@ class Ports {
   std::unique_ptr<modbus_rtu::Line> make_line(const modbus_rtu::LineSettings& settings);
   std::unique_ptr<can::Port> make_port(const canopen::NetworkSettings& settings);
   [[nodiscard]] core::LinkHelper link_helper();
+  /// Simulated drives follow the configuration.
+  void reconfigure(const config::Configuration& configuration,
+                   const std::vector<ConfigurationChange>& changes);
 
  private:
   Ports(core::CoreLoop& loop, const std::string& link_helper);

@@ -30,6 +30,7 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
 
 Result<std::unique_ptr<SimulatedLines>> SimulatedLines::open(const config::Configuration& configuration) {
   auto lines = std::make_unique<SimulatedLines>();
+  lines->places_.set(configuration);
   for (const auto& bus : configuration.lines) {
     if (!bus.simulated()) continue;
     std::vector<std::unique_ptr<simulation::SimulatedRtuNode>> nodes;
@@ -46,6 +47,24 @@ Result<std::unique_ptr<SimulatedLines>> SimulatedLines::open(const config::Confi
     lines->lines_.emplace(bus.name, std::move(*line));
   }
   return lines;
+}
+
+void SimulatedLines::reconfigure(const config::Configuration& configuration,
+                                 const std::vector<ConfigurationChange>& changes) {
+  const auto with = [this](const std::string& bus, const auto& use) {
+    if (const auto line = lines_.find(bus); line != lines_.end()) line->second->with_network(use);
+  };
+  places_.change(
+      configuration, changes,
+      [&](const SimulatedPlaces::Place& place) {
+        with(place.bus, [&](simulation::RtuNetwork& network) { network.remove(place.node); });
+      },
+      [&](const config::AxisEntry& entry) {
+        const auto* simulator = simulation::find_simulator(entry.axis.model);
+        if (simulator == nullptr) return;  // its axis stays offline
+        with(entry.axis.bus,
+             [&](simulation::RtuNetwork& network) { network.add(simulator->make(simulated_node(entry))); });
+      });
 }
 
 std::string SimulatedLines::path(const std::string& bus) const {

@@ -7,6 +7,7 @@
 
 #include "buses/error.hpp"
 #include "config/configuration.hpp"
+#include "daemon/simulated_places.hpp"
 #include "devices/simulation/pty_line.hpp"
 
 namespace axisd {
@@ -19,9 +20,14 @@ class SimulatedLines {
   static Result<std::unique_ptr<SimulatedLines>> open(const config::Configuration& configuration);
   /// What to open for the bus; empty: it is a real one.
   [[nodiscard]] std::string path(const std::string& bus) const;
+  /// Drives come and go as axes do; one whose place, model or mechanics change is another one, just powered
+  /// up. Buses are the same as before.
+  void reconfigure(const config::Configuration& configuration,
+                   const std::vector<ConfigurationChange>& changes);
 
  private:
   std::map<std::string, std::unique_ptr<simulation::PtyLine>> lines_;
+  SimulatedPlaces places_;
 };
 
 /// The mechanics around the drive of one axis, in pulses of the drive from its power-up position.

@@ -22,6 +22,7 @@ SimulatedNetworks::~SimulatedNetworks() = default;
 Result<std::unique_ptr<SimulatedNetworks>> SimulatedNetworks::open(
     Clock& clock, const config::Configuration& configuration) {
   std::unique_ptr<SimulatedNetworks> networks(new SimulatedNetworks);
+  networks->places_.set(configuration);
   for (const auto& bus : configuration.networks) {
     if (!bus.simulated()) continue;
     auto one = std::make_unique<One>(clock, bus.bitrate);
@@ -34,6 +35,25 @@ Result<std::unique_ptr<SimulatedNetworks>> SimulatedNetworks::open(
     networks->networks_.emplace(bus.name, std::move(one));
   }
   return networks;
+}
+
+void SimulatedNetworks::reconfigure(const config::Configuration& configuration,
+                                    const std::vector<ConfigurationChange>& changes) {
+  const auto nodes_of = [this](const std::string& bus) -> simulation::CanNodes* {
+    const auto found = networks_.find(bus);
+    return found == networks_.end() ? nullptr : &found->second->drives.nodes();
+  };
+  places_.change(
+      configuration, changes,
+      [&](const SimulatedPlaces::Place& place) {
+        if (auto* nodes = nodes_of(place.bus)) nodes->remove(place.node);
+      },
+      [&](const config::AxisEntry& entry) {
+        auto* nodes = nodes_of(entry.axis.bus);
+        if (nodes == nullptr) return;
+        if (auto node = simulation::make_can_node(entry.axis.model, simulated_node(entry)))
+          nodes->add(std::move(*node));  // without, its axis stays offline
+      });
 }
 
 can::Network* SimulatedNetworks::find(const std::string& bus) const {

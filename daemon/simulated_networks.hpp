@@ -7,6 +7,7 @@
 #include "buses/can/network.hpp"
 #include "buses/error.hpp"
 #include "config/configuration.hpp"
+#include "daemon/simulated_places.hpp"
 
 namespace axisd {
 
@@ -22,11 +23,15 @@ class SimulatedNetworks {
 
   /// nullptr: the bus is a real one.
   [[nodiscard]] can::Network* find(const std::string& bus) const;
+  /// As of SimulatedLines.
+  void reconfigure(const config::Configuration& configuration,
+                   const std::vector<ConfigurationChange>& changes);
 
  private:
   struct One;
   SimulatedNetworks();
   std::map<std::string, std::unique_ptr<One>> networks_;
+  SimulatedPlaces places_;
 };
 
 }  // namespace axisd

@@ -2,15 +2,19 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "buses/clock.hpp"
+#include "buses/error.hpp"
+#include "devices/configuration_change.hpp"
 
 namespace axisd {
 
-/// What was read when the daemon started, whatever the file holds by now.
+/// What was read when the daemon started, or at the last reload, whatever the file holds by now.
 struct ServedConfiguration {
   std::string yaml;
   std::string path;      ///< as the daemon was given it
@@ -29,14 +33,30 @@ struct ConfigurationCheck {
   std::string revision;
 };
 
+/// What became of a reload, or would.
+struct ConfigurationReload {
+  bool applied = false;                        ///< the file is served now; all of it, or else nothing
+  std::vector<ConfigurationFinding> findings;  ///< of a file that cannot be served; then nothing else
+  std::vector<ConfigurationChange> changes;    ///< from what was served before
+  std::vector<Error> refusals;                 ///< what stands against it, all, each with what to do
+  std::string before, revision;                ///< of the texts
+};
+
 /// Thread: any.
 class ConfigurationAccess {
  public:
   virtual ~ConfigurationAccess() = default;
-  [[nodiscard]] virtual const ServedConfiguration& served() const = 0;
+  [[nodiscard]] virtual std::shared_ptr<const ServedConfiguration> served() const = 0;
+  /// Of what the file holds now; empty if it cannot be read. Reads it.
+  [[nodiscard]] virtual std::string file_revision() const = 0;
   /// Checks a text as a start of the daemon would, with relative paths in it counting from the served file.
   /// Takes milliseconds. Opens no port.
   [[nodiscard]] virtual ConfigurationCheck check(std::string_view yaml) const = 0;
+  /// Reads the file again, and makes it what is served, all of it or nothing; `dry_run`: only tells what
+  /// would become of it. Calls back once, from a thread of its own, at once or when axes that change have
+  /// been exchanged. Errors: busy (another reload is under way), cancelled (the daemon ends).
+  virtual void reload(std::string client, bool dry_run,
+                      std::function<void(Result<ConfigurationReload>)> callback) = 0;
 };
 
 }  // namespace axisd

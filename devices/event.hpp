@@ -10,6 +10,7 @@
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
 #include "devices/axis/snapshot.hpp"
+#include "devices/configuration_change.hpp"
 
 namespace axisd {
 
@@ -50,13 +51,20 @@ struct FlightRecordWritten {
   std::string bus, name, reason;
 };
 
-using EventContent =
-    std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten, LeaseChange>;
+/// Another configuration is served from now on.
+struct ConfigurationReloaded {
+  std::string client;            ///< who asked for it
+  std::string before, revision;  ///< of the texts
+  std::vector<ConfigurationChange> changes;
+};
+
+using EventContent = std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift,
+                                  FlightRecordWritten, LeaseChange, ConfigurationReloaded>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon
   WallTime at{};
-  std::string axis;  ///< empty: it concerns a bus
+  std::string axis;  ///< empty: it concerns a bus, or the machine
   EventContent content;
 };
 

@@ -61,6 +61,8 @@ class Persistence {
 
   /// What was kept when the daemon started; does not follow later saves. Thread: any.
   [[nodiscard]] virtual const StoredState& loaded() const = 0;
+  /// The same with all that was asked for since, durable or not; what could not be saved as below.
+  [[nodiscard]] virtual const StoredState& current() const = 0;
 
   virtual void save_offset(std::string axis, OffsetRecord offset, Callback done) = 0;
   /// The position is no longer known: after a restart there is nothing to restore.

@@ -81,7 +81,8 @@ void add_event_commands(CLI::App& app, Invocation& invocation) {
   command->add_option("AXIS", arguments->axes, "Names of axes; none: all");
   command
       ->add_option("--kind", arguments->kinds,
-                   "terminal, state, link, configuration, flight or lease; several with commas")
+                   "terminal, state, link, configuration, configuration-reloaded, flight or lease; several "
+                   "with commas")
       ->type_name("LIST")
       ->delimiter(',');
   command->add_flag("--follow", arguments->follow, "Go on with new events until Ctrl-C");

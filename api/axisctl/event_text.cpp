@@ -57,6 +57,13 @@ std::string text_of(const v1::LeaseChange& change) {
   }
 }
 
+std::string text_of(const v1::ConfigurationReloaded& reloaded) {
+  std::string text = fmt::format("configuration {} reloaded by {}", reloaded.revision(), reloaded.client());
+  for (const auto& change : reloaded.changes())
+    text += (&change == &reloaded.changes(0) ? ": " : "; ") + axisctl::text_of(change);
+  return text;
+}
+
 std::string content(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
@@ -71,6 +78,8 @@ std::string content(const v1::Event& event) {
       return text_of(event.flight_record());
     case v1::Event::kLeaseChange:
       return text_of(event.lease_change());
+    case v1::Event::kConfigurationReloaded:
+      return text_of(event.configuration_reloaded());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -78,6 +87,13 @@ std::string content(const v1::Event& event) {
 }
 
 }  // namespace
+
+std::string text_of(const v1::ConfigChange& change) {
+  auto text = change.name().empty() ? change.section() : change.section() + "." + change.name();
+  text += " " + lower_word(v1::ConfigChangeKind_Name(change.kind()), "CONFIG_CHANGE_KIND_");
+  if (!change.keys().empty()) text += fmt::format(" ({})", fmt::join(change.keys(), ", "));
+  return text;
+}
 
 std::string event_line(const v1::Event& event) {
   // Milliseconds: no bus is quicker.
@@ -95,7 +111,7 @@ v1::EventKind parse_event_kind(std::string_view text) {
   }
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
-                            "configuration, flight, lease",
+                            "configuration (of a drive), configuration-reloaded, flight, lease",
                             text));
 }
 

@@ -10,8 +10,10 @@ namespace axisd::axisctl {
 
 /// "2026-01-02T03:04:05.678Z  12  feeder  X0 home on (within 20 ms)".
 std::string event_line(const v1::Event& event);
-/// "terminal-edge", "state-change", "link-change" or "configuration-drift", or their first words. Throws
-/// Failure (usage).
+/// "axes.feeder changed (limits.velocity)".
+std::string text_of(const v1::ConfigChange& change);
+/// "terminal-edge", "configuration-reloaded" ..., or their first words, of which "configuration" is the
+/// drift. Throws Failure (usage).
 v1::EventKind parse_event_kind(std::string_view text);
 
 }  // namespace axisd::axisctl

@@ -1,5 +1,6 @@
 #include "api/server/axis_service.hpp"
 
+#include <fmt/format.h>
 #include <grpcpp/support/proto_buffer_reader.h>
 #include <spdlog/spdlog.h>
 
@@ -100,7 +101,7 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* AxisServiceImpl::WatchAxes(Context* 
   const auto client = client_of(*context);
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
   if (!ticket) return new RefusedStream<grpc::ByteBuffer>(to_status(ticket.error()));
-  spdlog::debug("{}: watches {} axes", client, axes->size());
+  spdlog::debug("{}: watches {}", client, axes->empty() ? "all axes" : fmt::format("{} axes", axes->size()));
   auto* stream =
       services_.hub.open(services_, context, *std::move(ticket),
                          {.axes = *std::move(axes), .period = *period, .fields = *std::move(fields)});

@@ -18,7 +18,7 @@ template <class Proto, class Domain>
 Proto one_further(Domain value) {
   return static_cast<Proto>(std::to_underlying(value) + 1);
 }
-static_assert(std::to_underlying(Reason::internal) + 1 == v1::Reason_MAX);
+static_assert(std::to_underlying(Reason::reloading) + 1 == v1::Reason_MAX);
 static_assert(std::to_underlying(Outcome::unknown) + 1 == v1::Outcome_MAX);
 static_assert(std::to_underlying(AxisState::error_stop) + 1 == v1::State_MAX);
 static_assert(std::to_underlying(LinkState::online) + 1 == v1::LinkState_MAX);
@@ -58,6 +58,14 @@ void to_proto(WallTime from, google::protobuf::Timestamp& to) {
   to.set_seconds(whole.time_since_epoch().count());
   to.set_nanos(static_cast<std::int32_t>(duration_cast<nanoseconds>(from - whole).count()));
 }
+
+void to_proto(const ConfigurationChange& from, v1::ConfigChange& to) {
+  to.set_section(from.section);
+  to.set_name(from.name);
+  to.set_kind(static_cast<v1::ConfigChangeKind>(std::to_underlying(from.kind) + 1));  // 0 is "unspecified"
+  for (const auto& key : from.keys) to.add_keys(key);
+}
+static_assert(std::to_underlying(ConfigurationChangeKind::changed) + 1 == v1::CONFIG_CHANGE_KIND_CHANGED);
 
 void to_proto(const Error& from, v1::ErrorDetail& to) {
   to.set_reason(to_proto(from.reason));

@@ -23,6 +23,7 @@ namespace axisd::server {
 void to_proto(Duration from, google::protobuf::Duration& to);
 void to_proto(WallTime from, google::protobuf::Timestamp& to);
 void to_proto(const Error& from, v1::ErrorDetail& to);
+void to_proto(const ConfigurationChange& from, v1::ConfigChange& to);
 void to_proto(const MotionValues& from, v1::MotionValues& to);
 void to_proto(const Command& from, v1::Command& to);
 /// `now` is Machine::now() of this very message: AxisState.age is counted up to it.

@@ -49,6 +49,14 @@ void fill(const LeaseChange& from, v1::Event& event) {
 }
 static_assert(std::to_underlying(LeaseChange::What::taken) + 1 == v1::LEASE_CHANGE_KIND_TAKEN);
 
+void fill(const ConfigurationReloaded& from, v1::Event& event) {
+  auto& to = *event.mutable_configuration_reloaded();
+  to.set_client(from.client);
+  to.set_previous_revision(from.before);
+  to.set_revision(from.revision);
+  for (const auto& change : from.changes) to_proto(change, *to.add_changes());
+}
+
 }  // namespace
 
 v1::EventKind kind_of(const Event& event) {
@@ -59,6 +67,9 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const ConfigurationDrift&) const { return v1::EVENT_KIND_CONFIGURATION_DRIFT; }
     v1::EventKind operator()(const FlightRecordWritten&) const { return v1::EVENT_KIND_FLIGHT_RECORD; }
     v1::EventKind operator()(const LeaseChange&) const { return v1::EVENT_KIND_LEASE_CHANGE; }
+    v1::EventKind operator()(const ConfigurationReloaded&) const {
+      return v1::EVENT_KIND_CONFIGURATION_RELOADED;
+    }
   };
   return std::visit(Kind{}, event.content);
 }

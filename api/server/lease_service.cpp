@@ -41,7 +41,7 @@ Result<std::vector<std::string>> axes_of(const v1::AcquireLeaseRequest& from, Ma
   const auto add = [&axes](const std::string& axis) {
     if (std::ranges::find(axes, axis) == axes.end()) axes.push_back(axis);
   };
-  const auto& groups = machine.group_access().groups();
+  const auto groups = machine.group_access().groups();
   for (const auto& name : from.axes()) {
     const auto group = std::ranges::find(groups, name, &GroupSettings::name);
     if (group != groups.end()) {

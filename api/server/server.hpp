@@ -23,8 +23,8 @@ struct ServerOptions {
   int connections = 256;
   /// A stream whose reader has not read for so long is cancelled.
   Duration stalled_reader_limit = std::chrono::seconds(2);
-  /// What GetConfig and CheckConfig ask; outlives the server. nullptr: they are refused.
-  const ConfigurationAccess* configuration = nullptr;
+  /// What GetConfig, CheckConfig and ReloadConfig ask; outlives the server. nullptr: they are refused.
+  ConfigurationAccess* configuration = nullptr;
 };
 
 /// Serves one machine. start() and shutdown() on one thread, which is not one of gRPC's.

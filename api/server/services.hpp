@@ -25,7 +25,7 @@ struct Services {
   Admission& admission;
   WatchHub& hub;
   EventHub& events;
-  const ConfigurationAccess* configuration;  ///< nullptr: there is none to show
+  ConfigurationAccess* configuration;  ///< nullptr: there is none to show
 };
 
 }  // namespace axisd::server

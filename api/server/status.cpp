@@ -89,6 +89,8 @@ grpc::StatusCode status_code(Reason reason) {
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case Reason::cancelled:
       return grpc::StatusCode::CANCELLED;
+    case Reason::reloading:
+      return grpc::StatusCode::UNAVAILABLE;
     case Reason::internal:
       return grpc::StatusCode::INTERNAL;
   }

@@ -38,6 +38,22 @@ void to_proto(const Results& results, const std::vector<std::string>& axes, v1::
   }
 }
 
+void to_proto(const ConfigurationFinding& from, v1::ConfigFinding& to) {
+  to.set_line(from.line);
+  to.set_column(from.column);
+  to.set_message(from.message);
+  to.set_suggestion(from.suggestion);
+}
+
+void to_proto(const ConfigurationReload& from, v1::ReloadConfigResponse& to) {
+  to.set_applied(from.applied);
+  for (const auto& found : from.findings) to_proto(found, *to.add_findings());
+  for (const auto& change : from.changes) server::to_proto(change, *to.add_changes());
+  for (const auto& refusal : from.refusals) server::to_proto(refusal, *to.add_refusals());
+  to.set_previous_revision(from.before);
+  to.set_revision(from.revision);
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1::GetInfoRequest*,
@@ -119,11 +135,12 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetConfig(Context* context, const v
   const auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
-  const auto& served = services_.configuration->served();
-  response->set_yaml(served.yaml);
-  response->set_path(served.path);
-  response->set_revision(served.revision);
-  to_proto(served.served_since, *response->mutable_served_since());
+  const auto served = services_.configuration->served();
+  response->set_yaml(served->yaml);
+  response->set_path(served->path);
+  response->set_revision(served->revision);
+  server::to_proto(served->served_since, *response->mutable_served_since());
+  response->set_file_revision(services_.configuration->file_revision());
   return answer(context, grpc::Status::OK);
 }
 
@@ -134,15 +151,25 @@ grpc::ServerUnaryReactor* SystemServiceImpl::CheckConfig(Context* context,
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
   const auto checked = services_.configuration->check(request->yaml());
-  for (const auto& found : checked.findings) {
-    auto& entry = *response->add_findings();
-    entry.set_line(found.line);
-    entry.set_column(found.column);
-    entry.set_message(found.message);
-    entry.set_suggestion(found.suggestion);
-  }
+  for (const auto& found : checked.findings) to_proto(found, *response->add_findings());
   response->set_revision(checked.revision);
   return answer(context, grpc::Status::OK);
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::ReloadConfig(Context* context,
+                                                          const v1::ReloadConfigRequest* request,
+                                                          v1::ReloadConfigResponse* response) {
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.configuration->reload(
+            client, request->dry_run(),
+            reply_with_value<ConfigurationReload>(
+                call, [response](const ConfigurationReload& reload) { to_proto(reload, *response); }));
+      });
 }
 
 }  // namespace axisd::server

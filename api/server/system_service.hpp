@@ -23,6 +23,8 @@ class SystemServiceImpl final : public v1::SystemService::CallbackService {
                                       v1::GetConfigResponse* response) override;
   grpc::ServerUnaryReactor* CheckConfig(Context* context, const v1::CheckConfigRequest* request,
                                         v1::CheckConfigResponse* response) override;
+  grpc::ServerUnaryReactor* ReloadConfig(Context* context, const v1::ReloadConfigRequest* request,
+                                         v1::ReloadConfigResponse* response) override;
 
  private:
   const Services services_;

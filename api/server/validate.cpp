@@ -329,8 +329,8 @@ Result<Duration> watch_period(const v1::WatchBusStatisticsRequest& from) {
 }
 
 Result<std::vector<std::string>> watched_axes(const v1::WatchAxesRequest& from, const Machine& machine) {
+  if (from.axes().empty()) return std::vector<std::string>{};
   auto names = machine.axis_names();
-  if (from.axes().empty()) return names;
   for (const auto& name : from.axes())
     if (auto found = find_axis(machine, name); !found) return fail(std::move(found).error());
   // One order for all clients, so that streams of the same axes share their batches.

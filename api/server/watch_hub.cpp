@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "api/server/convert.hpp"
+#include "api/server/status.hpp"
+#include "api/server/validate.hpp"
 
 namespace axisd::server {
 namespace {
@@ -70,6 +72,7 @@ TimePoint WatchHub::tick(TimePoint now) {
 void WatchHub::run(Group& group, TimePoint now) {
   group.due = next_tick(now, group.scope.period);
   std::erase_if(group.streams, [](const auto& stream) { return stream->ended(); });
+  if (!end_without(group)) return;
   bool made = false;
   for (const auto& stream : group.streams) {
     if (!stream->idle() && stream->owe()) continue;
@@ -77,6 +80,16 @@ void WatchHub::run(Group& group, TimePoint now) {
     if (!std::exchange(made, true)) serialise(group, now);
     stream->write(group.batch, now);
   }
+}
+
+bool WatchHub::end_without(Group& group) {
+  for (const auto& axis : group.scope.axes) {
+    const auto found = find_axis(machine_, axis);
+    if (found) continue;
+    for (const auto& stream : group.streams) stream->close(to_status(found.error()));
+    return false;
+  }
+  return true;
 }
 
 void WatchHub::pay(const std::shared_ptr<WatchStream>& stream) {
@@ -116,7 +129,8 @@ void WatchHub::serialise(Group& group, TimePoint now) {
   auto& states = *group.message.mutable_axes();
   const auto machine_now = machine_.now();
   std::size_t count = 0;
-  for (const auto& axis : group.scope.axes)
+  const auto axes = group.scope.axes.empty() ? machine_.axis_names() : group.scope.axes;
+  for (const auto& axis : axes)
     if (auto snapshot = machine_.snapshot(axis)) {
       if (count == group.shown.size()) group.shown.push_back({.state = states.Add()});
       show(group.shown[count++], std::move(snapshot), group.scope, machine_now);

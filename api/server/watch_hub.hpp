@@ -15,7 +15,7 @@ namespace axisd::server {
 
 /// What a stream carries, and how often. Streams of the same make share their batches.
 struct WatchScope {
-  std::vector<std::string> axes;  ///< in the machine's order
+  std::vector<std::string> axes;  ///< in the machine's order; none: all that there are
   Duration period;
   google::protobuf::FieldMask fields{};  ///< of AxisState, in canonical form; empty: all
 };
@@ -65,6 +65,8 @@ class WatchHub {
   void pay(const std::shared_ptr<WatchStream>& stream);
   void refresh(Group& group, TimePoint now);
   static void show(Shown& shown, AxisSnapshotPtr snapshot, const WatchScope& scope, TimePoint now);
+  /// Ends streams of an axis that the configuration no longer has. True: there is none.
+  bool end_without(Group& group);
   void serialise(Group& group, TimePoint now);
   void look_for_stalls(TimePoint now);
 

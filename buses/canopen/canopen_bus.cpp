@@ -45,11 +45,14 @@ Result<void> CanopenBus::attach(std::uint8_t node, NodeHandlers handlers) {
   if (!nodes_.try_emplace(node, Node{.handlers = std::move(handlers)}).second)
     return fail(Reason::misconfigured, fmt::format("node {} is in use already", node),
                 "give each node an address of its own");
+  master_.sync().stop();
+  consider_sync();
   return {};
 }
 
 void CanopenBus::detach(std::uint8_t node) {
   nodes_.erase(node);
+  master_.remove_node(node);
   consider_sync();
 }
 

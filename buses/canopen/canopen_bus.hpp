@@ -37,7 +37,8 @@ class CanopenBus final : public Bus {
   /// Opens the port.
   void start();
 
-  /// Registers the drive of a node, before start(). Errors: not a node-ID, attached twice.
+  /// Registers the drive of a node, which may hold something for the next SYNC: none goes out until it is
+  /// settled. Errors: not a node-ID, attached twice.
   Result<void> attach(std::uint8_t node, NodeHandlers handlers);
   /// The drive is going away.
   void detach(std::uint8_t node);

@@ -44,6 +44,10 @@ Result<void> Master::add_node(std::uint8_t node, Duration heartbeat_timeout) {
   return {};
 }
 
+void Master::remove_node(std::uint8_t node) {
+  if (nodes_.erase(node) > 0) nmt_.watch(node, {});
+}
+
 Task<can::SendResult> Master::sent(can::Frame frame, can::SendOptions options) {
   Promise<can::SendResult> promise(executor_, *clock_);
   port_->send(frame, options, [&promise](const can::SendResult& result) { promise.set(result); });

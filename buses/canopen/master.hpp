@@ -57,6 +57,9 @@ class Master {
   /// Listens to `node`: boot-up, heartbeat (0: its absence is no event), EMCY. Twice: a new timeout.
   Result<void> add_node(std::uint8_t node, Duration heartbeat_timeout = {});
 
+  /// The opposite.
+  void remove_node(std::uint8_t node);
+
   /// Sends an NMT command to one node, and waits until it is on the network. That the node followed is seen
   /// in its heartbeat. A reset makes the drive forget its position: only when asked for explicitly (M25).
   Task<Result<void>> command(std::uint8_t node, NmtCommand command,

@@ -105,8 +105,11 @@ void RtuBus::drop(TransactionPtr transaction, TimePoint now) {
   end(std::move(transaction), not_sent(verdict == Verdict::send ? Verdict::expired : verdict, now));
 }
 
-void RtuBus::set_turnaround_max(std::uint8_t node, Duration turnaround) {
-  turnarounds_.insert_or_assign(node, turnaround);
+void RtuBus::set_turnaround_max(std::uint8_t node, std::optional<Duration> turnaround) {
+  if (turnaround)
+    turnarounds_.insert_or_assign(node, *turnaround);
+  else
+    turnarounds_.erase(node);
 }
 
 Duration RtuBus::turnaround_max(std::uint8_t node) const {

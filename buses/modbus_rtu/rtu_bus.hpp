@@ -61,7 +61,7 @@ class RtuBus final : public Bus {
   [[nodiscard]] bool idle() const override { return current_ == nullptr && queue_.size() == 0; }
 
   /// Of this node, in place of the line's.
-  void set_turnaround_max(std::uint8_t node, Duration turnaround);
+  void set_turnaround_max(std::uint8_t node, std::optional<Duration> turnaround);
   [[nodiscard]] Duration turnaround_max(std::uint8_t node) const;
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }

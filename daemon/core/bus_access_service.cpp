@@ -161,15 +161,14 @@ Task<> BusAccessService::run_scan(ScanRequest request, std::weak_ptr<void> alive
 
 std::vector<DeviceSnapshotPtr> BusAccessService::devices() const {
   std::vector<DeviceSnapshotPtr> all;
-  for (const auto& device : machine_->devices()) all.push_back(device->snapshot());
+  for (const auto& device : machine_->table()->devices) all.push_back(device->snapshot.load());
   return all;
 }
 
 void BusAccessService::write_device(std::string device, std::string name, double value,
                                     std::function<void(Result<double>)> callback) {
-  auto run = [](Device& found, std::string register_name, double wanted, auto done) -> Task<> {
-    done(co_await found.write(std::move(register_name), wanted));
-  };
+  auto run = [](Device& found, std::shared_ptr<void> /*in_use*/, std::string register_name, double wanted,
+                auto done) -> Task<> { done(co_await found.write(std::move(register_name), wanted)); };
   post(executor_, [this, run, device = std::move(device), name = std::move(name), value,
                    callback = std::move(callback)]() mutable {
     const auto& all = machine_->devices();
@@ -177,7 +176,11 @@ void BusAccessService::write_device(std::string device, std::string name, double
     if (found == all.end())
       return callback(fail(Reason::invalid_argument, fmt::format("there is no device '{}'", device),
                            "list them: axisctl device list"));
-    machine_->launch(run(**found, std::move(name), value, std::move(callback)), "write device");
+    if ((*found)->closing())
+      return callback(fail(Reason::reloading, fmt::format("{}: its configuration is being reloaded", device),
+                           "repeat it in a moment"));
+    machine_->launch(run(**found, (*found)->use(), std::move(name), value, std::move(callback)),
+                     "write device");
   });
 }
 

@@ -20,9 +20,10 @@ Error no_such_axis(const std::string& axis) {
           .remedy = "list them: axisctl list"};
 }
 
-/// Holds what the sequence needs until it has ended.
+/// Holds what the sequence needs until it has ended; the axis is not exchanged meanwhile.
 template <class T>
-Task<> answer(DriveOperations operations, std::function<Task<Result<T>>(const DriveOperations&)> operation,
+Task<> answer(DriveOperations operations, std::shared_ptr<void> /*in_use*/,
+              std::function<Task<Result<T>>(const DriveOperations&)> operation,
               std::function<void(Result<T>)> callback) {
   callback(co_await operation(operations));
 }
@@ -42,7 +43,10 @@ void DriveAccessService::run(std::string axis,
                    callback = std::move(callback), name]() mutable {
     auto* found = machine_->find(axis);
     if (found == nullptr) return callback(fail(no_such_axis(axis)));
-    machine_->launch(answer<T>(DriveOperations(*found), std::move(operation), std::move(callback)), name);
+    auto use = found->use();
+    if (!use) return callback(fail(use.error()));
+    machine_->launch(
+        answer<T>(DriveOperations(*found), *std::move(use), std::move(operation), std::move(callback)), name);
   });
 }
 
@@ -122,12 +126,11 @@ void DriveAccessService::save_parameters(std::string axis, Requester requester,
 void DriveAccessService::restore_factory(std::string axis, Requester requester,
                                          std::function<void(Result<std::string>)> callback) {
   audit(requester.client, axis, "restores the factory settings");
-  const auto* found = machine_->find(axis);  // axes never change, nor do their settings
-  auto taken = found == nullptr ? std::vector<std::uint8_t>{} : others_on_bus(*found);
-  run_at_rest<std::string>(
-      std::move(axis), std::move(requester),
-      [taken = std::move(taken)](const DriveOperations& drive) { return drive.restore_factory(taken); },
-      std::move(callback), "restore factory settings");
+  auto restore = [this, axis](const DriveOperations& drive) {
+    return drive.restore_factory(others_on_bus(*machine_->find(axis)));
+  };
+  run_at_rest<std::string>(std::move(axis), std::move(requester), std::move(restore), std::move(callback),
+                           "restore factory settings");
 }
 
 void DriveAccessService::read_segments(std::string axis, SegmentsCallback callback) {
@@ -155,14 +158,17 @@ std::shared_ptr<void> DriveAccessService::change_serial(std::string axis, Serial
                    callback = std::move(callback), alive = std::weak_ptr<void>(token)]() mutable {
     auto* found = machine_->find(axis);
     if (found == nullptr) return callback(fail(no_such_axis(axis)));
-    machine_->launch(
-        run_serial_change(*found, std::move(requester), change, std::move(alive), std::move(callback)),
-        "change address");
+    auto use = found->use();
+    if (!use) return callback(fail(use.error()));
+    machine_->launch(run_serial_change(*found, *std::move(use), std::move(requester), change,
+                                       std::move(alive), std::move(callback)),
+                     "change address");
   });
   return token;
 }
 
-Task<> DriveAccessService::run_serial_change(Axis& axis, Requester requester, SerialChange change,
+Task<> DriveAccessService::run_serial_change(Axis& axis, std::shared_ptr<void> /*in_use*/,
+                                             Requester requester, SerialChange change,
                                              std::weak_ptr<void> alive, SerialCallback callback) {
   const auto tell = [&](Result<SerialProgress> progress) {
     if (const auto held = alive.lock()) callback(std::move(progress));

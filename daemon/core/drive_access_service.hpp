@@ -53,8 +53,8 @@ class DriveAccessService final : public DriveAccess {
   template <class T>
   void run(std::string axis, std::function<Task<Result<T>>(const DriveOperations&)> operation,
            std::function<void(Result<T>)> callback, const char* name);
-  Task<> run_serial_change(Axis& axis, Requester requester, SerialChange change, std::weak_ptr<void> alive,
-                           SerialCallback callback);
+  Task<> run_serial_change(Axis& axis, std::shared_ptr<void> in_use, Requester requester, SerialChange change,
+                           std::weak_ptr<void> alive, SerialCallback callback);
   [[nodiscard]] Result<void> check_serial(const Axis& axis, const SerialChange& change) const;
   /// A search for the drive where it will be after its power cycle.
   [[nodiscard]] std::unique_ptr<NodeScan> look_for(const Axis& axis, const SerialChange& change,

@@ -22,13 +22,6 @@ struct GroupAccessService::Gathering {
   std::function<void(std::vector<GroupStopResult>)> callback;
 };
 
-GroupAccessService::GroupAccessService(CoreLoop& loop, MachineCore& machine)
-    : loop_(&loop), machine_(&machine) {
-  for (const auto& axis : machine.axes()) axes_.emplace(axis->settings().name, axis.get());
-}
-
-const std::vector<GroupSettings>& GroupAccessService::groups() const { return machine_->groups().groups(); }
-
 void GroupAccessService::move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
                               std::function<void(Result<GroupMove>)> callback) {
   options.arrived = loop_->clock().now();
@@ -56,12 +49,13 @@ void GroupAccessService::get(std::string id, std::function<void(Result<GroupMove
   });
 }
 
-std::vector<Axis*> GroupAccessService::resolve(const GroupStopRequest& request,
-                                               std::vector<GroupStopResult>& unknown) const {
+std::vector<std::string> GroupAccessService::resolve(const MachineTable& table,
+                                                     const GroupStopRequest& request,
+                                                     std::vector<GroupStopResult>& unknown) {
   auto names = request.axes;
   if (!request.group.empty()) {
-    const auto* group = machine_->groups().find(request.group);
-    if (group != nullptr)
+    const auto group = std::ranges::find(table.groups, request.group, &GroupSettings::name);
+    if (group != table.groups.end())
       names.insert(names.begin(), group->axes.begin(), group->axes.end());
     else
       unknown.push_back(
@@ -69,15 +63,14 @@ std::vector<Axis*> GroupAccessService::resolve(const GroupStopRequest& request,
            .command = fail(Reason::unknown_axis, fmt::format("there is no group '{}'", request.group),
                            "list them: axisctl group list")});
   }
-  std::vector<Axis*> axes;
+  std::vector<std::string> axes;
   for (const auto& name : names) {
-    const auto found = axes_.find(name);
-    if (found == axes_.end())
+    if (table.find(name) == nullptr)
       unknown.push_back({.axis = name,
                          .command = fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", name),
                                          "list them: axisctl list")});
-    else if (std::ranges::find(axes, found->second) == axes.end())
-      axes.push_back(found->second);
+    else if (std::ranges::find(axes, name) == axes.end())
+      axes.push_back(name);
   }
   return axes;
 }
@@ -86,26 +79,26 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
                               std::function<void(std::vector<GroupStopResult>)> callback) {
   auto gathering = std::make_shared<Gathering>();
   gathering->callback = std::move(callback);
-  const auto axes = resolve(request, gathering->results);
+  const auto table = machine_->table();
+  const auto axes = resolve(*table, request, gathering->results);
   if (axes.empty())
     return post(loop_->executor(), [gathering] { gathering->callback(std::move(gathering->results)); });
   auto serve = [this, gathering, axes, request, client = std::move(client), until,
                 arrived = loop_->clock().now()] {
     const auto known = gathering->results.size();
     std::vector<Result<CommandPtr>> commands;
-    for (auto* axis : axes) {
-      commands.push_back(axis->submit(StopRequest{.kind = request.kind, .hold = request.hold},
-                                      {.client = client, .arrived = arrived}));
-      gathering->results.push_back(
-          {.axis = axis->settings().name, .command = fail(Reason::internal, "no answer")});
+    for (const auto& axis : axes) {
+      commands.push_back(machine_->submit(axis, StopRequest{.kind = request.kind, .hold = request.hold},
+                                          {.client = client, .arrived = arrived}));
+      gathering->results.push_back({.axis = axis, .command = fail(Reason::internal, "no answer")});
     }
     gathering->missing = commands.size();
     for (std::size_t i = 0; i < commands.size(); ++i) gather(gathering, known + i, commands[i], until);
   };
   // Every gate is raised here and now; one visit of the core serves all.
-  for (auto* axis : axes)
-    if (axis != axes.back()) axis->gate()->request_stop();
-  loop_->lane().request(*axes.back()->gate(), std::move(serve));
+  for (const auto& axis : axes)
+    if (axis != axes.back()) table->find(axis)->gate->request_stop();
+  loop_->lane().request(*table->find(axes.back())->gate, std::move(serve));
 }
 
 void GroupAccessService::gather(const std::shared_ptr<Gathering>& gathering, std::size_t index,

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -17,9 +16,9 @@ namespace axisd::core {
 class GroupAccessService final : public GroupAccess {
  public:
   /// Both outlive it.
-  GroupAccessService(CoreLoop& loop, MachineCore& machine);
+  GroupAccessService(CoreLoop& loop, MachineCore& machine) : loop_(&loop), machine_(&machine) {}
 
-  [[nodiscard]] const std::vector<GroupSettings>& groups() const override;
+  [[nodiscard]] std::vector<GroupSettings> groups() const override { return machine_->table()->groups; }
   void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
             std::function<void(Result<GroupMove>)> callback) override;
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
@@ -31,14 +30,14 @@ class GroupAccessService final : public GroupAccess {
 
  private:
   struct Gathering;
-  /// The axes that are known, each once, and results for the names that are not.
-  std::vector<Axis*> resolve(const GroupStopRequest& request, std::vector<GroupStopResult>& unknown) const;
+  /// The names of axes that are known, each once, and results for those that are not.
+  static std::vector<std::string> resolve(const MachineTable& table, const GroupStopRequest& request,
+                                          std::vector<GroupStopResult>& unknown);
   void gather(const std::shared_ptr<Gathering>& gathering, std::size_t index,
               const Result<CommandPtr>& command, WaitUntil until);
 
   CoreLoop* loop_;
   MachineCore* machine_;
-  std::map<std::string, Axis*, std::less<>> axes_;  ///< never changes; only gates are used off the core
   std::atomic<bool> closing_{false};
 };
 

@@ -179,4 +179,15 @@ GroupRunPtr GroupKeeper::find_run(std::string_view id) const {
   return found == runs_.end() ? nullptr : *found;
 }
 
+GroupRunPtr GroupKeeper::engaged(std::string_view axis) const {
+  const auto found =
+      std::ranges::find_if(runs_, [&](const auto& run) { return !run->over() && run->moves(axis); });
+  return found == runs_.end() ? nullptr : *found;
+}
+
+void GroupKeeper::let_go(std::string_view axis) {
+  for (const auto& run : runs_)
+    if (run->moves(axis)) run->let_go();
+}
+
 }  // namespace axisd::core

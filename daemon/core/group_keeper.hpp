@@ -27,15 +27,21 @@ class GroupKeeper {
       : parts_(std::move(parts)), groups_(std::move(groups)) {}
   GroupKeeper(const GroupKeeper&) = delete;
 
-  /// Never changes. Thread: any.
   [[nodiscard]] const std::vector<GroupSettings>& groups() const { return groups_; }
-  /// nullptr: there is none. Thread: any.
+  /// nullptr: there is none.
   [[nodiscard]] const GroupSettings* find(std::string_view group) const;
 
   /// As GroupAccess::move(): a repeat gets the move of the first request.
   Result<GroupRunPtr> move(GroupMoveRequest request, const CommandOptions& options);
   /// nullptr: unknown, or forgotten.
   [[nodiscard]] GroupRunPtr find_run(std::string_view id) const;
+
+  /// From now on; moves that were accepted go on as they were.
+  void configure(std::vector<GroupSettings> groups) { groups_ = std::move(groups); }
+  /// The move that still needs the axis; nullptr: none does.
+  [[nodiscard]] GroupRunPtr engaged(std::string_view axis) const;
+  /// The axis is going away. Precondition: no move needs it.
+  void let_go(std::string_view axis);
 
  private:
   [[nodiscard]] Result<void> check(const GroupMoveRequest& request) const;

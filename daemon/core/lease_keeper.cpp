@@ -115,10 +115,12 @@ void LeaseKeeper::end(const EndedLease& over, const Lease* next) {
     return next != nullptr && std::ranges::find(next->axes, axis) != next->axes.end();
   };
   for (const auto& name : over.lease.axes)
-    find_(name)->gate()->set_fencing_token(follows(name) ? next->token : 0,
-                                           follows(name) ? next->expires : TimePoint::max());
+    if (const auto* axis = find_(name))
+      axis->gate()->set_fencing_token(follows(name) ? next->token : 0,
+                                      follows(name) ? next->expires : TimePoint::max());
   for (const auto& name : over.lease.axes) {
     auto* axis = find_(name);
+    if (axis == nullptr) continue;  // it ran out just before a reload removed the axis
     axis->lease_lost(cause);
     const bool taken = over.end == LeaseEnd::taken && follows(name);
     tell_(name, LeaseChange{.what = change_of(over.end),

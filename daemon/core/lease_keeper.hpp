@@ -21,6 +21,7 @@ class LeaseKeeper {
   LeaseKeeper(const LeaseKeeper&) = delete;
 
   [[nodiscard]] const LeaseTable& table() const { return table_; }
+  void configure(LeaseSettings settings) { table_.configure(settings); }
 
   // As LeaseAccess describes them.
   Result<LeaseGrant> acquire(const LeaseRequest& request);

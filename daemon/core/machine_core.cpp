@@ -5,11 +5,7 @@
 
 #include <algorithm>
 #include <boost/smart_ptr/make_shared.hpp>
-#include <stdexcept>
 #include <utility>
-
-#include "devices/generic/canopen_device.hpp"
-#include "devices/generic/modbus_device.hpp"
 
 namespace axisd::core {
 
@@ -47,6 +43,7 @@ void log_link(const canopen::CanopenBus& network, std::string& told) {
 
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
     : parts_(std::move(parts)),
+      recorder_memory_(static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024),
       book_(*parts_.clock, parts_.instance_id, parts_.journal),
       flight_recorder_(*parts_.clock, parts_.flight_records,
                        [this](const std::string& axis, const FlightRecordWritten& record) {
@@ -64,77 +61,18 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                .find = [this](std::string_view axis) { return find(axis); },
                .launch = [this](Task<> task, const char* name) { launch(std::move(task), name); }},
               configuration.groups) {
-  const auto memory = static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024;
   if (parts_.persistence != nullptr) {
     const auto& inhibit = parts_.persistence->loaded().inhibit;
     set_inhibit(inhibit.active, inhibit.by);
   }
-  for (const auto& line : configuration.lines) {
-    add_recorder(line.name, memory, 0);
-    lines_.push_back(
-        std::make_unique<modbus_rtu::RtuBus>(parts_.executor, *parts_.clock, line, parts_.make_line(line)));
-    buses_.push_back(lines_.back().get());
-  }
-  for (const auto& network : configuration.networks) {
-    auto& recorder = add_recorder(network.name, memory, static_cast<int>(network.bitrate));
-    networks_.push_back(std::make_unique<canopen::CanopenBus>(
-        parts_.executor, *parts_.clock, network,
-        std::make_unique<ObservedPort>(parts_.make_port(network), *parts_.clock,
-                                       recorder.network_observer())));
-    buses_.push_back(networks_.back().get());
-    cyclers_.push_back(
-        std::make_unique<LinkCycler>(parts_.executor, *parts_.clock, *networks_.back(), parts_.link_helper));
-  }
-  const auto record = [this](const std::string& axis, EventContent content) {
-    on_event(axis, std::move(content));
-  };
+  for (const auto& line : configuration.lines) add_line(line);
+  for (const auto& network : configuration.networks) add_network(network);
   for (const auto& entry : configuration.axes) {
-    const auto& settings = entry.axis;
-    auto* bus = find_bus(settings.bus);
-    const auto* descriptor = descriptor_of(settings);
-    auto setup =
-        descriptor == nullptr ? fail(Reason::internal, "unknown model") : drive_setup(settings, *descriptor);
-    // The loader has refused all of this with its position in the file.
-    if (bus == nullptr || !setup)
-      throw std::invalid_argument(
-          fmt::format("axis {}: {}", settings.name, setup ? "unknown bus" : setup.error().message));
-    auto drive = descriptor->make({.executor = parts_.executor,
-                                   .clock = parts_.clock,
-                                   .rtu = find_line(settings.bus),
-                                   .canopen = find_network(settings.bus),
-                                   .node = settings.node,
-                                   .setup = std::move(*setup)});
-    if (auto* line = find_line(settings.bus); line != nullptr && settings.turnaround_max)
-      line->set_turnaround_max(settings.node, *settings.turnaround_max);
-    axes_.push_back(std::make_unique<Axis>(AxisEnvironment{.executor = parts_.executor,
-                                                           .clock = parts_.clock,
-                                                           .bus = bus,
-                                                           .book = &book_,
-                                                           .persistence = parts_.persistence,
-                                                           .leases = &leases_.table(),
-                                                           .inhibited = &inhibited_,
-                                                           .published = parts_.published,
-                                                           .event = record},
-                                           settings, *descriptor, std::move(drive),
-                                           std::make_shared<AxisGate>(bus->stop_notice()), bus->simulated()));
-    by_name_.emplace(settings.name, axes_.back().get());
-    const bool brake =
-        std::ranges::any_of(settings.outputs, [](const auto& o) { return o.function == "brake"; });
-    if (settings.vertical && !brake)
-      spdlog::warn("{}: load: vertical, but no output has the function brake", settings.name);  // M2
+    axes_.push_back(make_axis(entry.axis, nullptr));
+    by_name_.emplace(entry.axis.name, axes_.back().get());
   }
-  for (const auto& settings : configuration.devices) {
-    auto* line = find_line(settings.bus);
-    auto* network = find_network(settings.bus);
-    if (settings.kind == BusKind::modbus_rtu && line != nullptr) {
-      if (settings.turnaround_max) line->set_turnaround_max(settings.node, *settings.turnaround_max);
-      devices_.push_back(std::make_unique<ModbusDevice>(parts_.executor, *parts_.clock, *line, settings));
-    } else if (settings.kind == BusKind::canopen && network != nullptr) {
-      devices_.push_back(std::make_unique<CanopenDevice>(parts_.executor, *parts_.clock, *network, settings));
-    } else {
-      throw std::invalid_argument(fmt::format("device {}: no bus for it", settings.name));
-    }
-  }
+  for (const auto& settings : configuration.devices) devices_.push_back(make_device(settings));
+  publish_table();
 }
 
 MachineCore::~MachineCore() = default;
@@ -213,11 +151,6 @@ Task<> MachineCore::watch_port(Bus& bus) {
   }
 }
 
-BusRecorder& MachineCore::add_recorder(const std::string& bus, std::size_t memory, int bit_rate) {
-  recorders_.push_back(std::make_unique<BusRecorder>(bus, memory, bit_rate, *parts_.clock, parts_.observer));
-  return *recorders_.back();
-}
-
 const BusRecorder* MachineCore::find_recorder(std::string_view bus) const {
   const auto found = std::ranges::find_if(recorders_, [&](const auto& r) { return r->bus() == bus; });
   return found == recorders_.end() ? nullptr : found->get();
@@ -258,6 +191,9 @@ Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& ac
   auto* found = find(axis);
   if (found == nullptr)
     return fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis), "list them: axisctl list");
+  const auto* stop = std::get_if<StopRequest>(&action);
+  if (const auto leaving = leaving_.find(axis); leaving != leaving_.end() && stop != nullptr)
+    return hold_stop(leaving->second, axis, *stop, options);
   return found->submit(action, options);
 }
 
@@ -282,8 +218,8 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
   std::ranges::sort(order);
   std::vector<Result<CommandPtr>> results(axes_.size(), fail(Reason::internal, "not stopped"));
   for (const auto& [urgency, i] : order)
-    results[i] = axes_[i]->submit(StopRequest{.kind = StopKind::stop, .all = true},
-                                  {.client = client, .arrived = arrived});
+    results[i] = submit(axes_[i]->settings().name, StopRequest{.kind = StopKind::stop, .all = true},
+                        {.client = client, .arrived = arrived});
   return results;
 }
 

@@ -16,6 +16,8 @@
 #include "daemon/core/group_keeper.hpp"
 #include "daemon/core/lease_keeper.hpp"
 #include "daemon/core/link_cycler.hpp"
+#include "daemon/core/machine_table.hpp"
+#include "daemon/core/reload.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
 #include "devices/generic/device.hpp"
@@ -38,6 +40,9 @@ struct MachineParts {
   FrameObserver observer{};  ///< told every frame (the wire log); may be empty
   store::RecordFiles* flight_records = nullptr;  ///< may be null: none are written
   std::vector<BusBudgetReport> budgets{};        ///< as computed; may be empty: none is told
+  /// Simulated drives of a new configuration; may be empty.
+  std::function<void(const config::Configuration&, const std::vector<ConfigurationChange>&)>
+      reconfigure_simulation{};
   std::function<void()> published;
 };
 
@@ -51,6 +56,8 @@ class MachineCore {
   /// Opens the buses and connects axes and devices. Moves nothing.
   void start();
 
+  /// What there is, for every thread.
+  [[nodiscard]] MachineTablePtr table() const { return table_.load(); }
   [[nodiscard]] Axis* find(std::string_view axis) const;
   [[nodiscard]] const std::vector<std::unique_ptr<Axis>>& axes() const { return axes_; }
   /// All buses, of either kind.
@@ -82,6 +89,14 @@ class MachineCore {
   /// Halts what moves, for the end of the daemon.
   void stop_moving_axes();
   [[nodiscard]] bool at_rest() const;
+  // machine_reload.cpp
+  /// Why the machine cannot become this now: all reasons, each with what to do; empty: it can.
+  [[nodiscard]] std::vector<Error> check_reload(const Reload& reload) const;
+  /// All of it, or, with what check_reload() says, nothing. What is the same as before is not touched: it
+  /// goes on moving. From the moment of the check on, axes that change refuse everything (`reloading`) until
+  /// their successors are there; stops wait for those. They come up as after a start of the daemon (M1, M20).
+  void reload(Reload reload, ReloadDone done);
+
   [[nodiscard]] std::vector<BusStatus> bus_status() const;
   /// What sees the frames of a bus. nullptr if there is none of that name.
   [[nodiscard]] const BusRecorder* find_recorder(std::string_view bus) const;
@@ -98,15 +113,42 @@ class MachineCore {
   [[nodiscard]] bool buses_reported() const;
 
  private:
+  // machine_build.cpp: what the configuration names
+  void add_line(const modbus_rtu::LineSettings& line);
+  void add_network(const canopen::NetworkSettings& network);
+  /// `face`: of the axis that it takes the place of; nullptr: there was none.
+  [[nodiscard]] std::unique_ptr<Axis> make_axis(const AxisSettings& settings, AxisFacePtr face);
+  [[nodiscard]] std::unique_ptr<Device> make_device(const DeviceSettings& settings);
+  void publish_table();
+
+  // machine_reload.cpp
+  void check_parts(const Reload& reload, const ConfigurationChange& change,
+                   std::vector<Error>& refusals) const;
+  void check_sync_for_reload(const ConfigurationChange& change, std::vector<Error>& refusals) const;
+  void check_lease_for_reload(const Reload& reload, const ConfigurationChange& change,
+                              std::vector<Error>& refusals) const;
+  [[nodiscard]] bool has_made_room() const;
+  [[nodiscard]] std::string unstopped(const Reload& reload) const;
+  Task<> run_reload(Reload reload, ReloadDone done);
+  Task<> stop_leaving(std::string name);
+  void carry_out(Reload& reload);
+  void clear_away();
+  [[nodiscard]] std::vector<Axis*> renew_axes(const Reload& reload);
+  [[nodiscard]] std::vector<Device*> renew_devices(const Reload& reload);
+  void tell_reloaded(const Reload& reload);
+  CommandPtr hold_stop(std::vector<HeldStop>& stops, const std::string& axis, const StopRequest& request,
+                       const CommandOptions& options);
+
   void expect_stops();
   Task<> watch(canopen::CanopenBus& network);
   Task<> watch_port(Bus& bus);
-  BusRecorder& add_recorder(const std::string& bus, std::size_t memory, int bit_rate);
+  BusRecorder& add_recorder(const std::string& bus, int bit_rate);
   void on_event(const std::string& axis, EventContent content);
   void note_fault(const Axis& axis, const EventContent& content);
   void set_inhibit(bool inhibited, const std::string& by);
 
   MachineParts parts_;
+  const std::size_t recorder_memory_;  ///< bytes, of each bus
   CommandBook book_;
   EventLog events_;
   std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before these, which tell them
@@ -124,7 +166,11 @@ class MachineCore {
   GroupKeeper groups_;  ///< after the axes, which its moves are of
   int sequences_ = 0;   ///< launched ones that still run
   bool closing_ = false;
+  bool reloading_ = false;
+  Leaving leaving_;  ///< axes that a reload exchanges or removes
+  std::map<std::string, LeftBehind, std::less<>> left_behind_;
   std::map<std::string, Axis*, std::less<>> by_name_;
+  boost::atomic_shared_ptr<const MachineTable> table_;
 };
 
 }  // namespace axisd::core

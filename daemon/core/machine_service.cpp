@@ -35,18 +35,14 @@ MachineService::MachineService(CoreLoop& loop, MachineCore& machine, std::string
       lease_access_(loop.executor(), machine.leases()),
       group_access_(loop, machine),
       name_(std::move(name)),
-      instance_id_(std::move(instance_id)) {
-  for (const auto& axis : machine.axes()) {
-    names_.push_back(axis->settings().name);
-    axes_.emplace(axis->settings().name, axis.get());
-  }
-}
+      instance_id_(std::move(instance_id)) {}
 
-std::vector<std::string> MachineService::axis_names() const { return names_; }
+std::vector<std::string> MachineService::axis_names() const { return machine_->table()->axes; }
 
 AxisSnapshotPtr MachineService::snapshot(std::string_view axis) const {
-  const auto found = axes_.find(axis);
-  return found == axes_.end() ? nullptr : found->second->snapshot();
+  const auto table = machine_->table();
+  const auto* found = table->find(axis);
+  return found == nullptr ? nullptr : found->snapshot.load();
 }
 
 MachineInfo MachineService::info() const {
@@ -72,7 +68,8 @@ void MachineService::answer(const Result<CommandPtr>& command, WaitUntil until, 
 
 void MachineService::submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
                             CommandCallback callback) {
-  const auto found = axes_.find(axis);
+  const auto table = machine_->table();
+  const auto* found = table->find(axis);
   const auto* stop = std::get_if<StopRequest>(&action);
   const bool disable = std::holds_alternative<DisableRequest>(action);
   options.arrived = now();
@@ -83,8 +80,8 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
     if (closing_ && !is_stop) return callback(closing());
     answer(machine_->submit(axis, action, options), until, std::move(callback));
   };
-  if (found != axes_.end() && (stop != nullptr || disable))
-    loop_->lane().request(*found->second->gate(), std::move(serve));
+  if (found != nullptr && (stop != nullptr || disable))
+    loop_->lane().request(*found->gate, std::move(serve));
   else
     post(loop_->executor(), std::move(serve));
 }
@@ -127,11 +124,12 @@ void MachineService::stop_all(std::string client, WaitUntil until,
         if (--gathering->missing == 0) callback(std::move(gathering->results));
       });
   };
-  if (axes_.empty()) return post(loop_->executor(), std::move(serve));
+  const auto table = machine_->table();
+  if (table->faces.empty()) return post(loop_->executor(), std::move(serve));
   // Every gate is raised here and now; one visit of the core serves all.
-  auto last = std::prev(axes_.end());
-  for (auto axis = axes_.begin(); axis != last; ++axis) axis->second->gate()->request_stop();
-  loop_->lane().request(*last->second->gate(), std::move(serve));
+  auto last = std::prev(table->faces.end());
+  for (auto axis = table->faces.begin(); axis != last; ++axis) axis->second->gate->request_stop();
+  loop_->lane().request(*last->second->gate, std::move(serve));
 }
 
 void MachineService::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {
@@ -167,7 +165,9 @@ void MachineService::cancel_command(std::string id, CommandCallback callback) {
   post(loop_->executor(), [this, id = std::move(id), callback = std::move(callback)]() mutable {
     const auto command = machine_->book().find(id);
     if (!command) return callback(unknown_command(id));
-    answer(machine_->find(command->value().axis)->cancel(command), WaitUntil::accepted, std::move(callback));
+    auto* axis = machine_->find(command->value().axis);
+    // Of an axis that the configuration no longer has: it has ended.
+    answer(axis == nullptr ? command : axis->cancel(command), WaitUntil::accepted, std::move(callback));
   });
 }
 
@@ -177,6 +177,16 @@ void MachineService::buses(std::function<void(std::vector<BusStatus>)> callback)
 
 void MachineService::budgets(std::function<void(std::vector<BusBudgetReport>)> callback) {
   post(loop_->executor(), [this, callback = std::move(callback)] { callback(machine_->budgets()); });
+}
+
+void MachineService::reload(Reload reload, bool dry_run, ReloadDone done) {
+  // Shared: what is posted has to be copyable, and this need not be copied.
+  auto whole = std::make_shared<Reload>(std::move(reload));
+  post(loop_->executor(), [this, whole = std::move(whole), dry_run, done = std::move(done)] {
+    if (closing_) return done({closing().error()});
+    if (dry_run) return done(machine_->check_reload(*whole));
+    machine_->reload(std::move(*whole), done);
+  });
 }
 
 void MachineService::on_published(std::function<void()> notify) { notify_ = std::move(notify); }

@@ -48,6 +48,8 @@ class MachineService final : public Machine {
   [[nodiscard]] WallTime wall(TimePoint t) const override { return loop_->clock().wall(t); }
   [[nodiscard]] TimePoint now() const override { return loop_->clock().now(); }
 
+  /// As MachineCore::reload(), or, with `dry_run`, check_reload(). Calls back on the core thread.
+  void reload(Reload reload, bool dry_run, ReloadDone done);
   /// From now on everything but stops is refused: the daemon is going down.
   void close() {
     closing_ = true;
@@ -70,9 +72,6 @@ class MachineService final : public Machine {
   std::string name_;
   std::string instance_id_;
   std::atomic<bool> closing_{false};
-  std::vector<std::string> names_;
-  std::map<std::string, Axis*, std::less<>>
-      axes_;  ///< never changes; only gate() and snapshot() are used here
   std::function<void()> notify_;
 };
 

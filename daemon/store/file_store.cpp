@@ -46,7 +46,7 @@ Result<void> FileStore::count_this_start() {
   for (int generation = 0; generation < 2; ++generation) {
     if (auto written = write(durable_.state); !written) return written;
   }
-  loaded_ = durable_.state;
+  loaded_ = *current_ = durable_.state;
   return {};
 }
 
@@ -67,6 +67,7 @@ void FileStore::count_eeprom_writes(std::string axis, std::uint64_t writes, Call
 }
 
 void FileStore::enqueue(Change change, Callback done) {
+  store::apply(*current_, change);
   {
     const std::scoped_lock lock(
         mutex_);  // held by the writer only for a swap: the core does not wait for the disk
@@ -97,7 +98,7 @@ void FileStore::commit(std::vector<Pending> batch) {
   if (!result) {
     for (const auto& pending : batch) apply_after_failure(durable_.state, pending.change);
   }
-  for (auto& pending : batch) report(std::move(pending.done), result);
+  for (auto& pending : batch) report(std::move(pending), result);
 }
 
 Result<void> FileStore::write(const StoredState& state) {
@@ -108,8 +109,12 @@ Result<void> FileStore::write(const StoredState& state) {
   return saved;
 }
 
-void FileStore::report(Callback done, const Result<void>& result) {
-  if (done) post(core_, [done = std::move(done), result] { done(result); });
+void FileStore::report(Pending pending, const Result<void>& result) {
+  if (!pending.done && result) return;
+  post(core_, [pending = std::move(pending), result, current = std::weak_ptr(current_)] {
+    if (const auto alive = current.lock(); alive && !result) apply_after_failure(*alive, pending.change);
+    if (pending.done) pending.done(result);
+  });
 }
 
 }  // namespace axisd::store

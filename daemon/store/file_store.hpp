@@ -27,6 +27,7 @@ class FileStore final : public Persistence {
 
   /// Includes this start in start_count.
   [[nodiscard]] const StoredState& loaded() const override { return loaded_; }
+  [[nodiscard]] const StoredState& current() const override { return *current_; }
   /// Set if the newest file was damaged and an older one is used, without its offsets and with motion
   /// inhibited.
   [[nodiscard]] const std::optional<Error>& damage() const { return damage_; }
@@ -47,11 +48,12 @@ class FileStore final : public Persistence {
   void run();
   void commit(std::vector<Pending> batch);
   Result<void> write(const StoredState& state);
-  void report(Callback done, const Result<void>& result);
+  void report(Pending pending, const Result<void>& result);
 
   Executor core_;
   std::optional<Error> damage_;
   StoredState loaded_;
+  std::shared_ptr<StoredState> current_ = std::make_shared<StoredState>();  ///< of the core
 
   // Of the writing thread, once it runs.
   StateDirectory directory_;

@@ -8,7 +8,7 @@
 namespace axisd {
 
 Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescriptor& descriptor,
-           std::unique_ptr<Drive> drive, std::shared_ptr<AxisGate> gate, bool simulated)
+           std::unique_ptr<Drive> drive, AxisFacePtr face, bool simulated)
     : env_(std::move(environment)),
       settings_(std::move(settings)),
       descriptor_(&descriptor),
@@ -16,24 +16,27 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       planner_(settings_, descriptor, scale_),
       tracker_(scale_),
       drive_(std::move(drive)),
-      gate_(std::move(gate)),
+      face_(std::move(face)),
+      gate_(face_->gate),
       simulated_(simulated),
       absolute_segments_(settings_.segments && settings_.segments->absolute),
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
       stopped_(env_.executor, *env_.clock) {
   if (env_.persistence != nullptr) {
-    const auto& axes = env_.persistence->loaded().axes;
+    const auto& axes = env_.persistence->current().axes;
     if (const auto found = axes.find(settings_.name); found != axes.end())
       eeprom_writes_ = found->second.eeprom_writes;
   }
+  if (const auto before = face_->snapshot.load()) revision_ = before->revision;
   drive_->on_attention([this] { wake_.notify_all(); });
   publish();
 }
 
 Axis::~Axis() = default;
 
-void Axis::start() {
+void Axis::start(bool answered) {
+  if (answered) link_ = LinkState::configuring;
   take_over();
   launch(run(), "link");
 }

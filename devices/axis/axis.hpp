@@ -18,7 +18,6 @@
 // (superseded, not cancelled).
 #pragma once
 
-#include <boost/smart_ptr/atomic_shared_ptr.hpp>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -33,6 +32,7 @@
 #include "buses/gate.hpp"
 #include "buses/signal.hpp"
 #include "buses/task.hpp"
+#include "devices/axis/axis_face.hpp"
 #include "devices/axis/command_book.hpp"
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
@@ -66,16 +66,34 @@ struct AxisEnvironment {
 class Axis {
  public:
   Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescriptor& descriptor,
-       std::unique_ptr<Drive> drive, std::shared_ptr<AxisGate> gate, bool simulated);
+       std::unique_ptr<Drive> drive, AxisFacePtr face, bool simulated);
   ~Axis();
   Axis(const Axis&) = delete;
 
-  /// Connects to the drive, now and whenever it was lost. Never moves or enables anything (M1).
-  void start();
+  /// Connects to the drive, now and whenever it was lost. Never moves or enables anything (M1). `answered`:
+  /// the drive did a moment ago, so silence is no more than a lost frame at first.
+  void start(bool answered = false);
 
   /// Ends all sequences; they run out on the core thread until closed(). The drive is left as it is.
   void close();
   [[nodiscard]] bool closed() const { return closing_ && sequences_ == 0; }
+
+  // axis_reload.cpp: for another axis of the same name, or none, to take its place
+  /// Why that cannot be now, all reasons, each with what to do; empty: nothing stands against it. Leases are
+  /// not looked at.
+  [[nodiscard]] std::vector<Error> check_exchange() const;
+  /// Refuses everything from now on (`reloading`) and ends as close() does: nothing of it is sent any more
+  /// but what is on its way. `other_drive`: what comes has another drive, and nothing that is known of this
+  /// one's position holds. Precondition: check_exchange() found nothing.
+  void retire(bool other_drive);
+  /// `on_lease_loss: disable` was not done yet.
+  [[nodiscard]] bool owes_release() const { return release_owed_.has_value(); }
+  /// Its drive answered when it was retired.
+  [[nodiscard]] bool answered() const { return answered_; }
+  /// Keeps the axis from being exchanged while it lives. Errors: reloading.
+  Result<std::shared_ptr<void>> use();
+  /// A stop that was accepted for the axis before this one, and not executed.
+  void take_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command);
 
   /// The axis as a member of a group (member.hpp).
   class Member;
@@ -142,7 +160,9 @@ class Axis {
   /// Thread: any.
   [[nodiscard]] const std::shared_ptr<AxisGate>& gate() const { return gate_; }
   /// Thread: any.
-  [[nodiscard]] AxisSnapshotPtr snapshot() const { return snapshot_.load(); }
+  [[nodiscard]] AxisSnapshotPtr snapshot() const { return face_->snapshot.load(); }
+  /// What is left of it when it is gone. Thread: any.
+  [[nodiscard]] const AxisFacePtr& face() const { return face_; }
 
  private:
   /// A command that is being executed.
@@ -270,6 +290,7 @@ class Axis {
   Result<CommandPtr> accept(const MoveVelocityRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const JogRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const StopRequest& request, const CommandOptions& options);
+  void execute_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command);
   Result<CommandPtr> accept(const ResetRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const SetPositionRequest& request, const CommandOptions& options);
   [[nodiscard]] double velocity_of(const MotionValues& with) const;
@@ -307,6 +328,7 @@ class Axis {
   void look_at_buffered(const Action& action, const CommandOptions& options, Obstacles& found) const;
   void look_at(const GroupMemberRequest& request, const CommandOptions& options, Obstacles& found) const;
   void look_at_options(const CommandOptions& options, Obstacles& found) const;
+  [[nodiscard]] Error reloading() const;
   void look_at_link(Obstacles& found) const;
   void look_at_fault(Obstacles& found) const;
   void look_at_maintenance(Obstacles& found) const;
@@ -393,7 +415,8 @@ class Axis {
   Planner planner_;
   PositionTracker tracker_;
   std::unique_ptr<Drive> drive_;
-  std::shared_ptr<AxisGate> gate_;
+  AxisFacePtr face_;
+  std::shared_ptr<AxisGate> gate_;  ///< that of the face
   bool simulated_;
 
   LinkState link_ = LinkState::offline;
@@ -405,10 +428,11 @@ class Axis {
   int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
   TimePoint settle_by_{};
-  std::vector<Unsettled> unsettled_;      ///< of earlier runs of the daemon
-  TimePoint fast_from_{}, fast_until_{};  ///< of poll_fast()
-  std::string drift_;                     ///< what the drive no longer holds as configured
-  std::weak_ptr<void> maintenance_;       ///< of begin_maintenance()
+  std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon
+  TimePoint fast_from_{}, fast_until_{};                  ///< of poll_fast()
+  std::string drift_;                                     ///< what the drive no longer holds as configured
+  std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
+  std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()
   std::uint64_t eeprom_writes_ = 0;
   UnknownOutcomes unknown_starts_;
   bool absolute_segments_ = false;
@@ -421,6 +445,8 @@ class Axis {
   int sequences_ = 0;               ///< coroutines that still run
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
   bool closing_ = false;
+  bool reloading_ = false;  ///< it was told to make room
+  bool answered_ = false;   ///< until then
 
   ActivityPtr activity_;
   std::deque<Buffered> buffer_;  ///< nothing waits where nothing is executed
@@ -440,7 +466,6 @@ class Axis {
       milliseconds(2000)};  ///< of the motion in progress; at first the drive's longest
 
   std::uint64_t revision_ = 0;
-  boost::atomic_shared_ptr<const AxisSnapshot> snapshot_;
 };
 
 }  // namespace axisd

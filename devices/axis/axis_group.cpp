@@ -71,6 +71,12 @@ Axis::Member::Member(Axis& axis, const GroupMemberRequest& request, const Comman
 
 Axis::Member::~Member() = default;
 
+void Axis::Member::let_go() {
+  chain_.reset();
+  prepared_.reset();
+  loaded_.reset();
+}
+
 bool Axis::Member::ready() const {
   return current() && axis_->link_ == LinkState::online && !axis_->bus_loss_ &&
          axis_->env_.bus->port().open && !axis_->fault_ && !axis_->drive_->in_trouble() &&

@@ -36,7 +36,7 @@ void Axis::take_over() {
     if (moves(command.kind)) stop_owed_ = true;
     if (command.kind == CommandKind::home) position_unsettled_ = true;
   }
-  if (auto cause = env_.book->unknown_outcome(settings_.name)) {
+  if (auto cause = env_.book->take_unknown_outcome(settings_.name)) {
     spdlog::error("{}", to_string(*cause));
     fault_ = std::move(cause);
     stop_owed_ = true;

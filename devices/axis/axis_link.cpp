@@ -135,15 +135,14 @@ Task<Result<void>> Axis::settle_found_motion() {
 
 Task<Result<void>> Axis::prove_or_configure() {
   if (const auto settled = co_await settle_earlier(); !settled) co_return settled;
-  const AxisRecord* stored = nullptr;
+  std::optional<OffsetRecord> stored;
   if (!configured_ && !restore_tried_ && env_.persistence != nullptr) {
-    const auto& axes = env_.persistence->loaded().axes;
-    const auto found = axes.find(settings_.name);
-    if (found != axes.end() && found->second.offset) stored = &found->second;
+    const auto& axes = env_.persistence->current().axes;
+    if (const auto found = axes.find(settings_.name); found != axes.end()) stored = found->second.offset;
   }
   bool restorable = false;
-  if (stored != nullptr) {
-    const auto& record = *stored->offset;
+  if (stored) {
+    const auto& record = *stored;
     // Nobody saw a homing that a terminal started meanwhile, which zeroes the counter.
     restorable = !position_unsettled_ && !has_input("homing_start") &&
                  record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
@@ -156,7 +155,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     restore_tried_ = true;
     env_.persistence->forget_offset(settings_.name, {});
   };
-  if (stored != nullptr && !restorable) void_record();
+  if (stored && !restorable) void_record();
   if (configured_ || restorable) {
     const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
@@ -177,7 +176,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     drift_checked_ = env_.clock->now();
     set_drift({});
     if (restorable) {
-      tracker_.restore(stored->offset->offset_pulses);
+      tracker_.restore(stored->offset_pulses);
       remember_position();
     }
   } else if (const auto checked = co_await check_for_drift(); !checked) {

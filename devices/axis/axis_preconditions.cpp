@@ -46,6 +46,7 @@ void Axis::look_at_options(const CommandOptions& options, Obstacles& found) cons
 }
 
 void Axis::look_at_link(Obstacles& found) const {
+  if (reloading_) return found.block(reloading());
   if (link_ == LinkState::configuring) {
     auto cause = error(Reason::configuring, "the drive is being identified and configured", "wait");
     if (link_error_) {
@@ -111,6 +112,7 @@ void Axis::look_at_maintenance(Obstacles& found) const {
 }
 
 void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
+  if (reloading_) return found.block(reloading());
   look_at_options(options, found);
   // A stop that the core has not seen yet comes before everything that is accepted now.
   if (stopping_.hold)

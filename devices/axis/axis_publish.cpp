@@ -130,8 +130,8 @@ void Axis::publish() {
     next->sampled_before = bits.measured_at;
     next->measured_at = env_.clock->wall(bits.measured_at);
   }
-  const auto before = snapshot_.load();
-  snapshot_.store(next);
+  const auto before = face_->snapshot.load();
+  face_->snapshot.store(next);
   if (before) tell_changes(*before, *next);
   if (env_.published) env_.published();
 }

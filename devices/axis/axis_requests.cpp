@@ -221,6 +221,11 @@ Result<CommandPtr> Axis::accept(const JogRequest& request, const CommandOptions&
 
 Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions& options) {
   auto command = env_.book->open(settings_.name, request, options);
+  execute_stop(request, options, command);
+  return command;
+}
+
+void Axis::execute_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command) {
   if (activity_) stopping_.shown = activity_->state;
   supersede(error(Reason::superseded,
                   fmt::format("{} {} by {}", to_string(command->value().kind), command->value().id,
@@ -228,9 +233,8 @@ Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions
   // The drive keeps the deceleration that was set before the motion: the answer says which (M12).
   if (request.kind != StopKind::quick_stop) command->grant({.deceleration_time = deceleration_bound()});
   if (options.arrived != TimePoint{}) observed_.stop_requested(options.arrived, request.all);
-  begin_stop(request.kind, request.hold, command);
+  begin_stop(request.kind, request.hold, std::move(command));
   publish();
-  return command;
 }
 
 Result<CommandPtr> Axis::accept(const ResetRequest& request, const CommandOptions& options) {

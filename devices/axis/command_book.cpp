@@ -300,9 +300,9 @@ std::vector<Unsettled> CommandBook::take_unsettled(const std::string& axis) {
   return taken.empty() ? std::vector<Unsettled>() : std::move(taken.mapped());
 }
 
-std::optional<Error> CommandBook::unknown_outcome(const std::string& axis) const {
-  const auto found = unknown_outcomes_.find(axis);
-  return found == unknown_outcomes_.end() ? std::nullopt : std::optional(found->second);
+std::optional<Error> CommandBook::take_unknown_outcome(const std::string& axis) {
+  auto found = unknown_outcomes_.extract(axis);
+  return found.empty() ? std::nullopt : std::optional(std::move(found.mapped()));
 }
 
 void CommandBook::give_up_unsettled() {

@@ -80,8 +80,8 @@ class CommandBook {
 
   /// What has to be settled for the axis, in order of acceptance. Once: it is handed over.
   [[nodiscard]] std::vector<Unsettled> take_unsettled(const std::string& axis);
-  /// Why the axis was in ErrorStop when an earlier run ended: what became of a command was not known.
-  [[nodiscard]] std::optional<Error> unknown_outcome(const std::string& axis) const;
+  /// Why the axis was in ErrorStop when an earlier run ended: what became of a command was not known. Once.
+  [[nodiscard]] std::optional<Error> take_unknown_outcome(const std::string& axis);
   /// Ends what is left of take_unsettled(): of axes that the configuration no longer has.
   void give_up_unsettled();
 

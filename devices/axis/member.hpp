@@ -67,6 +67,8 @@ class Axis::Member {
   [[nodiscard]] const std::optional<TimePoint>& arrived_at() const { return *arrived_; }
   /// Ends the command by an error of its own; a drive that may run gets a stop. Nothing where it has ended.
   void end_failed(Error cause);
+  /// What it holds of its drive is given up: the axis is going away. Precondition: its command has ended.
+  void let_go();
   /// Ends it because another member failed, the same way.
   void end_aborted(Error cause);
 

@@ -132,6 +132,8 @@ struct AxisSettings {
   std::map<std::string, SettingValue> model_settings{};  ///< by the descriptor's schema
   /// Of a model that is described by a file (DriveDescriptor::specialise); nothing: the model's.
   std::shared_ptr<const DriveDescriptor> own_descriptor{};
+  /// Of the content of that file: another one has another.
+  std::size_t own_descriptor_source = 0;
 };
 
 }  // namespace axisd

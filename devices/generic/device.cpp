@@ -38,6 +38,7 @@ void Device::start() {
 void Device::close() {
   closing_ = true;
   wake_.notify_all();
+  bus_->port_changed().notify_all();
 }
 
 TransactionClass Device::poll_class() const {
@@ -153,7 +154,7 @@ void Device::publish() {
         {.name = one.name, .unit = one.unit, .value = values_[i], .writable = one.writable});
   }
   if (measured_at_ != TimePoint{}) next->measured_at = clock_->wall(measured_at_);
-  snapshot_.store(std::move(next));
+  face_->snapshot.store(std::move(next));
 }
 
 }  // namespace axisd

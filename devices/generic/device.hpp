@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/smart_ptr/atomic_shared_ptr.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,6 +15,12 @@
 #include "devices/generic/settings.hpp"
 
 namespace axisd {
+
+/// The part of a device that every thread may use; it outlives the device for whoever holds it. Thread: any.
+struct DeviceFace {
+  boost::atomic_shared_ptr<const DeviceSnapshot> snapshot;  ///< not null
+};
+using DeviceFacePtr = std::shared_ptr<DeviceFace>;
 
 /// A node of a bus that is not an axis: its values are read at a steady rate, in class `parameters`, and
 /// published (M28).
@@ -34,6 +41,10 @@ class Device {
   /// Ends polling; closed() comes true on the core thread.
   void close();
   [[nodiscard]] bool closed() const { return closing_ && !polling_; }
+  /// Whoever writes to it holds this meanwhile.
+  [[nodiscard]] std::shared_ptr<void> use() { return users_; }
+  [[nodiscard]] bool in_use() const { return users_.use_count() > 1; }
+  [[nodiscard]] bool closing() const { return closing_; }
 
   /// Writes one value and reads it back; the value as written. Errors: invalid_argument (no such value, or
   /// not writable), out_of_range, misconfigured (reads back otherwise), no_reply (outcome unknown), bus_down,
@@ -42,7 +53,9 @@ class Device {
 
   [[nodiscard]] const DeviceSettings& settings() const { return settings_; }
   /// Thread: any.
-  [[nodiscard]] DeviceSnapshotPtr snapshot() const { return snapshot_.load(); }
+  [[nodiscard]] DeviceSnapshotPtr snapshot() const { return face_->snapshot.load(); }
+  /// Thread: any.
+  [[nodiscard]] DeviceFacePtr face() const { return face_; }
 
  protected:
   /// A raw number as it was read.
@@ -57,7 +70,6 @@ class Device {
   virtual Task<Result<Reading>> read_raw(std::size_t index) = 0;
 
   [[nodiscard]] TransactionClass poll_class() const;
-  [[nodiscard]] bool closing() const { return closing_; }
   void keep(std::size_t index, const Reading& reading);
   /// The device refuses to tell.
   void forget(std::size_t index) { values_[index].reset(); }
@@ -78,6 +90,7 @@ class Device {
   Bus* bus_;
   DeviceSettings settings_;
   Signal wake_;
+  std::shared_ptr<int> users_ = std::make_shared<int>();
   bool polling_ = false;
   bool closing_ = false;
 
@@ -85,7 +98,7 @@ class Device {
   std::optional<Error> error_;
   std::vector<std::optional<double>> values_;
   TimePoint measured_at_{};
-  boost::atomic_shared_ptr<const DeviceSnapshot> snapshot_;
+  const std::shared_ptr<DeviceFace> face_ = std::make_shared<DeviceFace>();
 };
 
 }  // namespace axisd

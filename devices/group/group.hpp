@@ -74,7 +74,8 @@ struct GroupStopResult {
 class GroupAccess {
  public:
   virtual ~GroupAccess() = default;
-  [[nodiscard]] virtual const std::vector<GroupSettings>& groups() const = 0;
+  /// Those of the configuration.
+  [[nodiscard]] virtual std::vector<GroupSettings> groups() const = 0;
   /// Calls back with an error if nothing was accepted, else when all members have come as far as `until`, or
   /// the move has ended. Errors: unknown_axis (also for groups), invalid_argument, out_of_range (the arrival
   /// error), and those of each axis.

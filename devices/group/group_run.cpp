@@ -71,8 +71,18 @@ void GroupRun::on_change(std::size_t member) {
   tell();
 }
 
+bool GroupRun::moves(std::string_view axis) const {
+  return std::ranges::any_of(commands_, [&](const auto& command) { return axis_of(command) == axis; });
+}
+
+void GroupRun::let_go() {
+  given_up_ = true;  // there is nothing to give up any more
+  for (const auto& member : members_) member->let_go();
+}
+
 Task<> GroupRun::run() {
   const auto self = shared_from_this();
+  running_ = true;
   auto failure = co_await prepare();
   if (!failure && !given_up_) failure = co_await start();
   if (failure) give_up(*failure);
@@ -81,6 +91,7 @@ Task<> GroupRun::run() {
   tell();
   for (const auto& member : members_)
     if (!given_up_) co_await member->follow_up();
+  running_ = false;
 }
 
 /// A member that something else has ended meanwhile, or is about to end.

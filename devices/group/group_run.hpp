@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "buses/clock.hpp"
@@ -44,6 +45,12 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   [[nodiscard]] CommandState state() const;
   void observe(Observer observer);
 
+  [[nodiscard]] bool moves(std::string_view axis) const;
+  /// All members have ended, and nothing is left to be done for them.
+  [[nodiscard]] bool over() const { return !running_ && ended(state()); }
+  /// An axis of it is going away: only what is known of the move stays. Precondition: it is over.
+  void let_go();
+
  private:
   struct Failure {
     std::size_t member;
@@ -71,6 +78,7 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   std::vector<Observer> observers_;
   std::optional<Error> cause_;
   bool given_up_ = false;
+  bool running_ = false;
 };
 using GroupRunPtr = std::shared_ptr<GroupRun>;
 

@@ -18,6 +18,9 @@ class LeaseTable {
   /// `epoch`: rises with every start of the daemon, so that tokens of an earlier one are stale for ever.
   LeaseTable(LeaseSettings settings, std::uint64_t epoch);
 
+  /// From now on; leases that were granted keep their time.
+  void configure(LeaseSettings settings) { settings_ = settings; }
+
   /// As LeaseAccess::acquire(), except unknown_axis and busy. A lease is one thing: whoever takes one of its
   /// axes ends it for all of them.
   Result<LeaseGrant> acquire(const LeaseRequest& request, TimePoint now);

@@ -33,6 +33,15 @@ void CanNodes::set_bitrate(std::uint32_t bitrate) {
   bitrate_ = bitrate;
 }
 
+void CanNodes::remove(std::uint8_t address) {
+  const auto* gone = node(address);
+  if (gone == nullptr) return;
+  troubles_.erase(gone);
+  std::erase_if(late_, [&](const auto& each) { return each.second.first == gone; });
+  std::erase_if(nodes_, [&](const auto& each) { return each.get() == gone; });
+  set_timer();
+}
+
 SimulatedCanNode& CanNodes::add(std::unique_ptr<SimulatedCanNode> node) {
   node->advance(now_);
   if (bitrate_) node->join(*bitrate_);

@@ -37,6 +37,8 @@ class CanNodes {
   void set_bitrate(std::uint32_t bitrate);
 
   SimulatedCanNode& add(std::unique_ptr<SimulatedCanNode> node);
+  /// Takes whoever has this node-ID off the network; nothing if nobody has.
+  void remove(std::uint8_t address);
   [[nodiscard]] std::span<const std::unique_ptr<SimulatedCanNode>> nodes() const { return nodes_; }
   /// nullptr if nobody has this node-ID now.
   [[nodiscard]] SimulatedCanNode* node(std::uint8_t address) const;

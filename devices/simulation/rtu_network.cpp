@@ -58,6 +58,13 @@ bool RtuNetwork::hears(const SimulatedRtuNode& node) const {
   return !own || own->fits(*serial_);
 }
 
+void RtuNetwork::remove(std::uint8_t address) {
+  const auto* gone = node(address);
+  if (gone == nullptr) return;
+  std::erase_if(returns_, [&](const Return& each) { return each.node == gone; });
+  std::erase_if(nodes_, [&](const auto& each) { return each.get() == gone; });
+}
+
 SimulatedRtuNode& RtuNetwork::add(std::unique_ptr<SimulatedRtuNode> node) {
   node->advance(now_);
   if (serial_) node->join(*serial_);

@@ -53,6 +53,8 @@ class RtuNetwork {
   [[nodiscard]] const std::optional<Serial>& serial() const { return serial_; }
 
   SimulatedRtuNode& add(std::unique_ptr<SimulatedRtuNode> node);
+  /// Takes whoever has this address off the line; nothing if nobody has.
+  void remove(std::uint8_t address);
   [[nodiscard]] std::span<const std::unique_ptr<SimulatedRtuNode>> nodes() const { return nodes_; }
   /// nullptr if nobody has this address now.
   [[nodiscard]] SimulatedRtuNode* node(std::uint8_t address) const;

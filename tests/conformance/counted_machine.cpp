@@ -13,8 +13,8 @@ using Token = std::shared_ptr<void>;
 template <class Start>
 Token deferred(CallLedger& ledger, Start start) {
   auto token = std::make_shared<Token>();
-  ledger.enter([start = std::move(start), weak = std::weak_ptr(token)](CallLedger::TicketPtr ticket) {
-    if (const auto held = weak.lock()) *held = start(std::move(ticket));
+  ledger.enter([start = std::move(start), weak = std::weak_ptr(token)](const CallLedger::TicketPtr& ticket) {
+    if (const auto held = weak.lock()) *held = start(ticket);
   });
   return token;
 }
@@ -179,7 +179,7 @@ class CountedGroups final : public GroupAccess {
  public:
   CountedGroups(GroupAccess& inner, CallLedger& ledger) : inner_(&inner), ledger_(&ledger) {}
 
-  [[nodiscard]] const std::vector<GroupSettings>& groups() const override { return inner_->groups(); }
+  [[nodiscard]] std::vector<GroupSettings> groups() const override { return inner_->groups(); }
   void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
             std::function<void(Result<GroupMove>)> callback) override {
     ledger_->enter([=, this](const auto& ticket) {

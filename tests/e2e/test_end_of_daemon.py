@@ -111,7 +111,7 @@ class Systemd(Scenario):
             machine.notify.forget()
             machine.notify.wait_for("WATCHDOG=1", daemon)
         self.assertNotIn("STOPPING=1", machine.notify.received())
-        daemon.process.send_signal(signal.SIGHUP)  # neither ends nor reloads it
+        daemon.process.send_signal(signal.SIGHUP)  # neither ends it nor touches what is the same
         machine.notify.forget()
         machine.notify.wait_for("WATCHDOG=1", daemon)
         wait_for(lambda: "SIGHUP" in daemon.log(), "the signal is logged")

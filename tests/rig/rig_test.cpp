@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "buses/modbus_rtu/rtu_worker.hpp"
+#include "config/fields.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
@@ -213,6 +214,61 @@ TEST_F(RealRig, ComesBackAfterTheAdapterWasUnplugged) {
   ASSERT_TRUE(line_->replug());
   wait_online();
   EXPECT_EQ(submit("axis-1", EnableRequest{})->state, CommandState::done);
+}
+
+/// Whoever reads, watches or stops meanwhile never meets an axis that is being destroyed.
+TEST_F(RealRig, AxesAreExchangedUnderReadersAndStops) {
+  wait_online();
+  std::atomic<bool> going{true};
+  std::vector<std::thread> others;
+  others.emplace_back([&] {
+    while (going) {
+      for (const auto& axis : service_->axis_names())
+        if (const auto state = service_->snapshot(axis)) EXPECT_EQ(state->name, axis);
+      (void)service_->group_access().groups();
+      (void)service_->bus_access().devices();
+    }
+  });
+  others.emplace_back([&] {
+    while (going) {
+      const auto stopped = submit("axis-3", StopRequest{});
+      if (stopped)
+        EXPECT_EQ(stopped->state, CommandState::done) << (stopped->cause ? to_string(*stopped->cause) : "");
+      else
+        EXPECT_EQ(stopped.error().reason, Reason::unknown_axis);
+      for (int pauses = 0; pauses < 20; ++pauses) pause();
+    }
+  });
+  others.emplace_back([&] {
+    while (going) {
+      std::promise<void> answered;
+      service_->group_access().stop({.axes = {"axis-2", "axis-3"}}, "rig", WaitUntil::done,
+                                    [&](const auto&) { answered.set_value(); });
+      answered.get_future().get();
+      for (int pauses = 0; pauses < 20; ++pauses) pause();
+    }
+  });
+  auto present = three_axes();
+  int applied = 0;
+  for (int i = 0; applied < 15; ++i) {  // in between they rest
+    auto wanted = three_axes();
+    if (i % 3 == 1) wanted.axes.pop_back();
+    if (i % 3 == 2) wanted.groups.push_back({.name = "both", .axes = {"axis-1", "axis-2"}});
+    for (auto& entry : wanted.axes) entry.axis.limits.velocity = 100 + i % 50;
+    std::promise<std::vector<Error>> answer;
+    service_->reload(
+        {.client = "rig", .configuration = wanted, .changes = config::differences(present, wanted)}, false,
+        [&](std::vector<Error> refusals) { answer.set_value(std::move(refusals)); });
+    const auto refusals = answer.get_future().get();
+    for (const auto& refusal : refusals) EXPECT_EQ(refusal.reason, Reason::stopping) << to_string(refusal);
+    if (refusals.empty()) present = wanted;
+    applied += refusals.empty() ? 1 : 0;
+    pause();
+  }
+  going = false;
+  for (auto& other : others) other.join();
+  wait_online();
+  EXPECT_EQ(service_->axis_names().size(), present.axes.size());
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SYNC: what an earlier master armed, and nodes that may hold something.
 #include <gtest/gtest.h>
 
+#include "config/fields.hpp"
 #include "tests/rules/m23_can_rig.hpp"
 
 namespace axisd::test {
@@ -77,6 +78,37 @@ TEST(M24, ANodeThatIsHeardButDoesNotAnswerKeepsSyncFromStarting) {
   rig.reconnect();
   rig.run(1s);
   EXPECT_GT(rig.count_of(0x80), 10);
+}
+
+/// A reload exchanges the axis: SYNC waits until the new one has settled the node, and nothing starts.
+TEST(M24, ANodeWhoseAxisIsExchangedIsSettledAnew) {
+  CanRig rig({.sync_period = 10ms, .limits = false});
+  rig.ready();
+  rig.done(MoveAbsoluteRequest{.position = 3});
+  const auto at = rig.shaft();
+  auto wanted = rig.configuration;
+  wanted.axes.at(0).axis.limits.velocity = 50;
+  auto& bus = *rig.machine->networks().front();
+  ASSERT_TRUE(bus.sync_running());
+  bool through = false;
+  rig.machine->reload({.client = "fitter",
+                       .configuration = wanted,
+                       .changes = config::differences(rig.configuration, wanted)},
+                      [&](const std::vector<Error>& refusals) {
+                        EXPECT_TRUE(refusals.empty()) << to_string(refusals.front());
+                        through = true;
+                        EXPECT_FALSE(bus.sync_running());
+                      });
+  ASSERT_TRUE(rig.run_until([&] { return through; }, 5s));
+  rig.reconnect();
+  ASSERT_TRUE(rig.run_until([&] { return bus.sync_running(); }, 5s));
+  rig.run(1s);
+  EXPECT_EQ(rig.shaft(), at);
+  EXPECT_TRUE(rig.state()->enabled) << "M1: the power stage is left alone";
+  EXPECT_EQ(rig.state()->link_note, "");
+  rig.done(SetPositionRequest{.position = 0});
+  rig.done(MoveAbsoluteRequest{.position = 3});
+  EXPECT_NE(rig.shaft(), at);
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ class FakePersistence final : public Persistence {
   }
 
   [[nodiscard]] const StoredState& loaded() const override { return loaded_; }
+  [[nodiscard]] const StoredState& current() const override { return saved; }
   void save_offset(std::string axis, OffsetRecord offset, Callback done) override {
     if (!failing && !frozen) saved.axes[axis].offset = offset;
     answer(std::move(done));

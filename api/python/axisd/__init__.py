@@ -8,9 +8,9 @@
 """
 from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
-from .configuration import ConfigFinding, Configuration
+from .configuration import ConfigChange, ConfigFinding, Configuration, Reload
 from .drive import Drive
-from .drives import (Alarm, ConfigurationDrift, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
+from .drives import (Alarm, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
                      StateChange, TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import AxisdError, LeaseLostError, MotionError, RefusedError, UnreachableError
@@ -24,12 +24,13 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 
 __all__ = [
     "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
-    "ClassStatistics", "Command", "CommandState", "ConfigFinding", "Configuration", "ConfigurationDrift", "Cursor", "Device", "Drive", "DriveInfo",
+    "ClassStatistics", "Command", "CommandState", "ConfigChange", "ConfigFinding", "Configuration",
+    "ConfigurationDrift", "ConfigurationReloaded", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "Jog", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle",
-    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "RefusedError", "ScanProgress", "Segments",
+    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "RefusedError", "Reload", "ScanProgress", "Segments",
     "SerialProgress", "State", "StateChange", "StopBudget", "StopResult", "Terminal", "TerminalCapability",
     "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",
 ]

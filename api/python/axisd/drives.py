@@ -7,6 +7,7 @@ from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
 
+from .configuration import ConfigChange
 from .types import (ErrorDetail, Link, MotionCause, State, _member, _optional, _optional_error, _optional_time, seconds)
 from .v1 import bus_service_pb2, drive_service_pb2, event_service_pb2, types_pb2
 
@@ -237,7 +238,17 @@ class LeaseChange:
     before: str
 
 
-Content = TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
+@dataclasses.dataclass(frozen=True)
+class ConfigurationReloaded:
+    """Another configuration is served from now on. No `changes`: only how it is written has changed."""
+    client: str
+    previous_revision: str
+    revision: str
+    changes: tuple[ConfigChange, ...]
+
+
+Content = (TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
+           | ConfigurationReloaded)
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -260,6 +271,9 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
     if kind == "lease_change":
         name = event_service_pb2.LeaseChangeKind.Name(content.kind)
         return LeaseChange(name.removeprefix("LEASE_CHANGE_KIND_").lower(), content.holder, content.before)
+    if kind == "configuration_reloaded":
+        return ConfigurationReloaded(content.client, content.previous_revision, content.revision,
+                                     tuple(ConfigChange.of(change) for change in content.changes))
     return None
 
 

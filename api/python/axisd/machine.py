@@ -15,7 +15,7 @@ from google.protobuf.field_mask_pb2 import FieldMask
 from .axis import Axis
 from .budget import BusBudget
 from .calls import Seconds, done, duration
-from .configuration import ConfigFinding, Configuration
+from .configuration import ConfigFinding, Configuration, Reload
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, translate
 from .group import Group
@@ -302,7 +302,7 @@ class Machine:
         return Info.of(await self._call(self._system.GetInfo, system_service_pb2.GetInfoRequest(), ""))
 
     async def configuration(self) -> Configuration:
-        """What the daemon was started with."""
+        """What is served: the daemon's file as it was at its start or at the last reload."""
         return Configuration.of(await self._call(self._system.GetConfig, system_service_pb2.GetConfigRequest(), ""))
 
     async def check_configuration(self, yaml: str) -> list[ConfigFinding]:
@@ -310,3 +310,9 @@ class Machine:
         request = system_service_pb2.CheckConfigRequest(yaml=yaml)
         response = await self._call(self._system.CheckConfig, request, "check configuration")
         return [ConfigFinding.of(found) for found in response.findings]
+
+    async def reload_configuration(self, dry_run: bool = False) -> Reload:
+        """Serves what the daemon's file says now: all of it or nothing, and only what changed is touched. What stands
+        against it is in the answer. An axis that changes comes up as after a start of the daemon."""
+        request = system_service_pb2.ReloadConfigRequest(dry_run=dry_run)
+        return Reload.of(await self._call(self._system.ReloadConfig, request, "reload configuration"))

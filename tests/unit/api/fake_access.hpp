@@ -149,7 +149,7 @@ class FakeGroups final : public FakeAccess, public GroupAccess {
  public:
   using FakeAccess::FakeAccess;
 
-  [[nodiscard]] const std::vector<GroupSettings>& groups() const override { return groups_; }
+  [[nodiscard]] std::vector<GroupSettings> groups() const override { return groups_; }
   void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
             std::function<void(Result<GroupMove>)> callback) override;
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;

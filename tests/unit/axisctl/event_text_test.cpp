@@ -51,10 +51,30 @@ TEST(EventText, StatesLinksAndDrift) {
   EXPECT_EQ(event_line(event()), lead + "an event that this axisctl does not know");
 }
 
+TEST(EventText, AReloadWithWhatItChanged) {
+  v1::Event event;
+  auto& reloaded = *event.mutable_configuration_reloaded();
+  reloaded.set_client("hmi-1");
+  reloaded.set_revision("r2");
+  EXPECT_THAT(event_line(event), testing::EndsWith("  -  configuration r2 reloaded by hmi-1"));
+  auto& changed = *reloaded.add_changes();
+  changed.set_section("axes");
+  changed.set_name("feeder");
+  changed.set_kind(v1::CONFIG_CHANGE_KIND_CHANGED);
+  changed.add_keys("scale.invert");
+  changed.add_keys("unit");
+  auto& control = *reloaded.add_changes();
+  control.set_section("control");
+  control.set_kind(v1::CONFIG_CHANGE_KIND_ADDED);
+  EXPECT_THAT(event_line(event),
+              testing::EndsWith(": axes.feeder changed (scale.invert, unit); control added"));
+}
+
 TEST(EventText, KindsByTheirNameOrFirstWord) {
   EXPECT_EQ(parse_event_kind("terminal"), v1::EVENT_KIND_TERMINAL_EDGE);
   EXPECT_EQ(parse_event_kind("link-change"), v1::EVENT_KIND_LINK_CHANGE);
   EXPECT_EQ(parse_event_kind("configuration"), v1::EVENT_KIND_CONFIGURATION_DRIFT);
+  EXPECT_EQ(parse_event_kind("configuration-reloaded"), v1::EVENT_KIND_CONFIGURATION_RELOADED);
   EXPECT_THROW(parse_event_kind(""), Failure);
   EXPECT_THROW(parse_event_kind("unspecified"), Failure);
 }

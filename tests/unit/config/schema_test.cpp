@@ -2,6 +2,7 @@
 #include "config/schema.hpp"
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "config/document.hpp"
+#include "config/fields.hpp"
 #include "config/reader.hpp"
 #include "config/value.hpp"
 #include "devices/descriptor.hpp"
@@ -143,12 +145,13 @@ class Schema : public ::testing::Test {
     }
     return "";
   }
-  [[nodiscard]] std::string loaded(const Emitter& emitter) const {
+  [[nodiscard]] Configuration configuration(const Emitter& emitter) const {
     // There, so that paths in it are found.
     const auto result = load_text(emitter.text(*root_), source_path("config/examples/changed.yaml").string());
     EXPECT_TRUE(result.configuration) << findings(result) << emitter.text(*root_);
-    return result.configuration ? dump(*result.configuration) : "";
+    return result.configuration.value_or(Configuration{});
   }
+  [[nodiscard]] std::string loaded(const Emitter& emitter) const { return dump(configuration(emitter)); }
 
   NodePtr root_;
 };
@@ -183,7 +186,7 @@ TEST_F(Schema, ReferenceShowsEverySettingOfEveryModel) {
 }
 
 TEST_F(Schema, EveryKeyHasAnEffect) {
-  const auto before = loaded(Emitter());
+  const auto before = configuration(Emitter());
   for (const auto& [pattern, spec] : leaves()) {
     if (spec->example.empty()) continue;  // of the model: below
     const auto path = in_reference(pattern);
@@ -196,9 +199,16 @@ TEST_F(Schema, EveryKeyHasAnEffect) {
         text.replace(at, 2, "cm");
       const auto result = load_text(text, source_path("config/examples/changed.yaml").string());
       ASSERT_TRUE(result.configuration) << findings(result);
-      EXPECT_TRUE(dump(*result.configuration) != before) << path;
+      EXPECT_FALSE(differences(before, *result.configuration).empty()) << path;
     } else {
-      EXPECT_TRUE(loaded(Emitter().replace(path, spec->example)) != before) << path << ": " << spec->example;
+      // Of that key only, by the name that it has in the file.
+      const auto changes = differences(before, configuration(Emitter().replace(path, spec->example)));
+      ASSERT_EQ(changes.size(), 1U) << path << ": " << spec->example;
+      EXPECT_EQ(changes[0].kind, ConfigurationChangeKind::changed) << path;
+      if (changes[0].keys.empty())
+        EXPECT_EQ(changes[0].path(), path);
+      else
+        EXPECT_THAT(changes[0].keys, testing::ElementsAre(path.substr(changes[0].path().size() + 1)));
     }
   }
 }

@@ -1,0 +1,74 @@
+// Giving way to another axis of the same name, or to none: what a reload of the configuration asks for.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+/// Everything that would be lost, or be done by nobody, if the axis went away now.
+std::vector<Error> Axis::check_exchange() const {
+  std::vector<Error> found;
+  const auto add = [&](Reason reason, std::string message, std::string remedy) {
+    found.push_back(error(reason, std::move(message), std::move(remedy)));
+  };
+  if (reloading_ || closing_) add(Reason::reloading, "it is being reloaded already", "wait for it");
+  if (activity_) {
+    const auto& command = activity_->command->value();
+    add(activity_->state == AxisState::standstill ? Reason::busy : Reason::moving,
+        fmt::format("executes {} {}{}", to_string(command.kind), command.id,
+                    buffer_.empty() ? "" : fmt::format(", and {} more wait for it", buffer_.size())),
+        "wait for its end, or stop it: " + shell("stop"));
+  } else if ((sample_ && sample_->moving && !stop_owed_) || terminal_motion_) {
+    add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + shell("stop"));
+  }
+  if (stopping_.hold)
+    add(Reason::stopping, "a stop is held", "release it: " + shell("release-stop"));
+  else if (stopping_.running || gate_->stop_pending())
+    add(Reason::stopping, "the axis is stopping", "wait for standstill");
+  if (stop_owed_ && !stopping_.running)
+    add(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
+        "look at the machine; the stop is the first that the drive gets when it answers");
+  if (release_owed_) add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
+  if (!maintenance_.expired() || users_.use_count() > 1)
+    add(Reason::busy, "the drive's parameters, segments or memory are being worked on", "wait for it");
+  if (!unsettled_.empty())
+    add(Reason::busy, "what became of a command of before the daemon's start is not known yet",
+        "wait until the drive has been asked");
+  const bool shown = fault_ && fault_->reason == Reason::alarm && sample_ &&
+                     sample_->alarm_code == fault_->where.native_code;
+  if (fault_ && !shown)  // whoever comes after would know nothing of it
+    add(Reason::fault, "in ErrorStop: " + fault_->message, "reset it first: " + shell("reset"));
+  return found;
+}
+
+Error Axis::reloading() const {
+  return error(Reason::reloading, "its configuration is being reloaded", "repeat it in a moment");
+}
+
+void Axis::retire(bool other_drive) {
+  reloading_ = true;
+  answered_ = link_ != LinkState::offline;
+  link_error_ = reloading();
+  // Homing that a terminal starts meanwhile would zero the counter, and nobody would have seen it.
+  if (has_input("homing_start") || other_drive) lose_trust();
+  if (other_drive && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
+  remember_position();
+  close();
+  env_.bus->port_changed().notify_all();  // whoever waits for the port looks again
+}
+
+Result<std::shared_ptr<void>> Axis::use() {
+  if (reloading_) return fail(reloading());
+  return users_;
+}
+
+void Axis::take_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command) {
+  accept_epoch_ = gate_->epoch();
+  gate_->stop_served();
+  execute_stop(request, options, std::move(command));
+}
+
+}  // namespace axisd

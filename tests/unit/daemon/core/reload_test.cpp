@@ -1,0 +1,370 @@
+// Another configuration for a machine that runs, in virtual time.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "config/fields.hpp"
+#include "daemon/core/machine_core.hpp"
+#include "devices/simulation/simulator.hpp"
+#include "tests/support/fake_persistence.hpp"
+#include "tests/support/virtual_line.hpp"
+
+namespace axisd::core {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// a1 and a2 on one line; spare drives at nodes 3 and 4.
+class ReloadedMachine : public testing::Test {
+ protected:
+  ReloadedMachine() : store_(world_.executor()) {
+    configuration_.machine = "two";
+    configuration_.lines.push_back({.name = "line-a", .port = "sim"});
+    for (const std::uint8_t node : {1, 2}) configuration_.axes.push_back({.axis = axis(node)});
+    machine_ = std::make_unique<MachineCore>(
+        MachineParts{.executor = world_.executor(),
+                     .clock = &world_.clock(),
+                     .persistence = &store_,
+                     .instance_id = "t",
+                     .make_line =
+                         [this](const modbus_rtu::LineSettings& settings) {
+                           auto made = std::make_unique<test::VirtualLine>(world_, settings);
+                           line_ = made.get();
+                           return made;
+                         }},
+        configuration_);
+    for (const std::uint8_t node : {1, 2, 3, 4})
+      line_->network().add(simulation::find_simulator("ykd2405pr")->make({.address = node}));
+    line_->network().advance(world_.now());
+    machine_->start();
+    world_.run_for(2s);
+    line_->forget_wire();
+  }
+  ~ReloadedMachine() override {
+    machine_->close();
+    EXPECT_TRUE(world_.run_until([this] { return machine_->closed(); }, 60s));
+  }
+  static AxisSettings axis(std::uint8_t node) {
+    AxisSettings axis{
+        .name = "a" + std::to_string(node), .bus = "line-a", .node = node, .model = "ykd2405pr"};
+    axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
+    axis.limits.velocity = 100;
+    return axis;
+  }
+
+  /// Asks for `wanted`; what stands against it is in `refusals_` once `answered_`.
+  void ask(const config::Configuration& wanted, const std::string& client = "fitter") {
+    answered_ = false;
+    wanted_ = wanted;
+    machine_->reload({.client = client,
+                      .configuration = wanted,
+                      .changes = config::differences(configuration_, wanted),
+                      .before = "r1",
+                      .revision = "r2"},
+                     [this](std::vector<Error> refusals) {
+                       answered_ = true;
+                       refusals_ = std::move(refusals);
+                       if (refusals_.empty()) configuration_ = wanted_;
+                     });
+  }
+  void reload(const config::Configuration& wanted, const std::string& client = "fitter") {
+    ask(wanted, client);
+    EXPECT_TRUE(world_.run_until([this] { return answered_; }, 10s));
+  }
+  /// The present configuration with another limit for an axis.
+  config::Configuration slower(std::size_t axis, double velocity = 50) {
+    auto wanted = configuration_;
+    wanted.axes.at(axis).axis.limits.velocity = velocity;
+    return wanted;
+  }
+  std::vector<Reason> reasons() const {
+    std::vector<Reason> all;
+    for (const auto& refusal : refusals_) {
+      all.push_back(refusal.reason);
+      EXPECT_FALSE(refusal.remedy.empty()) << to_string(refusal);
+    }
+    return all;
+  }
+  Command complete(const std::string& axis, const Action& action) {
+    const auto command = machine_->submit(axis, action, options());
+    EXPECT_TRUE(command) << to_string(command.error());
+    EXPECT_TRUE(world_.run_until([&] { return (*command)->has_ended(); }, 60s));
+    return (*command)->value();
+  }
+  CommandOptions options() { return {.client = "hmi", .request_id = std::to_string(++requests_)}; }
+  AxisSnapshotPtr state(const std::string& axis) { return machine_->find(axis)->snapshot(); }
+  bool online(const std::string& axis) {
+    return world_.run_until([&] { return state(axis)->link == LinkState::online; }, 10s);
+  }
+  int writes(std::uint8_t node, std::uint16_t address) {
+    return static_cast<int>(std::ranges::count_if(line_->wire(), [&](const auto& entry) {
+      return entry.node() == node && entry.is_write() && entry.address() == address;
+    }));
+  }
+
+  test::VirtualWorld world_;
+  test::FakePersistence store_;
+  config::Configuration configuration_, wanted_;
+  test::VirtualLine* line_ = nullptr;
+  std::unique_ptr<MachineCore> machine_;
+  std::vector<Error> refusals_;
+  bool answered_ = false;
+  int requests_ = 0;
+};
+
+TEST_F(ReloadedMachine, WhatIsTheSameGoesOnMoving) {
+  const auto run = machine_->submit("a1", MoveVelocityRequest{.velocity = 50}, options());
+  ASSERT_TRUE(run);
+  world_.run_for(500ms);
+  const auto* before = machine_->find("a1");
+  reload(slower(1));
+  EXPECT_THAT(refusals_, IsEmpty());
+  EXPECT_EQ(machine_->find("a1"), before);
+  EXPECT_EQ((*run)->value().state, CommandState::active);
+  ASSERT_TRUE(online("a2"));
+  world_.run_for(1s);
+  EXPECT_EQ((*run)->value().state, CommandState::active);
+  EXPECT_TRUE(line_->network().node(1)->shaft_moving());
+  EXPECT_EQ(line_->network().node(1)->starts(), 1);
+  EXPECT_EQ(line_->network().node(2)->starts(), 0) << "M1: nothing by itself";
+  EXPECT_EQ(writes(2, 0x000F), 0) << "the power stage is left alone";
+  EXPECT_EQ(machine_->submit("a2", MoveVelocityRequest{.velocity = 60}, options()).error().reason,
+            Reason::out_of_range)
+      << "the new limit";
+}
+
+TEST_F(ReloadedMachine, TheSameAgainTouchesNothing) {
+  const auto *first = machine_->find("a1"), *second = machine_->find("a2");
+  const auto table = machine_->table();
+  reload(configuration_);
+  EXPECT_THAT(refusals_, IsEmpty());
+  EXPECT_EQ(machine_->find("a1"), first);
+  EXPECT_EQ(machine_->find("a2"), second);
+  EXPECT_EQ(state("a1")->link, LinkState::online);
+}
+
+TEST_F(ReloadedMachine, IsRefusedAsAWholeWithEveryReason) {
+  ASSERT_TRUE(machine_->submit("a1", MoveVelocityRequest{.velocity = 50}, options()));
+  world_.run_for(500ms);
+  auto wanted = slower(0);
+  wanted.axes.at(1).axis.limits.velocity = 50;
+  wanted.machine = "other";
+  wanted.lines.front().baud = 57600;
+  complete("a2", StopRequest{.hold = true});
+  LeaseRequest lease{.client = "hmi", .axes = {"a2"}};
+  ASSERT_TRUE(machine_->leases().acquire(lease));
+  reload(wanted);
+  EXPECT_THAT(reasons(), ElementsAre(Reason::not_supported, Reason::not_supported, Reason::moving,
+                                     Reason::stopping, Reason::lease_required));
+  EXPECT_THAT(refusals_.at(0).message, HasSubstr("machine changed"));
+  EXPECT_THAT(refusals_.at(1).message, HasSubstr("buses.line-a changed (modbus_rtu.baud)"));
+  EXPECT_THAT(refusals_.at(2).message, HasSubstr("a1: executes move_velocity"));
+  EXPECT_EQ(state("a1")->link, LinkState::online) << "nothing was begun";
+  EXPECT_EQ(state("a2")->link, LinkState::online);
+  EXPECT_EQ(machine_->find("a1")->settings().limits.velocity, 100);
+}
+
+TEST_F(ReloadedMachine, AnErrorThatTheDriveDoesNotShowIsResetFirst) {
+  line_->network().node(2)->set_power(false);
+  ASSERT_TRUE(world_.run_until([this] { return state("a2")->link == LinkState::offline; }, 10s));
+  reload(slower(1));
+  EXPECT_THAT(refusals_, IsEmpty()) << "an axis that rested when it fell silent may be exchanged";
+  ASSERT_TRUE(machine_->submit("a1", MoveVelocityRequest{.velocity = 50}, options()));
+  world_.run_for(500ms);
+  line_->network().node(1)->set_power(false);
+  ASSERT_TRUE(world_.run_until([this] { return state("a1")->link == LinkState::offline; }, 10s));
+  reload(slower(0));
+  EXPECT_THAT(reasons(), ElementsAre(Reason::stopping, Reason::fault))
+      << "a stop is owed, its outcome unknown";
+}
+
+TEST_F(ReloadedMachine, OnlyItsHolderChangesALeasedAxis) {
+  const auto lease = machine_->leases().acquire({.client = "fitter", .axes = {"a2"}, .ttl = 10s});
+  ASSERT_TRUE(lease);
+  reload(slower(1), "somebody");
+  EXPECT_THAT(reasons(), ElementsAre(Reason::lease_required));
+  auto without = configuration_;
+  without.axes.pop_back();
+  reload(without);
+  EXPECT_THAT(reasons(), ElementsAre(Reason::lease_required)) << "released before the axis is gone";
+  reload(slower(1));
+  EXPECT_THAT(refusals_, IsEmpty());
+  ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(machine_->find("a2")->gate()->fencing_token(), lease->lease.token) << "it lives on";
+  EXPECT_EQ(machine_->submit("a2", MoveVelocityRequest{.velocity = 10}, options()).error().reason,
+            Reason::lease_required);
+}
+
+TEST_F(ReloadedMachine, MotionIsRefusedWhileAnAxisIsExchanged) {
+  const auto epoch = machine_->find("a2")->gate()->epoch();
+  ask(slower(1));
+  ASSERT_FALSE(answered_);
+  const auto refused = machine_->submit("a2", MoveVelocityRequest{.velocity = 10}, options());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::reloading);
+  EXPECT_EQ(machine_->submit("a2", DisableRequest{}, options()).error().reason, Reason::reloading);
+  const auto obstacles = machine_->find("a2")->explain({}, {});
+  EXPECT_TRUE(std::ranges::any_of(obstacles, [](const Obstacle& each) {
+    return each.blocking && each.error.reason == Reason::reloading && !each.error.remedy.empty();
+  }));
+  EXPECT_GT(machine_->find("a2")->gate()->epoch(), epoch) << "what was prepared is never sent";
+  ask(slower(0));
+  EXPECT_TRUE(answered_) << "one at a time";
+  EXPECT_THAT(reasons(), ElementsAre(Reason::busy));
+  answered_ = false;
+  wanted_ = slower(1);
+  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
+  ASSERT_TRUE(online("a2"));
+  EXPECT_TRUE(machine_->submit("a2", MoveVelocityRequest{.velocity = 10}, options()));
+}
+
+TEST_F(ReloadedMachine, AStopMeanwhileIsExecutedByTheAxisThatComes) {
+  ask(slower(1));
+  const auto stop = machine_->submit("a2", StopRequest{.hold = true}, {.client = "hmi"});
+  ASSERT_TRUE(stop);
+  EXPECT_EQ(writes(2, 0x0028), 0);
+  ASSERT_TRUE(world_.run_until([&] { return (*stop)->has_ended(); }, 10s));
+  EXPECT_EQ((*stop)->value().state, CommandState::done);
+  EXPECT_GE(writes(2, 0x0028), 1);
+  EXPECT_TRUE(state("a2")->stop_held);
+  EXPECT_TRUE(machine_->find("a2")->release_stop());
+}
+
+TEST_F(ReloadedMachine, StopAllMeanwhileStopsEveryAxis) {
+  ask(slower(1));
+  const auto stops = machine_->stop_all("hmi");
+  ASSERT_EQ(stops.size(), 2U);
+  for (const auto& stop : stops) {
+    ASSERT_TRUE(stop);
+    EXPECT_TRUE(world_.run_until([&] { return (*stop)->has_ended(); }, 10s));
+    EXPECT_EQ((*stop)->value().state, CommandState::done);
+  }
+  EXPECT_GE(writes(2, 0x0028), 1);
+  ASSERT_TRUE(online("a2"));
+  EXPECT_TRUE(state("a2")->inhibited);
+  EXPECT_FALSE(machine_->find("a2")->gate()->stop_pending());
+}
+
+TEST_F(ReloadedMachine, AStopForAnAxisThatGoesIsSentBeforeItIsGone) {
+  auto without = configuration_;
+  without.axes.pop_back();
+  ask(without);
+  const auto stop = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
+  ASSERT_TRUE(stop);
+  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
+  EXPECT_EQ((*stop)->value().state, CommandState::done);
+  EXPECT_EQ(writes(2, 0x0028), 1);
+  EXPECT_EQ(machine_->submit("a2", StopRequest{}, {}).error().reason, Reason::unknown_axis);
+  EXPECT_THAT(machine_->table()->axes, ElementsAre("a1"));
+  line_->forget_wire();
+  world_.run_for(2s);
+  EXPECT_TRUE(std::ranges::none_of(line_->wire(), [](const auto& entry) { return entry.node() == 2; }));
+}
+
+TEST_F(ReloadedMachine, AxesComeAndGoInTheOrderOfTheFile) {
+  auto wanted = configuration_;
+  wanted.axes.insert(wanted.axes.begin(), {.axis = axis(3)});
+  wanted.groups.push_back({.name = "both", .axes = {"a1", "a3"}});
+  const auto before = machine_->table();
+  reload(wanted);
+  EXPECT_THAT(refusals_, IsEmpty());
+  EXPECT_THAT(machine_->table()->axes, ElementsAre("a3", "a1", "a2"));
+  EXPECT_EQ(machine_->table()->groups.size(), 1U);
+  EXPECT_THAT(before->axes, ElementsAre("a1", "a2")) << "whoever holds it still sees what it was";
+  ASSERT_TRUE(online("a3"));
+  EXPECT_EQ(line_->network().node(3)->starts(), 0);
+  // Two axes that change places.
+  wanted.axes.at(1).axis.node = 2;
+  wanted.axes.at(2).axis.node = 1;
+  reload(wanted);
+  EXPECT_THAT(refusals_, IsEmpty());
+  ASSERT_TRUE(online("a1"));
+  ASSERT_TRUE(online("a2"));
+  ASSERT_TRUE(machine_->submit("a1", MoveVelocityRequest{.velocity = 10}, options()));
+  world_.run_for(500ms);
+  EXPECT_TRUE(line_->network().node(2)->shaft_moving());
+  EXPECT_FALSE(line_->network().node(1)->shaft_moving());
+}
+
+TEST_F(ReloadedMachine, ThePositionIsRestoredByWhatTheStoreKnowsNow) {
+  EXPECT_EQ(complete("a2", EnableRequest{}).state, CommandState::done);
+  EXPECT_EQ(complete("a2", SetPositionRequest{.position = 7}).state, CommandState::done);
+  EXPECT_EQ(complete("a2", MoveAbsoluteRequest{.position = 12}).state, CommandState::done);
+  reload(slower(1));
+  ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(state("a2")->trust, PositionTrust::restored);
+  EXPECT_DOUBLE_EQ(state("a2")->position, 12);
+  EXPECT_EQ(state("a2")->state, AxisState::standstill);
+  EXPECT_FALSE(state("a2")->enabled_by_us) << "M1: found energised";
+  auto inverted = slower(1);
+  inverted.axes.at(1).axis.scale.invert = true;
+  reload(inverted);
+  ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(state("a2")->trust, PositionTrust::unknown) << "the counter means something else";
+  // Another drive than the one that the record speaks of.
+  EXPECT_EQ(complete("a2", SetPositionRequest{.position = 7}).state, CommandState::done);
+  auto moved = inverted;
+  moved.axes.at(1).axis.node = 4;
+  reload(moved);
+  ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(state("a2")->trust, PositionTrust::unknown);
+}
+
+TEST_F(ReloadedMachine, ARepeatedRequestStillStartsNothing) {
+  EXPECT_EQ(complete("a2", EnableRequest{}).state, CommandState::done);
+  const auto move =
+      machine_->submit("a2", MoveRelativeRequest{.distance = 5}, {.client = "hmi", .request_id = "once"});
+  ASSERT_TRUE(move);
+  ASSERT_TRUE(world_.run_until([&] { return (*move)->has_ended(); }, 10s));
+  reload(slower(1));
+  ASSERT_TRUE(online("a2"));
+  const auto again =
+      machine_->submit("a2", MoveRelativeRequest{.distance = 5}, {.client = "hmi", .request_id = "once"});
+  ASSERT_TRUE(again);
+  EXPECT_EQ((*again)->value().id, (*move)->value().id);
+  world_.run_for(1s);
+  EXPECT_EQ(line_->network().node(2)->starts(), 1);
+}
+
+TEST_F(ReloadedMachine, IsAnEvent) {
+  const auto before = machine_->events().events_after(0, 0).newest;
+  reload(slower(1));
+  const auto batch = machine_->events().events_after(before, 100);
+  const auto told = std::ranges::find_if(batch.events, [](const Event& event) {
+    return std::holds_alternative<ConfigurationReloaded>(event.content);
+  });
+  ASSERT_NE(told, batch.events.end());
+  const auto& content = std::get<ConfigurationReloaded>(told->content);
+  EXPECT_EQ(content.client, "fitter");
+  EXPECT_EQ(content.before, "r1");
+  EXPECT_EQ(content.revision, "r2");
+  ASSERT_EQ(content.changes.size(), 1U);
+  EXPECT_EQ(to_string(content.changes.front()), "axes.a2 changed (limits.velocity)");
+}
+
+TEST_F(ReloadedMachine, TheEndOfTheDaemonEndsAReload) {
+  ask(slower(1));
+  const auto stop = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
+  machine_->close();
+  ASSERT_TRUE(world_.run_until([this] { return machine_->closed() && answered_; }, 10s));
+  EXPECT_EQ(refusals_.at(0).reason, Reason::cancelled);
+  EXPECT_TRUE((*stop)->has_ended());
+}
+
+TEST_F(ReloadedMachine, OneSilentDriveDoesNotKeepTheOthers) {
+  line_->network().node(2)->set_power(false);
+  world_.run_for(3s);
+  auto wanted = configuration_;
+  wanted.axes.at(1).axis.node = 4;  // its address was wrong
+  reload(wanted);
+  EXPECT_THAT(refusals_, IsEmpty());
+  EXPECT_TRUE(online("a2"));
+  EXPECT_EQ(state("a1")->link, LinkState::online);
+}
+
+}  // namespace
+}  // namespace axisd::core
