@@ -54,7 +54,7 @@ std::unique_ptr<Axis> MachineCore::make_axis(const AxisSettings& settings, AxisF
                                  .node = settings.node,
                                  .setup = std::move(*setup)});
   if (line != nullptr && settings.turnaround_max)
-    line->set_turnaround_max(settings.node, *settings.turnaround_max);
+    line->set_turnaround_max(settings.node, settings.turnaround_max);
   if (!face) face = std::make_shared<AxisFace>(bus->stop_notice());
   const bool brake =
       std::ranges::any_of(settings.outputs, [](const auto& o) { return o.function == "brake"; });
@@ -78,7 +78,7 @@ std::unique_ptr<Device> MachineCore::make_device(const DeviceSettings& settings)
   auto* line = find_line(settings.bus);
   auto* network = find_network(settings.bus);
   if (settings.kind == BusKind::modbus_rtu && line != nullptr) {
-    if (settings.turnaround_max) line->set_turnaround_max(settings.node, *settings.turnaround_max);
+    if (settings.turnaround_max) line->set_turnaround_max(settings.node, settings.turnaround_max);
     return std::make_unique<ModbusDevice>(parts_.executor, *parts_.clock, *line, settings);
   }
   if (settings.kind == BusKind::canopen && network != nullptr)
