@@ -175,14 +175,16 @@ bool RtuBus::must_wait(const Transaction& transaction) const {
 }
 
 /// When what waits for this node may be looked at again.
-TimePoint RtuBus::ready_at(std::uint8_t node) const {
-  return holds_back(node) ? quarantine_.ready_at(node) : late_.distinct_at(node, clock_->now());
+TimePoint RtuBus::ready_at(std::uint8_t node, TimePoint now) const {
+  const auto probed = quarantine_.ready_at(node);
+  return probed > now ? probed : late_.distinct_at(node, now);
 }
 
 /// What was put aside is looked at again as soon as the first of it may be sent.
 void RtuBus::await_release() {
   auto next = TimePoint::max();
-  for (const auto node : queue_.held_nodes()) next = std::min(next, ready_at(node));
+  const auto now = clock_->now();
+  for (const auto node : queue_.held_nodes()) next = std::min(next, ready_at(node, now));
   release_ = next == TimePoint::max() ? Clock::Timer{} : clock_->call_at(next, [this] {
     release_ready();
     pump();
@@ -193,7 +195,7 @@ void RtuBus::await_release() {
 void RtuBus::release_ready() {
   const auto now = clock_->now();
   for (const auto node : queue_.held_nodes())
-    if (ready_at(node) <= now) queue_.release(node);
+    if (ready_at(node, now) <= now) queue_.release(node);
 }
 
 void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result) {

@@ -87,7 +87,7 @@ class RtuBus final : public Bus {
   void pump();
   void arm_next();
   [[nodiscard]] bool must_wait(const Transaction& transaction) const;
-  [[nodiscard]] TimePoint ready_at(std::uint8_t node) const;
+  [[nodiscard]] TimePoint ready_at(std::uint8_t node, TimePoint now) const;
   void await_release();
   void release_ready();
   void note_silence(const Transaction& ended, const ExchangeResult& result);

@@ -43,6 +43,9 @@ Result<void> LeaseKeeper::check_axes(const LeaseRequest& request) const {
     if (axis == nullptr)
       return fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", name),
                   "list them: axisctl list");
+    if (axis->retired())
+      return fail(Reason::reloading, fmt::format("{}: its configuration is being reloaded", name),
+                  "repeat it in a moment");
     const auto* command = request.take ? nullptr : axis->commanded_without_lease();
     if (command != nullptr)
       return fail(Reason::busy,
@@ -69,6 +72,7 @@ Result<LeaseGrant> LeaseKeeper::acquire(const LeaseRequest& request) {
       });
       auto change = LeaseChange{.what = LeaseChange::What::acquired, .holder = lease.holder()};
       auto* axis = find_(name);
+      if (axis == nullptr) continue;
       if (const auto* command = axis->commanded_without_lease(); command != nullptr) {
         change.what = LeaseChange::What::taken;
         change.before = command->client;
@@ -100,7 +104,8 @@ Result<void> LeaseKeeper::release(const Requester& holder) {
 }
 
 void LeaseKeeper::prolong(const Lease& lease) {
-  for (const auto& name : lease.axes) find_(name)->gate()->set_fencing_token(lease.token, lease.expires);
+  for (const auto& name : lease.axes)
+    if (const auto* axis = find_(name)) axis->gate()->set_fencing_token(lease.token, lease.expires);
 }
 
 /// First the gates, so that nothing prepared under it is sent; then each axis does what its policy is.

@@ -242,12 +242,14 @@ void MachineCore::release_inhibit(const std::string& client, std::function<void(
 }
 
 void MachineCore::stop_moving_axes() {
+  ending_ = true;
   for (const auto& axis : axes_)
-    if (!axis->at_rest()) (void)axis->submit(StopRequest{.kind = StopKind::stop}, {.client = "shutdown"});
+    if (!axis->at_rest())
+      (void)submit(axis->settings().name, StopRequest{.kind = StopKind::stop}, {.client = "shutdown"});
 }
 
 bool MachineCore::at_rest() const {
-  return std::ranges::all_of(axes_, [](const auto& axis) { return axis->at_rest(); });
+  return !reloading_ && std::ranges::all_of(axes_, [](const auto& axis) { return axis->at_rest(); });
 }
 
 void MachineCore::close() {

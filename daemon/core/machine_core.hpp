@@ -125,6 +125,8 @@ class MachineCore {
   void check_parts(const Reload& reload, const ConfigurationChange& change,
                    std::vector<Error>& refusals) const;
   void check_sync_for_reload(const ConfigurationChange& change, std::vector<Error>& refusals) const;
+  void check_groups_for_reload(const Reload& reload, const ConfigurationChange& change,
+                               std::vector<Error>& refusals) const;
   void check_lease_for_reload(const Reload& reload, const ConfigurationChange& change,
                               std::vector<Error>& refusals) const;
   [[nodiscard]] bool has_made_room() const;
@@ -166,6 +168,7 @@ class MachineCore {
   GroupKeeper groups_;  ///< after the axes, which its moves are of
   int sequences_ = 0;   ///< launched ones that still run
   bool closing_ = false;
+  bool ending_ = false;  ///< the daemon is: no reload is carried out any more
   bool reloading_ = false;
   Leaving leaving_;  ///< axes that a reload exchanges or removes
   std::map<std::string, LeftBehind, std::less<>> left_behind_;

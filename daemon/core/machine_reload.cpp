@@ -29,6 +29,29 @@ bool concerns_another_drive(const ConfigurationChange& change) {
       change.keys, [](std::string_view key) { return key == "bus" || key == "node" || key == "model"; });
 }
 
+/// "limits.velocity" is of "limits", and so is "limits" itself.
+bool is_of(std::string_view key, std::string_view part) {
+  return key == part || (key.starts_with(part) && key.substr(part.size()).starts_with('.'));
+}
+
+/// Only keys that the daemon uses by itself: the drive gets nothing written for them.
+bool is_of_the_daemon_alone(const ConfigurationChange& change) {
+  static constexpr std::string_view own[] = {"limits.velocity", "poll",          "turnaround_max",
+                                             "jog_travel",      "on_lease_loss", "position_tolerance"};
+  return change.kind == Kind::changed && std::ranges::all_of(change.keys, [](std::string_view key) {
+           return std::ranges::any_of(own, [&](auto part) { return is_of(key, part); });
+         });
+}
+
+/// What a position says depends on these; on another drive it says nothing (M20).
+bool keeps_position(const ConfigurationChange& change) {
+  static constexpr std::string_view datum[] = {"bus",    "node",   "model", "scale",
+                                               "homing", "inputs", "unit",  "drive"};
+  return change.kind == Kind::changed && std::ranges::none_of(change.keys, [](std::string_view key) {
+           return std::ranges::any_of(datum, [&](auto part) { return is_of(key, part); });
+         });
+}
+
 Error restart_needed(const ConfigurationChange& change) {
   return {.reason = Reason::not_supported,
           .message = fmt::format("{}: this is read at the start of the daemon only", to_string(change)),
@@ -56,6 +79,27 @@ void MachineCore::check_sync_for_reload(const ConfigurationChange& change,
        .where = {.bus = network->name(), .node = axis->settings().node}});
 }
 
+/// A node that comes or goes stops SYNC on its network, and nobody starts by it until that node is known.
+void MachineCore::check_groups_for_reload(const Reload& reload, const ConfigurationChange& change,
+                                          std::vector<Error>& refusals) const {
+  std::vector<std::string> networks;
+  if (const auto* axis = find(change.name)) networks.push_back(axis->settings().bus);
+  for (const auto& entry : reload.configuration.axes)
+    if (named(entry.axis, change.name)) networks.push_back(entry.axis.bus);
+  for (const auto& axis : axes_) {
+    const auto& settings = axis->settings();
+    const bool beside = settings.name != change.name && find_network(settings.bus) != nullptr &&
+                        std::ranges::find(networks, settings.bus) != networks.end();
+    const auto run = beside ? groups_.engaged(settings.name) : nullptr;
+    if (run == nullptr) continue;
+    refusals.push_back(
+        {.reason = Reason::busy,
+         .message = fmt::format("{}: group move {} is under way on {}", change.name, run->id(), settings.bus),
+         .remedy = "wait for its end, or stop it"});
+    return;
+  }
+}
+
 /// Whoever leases an axis relies on what it does: another client may not change that under its hands. It is
 /// not taken away here: that is what `lease acquire --take` is for, which asks for it by name and is audited.
 void MachineCore::check_lease_for_reload(const Reload& reload, const ConfigurationChange& change,
@@ -76,17 +120,23 @@ void MachineCore::check_lease_for_reload(const Reload& reload, const Configurati
 
 std::vector<Error> MachineCore::check_reload(const Reload& reload) const {
   std::vector<Error> refusals;
-  if (closing_) refusals.push_back({.reason = Reason::cancelled, .message = "the daemon is shutting down"});
+  if (closing_ || ending_)
+    refusals.push_back({.reason = Reason::cancelled,
+                        .message = "the daemon is shutting down",
+                        .remedy = "it reads the file when it is started again"});
   if (reloading_)
     refusals.push_back(
         {.reason = Reason::busy, .message = "another reload is under way", .remedy = "wait for its end"});
   for (const auto& change : reload.changes) {
     if (needs_restart(change)) refusals.push_back(restart_needed(change));
-    if (change.section == "axes") check_parts(reload, change, refusals);
+    if (change.section == "axes") {
+      check_parts(reload, change, refusals);
+      check_groups_for_reload(reload, change, refusals);
+    }
     if (change.kind == Kind::added) continue;
     if (change.section == "axes") {
       if (const auto* axis = find(change.name); axis != nullptr)
-        std::ranges::move(axis->check_exchange(), std::back_inserter(refusals));
+        std::ranges::move(axis->check_exchange(is_of_the_daemon_alone(change)), std::back_inserter(refusals));
       if (const auto run = groups_.engaged(change.name); run != nullptr)
         refusals.push_back({.reason = Reason::moving,
                             .message = fmt::format("{}: a member of group move {}", change.name, run->id()),
@@ -128,7 +178,7 @@ void MachineCore::reload(Reload reload, ReloadDone done) {
     if (change.kind == Kind::added) continue;
     if (change.section == "axes") {
       leaving_.try_emplace(change.name);
-      find(change.name)->retire(concerns_another_drive(change));
+      find(change.name)->retire(keeps_position(change));
     } else if (change.section == "devices") {
       for (const auto& device : devices_)
         if (named(device->settings(), change.name)) device->close();
@@ -145,25 +195,33 @@ bool MachineCore::has_made_room() const {
 }
 
 Task<> MachineCore::run_reload(Reload reload, ReloadDone done) {
-  while (!has_made_room())
-    co_await sleep_until(parts_.executor, *parts_.clock, parts_.clock->now() + look_again);
-  for (auto name = unstopped(reload); !closing_ && !name.empty(); name = unstopped(reload))
-    co_await stop_leaving(name);
-  if (closing_) {
-    const Error cause{.reason = Reason::cancelled, .message = "the daemon is shutting down"};
+  for (;;) {
+    while (!has_made_room())
+      co_await sleep_until(parts_.executor, *parts_.clock, parts_.clock->now() + look_again);
+    const auto name = closing_ ? std::string() : unstopped(reload);
+    if (name.empty()) break;
+    co_await stop_leaving(name);  // others may have got something to do meanwhile
+  }
+  if (closing_ || ending_) {
+    const Error cause{.reason = Reason::cancelled,
+                      .message = "the daemon is shutting down",
+                      .remedy = "it reads the file when it is started again"};
     for (auto& [axis, stops] : leaving_)
       for (const auto& stop : stops) stop.command->abort(cause);
+    reloading_ = false;
     co_return done({cause});
   }
   carry_out(reload);
   done({});
 }
 
-/// An axis that goes for good and was told to stop: it has nobody to leave that to.
+/// An axis whose drive nobody has any more, and that was told to stop: it has nobody to leave that to.
 std::string MachineCore::unstopped(const Reload& reload) const {
-  for (const auto& change : reload.changes)
-    if (change.section == "axes" && change.kind == Kind::removed && !leaving_.at(change.name).empty())
-      return change.name;
+  for (const auto& change : reload.changes) {
+    if (change.section != "axes" || change.kind == Kind::added) continue;
+    const bool for_good = ending_ || change.kind == Kind::removed || concerns_another_drive(change);
+    if (for_good && !leaving_.at(change.name).empty()) return change.name;
+  }
   return {};
 }
 

@@ -80,12 +80,14 @@ class Axis {
 
   // axis_reload.cpp: for another axis of the same name, or none, to take its place
   /// Why that cannot be now, all reasons, each with what to do; empty: nothing stands against it. Leases are
-  /// not looked at.
-  [[nodiscard]] std::vector<Error> check_exchange() const;
+  /// not looked at. `energised`: may be, as what has changed is the daemon's alone.
+  [[nodiscard]] std::vector<Error> check_exchange(bool energised) const;
   /// Refuses everything from now on (`reloading`) and ends as close() does: nothing of it is sent any more
-  /// but what is on its way. `other_drive`: what comes has another drive, and nothing that is known of this
-  /// one's position holds. Precondition: check_exchange() found nothing.
-  void retire(bool other_drive);
+  /// but what is on its way. `position_holds`: for what comes, too; else it has to be homed again.
+  /// Precondition: check_exchange() found nothing.
+  void retire(bool position_holds);
+  /// From then on.
+  [[nodiscard]] bool retired() const { return reloading_; }
   /// `on_lease_loss: disable` was not done yet.
   [[nodiscard]] bool owes_release() const { return release_owed_.has_value(); }
   /// Its drive answered when it was retired.
@@ -329,6 +331,7 @@ class Axis {
   void look_at(const GroupMemberRequest& request, const CommandOptions& options, Obstacles& found) const;
   void look_at_options(const CommandOptions& options, Obstacles& found) const;
   [[nodiscard]] Error reloading() const;
+  [[nodiscard]] Error ending() const;
   void look_at_link(Obstacles& found) const;
   void look_at_fault(Obstacles& found) const;
   void look_at_maintenance(Obstacles& found) const;

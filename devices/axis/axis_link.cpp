@@ -85,6 +85,7 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   }
   auto identity = co_await drive_->identify(contact);
   if (!identity) co_return fail(identity.error());
+  if (closing_) co_return fail(ending());
   if (link_ != LinkState::configuring) {
     link_ = LinkState::configuring;
     link_error_.reset();
@@ -95,6 +96,7 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
   if (const auto settled = co_await settle_found_motion(); !settled) co_return settled;
+  if (closing_) co_return fail(ending());
   co_return co_await prove_or_configure();
 }
 
@@ -133,6 +135,9 @@ Task<Result<void>> Axis::settle_found_motion() {
   co_return Result<void>{};
 }
 
+/// What is begun is not gone on with: somebody else may be about to take the drive over.
+Error Axis::ending() const { return error(Reason::cancelled, "the axis is being closed"); }
+
 Task<Result<void>> Axis::prove_or_configure() {
   if (const auto settled = co_await settle_earlier(); !settled) co_return settled;
   std::optional<OffsetRecord> stored;
@@ -162,6 +167,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (!proof && configured_) on_reboot(proof.error());
     if (!proof && restorable) void_record();
     if (!proof) restorable = false;
+    if (closing_) co_return fail(ending());
   }
   if (!configured_) {
     // A terminal's motion is not disturbed by writing parameters under it.
@@ -170,6 +176,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     const auto configured = co_await drive_->configure();
     if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
     if (!configured) co_return configured;
+    if (closing_) co_return fail(ending());
     configured_ = true;
     continuity_checked_ = env_.clock->now();
     restore_tried_ = true;

@@ -9,7 +9,7 @@
 namespace axisd {
 
 /// Everything that would be lost, or be done by nobody, if the axis went away now.
-std::vector<Error> Axis::check_exchange() const {
+std::vector<Error> Axis::check_exchange(bool energised) const {
   std::vector<Error> found;
   const auto add = [&](Reason reason, std::string message, std::string remedy) {
     found.push_back(error(reason, std::move(message), std::move(remedy)));
@@ -37,9 +37,14 @@ std::vector<Error> Axis::check_exchange() const {
   if (!unsettled_.empty())
     add(Reason::busy, "what became of a command of before the daemon's start is not known yet",
         "wait until the drive has been asked");
-  const bool shown = fault_ && fault_->reason == Reason::alarm && sample_ &&
-                     sample_->alarm_code == fault_->where.native_code;
-  if (fault_ && !shown)  // whoever comes after would know nothing of it
+  // Nobody would look after a drive that is left, and one that stays is not configured under power (M1).
+  if (sample_ && sample_->enabled && (!energised || !drift_.empty()))
+    add(Reason::busy,
+        link_ == LinkState::online ? "its power stage is on" : "its power stage was on when it was last seen",
+        link_ == LinkState::online
+            ? "disable it first: " + shell("disable")
+            : "look at the machine and let the drive answer; or restart the service with this configuration");
+  if (fault_)  // whoever comes after would know nothing of it
     add(Reason::fault, "in ErrorStop: " + fault_->message, "reset it first: " + shell("reset"));
   return found;
 }
@@ -48,13 +53,13 @@ Error Axis::reloading() const {
   return error(Reason::reloading, "its configuration is being reloaded", "repeat it in a moment");
 }
 
-void Axis::retire(bool other_drive) {
+void Axis::retire(bool position_holds) {
   reloading_ = true;
   answered_ = link_ != LinkState::offline;
   link_error_ = reloading();
   // Homing that a terminal starts meanwhile would zero the counter, and nobody would have seen it.
-  if (has_input("homing_start") || other_drive) lose_trust();
-  if (other_drive && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
+  if (has_input("homing_start") || !position_holds) lose_trust();
+  if (!position_holds && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
   remember_position();
   close();
   env_.bus->port_changed().notify_all();  // whoever waits for the port looks again

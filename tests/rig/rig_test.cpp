@@ -220,6 +220,8 @@ TEST_F(RealRig, ComesBackAfterTheAdapterWasUnplugged) {
 TEST_F(RealRig, AxesAreExchangedUnderReadersAndStops) {
   wait_online();
   std::atomic<bool> going{true};
+  const auto released = submit("axis-3", DisableRequest{});
+  ASSERT_TRUE(released && released->state == CommandState::done) << "an energised axis may not go";
   std::vector<std::thread> others;
   others.emplace_back([&] {
     while (going) {

@@ -183,6 +183,7 @@ TEST_F(ReloadedMachine, AnErrorThatTheDriveDoesNotShowIsResetFirst) {
 }
 
 TEST_F(ReloadedMachine, OnlyItsHolderChangesALeasedAxis) {
+  complete("a2", DisableRequest{});
   const auto lease = machine_->leases().acquire({.client = "fitter", .axes = {"a2"}, .ttl = 10s});
   ASSERT_TRUE(lease);
   reload(slower(1), "somebody");
@@ -195,6 +196,7 @@ TEST_F(ReloadedMachine, OnlyItsHolderChangesALeasedAxis) {
   EXPECT_THAT(refusals_, IsEmpty());
   ASSERT_TRUE(online("a2"));
   EXPECT_EQ(machine_->find("a2")->gate()->fencing_token(), lease->lease.token) << "it lives on";
+  EXPECT_TRUE(machine_->leases().renew({.client = "fitter", .lease_token = lease->lease.token}));
   EXPECT_EQ(machine_->submit("a2", MoveVelocityRequest{.velocity = 10}, options()).error().reason,
             Reason::lease_required);
 }
@@ -249,7 +251,65 @@ TEST_F(ReloadedMachine, StopAllMeanwhileStopsEveryAxis) {
   EXPECT_FALSE(machine_->find("a2")->gate()->stop_pending());
 }
 
+/// Nobody would look after it any more, nor stop it; and nothing is configured under power.
+TEST_F(ReloadedMachine, AnEnergisedAxisIsExchangedForKeysOfTheDaemonOnly) {
+  auto without = configuration_;
+  without.axes.pop_back();
+  auto finer = configuration_;
+  finer.axes.at(1).axis.scale.pulses_per_revolution = 2000;
+  auto elsewhere = configuration_;
+  elsewhere.axes.at(1).axis.node = 4;
+  for (const auto& wanted : {without, finer, elsewhere}) {
+    reload(wanted);
+    EXPECT_THAT(reasons(), ElementsAre(Reason::busy));
+    EXPECT_THAT(refusals_.front().remedy, HasSubstr("axisctl disable a2"));
+  }
+  line_->network().node(2)->set_power(false);
+  ASSERT_TRUE(world_.run_until([this] { return state("a2")->link == LinkState::offline; }, 10s));
+  reload(without);
+  EXPECT_THAT(reasons(), ElementsAre(Reason::busy)) << "it may come back, and move by its terminals";
+}
+
+TEST_F(ReloadedMachine, NobodyLeasesAnAxisMeanwhile) {
+  complete("a2", DisableRequest{});
+  auto without = configuration_;
+  without.axes.pop_back();
+  ask(without);
+  const auto lease = machine_->leases().acquire({.client = "hmi", .axes = {"a1", "a2"}, .ttl = 1s});
+  ASSERT_FALSE(lease);
+  EXPECT_EQ(lease.error().reason, Reason::reloading);
+  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
+  EXPECT_TRUE(machine_->leases().acquire({.client = "hmi", .axes = {"a1"}, .ttl = 1s}));
+}
+
+TEST_F(ReloadedMachine, AStopForAnAxisThatGetsAnotherDriveGoesToTheOneThatItHas) {
+  complete("a2", DisableRequest{});
+  line_->forget_wire();
+  auto elsewhere = configuration_;
+  elsewhere.axes.at(1).axis.node = 4;
+  ask(elsewhere);
+  const auto stop = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
+  ASSERT_TRUE(stop);
+  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
+  EXPECT_EQ((*stop)->value().state, CommandState::done);
+  EXPECT_EQ(writes(2, 0x0028), 1);
+}
+
+TEST_F(ReloadedMachine, TheEndOfTheDaemonStillSendsAStopThatWaits) {
+  ask(slower(1));
+  const auto stop = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
+  ASSERT_TRUE(stop);
+  machine_->stop_moving_axes();
+  EXPECT_FALSE(machine_->at_rest());
+  ASSERT_TRUE(world_.run_until([this] { return machine_->at_rest(); }, 10s));
+  EXPECT_EQ((*stop)->value().state, CommandState::done);
+  EXPECT_EQ(writes(2, 0x0028), 1);
+  EXPECT_THAT(reasons(), ElementsAre(Reason::cancelled));
+}
+
 TEST_F(ReloadedMachine, AStopForAnAxisThatGoesIsSentBeforeItIsGone) {
+  complete("a2", DisableRequest{});
+  line_->forget_wire();
   auto without = configuration_;
   without.axes.pop_back();
   ask(without);
@@ -278,12 +338,14 @@ TEST_F(ReloadedMachine, AxesComeAndGoInTheOrderOfTheFile) {
   ASSERT_TRUE(online("a3"));
   EXPECT_EQ(line_->network().node(3)->starts(), 0);
   // Two axes that change places.
+  for (const auto* axis : {"a1", "a2"}) complete(axis, DisableRequest{});
   wanted.axes.at(1).axis.node = 2;
   wanted.axes.at(2).axis.node = 1;
   reload(wanted);
   EXPECT_THAT(refusals_, IsEmpty());
   ASSERT_TRUE(online("a1"));
   ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(complete("a1", EnableRequest{}).state, CommandState::done);
   ASSERT_TRUE(machine_->submit("a1", MoveVelocityRequest{.velocity = 10}, options()));
   world_.run_for(500ms);
   EXPECT_TRUE(line_->network().node(2)->shaft_moving());
@@ -300,13 +362,16 @@ TEST_F(ReloadedMachine, ThePositionIsRestoredByWhatTheStoreKnowsNow) {
   EXPECT_DOUBLE_EQ(state("a2")->position, 12);
   EXPECT_EQ(state("a2")->state, AxisState::standstill);
   EXPECT_FALSE(state("a2")->enabled_by_us) << "M1: found energised";
+  complete("a2", DisableRequest{});
   auto inverted = slower(1);
   inverted.axes.at(1).axis.scale.invert = true;
   reload(inverted);
   ASSERT_TRUE(online("a2"));
   EXPECT_EQ(state("a2")->trust, PositionTrust::unknown) << "the counter means something else";
   // Another drive than the one that the record speaks of.
+  EXPECT_EQ(complete("a2", EnableRequest{}).state, CommandState::done);
   EXPECT_EQ(complete("a2", SetPositionRequest{.position = 7}).state, CommandState::done);
+  complete("a2", DisableRequest{});
   auto moved = inverted;
   moved.axes.at(1).axis.node = 4;
   reload(moved);
@@ -356,6 +421,7 @@ TEST_F(ReloadedMachine, TheEndOfTheDaemonEndsAReload) {
 }
 
 TEST_F(ReloadedMachine, OneSilentDriveDoesNotKeepTheOthers) {
+  complete("a2", DisableRequest{});
   line_->network().node(2)->set_power(false);
   world_.run_for(3s);
   auto wanted = configuration_;
