@@ -14,19 +14,40 @@ namespace axisd::modbus_rtu::test {
 
 using namespace axisd::test;
 
+/// Time that passes between two looks at it, as real time does.
+class RestlessClock final : public Clock {
+ public:
+  explicit RestlessClock(VirtualClock& base) : base_(&base) {}
+  [[nodiscard]] TimePoint now() const override { return base_->now() + Duration(++looks_); }
+  [[nodiscard]] WallTime wall(TimePoint t) const override { return base_->wall(t); }
+
+ private:
+  void schedule(TimePoint when) override {
+    timer_ = base_->call_at(when, [this] {
+      const auto running = std::move(timer_);
+      if (const auto next = run_due(now()); next != TimePoint::max()) schedule(next);
+    });
+  }
+  VirtualClock* base_;
+  mutable std::int64_t looks_ = 0;
+  Timer timer_;
+};
+
 /// Two simulated drives, 1 and 2, on a line "a" in virtual time.
 struct BusRig {
   VirtualWorld world;
+  RestlessClock restless{world.clock()};
   VirtualLine* line = nullptr;
   std::unique_ptr<RtuBus> bus;
   std::map<std::string, Result<Answer>> results;
 
-  BusRig() {
+  explicit BusRig(bool is_restless = false) {
     auto made = std::make_unique<VirtualLine>(world, LineSettings{.name = "a", .port = "sim"});
     line = made.get();
     for (const std::uint8_t node : {1, 2})
       line->network().add(simulation::find_simulator("ykd2405pr")->make({.address = node}));
-    bus = std::make_unique<RtuBus>(world.executor(), world.clock(), LineSettings{.name = "a", .port = "sim"},
+    Clock& clock = is_restless ? static_cast<Clock&>(restless) : world.clock();
+    bus = std::make_unique<RtuBus>(world.executor(), clock, LineSettings{.name = "a", .port = "sim"},
                                    std::move(made));
     bus->start();
     world.run_for(std::chrono::milliseconds(10));

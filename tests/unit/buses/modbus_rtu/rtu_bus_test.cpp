@@ -198,6 +198,15 @@ TEST(RtuBus, AStopOvertakesWhatIsArmedAndCutsAnotherNodesSilence) {
 
 /// Of a node that does not answer: a new stop goes at once, its repetition as seldom as any probe, and at
 /// once when anything is heard of the node.
+TEST(RtuBus, WhatIsHeldBackGoesOutInItsTurnThoughTimePassesMeanwhile) {
+  BusRig rig(true);
+  rig.line->network().node(1)->set_power(false);
+  for (int i = 0; i < 4; ++i) rig.read("in vain", 0x0003, 10);
+  ASSERT_TRUE(rig.world.run_until([&] { return rig.bus->held_back() > 0; }, 5s));
+  const auto asked = rig.line->wire().size();
+  EXPECT_TRUE(rig.world.run_until([&] { return rig.line->wire().size() > asked; }, 5s));
+}
+
 TEST(RtuBus, RepeatedStopsToASilentNodeWaitForTheirTurn) {
   BusRig rig;
   rig.line->network().node(1)->set_power(false);
