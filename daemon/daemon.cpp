@@ -248,11 +248,11 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
   }
 
   server.shutdown();
-  served.close();
   ask_core(loop, [&] {
     machine.close();
     return true;
   });
+  served.close();  // after that, which ends a reload that waits
   if (!wait_until([&] { return ask_core(loop, [&] { return machine.closed(); }); }, close_patience)) {
     spdlog::critical("sequences did not end; leaving at once");
     end_logging();

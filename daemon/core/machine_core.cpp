@@ -249,7 +249,8 @@ void MachineCore::stop_moving_axes() {
 }
 
 bool MachineCore::at_rest() const {
-  return !reloading_ && std::ranges::all_of(axes_, [](const auto& axis) { return axis->at_rest(); });
+  return !reloading_ && !unconfirmed_ &&
+         std::ranges::all_of(axes_, [](const auto& axis) { return axis->at_rest(); });
 }
 
 void MachineCore::close() {

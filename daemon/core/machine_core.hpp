@@ -133,6 +133,7 @@ class MachineCore {
   [[nodiscard]] std::string unstopped(const Reload& reload) const;
   Task<> run_reload(Reload reload, ReloadDone done);
   Task<> stop_leaving(std::string name);
+  Task<> send_stop(Axis& axis, StopKind kind);
   void carry_out(Reload& reload);
   void clear_away();
   [[nodiscard]] std::vector<Axis*> renew_axes(const Reload& reload);
@@ -168,7 +169,9 @@ class MachineCore {
   GroupKeeper groups_;  ///< after the axes, which its moves are of
   int sequences_ = 0;   ///< launched ones that still run
   bool closing_ = false;
-  bool ending_ = false;  ///< the daemon is: no reload is carried out any more
+  int stops_on_their_way_ = 0;  ///< of axes that are leaving
+  bool unconfirmed_ = false;    ///< a stop of such an axis was not confirmed
+  bool ending_ = false;         ///< the daemon is: no reload is carried out any more
   bool reloading_ = false;
   Leaving leaving_;  ///< axes that a reload exchanges or removes
   std::map<std::string, LeftBehind, std::less<>> left_behind_;

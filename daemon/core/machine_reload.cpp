@@ -16,6 +16,10 @@ using Kind = ConfigurationChangeKind;
 
 /// How often it is looked whether what has to end has ended: some milliseconds, where nothing is silent.
 constexpr auto look_again = std::chrono::milliseconds(1);
+constexpr int stop_attempts = 3;
+/// Of a stop that the axis itself does not confirm any more.
+constexpr auto longest_deceleration = std::chrono::seconds(3);
+constexpr auto look_at_motion = std::chrono::milliseconds(20);
 
 /// What a running daemon cannot change; these keys are read at its start.
 bool needs_restart(const ConfigurationChange& change) {
@@ -188,7 +192,8 @@ void MachineCore::reload(Reload reload, ReloadDone done) {
 }
 
 bool MachineCore::has_made_room() const {
-  return std::ranges::all_of(leaving_, [this](const auto& axis) { return find(axis.first)->closed(); }) &&
+  return stops_on_their_way_ == 0 &&
+         std::ranges::all_of(leaving_, [this](const auto& axis) { return find(axis.first)->closed(); }) &&
          std::ranges::all_of(devices_, [](const auto& device) {
            return !device->closing() || (device->closed() && !device->in_use());
          });
@@ -225,7 +230,7 @@ std::string MachineCore::unstopped(const Reload& reload) const {
   return {};
 }
 
-/// One frame for all: each asks for the same, and the drive rests as far as is known.
+/// For whom nobody else confirms them: all of them at once, as each asks for the same.
 Task<> MachineCore::stop_leaving(std::string name) {
   auto& axis = *find(name);
   const auto stops = std::exchange(leaving_.at(name), {});
@@ -234,11 +239,23 @@ Task<> MachineCore::stop_leaving(std::string name) {
     kind = std::max(kind, stop.request.kind);
     axis.gate()->stop_served();
   }
-  const auto sent = co_await axis.drive().stop(kind);
-  const auto sample = sent ? co_await axis.drive().read_state(TransactionClass::moving_state)
-                           : Result<DriveSample>(fail(sent.error()));
+  const auto until = parts_.clock->now() + longest_deceleration;
+  auto sample = Result<DriveSample>(fail(Reason::internal, "not stopped"));
+  for (int attempt = 0; attempt < stop_attempts; ++attempt) {
+    const auto sent = co_await axis.drive().stop(kind);
+    sample = sent ? co_await axis.drive().read_state(TransactionClass::moving_state)
+                  : Result<DriveSample>(fail(sent.error()));
+    if (sample) break;
+  }
+  while (sample && sample->moving && parts_.clock->now() < until && !closing_) {
+    co_await sleep_until(parts_.executor, *parts_.clock, parts_.clock->now() + look_at_motion);
+    sample = co_await axis.drive().read_state(TransactionClass::moving_state);
+  }
+  const bool rests = sample && !sample->moving;
+  unconfirmed_ = unconfirmed_ || !rests;
+  if (!rests) spdlog::error("{}: standstill was not confirmed; look at the machine", name);
   for (const auto& stop : stops) {
-    if (sample && !sample->moving)
+    if (rests)
       stop.command->done();
     else if (sample)
       stop.command->error({.reason = Reason::not_confirmed,
@@ -247,6 +264,12 @@ Task<> MachineCore::stop_leaving(std::string name) {
     else
       stop.command->unknown(sample.error());
   }
+}
+
+/// Whoever confirms it later: its frame goes out now. (The drive is there until all have made room.)
+Task<> MachineCore::send_stop(Axis& axis, StopKind kind) {
+  (void)co_await axis.drive().stop(kind);
+  --stops_on_their_way_;
 }
 
 /// Nothing waits in here: whoever looks before or after finds one configuration, whole.
@@ -329,9 +352,11 @@ void MachineCore::clear_away() {
   };
   for (const auto& [name, stops] : leaving_) {
     const auto* axis = find(name);
-    left_behind_.emplace(
-        name,
-        LeftBehind{.face = axis->face(), .bus = axis->settings().bus, .owes_release = axis->owes_release()});
+    left_behind_.emplace(name, LeftBehind{.face = axis->face(),
+                                          .bus = axis->settings().bus,
+                                          .node = axis->settings().node,
+                                          .answered = axis->answered(),
+                                          .owes_release = axis->owes_release()});
     forget_node(axis->settings().bus, axis->settings().node);
     groups_.let_go(name);
     by_name_.erase(name);
@@ -362,6 +387,12 @@ CommandPtr MachineCore::hold_stop(std::vector<HeldStop>& stops, const std::strin
   always.request_id.clear();
   auto command = book_.open(axis, request, always);
   stops.push_back({.request = request, .options = std::move(always), .command = command});
+  if (reloading_) {
+    ++stops_on_their_way_;
+    launch(send_stop(*find(axis), request.kind), "stop");
+  } else {  // the reload was given up, because the daemon ends
+    launch(stop_leaving(axis), "stop");
+  }
   return command;
 }
 

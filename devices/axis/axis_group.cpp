@@ -215,6 +215,13 @@ Duration Axis::Member::unseen_for() const {
 }
 
 Task<Result<void>> Axis::Member::look_after() {
+  // As often as polling would.
+  if (axis_->env_.clock->now() - axis_->continuity_checked_ >= continuity_period) {
+    const auto proof = co_await axis_->prove_continuity(TransactionClass::motion);
+    if (!proof && proof.error().reason == Reason::rebooted && axis_->link_ == LinkState::online)
+      axis_->on_reboot(proof.error());
+    if (!current()) co_return axisd::fail(gone());
+  }
   const auto sample = co_await read_state();
   if (!current()) co_return axisd::fail(gone());
   if (sample)

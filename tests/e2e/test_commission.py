@@ -5,7 +5,7 @@ import re
 import unittest
 
 from harness import HOMING, START, pb
-from harness.operator import CommissionScenario, Hand
+from harness.person import CommissionScenario, Hand
 
 
 class Commission(CommissionScenario):

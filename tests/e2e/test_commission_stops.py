@@ -8,7 +8,7 @@ import time
 import unittest
 
 from harness import AXISCTL, ENABLE, HOMING, STOP, wait_for
-from harness.operator import CommissionScenario
+from harness.person import CommissionScenario
 
 
 class CommissionStops(CommissionScenario):

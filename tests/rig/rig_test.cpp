@@ -38,6 +38,7 @@ config::Configuration three_axes() {
                       .model = "ykd2405pr"};
     axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
     axis.limits.velocity = 200;
+    axis.turnaround_max = 1s;  // the simulated line's thread may wait long for its turn
     configuration.axes.push_back({.axis = axis});
   }
   return configuration;

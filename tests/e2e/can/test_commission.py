@@ -2,7 +2,7 @@
 import unittest
 
 from harness import CanScenario, turntable
-from harness.operator import Hand, ScriptedOperator
+from harness.person import Hand, ScriptedOperator
 
 
 class CommissionOnCan(CanScenario):

@@ -292,7 +292,7 @@ TEST_F(ReloadedMachine, AStopForAnAxisThatGetsAnotherDriveGoesToTheOneThatItHas)
   ASSERT_TRUE(stop);
   ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
   EXPECT_EQ((*stop)->value().state, CommandState::done);
-  EXPECT_EQ(writes(2, 0x0028), 1);
+  EXPECT_GE(writes(2, 0x0028), 1);
 }
 
 TEST_F(ReloadedMachine, TheEndOfTheDaemonStillSendsAStopThatWaits) {
@@ -303,8 +303,29 @@ TEST_F(ReloadedMachine, TheEndOfTheDaemonStillSendsAStopThatWaits) {
   EXPECT_FALSE(machine_->at_rest());
   ASSERT_TRUE(world_.run_until([this] { return machine_->at_rest(); }, 10s));
   EXPECT_EQ((*stop)->value().state, CommandState::done);
-  EXPECT_EQ(writes(2, 0x0028), 1);
+  EXPECT_GE(writes(2, 0x0028), 1);
   EXPECT_THAT(reasons(), ElementsAre(Reason::cancelled));
+  line_->forget_wire();
+  const auto later = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
+  ASSERT_TRUE(later);
+  ASSERT_TRUE(world_.run_until([&] { return (*later)->has_ended(); }, 10s));
+  EXPECT_EQ((*later)->value().state, CommandState::done);
+  EXPECT_GE(writes(2, 0x0028), 1);
+}
+
+TEST_F(ReloadedMachine, AStopMeanwhileDoesNotWaitForASilentDrive) {
+  complete("a1", DisableRequest{});
+  line_->network().node(1)->set_power(false);
+  world_.run_for(20s);  // its node is held back for long
+  auto wanted = slower(1);
+  wanted.axes.at(0).axis.limits.velocity = 50;
+  ask(wanted);
+  line_->forget_wire();
+  ASSERT_TRUE(machine_->submit("a2", StopRequest{}, {.client = "hmi"}));
+  world_.run_for(60ms);
+  EXPECT_GE(writes(2, 0x0028), 1);
+  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 20s));
+  EXPECT_THAT(refusals_, IsEmpty());
 }
 
 TEST_F(ReloadedMachine, AStopForAnAxisThatGoesIsSentBeforeItIsGone) {
@@ -317,7 +338,7 @@ TEST_F(ReloadedMachine, AStopForAnAxisThatGoesIsSentBeforeItIsGone) {
   ASSERT_TRUE(stop);
   ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
   EXPECT_EQ((*stop)->value().state, CommandState::done);
-  EXPECT_EQ(writes(2, 0x0028), 1);
+  EXPECT_GE(writes(2, 0x0028), 1);
   EXPECT_EQ(machine_->submit("a2", StopRequest{}, {}).error().reason, Reason::unknown_axis);
   EXPECT_THAT(machine_->table()->axes, ElementsAre("a1"));
   line_->forget_wire();
