@@ -42,7 +42,8 @@ bool is_of(std::string_view key, std::string_view part) {
 bool is_of_the_daemon_alone(const ConfigurationChange& change) {
   static constexpr std::string_view own[] = {"limits.velocity", "poll",          "turnaround_max",
                                              "jog_travel",      "on_lease_loss", "position_tolerance"};
-  return change.kind == Kind::changed && std::ranges::all_of(change.keys, [](std::string_view key) {
+  return change.kind == Kind::changed && !change.keys.empty() &&
+         std::ranges::all_of(change.keys, [](std::string_view key) {
            return std::ranges::any_of(own, [&](auto part) { return is_of(key, part); });
          });
 }
@@ -51,7 +52,8 @@ bool is_of_the_daemon_alone(const ConfigurationChange& change) {
 bool keeps_position(const ConfigurationChange& change) {
   static constexpr std::string_view datum[] = {"bus",    "node",   "model", "scale",
                                                "homing", "inputs", "unit",  "drive"};
-  return change.kind == Kind::changed && std::ranges::none_of(change.keys, [](std::string_view key) {
+  return change.kind == Kind::changed && !change.keys.empty() &&
+         std::ranges::none_of(change.keys, [](std::string_view key) {
            return std::ranges::any_of(datum, [&](auto part) { return is_of(key, part); });
          });
 }

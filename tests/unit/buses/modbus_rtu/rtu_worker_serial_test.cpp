@@ -10,7 +10,6 @@ namespace {
 
 using namespace test;
 
-constexpr int fast = 115200;
 constexpr SerialSettings other{.baud = 9600, .format = {.stop_bits = 2}};
 
 Exchange with(Exchange exchange, std::optional<SerialSettings> serial) {

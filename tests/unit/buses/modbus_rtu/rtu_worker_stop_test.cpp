@@ -11,12 +11,6 @@ namespace {
 
 using namespace test;
 
-constexpr int fast = 115200;
-/// 3.5 characters take 318 ms: time enough for the core to act in the silence, however busy the machine.
-constexpr int slow = 110;
-
-std::string hex(const Frame& frame) { return to_hex(frame.bytes()); }
-
 TEST(RtuWorkerStop, StopDuringTheSilenceStillSupersedes) {
   const ScriptedNode node(answering());
   WorkerBench bench(line_at(slow, node.path()));

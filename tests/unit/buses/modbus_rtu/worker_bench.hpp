@@ -32,8 +32,12 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 inline constexpr Duration ample = seconds(30);  ///< "does not happen": far longer than a busy machine stalls
-inline constexpr std::uint8_t nobody = 248;     ///< address of the worker's echo probe
+inline constexpr int fast = 115200;
+/// 3.5 characters take 318 ms: time enough for the core to act in the silence, however busy the machine.
+inline constexpr int slow = 110;
+inline constexpr std::uint8_t nobody = 248;  ///< address of the worker's echo probe
 
+inline std::string hex(const Frame& frame) { return to_hex(frame.bytes()); }
 inline Frame framed(Bytes bytes) {
   Frame frame(bytes);
   frame.append_crc();
