@@ -38,9 +38,13 @@ class Bus {
   /// `gate` of `node` was raised: the motion frames that it guarded end, whether they wait or are armed.
   /// Called for each stop before its frame is queued; what waits for others costs it no time.
   virtual void purge_superseded(std::uint8_t node, const AxisGate& gate) = 0;
+  /// The axis of `node` is offline: readings for it that wait end as superseded, so that what it is owed now
+  /// need not wait for them. Not those of class `parameters`, which others asked for.
+  virtual void give_up_readings(std::uint8_t /*node*/) {}
   /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
   virtual void hasten(std::uint8_t node, TransactionClass to) = 0;
-  /// Requests to this node wait for their turn, because it does not answer.
+  /// Requests to this node wait for their turn, because it does not answer, or because nobody could tell the
+  /// answer to a reading from a late one.
   [[nodiscard]] virtual bool holds_back(std::uint8_t /*node*/) const { return false; }
   /// nullopt: it is asked whenever there is something to ask.
   [[nodiscard]] virtual std::optional<QuarantinedNode> quarantined(std::uint8_t /*node*/) const {

@@ -94,6 +94,13 @@ void RtuBus::purge_superseded(std::uint8_t /*node*/, const AxisGate& gate) {
   pump();
 }
 
+void RtuBus::give_up_readings(std::uint8_t node) {
+  const auto now = clock_->now();
+  for (auto& reading : queue_.take_reads(node, TransactionClass::idle_state))
+    end(std::move(reading), not_sent(Verdict::superseded, now));
+  pump();
+}
+
 void RtuBus::about_to_energise() {
   override_gate_->raise();
   purge_superseded({}, *override_gate_);
@@ -170,8 +177,14 @@ bool RtuBus::must_wait(const Transaction& transaction) const {
   if (urgent || transaction.transaction_class == scan || transaction.exchange.serial) return false;
   const auto& request = transaction.exchange.request;
   const auto now = clock_->now();
-  return holds_back(request.node) || (transaction.transaction_class != stop &&
-                                      late_.may_answer(request, now) && !late_.distinct_read(request, now));
+  return quarantine_.ready_at(request.node) > now ||
+         (transaction.transaction_class != stop && late_.may_answer(request, now) &&
+          !late_.distinct_read(request, now));
+}
+
+bool RtuBus::holds_back(std::uint8_t node) const {
+  const auto now = clock_->now();
+  return ready_at(node, now) > now;
 }
 
 /// When what waits for this node may be looked at again.

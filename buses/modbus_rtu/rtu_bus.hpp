@@ -53,9 +53,8 @@ class RtuBus final : public Bus {
   /// Exchanges with serial settings of their own end.
   void about_to_energise() override;
   void hasten(std::uint8_t node, TransactionClass to) override;
-  [[nodiscard]] bool holds_back(std::uint8_t node) const override {
-    return quarantine_.ready_at(node) > clock_->now();
-  }
+  void give_up_readings(std::uint8_t node) override;
+  [[nodiscard]] bool holds_back(std::uint8_t node) const override;
   [[nodiscard]] std::optional<QuarantinedNode> quarantined(std::uint8_t node) const override;
   void close() override;
   [[nodiscard]] bool idle() const override { return current_ == nullptr && queue_.size() == 0; }

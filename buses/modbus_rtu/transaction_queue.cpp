@@ -142,6 +142,18 @@ std::vector<TransactionPtr> TransactionQueue::take_forbidden(const AxisGate& gat
   return taken;
 }
 
+std::vector<TransactionPtr> TransactionQueue::take_reads(std::uint8_t node, TransactionClass lowest) {
+  std::vector<TransactionPtr> taken;
+  const auto waiting = by_node_.find(node);
+  if (waiting == by_node_.end()) return taken;
+  std::vector<Transaction*> reads;
+  for (const auto& [sequence, place] : waiting->second)
+    if (is_read(*place.transaction) && place.transaction->transaction_class <= lowest)
+      reads.push_back(place.transaction);
+  for (auto* read : reads) taken.push_back(take(read));
+  return taken;
+}
+
 std::vector<TransactionPtr> TransactionQueue::take_expired(TimePoint now) {
   std::vector<TransactionPtr> taken;
   while (next_expiry() < now) taken.push_back(take(expiries_.begin()->second));

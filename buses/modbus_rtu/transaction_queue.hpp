@@ -58,6 +58,8 @@ class TransactionQueue {
   void hasten(std::uint8_t node, TransactionClass to);
   /// Takes out all that `gate` forbids to send.
   std::vector<TransactionPtr> take_forbidden(const AxisGate& gate, TimePoint now);
+  /// Takes out all reads that wait for `node` in class `lowest` or above.
+  std::vector<TransactionPtr> take_reads(std::uint8_t node, TransactionClass lowest);
   /// Takes out all whose deadline or validity has passed.
   std::vector<TransactionPtr> take_expired(TimePoint now);
   std::vector<TransactionPtr> take_all();

@@ -232,16 +232,19 @@ class Axis {
   Task<Result<void>> prove_or_configure();
   Task<> poll();
   Task<bool> poll_once(int& failures);
+  void watch_continuity();
   Task<Result<void>> prove_continuity(TransactionClass priority);
   /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
   void poll_fast(TimePoint from, Duration longest);
   [[nodiscard]] TimePoint next_poll(TimePoint began) const;
-  Task<> look_for_drift();
-  Task<Result<void>> check_for_drift();
-  void set_drift(const std::string& text);
   Task<> wait_for_port();
   void go_offline(const Error& cause);
   void on_reboot(const Error& cause);
+
+  // axis_drift.cpp
+  Task<> look_for_drift();
+  Task<Result<void>> check_for_drift();
+  void set_drift(const std::string& text);
 
   // axis_journal.cpp: commands over restarts of the daemon
   void take_over();
@@ -430,6 +433,7 @@ class Axis {
   bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
   int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
+  Clock::Timer continuity_watch_;
   TimePoint settle_by_{};
   std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon
   TimePoint fast_from_{}, fast_until_{};                  ///< of poll_fast()

@@ -20,6 +20,8 @@ constexpr auto continuity_forgotten = milliseconds(2000);
 /// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
 /// trusted meanwhile.
 constexpr auto continuity_longest = milliseconds(2500);
+/// How soon the watch looks again at an axis that is beyond it, but is being asked.
+constexpr auto continuity_look = milliseconds(50);
 
 }  // namespace
 
@@ -45,6 +47,7 @@ Task<> Axis::connect() {
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
+      watch_continuity();
       spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
                    identity_ ? identity_->version : "");
       break;
@@ -231,41 +234,6 @@ TimePoint Axis::next_poll(TimePoint began) const {
   return began < fast_from_ ? std::min(next, fast_from_) : next;
 }
 
-/// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
-/// once the drive is released, and forbids motion until then.
-Task<> Axis::look_for_drift() {
-  const auto now = env_.clock->now();
-  if (link_ != LinkState::online || busy() || !maintenance_.expired()) co_return;
-  if (now - drift_checked_ >= settings_.drift_check && !co_await check_for_drift()) co_return;
-  const bool free = link_ == LinkState::online && !busy() && maintenance_.expired();
-  if (!drift_.empty() && free && sample_ && !sample_->enabled) reconfigure(drift_, false);
-}
-
-Task<Result<void>> Axis::check_for_drift() {
-  drift_checked_ = env_.clock->now();
-  const auto drift = co_await drive_->check_drift(TransactionClass::idle_state);
-  if (!drift) co_return fail(drift.error());
-  if (drift->scale_changed) lose_trust();
-  set_drift(drift->text);
-  // A motion that was accepted while this was being read goes on without what it relies on.
-  if ((drift->scale_changed || drift->limits_changed) && activity_ &&
-      activity_->state != AxisState::standstill) {
-    enter_error_stop(error(Reason::misconfigured,
-                           "the drive no longer holds its configuration: " + drift->text,
-                           "disable the axis: the configuration is then applied again; then reset it"));
-    begin_stop(StopKind::stop, false, nullptr);
-  }
-  co_return Result<void>{};
-}
-
-void Axis::set_drift(const std::string& text) {
-  if (text == drift_) return;
-  if (!text.empty())
-    spdlog::warn("{}: the drive no longer holds its configuration: {}", settings_.name, text);
-  drift_ = text;
-  publish();
-}
-
 Result<std::shared_ptr<void>> Axis::begin_maintenance() {
   if (auto online = check_online(); !online) return fail(online.error());
   if (!maintenance_.expired() || activity_)
@@ -333,12 +301,27 @@ Task<bool> Axis::poll_once(int& failures) {
     failures = 0;
     co_return true;
   }
-  const bool unproven = env_.clock->now() - continuity_checked_ > continuity_longest;
+  const bool unproven = env_.clock->now() - continuity_checked_ >= continuity_longest;
   if (result.error().reason == Reason::bus_down || ++failures >= attempts_before_offline || unproven) {
     go_offline(result.error());
     co_return false;
   }
   co_return true;
+}
+
+/// While its node is held back no request fails, as none is sent: nothing else would tell that nobody has
+/// heard of the drive for so long.
+void Axis::watch_continuity() {
+  if (link_ != LinkState::online) return;
+  const auto now = env_.clock->now();
+  const auto limit = continuity_checked_ + continuity_longest;
+  if (now >= limit && env_.bus->holds_back(settings_.node)) {
+    go_offline(error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
+                     "check power, wiring, address and baud rate of the node"));
+    return;
+  }
+  continuity_watch_ =
+      env_.clock->call_at(std::max(limit, now + continuity_look), [this] { watch_continuity(); });
 }
 
 void Axis::bus_lost(Error cause) {
@@ -358,6 +341,7 @@ void Axis::go_offline(const Error& cause) {
   link_error_ = cause;
   gate_->raise();
   env_.bus->purge_superseded(settings_.node, *gate_);
+  env_.bus->give_up_readings(settings_.node);
   const bool moved = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
                      terminal_motion_ || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
@@ -375,6 +359,7 @@ void Axis::go_offline(const Error& cause) {
   terminal_motion_ = false;
   publish();
   sampled_.notify_all();
+  wake_.notify_all();
 }
 
 void Axis::on_reboot(const Error& cause) {

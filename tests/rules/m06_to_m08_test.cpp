@@ -96,35 +96,6 @@ TEST(M07, PowerCycleBetweenTwoPollsThenAnIdenticalMove) {
   });
 }
 
-/// A reading that waited for long, because its node was not asked meanwhile, shows nothing before the drive
-/// has proven that it was not restarted.
-TEST(M07, PowerCycleWhileTheNodeIsHeldBack) {
-  both_directions({}, [](const RigOptions& options) {
-    for (const auto wait : {300ms, 900ms}) {
-      Rig rig(options);
-      rig.ready();
-      EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
-      rig.fault({.kind = FaultKind::drop_request, .count = -1});
-      for (int i = 0; i < 4;
-           ++i) {  // each asks several times in vain: polls are held back for longer and longer
-        (void)rig.try_submit(MoveAbsoluteRequest{.position = 20});
-        rig.run(700ms);
-      }
-      rig.run(wait);
-      ASSERT_EQ(rig.state()->link, LinkState::online) << "not long enough to be offline";
-      rig.cycle_power(300ms);
-      rig.faults().clear();
-      for (int i = 0; i < 9000; ++i) {
-        rig.run(1ms);
-        const auto state = rig.state();
-        if (state->link == LinkState::online && state->trust != PositionTrust::unknown)
-          ASSERT_EQ(state->position, 10) << i;
-      }
-      EXPECT_EQ(rig.state()->reboots, 1);
-    }
-  });
-}
-
 /// A drive that was restarted shows the counter 0, and rests: a move to just there has nothing to do, but is
 /// not done.
 TEST(M10, PowerCycleThenAMoveToTheCountersZero) {

@@ -237,6 +237,40 @@ TEST(RtuBus, RepeatedStopsToASilentNodeWaitForTheirTurn) {
   EXPECT_FALSE(rig.bus->holds_back(1));
 }
 
+TEST(RtuBus, HoldsBackWhileNoReplyCouldBeToldFromALateOne) {
+  BusRig rig;
+  const auto wait_for = [&](const std::string& name, TransactionClass transaction_class) {
+    rig.transact(name, {.node = 1, .address = 0x0003, .count = 2}, {.transaction_class = transaction_class});
+  };
+  rig.line->network().faults().add({.kind = simulation::FaultKind::corrupt_reply, .count = -1});
+  for (std::uint16_t count = 1; count <= LateReplies::longest_read; ++count) {
+    EXPECT_FALSE(rig.bus->holds_back(1));
+    rig.read("garbled", 0x0003, count);
+    rig.world.run_for(50ms);
+  }
+  rig.line->network().faults().clear();
+  EXPECT_TRUE(rig.bus->holds_back(1));
+  EXPECT_FALSE(rig.bus->holds_back(2));
+  wait_for("state", TransactionClass::idle_state);
+  wait_for("asked for", TransactionClass::parameters);
+  rig.world.run_for(1s);
+  EXPECT_TRUE(rig.results.contains("garbled"));
+  EXPECT_EQ(rig.results.size(), 1U);
+  rig.bus->give_up_readings(2);
+  rig.world.run_for(10ms);
+  EXPECT_EQ(rig.results.size(), 1U);
+  rig.bus->give_up_readings(1);
+  rig.world.run_for(10ms);
+  ASSERT_TRUE(rig.results.contains("state"));
+  EXPECT_EQ(rig.results.at("state").error().reason, Reason::superseded);
+  EXPECT_EQ(rig.results.at("state").error().outcome, Outcome::not_sent);
+  EXPECT_FALSE(rig.results.contains("asked for"));
+  rig.world.run_for(LateReplies::latest);
+  EXPECT_FALSE(rig.bus->holds_back(1));
+  ASSERT_TRUE(rig.results.contains("asked for"));
+  EXPECT_TRUE(rig.results.at("asked for"));
+}
+
 TEST(RtuBus, ARaisedGateIsNeverSent) {
   for (int offset = 0; offset < 40; ++offset) {
     BusRig rig;

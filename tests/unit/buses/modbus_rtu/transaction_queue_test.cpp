@@ -166,6 +166,24 @@ TEST(TransactionQueue, WhatIsHeldWaitsForItsNodeAndIsHastenedWithIt) {
   EXPECT_TRUE(queue.held_nodes().empty());
 }
 
+TEST(TransactionQueue, ReadsOfOneNodeAreTakenOutDownToAClassHeldOrNot) {
+  TransactionQueue queue;
+  queue.hold(read_of(1, Class::idle_state));
+  queue.push(read_of(2, Class::motion));
+  queue.push(read_of(3, Class::parameters));
+  queue.hold(read_of(4, Class::parameters));
+  queue.hold(read_of(5, Class::idle_state, TimePoint::max(), 2));
+  auto write = read_of(6, Class::motion);
+  write->exchange.request.function = Function::write_single_register;
+  queue.push(std::move(write));
+  EXPECT_EQ(queue.take_reads(1, Class::idle_state).size(), 2U);
+  EXPECT_TRUE(queue.take_reads(1, Class::idle_state).empty());
+  EXPECT_TRUE(queue.take_reads(3, Class::idle_state).empty());
+  EXPECT_EQ(queue.held_nodes(), (std::vector<std::uint8_t>{1, 2}));
+  queue.release(1);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{6, 3, 4}));
+}
+
 TEST(TransactionQueue, PutBackKeepsItsPlace) {
   TransactionQueue queue;
   queue.push(read_of(1, Class::parameters));

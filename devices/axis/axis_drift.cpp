@@ -1,0 +1,43 @@
+// What the drive no longer holds as configured, because somebody else changed it.
+#include <spdlog/spdlog.h>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+/// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
+/// once the drive is released, and forbids motion until then.
+Task<> Axis::look_for_drift() {
+  const auto now = env_.clock->now();
+  if (link_ != LinkState::online || busy() || !maintenance_.expired()) co_return;
+  if (now - drift_checked_ >= settings_.drift_check && !co_await check_for_drift()) co_return;
+  const bool free = link_ == LinkState::online && !busy() && maintenance_.expired();
+  if (!drift_.empty() && free && sample_ && !sample_->enabled) reconfigure(drift_, false);
+}
+
+Task<Result<void>> Axis::check_for_drift() {
+  drift_checked_ = env_.clock->now();
+  const auto drift = co_await drive_->check_drift(TransactionClass::idle_state);
+  if (!drift) co_return fail(drift.error());
+  if (drift->scale_changed) lose_trust();
+  set_drift(drift->text);
+  // A motion that was accepted while this was being read goes on without what it relies on.
+  if ((drift->scale_changed || drift->limits_changed) && activity_ &&
+      activity_->state != AxisState::standstill) {
+    enter_error_stop(error(Reason::misconfigured,
+                           "the drive no longer holds its configuration: " + drift->text,
+                           "disable the axis: the configuration is then applied again; then reset it"));
+    begin_stop(StopKind::stop, false, nullptr);
+  }
+  co_return Result<void>{};
+}
+
+void Axis::set_drift(const std::string& text) {
+  if (text == drift_) return;
+  if (!text.empty())
+    spdlog::warn("{}: the drive no longer holds its configuration: {}", settings_.name, text);
+  drift_ = text;
+  publish();
+}
+
+}  // namespace axisd
