@@ -31,6 +31,7 @@ Examples:
 
 struct Arguments {
   std::vector<std::string> axes, command;
+  std::string list;  ///< of axes, in one word
   std::string ttl, label;
   bool take = false;
 };
@@ -84,17 +85,21 @@ void list(Invocation& invocation) {
 /// it commands from then on is refused. Its exit status.
 int hold_while(Invocation& invocation, ChildProcess& child, std::uint64_t token, std::chrono::nanoseconds ttl,
                bool& lost) {
-  // Three renewals per time to live: two may be late or lost. A signal brings one forward, no more.
+  // Three renewals per time to live: one may be late by as much again; where the call fails it is repeated
+  // soon. A signal brings one forward, no more.
   const auto pause = std::max(std::chrono::floor<milliseconds>(ttl / 3), milliseconds(1));
+  const auto short_pause = std::max(pause / 10, milliseconds(1));
   bool told = false;
-  for (;;) {
-    if (const auto status = child.wait_for(pause)) return *status;
+  for (auto wait = pause;;) {
+    if (const auto status = child.wait_for(wait)) return *status;
+    wait = pause;
     if (lost) continue;
     try {
-      renew(invocation, token, ttl / 3);
+      renew(invocation, token, 2 * ttl / 3);
       told = false;
     } catch (const Failure& failure) {
       lost = failure.code() == ExitCode::refused;
+      wait = short_pause;
       if (lost || !told)
         fmt::print(stderr, "axisctl: lease {}: {}\n", lost ? "lost" : "not renewed", failure.what());
       told = true;
@@ -184,15 +189,15 @@ void add_lease_commands(CLI::App& app, Invocation& invocation) {
       "Lease axes while a program runs, with its token in AXISD_LEASE; status: the program's, or 4 if the "
       "lease was lost");
   // One word: a list would swallow the program's words.
-  hold_command
-      ->add_option_function<std::string>(
-          "AXIS", [holding](const std::string& names) { holding->axes = CLI::detail::split(names, ','); },
-          "Names of axes, or of groups, with commas between")
+  hold_command->add_option("AXIS", holding->list, "Names of axes, or of groups, with commas between")
       ->required();
   hold_command->add_option("COMMAND", holding->command, "The program and its arguments, after --")
       ->required();
   add_acquiring(*hold_command, *holding);
-  hold_command->callback([&invocation, holding] { hold(invocation, *holding); });
+  hold_command->callback([&invocation, holding] {
+    holding->axes = CLI::detail::split(holding->list, ',');
+    hold(invocation, *holding);
+  });
 }
 
 }  // namespace axisd::axisctl

@@ -11,8 +11,9 @@ namespace {
 using std::chrono::milliseconds;
 using Stub = v1::LeaseService::Stub;
 
-/// Two of three renewals may be late or lost.
+/// Renewals per time to live. One may be late by as much again; where the call fails it is repeated soon.
 constexpr int renewals = 3;
+constexpr int repeats = 10;  // per renewal
 
 }  // namespace
 
@@ -55,14 +56,17 @@ void LeaseKeeper::renew_until_closed() {
   v1::RenewLeaseRequest request;
   request.set_lease_token(token_);
   std::unique_lock lock(mutex_);
-  while (!closing_changed_.wait_for(lock, pause_, [this] { return closing_; }) && lost_.empty()) {
+  auto pause = pause_;
+  while (!closing_changed_.wait_for(lock, pause, [this] { return closing_; }) && lost_.empty()) {
     lock.unlock();
     std::string why;
     try {
-      client_.call_within(pause_, &Stub::RenewLease, request, {});
+      client_.call_within(pause_ * (renewals - 1), &Stub::RenewLease, request, {});
+      pause = pause_;
     } catch (const Failure& failure) {
       // What was only late is tried again; the daemon knows when it is too late.
       if (failure.code() == ExitCode::refused) why = failure.what();
+      pause = std::max(pause_ / repeats, milliseconds(1));
     }
     lock.lock();
     lost_ = why;
