@@ -1,11 +1,12 @@
 """axisctl commission with an operator who answers, and whose hand is at the simulated switches."""
+import concurrent.futures
 import json
 import pathlib
 import re
 import unittest
 
-from harness import HOMING, START, pb
-from harness.person import CommissionScenario, Hand
+from harness import HOMING, START, STOP, pb
+from harness.person import CommissionScenario, Hand, ScriptedOperator
 
 
 class Commission(CommissionScenario):
@@ -24,7 +25,7 @@ class Commission(CommissionScenario):
         self.assertEqual(record["configuration_revision"], config["revision"])
         self.assertEqual(len(person.step("switch X0")["edges"]), 2)
         figures = {figure["name"]: figure["value"] for figure in person.step("jog positive")["figures"]}
-        self.assertEqual((figures["asked"], figures["travelled"]), (5, 5))
+        self.assertEqual((figures["asked"], figures["travelled"]), (2, 2))
         figures = {figure["name"]: figure["value"] for figure in person.step("stop")["figures"]}
         self.assertTrue(0 < figures["standstill_after"] < figures["published_bound"], figures)
         self.assertGreaterEqual(figures["call_answered_after"], figures["standstill_after"])
@@ -37,26 +38,28 @@ class Commission(CommissionScenario):
         self.assertEqual(len(machine.wire.writes(START)) + len(machine.wire.writes(HOMING)), asked)
 
     def test_other_models_and_a_motor_the_other_way_round_pass(self):
-        for keys in ({"model": "ssd2608pr"}, {"model": "ess42-r"},
-                     {"scale": "{ microstep: 10000 pulses/rev, travel: 5 mm/rev, invert: true }",
-                      "simulated": "home=20000:28000"}):
-            with self.subTest(**keys):
-                machine = self.cell(**keys)
-                person = self.person(machine)
-                self.assertEqual(person.finish(), 0, person.text)
-                self.assertEqual(person.record()["verdict"], "VERDICT_PASSED")
+        people = [self.person(self.cell(**keys)) for keys in (
+            {"model": "ssd2608pr"}, {"model": "ess42-r"},
+            {"scale": "{ microstep: 10000 pulses/rev, travel: 5 mm/rev, invert: true }", "simulated": "home=20000:28000"})]
+        with concurrent.futures.ThreadPoolExecutor() as threads:  # side by side: most of it is waiting
+            ends = list(threads.map(ScriptedOperator.finish, people))
+        for person, end in zip(people, ends):
+            self.assertEqual((end, person.record()["verdict"]), (0, "VERDICT_PASSED"), person.text)
 
     def test_a_limit_switch_on_the_wrong_side_is_named(self):
-        """Swapped after the switches were looked at by hand, where each answered to its name."""
+        """Swapped after the switches were looked at by hand, where each answered to its name: the drive would go on."""
         machine = self.cell()
         swapped = Hand(machine, reacts={"X1": "X2"})
         person = self.person(machine, (r"Go to the switch at (X1) [^\]]*\] ", swapped.to_the_switch),
                              (r"--- limit negative\n", lambda _: machine.sim.control("input 1 X2 auto") or None),
-                             options=("--velocity", "20mm/s", "--distance", "2mm"))
+                             (r"Actuate (X0|X2) ", "skip"))
         self.assertEqual(person.finish(), 1, person.text)
         self.assert_verdicts(person, switch_X1="PASSED", limit_positive="FAILED", homing="NOT_DONE")
-        self.assertEqual(person.step("limit positive")["reason"],
-                         "X2 (negative_limit) became active on the way, not X1 (positive_limit): swapped?")
+        step = person.step("limit positive")
+        self.assertEqual(step["reason"], "X2 (negative_limit) became active on the way, not X1 (positive_limit): swapped?")
+        self.assertEqual([command["state"] for command in step["commands"]],
+                         ["COMMAND_STATE_ABORTED", "COMMAND_STATE_DONE"])
+        self.assertTrue(machine.wire.writes(STOP, 0))
 
     def test_a_wrong_polarity_is_told_with_its_key(self):
         # A switch that closes when it is actuated, and a configuration that says the contrary.
@@ -91,21 +94,27 @@ class Commission(CommissionScenario):
 
     def test_a_step_that_failed_can_be_tried_again(self):
         machine = self.cell()
-        seen = []
+        tries = []
 
-        def forget_once(match):
-            seen.append(match[0])
-            return None if len(seen) == 1 else Hand(machine).press(match)
-        person = self.person(machine, (r"Actuate (X0) ", forget_once), (r"again/go-on/abort\] ", "again"),
-                             (r"Actuate X1 ", "abort"), options=("--patience", "500ms"))
+        def press_but_once(match):
+            return Hand(machine).press(match) if tries else None
+
+        def again(_match):
+            tries.append("again")
+            machine.sim.control("input 1 X0 auto")  # a computer that is busy may have seen the hand too late
+            return "again"
+        person = self.person(machine, (r"Actuate (X0) ", press_but_once), (r"again/go-on/abort\] ", again),
+                             (r"Actuate X1 ", "abort"), options=("--patience", "1s"))
         self.assertEqual(person.finish(), 1, person.text)
         self.assertIn("no terminal changed", person.text)
-        self.assertEqual((person.step("switch X0")["verdict"], person.step("switch X0")["attempts"]), ("VERDICT_PASSED", 2))
+        step = person.step("switch X0")
+        self.assertEqual((step["verdict"], step["attempts"]), ("VERDICT_PASSED", 1 + len(tries)))
         self.assertIn("aborted by the operator", person.record()["ended_early"])
 
     def test_the_wrong_direction_ends_what_relies_on_it(self):
         machine = self.cell()
-        person = self.person(machine, (r"in the positive direction\? [^\]]*\] ", "no"), (r"What did it do[^\]]*\] ", "o"))
+        person = self.person(machine, (r"in the positive direction\? [^\]]*\] ", "no"), (r"What did it do[^\]]*\] ", "o"),
+                             (r"Actuate ", "skip"))
         self.assertEqual(person.finish(), 1, person.text)
         self.assert_verdicts(person, jog_positive="FAILED", limit_positive="NOT_DONE", limit_negative="NOT_DONE",
                              stop="NOT_DONE", homing="NOT_DONE")
@@ -125,7 +134,7 @@ class Commission(CommissionScenario):
         self.assertIn("fault", person.text)
 
     def test_an_axis_that_is_offline_says_what_to_do(self):
-        machine = self.cell()
+        machine = self.cell(turnaround_max="300 ms")
         machine.sim.control("power 1 off")
         machine.client.wait_state("feeder", lambda s: s.link == pb.LINK_STATE_OFFLINE, "offline")
         person = self.person(machine)

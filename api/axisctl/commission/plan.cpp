@@ -13,10 +13,6 @@ constexpr double jog_seconds = 2;
 /// A hand needs so long to reach a switch after the motion has begun; after so long nobody will.
 constexpr double hand_seconds = 10, longest_hand_seconds = 30;
 
-bool is_limit(const std::string& function) {
-  return function == "positive_limit" || function == "negative_limit";
-}
-
 const Step* find(const Record& record, const std::string& name) {
   const auto found = std::ranges::find(record.steps(), name, &Step::name);
   return found == record.steps().end() ? nullptr : &*found;
@@ -49,7 +45,17 @@ std::string unproven_direction(const Record& record) {
   return {};
 }
 
+/// Of a move that is to be stopped on its way.
+double stop_seconds(const std::optional<Settings>& settings) {
+  const double ramps = settings ? settings->acceleration_time + settings->deceleration_time : 1;
+  return 2 * (1 + ramps);
+}
+
 }  // namespace
+
+bool is_limit(const std::string& function) {
+  return function == "positive_limit" || function == "negative_limit";
+}
 
 std::vector<StepPlan> plan_steps(const v1::AxisState& state, const std::optional<Settings>& settings) {
   std::vector<StepPlan> steps;
@@ -148,8 +154,15 @@ Motion limit_motion(Motion motion, double room, VelocityRange permitted) {
 }
 
 double stop_distance(Motion motion, const std::optional<Settings>& settings) {
-  const double ramps = settings ? settings->acceleration_time + settings->deceleration_time : 1;
-  return std::max(motion.distance, motion.velocity * 2 * (1 + ramps));
+  return std::max(motion.distance, motion.velocity * stop_seconds(settings));
+}
+
+Motion stop_motion(Motion motion, double room, VelocityRange permitted,
+                   const std::optional<Settings>& settings) {
+  motion.distance = std::min(stop_distance(motion, settings), room);
+  motion.velocity = std::clamp(motion.distance / stop_seconds(settings),
+                               std::min(permitted.minimum, motion.velocity), motion.velocity);
+  return motion;
 }
 
 double unwrapped(double position, double reference, const std::optional<Settings>& settings) {

@@ -33,6 +33,9 @@ struct StepPlan {
   std::string not_applicable;      ///< why there is nothing to do; empty: there is
 };
 
+/// Of a terminal that ends motion in one direction.
+bool is_limit(const std::string& function);
+
 /// Steps in the order in which they are done. Everything before `enable` is done with the power stage off.
 std::vector<StepPlan> plan_steps(const v1::AxisState& state, const std::optional<Settings>& settings);
 
@@ -65,6 +68,10 @@ Motion limit_motion(Motion motion, double room, VelocityRange permitted);
 
 /// To be stopped on its way: a second at full velocity and both ramps fit into its first half.
 double stop_distance(Motion motion, const std::optional<Settings>& settings);
+/// The same where there is only so much room: as much slower as it takes, so that the stop still comes on the
+/// way.
+Motion stop_motion(Motion motion, double room, VelocityRange permitted,
+                   const std::optional<Settings>& settings);
 
 /// A position of a rotary axis next to `reference`: its positions begin anew after a turn.
 double unwrapped(double position, double reference, const std::optional<Settings>& settings);

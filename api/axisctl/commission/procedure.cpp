@@ -84,14 +84,10 @@ void Procedure::carry_out(const StepPlan& plan, Step& step) {
   while (again) {
     forget_attempt(step);
     step.set_attempts(step.attempts() + 1);
-    try {
-      set_judgement(step, attempt(plan, step));
-    } catch (const StepEnd& end) {
-      set_judgement(step, end.judgement());
-    } catch (const Failure& failure) {
-      if (failure.code() != ExitCode::refused) throw;
-      set_judgement(step, {.verdict = VERDICT_FAILED, .reason = failure.what(), .remedy = {}});
-    }
+    const auto judgement = judged_attempt(plan, step);
+    // The stop of an interrupt shows in what a step observes before the interrupt itself is looked at.
+    if (judgement.verdict == VERDICT_FAILED && axis_.stopped_at_once()) throw Ended(true, "interrupted");
+    set_judgement(step, judgement);
     person_.tell(fmt::format("{}: {}{}{}{}{}", plan.name, verdict_text(step.verdict()),
                              step.reason().empty() ? "" : ": ", step.reason(),
                              step.remedy().empty() ? "" : "\n  -> ", step.remedy()));
@@ -100,6 +96,17 @@ void Procedure::carry_out(const StepPlan& plan, Step& step) {
             dialogue_.choose("Try it again, or go on?", {"again", "go-on"}, step) == "again";
   }
   *step.mutable_ended_at() = now();
+}
+
+Judgement Procedure::judged_attempt(const StepPlan& plan, Step& step) {
+  try {
+    return attempt(plan, step);
+  } catch (const StepEnd& end) {
+    return end.judgement();
+  } catch (const Failure& failure) {
+    if (failure.code() != ExitCode::refused) throw;
+    return {.verdict = VERDICT_FAILED, .reason = failure.what(), .remedy = {}};
+  }
 }
 
 Judgement Procedure::attempt(const StepPlan& plan, Step& step) {

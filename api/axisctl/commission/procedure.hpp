@@ -60,6 +60,8 @@ class Procedure {
 
   void read_settings();
   void carry_out(const StepPlan& plan, Step& step);
+  /// One attempt; a step that was ended, or refused by the daemon, is judged, too.
+  Judgement judged_attempt(const StepPlan& plan, Step& step);
   Judgement attempt(const StepPlan& plan, Step& step);
 
   Judgement identity(Step& step);
@@ -75,6 +77,8 @@ class Procedure {
   Judgement enable(Step& step);
   Judgement jog(const StepPlan& plan, Step& step);
   Judgement limit(const StepPlan& plan, Step& step);
+  /// Stops a move on which another limit switch became active.
+  void end_by_stop(Step& step, LimitObservation& seen);
   void leave_limit(const StepPlan& plan, Step& step, LimitObservation& seen);
   Judgement stop(Step& step);
   Judgement home(Step& step);
@@ -97,6 +101,8 @@ class Procedure {
   /// Waits for the operator's hand. False: it did not come in time. Throws StepEnd if the operator skips.
   bool wait_until(const std::function<bool()>& condition, Step& step);
   [[nodiscard]] bool is_active(const std::string& terminal);
+  /// Until what moved together with the first terminal has been read, too: a hand's other contacts.
+  void wait_for_company(Step& step);
   [[nodiscard]] ExpectedInput expected(const StepPlan& plan) const;
   [[nodiscard]] std::string with_sign(double value, const std::string& unit) const;
 

@@ -1,5 +1,6 @@
 // The steps before the power stage is on: what is talked to, and hands at the switches.
 #include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
 
@@ -14,8 +15,10 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Other terminals are looked at for so long after the first: an idle axis is read some times per second.
-constexpr milliseconds company(600);
+/// Other terminals are looked at for so long after the first, and until they were read so often: how often an
+/// idle axis is read is its line's affair.
+constexpr milliseconds company(200);
+constexpr int company_readings = 2;
 
 void add_setting(Record& record, const std::string& name, double value, const std::string& unit) {
   auto& figure = *record.add_settings();
@@ -154,6 +157,20 @@ Judgement Procedure::release(Step& step) {
   return {};
 }
 
+void Procedure::wait_for_company(Step& step) {
+  auto last = axis_.state().measured_at();
+  int readings = 0;
+  (void)person_.line_within(company);
+  (void)wait_until(
+      [&] {
+        const auto at = axis_.state().measured_at();
+        if (at > last) ++readings;
+        last = at;
+        return readings >= company_readings;
+      },
+      step);
+}
+
 Judgement Procedure::actuate(const StepPlan& plan, Step& step) {
   const auto input = expected(plan);
   if (axis_.state().enabled())
@@ -181,7 +198,7 @@ Judgement Procedure::actuate(const StepPlan& plan, Step& step) {
     return step.edges_size() > 0;
   };
   if (!wait_until(any_edge, step)) return judge_switch(input, {});
-  (void)person_.line_within(company);
+  wait_for_company(step);
   collect();
   const auto first = step.edges(0);
   person_.tell(
@@ -194,7 +211,7 @@ Judgement Procedure::actuate(const StepPlan& plan, Step& step) {
         });
       },
       step);
-  (void)person_.line_within(company);
+  wait_for_company(step);
   collect();
   return judge_switch(input, {step.edges().begin(), step.edges().end()});
 }

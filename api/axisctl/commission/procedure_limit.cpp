@@ -1,6 +1,7 @@
 // A limit switch has to end a motion, forbid its direction, and permit the other one.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "api/axisctl/commission/procedure.hpp"
@@ -10,6 +11,28 @@
 #include "api/axisctl/format.hpp"
 
 namespace axisd::axisctl::commission {
+namespace {
+
+std::string with_function(const v1::Terminal& input) {
+  return fmt::format("{} ({})", input.name(), input.function());
+}
+
+bool is_active_in(const v1::AxisState& state, const std::string& terminal) {
+  return std::ranges::any_of(state.inputs(),
+                             [&](const auto& input) { return input.name() == terminal && input.active(); });
+}
+
+/// The limit switch that became active in place of `expected`: the axis would go on into the end of its way.
+std::string limit_instead(const v1::AxisState& state, const v1::AxisState& before,
+                          const std::string& expected) {
+  if (is_active_in(state, expected)) return {};
+  for (const auto& input : state.inputs())
+    if (input.active() && is_limit(input.function()) && !is_active_in(before, input.name()))
+      return with_function(input);
+  return {};
+}
+
+}  // namespace
 
 Judgement Procedure::limit(const StepPlan& plan, Step& step) {
   const auto& unit = record_.unit();
@@ -36,10 +59,12 @@ Judgement Procedure::limit(const StepPlan& plan, Step& step) {
   LimitObservation seen{.input = expected(plan), .command = {}, .further = {}, .away_left_out = {}};
   std::optional<double> active_at;
   const auto run = follow(axis_.move(distance, motion.velocity), step, [&](const v1::AxisState& state) {
-    for (const auto& input : state.inputs())
-      if (input.name() == plan.terminal && input.active() && !active_at) active_at = state.position();
-    return true;
+    if (!active_at && is_active_in(state, plan.terminal)) active_at = state.position();
+    seen.other = limit_instead(state, before, plan.terminal);
+    return seen.other.empty();
   });
+  seen.command = run.command;
+  if (!ended(run.command)) end_by_stop(step, seen);
   const auto rest = settled();
   const auto place = unwrapped(rest.position(), run.samples.back().position(), settings_);
   for (auto& edge : feed.take()) {
@@ -50,7 +75,6 @@ Judgement Procedure::limit(const StepPlan& plan, Step& step) {
     *step.add_edges() = std::move(edge);
   }
   seen.became_active = seen.became_active || active_at.has_value();
-  seen.command = run.command;
   seen.moving = rest.moving();
   add_figure(step, "travelled", place - before.position(), unit);
   if (active_at) add_figure(step, "after_edge", std::abs(place - *active_at), unit);
@@ -58,6 +82,17 @@ Judgement Procedure::limit(const StepPlan& plan, Step& step) {
   if (auto judgement = judge_limit_end(seen); judgement.verdict != VERDICT_PASSED) return judgement;
   leave_limit(plan, step, seen);
   return judge_limit(seen);
+}
+
+void Procedure::end_by_stop(Step& step, LimitObservation& seen) {
+  const auto stop = axis_.stop(false);
+  seen.command = axis_.command(seen.command.id());
+  seen.stopped = true;
+  *step.add_commands() = seen.command;
+  *step.add_commands() = stop;
+  if (stop.state() != v1::COMMAND_STATE_DONE)
+    throw StepEnd(VERDICT_FAILED, fmt::format("{} became active; standstill is NOT confirmed", seen.other),
+                  "look at the machine");
 }
 
 void Procedure::leave_limit(const StepPlan& plan, Step& step, LimitObservation& seen) {

@@ -102,14 +102,15 @@ Judgement Procedure::stop(Step& step) {
   const double up = bounded(wanted, true, before, settings_);
   const double down = bounded(wanted, false, before, settings_);
   const bool positive = up >= down;
-  const double distance = positive ? up : -down;
+  const auto motion = stop_motion(motion_, std::max(up, down), velocities_, settings_);
+  const double distance = positive ? motion.distance : -motion.distance;
   if (distance == 0) throw StepEnd(VERDICT_NOT_DONE, no_room(before), room_remedy(before));
-  check_move(distance, motion_.velocity);
+  check_move(distance, motion.velocity);
   const auto bound = axis_.budget(before.bus());
   permit(fmt::format("{}, but is stopped after about a third of it. Enter stops it, too. Move?",
-                     move_text(distance, motion_.velocity, before)),
+                     move_text(distance, motion.velocity, before)),
          step);
-  auto run = follow(axis_.move(distance, motion_.velocity), step, [&](const v1::AxisState& state) {
+  auto run = follow(axis_.move(distance, motion.velocity), step, [&](const v1::AxisState& state) {
     const auto way = unwrapped(state.position(), before.position(), settings_) - before.position();
     return std::abs(way) < std::abs(distance) * share_before_stop;
   });
@@ -118,7 +119,7 @@ Judgement Procedure::stop(Step& step) {
       .move = {}, .stop = axis_.stop(true), .unit = unit, .bound = {}, .way_bound = {}, .while_held = {}};
   const auto answered = now();
   const auto held = axis_.state();
-  seen.while_held = axis_.explain_move(distance, motion_.velocity);
+  seen.while_held = axis_.explain_move(distance, motion.velocity);
   axis_.release_stop();
   const auto released = axis_.state();
   if (!ended(run.command)) {

@@ -104,7 +104,9 @@ Judgement judge_limit_end(const LimitObservation& limit) {
   const auto name = with_function(limit.input.terminal, limit.input.function);
   if (limit.moving)
     return failed(fmt::format("it still moves although {} is active", name), "look at the machine");
-  if (done(limit.command)) {
+  if (limit.stopped && limit.became_active)
+    return failed(fmt::format("{} became active, too", limit.other), "look for a short between the wires");
+  if (done(limit.command) || limit.stopped) {
     if (!limit.became_active && !limit.other.empty())
       return failed(fmt::format("{} became active on the way, not {}: swapped?", limit.other, name),
                     fmt::format("swap the wires, or the functions in axes.{}.inputs", limit.input.axis));
@@ -140,7 +142,8 @@ Judgement judge_stop(const StopObservation& stop) {
     return failed("standstill is not confirmed: " + end_of(stop.stop), "look at the machine");
   if (stop.moving) return failed("it still moves", "look at the machine");
   if (stop.move.state() != v1::COMMAND_STATE_ABORTED)
-    return failed("the move was over before the stop: " + end_of(stop.move), "give a longer --distance");
+    return failed("the move was over before the stop: " + end_of(stop.move),
+                  "give a longer --distance, or a lower --velocity");
   if (stop.at_target)
     return failed("it went on to its target: the stop did not end it", "look at the bus (axisctl trace)");
   if (stop.bound && stop.time > *stop.bound)

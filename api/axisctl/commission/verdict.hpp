@@ -53,6 +53,7 @@ struct LimitObservation {
   v1::Command command;                ///< towards the switch, as it ended
   bool became_active = false;         ///< during the move
   std::string other{};                ///< terminal that became active in its place, with its function
+  bool stopped = false;               ///< from here, because of `other`
   bool moving = false;                ///< it still moves afterwards
   v1::ExplainResponse further;        ///< on in the same direction
   std::optional<v1::Command> away{};  ///< nothing: the operator left it out

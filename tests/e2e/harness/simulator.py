@@ -2,6 +2,7 @@
 import os
 import re
 import socket
+import threading
 import typing
 
 from .programs import AXISD_SIM, Program, wait_for
@@ -31,6 +32,7 @@ class Simulator:
         self._socket = socket.socket(socket.AF_UNIX)
         self._socket.connect(self._control)
         self._replies = self._socket.makefile()
+        self._one_at_a_time = threading.Lock()  # an operator's hands are threads
 
     def _ready(self):
         if not self.program.running():
@@ -39,8 +41,9 @@ class Simulator:
 
     def control(self, command):
         """Sends one command; its reply without the "ok"."""
-        self._socket.sendall(command.encode() + b"\n")
-        reply = self._replies.readline().strip()
+        with self._one_at_a_time:
+            self._socket.sendall(command.encode() + b"\n")
+            reply = self._replies.readline().strip()
         if not reply.startswith("ok"):
             raise AssertionError(f"{command}: {reply}")
         return reply[2:].strip()

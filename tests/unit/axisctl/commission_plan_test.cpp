@@ -199,6 +199,16 @@ TEST(Motion, LeavesRoomForAStop) {
   EXPECT_DOUBLE_EQ(duration_of(10, 5, settings()), 2.2);
 }
 
+TEST(Motion, IsSlowerWhereThereIsLittleRoomForAStop) {
+  const Motion fast{.velocity = 20, .distance = 5};
+  EXPECT_DOUBLE_EQ(stop_motion(fast, 1000, permitted, settings()).distance, 56);
+  EXPECT_DOUBLE_EQ(stop_motion(fast, 1000, permitted, settings()).velocity, 20);
+  const auto near = stop_motion(fast, 14, permitted, settings());
+  EXPECT_DOUBLE_EQ(near.distance, 14);
+  EXPECT_DOUBLE_EQ(near.velocity, 5);
+  EXPECT_DOUBLE_EQ(stop_motion(fast, 0.7, permitted, settings()).velocity, 0.5);
+}
+
 TEST(Motion, OfARotaryAxisGoesOnPastATurn) {
   auto rotary = settings();
   rotary.modulo = 360;

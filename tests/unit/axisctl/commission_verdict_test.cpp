@@ -120,6 +120,12 @@ TEST(JudgeLimit, FailsWhereTheAxisWentOn) {
   seen.other = "X2 (negative_limit)";
   EXPECT_EQ(judge_limit(seen).reason,
             "X2 (negative_limit) became active on the way, not X1 (positive_limit): swapped?");
+  seen.command = command(v1::COMMAND_STATE_ABORTED, v1::REASON_SUPERSEDED);
+  seen.stopped = true;
+  EXPECT_EQ(judge_limit(seen).reason,
+            "X2 (negative_limit) became active on the way, not X1 (positive_limit): swapped?");
+  seen.became_active = true;
+  EXPECT_EQ(judge_limit(seen).reason, "X2 (negative_limit) became active, too");
   seen = limit();
   seen.moving = true;
   EXPECT_EQ(judge_limit(seen).verdict, VERDICT_FAILED);
