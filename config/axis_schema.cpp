@@ -178,7 +178,8 @@ constexpr KeySpec simulate_keys[] = {
     {.key = "home_switch",
      .kind = Kind::position,
      .description =
-         "Where the home switch becomes active. Positions of simulate: count from the load's zero.",
+         "Where the home switch becomes active, on an axis with modulo once per turn. Positions of simulate: "
+         "count from the load's zero.",
      .example = "-20",
      .apply = [](Target& t, const Value& v) { t.axis->simulation.home_switch = v.number; }},
     {.key = "home_width",

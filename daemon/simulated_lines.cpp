@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "devices/simulation/simulator.hpp"
@@ -21,6 +22,8 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
         std::minmax({pulses(*simulate.home_switch), pulses(*simulate.home_switch + simulate.home_width)});
     mechanics.home_switch_from = edges.first;
     mechanics.home_switch_to = edges.second;
+    if (entry.axis.scale.modulo)
+      mechanics.turn = *entry.axis.scale.modulo * std::abs(scale.pulses_per_unit());
   }
   if (simulate.positive_limit) mechanics.positive_limit_from = pulses(*simulate.positive_limit);
   if (simulate.negative_limit) mechanics.negative_limit_from = pulses(*simulate.negative_limit);

@@ -65,6 +65,11 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
   if (named("eeprom.")) return parse_eeprom(key.substr(7), value, settings);
   if (named("wire.")) return parse_wire(key.substr(5), value, settings);
   if (key == "home") return parse_range(value, settings.mechanics);
+  if (key == "turn") {
+    const auto turn = parse_number<std::uint32_t>(value);
+    if (turn) settings.mechanics.turn = *turn;
+    return turn && *turn > 0;
+  }
   if (key == "positive_limit") return parse_position(value, settings.mechanics.positive_limit_from);
   if (key == "negative_limit") return parse_position(value, settings.mechanics.negative_limit_from);
   if (key == "model") {
@@ -106,7 +111,7 @@ Result<DriveOption> parse_drive(std::string_view text) {
     if (!parse_part(key, value, option))
       return fail(
           Reason::invalid_argument, fmt::format("\"{}\" is not understood", part),
-          "use node=, model=, home=FROM:TO, positive_limit=, negative_limit=, switch.NAME=on|off, "
+          "use node=, model=, home=FROM:TO, turn=, positive_limit=, negative_limit=, switch.NAME=on|off, "
           "eeprom.REGISTER=VALUE, wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
           "dip_baud=BAUD|custom, boot_ms=, powered=on|off");
   }

@@ -104,6 +104,7 @@ struct Mechanics {
   std::optional<std::int64_t> home_switch_from, home_switch_to;  ///< active between these
   std::optional<std::int64_t> positive_limit_from;               ///< active at and beyond
   std::optional<std::int64_t> negative_limit_from;               ///< active at and below
+  std::optional<double> turn{};  ///< pulses after which a rotary load meets its home switch again, > 0
 };
 
 enum class SwitchKind : std::uint8_t { home, positive_limit, negative_limit };

@@ -9,7 +9,8 @@ namespace {
 
 TEST(DriveOption, ReadsEveryPart) {
   const auto option = parse_drive(
-      "node=3,model=ykd2405pr,home=-50:600,positive_limit=90000,negative_limit=-2000,switch.start_in_motion="
+      "node=3,model=ykd2405pr,home=-50:600,turn=4000,positive_limit=90000,negative_limit=-2000,switch.start_"
+      "in_motion="
       "on,"
       "switch.unsigned_speed=off,eeprom.0x0011=13,wire.X1=positive_limit:nc,dip=0,dip_baud=custom,boot_ms="
       "250,powered=off");
@@ -19,6 +20,7 @@ TEST(DriveOption, ReadsEveryPart) {
   EXPECT_EQ(3, settings.address);
   EXPECT_EQ(-50, settings.mechanics.home_switch_from);
   EXPECT_EQ(600, settings.mechanics.home_switch_to);
+  EXPECT_EQ(4000, settings.mechanics.turn);
   EXPECT_EQ(90000, settings.mechanics.positive_limit_from);
   EXPECT_EQ(-2000, settings.mechanics.negative_limit_from);
   EXPECT_EQ((Switches{{"start_in_motion", true}, {"unsigned_speed", false}}), settings.switches);
@@ -34,9 +36,9 @@ TEST(DriveOption, ReadsEveryPart) {
 
 TEST(DriveOption, NamesThePartThatIsWrong) {
   for (const std::string wrong :
-       {"node=0x1FF", "home=5", "home=6:5", "positive_limit=far", "switch.a=maybe", "eeprom.1=x",
-        "eeprom.1=5000000000", "wire.X0=somewhere", "boot_ms=-1", "dip=x", "dip=256", "dip_baud=0",
-        "dip_baud=fast", "powered=1", "color=red", "model="}) {
+       {"node=0x1FF", "home=5", "home=6:5", "turn=0", "turn=x", "positive_limit=far", "switch.a=maybe",
+        "eeprom.1=x", "eeprom.1=5000000000", "wire.X0=somewhere", "boot_ms=-1", "dip=x", "dip=256",
+        "dip_baud=0", "dip_baud=fast", "powered=1", "color=red", "model="}) {
     const auto option = parse_drive("node=1,model=ykd2405pr," + wrong);
     ASSERT_FALSE(option) << wrong;
     EXPECT_NE(std::string::npos, option.error().message.find(wrong));

@@ -1,0 +1,27 @@
+"""The example that runs without hardware: what the quick start permits can be done again."""
+import concurrent.futures
+import unittest
+
+from harness.case import Scenario
+from harness.demo import Demo
+
+
+class DemoScenarios(Scenario):
+    def test_rotary_axes_home_again_wherever_they_have_turned(self):
+        demo = Demo()
+        self.addCleanup(demo.close)
+
+        def home_and_turn(axis):
+            demo.client.wait_online(axis)
+            demo.client.to_done("Enable", axis)
+            demo.client.to_done("Home", axis)
+            for turned in (330.0, -390.0):
+                demo.client.to_done("MoveRelative", axis, distance=turned, velocity=180.0)
+                demo.client.to_done("Home", axis)
+                self.assertAlmostEqual(demo.client.state(axis).position, 0, delta=1)
+        with concurrent.futures.ThreadPoolExecutor() as threads:  # side by side: most of it is waiting
+            list(threads.map(home_and_turn, ("carousel", "turntable", "dial")))
+
+
+if __name__ == "__main__":
+    unittest.main()
