@@ -87,74 +87,6 @@ constexpr KeySpec limit_keys[] = {
                  const Value& v) { t.axis->axis.limits.start_speed_rpm = static_cast<int>(v.integer); }},
 };
 
-constexpr std::string_view methods[] = {"home_positive", "home_negative", "positive_limit", "negative_limit"};
-
-constexpr KeySpec homing_keys[] = {
-    {.key = "method",
-     .kind = Kind::choice,
-     .required = true,
-     .description = "Which switch is searched for and in which axis direction.",
-     .example = "home_negative",
-     .choices = methods,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.homing->method = static_cast<HomingMethod>(choice_index(methods, v.text));
-         }},
-    {.key = "velocity",
-     .kind = Kind::velocity,
-     .required = true,
-     .description = "Towards the switch.",
-     .example = "20 mm/s",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->velocity = v.number; }},
-    {.key = "search_velocity",
-     .kind = Kind::velocity,
-     .required = true,
-     .description = "Slow, while looking for the edge of the switch.",
-     .example = "2 mm/s",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->search_velocity = v.number; }},
-    {.key = "acceleration_time",
-     .kind = Kind::duration,
-     .description = "While homing.",
-     .example = "200 ms",
-     .default_value = "100 ms",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->acceleration_time = v.duration; }},
-    {.key = "position",
-     .kind = Kind::position,
-     .description = "Position of the axis once it is homed.",
-     .example = "12.5 mm",
-     .default_value = "0",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->position = v.number; }},
-    {.key = "offset",
-     .kind = Kind::position,
-     .description = "Signed way that the drive goes on from the switch before it is homed.",
-     .example = "-3 mm",
-     .default_value = "0",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->offset = v.number; }},
-    {.key = "backoff",
-     .kind = Kind::position,
-     .above_minimum = true,
-     .description =
-         "How far to move away from a switch that is already active; without it homing is refused there.",
-     .example = "10 mm",
-     .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->backoff = v.number; }},
-    {.key = "max_travel",
-     .kind = Kind::position,
-     .above_minimum = true,
-     .description = "Homing is stopped after this way.",
-     .example = "450 mm",
-     .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->max_travel = v.number; }},
-    {.key = "timeout",
-     .kind = Kind::duration,
-     .description = "Homing is stopped after this time.",
-     .example = "30 s",
-     .default_value = "60 s",
-     .minimum = 100,
-     .maximum = 3'600'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->timeout = v.duration; }},
-};
-
 constexpr KeySpec poll_keys[] = {
     {.key = "moving",
      .kind = Kind::duration,
@@ -279,7 +211,7 @@ const KeySpec axis_keys[] = {
     {.key = "homing",
      .kind = Kind::section,
      .description = "How the axis finds its zero; without it Home is refused.",
-     .children = homing_keys,
+     .children = homing_schema(),
      .apply = [](Target& t, const Value&) { t.axis->axis.homing.emplace(); }},
     {.key = "inputs",
      .kind = Kind::terminals,
@@ -405,6 +337,5 @@ const KeySpec axis_keys[] = {
 }  // namespace
 
 std::span<const KeySpec> axis_schema() { return axis_keys; }
-std::span<const std::string_view> homing_methods() { return methods; }
 
 }  // namespace axisd::config

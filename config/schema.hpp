@@ -89,9 +89,13 @@ struct KeySpec {
 
 /// The keys of the file's top level.
 std::span<const KeySpec> schema();
+/// The keys of one bus.
+std::span<const KeySpec> bus_schema();
 /// The keys of one axis, in the order in which they are read: unit and model come before what depends on
 /// them.
 std::span<const KeySpec> axis_schema();
+/// The keys of an axis's `homing`.
+std::span<const KeySpec> homing_schema();
 /// The keys of an axis's `segments`.
 std::span<const KeySpec> segment_schema();
 /// The keys of one device that is not an axis.
