@@ -401,6 +401,8 @@ class Axis {
   void give_up_release(const Error& cause);
 
   // axis_stop.cpp
+  /// Nothing of motion that was prepared so far is sent any more.
+  void revoke_motion();
   void supersede(const Error& cause);
   void begin_stop(StopKind kind, bool hold, CommandPtr command);
   Task<> run_stop();

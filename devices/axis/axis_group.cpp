@@ -263,10 +263,9 @@ void Axis::Member::end(Error cause, bool aborted) {
   if (!aborted && own && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
   if (!aborted && own && cause.reason == Reason::terminal) return axis.on_turned_by_power(cause);
   const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->may_run;
+  axis.revoke_motion();
   if (activity_->may_run) {
     // The stop of one that may move goes out whatever is known of its start.
-    axis.gate_->raise();
-    axis.env_.bus->purge_superseded(axis.settings_.node, *axis.gate_);
     axis.tracker_.forget_target();
     axis.keep_deceleration(*activity_);
     axis.stopping_.shown = activity_->state;
@@ -277,9 +276,6 @@ void Axis::Member::end(Error cause, bool aborted) {
     axis.begin_stop(StopKind::stop, false, nullptr);
     tell_part(*activity_, cause);
     cause.outcome = Outcome::unknown;  // also where nobody has heard yet whether it had started
-  } else {
-    axis.gate_->raise();
-    axis.env_.bus->purge_superseded(axis.settings_.node, *axis.gate_);
   }
   axis.finish(*activity_, [&](CommandRecord& command) {
     if (unknown)

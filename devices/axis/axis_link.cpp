@@ -339,8 +339,7 @@ void Axis::go_offline(const Error& cause) {
   spdlog::warn("{}: offline: {}", settings_.name, to_string(cause));
   link_ = LinkState::offline;
   link_error_ = cause;
-  gate_->raise();
-  env_.bus->purge_superseded(settings_.node, *gate_);
+  revoke_motion();
   env_.bus->give_up_readings(settings_.node);
   const bool moved = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
                      terminal_motion_ || (sample_ && sample_->moving);

@@ -53,8 +53,7 @@ void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>&
 
 void Axis::fail_with_stop(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
-  gate_->raise();
-  env_.bus->purge_superseded(settings_.node, *gate_);
+  revoke_motion();
   tracker_.forget_target();
   keep_deceleration(activity);
   stopping_.shown = activity.state;
@@ -66,16 +65,14 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
 /// stand then (in velocity mode 60FFh is followed as a level), so it is taken back (M1).
 void Axis::abort_at_rest(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
-  gate_->raise();
-  env_.bus->purge_superseded(settings_.node, *gate_);
+  revoke_motion();
   keep_deceleration(activity);
   begin_stop(StopKind::halt, false, nullptr);
   finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
 
 void Axis::enter_error_stop(const Error& cause) {
-  gate_->raise();
-  env_.bus->purge_superseded(settings_.node, *gate_);
+  revoke_motion();
   if (!fault_ || fault_->reason != cause.reason || fault_->where.native_code != cause.where.native_code) {
     spdlog::error("{}", to_string(cause));
     fault_ = cause;
@@ -325,8 +322,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
     if (activity->hold_until && now >= *activity->hold_until) {
       const bool jog = activity->command->value().kind == CommandKind::jog;
       stopping_.shown = activity->state;
-      gate_->raise();
-      env_.bus->purge_superseded(settings_.node, *gate_);
+      revoke_motion();
       keep_deceleration(*activity);
       begin_stop(StopKind::halt, false, nullptr);
       auto cause =

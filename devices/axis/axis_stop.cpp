@@ -19,11 +19,15 @@ constexpr int unacknowledged_rounds = 4;
 
 }  // namespace
 
+void Axis::revoke_motion() {
+  gate_->raise();
+  env_.bus->purge_superseded(settings_.node, *gate_);
+}
+
 /// Ends what is being executed. Nothing that was prepared for it is sent any more.
 void Axis::supersede(const Error& cause) {
-  gate_->raise();
   ++accept_epoch_;
-  env_.bus->purge_superseded(settings_.node, *gate_);
+  revoke_motion();
   if (auto activity = std::exchange(activity_, nullptr)) {
     keep_deceleration(*activity);
     if (activity->state != AxisState::standstill) tracker_.forget_target();
