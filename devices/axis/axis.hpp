@@ -1,17 +1,4 @@
-// One axis: the vendor-free motion object (PLCopen Motion Control part 1).
-//
-//                      Enable                      Home            +--------+
-//        Disabled ---------------> Standstill ------------------->| Homing |--+
-//           ^                       |  ^   ^  \                    +--------+  | done
-//           |        Disable        |  |   |   \ MoveAbsolute, MoveRelative    |
-//           +-----------------------+  |   |    +--> DiscreteMotion -----------+--> Standstill
-//                                      |   |  MoveVelocity, Jog
-//                            confirmed |   +-------> ContinuousMotion -- Halt --> Standstill
-//                                      |
-//     any ---- Stop, QuickStop ---> Stopping            any ---- fault ---> ErrorStop ---- Reset --->
-//     Disabled or
-//                                                                                                     Standstill
-//
+// One axis: the vendor-free motion object (PLCopen Motion Control part 1). Its states: snapshot.hpp.
 // A state is visible as soon as a command is accepted. Beside the state stands the link to the drive
 // (offline, configuring, online). Every change that forbids motion raises the epoch of the gate first; what
 // was prepared before is then never sent, and the sequence that prepared it ends by itself at its next step
@@ -27,40 +14,23 @@
 #include <string_view>
 #include <vector>
 
-#include "buses/bus.hpp"
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
 #include "buses/signal.hpp"
 #include "buses/task.hpp"
+#include "devices/axis/activity.hpp"
+#include "devices/axis/axis_environment.hpp"
 #include "devices/axis/axis_face.hpp"
-#include "devices/axis/command_book.hpp"
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
 #include "devices/axis/planner.hpp"
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
-#include "devices/axis/snapshot.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
-#include "devices/event.hpp"
-#include "devices/lease/lease_table.hpp"
-#include "devices/persistence.hpp"
 
 namespace axisd {
-
-/// What an axis shares with the rest of its machine.
-struct AxisEnvironment {
-  Executor executor;
-  Clock* clock = nullptr;
-  Bus* bus = nullptr;
-  CommandBook* book = nullptr;
-  Persistence* persistence = nullptr;
-  const LeaseTable* leases = nullptr;
-  const bool* inhibited = nullptr;  ///< StopAll is latched
-  std::function<void()> published;  ///< after each new snapshot
-  std::function<void(const std::string& axis, EventContent)> event{};
-};
 
 /// Thread: core, except gate() and snapshot().
 class Axis {
@@ -167,56 +137,7 @@ class Axis {
   [[nodiscard]] const AxisFacePtr& face() const { return face_; }
 
  private:
-  /// A command that is being executed.
-  struct Activity {
-    CommandPtr command;
-    AxisState state = AxisState::standstill;
-    std::uint64_t epoch = 0;
-    CommandOptions options;
-    Plan plan{};
-    std::optional<TimePoint> hold_until{};  ///< jog and held velocity: halts at this time
-    bool started = false;                   ///< the drive was seen moving for it
-    bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
-    bool lease_over = false;                ///< goes on without its lease, and starts nothing more
-    bool noted = false;                     ///< durably, or that is under way
-  };
-  using ActivityPtr = std::shared_ptr<Activity>;
-
-  /// Accepted to start when what is before it is done.
-  struct Buffered {
-    CommandPtr command;
-    Action action;
-    CommandOptions options;
-    PositionTracker end;  ///< as it will be when this is done
-  };
-
-  /// Stops in progress; one sequence serves all that arrive meanwhile.
-  struct Stopping {
-    bool running = false;
-    bool hold = false;                        ///< stay in Stopping until ReleaseStop
-    StopKind kind = StopKind::none;           ///< strongest requested
-    int requests = 0;                         ///< each needs a frame of its own
-    AxisState shown = AxisState::standstill;  ///< while a halt decelerates
-    std::vector<CommandPtr> commands;
-    CommandPtr last;
-  };
-
-  /// Keeps the poll loop off the node: a start is one uninterrupted chain (M6).
-  class Chain {
-   public:
-    explicit Chain(Axis& axis) : axis_(&axis) {
-      ++axis_->chains_;
-      axis_->observed_.interrupted();
-    }
-    ~Chain() {
-      --axis_->chains_;
-      axis_->wake_.notify_all();
-    }
-    Chain(const Chain&) = delete;
-
-   private:
-    Axis* axis_;
-  };
+  class Chain;  ///< chain.hpp
 
   /// Runs a sequence and counts it while it lives.
   void launch(Task<> sequence, const char* name);
@@ -361,9 +282,7 @@ class Axis {
   Task<Result<void>> make_room(ActivityPtr activity);
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
-  static MoveProfile profile_of(const Plan& plan);
   bool may_start(Activity& activity);
-  static void tell_part(const Activity& activity, Error& cause);
   void end_unsent(Activity& activity, const Error& cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);

@@ -116,7 +116,7 @@ Task<Result<void>> Axis::Member::note() {
   if (!ready()) co_return axisd::fail(gone());
   if (const auto room = co_await axis.make_room(activity_); !room) co_return room;
   if (!ready()) co_return axisd::fail(gone());
-  const auto profile = Axis::profile_of(activity_->plan);
+  const auto profile = profile_of(activity_->plan);
   if (!co_await axis.noted(activity_, axis.note_of(*activity_, axis.drive_->marks_until(profile))))
     co_return axisd::fail(gone());
   co_return Result<void>{};
@@ -128,7 +128,7 @@ Task<Result<void>> Axis::Member::load() {
   chain_ = std::make_unique<Chain>(axis);
   aim();
   if (there_) co_return Result<void>{};
-  const auto profile = Axis::profile_of(activity_->plan);
+  const auto profile = profile_of(activity_->plan);
   auto prepared = co_await axis.drive_->prepare_move(profile, tied());
   if (prepared) {
     prepared_ = std::move(*prepared);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/chain.hpp"
 
 namespace axisd {
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/chain.hpp"
 
 namespace axisd {
 
@@ -113,14 +114,6 @@ Task<> Axis::run_move(ActivityPtr activity) {
   tracker_.reached(activity->plan.exact_target);
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
-}
-
-MoveProfile Axis::profile_of(const Plan& plan) {
-  return {.target_pulses = static_cast<std::int32_t>(plan.target_counter),
-          .velocity_rpm = plan.velocity_rpm,
-          .start_rpm = plan.start_rpm,
-          .acceleration_time = plan.acceleration_time,
-          .deceleration_time = plan.deceleration_time};
 }
 
 /// What was true at its acceptance, or before the disk was waited for, may have changed. False: the activity
@@ -236,13 +229,6 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   co_await follow(activity, base, since);
-}
-
-/// A start that fails does not undo what was executed before it: homing backs off first.
-void Axis::tell_part(const Activity& activity, Error& cause) {
-  if (activity.command->value().state != CommandState::active) return;
-  cause.outcome = Outcome::unknown;
-  cause.message = "executed in part: " + cause.message;
 }
 
 /// What the gate no longer let out was overtaken by time or by another client: nobody's error.

@@ -40,8 +40,7 @@ Result<void> Axis::permit(const Request& request, const CommandOptions& options)
 
 /// Enters a command and makes it the one that is executed; whatever was executed before is aborted and
 /// halted.
-Axis::ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, AxisState state,
-                              Plan plan) {
+ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan) {
   auto command = next_ ? std::exchange(next_, nullptr) : env_.book->open(settings_.name, action, options);
   const auto replaced = activity_;
   const bool moving = (replaced && replaced->state != AxisState::standstill) || (sample_ && sample_->moving);

@@ -1,5 +1,6 @@
 // The drive's counter is zeroed before a target could leave it.
 #include "devices/axis/axis.hpp"
+#include "devices/axis/chain.hpp"
 
 namespace axisd {
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/chain.hpp"
 
 namespace axisd {
 

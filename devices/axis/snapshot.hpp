@@ -14,6 +14,17 @@
 namespace axisd {
 
 /// PLCopen Motion Control part 1, state diagram. `offline` is not a state but stands beside (LinkState).
+///
+///                      Enable                      Home            +--------+
+///        Disabled ---------------> Standstill ------------------->| Homing |--+
+///           ^                       |  ^   ^  \                    +--------+  | done
+///           |        Disable        |  |   |   \ MoveAbsolute, MoveRelative    |
+///           +-----------------------+  |   |    +--> DiscreteMotion -----------+--> Standstill
+///                                      |   |  MoveVelocity, Jog
+///                            confirmed |   +-------> ContinuousMotion -- Halt --> Standstill
+///                                      |
+///     any ---- Stop, QuickStop ---> Stopping
+///     any ---- fault -------------> ErrorStop ---- Reset ---> Standstill or Disabled
 enum class AxisState : std::uint8_t {
   disabled,
   standstill,

@@ -1,0 +1,56 @@
+// What an axis is executing, what waits for its end, and its stops.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "buses/clock.hpp"
+#include "devices/axis/command.hpp"
+#include "devices/axis/command_book.hpp"
+#include "devices/axis/planner.hpp"
+#include "devices/axis/position_tracker.hpp"
+#include "devices/drive.hpp"
+
+namespace axisd {
+
+/// A command that is being executed.
+struct Activity {
+  CommandPtr command;
+  AxisState state = AxisState::standstill;
+  std::uint64_t epoch = 0;
+  CommandOptions options;
+  Plan plan{};
+  std::optional<TimePoint> hold_until{};  ///< jog and held velocity: halts at this time
+  bool started = false;                   ///< the drive was seen moving for it
+  bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
+  bool lease_over = false;                ///< goes on without its lease, and starts nothing more
+  bool noted = false;                     ///< durably, or that is under way
+};
+using ActivityPtr = std::shared_ptr<Activity>;
+
+MoveProfile profile_of(const Plan& plan);
+/// A start that fails does not undo what was executed before it: homing backs off first.
+void tell_part(const Activity& activity, Error& cause);
+
+/// Accepted to start when what is before it is done.
+struct Buffered {
+  CommandPtr command;
+  Action action;
+  CommandOptions options;
+  PositionTracker end;  ///< as it will be when this is done
+};
+
+/// Stops in progress; one sequence serves all that arrive meanwhile.
+struct Stopping {
+  bool running = false;
+  bool hold = false;                        ///< stay in Stopping until ReleaseStop
+  StopKind kind = StopKind::none;           ///< strongest requested
+  int requests = 0;                         ///< each needs a frame of its own
+  AxisState shown = AxisState::standstill;  ///< while a halt decelerates
+  std::vector<CommandPtr> commands;
+  CommandPtr last;
+};
+
+}  // namespace axisd

@@ -1,0 +1,29 @@
+// What an axis shares with the rest of its machine.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "buses/bus.hpp"
+#include "buses/clock.hpp"
+#include "buses/task.hpp"
+#include "devices/axis/command_book.hpp"
+#include "devices/event.hpp"
+#include "devices/lease/lease_table.hpp"
+#include "devices/persistence.hpp"
+
+namespace axisd {
+
+struct AxisEnvironment {
+  Executor executor;
+  Clock* clock = nullptr;
+  Bus* bus = nullptr;
+  CommandBook* book = nullptr;
+  Persistence* persistence = nullptr;
+  const LeaseTable* leases = nullptr;
+  const bool* inhibited = nullptr;  ///< StopAll is latched
+  std::function<void()> published;  ///< after each new snapshot
+  std::function<void(const std::string& axis, EventContent)> event{};
+};
+
+}  // namespace axisd

@@ -1,0 +1,25 @@
+// An axis's uninterrupted use of its node.
+#pragma once
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+/// Keeps the poll loop off the node: a start is one uninterrupted chain (M6).
+class Axis::Chain {
+ public:
+  explicit Chain(Axis& axis) : axis_(&axis) {
+    ++axis_->chains_;
+    axis_->observed_.interrupted();
+  }
+  ~Chain() {
+    --axis_->chains_;
+    axis_->wake_.notify_all();
+  }
+  Chain(const Chain&) = delete;
+
+ private:
+  Axis* axis_;
+};
+
+}  // namespace axisd
