@@ -42,51 +42,6 @@ TEST(Explain, ADisabledAxisHasLostItsPositionToo) {
   EXPECT_THAT(rig.reasons(SetPositionRequest{.position = 3}), ElementsAre("disabled"));
 }
 
-TEST(Explain, ASilentNodeIsOfflineAndInQuarantine) {
-  ExplainRig rig;
-  rig.ready();
-  rig.line->network().set_connected(false);
-  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 5s));
-  rig.run(5s);
-  EXPECT_THAT(rig.reasons(move), ElementsAre("offline", "no_reply"));
-  EXPECT_THAT(rig.text(move, Reason::no_reply),
-              AllOf(HasSubstr("node 1 is in quarantine for"), HasSubstr("asked again in"),
-                    HasSubstr("axisctl bus scan line-a")));
-  EXPECT_THAT(rig.reasons(DisableRequest{}), ElementsAre("offline", "no_reply"));
-  EXPECT_THAT(rig.reasons(ResetRequest{}), ElementsAre("offline", "no_reply"));
-}
-
-TEST(Explain, ADriveThatNeverAnsweredIsNotKnownToBeOn) {
-  ExplainRig rig(
-      {.adjust_drive = [](simulation::SimulatedNodeSettings& node) { node.address = 2; }, .connect = false});
-  rig.run(3s);
-  EXPECT_THAT(rig.reasons(move), ElementsAre("offline", "no_reply", "disabled", "not_trusted"));
-  EXPECT_THAT(rig.text(move, Reason::disabled), HasSubstr("not known to be on"));
-}
-
-TEST(Explain, APortThatIsGoneIsNamed) {
-  ExplainRig rig;
-  rig.ready();
-  rig.line->set_open(false);
-  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 5s));
-  EXPECT_THAT(rig.reasons(move), ElementsAre("offline", "bus_down"));
-}
-
-TEST(Explain, AnotherModelThanConfiguredIsNamed) {
-  ExplainRig rig({.adjust = [](AxisSettings& axis) { axis.model = "ssd2608pr"; }, .connect = false});
-  rig.run(3s);
-  EXPECT_THAT(rig.reasons(EnableRequest{}), ElementsAre("wrong_model"));
-}
-
-TEST(Explain, ADriveThatWasRestartedIsBeingConfigured) {
-  ExplainRig rig({.switches = {{"enabled_at_power_up", false}}});
-  rig.ready();
-  rig.cycle_power(10ms);
-  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::configuring; }, 5s));
-  EXPECT_THAT(rig.reasons(EnableRequest{}), ElementsAre("configuring"));
-  EXPECT_THAT(rig.text(EnableRequest{}, Reason::configuring), HasSubstr("wait"));
-}
-
 TEST(Explain, AnAlarmComesWithItsRemedyFromTheModelsTable) {
   ExplainRig rig;
   rig.ready();
@@ -301,25 +256,6 @@ TEST(Explain, AReleaseThatALostLeaseOwesIsWaitedFor) {
   rig.run(1050ms);
   EXPECT_THAT(rig.reasons(HomeRequest{}, {.client = "b"}), ElementsAre("stopping", "busy", "disabled"));
   EXPECT_THAT(rig.text(HomeRequest{}, Reason::busy, {.client = "b"}), HasSubstr("because a lease ended"));
-}
-
-TEST(Explain, WorkOnTheDrivesMemoryIsWaitedFor) {
-  ExplainRig rig;
-  rig.complete(DisableRequest{});
-  const auto token = rig.axis().begin_maintenance();
-  ASSERT_TRUE(token) << to_string(token.error());
-  EXPECT_THAT(rig.reasons(EnableRequest{}), ElementsAre("busy"));
-  EXPECT_THAT(rig.reasons(ResetRequest{}), ElementsAre("busy"));
-}
-
-TEST(Explain, ADriveThatNoLongerHoldsItsConfigurationIsToBeDisabled) {
-  ExplainRig rig({.adjust = [](AxisSettings& axis) { axis.drift_check = 1s; }});
-  rig.ready();
-  rig.write_behind(0x0044, 0);
-  ASSERT_TRUE(rig.run_until([&] { return !rig.state()->drift.empty(); }, 3s));
-  EXPECT_THAT(rig.reasons(move), ElementsAre("misconfigured"));
-  EXPECT_THAT(rig.text(move, Reason::misconfigured),
-              AllOf(HasSubstr(rig.state()->drift), HasSubstr("axisctl disable feeder")));
 }
 
 TEST(Explain, ATerminalThatMovesTheDriveIsNamed) {

@@ -1,12 +1,8 @@
 #include "daemon/core/machine_core.hpp"
 
-#include <gtest/gtest.h>
-
 #include <stdexcept>
 
-#include "devices/simulation/simulator.hpp"
-#include "tests/support/fake_persistence.hpp"
-#include "tests/support/virtual_line.hpp"
+#include "tests/unit/daemon/core/machine_rig.hpp"
 
 namespace axisd::core {
 namespace {
@@ -14,50 +10,10 @@ namespace {
 using namespace std::chrono_literals;
 
 /// Three axes on one line; the drive of the last one has no power.
-class ThreeAxes : public testing::Test {
+class ThreeAxes : public MachineOnALine {
  protected:
-  ThreeAxes() : store_(world_.executor()) {
-    configuration_.machine = "three";
-    configuration_.lines.push_back({.name = "line-a", .port = "sim"});
-    for (const std::uint8_t node : {1, 2, 3}) {
-      AxisSettings axis{
-          .name = "a" + std::to_string(node), .bus = "line-a", .node = node, .model = "ykd2405pr"};
-      axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
-      axis.limits.velocity = 100;
-      configuration_.axes.push_back({.axis = axis});
-    }
-  }
-  ~ThreeAxes() override {
-    if (!machine_) return;
-    machine_->close();
-    EXPECT_TRUE(world_.run_until([this] { return machine_->closed(); }, 60s));
-  }
-  void start() {
-    machine_ = std::make_unique<MachineCore>(
-        MachineParts{.executor = world_.executor(),
-                     .clock = &world_.clock(),
-                     .persistence = &store_,
-                     .instance_id = "t",
-                     .make_line =
-                         [this](const modbus_rtu::LineSettings& settings) {
-                           auto made = std::make_unique<test::VirtualLine>(world_, settings);
-                           line_ = made.get();
-                           return made;
-                         }},
-        configuration_);
-    for (const std::uint8_t node : {1, 2, 3})
-      line_->network().add(
-          simulation::find_simulator("ykd2405pr")->make({.address = node, .powered = node != 3}));
-    line_->network().advance(world_.now());
-    machine_->start();
-    world_.run_for(2s);
-  }
-
-  test::VirtualWorld world_;
-  test::FakePersistence store_;
-  config::Configuration configuration_;
-  test::VirtualLine* line_ = nullptr;
-  std::unique_ptr<MachineCore> machine_;
+  ThreeAxes() : MachineOnALine("three", {1, 2, 3}) {}
+  void start() { start_with({1, 2, 3}, 3); }
 };
 
 TEST_F(ThreeAxes, OneDeadDriveDoesNotDelayTheOthers) {

@@ -4,11 +4,7 @@
 
 #include <algorithm>
 
-#include "config/fields.hpp"
-#include "daemon/core/machine_core.hpp"
-#include "devices/simulation/simulator.hpp"
-#include "tests/support/fake_persistence.hpp"
-#include "tests/support/virtual_line.hpp"
+#include "tests/unit/daemon/core/reload_rig.hpp"
 
 namespace axisd::core {
 namespace {
@@ -17,104 +13,6 @@ using namespace std::chrono_literals;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-/// a1 and a2 on one line; spare drives at nodes 3 and 4.
-class ReloadedMachine : public testing::Test {
- protected:
-  ReloadedMachine() : store_(world_.executor()) {
-    configuration_.machine = "two";
-    configuration_.lines.push_back({.name = "line-a", .port = "sim"});
-    for (const std::uint8_t node : {1, 2}) configuration_.axes.push_back({.axis = axis(node)});
-    machine_ = std::make_unique<MachineCore>(
-        MachineParts{.executor = world_.executor(),
-                     .clock = &world_.clock(),
-                     .persistence = &store_,
-                     .instance_id = "t",
-                     .make_line =
-                         [this](const modbus_rtu::LineSettings& settings) {
-                           auto made = std::make_unique<test::VirtualLine>(world_, settings);
-                           line_ = made.get();
-                           return made;
-                         }},
-        configuration_);
-    for (const std::uint8_t node : {1, 2, 3, 4})
-      line_->network().add(simulation::find_simulator("ykd2405pr")->make({.address = node}));
-    line_->network().advance(world_.now());
-    machine_->start();
-    world_.run_for(2s);
-    line_->forget_wire();
-  }
-  ~ReloadedMachine() override {
-    machine_->close();
-    EXPECT_TRUE(world_.run_until([this] { return machine_->closed(); }, 60s));
-  }
-  static AxisSettings axis(std::uint8_t node) {
-    AxisSettings axis{
-        .name = "a" + std::to_string(node), .bus = "line-a", .node = node, .model = "ykd2405pr"};
-    axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
-    axis.limits.velocity = 100;
-    return axis;
-  }
-
-  /// Asks for `wanted`; what stands against it is in `refusals_` once `answered_`.
-  void ask(const config::Configuration& wanted, const std::string& client = "fitter") {
-    answered_ = false;
-    wanted_ = wanted;
-    machine_->reload({.client = client,
-                      .configuration = wanted,
-                      .changes = config::differences(configuration_, wanted),
-                      .before = "r1",
-                      .revision = "r2"},
-                     [this](std::vector<Error> refusals) {
-                       answered_ = true;
-                       refusals_ = std::move(refusals);
-                       if (refusals_.empty()) configuration_ = wanted_;
-                     });
-  }
-  void reload(const config::Configuration& wanted, const std::string& client = "fitter") {
-    ask(wanted, client);
-    EXPECT_TRUE(world_.run_until([this] { return answered_; }, 10s));
-  }
-  /// The present configuration with another limit for an axis.
-  config::Configuration slower(std::size_t axis, double velocity = 50) {
-    auto wanted = configuration_;
-    wanted.axes.at(axis).axis.limits.velocity = velocity;
-    return wanted;
-  }
-  std::vector<Reason> reasons() const {
-    std::vector<Reason> all;
-    for (const auto& refusal : refusals_) {
-      all.push_back(refusal.reason);
-      EXPECT_FALSE(refusal.remedy.empty()) << to_string(refusal);
-    }
-    return all;
-  }
-  Command complete(const std::string& axis, const Action& action) {
-    const auto command = machine_->submit(axis, action, options());
-    EXPECT_TRUE(command) << to_string(command.error());
-    EXPECT_TRUE(world_.run_until([&] { return (*command)->has_ended(); }, 60s));
-    return (*command)->value();
-  }
-  CommandOptions options() { return {.client = "hmi", .request_id = std::to_string(++requests_)}; }
-  AxisSnapshotPtr state(const std::string& axis) { return machine_->find(axis)->snapshot(); }
-  bool online(const std::string& axis) {
-    return world_.run_until([&] { return state(axis)->link == LinkState::online; }, 10s);
-  }
-  int writes(std::uint8_t node, std::uint16_t address) {
-    return static_cast<int>(std::ranges::count_if(line_->wire(), [&](const auto& entry) {
-      return entry.node() == node && entry.is_write() && entry.address() == address;
-    }));
-  }
-
-  test::VirtualWorld world_;
-  test::FakePersistence store_;
-  config::Configuration configuration_, wanted_;
-  test::VirtualLine* line_ = nullptr;
-  std::unique_ptr<MachineCore> machine_;
-  std::vector<Error> refusals_;
-  bool answered_ = false;
-  int requests_ = 0;
-};
 
 TEST_F(ReloadedMachine, WhatIsTheSameGoesOnMoving) {
   const auto run = machine_->submit("a1", MoveVelocityRequest{.velocity = 50}, options());
@@ -201,56 +99,6 @@ TEST_F(ReloadedMachine, OnlyItsHolderChangesALeasedAxis) {
             Reason::lease_required);
 }
 
-TEST_F(ReloadedMachine, MotionIsRefusedWhileAnAxisIsExchanged) {
-  const auto epoch = machine_->find("a2")->gate()->epoch();
-  ask(slower(1));
-  ASSERT_FALSE(answered_);
-  const auto refused = machine_->submit("a2", MoveVelocityRequest{.velocity = 10}, options());
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().reason, Reason::reloading);
-  EXPECT_EQ(machine_->submit("a2", DisableRequest{}, options()).error().reason, Reason::reloading);
-  const auto obstacles = machine_->find("a2")->explain({}, {});
-  EXPECT_TRUE(std::ranges::any_of(obstacles, [](const Obstacle& each) {
-    return each.blocking && each.error.reason == Reason::reloading && !each.error.remedy.empty();
-  }));
-  EXPECT_GT(machine_->find("a2")->gate()->epoch(), epoch) << "what was prepared is never sent";
-  ask(slower(0));
-  EXPECT_TRUE(answered_) << "one at a time";
-  EXPECT_THAT(reasons(), ElementsAre(Reason::busy));
-  answered_ = false;
-  wanted_ = slower(1);
-  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
-  ASSERT_TRUE(online("a2"));
-  EXPECT_TRUE(machine_->submit("a2", MoveVelocityRequest{.velocity = 10}, options()));
-}
-
-TEST_F(ReloadedMachine, AStopMeanwhileIsExecutedByTheAxisThatComes) {
-  ask(slower(1));
-  const auto stop = machine_->submit("a2", StopRequest{.hold = true}, {.client = "hmi"});
-  ASSERT_TRUE(stop);
-  EXPECT_EQ(writes(2, 0x0028), 0);
-  ASSERT_TRUE(world_.run_until([&] { return (*stop)->has_ended(); }, 10s));
-  EXPECT_EQ((*stop)->value().state, CommandState::done);
-  EXPECT_GE(writes(2, 0x0028), 1);
-  EXPECT_TRUE(state("a2")->stop_held);
-  EXPECT_TRUE(machine_->find("a2")->release_stop());
-}
-
-TEST_F(ReloadedMachine, StopAllMeanwhileStopsEveryAxis) {
-  ask(slower(1));
-  const auto stops = machine_->stop_all("hmi");
-  ASSERT_EQ(stops.size(), 2U);
-  for (const auto& stop : stops) {
-    ASSERT_TRUE(stop);
-    EXPECT_TRUE(world_.run_until([&] { return (*stop)->has_ended(); }, 10s));
-    EXPECT_EQ((*stop)->value().state, CommandState::done);
-  }
-  EXPECT_GE(writes(2, 0x0028), 1);
-  ASSERT_TRUE(online("a2"));
-  EXPECT_TRUE(state("a2")->inhibited);
-  EXPECT_FALSE(machine_->find("a2")->gate()->stop_pending());
-}
-
 /// Nobody would look after it any more, nor stop it; and nothing is configured under power.
 TEST_F(ReloadedMachine, AnEnergisedAxisIsExchangedForKeysOfTheDaemonOnly) {
   auto without = configuration_;
@@ -268,82 +116,6 @@ TEST_F(ReloadedMachine, AnEnergisedAxisIsExchangedForKeysOfTheDaemonOnly) {
   ASSERT_TRUE(world_.run_until([this] { return state("a2")->link == LinkState::offline; }, 10s));
   reload(without);
   EXPECT_THAT(reasons(), ElementsAre(Reason::busy)) << "it may come back, and move by its terminals";
-}
-
-TEST_F(ReloadedMachine, NobodyLeasesAnAxisMeanwhile) {
-  complete("a2", DisableRequest{});
-  auto without = configuration_;
-  without.axes.pop_back();
-  ask(without);
-  const auto lease = machine_->leases().acquire({.client = "hmi", .axes = {"a1", "a2"}, .ttl = 1s});
-  ASSERT_FALSE(lease);
-  EXPECT_EQ(lease.error().reason, Reason::reloading);
-  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
-  EXPECT_TRUE(machine_->leases().acquire({.client = "hmi", .axes = {"a1"}, .ttl = 1s}));
-}
-
-TEST_F(ReloadedMachine, AStopForAnAxisThatGetsAnotherDriveGoesToTheOneThatItHas) {
-  complete("a2", DisableRequest{});
-  line_->forget_wire();
-  auto elsewhere = configuration_;
-  elsewhere.axes.at(1).axis.node = 4;
-  ask(elsewhere);
-  const auto stop = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
-  ASSERT_TRUE(stop);
-  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
-  EXPECT_EQ((*stop)->value().state, CommandState::done);
-  EXPECT_GE(writes(2, 0x0028), 1);
-}
-
-TEST_F(ReloadedMachine, TheEndOfTheDaemonStillSendsAStopThatWaits) {
-  ask(slower(1));
-  const auto stop = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
-  ASSERT_TRUE(stop);
-  machine_->stop_moving_axes();
-  EXPECT_FALSE(machine_->at_rest());
-  ASSERT_TRUE(world_.run_until([this] { return machine_->at_rest(); }, 10s));
-  EXPECT_EQ((*stop)->value().state, CommandState::done);
-  EXPECT_GE(writes(2, 0x0028), 1);
-  EXPECT_THAT(reasons(), ElementsAre(Reason::cancelled));
-  line_->forget_wire();
-  const auto later = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
-  ASSERT_TRUE(later);
-  ASSERT_TRUE(world_.run_until([&] { return (*later)->has_ended(); }, 10s));
-  EXPECT_EQ((*later)->value().state, CommandState::done);
-  EXPECT_GE(writes(2, 0x0028), 1);
-}
-
-TEST_F(ReloadedMachine, AStopMeanwhileDoesNotWaitForASilentDrive) {
-  complete("a1", DisableRequest{});
-  line_->network().node(1)->set_power(false);
-  world_.run_for(20s);  // its node is held back for long
-  auto wanted = slower(1);
-  wanted.axes.at(0).axis.limits.velocity = 50;
-  ask(wanted);
-  line_->forget_wire();
-  ASSERT_TRUE(machine_->submit("a2", StopRequest{}, {.client = "hmi"}));
-  world_.run_for(60ms);
-  EXPECT_GE(writes(2, 0x0028), 1);
-  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 20s));
-  EXPECT_THAT(refusals_, IsEmpty());
-}
-
-TEST_F(ReloadedMachine, AStopForAnAxisThatGoesIsSentBeforeItIsGone) {
-  complete("a2", DisableRequest{});
-  line_->forget_wire();
-  auto without = configuration_;
-  without.axes.pop_back();
-  ask(without);
-  const auto stop = machine_->submit("a2", StopRequest{}, {.client = "hmi"});
-  ASSERT_TRUE(stop);
-  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
-  EXPECT_EQ((*stop)->value().state, CommandState::done);
-  EXPECT_GE(writes(2, 0x0028), 1);
-  EXPECT_EQ(machine_->submit("a2", StopRequest{}, {}).error().reason, Reason::unknown_axis);
-  EXPECT_THAT(machine_->table()->axes, ElementsAre("a1"));
-  line_->forget_wire();
-  world_.run_for(2s);
-  EXPECT_TRUE(std::ranges::none_of(line_->wire(), [](const auto& entry) { return entry.node() == 2; }));
 }
 
 TEST_F(ReloadedMachine, AxesComeAndGoInTheOrderOfTheFile) {
