@@ -77,8 +77,12 @@ Task<Result<std::unique_ptr<LoadedMove>>> YakoRtuDrive::load_move(MoveProfile pr
   Result<void> loaded;
   for (int attempt = 0; attempt < attempts; ++attempt) {
     const auto canary = co_await read_canary(motion);
-    loaded = canary ? co_await write_canary(block, motion) : fail(canary.error());
-    if (loaded || loaded.error().reason != Reason::no_reply) break;
+    auto fresh = motion;  // as of start_once()
+    if (canary) fresh.guard.not_after = std::min(guard.not_after, canary->sent_at + setup_.reboot_guard);
+    loaded = canary ? co_await write_canary(block, fresh) : fail(canary.error());
+    if (loaded) break;
+    const bool grown_old = loaded.error().reason == Reason::expired && clock_->now() < guard.not_after;
+    if (!grown_old && loaded.error().reason != Reason::no_reply) break;
   }
   if (!loaded) {
     auto error = loaded.error();

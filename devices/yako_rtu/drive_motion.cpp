@@ -156,16 +156,15 @@ Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<Hom
   const auto canary = co_await read_canary(motion);
   if (!canary) co_return fail(canary.error());
 
-  if (homing) {
-    if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
-  } else if (const auto written = co_await write_canary(distinct(block), motion); !written) {
-    co_return written;
-  }
-
   // A drive that restarts after the canary was read is silent for longer than reboot_guard: a trigger bound
-  // within it never meets default parameters.
+  // within it never meets default parameters, and a block never hides a restart as the next canary.
   auto fresh = motion;
   fresh.guard.not_after = std::min(guard.not_after, canary->sent_at + setup_.reboot_guard);
+  if (homing) {
+    if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
+  } else if (const auto written = co_await write_canary(distinct(block), fresh); !written) {
+    co_return written;
+  }
   const auto triggered = co_await node_.write(trigger.address, trigger.value, fresh);
   if (!triggered) co_return failed(triggered.error());
   co_return Result<void>{};

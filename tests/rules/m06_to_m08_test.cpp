@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <utility>
 
+#include "buses/modbus_rtu/rtu_bus.hpp"
 #include "tests/support/rig.hpp"
 
 namespace axisd::test {
@@ -176,6 +178,40 @@ TEST(M06, ChainThatNeverSucceedsIsAnErrorAndDoesNotMove) {
   EXPECT_EQ(rig.triggers(), 0);
   rig.faults().clear();
   EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 30}).state, CommandState::done);
+}
+
+/// The block is the next canary: written over that of a drive which was restarted meanwhile, it would hide
+/// the restart, and the move would go from a counter of 0.
+TEST(M06, ABlockThatHadToWaitIsNotWrittenWithoutAnotherCanary) {
+  both_directions({}, [](const RigOptions& base) {
+    auto options = base;
+    options.adjust_drive = [](auto& node) { node.boot_time = 101ms; };
+    Rig rig(options);
+    rig.ready();
+    EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
+    rig.run(50ms);
+    bool lost = false;
+    auto wait = [](modbus_rtu::RtuBus& bus) -> Task<> {  // for nobody, before what is queued after it
+      (void)co_await bus.transact({.node = 9, .address = 0x0003, .count = 1},
+                                  {.transaction_class = TransactionClass::stop, .turnaround_max = 400ms});
+    };
+    rig.line->forget_wire();
+    const auto move = rig.submit(MoveAbsoluteRequest{.position = 20});
+    rig.line->set_on_bind([&](const WireEntry& entry) {
+      if (entry.is_write() || entry.address() != 0x0020 || std::exchange(lost, true)) return;
+      spawn(rig.world.executor(), wait(*rig.machine->find_line("line-a")), "wait");
+    });
+    ASSERT_TRUE(rig.run_until([&] { return rig.line->wire().size() > 1 && lost; }, 1s));
+    ASSERT_EQ(rig.line->wire().back().node(), 9);
+    rig.cycle_power();
+    rig.run(3s);
+    EXPECT_TRUE(move->has_ended());
+    EXPECT_EQ(rig.load_mm(), 10);
+    EXPECT_EQ(rig.triggers(), 0);
+    EXPECT_EQ(move->value().cause->reason, Reason::rebooted) << describe(move->value());
+    EXPECT_EQ(rig.state()->reboots, 1);
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+  });
 }
 
 TEST(M06, RebootGuardExpiresTheTrigger) {
