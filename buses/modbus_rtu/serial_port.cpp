@@ -242,6 +242,11 @@ Received SerialPort::receive(std::uint8_t node, Duration timeout) {
   }
 }
 
+std::size_t SerialPort::waiting() const {
+  int count = 0;
+  return ioctl(descriptor_, FIONREAD, &count) == 0 && count > 0 ? static_cast<std::size_t>(count) : 0;
+}
+
 std::expected<std::size_t, int> SerialPort::read_available(std::span<std::uint8_t> buffer) {
   const auto got = read(descriptor_, buffer.data(), buffer.size());
   if (got > 0) return static_cast<std::size_t>(got);

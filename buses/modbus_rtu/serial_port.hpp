@@ -54,6 +54,8 @@ class SerialPort {
   int send(const Frame& request);
   /// Lets libmodbus read one frame. `timeout` counts until the frame's last byte.
   Received receive(std::uint8_t node, Duration timeout);
+  /// Bytes that lie ready; 0 also where the port cannot tell.
+  [[nodiscard]] std::size_t waiting() const;
   /// Reads what is there, at most `buffer`, without waiting. Error: errno (EIO once the port hung up).
   std::expected<std::size_t, int> read_available(std::span<std::uint8_t> buffer);
 

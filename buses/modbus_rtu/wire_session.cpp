@@ -21,6 +21,8 @@ constexpr Duration longest_wait = std::chrono::seconds(1);
 /// Within this an adapter has delivered its own echo: 16 ms latency of an FTDI adapter, hubs and a busy host.
 constexpr Duration echo_latency = milliseconds(100);
 constexpr int echo_attempts = 3;
+/// A shorter sleep saves nothing.
+constexpr Duration shortest_sleep = milliseconds(1);
 /// 248..255 are reserved (Modbus over serial line 2.2): no node answers, so whatever comes back is an echo.
 constexpr std::uint8_t nobody = 248;
 
@@ -52,8 +54,9 @@ void WireSession::touch() {
   progress_.store(monotonic_now().time_since_epoch().count(), std::memory_order_relaxed);
 }
 
-/// Waits for bytes until `until`; with `cut_from` a cut ends the wait from that moment on.
-WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_from) {
+/// Waits for bytes until `until`, or with `for_bytes` false for the time alone; with `cut_from` a cut ends
+/// the wait from that moment on.
+WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes) {
   for (;;) {
     touch();
     if (wakeup_.quit.load(std::memory_order_acquire)) return Wait::quit;
@@ -61,8 +64,10 @@ WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_
     const auto end = cut ? std::min(until, *cut_from) : until;
     const auto left = end - monotonic_now();
     const auto timeout = to_timespec(std::min<Duration>(left, longest_wait));
-    std::array<pollfd, 2> watched{{{.fd = port_.descriptor(), .events = POLLIN, .revents = 0},
-                                   {.fd = wakeup_.descriptor(), .events = POLLIN, .revents = 0}}};
+    // A negative descriptor is not looked at.
+    std::array<pollfd, 2> watched{
+        {{.fd = for_bytes ? port_.descriptor() : -1, .events = POLLIN, .revents = 0},
+         {.fd = wakeup_.descriptor(), .events = POLLIN, .revents = 0}}};
     if (ppoll(watched.data(), watched.size(), &timeout, nullptr) < 0 && errno != EINTR) return Wait::failed;
     if ((watched[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return Wait::failed;
     if (watched[0].revents != 0) return Wait::bytes;
@@ -211,6 +216,32 @@ WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const Ex
   return wait_until(reply_deadline_, &cut_from);
 }
 
+/// No byte of the reply is needed before it is complete, and each piece of it would wake this thread.
+void WireSession::sleep_before_reply(const Exchange& exchange, const ExchangeResult& result) {
+  reply_awaited_ = true;
+  const auto size = reply_size(exchange.request);
+  const auto quiet = pace_.quiet(exchange.request.node, wire_time(serial_, size));
+  const auto until = std::min(result.request_end + quiet, reply_deadline_);
+  if (until - monotonic_now() < shortest_sleep) return;
+  const auto cut_from = result.request_end + exchange.turnaround_max;
+  wait_until(until, &cut_from, false);
+  reply_awaited_ = port_.waiting() < size;
+}
+
+void WireSession::note_pace(const Exchange& exchange, const ExchangeResult& result) {
+  const auto node = exchange.request.node;
+  if (result.status == ExchangeStatus::replied && result.reply.kind == ReplyKind::match)
+    pace_.complete(node, wire_time(serial_, result.reply_frame.size()), result.reply_end - result.request_end,
+                   reply_awaited_);
+  else if (result.status != ExchangeStatus::replied)
+    pace_.forget(node);
+}
+
+/// When a frame began whose last byte has just come: what arrived during the sleep was seen only after it.
+TimePoint WireSession::begin_of(const Frame& frame, TimePoint seen) const {
+  return std::min(seen, std::max(request_end_, last_byte_ - wire_time(serial_, frame.size())));
+}
+
 /// Lets libmodbus read one frame. True: the exchange has ended.
 bool WireSession::take_frame(const Exchange& exchange, ExchangeResult& result) {
   const auto first_byte = monotonic_now();
@@ -225,7 +256,7 @@ bool WireSession::take_frame(const Exchange& exchange, ExchangeResult& result) {
   if (reply.kind == ReplyKind::match || reply.kind == ReplyKind::exception) {
     result.reply = reply;
     result.reply_frame = received.bytes;
-    result.reply_begin = first_byte;
+    result.reply_begin = begin_of(received.bytes, first_byte);
     end(result, ExchangeStatus::replied);
     return true;
   }
@@ -240,7 +271,7 @@ bool WireSession::take_frame(const Exchange& exchange, ExchangeResult& result) {
     return false;
   }
   result.reply_frame = received.bytes;
-  result.reply_begin = first_byte;
+  result.reply_begin = begin_of(received.bytes, first_byte);
   settle(result);
   end(result, ExchangeStatus::corrupt);
   return true;
@@ -258,11 +289,13 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
   request_end_ = last_byte_ = result.request_end;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
   if (echo_ && !pass_echo(exchange, result)) return result;
+  sleep_before_reply(exchange, result);
   for (;;) {
     const auto wait = wait_for_reply(exchange, result);
     if (wait == Wait::bytes) {
-      if (take_frame(exchange, result)) return result;
-      continue;
+      if (!take_frame(exchange, result)) continue;
+      note_pace(exchange, result);
+      return result;
     }
     last_byte_ = std::max(last_byte_, request_end_);
     if (wait == Wait::failed) {
@@ -271,6 +304,7 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
       const auto silent = wait == Wait::timeout ? ExchangeStatus::timeout : ExchangeStatus::cut;
       end(result, damaged_ ? ExchangeStatus::corrupt : silent);
     }
+    note_pace(exchange, result);
     return result;
   }
 }

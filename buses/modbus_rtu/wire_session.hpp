@@ -6,6 +6,7 @@
 #include <span>
 
 #include "buses/modbus_rtu/line.hpp"
+#include "buses/modbus_rtu/reply_pace.hpp"
 #include "buses/modbus_rtu/serial_port.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "buses/modbus_rtu/wakeup.hpp"
@@ -48,8 +49,11 @@ class WireSession {
     int native_error = 0;
   };
 
-  Wait wait_until(TimePoint until, const TimePoint* cut_from);
+  Wait wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes = true);
   Wait wait_for_reply(const Exchange& exchange, const ExchangeResult& result);
+  void sleep_before_reply(const Exchange& exchange, const ExchangeResult& result);
+  void note_pace(const Exchange& exchange, const ExchangeResult& result);
+  [[nodiscard]] TimePoint begin_of(const Frame& frame, TimePoint seen) const;
   bool pass_echo(const Exchange& exchange, ExchangeResult& result);
   bool take_frame(const Exchange& exchange, ExchangeResult& result);
   bool is_own_echo(const Exchange& exchange, const Frame& damaged);
@@ -68,7 +72,9 @@ class WireSession {
   TimePoint last_byte_;       ///< end of the last character on the wire, sent or received
   TimePoint request_end_;     ///< when the last request has left the adapter
   TimePoint reply_deadline_;  ///< of the exchange under way
-  bool damaged_ = false;      ///< unsound bytes came during the exchange under way
+  ReplyPace pace_;
+  bool reply_awaited_ = false;  ///< it was not complete when the sleep before it ended
+  bool damaged_ = false;        ///< unsound bytes came during the exchange under way
   bool echo_known_ = false;
   bool echo_ = false;
   int stray_frames_ = 0;  ///< bursts that nobody asked for, not yet reported

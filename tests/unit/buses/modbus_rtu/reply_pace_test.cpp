@@ -1,0 +1,94 @@
+#include "buses/modbus_rtu/reply_pace.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace axisd::modbus_rtu {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Duration on_wire = 2ms;
+
+/// A node as it answers after `turnaround`; the sleep is over `late` after its time.
+Duration ask(ReplyPace& pace, Duration turnaround, Duration late = {}) {
+  const auto slept = pace.quiet(1, on_wire);
+  const auto woken = slept == Duration::zero() ? Duration::zero() : slept + late;
+  const auto complete = turnaround + on_wire;
+  pace.complete(1, on_wire, std::max(woken, complete), woken < complete);
+  return slept;
+}
+
+TEST(ReplyPace, SleepsUntilShortlyBeforeTheReplyCanBeComplete) {
+  ReplyPace pace;
+  for (int i = 0; i < ReplyPace::measured; ++i)
+    EXPECT_EQ(ask(pace, 5ms), Duration::zero()) << "not known yet";
+  EXPECT_EQ(ask(pace, 5ms), 7ms - ReplyPace::margin);
+  EXPECT_EQ(pace.quiet(1, 12ms), 17ms - ReplyPace::margin) << "a longer reply of the same node";
+  EXPECT_EQ(pace.quiet(2, on_wire), Duration::zero()) << "another node";
+}
+
+TEST(ReplyPace, KeepsToTheSoonest) {
+  ReplyPace pace;
+  for (const auto turnaround : {9ms, 5ms, 7ms}) ask(pace, turnaround);
+  EXPECT_EQ(pace.quiet(1, on_wire), 7ms - ReplyPace::margin);
+  ask(pace, 4900us);
+  EXPECT_EQ(pace.quiet(1, on_wire), 6900us - ReplyPace::margin) << "and to one that is sooner yet";
+}
+
+TEST(ReplyPace, FollowsANodeThatBecameSlower) {
+  ReplyPace pace;
+  for (int i = 0; i < 5; ++i) ask(pace, 2ms);
+  ask(pace, 10ms);
+  EXPECT_LT(pace.quiet(1, on_wire), 5ms) << "one slow reply is an accident";
+  for (int i = 0; i < 2 * ReplyPace::remembered; ++i) ask(pace, 10ms);
+  EXPECT_GT(pace.quiet(1, on_wire), 11ms);
+}
+
+TEST(ReplyPace, OneThatBecameFasterCostsOneReplyOfItsTime) {
+  ReplyPace pace;
+  for (int i = 0; i < 5; ++i) ask(pace, 40ms);
+  EXPECT_GT(ask(pace, 2ms), 40ms) << "not known in advance";
+  for (int i = 0; i < ReplyPace::measured; ++i)
+    EXPECT_EQ(ask(pace, 2ms), Duration::zero()) << "measured anew";
+  EXPECT_EQ(ask(pace, 2ms), 4ms - ReplyPace::margin);
+}
+
+TEST(ReplyPace, ANodeThatAnswersIrregularlyLosesNearlyNothing) {
+  ReplyPace pace;
+  std::minstd_rand engine(1);
+  Duration in_all{}, lost{}, slept_in_all{};
+  for (int i = 0; i < 5000; ++i) {
+    const auto turnaround = std::uniform_int_distribution(2000, 10000)(engine) * 1us;
+    const auto slept = ask(pace, turnaround);
+    in_all += turnaround + on_wire;
+    lost += std::max(slept - turnaround - on_wire, Duration::zero());
+    slept_in_all += slept;
+  }
+  EXPECT_LT(100 * lost, in_all);
+  EXPECT_GT(3 * slept_in_all, in_all) << "and most of what can be slept through is";
+}
+
+TEST(ReplyPace, WokenTooLateMeasuresAnew) {
+  ReplyPace pace;
+  for (int i = 0; i < 5; ++i) ask(pace, 5ms);
+  ask(pace, 5ms, 1ms);
+  EXPECT_EQ(pace.quiet(1, on_wire), Duration::zero());
+}
+
+TEST(ReplyPace, ReliesOnNothingAfterSilence) {
+  ReplyPace pace;
+  for (int i = 0; i < 5; ++i) ask(pace, 5ms);
+  pace.forget(1);
+  EXPECT_EQ(pace.quiet(1, on_wire), Duration::zero());
+}
+
+TEST(ReplyPace, AReplyBeforeItsTimeOnTheWireIsOneWithoutTurnaround) {
+  ReplyPace pace;  // the adapter's clock, or the end of the request, is off
+  for (int i = 0; i < 5; ++i) pace.complete(1, on_wire, 1900us, true);
+  EXPECT_EQ(pace.quiet(1, on_wire), on_wire - ReplyPace::margin);
+}
+
+}  // namespace
+}  // namespace axisd::modbus_rtu
