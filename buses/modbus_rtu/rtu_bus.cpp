@@ -21,7 +21,7 @@ RtuBus::RtuBus(Executor executor, Clock& clock, LineSettings settings, std::uniq
       port_changed_(executor_, clock),
       statistics_(settings_.serial(), clock.now()) {}
 
-RtuBus::~RtuBus() = default;
+RtuBus::~RtuBus() { line_.reset(); }  // it looks at what is armed
 
 void RtuBus::start(ExchangeObserver observer) {
   observer_ = std::move(observer);
@@ -124,7 +124,14 @@ Duration RtuBus::turnaround_max(std::uint8_t node) const {
   return own == turnarounds_.end() ? settings_.turnaround_max : own->second;
 }
 
-void RtuBus::hasten(std::uint8_t node, TransactionClass to) { queue_.hasten(node, to); }
+/// What is armed but not bound yet is hastened in the queue, too: a stop may take its place.
+void RtuBus::hasten(std::uint8_t node, TransactionClass to) {
+  const bool armed = current_ && current_->exchange.request.node == node && current_->transaction_class > to;
+  const bool revoked = armed && line_->revoke();
+  if (revoked) queue_.put_back(std::exchange(current_, nullptr));
+  queue_.hasten(node, to);
+  if (revoked) pump();
+}
 
 /// Brings line and queue in step: the most urgent sendable transaction belongs into the slot.
 void RtuBus::pump() {

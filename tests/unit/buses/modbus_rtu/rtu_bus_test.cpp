@@ -41,6 +41,30 @@ TEST(RtuBus, ALateReplyNeverAnswersAnotherRead) {
   }
 }
 
+/// Its stopping axis waits for it, and has nothing else under way.
+TEST(RtuBus, AReadingThatIsArmedIsHastenedThoughAStopTakesItsPlace) {
+  BusRig rig;
+  const auto read = [&](std::uint8_t node, std::uint16_t address, TransactionClass transaction_class) {
+    rig.transact(std::to_string(address), {.node = node, .address = address, .count = 1},
+                 {.transaction_class = transaction_class});
+  };
+  read(2, 0x0003, TransactionClass::idle_state);
+  while (rig.results.empty()) rig.world.run_for(100us);
+  rig.line->forget_wire();
+  read(1, 0x0004, TransactionClass::idle_state);
+  rig.world.run_for(1us);  // armed; the line must be silent for a while yet
+  EXPECT_TRUE(rig.line->wire().empty());
+  rig.bus->hasten(1, TransactionClass::moving_state);
+  rig.transact("stop",
+               {.node = 2, .function = Function::write_single_register, .address = 0x0028, .values = {0}},
+               {.transaction_class = TransactionClass::stop});
+  read(2, 0x0005, TransactionClass::moving_state);
+  rig.world.run_for(200ms);
+  std::vector<std::uint16_t> order;
+  for (const auto& entry : rig.line->wire()) order.push_back(entry.address());
+  EXPECT_EQ(order, (std::vector<std::uint16_t>{0x0028, 0x0004, 0x0005}));
+}
+
 /// The echo of a write that was late answers the same write when it is repeated: a read between the two may
 /// still be on its way.
 TEST(RtuBus, TheEchoOfARepeatedWriteDoesNotProveThatAReadIsNoLongerLate) {
