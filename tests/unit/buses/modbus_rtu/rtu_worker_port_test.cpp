@@ -95,11 +95,11 @@ TEST(RtuWorkerPort, HangUpIsNoticedWhileIdle) {
 
 TEST(RtuWorkerPort, ArmedExchangeOfALostPortEndsUnsentExactlyOnce) {
   ScriptedNode node(silent());
-  WorkerBench bench(line_at(110, node.path()));  // 318 ms of silence: armed, not yet bound
+  WorkerBench bench(line_at(slow, node.path()));
   const auto exchange = write_of(0x0027, 1);
   bench.on_open = [&] {
+    node.hang_up();  // the worker does not know it yet: the line must be silent first
     bench.worker->arm(exchange);
-    node.hang_up();
   };
   bench.start();
   const auto result = bench.next_result();
