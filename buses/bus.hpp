@@ -39,7 +39,8 @@ class Bus {
   /// Called for each stop before its frame is queued; what waits for others costs it no time.
   virtual void purge_superseded(std::uint8_t node, const AxisGate& gate) = 0;
   /// The axis of `node` is offline: readings for it that wait end as superseded, so that what it is owed now
-  /// need not wait for them. Not those of class `parameters`, which others asked for.
+  /// need not wait for them. Not those of class `parameters`, which others asked for, unless they were
+  /// hastened.
   virtual void give_up_readings(std::uint8_t /*node*/) {}
   /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
   virtual void hasten(std::uint8_t node, TransactionClass to) = 0;

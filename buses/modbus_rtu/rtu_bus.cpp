@@ -124,11 +124,16 @@ Duration RtuBus::turnaround_max(std::uint8_t node) const {
   return own == turnarounds_.end() ? settings_.turnaround_max : own->second;
 }
 
-/// What is armed but not bound yet is hastened in the queue, too: a stop may take its place.
+/// What is armed but not bound yet is hastened in the queue, too: a stop may take its place. What is under
+/// way may have to be followed by what it was sent for (resync_before).
 void RtuBus::hasten(std::uint8_t node, TransactionClass to) {
-  const bool armed = current_ && current_->exchange.request.node == node && current_->transaction_class > to;
-  const bool revoked = armed && line_->revoke();
-  if (revoked) queue_.put_back(std::exchange(current_, nullptr));
+  const bool concerned =
+      current_ && current_->exchange.request.node == node && current_->transaction_class > to;
+  const bool revoked = concerned && line_->revoke();
+  if (revoked)
+    queue_.put_back(std::exchange(current_, nullptr));
+  else if (concerned)
+    current_->transaction_class = to;
   queue_.hasten(node, to);
   if (revoked) pump();
 }
@@ -257,7 +262,8 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
       wire_time(resync->exchange.serial.value_or(settings_.serial()), reply_size(request)) -
       wire_time(resync->exchange.serial.value_or(settings_.serial()), reply_size(waiting->exchange.request));
   auto held = std::make_shared<TransactionPtr>(std::move(waiting));
-  resync->on_end.emplace_back([this, held](const Transaction&, const ExchangeResult& result) {
+  resync->on_end.emplace_back([this, held](const Transaction& ended, const ExchangeResult& result) {
+    (*held)->transaction_class = std::min((*held)->transaction_class, ended.transaction_class);
     if (result.status == ExchangeStatus::replied) return queue_.put_back(std::move(*held));
     for (const auto& tell : (*held)->on_end) tell(**held, result);
   });

@@ -65,6 +65,27 @@ TEST(RtuBus, AReadingThatIsArmedIsHastenedThoughAStopTakesItsPlace) {
   EXPECT_EQ(order, (std::vector<std::uint16_t>{0x0028, 0x0004, 0x0005}));
 }
 
+/// As before, where another read has to go out before it: the first one was lost.
+TEST(RtuBus, AReadingIsHastenedWhileAnotherGoesBeforeIt) {
+  BusRig rig;
+  const auto read = [&](std::string name, std::uint8_t node, std::uint16_t address, TransactionClass of) {
+    rig.transact(std::move(name), {.node = node, .address = address, .count = 1}, {.transaction_class = of});
+  };
+  rig.line->network().faults().add({.kind = FaultKind::drop_reply, .node = 1, .function = 3});
+  read("lost", 1, 0x0004, TransactionClass::idle_state);
+  while (rig.results.empty() || rig.bus->holds_back(1)) rig.world.run_for(1ms);
+  rig.line->forget_wire();
+  read("hastened", 1, 0x0004, TransactionClass::idle_state);
+  while (rig.line->wire().empty()) rig.world.run_for(100us);
+  rig.bus->hasten(1, TransactionClass::moving_state);
+  for (const std::uint16_t address : {5, 6})
+    read(std::to_string(address), 2, address, TransactionClass::moving_state);
+  rig.world.run_for(200ms);
+  std::vector<int> order;
+  for (const auto& entry : rig.line->wire()) order.push_back(entry.node());
+  EXPECT_EQ(order, (std::vector<int>{1, 1, 2, 2}));
+}
+
 /// The echo of a write that was late answers the same write when it is repeated: a read between the two may
 /// still be on its way.
 TEST(RtuBus, TheEchoOfARepeatedWriteDoesNotProveThatAReadIsNoLongerLate) {
