@@ -23,6 +23,10 @@ constexpr Duration echo_latency = milliseconds(100);
 constexpr int echo_attempts = 3;
 /// A shorter sleep saves nothing.
 constexpr Duration shortest_sleep = milliseconds(1);
+
+bool is_paced(const Exchange& exchange) {
+  return exchange.request.function == Function::read_holding_registers;
+}
 /// 248..255 are reserved (Modbus over serial line 2.2): no node answers, so whatever comes back is an echo.
 constexpr std::uint8_t nobody = 248;
 
@@ -213,12 +217,16 @@ bool WireSession::is_own_echo(const Exchange& exchange, const Frame& damaged) {
 
 WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const ExchangeResult& result) {
   const auto cut_from = result.request_end + exchange.turnaround_max;
-  return wait_until(reply_deadline_, &cut_from);
+  const auto wait = wait_until(reply_deadline_, &cut_from);
+  // One that began during the sleep is heard to its end.
+  return wait == Wait::quit && port_.waiting() > 0 ? Wait::bytes : wait;
 }
 
-/// No byte of the reply is needed before it is complete, and each piece of it would wake this thread.
+/// No byte of the reply is needed before it is complete, and each piece of it would wake this thread. Only
+/// for reads: a write may take a drive a thousand times as long as the one before.
 void WireSession::sleep_before_reply(const Exchange& exchange, const ExchangeResult& result) {
   reply_awaited_ = true;
+  if (!is_paced(exchange)) return;
   const auto size = reply_size(exchange.request);
   const auto quiet = pace_.quiet(exchange.request.node, wire_time(serial_, size));
   const auto until = std::min(result.request_end + quiet, reply_deadline_);
@@ -230,11 +238,11 @@ void WireSession::sleep_before_reply(const Exchange& exchange, const ExchangeRes
 
 void WireSession::note_pace(const Exchange& exchange, const ExchangeResult& result) {
   const auto node = exchange.request.node;
-  if (result.status == ExchangeStatus::replied && result.reply.kind == ReplyKind::match)
+  if (result.status != ExchangeStatus::replied)
+    pace_.forget(node);
+  else if (is_paced(exchange) && result.reply.kind == ReplyKind::match)
     pace_.complete(node, wire_time(serial_, result.reply_frame.size()), result.reply_end - result.request_end,
                    reply_awaited_);
-  else if (result.status != ExchangeStatus::replied)
-    pace_.forget(node);
 }
 
 /// When a frame began whose last byte has just come: what arrived during the sleep was seen only after it.
@@ -288,7 +296,10 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
   result.request_end = monotonic_now() + wire_time(serial_, exchange.frame.size());
   request_end_ = last_byte_ = result.request_end;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
-  if (echo_ && !pass_echo(exchange, result)) return result;
+  if (echo_ && !pass_echo(exchange, result)) {
+    note_pace(exchange, result);
+    return result;
+  }
   sleep_before_reply(exchange, result);
   for (;;) {
     const auto wait = wait_for_reply(exchange, result);

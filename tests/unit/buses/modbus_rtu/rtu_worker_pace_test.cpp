@@ -16,7 +16,7 @@ class RtuWorkerPace : public ::testing::Test {
  protected:
   void learn() {
     bench_.start_and_open();
-    for (int i = 0; i <= ReplyPace::measured; ++i)
+    for (int i = 0; i < ReplyPace::measured; ++i)
       ASSERT_EQ(bench_.run(read_).status, ExchangeStatus::replied);
   }
   void answer(const ScriptedNode& node, const Bytes& request) const {
@@ -24,6 +24,9 @@ class RtuWorkerPace : public ::testing::Test {
     const auto refused = static_cast<std::uint8_t>(request[1] | 0x80U);
     node.say(refuses_ ? framed({request[0], refused, 0x05}) : proper_reply(request));
   }
+
+  /// Far longer than a busy machine stalls.
+  static constexpr auto long_pause = milliseconds(1500);
 
   std::atomic<int> pause_ms_ = 100;  ///< negative: no answer
   std::atomic<bool> refuses_ = false;
@@ -59,23 +62,25 @@ TEST_F(RtuWorkerPace, AnExceptionIsHeard) {
 }
 
 TEST_F(RtuWorkerPace, ACutEndsTheSleepOverANodeThatFellSilent) {
+  pause_ms_ = long_pause / milliseconds(1);
   learn();
   pause_ms_ = -1;
-  auto exchange = read_of(0x0020, 4, 10 * ample);
+  auto exchange = read_of(0x0020, 4);
   exchange.turnaround_max = milliseconds(20);
   const auto before = node_.seen().size();
   bench_.worker->arm(exchange);
   ASSERT_TRUE(bench_.run_until([&] { return node_.seen().size() > before; }));
   bench_.worker->cut_wait();
-  EXPECT_EQ(bench_.next_result().status, ExchangeStatus::cut);
+  const auto result = bench_.next_result();
+  EXPECT_EQ(result.status, ExchangeStatus::cut);
+  EXPECT_LT(result.reply_end, result.request_end + long_pause);
 }
 
 TEST_F(RtuWorkerPace, ACutDuringTheSleepLosesNoReplyThatHasCome) {
   learn();
   pause_ms_ = 0;
   auto exchange = read_of(0x0020, 4);
-  exchange.turnaround_max =
-      milliseconds(50);  // the reply is there by then; the sleep would last twice as long
+  exchange.turnaround_max = milliseconds(50);  // the sleep would last twice as long
   const auto requests = node_.seen().size();
   const auto results = bench_.results.size();
   bench_.worker->arm(exchange);
@@ -86,10 +91,23 @@ TEST_F(RtuWorkerPace, ACutDuringTheSleepLosesNoReplyThatHasCome) {
 }
 
 TEST_F(RtuWorkerPace, TheTimeoutStillHolds) {
+  pause_ms_ = long_pause / milliseconds(1);
   learn();
   pause_ms_ = -1;
   const auto result = bench_.run(read_of(0x0020, 4, milliseconds(30)));
   EXPECT_EQ(result.status, ExchangeStatus::timeout);
+  EXPECT_LT(result.reply_end, result.request_end + long_pause);
+}
+
+TEST_F(RtuWorkerPace, WhatAWriteTakesSaysNothingOfReads) {
+  pause_ms_ = long_pause / milliseconds(1);
+  bench_.start_and_open();
+  for (int i = 0; i < ReplyPace::measured; ++i)
+    ASSERT_EQ(bench_.run(write_of(0x0020, 1)).status, ExchangeStatus::replied);
+  pause_ms_ = 0;
+  const auto result = bench_.run(read_);
+  EXPECT_EQ(result.status, ExchangeStatus::replied);
+  EXPECT_LT(result.reply_end, result.request_end + long_pause);
 }
 
 }  // namespace
