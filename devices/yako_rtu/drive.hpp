@@ -102,6 +102,7 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] std::vector<ContinuityMark> marks_until(const MotionBlock& block) const;
   Task<Result<void>> send_stop(StopKind kind, bool patient);
   Task<Result<void>> write_canary(MotionBlock block, TransactionOptions options);
+  Task<Result<void>> replace_canary(MotionBlock block);
   Task<Result<Answer>> read_canary(TransactionOptions options);
   [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
   /// A content that a power-up may leave: never a canary.

@@ -136,18 +136,7 @@ Task<Result<YakoRtuDrive::Registers>> YakoRtuDrive::read_registers(std::vector<s
 Task<Result<void>> YakoRtuDrive::configure() {
   if (setup_error_) co_return failed(*setup_error_);
   // The canary goes first and is read last: a restart in between would undo what was found or written.
-  const auto found = co_await node_.read_patiently(reg::start_speed, 6, in(TransactionClass::parameters));
-  if (!found) co_return failed(found.error());
-  MotionBlock block{};
-  std::ranges::copy(found->registers, block.begin());
-  const bool known = std::ranges::find(expected_, block) != expected_.end();
-  const bool restarted = !known && !expected_.empty();
-  if (!known) forget_power_cycle(block);
-  // Whatever asked for this: a restart that nobody had noticed must not be overwritten here.
-  if (restarted) co_return fail(lost_memory());
-  const auto marked =
-      co_await write_canary(distinct(fresh_neutral_block()), in(TransactionClass::parameters));
-  if (!marked) co_return marked;
+  if (const auto marked = co_await replace_canary(fresh_neutral_block()); !marked) co_return marked;
   if (const auto done = co_await bring_to(required_); !done) co_return done;
   co_return co_await check_continuity(TransactionClass::parameters);
 }

@@ -62,6 +62,26 @@ Task<Result<void>> YakoRtuDrive::write_canary(MotionBlock block, TransactionOpti
   co_return failed(written.error());
 }
 
+/// Whatever asks for this: a restart that nobody had noticed must not be overwritten. So the new one is
+/// written soon after the old one was read, as in start_once(), and with the class that can be soon.
+Task<Result<void>> YakoRtuDrive::replace_canary(MotionBlock block) {
+  for (int attempt = 1;; ++attempt) {
+    const auto found = co_await node_.read_patiently(reg::start_speed, 6, in(TransactionClass::motion));
+    if (!found) co_return failed(found.error());
+    MotionBlock present{};
+    std::ranges::copy(found->registers, present.begin());
+    const bool known = std::ranges::find(expected_, present) != expected_.end();
+    const bool restarted = !known && !expected_.empty();
+    if (!known) forget_power_cycle(present);
+    if (restarted) co_return fail(lost_memory());
+    auto fresh = in(TransactionClass::motion);
+    fresh.deadline = found->sent_at + setup_.reboot_guard;
+    auto written = co_await write_canary(distinct(block), fresh);
+    const bool grown_old = !written && written.error().reason == Reason::expired;
+    if (!grown_old || attempt == chain_attempts) co_return written;
+  }
+}
+
 Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions options) {
   auto answer = co_await node_.read(reg::start_speed, 6, std::move(options));
   if (!answer) co_return failed(answer.error());

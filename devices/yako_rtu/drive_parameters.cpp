@@ -121,7 +121,7 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
   MotionBlock neutral = fresh_neutral_block();
   neutral[3] = 0;
   neutral = distinct(neutral);
-  if (const auto written = co_await write_canary(neutral, parameters()); !written) co_return written;
+  if (const auto written = co_await replace_canary(neutral); !written) co_return written;
   const auto saved = co_await node_.write(reg::parameter_setting, 2, eeprom());
   const bool executed = saved || saved.error().outcome == Outcome::unknown;
   if (executed) {

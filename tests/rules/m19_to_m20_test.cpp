@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "buses/modbus_rtu/rtu_bus.hpp"
 #include "tests/support/rig.hpp"
 
 namespace axisd::test {
@@ -320,6 +321,36 @@ TEST(M20, ARecordThatFailedOnceIsVoidForEver) {
   rig.stop_daemon();
   rig.start_daemon();
   EXPECT_EQ(rig.state()->trust, PositionTrust::unknown) << "a power cycle was forgotten";
+}
+
+/// The canary is replaced when a drive is configured: written over that of one that was restarted since it
+/// was read, it would hide the restart, and the record would be taken for true at a counter of 0.
+TEST(M20, ARestartWhileTheCanaryIsBeingReplacedIsNoProof) {
+  Rig rig({.switches = {{"enabled_at_power_up", true}},
+           .adjust_drive = [](auto& node) { node.boot_time = 101ms; },
+           .persistence = true});
+  rig.ready();
+  rig.complete(MoveAbsoluteRequest{.position = 10});
+  rig.run(500ms);
+  rig.stop_daemon();
+  rig.start_daemon(false);
+  auto wait = [](modbus_rtu::RtuBus& bus) -> Task<> {  // for nobody, before what is queued after it
+    (void)co_await bus.transact({.node = 9, .address = 0x0003, .count = 1},
+                                {.transaction_class = TransactionClass::stop, .turnaround_max = 400ms});
+  };
+  int canaries_read = 0;
+  rig.line->set_on_bind([&](const WireEntry& entry) {
+    if (entry.is_write() || entry.address() != 0x0020 || ++canaries_read != 2)
+      return;  // the first is the proof
+    spawn(rig.world.executor(), wait(*rig.machine->find_line("line-a")), "wait");
+  });
+  ASSERT_TRUE(
+      rig.run_until([&] { return !rig.line->wire().empty() && rig.line->wire().back().node() == 9; }, 5s));
+  EXPECT_EQ(rig.writes_of(0x0020), 0) << "not yet replaced";
+  rig.cycle_power();
+  rig.run(5s);
+  EXPECT_EQ(rig.state()->link, LinkState::online);
+  EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
 }
 
 TEST(M20, WithoutStorageThereIsNoSetPosition) {
