@@ -24,6 +24,7 @@ bool is_input_function(const RegisterSetting& setting) { return setting.key.star
 
 std::vector<std::uint16_t> addresses_of(const std::vector<RegisterSetting>& settings) {
   std::vector<std::uint16_t> addresses;
+  addresses.reserve(settings.size());
   for (const auto& setting : settings) addresses.push_back(setting.address);
   return addresses;
 }

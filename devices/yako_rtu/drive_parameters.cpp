@@ -55,6 +55,7 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_parameters(
   const auto registers = co_await read_registers(std::move(wanted), parameters());
   if (!registers) co_return fail(registers.error());
   std::vector<ParameterValue> values;
+  values.reserve(addresses.size());
   for (const auto address : addresses) {
     const auto* parameter = find_parameter(model_->descriptor->parameters, address);
     const auto word = registers->find(static_cast<std::uint16_t>(address));
@@ -69,6 +70,7 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_parameters(
 
 Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::vector<ParameterValue> values) {
   std::vector<std::uint32_t> addresses;
+  addresses.reserve(values.size());
   for (const auto& value : values) addresses.push_back(value.address);
   const auto before = co_await read_parameters(addresses);
   if (!before) co_return fail(before.error());
