@@ -108,13 +108,16 @@ GroupRun::MaybeFailure GroupRun::unready() const {
   return std::nullopt;
 }
 
-/// What was not sent at one member may have been forbidden by another.
+/// What was not sent at one member may have been forbidden by another, or by what ended the member itself.
 GroupRun::Failure GroupRun::attributed(std::size_t member, Error cause) const {
   const bool not_sent = cause.outcome == Outcome::not_sent &&
                         (cause.reason == Reason::superseded || cause.reason == Reason::lease_lost ||
                          cause.reason == Reason::expired);
-  if (not_sent && members_[member]->ready())
+  if (not_sent && members_[member]->ready()) {
     if (auto other = unready()) return *std::move(other);
+  } else if (not_sent) {
+    cause = commands_[member]->value().cause.value_or(std::move(cause));
+  }
   return {.member = member, .cause = std::move(cause)};
 }
 
