@@ -42,6 +42,9 @@ class Bus {
   /// need not wait for them. Not those of class `parameters`, which others asked for, unless they were
   /// hastened.
   virtual void give_up_readings(std::uint8_t /*node*/) {}
+  /// A state that the bus reads again and again by itself, because it stays the same, is told with the next
+  /// reading, or at once that there is none (Drive::watch_state).
+  virtual void end_repetition(std::uint8_t /*node*/) {}
   /// An axis became busy: what already waits for its node becomes as urgent as what it asks for now.
   virtual void hasten(std::uint8_t node, TransactionClass to) = 0;
   /// Requests to this node wait for their turn, because it does not answer, or because nobody could tell the

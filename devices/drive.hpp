@@ -39,6 +39,7 @@ struct DriveSample {
   bool negative_direction = false;
   std::uint32_t inputs = 0;  ///< bit per terminal, in the descriptor's order; 1 active
   std::uint32_t outputs = 0;
+  bool operator==(const DriveSample&) const = default;
 };
 
 struct DriveIdentity {
@@ -158,6 +159,14 @@ class Drive {
   /// The whole state, coherent as far as the bus allows. Error `rebooted`: as of check_continuity(), where
   /// the node itself said so.
   virtual Task<Result<DriveSample>> read_state(TransactionClass transaction_class) = 0;
+
+  /// The same, in class idle_state, every `period` from now on for as long as `goes_on` says of a reading
+  /// that it tells nothing new. Ends with the first that does; nothing: Bus::end_repetition() came between
+  /// two.
+  virtual Task<Result<std::optional<DriveSample>>> watch_state(
+      Duration /*period*/, std::function<bool(const DriveSample&)> /*goes_on*/) {
+    co_return co_await read_state(TransactionClass::idle_state);
+  }
 
   /// Reads the canary (M7). Error `rebooted` if the drive lost its memory since configure().
   virtual Task<Result<void>> check_continuity(TransactionClass transaction_class) = 0;

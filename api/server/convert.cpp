@@ -107,8 +107,9 @@ void to_proto(const Command& from, v1::Command& to) {
   if (from.ended_at) to_proto(*from.ended_at, *to.mutable_ended_at());
 }
 
-void set_age(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
-  to_proto(std::max(now - from.sampled_before, Duration::zero()), *to.mutable_age());
+void update_times(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
+  if (to.has_measured_at()) to_proto(from.sampled.measured_at(), *to.mutable_measured_at());
+  if (to.has_age()) to_proto(std::max(now - from.sampled.before(), Duration::zero()), *to.mutable_age());
 }
 
 void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
@@ -138,9 +139,10 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   for (const auto& terminal : from.outputs) to_proto(terminal, *to.add_outputs());
   // A drive that never answered has no sample: both times stay unset instead of naming 1970 and an absurd
   // age.
-  if (from.sampled_before != TimePoint{}) {
-    to_proto(from.measured_at, *to.mutable_measured_at());
-    set_age(from, now, to);
+  if (from.sampled.known()) {
+    to.mutable_measured_at();
+    to.mutable_age();
+    update_times(from, now, to);
   }
   to.set_simulated(from.simulated);
   to.set_command_id(from.command_id);

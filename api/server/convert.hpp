@@ -28,8 +28,8 @@ void to_proto(const MotionValues& from, v1::MotionValues& to);
 void to_proto(const Command& from, v1::Command& to);
 /// `now` is Machine::now() of this very message: AxisState.age is counted up to it.
 void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to);
-/// Its age alone, where the rest is as it was. Precondition: there is a sample.
-void set_age(const AxisSnapshot& from, TimePoint now, v1::AxisState& to);
+/// The times alone, where the rest is as it was: those that `to` has.
+void update_times(const AxisSnapshot& from, TimePoint now, v1::AxisState& to);
 
 /// nullopt: not a valid google.protobuf.Duration, or beyond +-100 years.
 [[nodiscard]] std::optional<Duration> from_proto(const google::protobuf::Duration& from);

@@ -109,10 +109,10 @@ void WatchHub::refresh(Group& group, TimePoint now) {
   serialise(group, now);
 }
 
-/// At a high rate few axes have changed since the last batch: of the others only the age has.
+/// At a high rate few axes have changed since the last batch: of the others only the times have.
 void WatchHub::show(Shown& shown, AxisSnapshotPtr snapshot, const WatchScope& scope, TimePoint now) {
   if (shown.snapshot == snapshot) {
-    if (shown.state->has_age()) set_age(*snapshot, now, *shown.state);
+    update_times(*snapshot, now, *shown.state);
     return;
   }
   shown.state->Clear();

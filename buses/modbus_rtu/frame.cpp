@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace axisd::modbus_rtu {
 namespace {
@@ -80,7 +81,9 @@ bool answers(const Request& request, std::span<const std::uint8_t> reply) {
 }  // namespace
 
 Frame::Frame(std::span<const std::uint8_t> bytes) {
-  for (const auto byte : bytes) append(byte);
+  if (bytes.size() > capacity) throw std::out_of_range("a frame has 256 bytes at most");
+  std::ranges::copy(bytes, bytes_.begin());
+  size_ = bytes.size();
 }
 
 void Frame::append_word(std::uint16_t word) {
@@ -132,6 +135,13 @@ std::size_t reply_size(const Request& request) {
   return is_write(request.function) ? write_reply_size : 5U + 2U * request.count;
 }
 
+std::size_t reply_size(std::span<const std::uint8_t> head) {
+  const auto function = head[1];
+  if ((function & exception_bit) != 0) return exception_size;
+  if (function >= 0x01 && function <= 0x04) return 5U + head[2];  // reads, with a byte count
+  return function == 0x05 || function == 0x06 || function == 0x0F || function == 0x10 ? write_reply_size : 0;
+}
+
 Reply decode(const Request& request, std::span<const std::uint8_t> reply) {
   // The CRC of a frame together with its own CRC bytes is 0.
   if (reply.size() < smallest_frame || reply.size() > Frame::capacity || crc16(reply) != 0)
@@ -142,9 +152,10 @@ Reply decode(const Request& request, std::span<const std::uint8_t> reply) {
     return {.kind = ReplyKind::exception, .exception_code = reply[2]};
   if (reply[1] != function || !answers(request, reply)) return {.kind = ReplyKind::foreign};
   Reply match{.kind = ReplyKind::match};
-  if (!is_write(request.function))
-    for (std::size_t index = 0; index < request.count; ++index)
-      match.registers.push_back(word_at(reply, 3 + 2 * index));
+  if (is_write(request.function)) return match;
+  match.registers.reserve(request.count);
+  for (std::size_t index = 0; index < request.count; ++index)
+    match.registers.push_back(word_at(reply, 3 + 2 * index));
   return match;
 }
 

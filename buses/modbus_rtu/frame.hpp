@@ -56,6 +56,10 @@ Result<Frame> encode(const Request& request);
 /// Size of the normal reply to `request` in bytes.
 std::size_t reply_size(const Request& request);
 
+/// Of a frame that begins with `head` (at least 3 bytes) and answers some master: by its function and byte
+/// count. 0: nobody can say.
+std::size_t reply_size(std::span<const std::uint8_t> head);
+
 /// What a reply turned out to be.
 enum class ReplyKind : std::uint8_t {
   match,      ///< answers the request; for reads `registers` is filled

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "buses/bus.hpp"
 #include "buses/modbus_rtu/frame.hpp"
@@ -24,6 +25,12 @@ struct Exchange {
   Duration turnaround_max{};  ///< from the last byte of the request; after it a stop may cut the wait
   std::optional<SerialSettings> serial{};  ///< other settings than the line's, for this exchange alone
   bool stop = false;                       ///< it waits for no stop that was announced
+  /// Carried out behind this one without the core, if this one says nothing new: a round. Unless its first
+  /// byte went out longer than `round_longest` before.
+  const Exchange* then = nullptr;
+  Duration round_longest{};
+  const Frame* known =
+      nullptr;  ///< the last reply to this request, if there is one; not the core's meanwhile
 };
 
 enum class ExchangeStatus : std::uint8_t {
@@ -50,22 +57,37 @@ struct ExchangeResult {
   TimePoint reply_end{};      ///< last byte in, or the end of the wait
 };
 
+/// The reply is the one that is known, and nothing else was heard.
+[[nodiscard]] inline bool says_nothing_new(const Exchange& exchange, const ExchangeResult& result) {
+  return result.status == ExchangeStatus::replied && result.foreign_frames == 0 &&
+         exchange.known != nullptr && *exchange.known == result.reply_frame;
+}
+
+/// What stands behind `exchange` follows its result, the last of `results`, without the core.
+[[nodiscard]] inline bool round_goes_on(const Exchange& exchange, std::span<const ExchangeResult> results) {
+  return exchange.then != nullptr && says_nothing_new(exchange, results.back()) &&
+         results.back().reply_end - results.front().request_begin < exchange.round_longest;
+}
+
 /// Carries one exchange at a time, with the mandatory silence before each. All calls from the core thread;
 /// both callbacks arrive on the core thread.
 class Line {
  public:
-  using ResultHandler = std::function<void(const ExchangeResult&)>;
+  /// Of one exchange, or of those of a round that were carried out, in their order.
+  using ResultHandler = std::function<void(std::span<const ExchangeResult>)>;
   using PortHandler = std::function<void(const PortStatus&)>;
   virtual ~Line() = default;
 
   /// Sets the callbacks and starts opening the port (again and again, with back-off).
   virtual void start(ResultHandler on_result, PortHandler on_port) = 0;
   /// Puts `exchange` into the one-place slot. It is bound, and its guard checked, when the silence has
-  /// passed; the line then has the serial settings of `exchange`. Precondition: the port is open, the slot is
+  /// passed; the line then has the serial settings of `exchange`. Where there is one behind it, that comes
+  /// into the slot in its turn, until one says something new. Precondition: the port is open, the slot is
   /// empty and nothing is under way. Ends with exactly one on_result, unless revoke() succeeds.
   virtual void arm(const Exchange& exchange) = 0;
-  /// Takes the armed exchange back. False: it was already bound, its result will come.
-  virtual bool revoke() = 0;
+  /// Takes back what is in the slot, and what stands behind it: the results so far, valid until the next
+  /// call. nullopt: it was already bound. The results will come, and nothing follows it.
+  virtual std::optional<std::span<const ExchangeResult>> revoke() = 0;
   /// A stop waits: end the wait for a silent node as soon as its turnaround_max has passed without a byte.
   virtual void cut_wait() = 0;
   /// Where stops are announced that the core does not know of yet. May be null.

@@ -9,6 +9,13 @@ Task<Result<Answer>> Node::read(std::uint16_t address, std::uint16_t count,
       std::move(options));
 }
 
+Task<Result<std::optional<Answer>>> Node::watch(std::uint16_t address, std::uint16_t count,
+                                                Repetition repetition) const {
+  co_return co_await bus_->watch(
+      {.node = address_, .function = Function::read_holding_registers, .address = address, .count = count},
+      std::move(repetition));
+}
+
 Task<Result<Answer>> Node::write(std::uint16_t address, std::uint16_t value,
                                  TransactionOptions options) const {
   Request request{.node = address_, .function = Function::write_single_register, .address = address};

@@ -13,6 +13,9 @@ class Node {
   Node(RtuBus& bus, std::uint8_t address) : bus_(&bus), address_(address) {}
 
   Task<Result<Answer>> read(std::uint16_t address, std::uint16_t count, TransactionOptions options) const;
+  /// Errors: as of RtuBus::watch().
+  Task<Result<std::optional<Answer>>> watch(std::uint16_t address, std::uint16_t count,
+                                            Repetition repetition) const;
   /// FC06.
   Task<Result<Answer>> write(std::uint16_t address, std::uint16_t value, TransactionOptions options) const;
   /// FC16.

@@ -25,14 +25,20 @@ RtuBus::~RtuBus() { line_.reset(); }  // it looks at what is armed
 
 void RtuBus::start(ExchangeObserver observer) {
   observer_ = std::move(observer);
-  line_->start([this](const ExchangeResult& result) { on_result(result); },
+  line_->start([this](std::span<const ExchangeResult> results) { on_results(results); },
                [this](const PortStatus& status) { on_port(status); });
 }
 
 LineStatistics RtuBus::statistics() const {
   auto copy = statistics_;
-  copy.waiting([this](TransactionClass transaction_class) { return queue_.size(transaction_class); });
+  copy.waiting([this](TransactionClass transaction_class) { return waiting(transaction_class); });
   return copy;
+}
+
+/// Of a round, too, all but the first.
+std::size_t RtuBus::waiting(TransactionClass transaction_class) const {
+  const auto in_round = round_.size() > 1 && transaction_class == TransactionClass::idle_state;
+  return queue_.size(transaction_class) + (in_round ? round_.size() - 1 : 0);
 }
 
 std::size_t RtuBus::held_back() const {
@@ -57,33 +63,43 @@ Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOp
           .stop = options.transaction_class == TransactionClass::stop};
 }
 
-Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {
+Result<TransactionPtr> RtuBus::prepare(Request request, TransactionOptions options) const {
   auto frame = encode(request);
-  if (!frame) co_return fail(frame.error());
+  if (!frame) return fail(frame.error());
   if (!port_.open) {
     auto error =
         port_.error.value_or(Error{.reason = Reason::bus_down, .message = "the port is not open yet"});
     error.where.bus = settings_.name;
-    co_return fail(std::move(error));
+    return fail(std::move(error));
   }
   if (options.serial && options.transaction_class <= TransactionClass::motion)
-    co_return fail(Reason::internal, "stops and motion go out with the line's own serial settings only");
+    return fail(Reason::internal, "stops and motion go out with the line's own serial settings only");
   auto transaction = std::make_unique<Transaction>();
   transaction->transaction_class = options.transaction_class;
-  const auto transaction_class = options.transaction_class;
   transaction->patient = options.patient;
   transaction->queued_at = clock_->now();
   transaction->exchange = exchange_for(std::move(request), *frame, std::move(options));
+  return transaction;
+}
 
-  Promise<Result<Answer>> promise(executor_, *clock_);
-  transaction->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
-    promise.set(answer(ended, result));
-  });
-  if (must_wait(*transaction))
+void RtuBus::submit(TransactionPtr transaction) {
+  const auto transaction_class = transaction->transaction_class;
+  if (must_wait(*transaction, clock_->now()))
     queue_.hold(std::move(transaction));
   else
     queue_.push(std::move(transaction));
-  statistics_.queued(transaction_class, queue_.size(transaction_class));
+  statistics_.queued(transaction_class, waiting(transaction_class));
+}
+
+Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions options) {
+  auto transaction = prepare(std::move(request), std::move(options));
+  if (!transaction) co_return fail(transaction.error());
+  Promise<Result<Answer>> promise(executor_, *clock_);
+  (*transaction)
+      ->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
+        promise.set(answer(ended, result));
+      });
+  submit(*std::move(transaction));
   pump();
   co_return co_await promise.get();
 }
@@ -96,8 +112,11 @@ void RtuBus::purge_superseded(std::uint8_t /*node*/, const AxisGate& gate) {
 
 void RtuBus::give_up_readings(std::uint8_t node) {
   const auto now = clock_->now();
+  if (!recall(node))
+    for (const auto& one : round_) one->given_up = one->given_up || one->exchange.request.node == node;
   for (auto& reading : queue_.take_reads(node, TransactionClass::idle_state))
     end(std::move(reading), not_sent(Verdict::superseded, now));
+  if (const auto found = watches_.find(node); found != watches_.end()) found->second->end();
   pump();
 }
 
@@ -127,13 +146,12 @@ Duration RtuBus::turnaround_max(std::uint8_t node) const {
 /// What is armed but not bound yet is hastened in the queue, too: a stop may take its place. What is under
 /// way may have to be followed by what it was sent for (resync_before).
 void RtuBus::hasten(std::uint8_t node, TransactionClass to) {
-  const bool concerned =
-      current_ && current_->exchange.request.node == node && current_->transaction_class > to;
-  const bool revoked = concerned && line_->revoke();
-  if (revoked)
-    queue_.put_back(std::exchange(current_, nullptr));
-  else if (concerned)
-    current_->transaction_class = to;
+  const auto concerned = [&](const TransactionPtr& one) {
+    return one->exchange.request.node == node && one->transaction_class > to;
+  };
+  const bool revoked = std::ranges::any_of(round_, concerned) && take_back();
+  for (const auto& one : round_)
+    if (concerned(one)) one->transaction_class = to;
   queue_.hasten(node, to);
   if (revoked) pump();
 }
@@ -141,25 +159,46 @@ void RtuBus::hasten(std::uint8_t node, TransactionClass to) {
 /// Brings line and queue in step: the most urgent sendable transaction belongs into the slot.
 void RtuBus::pump() {
   const auto now = clock_->now();
-  if (current_) {
+  if (!round_.empty()) {
+    const auto& first = *round_.front();
     const auto top = queue_.top_class();
     // State reads do not overtake each other in the slot: a reservation would be taken back each time.
-    const bool urgent =
-        top == TransactionClass::stop || (top == TransactionClass::motion && !current_->reserved);
-    const bool overtaken = urgent && *top < current_->transaction_class;
-    const bool dead = may_send(current_->exchange.guard, now) != Verdict::send;
-    if ((overtaken || dead) && line_->revoke()) {
-      auto revoked = std::exchange(current_, nullptr);
-      if (dead)
-        drop(std::move(revoked), now);
-      else
-        queue_.put_back(std::move(revoked));
-    } else if (top == TransactionClass::stop) {
+    const bool urgent = top == TransactionClass::stop || (top == TransactionClass::motion && !first.reserved);
+    const bool overtaken = urgent && *top < first.transaction_class;
+    const bool dead = may_send(first.exchange.guard, now) != Verdict::send;
+    const bool disturbed = round_.size() > 1 && !queue_.only_idle();
+    if (!((overtaken || dead || disturbed) && take_back()) && top == TransactionClass::stop)
       line_->cut_wait();
-    }
   }
   reap(now);
-  if (!current_ && port_.open) arm_next();
+  if (round_.empty() && port_.open) arm_next();
+}
+
+/// Empties the slot; what was carried out of a round by then has ended. False: something is under way. No
+/// more follows it.
+bool RtuBus::take_back() {
+  const auto results = line_->revoke();
+  if (results) finish(*results);
+  return results.has_value();
+}
+
+/// What was not carried out takes its place again.
+void RtuBus::finish(std::span<const ExchangeResult> results) {
+  const auto now = clock_->now();
+  auto round = std::exchange(round_, {});
+  for (std::size_t i = 0; i < round.size(); ++i) {
+    round[i]->exchange.then = nullptr;
+    if (i < results.size())
+      finish(std::move(round[i]), results[i], now);
+    else if (!port_.open)
+      end(std::move(round[i]), {.status = ExchangeStatus::not_sent});
+    else if (round[i]->given_up)
+      end(std::move(round[i]), not_sent(Verdict::superseded, now));
+    else if (may_send(round[i]->exchange.guard, now) != Verdict::send)
+      drop(std::move(round[i]), now);
+    else
+      queue_.put_back(std::move(round[i]));
+  }
 }
 
 void RtuBus::arm_next() {
@@ -167,28 +206,29 @@ void RtuBus::arm_next() {
   while (auto next = queue_.pop()) {
     if (may_send(next->exchange.guard, now) != Verdict::send) {
       drop(std::move(next), now);
-    } else if (must_wait(*next)) {
+    } else if (must_wait(*next, now)) {
       queue_.hold(std::move(next));
     } else {
-      current_ = std::move(next);
+      round_.push_back(std::move(next));
       break;
     }
   }
   await_release();
-  if (!current_) return;
-  if (current_->transaction_class != TransactionClass::stop &&
-      late_.may_answer(current_->exchange.request, now))
-    current_ = resync_before(std::move(current_));
-  line_->arm(current_->exchange);
+  if (round_.empty()) return;
+  auto& first = round_.front();
+  if (first->transaction_class != TransactionClass::stop && late_.may_answer(first->exchange.request, now))
+    first = resync_before(std::move(first));
+  else
+    extend_round();
+  line_->arm(round_.front()->exchange);
 }
 
 /// The quarantine of its node forbids sending it now, or no answer to it could be told from a late one.
-bool RtuBus::must_wait(const Transaction& transaction) const {
+bool RtuBus::must_wait(const Transaction& transaction, TimePoint now) const {
   using enum TransactionClass;
   const bool urgent = transaction.transaction_class == stop && !transaction.patient;
   if (urgent || transaction.transaction_class == scan || transaction.exchange.serial) return false;
   const auto& request = transaction.exchange.request;
-  const auto now = clock_->now();
   return quarantine_.ready_at(request.node) > now ||
          (transaction.transaction_class != stop && late_.may_answer(request, now) &&
           !late_.distinct_read(request, now));
@@ -254,6 +294,8 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   resync->reserved = waiting->reserved;
   resync->queued_at = waiting->queued_at;
   resync->exchange = waiting->exchange;
+  resync->exchange.then = nullptr;
+  resync->exchange.known = nullptr;
   auto& request = resync->exchange.request = *std::move(distinct);
   const auto frame = encode(request);
   if (!frame) return waiting;  // cannot be: it is of the lengths that there are
@@ -264,7 +306,8 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   auto held = std::make_shared<TransactionPtr>(std::move(waiting));
   resync->on_end.emplace_back([this, held](const Transaction& ended, const ExchangeResult& result) {
     (*held)->transaction_class = std::min((*held)->transaction_class, ended.transaction_class);
-    if (result.status == ExchangeStatus::replied) return queue_.put_back(std::move(*held));
+    if (result.status == ExchangeStatus::replied && port_.open) return queue_.put_back(std::move(*held));
+    if (!port_.open) return end(std::move(*held), {.status = ExchangeStatus::not_sent});
     for (const auto& tell : (*held)->on_end) tell(**held, result);
   });
   return resync;
@@ -278,21 +321,26 @@ void RtuBus::reap(TimePoint now) {
                 : clock_->call_at(next + std::chrono::nanoseconds(1), [this] { pump(); });
 }
 
-void RtuBus::on_result(const ExchangeResult& result) {
-  auto ended = std::exchange(current_, nullptr);
-  if (!ended) return;
-  late_.note(ended->exchange.request, result, clock_->now());
-  note_garbled(ended->exchange.request, result);
-  note_silence(*ended, result);
-  end(std::move(ended), result);
+void RtuBus::on_results(std::span<const ExchangeResult> results) {
+  finish(results);
   pump();
+}
+
+void RtuBus::finish(TransactionPtr transaction, const ExchangeResult& result, TimePoint now) {
+  late_.note(transaction->exchange.request, result, now);
+  note_garbled(transaction->exchange.request, result);
+  note_silence(*transaction, result);
+  note_known(transaction->exchange, result);
+  if (is_repeated(*transaction, result))
+    repeat(std::move(transaction), result, now);
+  else
+    end(std::move(transaction), result);
 }
 
 void RtuBus::close() {
   closed_ = true;
   on_port({.open = false, .error = Error{.reason = Reason::cancelled, .message = "the bus is being closed"}});
-  if (current_ && line_->revoke())
-    end(std::exchange(current_, nullptr), {.status = ExchangeStatus::not_sent});
+  if (!round_.empty()) take_back();
 }
 
 void RtuBus::on_port(const PortStatus& status) {
@@ -305,14 +353,20 @@ void RtuBus::on_port(const PortStatus& status) {
     // What is under way gets its own result from the line; what waits can no longer be sent in time.
     const ExchangeResult lost{.status = ExchangeStatus::not_sent, .verdict = Verdict::send};
     for (auto& transaction : queue_.take_all()) end(std::move(transaction), lost);
+    for (const auto& [node, watch] : watches_)
+      if (auto transaction = watch->take_resting()) end(std::move(transaction), lost);
   }
   port_changed_.notify_all();
   pump();
 }
 
+void RtuBus::note(const Transaction& transaction, const ExchangeResult& result) {
+  statistics_.ended(transaction, result);
+  if (observer_) observer_(transaction, result);
+}
+
 void RtuBus::end(TransactionPtr transaction, const ExchangeResult& result) {
-  statistics_.ended(*transaction, result);
-  if (observer_) observer_(*transaction, result);
+  note(*transaction, result);
   for (const auto& tell : transaction->on_end) tell(*transaction, result);
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "buses/modbus_rtu/quarantine.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "buses/modbus_rtu/transaction_queue.hpp"
+#include "buses/modbus_rtu/watch.hpp"
 #include "buses/signal.hpp"
 #include "buses/task.hpp"
 
@@ -48,6 +50,12 @@ class RtuBus final : public Bus {
   /// `bus_down`, `refused` (native_code is the exception), `no_reply` (outcome unknown), `not_supported` (the
   /// port cannot do options.serial: not sent).
   Task<Result<Answer>> transact(Request request, TransactionOptions options);
+  /// A reading in class idle_state that the bus repeats by itself, so that whoever polls a node is woken for
+  /// news alone. Ends with the answer of which `repetition` says so, with nothing where end_repetition() came
+  /// between two readings, or with an error of transact(). Of several for one node only the first is
+  /// repeated.
+  Task<Result<std::optional<Answer>>> watch(Request request, Repetition repetition);
+  void end_repetition(std::uint8_t node) override;
 
   void purge_superseded(std::uint8_t node, const AxisGate& gate) override;
   /// Exchanges with serial settings of their own end.
@@ -57,7 +65,7 @@ class RtuBus final : public Bus {
   [[nodiscard]] bool holds_back(std::uint8_t node) const override;
   [[nodiscard]] std::optional<QuarantinedNode> quarantined(std::uint8_t node) const override;
   void close() override;
-  [[nodiscard]] bool idle() const override { return current_ == nullptr && queue_.size() == 0; }
+  [[nodiscard]] bool idle() const override { return round_.empty() && queue_.size() == 0; }
 
   /// Of this node, in place of the line's.
   void set_turnaround_max(std::uint8_t node, std::optional<Duration> turnaround);
@@ -83,18 +91,30 @@ class RtuBus final : public Bus {
 
  private:
   [[nodiscard]] Exchange exchange_for(Request request, const Frame& frame, TransactionOptions options) const;
+  Result<TransactionPtr> prepare(Request request, TransactionOptions options) const;
+  void submit(TransactionPtr transaction);
+  [[nodiscard]] bool is_repeated(const Transaction& ended, const ExchangeResult& result) const;
+  void repeat(TransactionPtr transaction, const ExchangeResult& result, TimePoint now);
+  [[nodiscard]] std::size_t waiting(TransactionClass transaction_class) const;
   void pump();
+  bool take_back();
+  void finish(std::span<const ExchangeResult> results);
+  void finish(TransactionPtr transaction, const ExchangeResult& result, TimePoint now);
+  void extend_round();
+  bool recall(std::uint8_t node);
+  void note_known(const Exchange& exchange, const ExchangeResult& result);
   void arm_next();
-  [[nodiscard]] bool must_wait(const Transaction& transaction) const;
+  [[nodiscard]] bool must_wait(const Transaction& transaction, TimePoint now) const;
   [[nodiscard]] TimePoint ready_at(std::uint8_t node, TimePoint now) const;
   void await_release();
   void release_ready();
   void note_silence(const Transaction& ended, const ExchangeResult& result);
   TransactionPtr resync_before(TransactionPtr waiting);
-  void on_result(const ExchangeResult& result);
+  void on_results(std::span<const ExchangeResult> results);
   void on_port(const PortStatus& status);
   void reap(TimePoint now);
   void drop(TransactionPtr transaction, TimePoint now);
+  void note(const Transaction& transaction, const ExchangeResult& result);
   void end(TransactionPtr transaction, const ExchangeResult& result);
   void note_garbled(const Request& request, const ExchangeResult& result);
   [[nodiscard]] Result<Answer> answer(const Transaction& transaction, const ExchangeResult& result) const;
@@ -108,7 +128,12 @@ class RtuBus final : public Bus {
   PortStatus port_;
   Signal port_changed_;
   TransactionQueue queue_;
-  TransactionPtr current_;  ///< armed or under way
+  std::vector<TransactionPtr> round_;  ///< armed or under way, in the order of the line
+  std::map<std::uint8_t, std::unique_ptr<Watch>> watches_;
+  struct Known {
+    Frame request, reply;
+  };
+  std::map<std::uint8_t, Known> known_;  ///< what the last repeated reading of each node says
   LateReplies late_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Quarantine quarantine_;

@@ -42,6 +42,8 @@ Error lost_error(const LineSettings& line, const std::string& path, int native_e
 
 }  // namespace
 
+const Exchange RtuWorker::nothing_more;
+
 RtuWorker::RtuWorker(Executor core, LineSettings settings, PortPath port_path)
     : core_(std::move(core)),
       settings_(std::move(settings)),
@@ -50,8 +52,8 @@ RtuWorker::RtuWorker(Executor core, LineSettings settings, PortPath port_path)
 
 RtuWorker::~RtuWorker() {
   callbacks_->alive = false;
-  slot_.store(nullptr, std::memory_order_release);
   wakeup_.quit.store(true, std::memory_order_release);
+  slot_.store(&nothing_more);
   wakeup_.notify();
   if (thread_.joinable()) thread_.join();
 }
@@ -75,7 +77,28 @@ void RtuWorker::arm(const Exchange& exchange) {
   if (idle_.load()) wakeup_.notify();
 }
 
-bool RtuWorker::revoke() { return slot_.exchange(nullptr, std::memory_order_acq_rel) != nullptr; }
+std::optional<std::span<const ExchangeResult>> RtuWorker::revoke() {
+  const auto* was = slot_.exchange(&nothing_more);
+  if (was == nullptr || was == &nothing_more) return std::nullopt;
+  return take_results();
+}
+
+bool RtuWorker::armed() const {
+  const auto* exchange = slot_.load();
+  return exchange != nullptr && exchange != &nothing_more;
+}
+
+/// What is armed, out of the slot; or nullptr.
+const Exchange* RtuWorker::take() {
+  const auto* exchange = slot_.exchange(nullptr, std::memory_order_acq_rel);
+  return exchange == &nothing_more ? nullptr : exchange;
+}
+
+std::span<const ExchangeResult> RtuWorker::take_results() {
+  callbacks_->told.clear();
+  callbacks_->told.swap(results_);
+  return callbacks_->told;
+}
 
 void RtuWorker::cut_wait() {
   if (!wakeup_.cut.exchange(true, std::memory_order_acq_rel)) wakeup_.notify();
@@ -126,7 +149,7 @@ Error RtuWorker::serve(SerialPort port) {
     if (lost != 0) break;
     if (yield_to_stop()) continue;
     // The latest possible moment: until here a stop could take the exchange back.
-    if (const auto* exchange = slot_.exchange(nullptr, std::memory_order_acq_rel)) {
+    if (const auto* exchange = take()) {
       yielded_ = false;
       bind(session, *exchange, lost);
     } else {
@@ -143,17 +166,17 @@ bool RtuWorker::prepare(WireSession& session, const Exchange& exchange, int& los
   const int failed = session.use(wanted);
   if (failed == EINVAL && exchange.serial) {
     const auto now = monotonic_now();
-    report(ExchangeResult{.status = ExchangeStatus::unsupported,
-                          .native_error = EINVAL,
-                          .request_begin = now,
-                          .request_end = now,
-                          .reply_end = now});
+    report(exchange, ExchangeResult{.status = ExchangeStatus::unsupported,
+                                    .native_error = EINVAL,
+                                    .request_begin = now,
+                                    .request_end = now,
+                                    .reply_end = now});
     return false;
   }
   lost = failed != 0 ? failed : session.keep_silence();  // the silence of the new rate may be longer
   if (lost == 0) return true;
   report(PortStatus{.open = false, .error = lost_error(settings_, session.path(), lost)});
-  report(ExchangeResult{.status = ExchangeStatus::not_sent, .native_error = lost});
+  report(exchange, ExchangeResult{.status = ExchangeStatus::not_sent, .native_error = lost});
   return false;
 }
 
@@ -162,20 +185,20 @@ void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) 
   const auto now = monotonic_now();
   const auto verdict = now > exchange.deadline ? Verdict::expired : may_send(exchange.guard, now);
   if (verdict != Verdict::send) {
-    report(ExchangeResult{.status = ExchangeStatus::not_sent,
-                          .verdict = verdict,
-                          .request_begin = now,
-                          .request_end = now,
-                          .reply_end = now});
+    report(exchange, ExchangeResult{.status = ExchangeStatus::not_sent,
+                                    .verdict = verdict,
+                                    .request_begin = now,
+                                    .request_end = now,
+                                    .reply_end = now});
     return;
   }
-  const auto result = session.run(exchange);
+  auto result = session.run(exchange);
   if (result.status == ExchangeStatus::io_error) {
     lost = result.native_error;
     // First the port, then the result: the core must not arm the next exchange on it.
     report(PortStatus{.open = false, .error = lost_error(settings_, session.path(), lost)});
   }
-  report(result);
+  report(exchange, std::move(result));
 }
 
 /// A stop that is on its way to the core is let in before whatever was armed without knowing of it. Once per
@@ -195,7 +218,7 @@ bool RtuWorker::yield_to_stop() {
 
 void RtuWorker::idle(WireSession& session, int& lost) {
   idle_.store(true);
-  if (slot_.load() == nullptr && !quitting()) lost = session.idle(longest_idle);
+  if (!armed() && !quitting()) lost = session.idle(longest_idle);
   idle_.store(false);
 }
 
@@ -205,8 +228,8 @@ void RtuWorker::wait_closed(Duration duration, int native_error) {
   while (!quitting() && monotonic_now() < until) {
     touch();
     idle_.store(true);
-    if (slot_.exchange(nullptr) != nullptr) {
-      report(ExchangeResult{.status = ExchangeStatus::not_sent, .native_error = native_error});
+    if (const auto* exchange = take()) {
+      report(*exchange, ExchangeResult{.status = ExchangeStatus::not_sent, .native_error = native_error});
     } else {
       wakeup_.wait(until - monotonic_now());
     }
@@ -214,9 +237,18 @@ void RtuWorker::wait_closed(Duration duration, int native_error) {
   }
 }
 
-void RtuWorker::report(const ExchangeResult& result) {
-  post(core_, [callbacks = callbacks_, result] {
-    if (callbacks->alive) callbacks->on_result(result);
+/// Of a round that says nothing new the core hears at its end: to wake it costs as much as an exchange.
+void RtuWorker::report(const Exchange& exchange, ExchangeResult result) {
+  results_.push_back(std::move(result));
+  const Exchange* empty = nullptr;
+  // From then on all of it is the core's again, if it takes the next one back.
+  if (round_goes_on(exchange, results_) && slot_.compare_exchange_strong(empty, exchange.then)) return;
+  tell();
+}
+
+void RtuWorker::tell() {
+  post(core_, [this, callbacks = callbacks_] {
+    if (callbacks->alive) callbacks->on_result(take_results());
   });
 }
 

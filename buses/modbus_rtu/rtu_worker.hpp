@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "buses/modbus_rtu/line.hpp"
 #include "buses/modbus_rtu/settings.hpp"
@@ -19,7 +20,7 @@ class WireSession;
 
 /// A Line on a serial port. Public functions: thread core; private ones: the worker's own thread.
 ///
-///   opening --ok--> serving { silence -> take the slot -> exchange -> result }*
+///   opening --ok--> serving { silence -> take the slot -> exchange -> result, or the next of its round }*
 ///      ^                |
 ///      +---back-off-----+ the port is lost: an exchange under way ends as io_error, an armed one as not_sent
 ///
@@ -42,7 +43,7 @@ class RtuWorker final : public Line {
 
   void start(ResultHandler on_result, PortHandler on_port) override;
   void arm(const Exchange& exchange) override;
-  bool revoke() override;
+  std::optional<std::span<const ExchangeResult>> revoke() override;
   void cut_wait() override;
   [[nodiscard]] std::shared_ptr<StopNotice> stop_notice() const override { return stop_notice_; }
   [[nodiscard]] TimePoint last_progress() const override;
@@ -53,6 +54,7 @@ class RtuWorker final : public Line {
     ResultHandler on_result;
     PortHandler on_port;
     bool alive = true;
+    std::vector<ExchangeResult> told;  ///< last
   };
 
   void run();
@@ -63,7 +65,11 @@ class RtuWorker final : public Line {
   bool yield_to_stop();
   void idle(WireSession& session, int& lost);
   void wait_closed(Duration duration, int native_error);
-  void report(const ExchangeResult& result);
+  void report(const Exchange& exchange, ExchangeResult result);
+  [[nodiscard]] bool armed() const;
+  const Exchange* take();
+  void tell();
+  std::span<const ExchangeResult> take_results();
   void report(const PortStatus& status);
   void touch();
   [[nodiscard]] bool quitting() const { return wakeup_.quit.load(std::memory_order_acquire); }
@@ -73,6 +79,10 @@ class RtuWorker final : public Line {
   PortPath port_path_;
   std::shared_ptr<Callbacks> callbacks_ = std::make_shared<Callbacks>();
   std::atomic<const Exchange*> slot_ = nullptr;
+  /// In the slot: nothing is armed, and nothing follows what is under way.
+  static const Exchange nothing_more;
+  /// Not told yet. Whoever holds what is armed has it, too: it goes through the slot, or with a post.
+  std::vector<ExchangeResult> results_;
   std::atomic<bool> stop_armed_ = false;  ///< what is in the slot, or was last, is a stop
   std::shared_ptr<StopNotice> stop_notice_ = std::make_shared<StopNotice>();
   bool yielded_ = false;            ///< of the worker: since the last exchange it has waited for a stop

@@ -46,6 +46,7 @@ bool TransactionQueue::merge(Transaction& transaction) {
   });
   if (found == waiting->second.end()) return false;
   auto known = take(found->second.transaction);
+  known->watch = nullptr;  // somebody waits for it
   std::ranges::move(transaction.on_end, std::back_inserter(known->on_end));
   known->transaction_class = std::min(known->transaction_class, transaction.transaction_class);
   // The later deadline: an answer that still serves one of them is worth sending for.
@@ -125,6 +126,16 @@ void TransactionQueue::hasten(std::uint8_t node, TransactionClass to) {
     hastened->transaction_class = to;
     insert(std::move(hastened), place.held);
   }
+}
+
+bool TransactionQueue::only_idle() const {
+  const auto* const idle = &lanes_.at(static_cast<std::size_t>(TransactionClass::idle_state));
+  return std::ranges::all_of(lanes_, [&](const Lane& lane) { return &lane == idle || lane.empty(); });
+}
+
+const Transaction* TransactionQueue::next_idle() const {
+  const auto& idle = lanes_.at(static_cast<std::size_t>(TransactionClass::idle_state));
+  return idle.empty() || !only_idle() ? nullptr : idle.begin()->get();
 }
 
 std::optional<TransactionClass> TransactionQueue::top_class() const {

@@ -16,6 +16,8 @@
 
 namespace axisd::modbus_rtu {
 
+class Watch;
+
 /// A queued exchange and whom to tell how it ended.
 struct Transaction {
   Exchange exchange;
@@ -24,7 +26,10 @@ struct Transaction {
   TimePoint queued_at{};       ///< when it was asked for
   bool patient = false;        ///< though a stop, it waits as others do for a node in quarantine
   bool reserved = false;       ///< it was given out by the reservation: only a stop may take its place
-  /// Called exactly once each. Several: identical reads that were merged.
+  Watch* watch = nullptr;      ///< that may repeat it
+  bool given_up = false;       ///< unless it goes out before it can be taken back
+  /// Called exactly once each, unless its watch ends between two readings. Several: identical reads that were
+  /// merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
 };
 using TransactionPtr = std::unique_ptr<Transaction>;
@@ -46,6 +51,10 @@ class TransactionQueue {
   void put_back(TransactionPtr transaction);
   /// The next one, or nullptr. Whether it may be sent still is the caller's to ask.
   TransactionPtr pop();
+  /// Nothing is to be given out but class idle_state.
+  [[nodiscard]] bool only_idle() const;
+  /// What pop() gives then, or nullptr.
+  [[nodiscard]] const Transaction* next_idle() const;
   /// Puts one aside: it is not given out before release() of its node.
   void hold(TransactionPtr transaction);
   /// What was put aside for `node` takes its places again.

@@ -75,11 +75,10 @@ WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_
     if (ppoll(watched.data(), watched.size(), &timeout, nullptr) < 0 && errno != EINTR) return Wait::failed;
     if ((watched[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return Wait::failed;
     if (watched[0].revents != 0) return Wait::bytes;
-    if (watched[1].revents != 0) {
+    if (watched[1].revents != 0)
       wakeup_.drain();
-    } else if (left <= Duration::zero()) {
+    else if (monotonic_now() >= end)
       return end < until ? Wait::cut : Wait::timeout;
-    }
   }
 }
 
@@ -225,15 +224,79 @@ WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const Ex
 /// No byte of the reply is needed before it is complete, and each piece of it would wake this thread. Only
 /// for reads: a write may take a drive a thousand times as long as the one before.
 void WireSession::sleep_before_reply(const Exchange& exchange, const ExchangeResult& result) {
+  slept_ = false;
   reply_awaited_ = true;
   if (!is_paced(exchange)) return;
-  const auto size = reply_size(exchange.request);
-  const auto quiet = pace_.quiet(exchange.request.node, wire_time(serial_, size));
+  const auto quiet = pace_.quiet(exchange.request.node, wire_time(serial_, reply_size(exchange.request)));
   const auto until = std::min(result.request_end + quiet, reply_deadline_);
   if (until - monotonic_now() < shortest_sleep) return;
   const auto cut_from = result.request_end + exchange.turnaround_max;
   wait_until(until, &cut_from, false);
-  reply_awaited_ = port_.waiting() < size;
+  slept_ = true;
+  reply_awaited_ = false;
+}
+
+/// For the rest of a reply that has begun: nothing but its deadline ends this.
+WireSession::Wait WireSession::wait_for_more() {
+  for (;;) {
+    const auto left = reply_deadline_ - monotonic_now();
+    const auto timeout = to_timespec(left);
+    pollfd watched{.fd = port_.descriptor(), .events = POLLIN, .revents = 0};
+    if (ppoll(&watched, 1, &timeout, nullptr) < 0 && errno != EINTR) return Wait::failed;
+    if ((watched.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return Wait::failed;
+    if (watched.revents != 0) return Wait::bytes;
+    if (left <= Duration::zero()) return Wait::timeout;
+  }
+}
+
+/// Takes the reply of a node that has always answered: its size is known, so it is read in as few pieces as
+/// it comes in, where libmodbus needs six system calls at least. Other sound frames before it are passed
+/// over. After damage the node's replies are left to libmodbus for a while. True: the exchange has ended.
+bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result) {
+  const auto first_byte = monotonic_now();
+  const bool awaited = std::exchange(reply_awaited_, true);
+  constexpr std::size_t head = 3;
+  std::array<std::uint8_t, Frame::capacity> buffer;
+  std::size_t size = reply_size(exchange.request);
+  std::size_t count = 0;
+  for (bool first = true;; first = false) {
+    const auto wait = first ? Wait::bytes : wait_for_more();
+    const auto got = wait == Wait::bytes ? port_.read_available(std::span(buffer).first(size).subspan(count))
+                                         : std::expected<std::size_t, int>(0);
+    if (!got || wait == Wait::failed) {
+      end(result, ExchangeStatus::io_error, got ? EIO : got.error());
+      return true;
+    }
+    if (*got > 0) last_byte_ = monotonic_now();
+    count += *got;
+    while (count >= head) {
+      const auto bytes = std::span(buffer).first(count);
+      size = std::min(reply_size(bytes), buffer.size());
+      if (size == 0) return end_damaged(result, Frame(bytes), first_byte);
+      if (count < size) break;
+      auto reply = decode(exchange.request, bytes.first(size));
+      if (reply.kind == ReplyKind::corrupt) return end_damaged(result, Frame(bytes), first_byte);
+      if (reply.kind != ReplyKind::foreign) {
+        if (first) reply_awaited_ = awaited;
+        end_replied(result, std::move(reply), Frame(bytes.first(size)), first_byte);
+        return true;
+      }
+      ++result.foreign_frames;
+      std::ranges::copy(bytes.subspan(size), buffer.begin());
+      count -= size;
+    }
+    if (count == 0) return false;
+    if (count < head) size = reply_size(exchange.request);
+    if (wait == Wait::timeout) return end_damaged(result, Frame(std::span(buffer).first(count)), first_byte);
+  }
+}
+
+void WireSession::end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte) {
+  touch();
+  result.reply = std::move(reply);
+  result.reply_frame = frame;
+  result.reply_begin = begin_of(frame, first_byte);
+  end(result, ExchangeStatus::replied);
 }
 
 void WireSession::note_pace(const Exchange& exchange, const ExchangeResult& result) {
@@ -262,10 +325,7 @@ bool WireSession::take_frame(const Exchange& exchange, ExchangeResult& result) {
   last_byte_ = monotonic_now();
   const auto reply = decode(exchange.request, received.bytes.bytes());
   if (reply.kind == ReplyKind::match || reply.kind == ReplyKind::exception) {
-    result.reply = reply;
-    result.reply_frame = received.bytes;
-    result.reply_begin = begin_of(received.bytes, first_byte);
-    end(result, ExchangeStatus::replied);
+    end_replied(result, reply, received.bytes, first_byte);
     return true;
   }
   if (received.kind == Reception::frame || received.kind == Reception::filtered) {
@@ -278,8 +338,12 @@ bool WireSession::take_frame(const Exchange& exchange, ExchangeResult& result) {
     echo_ = true;
     return false;
   }
-  result.reply_frame = received.bytes;
-  result.reply_begin = begin_of(received.bytes, first_byte);
+  return end_damaged(result, received.bytes, first_byte);
+}
+
+bool WireSession::end_damaged(ExchangeResult& result, const Frame& bytes, TimePoint first_byte) {
+  result.reply_frame = bytes;
+  result.reply_begin = begin_of(bytes, first_byte);
   settle(result);
   end(result, ExchangeStatus::corrupt);
   return true;
@@ -301,10 +365,14 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
     return result;
   }
   sleep_before_reply(exchange, result);
+  if (slept_ && take_expected(exchange, result)) {
+    note_pace(exchange, result);
+    return result;
+  }
   for (;;) {
     const auto wait = wait_for_reply(exchange, result);
     if (wait == Wait::bytes) {
-      if (!take_frame(exchange, result)) continue;
+      if (!(slept_ ? take_expected(exchange, result) : take_frame(exchange, result))) continue;
       note_pace(exchange, result);
       return result;
     }

@@ -52,6 +52,10 @@ class WireSession {
   Wait wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes = true);
   Wait wait_for_reply(const Exchange& exchange, const ExchangeResult& result);
   void sleep_before_reply(const Exchange& exchange, const ExchangeResult& result);
+  bool take_expected(const Exchange& exchange, ExchangeResult& result);
+  void end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte);
+  bool end_damaged(ExchangeResult& result, const Frame& bytes, TimePoint first_byte);
+  Wait wait_for_more();
   void note_pace(const Exchange& exchange, const ExchangeResult& result);
   [[nodiscard]] TimePoint begin_of(const Frame& frame, TimePoint seen) const;
   bool pass_echo(const Exchange& exchange, ExchangeResult& result);
@@ -73,7 +77,8 @@ class WireSession {
   TimePoint request_end_;     ///< when the last request has left the adapter
   TimePoint reply_deadline_;  ///< of the exchange under way
   ReplyPace pace_;
-  bool reply_awaited_ = false;  ///< it was not complete when the sleep before it ended
+  bool slept_ = false;          ///< before the reply, as its node's pace is known
+  bool reply_awaited_ = false;  ///< it was not complete when that sleep ended
   bool damaged_ = false;        ///< unsound bytes came during the exchange under way
   bool echo_known_ = false;
   bool echo_ = false;

@@ -29,7 +29,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       eeprom_writes_ = found->second.eeprom_writes;
   }
   if (const auto before = face_->snapshot.load()) revision_ = before->revision;
-  drive_->on_attention([this] { wake_.notify_all(); });
+  drive_->on_attention([this] { wake(); });
   publish();
 }
 
@@ -55,7 +55,8 @@ void Axis::close() {
   link_ = LinkState::offline;
   supersede(error(Reason::cancelled, "the daemon ends"));
   publish();
-  for (auto* signal : {&sampled_, &wake_, &stopped_}) signal->notify_all();
+  wake();
+  for (auto* signal : {&sampled_, &stopped_}) signal->notify_all();
 }
 
 Error Axis::error(Reason reason, std::string message, std::string remedy) const {
@@ -141,6 +142,7 @@ void Axis::on_sample(const DriveSample& sample) {
     on_unexplained_motion(sample, before);
   release_as_owed();
   publish();
+  sampled_revision_ = revision_;
   sampled_.notify_all();
 }
 
@@ -191,7 +193,7 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
       settings_.inputs, [this](const TerminalSettings& input) { return starts_motion(input); });
   const bool just_began = before && !before->moving;
   if (!stop_owed_ && !fault_ && possible && just_began && !segments && !homing && !started) {
-    wake_.notify_all();
+    wake();
     return;
   }
   // A motor that was told to stop, and has not confirmed it, is never a terminal's.

@@ -151,16 +151,26 @@ class Axis {
   [[nodiscard]] bool found_in_motion() const;
   [[nodiscard]] bool found_by_terminal() const;
   Task<Result<void>> prove_or_configure();
+  Task<> wait_for_port();
+  void go_offline(const Error& cause);
+  void on_reboot(const Error& cause);
+
+  // axis_poll.cpp: its state, again and again
   Task<> poll();
-  Task<bool> poll_once(int& failures);
+  struct Polling {
+    int failures = 0;    ///< in a row
+    bool woken = false;  ///< in place of a sample
+  };
+  Task<bool> poll_once(Polling& polling);
+  Task<Result<std::optional<DriveSample>>> next_sample(bool in_doubt);
+  bool seen_again(const DriveSample& sample);
+  [[nodiscard]] bool only_watches() const;
+  void wake();
   void watch_continuity();
   Task<Result<void>> prove_continuity(TransactionClass priority);
   /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
   void poll_fast(TimePoint from, Duration longest);
   [[nodiscard]] TimePoint next_poll(TimePoint began) const;
-  Task<> wait_for_port();
-  void go_offline(const Error& cause);
-  void on_reboot(const Error& cause);
 
   // axis_drift.cpp
   Task<> look_for_drift();
@@ -187,6 +197,7 @@ class Axis {
   void on_released(const DriveSample& sample, bool enabled_before);
   void on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before);
   void publish();
+  bool note_eeprom_writes();
   void tell_edges(const DriveSample& before, const DriveSample& now);
   void tell_changes(const AxisSnapshot& before, const AxisSnapshot& now);
   [[nodiscard]] std::vector<TerminalState> inputs(std::uint32_t bits) const;
@@ -390,10 +401,11 @@ class Axis {
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed
   bool last_positive_ = true;
   std::optional<Error> fault_;
-  Duration last_deceleration_{
-      milliseconds(2000)};  ///< of the motion in progress; at first the drive's longest
-
+  /// Of the motion in progress; at first the drive's longest.
+  Duration last_deceleration_ = milliseconds(2000);
+  boost::shared_ptr<AxisSnapshot> shown_;  ///< the last snapshot
   std::uint64_t revision_ = 0;
+  std::uint64_t sampled_revision_ = 0;  ///< of the snapshot after the last sample
 };
 
 }  // namespace axisd

@@ -1,4 +1,4 @@
-// The way to the drive: connecting, verifying, polling, and noticing that it is gone or was restarted.
+// The way to the drive: connecting, verifying, and what follows when it is gone or was restarted.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -13,15 +13,6 @@ namespace {
 
 constexpr auto first_backoff = milliseconds(100);
 constexpr auto longest_backoff = milliseconds(1000);
-constexpr int attempts_before_offline = 3;
-constexpr auto continuity_latest = milliseconds(950);
-/// More than a reading waits for on a line that is only slow.
-constexpr auto continuity_forgotten = milliseconds(2000);
-/// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
-/// trusted meanwhile.
-constexpr auto continuity_longest = milliseconds(2500);
-/// How soon the watch looks again at an axis that is beyond it, but is being asked.
-constexpr auto continuity_look = milliseconds(50);
 
 }  // namespace
 
@@ -205,35 +196,6 @@ Task<Result<void>> Axis::prove_or_configure() {
   co_return Result<void>{};
 }
 
-Task<> Axis::poll() {
-  int failures = 0;
-  while (link_ == LinkState::online) {
-    if (chains_ > 0) {
-      co_await wake_.wait();
-      continue;
-    }
-    if (bus_loss_) co_return go_offline(Error(*bus_loss_));
-    const auto began = env_.clock->now();
-    if (!co_await poll_once(failures)) co_return;
-    if (failures > 0) continue;  // the bus's own timeouts pace the repetition
-    co_await look_for_drift();
-    co_await wake_.wait_until(std::min(next_poll(began), continuity_checked_ + continuity_latest));
-  }
-}
-
-void Axis::poll_fast(TimePoint from, Duration longest) {
-  fast_from_ = from;
-  fast_until_ = from + longest;
-  wake_.notify_all();
-}
-
-TimePoint Axis::next_poll(TimePoint began) const {
-  if (!busy()) return began + settings_.poll_idle;
-  if (began >= fast_from_ && began < fast_until_) return began + fastest_poll;
-  const auto next = began + settings_.poll_moving;
-  return began < fast_from_ ? std::min(next, fast_from_) : next;
-}
-
 Result<std::shared_ptr<void>> Axis::begin_maintenance() {
   if (auto online = check_online(); !online) return fail(online.error());
   if (!maintenance_.expired() || activity_)
@@ -259,69 +221,7 @@ void Axis::reconfigure(const std::string& why, bool position_lost) {
   }
   publish();
   sampled_.notify_all();
-  wake_.notify_all();
-}
-
-/// The drive was not restarted since its parameters were last written.
-Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
-  auto proof = co_await drive_->check_continuity(priority);
-  if (proof) continuity_checked_ = env_.clock->now();
-  co_return proof;
-}
-
-/// False: the link is gone.
-Task<bool> Axis::poll_once(int& failures) {
-  Result<void> result;
-  const auto now = env_.clock->now();
-  // Where an end is awaited the canary waits as long as it may.
-  const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
-  if (now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
-    result =
-        co_await prove_continuity(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
-    if (!result && result.error().reason == Reason::rebooted) {
-      on_reboot(result.error());
-      co_return false;
-    }
-  }
-  if (result) {
-    const auto sample =
-        co_await drive_->read_state(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
-    if (!sample) result = fail(sample.error());
-    // Its node was held back: what was proven before that says nothing of it.
-    else if (sample->asked_at - continuity_checked_ > continuity_forgotten)
-      result = co_await prove_continuity(TransactionClass::moving_state);
-    if (result) on_sample(*sample);
-    if (!result && result.error().reason == Reason::rebooted) {
-      if (link_ == LinkState::online) on_reboot(result.error());
-      co_return false;
-    }
-  }
-  if (link_ != LinkState::online) co_return false;  // a sequence found the reboot first
-  if (result) {
-    failures = 0;
-    co_return true;
-  }
-  const bool unproven = env_.clock->now() - continuity_checked_ >= continuity_longest;
-  if (result.error().reason == Reason::bus_down || ++failures >= attempts_before_offline || unproven) {
-    go_offline(result.error());
-    co_return false;
-  }
-  co_return true;
-}
-
-/// While its node is held back no request fails, as none is sent: nothing else would tell that nobody has
-/// heard of the drive for so long.
-void Axis::watch_continuity() {
-  if (link_ != LinkState::online) return;
-  const auto now = env_.clock->now();
-  const auto limit = continuity_checked_ + continuity_longest;
-  if (now >= limit && env_.bus->holds_back(settings_.node)) {
-    go_offline(error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
-                     "check power, wiring, address and baud rate of the node"));
-    return;
-  }
-  continuity_watch_ =
-      env_.clock->call_at(std::max(limit, now + continuity_look), [this] { watch_continuity(); });
+  wake();
 }
 
 void Axis::bus_lost(Error cause) {
@@ -329,7 +229,7 @@ void Axis::bus_lost(Error cause) {
   bus_loss_ = std::move(cause);
   // The others of its group look at its gate.
   if (activity_ && activity_->state == AxisState::synchronized_motion) gate_->raise();
-  wake_.notify_all();
+  wake();
 }
 
 void Axis::go_offline(const Error& cause) {
@@ -358,7 +258,7 @@ void Axis::go_offline(const Error& cause) {
   terminal_motion_ = false;
   publish();
   sampled_.notify_all();
-  wake_.notify_all();
+  wake();
 }
 
 void Axis::on_reboot(const Error& cause) {
@@ -375,7 +275,7 @@ void Axis::on_reboot(const Error& cause) {
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();
   sampled_.notify_all();
-  wake_.notify_all();
+  wake();
 }
 
 }  // namespace axisd

@@ -89,7 +89,7 @@ void Axis::enter_error_stop(const Error& cause) {
 /// Waits for a sample whose request went out at `since` or later.
 Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience) {
   const auto deadline = env_.clock->now() + patience;
-  wake_.notify_all();
+  wake();
   while (env_.clock->now() < deadline && link_ != LinkState::offline) {
     if (sample_ && sample_->asked_at >= since) co_return *sample_;
     co_await sampled_.wait_until(deadline);
@@ -262,7 +262,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   }
   const auto deadline = since + start_window;
   while (env_.clock->now() < deadline || !sample_ || sample_->asked_at < deadline) {
-    wake_.notify_all();
+    wake();
     co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(50)));
     if (!current(*activity)) {  // offline, too: then the command has ended as unknown
       ++unknown_starts_.unresolved;

@@ -72,11 +72,18 @@ MotionCause Axis::motion_cause() const {
   return sample_ && sample_->moving ? MotionCause::unknown : MotionCause::none;
 }
 
+/// False: nothing was written since the last look. Else the next sample is published, whatever it says.
+bool Axis::note_eeprom_writes() {
+  const auto written = drive_->take_eeprom_writes();
+  if (written == 0) return false;
+  sampled_revision_ = 0;  // to be published
+  eeprom_writes_ += written;
+  if (env_.persistence != nullptr) env_.persistence->count_eeprom_writes(settings_.name, written, {});
+  return true;
+}
+
 void Axis::publish() {
-  if (const auto written = drive_->take_eeprom_writes(); written > 0) {
-    eeprom_writes_ += written;
-    if (env_.persistence != nullptr) env_.persistence->count_eeprom_writes(settings_.name, written, {});
-  }
+  note_eeprom_writes();
   auto next = boost::make_shared<AxisSnapshot>();
   next->name = settings_.name;
   next->bus = settings_.bus;
@@ -126,10 +133,9 @@ void Axis::publish() {
     next->alarm_code = bits.alarm_code;
     const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*descriptor_, bits.alarm_code);
     if (alarm != nullptr) next->alarm_name = alarm->name;
-    next->sampled_after = bits.asked_at;
-    next->sampled_before = bits.measured_at;
-    next->measured_at = env_.clock->wall(bits.measured_at);
+    next->sampled.set(bits.asked_at, bits.measured_at, env_.clock->wall(bits.measured_at));
   }
+  shown_ = next;
   const auto before = face_->snapshot.load();
   face_->snapshot.store(next);
   if (before) tell_changes(*before, *next);

@@ -94,7 +94,7 @@ Task<> Axis::run_stop() {
   }
   publish();
   stopped_.notify_all();
-  wake_.notify_all();
+  wake();
 }
 
 void Axis::note_stop_sent(TimePoint end) {
@@ -116,7 +116,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto requests = stopping_.requests;
     const auto kind = stopping_.kind;
     const auto sent = co_await drive_->stop(kind);
-    wake_.notify_all();
+    wake();
     if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out);
     const bool no_reply = !sent && sent.error().reason == Reason::no_reply;
     if (no_reply && link_ != LinkState::offline && ++silent < stop_attempts) continue;

@@ -11,10 +11,11 @@ class Axis::Chain {
   explicit Chain(Axis& axis) : axis_(&axis) {
     ++axis_->chains_;
     axis_->observed_.interrupted();
+    axis_->wake();
   }
   ~Chain() {
     --axis_->chains_;
-    axis_->wake_.notify_all();
+    axis_->wake();
   }
   Chain(const Chain&) = delete;
 

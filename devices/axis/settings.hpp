@@ -101,6 +101,9 @@ using SettingValue = std::variant<bool, std::int64_t, double, std::string>;
 /// How often the canary is read, whatever the polling period: at least every second (M7), less what the wire
 /// takes.
 inline constexpr Duration continuity_period = milliseconds(800);
+/// A proof older than that says nothing of a sample: more than a reading waits for on a line that is only
+/// slow.
+inline constexpr Duration continuity_forgotten = milliseconds(2000);
 /// How often an axis is read where the end of a motion is awaited. Less than any reading takes on RS-485; on
 /// CAN the state may be known already.
 inline constexpr Duration fastest_poll = milliseconds(2);

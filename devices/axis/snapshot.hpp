@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <boost/smart_ptr/shared_ptr.hpp>
 #include <memory>
 #include <optional>
@@ -59,7 +60,38 @@ struct TerminalState {
   bool active = false;
 };
 
-/// Everything known about an axis at one moment. Immutable once published; user units, axis direction.
+/// When the drive's values of a snapshot were read. While they stay the same it is only these that go on.
+/// Set by one thread, read by any.
+class SampleTimes {
+ public:
+  SampleTimes() = default;
+  SampleTimes(const SampleTimes& other) { set(other.after(), other.before(), other.measured_at()); }
+  SampleTimes& operator=(const SampleTimes& other) {
+    set(other.after(), other.before(), other.measured_at());
+    return *this;
+  }
+  ~SampleTimes() = default;
+
+  /// The values are from between `after` and `before`; `measured_at` is `before` as wall-clock time.
+  void set(TimePoint after, TimePoint before, WallTime measured_at) {
+    // Whoever reads after() first and before() last takes the span for longer at most, never for shorter.
+    before_.store(before, std::memory_order_release);
+    measured_at_.store(measured_at, std::memory_order_release);
+    after_.store(after, std::memory_order_release);
+  }
+  /// False: there are none yet.
+  [[nodiscard]] bool known() const { return before() != TimePoint{}; }
+  [[nodiscard]] TimePoint after() const { return after_.load(std::memory_order_acquire); }
+  [[nodiscard]] TimePoint before() const { return before_.load(std::memory_order_acquire); }
+  [[nodiscard]] WallTime measured_at() const { return measured_at_.load(std::memory_order_acquire); }
+
+ private:
+  std::atomic<TimePoint> after_{TimePoint{}}, before_{TimePoint{}};
+  std::atomic<WallTime> measured_at_{WallTime{}};
+};
+
+/// Everything known about an axis at one moment. Immutable once published, but for the times of its values;
+/// user units, axis direction.
 struct AxisSnapshot {
   std::string name;
   std::string bus;
@@ -98,9 +130,7 @@ struct AxisSnapshot {
   std::uint64_t eeprom_writes =
       0;  ///< registers saved in the drive, since the axis is known on this computer
 
-  TimePoint sampled_after{};  ///< the drive values are from between these two
-  TimePoint sampled_before{};
-  WallTime measured_at{};
+  SampleTimes sampled{};
   std::string command_id{};    ///< current command, if any
   std::string lease_holder{};  ///< who leases the axis; empty: nobody
   std::uint64_t revision = 0;  ///< rises with every publication

@@ -30,6 +30,8 @@ class YakoRtuDrive final : public Drive {
   Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) override;
   Task<Result<void>> configure() override;
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
+  Task<Result<std::optional<DriveSample>>> watch_state(
+      Duration period, std::function<bool(const DriveSample&)> goes_on) override;
   Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
   [[nodiscard]] bool moves_by_itself() const override;
   [[nodiscard]] bool closed_loop() const override;

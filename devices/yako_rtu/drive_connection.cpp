@@ -29,6 +29,13 @@ std::vector<std::uint16_t> addresses_of(const std::vector<RegisterSetting>& sett
   return addresses;
 }
 
+DriveSample sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at, TimePoint measured_at) {
+  auto sample = decode_state(registers);
+  sample.asked_at = asked_at;
+  sample.measured_at = measured_at;
+  return sample;
+}
+
 }  // namespace
 
 YakoRtuDrive::YakoRtuDrive(const Model& model, DriveContext context)
@@ -105,10 +112,19 @@ bool YakoRtuDrive::moves_by_itself() const { return !check_control_mode(); }
 Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class) {
   const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
   if (!answer) co_return failed(answer.error());
-  auto sample = decode_state(answer->registers);
-  sample.asked_at = answer->sent_at;
-  sample.measured_at = answer->answered_at;
-  co_return sample;
+  co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
+}
+
+Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(
+    Duration period, std::function<bool(const DriveSample&)> goes_on) {
+  const auto answer = co_await node_.watch(
+      reg::mode, state_count,
+      {.period = period, .goes_on = [&goes_on](const modbus_rtu::Reading& reading) {
+         return goes_on(sample_of(reading.registers, reading.sent_at, reading.answered_at));
+       }});
+  if (!answer) co_return failed(answer.error());
+  if (!*answer) co_return std::nullopt;
+  co_return sample_of((*answer)->registers, (*answer)->sent_at, (*answer)->answered_at);
 }
 
 bool YakoRtuDrive::readable(std::uint32_t address) const {

@@ -195,7 +195,8 @@ void Judge::look() {
   for (auto& station : plant_->stations) {
     const auto state = station.axis->snapshot();
     const auto& subject = subjects_.at(station.name);
-    const bool fresh = state->link == LinkState::online && state->sampled_after > station.drive->last_moved();
+    const bool fresh =
+        state->link == LinkState::online && state->sampled.after() > station.drive->last_moved();
     const bool rebooted = plant_->world.now() - station.drive->last_power_loss() < reboot_unnoticed;
     if (state->trust == PositionTrust::unknown || !subject.origin || !fresh || rebooted) continue;
     ++tally_.positions;

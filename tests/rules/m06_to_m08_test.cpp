@@ -80,8 +80,8 @@ TEST(M07, PowerCycleBetweenTwoPollsThenAnIdenticalMove) {
     EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
     EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 20}).state, CommandState::done);
     // Just after a poll: the next one is 200 ms away, and the drive is back before it.
-    const auto before = rig.state()->sampled_after;
-    rig.run_until([&] { return rig.state()->sampled_after != before; }, 1s);
+    const auto before = rig.state()->sampled.after();
+    rig.run_until([&] { return rig.state()->sampled.after() != before; }, 1s);
     rig.cycle_power();
     rig.run(110ms);
     rig.line->forget_wire();
@@ -107,8 +107,8 @@ TEST(M10, PowerCycleThenAMoveToTheCountersZero) {
     Rig rig(options);
     rig.ready();
     EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
-    rig.run_until([&, checked = rig.state()->sampled_after] { return rig.state()->sampled_after != checked; },
-                  1s);
+    rig.run_until(
+        [&, checked = rig.state()->sampled.after()] { return rig.state()->sampled.after() != checked; }, 1s);
     rig.cycle_power();
     ASSERT_TRUE(rig.run_until([&] { return rig.state()->position == 0; }, 900ms)) << "noticed before";
     const auto move = rig.complete(MoveAbsoluteRequest{.position = 0});

@@ -215,8 +215,8 @@ TEST(M10, EveryRefusedStartEnds) {
   for (const bool refused : {false, true}) {
     Rig rig({.switches = {{"start_refused_when_disabled", refused}}});
     rig.ready();
-    rig.run_until([&, before = rig.state()->sampled_after] { return rig.state()->sampled_after != before; },
-                  1s);
+    rig.run_until(
+        [&, before = rig.state()->sampled.after()] { return rig.state()->sampled.after() != before; }, 1s);
     rig.write_behind(0x0029, 0);
     const auto move = rig.complete(MoveAbsoluteRequest{.position = 30});
     EXPECT_TRUE(move.state == CommandState::error || move.state == CommandState::aborted) << describe(move);

@@ -30,13 +30,21 @@ void VirtualLine::set_open(bool open) {
     if (!open) status.error = Error{.reason = Reason::bus_down, .message = "unplugged"};
     on_port_(status);
     if (open) return;
-    if (std::exchange(armed_, nullptr) != nullptr) end(ExchangeStatus::not_sent);
+    if (armed_ != nullptr) {
+      result_ = {};
+      end(ExchangeStatus::not_sent);
+    }
     if (under_way_ != nullptr) end(ExchangeStatus::io_error);
   });
 }
 
 void VirtualLine::arm(const Exchange& exchange) {
   armed_ = &exchange;
+  revoked_ = false;
+  await_bind();
+}
+
+void VirtualLine::await_bind() {
   timer_ = world_->clock().call_at(earliest_begin(), [this] { bind(); });
 }
 
@@ -54,22 +62,25 @@ bool VirtualLine::use(const SerialSettings& serial) {
   return true;
 }
 
-bool VirtualLine::revoke() {
-  if (armed_ == nullptr) return false;
+std::optional<std::span<const ExchangeResult>> VirtualLine::revoke() {
+  revoked_ = true;
+  if (armed_ == nullptr) return std::nullopt;
   armed_ = nullptr;
   timer_.reset();
-  return true;
+  told_ = std::exchange(results_, {});
+  return told_;
 }
 
 void VirtualLine::bind() {
   const auto now = world_->now();
-  const auto& exchange = *std::exchange(armed_, nullptr);
+  const auto& exchange = *armed_;
   result_ = {};
   result_.request_begin = result_.request_end = now;
   if (!use(exchange.serial.value_or(settings_.serial()))) return end(ExchangeStatus::unsupported);
   if (exchange.deadline < now) return end(ExchangeStatus::not_sent, Verdict::expired);
   if (const auto verdict = may_send(exchange.guard, now); verdict != Verdict::send)
     return end(ExchangeStatus::not_sent, verdict);
+  armed_ = nullptr;
   under_way_ = &exchange;
   result_.request_end = now + wire_time(serial_, exchange.frame.size());
   const auto bytes = exchange.frame.bytes();
@@ -122,7 +133,7 @@ void VirtualLine::arrive(TimePoint when, std::span<const std::uint8_t> bytes, Ti
 void VirtualLine::hear(std::span<const std::uint8_t> bytes) {
   quiet_since_ = std::max(quiet_since_, world_->now());
   if (armed_ != nullptr) {  // the silence begins anew
-    timer_ = world_->clock().call_at(earliest_begin(), [this] { bind(); });
+    await_bind();
     return;
   }
   // Bytes that arrive while the request is being sent are lost with it.
@@ -166,9 +177,14 @@ void VirtualLine::end(ExchangeStatus status, Verdict verdict) {
     }
     quiet_since_ = std::max(quiet_since_, world_->now());
   }
-  under_way_ = nullptr;
+  const auto& ended = *std::exchange(under_way_ != nullptr ? under_way_ : armed_, nullptr);
   reply_coming_ = false;
-  post(world_->executor(), [this, result = result_] { on_result_(result); });
+  results_.push_back(result_);
+  if (round_goes_on(ended, results_) && !revoked_) {
+    armed_ = ended.then;
+    return await_bind();
+  }
+  post(world_->executor(), [this, results = std::exchange(results_, {})] { on_result_(results); });
 }
 
 }  // namespace axisd::test

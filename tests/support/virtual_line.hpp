@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -61,7 +62,7 @@ class VirtualLine final : public modbus_rtu::Line {
 
   void start(ResultHandler on_result, PortHandler on_port) override;
   void arm(const modbus_rtu::Exchange& exchange) override;
-  bool revoke() override;
+  std::optional<std::span<const modbus_rtu::ExchangeResult>> revoke() override;
   void cut_wait() override;
   [[nodiscard]] TimePoint last_progress() const override { return world_->now(); }
 
@@ -73,6 +74,7 @@ class VirtualLine final : public modbus_rtu::Line {
   void arrive(TimePoint when, std::span<const std::uint8_t> bytes, TimePoint busy_until);
   void hear(std::span<const std::uint8_t> bytes);
   void end(modbus_rtu::ExchangeStatus status, Verdict verdict = Verdict::send);
+  void await_bind();
 
   VirtualWorld* world_;
   modbus_rtu::LineSettings settings_;
@@ -85,6 +87,8 @@ class VirtualLine final : public modbus_rtu::Line {
   const modbus_rtu::Exchange* armed_ = nullptr;
   const modbus_rtu::Exchange* under_way_ = nullptr;
   modbus_rtu::ExchangeResult result_;
+  std::vector<modbus_rtu::ExchangeResult> results_, told_;  ///< of a round
+  bool revoked_ = false;
   bool reply_coming_ = false;
   TimePoint quiet_since_{};
   TimePoint last_reply_end_{};

@@ -90,7 +90,7 @@ TEST_F(Streams, FirstBatchComesAtOnceAndShowsWhatWasPublishedBefore) {
 TEST_F(Streams, TicksCountOnAndAgesAreFresh) {
   serve();
   AxisSnapshot snapshot{.name = "feeder"};
-  snapshot.sampled_before = machine_.now();
+  snapshot.sampled.set({}, machine_.now(), {});
   machine_.publish(snapshot);
   Watch watch(*axes_, 10ms, {"feeder"});
   ASSERT_TRUE(watch.read());

@@ -78,8 +78,7 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   snapshot.outputs = {{"Y0", "alarm", false}};
   snapshot.identity = DriveIdentity{.model_code = 1, .version = "1.2"};
   snapshot.reboots = 4;
-  snapshot.sampled_before = TimePoint(10s);
-  snapshot.measured_at = WallTime(1s + 500ms);
+  snapshot.sampled.set(TimePoint(9s), TimePoint(10s), WallTime(1s + 500ms));
   snapshot.command_id = "c-9";
   snapshot.revision = 77;
   snapshot.motion_cause = MotionCause::terminal;

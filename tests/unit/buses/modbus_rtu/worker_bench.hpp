@@ -16,6 +16,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -195,11 +196,15 @@ class WorkerBench {
       : worker(std::make_unique<RtuWorker>(io_.get_executor(), std::move(settings), std::move(path))) {}
 
   void start() {
-    worker->start([this](const ExchangeResult& result) { results.push_back(result); },
-                  [this](const PortStatus& status) {
-                    ports.push_back(status);
-                    if (status.open && on_open) on_open();
-                  });
+    worker->start(
+        [this](std::span<const ExchangeResult> told) {
+          results.insert(results.end(), told.begin(), told.end());
+          rounds.push_back(told.size());
+        },
+        [this](const PortStatus& status) {
+          ports.push_back(status);
+          if (status.open && on_open) on_open();
+        });
   }
   void start_and_open() {
     start();
@@ -237,6 +242,7 @@ class WorkerBench {
 
  public:
   std::vector<ExchangeResult> results;
+  std::vector<std::size_t> rounds;  ///< how many results were told together
   std::vector<PortStatus> ports;
   std::function<void()> on_open;
   std::unique_ptr<RtuWorker> worker;

@@ -1,0 +1,115 @@
+// Readings that are repeated without whoever asked for them.
+#include <algorithm>
+#include <utility>
+
+#include "buses/modbus_rtu/rtu_bus.hpp"
+
+namespace axisd::modbus_rtu {
+
+namespace {
+
+/// So much later than by itself the core hears of a reading that says nothing new, and of what was carried
+/// out behind it.
+constexpr Duration longest_round = std::chrono::milliseconds(40);
+
+}  // namespace
+
+Task<Result<std::optional<Answer>>> RtuBus::watch(Request request, Repetition repetition) {
+  const auto node = request.node;
+  auto transaction = prepare(std::move(request), {.transaction_class = TransactionClass::idle_state});
+  if (!transaction) co_return fail(transaction.error());
+  Promise<Result<std::optional<Answer>>> promise(executor_, *clock_);
+  (*transaction)
+      ->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
+        promise.set(answer(ended, result));
+      });
+  auto& known = watches_[node];
+  const bool first = known == nullptr;
+  if (first) {
+    known = std::make_unique<Watch>(std::move(repetition), [&promise] { promise.set(std::nullopt); });
+    (*transaction)->watch = known.get();
+    auto& said = known_[node];
+    if (said.request != (*transaction)->exchange.frame) said = {.request = (*transaction)->exchange.frame};
+    (*transaction)->exchange.known = &said.reply;
+  }
+  submit(*std::move(transaction));
+  pump();
+  auto result = co_await promise.get();
+  if (first) watches_.erase(node);
+  co_return result;
+}
+
+/// Whoever ends it waits for its answer: it is not to be told with those of the round only.
+void RtuBus::end_repetition(std::uint8_t node) {
+  const auto found = watches_.find(node);
+  if (found == watches_.end()) return;
+  found->second->end();
+  if (recall(node)) pump();
+}
+
+/// Takes a round back of which `node` is part, as far as it has not been carried out.
+bool RtuBus::recall(std::uint8_t node) {
+  return round_.size() > 1 &&
+         std::ranges::any_of(round_, [&](const auto& one) { return one->exchange.request.node == node; }) &&
+         take_back();
+}
+
+/// Whoever asked: a later reading that says the same says nothing new.
+void RtuBus::note_known(const Exchange& exchange, const ExchangeResult& result) {
+  if (result.status != ExchangeStatus::replied) return;
+  const auto known = known_.find(exchange.request.node);
+  if (known != known_.end() && known->second.request == exchange.frame &&
+      known->second.reply != result.reply_frame)
+    known->second.reply = result.reply_frame;
+}
+
+/// What was hastened has somebody waiting.
+bool RtuBus::is_repeated(const Transaction& ended, const ExchangeResult& result) const {
+  return ended.watch != nullptr && ended.transaction_class == TransactionClass::idle_state &&
+         result.status == ExchangeStatus::replied && result.reply.kind == ReplyKind::match && port_.open &&
+         ended.watch->goes_on({.registers = result.reply.registers,
+                               .sent_at = result.request_begin,
+                               .answered_at = result.reply_end});
+}
+
+/// Puts what is next behind the first one, as long as nothing but axes at rest is asked for: to wake the core
+/// for each of them costs as much as the exchange. One that somebody waits for is the last.
+void RtuBus::extend_round() {
+  const auto now = clock_->now();
+  const auto length_of = [this](const Transaction& one) {
+    return silence(settings_.serial()) + wire_time(settings_.serial(), one.exchange.frame.size()) +
+           wire_time(settings_.serial(), reply_size(one.exchange.request));
+  };
+  Duration length{};
+  for (auto* last = round_.front().get();; last = round_.back().get()) {
+    last->exchange.then = nullptr;
+    length += length_of(*last);
+    if (last->watch == nullptr || last->watch->over() ||
+        last->transaction_class != TransactionClass::idle_state)
+      return;
+    const auto* next = queue_.next_idle();
+    if (next == nullptr || length + length_of(*next) > longest_round || next->exchange.serial ||
+        may_send(next->exchange.guard, now) != Verdict::send || must_wait(*next, now) ||
+        late_.may_answer(next->exchange.request, now))
+      return;
+    round_.push_back(queue_.pop());
+    last->exchange.then = &round_.back()->exchange;
+    last->exchange.round_longest = longest_round;
+  }
+}
+
+/// The same transaction once more, behind what waits by then.
+void RtuBus::repeat(TransactionPtr transaction, const ExchangeResult& result, TimePoint now) {
+  note(*transaction, result);
+  auto* watch = transaction->watch;
+  const auto due = std::max(watch->next(transaction->queued_at), now);
+  transaction->reserved = false;
+  transaction->queued_at = due;
+  if (due == now) return submit(std::move(transaction));
+  watch->rest(std::move(transaction), clock_->call_at(due, [this, watch] {
+    submit(watch->take_resting());
+    pump();
+  }));
+}
+
+}  // namespace axisd::modbus_rtu

@@ -1,0 +1,161 @@
+// Reading the state again and again, and noticing that the drive is gone or was restarted.
+#include <algorithm>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+constexpr int attempts_before_offline = 3;
+constexpr auto continuity_latest = milliseconds(950);
+/// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
+/// trusted meanwhile.
+constexpr auto continuity_longest = milliseconds(2500);
+/// How soon the watch looks again at an axis that is beyond it, but is being asked.
+constexpr auto continuity_look = milliseconds(50);
+
+}  // namespace
+
+Task<> Axis::poll() {
+  Polling polling;
+  while (link_ == LinkState::online) {
+    if (chains_ > 0) {
+      co_await wake_.wait();
+      continue;
+    }
+    if (bus_loss_) co_return go_offline(Error(*bus_loss_));
+    const auto began = env_.clock->now();
+    if (!co_await poll_once(polling)) co_return;
+    if (polling.failures > 0 || polling.woken) continue;  // the bus's own timeouts pace the repetition
+    co_await look_for_drift();
+    // What was repeated was asked for later.
+    const auto asked = sample_ ? std::max(began, sample_->asked_at) : began;
+    const auto next = std::min(next_poll(asked), continuity_checked_ + continuity_latest);
+    if (next > env_.clock->now()) co_await wake_.wait_until(next);
+  }
+}
+
+void Axis::poll_fast(TimePoint from, Duration longest) {
+  fast_from_ = from;
+  fast_until_ = from + longest;
+  wake();
+}
+
+TimePoint Axis::next_poll(TimePoint began) const {
+  if (!busy()) return began + settings_.poll_idle;
+  if (began >= fast_from_ && began < fast_until_) return began + fastest_poll;
+  const auto next = began + settings_.poll_moving;
+  return began < fast_from_ ? std::min(next, fast_from_) : next;
+}
+
+/// The drive was not restarted since its parameters were last written.
+Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
+  auto proof = co_await drive_->check_continuity(priority);
+  if (proof) continuity_checked_ = env_.clock->now();
+  co_return proof;
+}
+
+/// False: the link is gone.
+Task<bool> Axis::poll_once(Polling& polling) {
+  polling.woken = false;
+  Result<void> result;
+  const auto now = env_.clock->now();
+  // Where an end is awaited the canary waits as long as it may.
+  const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
+  if (now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
+    result =
+        co_await prove_continuity(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
+    if (!result && result.error().reason == Reason::rebooted) {
+      on_reboot(result.error());
+      co_return false;
+    }
+  }
+  if (result) {
+    const auto sample = co_await next_sample(polling.failures > 0);
+    polling.woken = sample && !*sample;
+    if (polling.woken) co_return link_ == LinkState::online;
+    if (!sample) result = fail(sample.error());
+    // Its node was held back: what was proven before that says nothing of it.
+    else if ((*sample)->asked_at - continuity_checked_ > continuity_forgotten)
+      result = co_await prove_continuity(TransactionClass::moving_state);
+    if (result && !seen_again(**sample)) on_sample(**sample);
+    if (!result && result.error().reason == Reason::rebooted) {
+      if (link_ == LinkState::online) on_reboot(result.error());
+      co_return false;
+    }
+  }
+  if (link_ != LinkState::online) co_return false;  // a sequence found the reboot first
+  if (result) {
+    polling.failures = 0;
+    co_return true;
+  }
+  const bool unproven = env_.clock->now() - continuity_checked_ >= continuity_longest;
+  if (result.error().reason == Reason::bus_down || ++polling.failures >= attempts_before_offline ||
+      unproven) {
+    go_offline(result.error());
+    co_return false;
+  }
+  co_return true;
+}
+
+/// At rest the bus reads the state again and again, and tells what is new. Nothing: the axis was woken
+/// before.
+Task<Result<std::optional<DriveSample>>> Axis::next_sample(bool in_doubt) {
+  if (busy()) co_return co_await drive_->read_state(TransactionClass::moving_state);
+  if (in_doubt) co_return co_await drive_->read_state(TransactionClass::idle_state);
+  co_return co_await drive_->watch_state(settings_.poll_idle, [this](const DriveSample& sample) {
+    return seen_again(sample) && only_watches();
+  });
+}
+
+/// The drive is as it was, and nothing has changed about the axis since it was looked at with that state:
+/// then only the time at which that is known has.
+bool Axis::seen_again(const DriveSample& sample) {
+  if (sample.asked_at - continuity_checked_ > continuity_forgotten) return false;  // to be proven first
+  if (link_ != LinkState::online || revision_ != sampled_revision_ || busy() || release_owed_ || !sample_ ||
+      note_eeprom_writes() || shown_->link_note != drive_->link_note())
+    return false;
+  auto known = *sample_;
+  known.asked_at = sample.asked_at;
+  known.measured_at = sample.measured_at;
+  if (known != sample) return false;
+  sample_ = sample;
+  observed_.on_sample(sample, false);
+  shown_->sampled.set(sample.asked_at, sample.measured_at, env_.clock->wall(sample.measured_at));
+  sampled_.notify_all();
+  return true;
+}
+
+/// The poll loop has nothing to do but to read the state.
+bool Axis::only_watches() const {
+  const auto now = env_.clock->now();
+  // The canary goes before the reading at which it is due: the next one may have to wait for the line.
+  const bool canary_due = now + settings_.poll_idle >= continuity_checked_ + continuity_period;
+  return chains_ == 0 && !bus_loss_ && drift_.empty() && !canary_due &&
+         now - drift_checked_ < settings_.drift_check;
+}
+
+/// The poll loop has something to look at.
+void Axis::wake() {
+  env_.bus->end_repetition(settings_.node);
+  wake_.notify_all();
+}
+
+/// While its node is held back no request fails, as none is sent: nothing else would tell that nobody has
+/// heard of the drive for so long.
+void Axis::watch_continuity() {
+  if (link_ != LinkState::online) return;
+  const auto now = env_.clock->now();
+  const auto limit = continuity_checked_ + continuity_longest;
+  if (now >= limit && env_.bus->holds_back(settings_.node)) {
+    go_offline(error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
+                     "check power, wiring, address and baud rate of the node"));
+    return;
+  }
+  continuity_watch_ =
+      env_.clock->call_at(std::max(limit, now + continuity_look), [this] { watch_continuity(); });
+}
+
+}  // namespace axisd
