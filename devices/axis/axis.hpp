@@ -156,13 +156,14 @@ class Axis {
   void on_reboot(const Error& cause);
 
   // axis_poll.cpp: its state, again and again
-  Task<> poll();
   struct Polling {
-    int failures = 0;    ///< in a row
-    bool woken = false;  ///< in place of a sample
+    int failures = 0;       ///< in a row
+    bool woken = false;     ///< in place of a sample
+    bool repeated = false;  ///< the sample was asked for later than by the poll loop
   };
+  Task<> poll();
   Task<bool> poll_once(Polling& polling);
-  Task<Result<std::optional<DriveSample>>> next_sample(bool in_doubt);
+  Task<Result<std::optional<DriveSample>>> next_sample(Polling& polling);
   bool seen_again(const DriveSample& sample);
   [[nodiscard]] bool only_watches() const;
   void wake();

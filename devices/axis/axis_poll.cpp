@@ -30,8 +30,7 @@ Task<> Axis::poll() {
     if (!co_await poll_once(polling)) co_return;
     if (polling.failures > 0 || polling.woken) continue;  // the bus's own timeouts pace the repetition
     co_await look_for_drift();
-    // What was repeated was asked for later.
-    const auto asked = sample_ ? std::max(began, sample_->asked_at) : began;
+    const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
     const auto next = std::min(next_poll(asked), continuity_checked_ + continuity_latest);
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }
@@ -59,7 +58,7 @@ Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
 
 /// False: the link is gone.
 Task<bool> Axis::poll_once(Polling& polling) {
-  polling.woken = false;
+  polling.woken = polling.repeated = false;
   Result<void> result;
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
@@ -73,7 +72,7 @@ Task<bool> Axis::poll_once(Polling& polling) {
     }
   }
   if (result) {
-    const auto sample = co_await next_sample(polling.failures > 0);
+    const auto sample = co_await next_sample(polling);
     polling.woken = sample && !*sample;
     if (polling.woken) co_return link_ == LinkState::online;
     if (!sample) result = fail(sample.error());
@@ -102,11 +101,13 @@ Task<bool> Axis::poll_once(Polling& polling) {
 
 /// At rest the bus reads the state again and again, and tells what is new. Nothing: the axis was woken
 /// before.
-Task<Result<std::optional<DriveSample>>> Axis::next_sample(bool in_doubt) {
+Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
   if (busy()) co_return co_await drive_->read_state(TransactionClass::moving_state);
-  if (in_doubt) co_return co_await drive_->read_state(TransactionClass::idle_state);
-  co_return co_await drive_->watch_state(settings_.poll_idle, [this](const DriveSample& sample) {
-    return seen_again(sample) && only_watches();
+  if (polling.failures > 0) co_return co_await drive_->read_state(TransactionClass::idle_state);
+  co_return co_await drive_->watch_state(settings_.poll_idle, [this, &polling](const DriveSample& sample) {
+    const bool goes_on = seen_again(sample) && only_watches();
+    polling.repeated = polling.repeated || goes_on;
+    return goes_on;
   });
 }
 

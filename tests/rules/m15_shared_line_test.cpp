@@ -1,6 +1,7 @@
 // M15 and the scheduling that it rests on: many axes on one line, none of them starved.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 
 #include "tests/rules/shared_line.hpp"
@@ -35,6 +36,31 @@ TEST(M15, MovingAxesLeaveTheOthersTheirShare) {
   for (const auto& entry : line.line->wire()) ++requests[entry.node()];
   for (int i = 4; i <= 8; ++i) EXPECT_GE(requests[i], 5) << "node " << i;
   EXPECT_TRUE(online());
+}
+
+/// M7 on a full line: what is repeated by itself does not keep the canaries waiting.
+TEST(M15, TheCanaryOfEachAxisIsReadInTimeOnAFullLine) {
+  for (const auto idle : {1ms, 50ms, 200ms}) {
+    SharedLine line(16, 115200, [idle](AxisSettings& axis) { axis.poll_idle = idle; });
+    ASSERT_TRUE(line.world.run_until(
+        [&] { return line.all([](const AxisSnapshot& a) { return a.link == LinkState::online; }); }, 60s));
+    line.world.run_for(2s);
+    line.line->forget_wire();
+    line.world.run_for(10s);
+    std::map<int, TimePoint> last;
+    std::map<int, int> reads;
+    Duration longest{};
+    for (const auto& entry : line.line->wire()) {
+      if (entry.is_write() || entry.address() != 0x0020) continue;
+      if (last.contains(entry.node())) longest = std::max(longest, entry.begin - last[entry.node()]);
+      last[entry.node()] = entry.begin;
+      ++reads[entry.node()];
+    }
+    EXPECT_EQ(reads.size(), 16U);
+    // The canary is asked for in time, but waits for its turn: 16 readings of 6.5 ms.
+    EXPECT_LE(longest, 1100ms) << "poll " << idle.count();
+    EXPECT_GE(longest, 700ms) << "no more often than needed";
+  }
 }
 
 TEST(M15, StopAllOnASlowLineConfirmsWithoutEscalating) {
