@@ -5,7 +5,7 @@ import pathlib
 import re
 import unittest
 
-from harness import HOMING, START, STOP, pb
+from harness import HOMING, START, STOP, error_pb, pb, system_pb, wait_for
 from harness.person import CommissionScenario, Hand, ScriptedOperator
 
 
@@ -125,6 +125,9 @@ class Commission(CommissionScenario):
         machine = self.cell()
         machine.sim.control("alarm 1 1")
         machine.client.wait_state("feeder", lambda s: s.state == pb.STATE_ERROR_STOP, "the alarm is seen")
+        client = machine.client
+        wait_for(lambda: all(o.detail.reason != error_pb.REASON_STOPPING for o in client.call(
+            client.system.Explain, system_pb.ExplainRequest(axis="feeder")).obstacles), "the stop is confirmed")
         person = self.person(machine)
         self.assertEqual(person.finish(), 1, person.text)
         step = person.step("identity")
