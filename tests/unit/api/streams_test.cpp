@@ -11,7 +11,6 @@ namespace axisd::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using ::testing::ElementsAre;
 
 /// An open WatchAxes stream.
 struct Watch {

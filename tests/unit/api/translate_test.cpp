@@ -267,13 +267,16 @@ TEST(Validate, UnknownEnumValuesAreRefusedForMotionButNeverForStops) {
   FakeMachine machine;
   v1::CommandOptions options;
   options.set_request_id("r");
-  options.set_wait_until(static_cast<v1::WaitUntil>(77));
+  const auto set_unknown = [&options](const char* field) {
+    options.GetReflection()->SetEnumValue(&options, options.GetDescriptor()->FindFieldByName(field), 77);
+  };
+  set_unknown("wait_until");
   EXPECT_FALSE(motion_options(options, "hmi", machine));
   EXPECT_EQ(stop_options(options, "hmi").until, WaitUntil::accepted);
   options.set_wait_until(v1::WAIT_UNTIL_DONE);
   EXPECT_EQ(stop_options(options, "hmi").until, WaitUntil::done);
   EXPECT_EQ(motion_options(options, "hmi", machine)->until, WaitUntil::done);
-  options.set_buffer_mode(static_cast<v1::BufferMode>(77));
+  set_unknown("buffer_mode");
   EXPECT_FALSE(motion_options(options, "hmi", machine));
   options.set_buffer_mode(v1::BUFFER_MODE_BUFFERED);
   EXPECT_EQ(motion_options(options, "hmi", machine)->options.buffer_mode, BufferMode::buffered);

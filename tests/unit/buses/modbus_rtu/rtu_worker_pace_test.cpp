@@ -58,7 +58,7 @@ class RtuWorkerPace : public ::testing::Test {
 };
 
 /// The first `count` bytes after `first`, the others `between` later.
-ScriptedNode::Script in_pieces(std::function<Frame(const Bytes&)> reply, std::size_t count,
+ScriptedNode::Script in_pieces(const std::function<Frame(const Bytes&)>& reply, std::size_t count,
                                milliseconds first, milliseconds between) {
   return [=](ScriptedNode& node, const Bytes& request) {
     const auto frame = reply(request);
@@ -73,7 +73,7 @@ Frame refusal(const Bytes& request) {
 /// To somebody else's reading of so many registers, none of which this node has.
 Frame foreign(std::uint8_t registers) {
   Bytes bytes{2, 3, static_cast<std::uint8_t>(2 * registers)};
-  bytes.resize(bytes.size() + 2U * registers, 0x77);
+  bytes.resize(bytes.size() + std::size_t{2} * registers, 0x77);
   return framed(bytes);
 }
 
