@@ -156,11 +156,8 @@ char parity_letter(Parity parity) {
 
 /// Length of the frame that libmodbus assembled in `bytes`: it tells only whether it was sound.
 std::size_t assembled_length(std::span<const std::uint8_t> bytes) {
-  const auto function = bytes[1];
-  if (function == 0x05 || function == 0x06 || function == 0x0F || function == 0x10) return 8;
-  if (function == 0x16) return 10;
-  const bool counted = function <= 0x04 || function == 0x11 || function == 0x17;
-  return counted ? std::min<std::size_t>(5U + bytes[2], bytes.size()) : 5;
+  constexpr std::size_t shortest = 5;  // what it takes of a function that it does not know
+  return std::clamp(reply_size(bytes), shortest, bytes.size());
 }
 
 }  // namespace
