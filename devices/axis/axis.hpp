@@ -166,6 +166,7 @@ class Axis {
   Task<Result<std::optional<DriveSample>>> next_sample(Polling& polling);
   bool seen_again(const DriveSample& sample);
   [[nodiscard]] bool only_watches() const;
+  [[nodiscard]] bool canary_would_be_late() const;
   void wake();
   void watch_continuity();
   Task<Result<void>> prove_continuity(TransactionClass priority);
@@ -366,6 +367,7 @@ class Axis {
   bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
   int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
+  Duration refresh_{};  ///< between the last two of the readings that the bus repeats
   Clock::Timer continuity_watch_;
   TimePoint settle_by_{};
   std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon

@@ -10,6 +10,10 @@ namespace {
 
 constexpr int attempts_before_offline = 3;
 constexpr auto continuity_latest = milliseconds(950);
+/// M7.
+constexpr auto continuity_every = milliseconds(1000);
+/// So long after its reply, at most, a bus tells of a reading that it repeats.
+constexpr auto told_late = milliseconds(50);
 /// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
 /// trusted meanwhile.
 constexpr auto continuity_longest = milliseconds(2500);
@@ -28,7 +32,8 @@ Task<> Axis::poll() {
     if (bus_loss_) co_return go_offline(Error(*bus_loss_));
     const auto began = env_.clock->now();
     if (!co_await poll_once(polling)) co_return;
-    if (polling.failures > 0 || polling.woken) continue;  // the bus's own timeouts pace the repetition
+    if (polling.woken) continue;
+    if (polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
     co_await look_for_drift();
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
     const auto next = std::min(next_poll(asked), continuity_checked_ + continuity_latest);
@@ -63,7 +68,8 @@ Task<bool> Axis::poll_once(Polling& polling) {
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
   const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
-  if (now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
+  const bool late_next = !busy() && canary_would_be_late();
+  if (late_next || now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
     result =
         co_await prove_continuity(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
     if (!result && result.error().reason == Reason::rebooted) {
@@ -105,6 +111,8 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
   if (busy()) co_return co_await drive_->read_state(TransactionClass::moving_state);
   if (polling.failures > 0) co_return co_await drive_->read_state(TransactionClass::idle_state);
   co_return co_await drive_->watch_state(settings_.poll_idle, [this, &polling](const DriveSample& sample) {
+    const auto before = sample_ ? sample_->asked_at : sample.asked_at;
+    refresh_ = sample.asked_at - before;
     const bool goes_on = seen_again(sample) && only_watches();
     polling.repeated = polling.repeated || goes_on;
     return goes_on;
@@ -129,12 +137,18 @@ bool Axis::seen_again(const DriveSample& sample) {
   return true;
 }
 
+/// M7, if another reading went first: on a full line that one waits for its turn, and then the canary does.
+bool Axis::canary_would_be_late() const {
+  return refresh_ > settings_.poll_idle &&
+         env_.clock->now() + 2 * refresh_ + told_late > continuity_checked_ + continuity_every;
+}
+
 /// The poll loop has nothing to do but to read the state.
 bool Axis::only_watches() const {
   const auto now = env_.clock->now();
-  // The canary goes before the reading at which it is due: the next one may have to wait for the line.
-  const bool canary_due = now + settings_.poll_idle >= continuity_checked_ + continuity_period;
-  return chains_ == 0 && !bus_loss_ && drift_.empty() && !canary_due &&
+  // The canary goes before the reading at which it is due.
+  const bool canary_next = now + settings_.poll_idle >= continuity_checked_ + continuity_period;
+  return chains_ == 0 && !bus_loss_ && drift_.empty() && !canary_next && !canary_would_be_late() &&
          now - drift_checked_ < settings_.drift_check;
 }
 

@@ -57,8 +57,7 @@ TEST(M15, TheCanaryOfEachAxisIsReadInTimeOnAFullLine) {
       ++reads[entry.node()];
     }
     EXPECT_EQ(reads.size(), 16U);
-    // The canary is asked for in time, but waits for its turn: 16 readings of 6.5 ms.
-    EXPECT_LE(longest, 1100ms) << "poll " << idle.count();
+    EXPECT_LE(longest, 1s) << "poll " << idle.count();
     EXPECT_GE(longest, 700ms) << "no more often than needed";
   }
 }
