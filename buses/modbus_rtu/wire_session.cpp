@@ -112,10 +112,13 @@ WireSession::Bytes WireSession::absorb() {
 int WireSession::keep_silence() {
   const auto give_up = monotonic_now() + babble_limit;
   for (;;) {
-    block_until(last_byte_ + silence(serial_));
+    silence_.begin(last_byte_ + silence(serial_));
     const auto heard = absorb();
     if (heard.native_error != 0) return heard.native_error;
-    if (heard.count == 0 || monotonic_now() > give_up) return 0;
+    if (heard.count == 0) return 0;
+    if (monotonic_now() < give_up) continue;
+    silence_.abandon();
+    return 0;
   }
 }
 
@@ -148,6 +151,7 @@ int WireSession::find_echo() {
   const auto probe = make_probe();
   for (int attempt = 0; attempt < echo_attempts && !echo_known_; ++attempt) {
     if (const int lost = keep_silence(); lost != 0) return lost;
+    silence_.finish();
     if (const int lost = port_.send(probe); lost != 0) return lost;
     request_end_ = last_byte_ = monotonic_now() + wire_time(serial_, probe.size());
     std::array<std::uint8_t, Frame::capacity> buffer;
@@ -228,10 +232,10 @@ void WireSession::sleep_before_reply(const Exchange& exchange, const ExchangeRes
   reply_awaited_ = true;
   if (!is_paced(exchange)) return;
   const auto quiet = pace_.quiet(exchange.request.node, wire_time(serial_, reply_size(exchange.request)));
-  const auto until = std::min(result.request_end + quiet, reply_deadline_);
+  const auto until = reply_latency_.asked_for(std::min(result.request_end + quiet, reply_deadline_));
   if (until - monotonic_now() < shortest_sleep) return;
   const auto cut_from = result.request_end + exchange.turnaround_max;
-  wait_until(until, &cut_from, false);
+  if (wait_until(until, &cut_from, false) == Wait::timeout) reply_latency_.note(until, monotonic_now());
   slept_ = true;
   reply_awaited_ = false;
 }
@@ -352,7 +356,7 @@ bool WireSession::end_damaged(ExchangeResult& result, const Frame& bytes, TimePo
 ExchangeResult WireSession::run(const Exchange& exchange) {
   ExchangeResult result{.foreign_frames = std::exchange(stray_frames_, 0)};
   damaged_ = false;
-  result.request_begin = monotonic_now();
+  result.request_begin = silence_.finish();
   if (const int lost = port_.send(exchange.frame); lost != 0) {
     end(result, ExchangeStatus::io_error, lost);
     return result;

@@ -6,9 +6,11 @@
 #include <span>
 
 #include "buses/modbus_rtu/line.hpp"
+#include "buses/modbus_rtu/punctual_wait.hpp"
 #include "buses/modbus_rtu/reply_pace.hpp"
 #include "buses/modbus_rtu/serial_port.hpp"
 #include "buses/modbus_rtu/settings.hpp"
+#include "buses/modbus_rtu/wake_latency.hpp"
 #include "buses/modbus_rtu/wakeup.hpp"
 
 namespace axisd::modbus_rtu {
@@ -33,7 +35,8 @@ class WireSession {
   /// Brings the port to other serial settings; the line must be silent. 0, EINVAL (the port cannot do them)
   /// or the errno with which it was lost.
   int use(const SerialSettings& serial);
-  /// Blocks until the line has been silent for as long as must be before a request.
+  /// Blocks until the line has been silent for as long as must be before a request, but for what comes
+  /// between waking and sending; run() waits for the rest.
   int keep_silence();
   /// Blocks until the wakeup is notified, bytes that nobody asked for come, or `limit` has passed.
   int idle(Duration limit);
@@ -76,6 +79,8 @@ class WireSession {
   TimePoint last_byte_;       ///< end of the last character on the wire, sent or received
   TimePoint request_end_;     ///< when the last request has left the adapter
   TimePoint reply_deadline_;  ///< of the exchange under way
+  PunctualWait silence_;      ///< before a request
+  WakeLatency reply_latency_;
   ReplyPace pace_;
   bool slept_ = false;          ///< before the reply, as its node's pace is known
   bool reply_awaited_ = false;  ///< it was not complete when that sleep ended
