@@ -141,6 +141,19 @@ class LoadedMove {
   virtual Task<> follow_up() { co_return; }
 };
 
+/// What becomes of a state that is read again and again. All of it is called on the core thread and must not
+/// block.
+struct StateWatch {
+  Duration period{};  ///< from one reading to the next
+  /// This one tells nothing new, and nobody waits for another.
+  std::function<bool(const DriveSample&)> goes_on;
+  /// When Drive::check_continuity() is asked for, if the next reading is at `next`; after that: not before
+  /// that reading.
+  std::function<TimePoint(TimePoint next)> proof_due;
+  /// It succeeded; its reply had come then.
+  std::function<void(TimePoint)> proven;
+};
+
 /// One drive. All sequences are coroutines of the core thread. Errors carry bus, node, register and native
 /// code; `outcome` says what is known about the execution. Thread: core.
 class Drive {
@@ -160,11 +173,10 @@ class Drive {
   /// the node itself said so.
   virtual Task<Result<DriveSample>> read_state(TransactionClass transaction_class) = 0;
 
-  /// The same, in class idle_state, every `period` from now on for as long as `goes_on` says of a reading
-  /// that it tells nothing new. Ends with the first that does; nothing: Bus::end_repetition() came between
-  /// two.
-  virtual Task<Result<std::optional<DriveSample>>> watch_state(
-      Duration /*period*/, std::function<bool(const DriveSample&)> /*goes_on*/) {
+  /// The same, in class idle_state, again and again for as long as `watch` says of a reading that it tells
+  /// nothing new. Ends with the first that does; nothing: Bus::end_repetition() came between two, or
+  /// continuity could not be proven.
+  virtual Task<Result<std::optional<DriveSample>>> watch_state(StateWatch /*watch*/) {
     co_return co_await read_state(TransactionClass::idle_state);
   }
 

@@ -4,16 +4,16 @@ namespace axisd::modbus_rtu {
 
 Task<Result<Answer>> Node::read(std::uint16_t address, std::uint16_t count,
                                 TransactionOptions options) const {
-  co_return co_await bus_->transact(
-      {.node = address_, .function = Function::read_holding_registers, .address = address, .count = count},
-      std::move(options));
+  co_return co_await bus_->transact(reading(address, count), std::move(options));
 }
 
 Task<Result<std::optional<Answer>>> Node::watch(std::uint16_t address, std::uint16_t count,
                                                 Repetition repetition) const {
-  co_return co_await bus_->watch(
-      {.node = address_, .function = Function::read_holding_registers, .address = address, .count = count},
-      std::move(repetition));
+  co_return co_await bus_->watch(reading(address, count), std::move(repetition));
+}
+
+Request Node::reading(std::uint16_t address, std::uint16_t count) const {
+  return {.node = address_, .function = Function::read_holding_registers, .address = address, .count = count};
 }
 
 Task<Result<Answer>> Node::write(std::uint16_t address, std::uint16_t value,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -52,8 +53,8 @@ class RtuBus final : public Bus {
   Task<Result<Answer>> transact(Request request, TransactionOptions options);
   /// A reading in class idle_state that the bus repeats by itself, so that whoever polls a node is woken for
   /// news alone. Ends with the answer of which `repetition` says so, with nothing where end_repetition() came
-  /// between two readings, or with an error of transact(). Of several for one node only the first is
-  /// repeated.
+  /// between two readings or a proof was not answered as it should be, or with an error of transact(). Of
+  /// several for one node only the first is repeated.
   Task<Result<std::optional<Answer>>> watch(Request request, Repetition repetition);
   void end_repetition(std::uint8_t node) override;
 
@@ -90,6 +91,9 @@ class RtuBus final : public Bus {
   [[nodiscard]] std::shared_ptr<StopNotice> stop_notice() const override { return line_->stop_notice(); }
 
  private:
+  struct Known {
+    Frame request, reply;
+  };
   [[nodiscard]] Exchange exchange_for(Request request, const Frame& frame, TransactionOptions options) const;
   Result<TransactionPtr> prepare(Request request, TransactionOptions options) const;
   void submit(TransactionPtr transaction);
@@ -102,6 +106,7 @@ class RtuBus final : public Bus {
   void finish(TransactionPtr transaction, const ExchangeResult& result, TimePoint now);
   void extend_round();
   bool recall(std::uint8_t node);
+  static void know(Exchange& exchange, Known& known);
   void note_known(const Exchange& exchange, const ExchangeResult& result);
   void arm_next();
   [[nodiscard]] bool must_wait(const Transaction& transaction, TimePoint now) const;
@@ -130,10 +135,8 @@ class RtuBus final : public Bus {
   TransactionQueue queue_;
   std::vector<TransactionPtr> round_;  ///< armed or under way, in the order of the line
   std::map<std::uint8_t, std::unique_ptr<Watch>> watches_;
-  struct Known {
-    Frame request, reply;
-  };
-  std::map<std::uint8_t, Known> known_;  ///< what the last repeated reading of each node says
+  /// What the last repeated reading of each node says, and its proof.
+  std::map<std::uint8_t, std::array<Known, 2>> known_;
   LateReplies late_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Quarantine quarantine_;

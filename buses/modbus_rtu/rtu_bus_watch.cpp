@@ -16,27 +16,43 @@ constexpr Duration longest_round = std::chrono::milliseconds(40);
 
 Task<Result<std::optional<Answer>>> RtuBus::watch(Request request, Repetition repetition) {
   const auto node = request.node;
-  auto transaction = prepare(std::move(request), {.transaction_class = TransactionClass::idle_state});
+  const TransactionOptions options{.transaction_class = TransactionClass::idle_state};
+  auto transaction = prepare(std::move(request), options);
   if (!transaction) co_return fail(transaction.error());
-  Promise<Result<std::optional<Answer>>> promise(executor_, *clock_);
-  (*transaction)
-      ->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
-        promise.set(answer(ended, result));
-      });
-  auto& known = watches_[node];
-  const bool first = known == nullptr;
-  if (first) {
-    known = std::make_unique<Watch>(std::move(repetition), [&promise] { promise.set(std::nullopt); });
-    (*transaction)->watch = known.get();
-    auto& said = known_[node];
-    if (said.request != (*transaction)->exchange.frame) said = {.request = (*transaction)->exchange.frame};
-    (*transaction)->exchange.known = &said.reply;
+  std::optional<Exchange> proof;
+  if (repetition.proof) {
+    const auto prepared = prepare(repetition.proof->request, options);
+    if (!prepared) co_return fail(prepared.error());
+    proof = (*prepared)->exchange;
   }
+  Promise<Result<std::optional<Answer>>> promise(executor_, *clock_);
+  Watch* watch = nullptr;
+  if (auto& own = watches_[node]; !own) {
+    own = std::make_unique<Watch>(std::move(repetition), std::move(proof),
+                                  [&promise] { promise.set(std::nullopt); });
+    (*transaction)->watch = watch = own.get();
+    auto& [reading, proof_known] = known_[node];
+    know((*transaction)->exchange, reading);
+    if (auto* exchange = watch->proof()) know(*exchange, proof_known);
+  }
+  (*transaction)
+      ->on_end.emplace_back([this, &promise, watch](const Transaction& ended, const ExchangeResult& result) {
+        if (watch != nullptr && watch->proves())
+          promise.set(std::nullopt);  // it was a reading that was asked for
+        else
+          promise.set(answer(ended, result));
+      });
   submit(*std::move(transaction));
   pump();
   auto result = co_await promise.get();
-  if (first) watches_.erase(node);
+  if (watch != nullptr) watches_.erase(node);
   co_return result;
+}
+
+/// From now on `exchange` is compared with what `known` holds.
+void RtuBus::know(Exchange& exchange, Known& known) {
+  if (known.request != exchange.frame) known = {.request = exchange.frame};
+  exchange.known = &known.reply;
 }
 
 /// Whoever ends it waits for its answer: it is not to be told with those of the round only.
@@ -57,10 +73,11 @@ bool RtuBus::recall(std::uint8_t node) {
 /// Whoever asked: a later reading that says the same says nothing new.
 void RtuBus::note_known(const Exchange& exchange, const ExchangeResult& result) {
   if (result.status != ExchangeStatus::replied) return;
-  const auto known = known_.find(exchange.request.node);
-  if (known != known_.end() && known->second.request == exchange.frame &&
-      known->second.reply != result.reply_frame)
-    known->second.reply = result.reply_frame;
+  const auto of_node = known_.find(exchange.request.node);
+  if (of_node == known_.end()) return;
+  for (auto& known : of_node->second)
+    if (known.request == exchange.frame && known.reply != result.reply_frame)
+      known.reply = result.reply_frame;
 }
 
 /// What was hastened has somebody waiting.
@@ -98,11 +115,11 @@ void RtuBus::extend_round() {
   }
 }
 
-/// The same transaction once more, behind what waits by then.
+/// The same transaction once more, or its proof, behind what waits by then.
 void RtuBus::repeat(TransactionPtr transaction, const ExchangeResult& result, TimePoint now) {
   note(*transaction, result);
   auto* watch = transaction->watch;
-  const auto due = std::max(watch->next(transaction->queued_at), now);
+  const auto due = std::max(watch->turn(*transaction), now);
   transaction->reserved = false;
   transaction->queued_at = due;
   if (due == now) return submit(std::move(transaction));

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -18,27 +19,53 @@ struct Reading {
   TimePoint answered_at;  ///< last byte of the reply
 };
 
+/// A second request of a watch: its answer shows that the readings are worth what they seem to be.
+struct Proof {
+  Request request;
+  /// When it is asked for, if the next reading is at `next`; after that: not before that reading. Called on
+  /// the core thread; must not block, and not call the bus.
+  std::function<TimePoint(TimePoint next)> due;
+  /// The readings go on. Likewise.
+  std::function<bool(const Reading&)> holds;
+};
+
 /// How a reading is repeated.
 struct Repetition {
   Duration period{};  ///< from when one is asked for to the next; on a full line it waits in the queue, too
   /// This one says nothing new, and nobody waits for another: the reading goes on. Called on the core thread;
   /// must not block, and not call the bus.
   std::function<bool(const Reading&)> goes_on;
+  std::optional<Proof> proof{};
 };
 
 /// One reading that is being repeated. Between two of them its transaction rests here. Thread: core.
 class Watch {
  public:
-  /// `woken`: called once where it ends between two readings.
-  Watch(Repetition repetition, std::function<void()> woken)
-      : repetition_(std::move(repetition)), woken_(std::move(woken)) {}
+  /// `proof`: the exchange of the repetition's proof, if it has one. `woken`: called once where it ends
+  /// between two readings.
+  Watch(Repetition repetition, std::optional<Exchange> proof, std::function<void()> woken)
+      : repetition_(std::move(repetition)), other_(std::move(proof)), woken_(std::move(woken)) {}
+
+  [[nodiscard]] Exchange* proof() { return other_ && !proves_ ? &*other_ : nullptr; }
+  /// Its transaction asks for the proof.
+  [[nodiscard]] bool proves() const { return proves_; }
 
   /// The reading under way is the last one.
   [[nodiscard]] bool over() const { return over_; }
-  /// Whether another reading follows this one.
-  [[nodiscard]] bool goes_on(const Reading& reading) const { return !over_ && repetition_.goes_on(reading); }
-  /// When the one that follows is asked for.
-  [[nodiscard]] TimePoint next(TimePoint asked_at) const { return asked_at + repetition_.period; }
+  /// Whether another reading follows this answer.
+  [[nodiscard]] bool goes_on(const Reading& answer) const {
+    if (proves_) return repetition_.proof->holds(answer) && !over_;
+    return !over_ && repetition_.goes_on(answer);
+  }
+  /// Gives `transaction` what it asks for next. Returns when it does.
+  [[nodiscard]] TimePoint turn(Transaction& transaction) {
+    if (!proves_) next_reading_ = transaction.queued_at + repetition_.period;
+    const auto proof_at = other_ && !proves_ ? repetition_.proof->due(next_reading_) : TimePoint::max();
+    const bool proof_is_next = proof_at <= next_reading_;
+    if (proof_is_next != proves_) std::swap(transaction.exchange, *other_);
+    proves_ = proof_is_next;
+    return proves_ ? proof_at : next_reading_;
+  }
   /// `due`: when `transaction` is to be taken.
   void rest(TransactionPtr transaction, Clock::Timer due) {
     resting_ = std::move(transaction);
@@ -56,6 +83,9 @@ class Watch {
 
  private:
   Repetition repetition_;
+  std::optional<Exchange> other_;  ///< what its transaction does not ask for at the moment
+  bool proves_ = false;
+  TimePoint next_reading_{};
   std::function<void()> woken_;
   bool over_ = false;
   TransactionPtr resting_;

@@ -159,6 +159,7 @@ class Axis {
   struct Polling {
     int failures = 0;       ///< in a row
     bool woken = false;     ///< in place of a sample
+    bool unproven = false;  ///< continuity was to be proven beside a sample, and was not
     bool repeated = false;  ///< the sample was asked for later than by the poll loop
   };
   Task<> poll();
@@ -166,6 +167,7 @@ class Axis {
   Task<Result<std::optional<DriveSample>>> next_sample(Polling& polling);
   bool seen_again(const DriveSample& sample);
   [[nodiscard]] bool only_watches() const;
+  [[nodiscard]] TimePoint canary_due(TimePoint next_reading) const;
   [[nodiscard]] bool canary_would_be_late() const;
   void wake();
   void watch_continuity();

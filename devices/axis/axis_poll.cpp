@@ -68,8 +68,10 @@ Task<bool> Axis::poll_once(Polling& polling) {
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
   const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
+  const bool asked_in_vain = std::exchange(polling.unproven, false);
   const bool late_next = !busy() && canary_would_be_late();
-  if (late_next || now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
+  if (asked_in_vain || late_next ||
+      now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
     result =
         co_await prove_continuity(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
     if (!result && result.error().reason == Reason::rebooted) {
@@ -110,13 +112,24 @@ Task<bool> Axis::poll_once(Polling& polling) {
 Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
   if (busy()) co_return co_await drive_->read_state(TransactionClass::moving_state);
   if (polling.failures > 0) co_return co_await drive_->read_state(TransactionClass::idle_state);
-  co_return co_await drive_->watch_state(settings_.poll_idle, [this, &polling](const DriveSample& sample) {
+  StateWatch watch{.period = settings_.poll_idle};
+  watch.goes_on = [this, &polling](const DriveSample& sample) {
     const auto before = sample_ ? sample_->asked_at : sample.asked_at;
     refresh_ = sample.asked_at - before;
     const bool goes_on = seen_again(sample) && only_watches();
     polling.repeated = polling.repeated || goes_on;
     return goes_on;
-  });
+  };
+  watch.proof_due = [this, &polling](TimePoint next) {
+    const auto due = canary_due(next);
+    polling.unproven = due <= next;
+    return due;
+  };
+  watch.proven = [this, &polling](TimePoint at) {
+    continuity_checked_ = at;
+    polling.unproven = false;
+  };
+  co_return co_await drive_->watch_state(std::move(watch));
 }
 
 /// The drive is as it was, and nothing has changed about the axis since it was looked at with that state:
@@ -143,13 +156,18 @@ bool Axis::canary_would_be_late() const {
          env_.clock->now() + 2 * refresh_ + told_late > continuity_checked_ + continuity_every;
 }
 
-/// The poll loop has nothing to do but to read the state.
+/// The canary goes before the reading at which it is due, and in time where readings are rare.
+TimePoint Axis::canary_due(TimePoint next_reading) const {
+  if (canary_would_be_late()) return next_reading;
+  return next_reading < continuity_checked_ + continuity_period
+             ? TimePoint::max()
+             : std::min(next_reading, continuity_checked_ + continuity_latest);
+}
+
+/// The poll loop has nothing to do but to read the state and the canary.
 bool Axis::only_watches() const {
-  const auto now = env_.clock->now();
-  // The canary goes before the reading at which it is due.
-  const bool canary_next = now + settings_.poll_idle >= continuity_checked_ + continuity_period;
-  return chains_ == 0 && !bus_loss_ && drift_.empty() && !canary_next && !canary_would_be_late() &&
-         now - drift_checked_ < settings_.drift_check;
+  return chains_ == 0 && !bus_loss_ && drift_.empty() &&
+         env_.clock->now() - drift_checked_ < settings_.drift_check;
 }
 
 /// The poll loop has something to look at.

@@ -30,8 +30,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) override;
   Task<Result<void>> configure() override;
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
-  Task<Result<std::optional<DriveSample>>> watch_state(
-      Duration period, std::function<bool(const DriveSample&)> goes_on) override;
+  Task<Result<std::optional<DriveSample>>> watch_state(StateWatch watch) override;
   Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
   [[nodiscard]] bool moves_by_itself() const override;
   [[nodiscard]] bool closed_loop() const override;
@@ -106,6 +105,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> write_canary(MotionBlock block, TransactionOptions options);
   Task<Result<void>> replace_canary(MotionBlock block);
   Task<Result<Answer>> read_canary(TransactionOptions options);
+  bool is_canary(std::span<const std::uint16_t> registers);
   [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
   /// A content that a power-up may leave: never a canary.
   void note_power_up_block(const MotionBlock& block);

@@ -115,13 +115,19 @@ Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_
   co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
 }
 
-Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(
-    Duration period, std::function<bool(const DriveSample&)> goes_on) {
-  const auto answer = co_await node_.watch(
-      reg::mode, state_count,
-      {.period = period, .goes_on = [&goes_on](const modbus_rtu::Reading& reading) {
-         return goes_on(sample_of(reading.registers, reading.sent_at, reading.answered_at));
-       }});
+Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(StateWatch watch) {
+  modbus_rtu::Repetition repetition{.period = watch.period};
+  repetition.goes_on = [&watch](const modbus_rtu::Reading& reading) {
+    return watch.goes_on(sample_of(reading.registers, reading.sent_at, reading.answered_at));
+  };
+  repetition.proof = {.request = node_.reading(reg::start_speed, canary_count),
+                      .due = watch.proof_due,
+                      .holds = [this, &watch](const modbus_rtu::Reading& reading) {
+                        const bool proven = is_canary(reading.registers);
+                        if (proven) watch.proven(reading.answered_at);
+                        return proven;
+                      }};
+  const auto answer = co_await node_.watch(reg::mode, state_count, std::move(repetition));
   if (!answer) co_return failed(answer.error());
   if (!*answer) co_return std::nullopt;
   co_return sample_of((*answer)->registers, (*answer)->sent_at, (*answer)->answered_at);

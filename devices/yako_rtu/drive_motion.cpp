@@ -66,7 +66,8 @@ Task<Result<void>> YakoRtuDrive::write_canary(MotionBlock block, TransactionOpti
 /// written soon after the old one was read, as in start_once(), and with the class that can be soon.
 Task<Result<void>> YakoRtuDrive::replace_canary(MotionBlock block) {
   for (int attempt = 1;; ++attempt) {
-    const auto found = co_await node_.read_patiently(reg::start_speed, 6, in(TransactionClass::motion));
+    const auto found =
+        co_await node_.read_patiently(reg::start_speed, canary_count, in(TransactionClass::motion));
     if (!found) co_return failed(found.error());
     MotionBlock present{};
     std::ranges::copy(found->registers, present.begin());
@@ -83,16 +84,24 @@ Task<Result<void>> YakoRtuDrive::replace_canary(MotionBlock block) {
 }
 
 Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions options) {
-  auto answer = co_await node_.read(reg::start_speed, 6, std::move(options));
+  auto answer = co_await node_.read(reg::start_speed, canary_count, std::move(options));
   if (!answer) co_return failed(answer.error());
-  MotionBlock block{};
-  std::ranges::copy(answer->registers, block.begin());
-  if (std::ranges::find(expected_, block) == expected_.end()) {
-    forget_power_cycle(block);
+  if (!is_canary(answer->registers)) {
+    MotionBlock found{};
+    std::ranges::copy(answer->registers, found.begin());
+    forget_power_cycle(found);
     co_return fail(lost_memory());
   }
-  expected_ = {block};
   co_return answer;
+}
+
+/// What stands where the canary does may be it; then it is known from now on which.
+bool YakoRtuDrive::is_canary(std::span<const std::uint16_t> registers) {
+  MotionBlock found{};
+  std::ranges::copy(registers, found.begin());
+  if (std::ranges::find(expected_, found) == expected_.end()) return false;
+  expected_ = {found};
+  return true;
 }
 
 std::vector<ContinuityMark> YakoRtuDrive::marks_until(const MotionBlock& block) const {

@@ -38,14 +38,19 @@ struct WatchEnd {
 struct WatchRig {
   static constexpr std::uint16_t watched = 0x0090;
   static constexpr std::uint16_t watched_count = 4;
+  static constexpr std::uint16_t proof = watched + 8;
+  static constexpr std::uint16_t proof_count = 3;
   static constexpr Duration period = std::chrono::milliseconds(200);
 
   VirtualWorld world;
   VirtualLine* line = nullptr;
   std::unique_ptr<RtuBus> bus;
   std::vector<Told> told;
-  std::vector<TimePoint> noted;         ///< what the bus says that it has sent, in its order
-  std::map<std::uint8_t, int> watches;  ///< begun, by node
+  std::vector<Told> proofs;
+  std::map<std::uint8_t, int> proof_every;  ///< readings, by node: those are proven
+  Duration proof_before{};                  ///< the next of them
+  std::vector<TimePoint> noted;             ///< what the bus says that it has sent, in its order
+  std::map<std::uint8_t, int> watches;      ///< begun, by node
   std::map<std::uint8_t, std::vector<WatchEnd>> ends;
   std::map<std::string, std::vector<Result<Answer>>> results;
   int nodes;
@@ -75,8 +80,8 @@ struct WatchRig {
   [[nodiscard]] static std::uint16_t value_of(std::uint8_t node, std::uint16_t index = 0) {
     return static_cast<std::uint16_t>(node << 12U | index);
   }
-  void poke(std::uint8_t node, std::uint16_t value) const {
-    line->network().node(node)->poke(watched, value);
+  void poke(std::uint8_t node, std::uint16_t value, std::uint16_t address = watched) const {
+    line->network().node(node)->poke(address, value);
   }
 
   /// It goes on as long as the first register says what it said at first.
@@ -150,22 +155,42 @@ struct WatchRig {
   }
 
  private:
+  [[nodiscard]] Told told_now(std::uint8_t node, const Reading& reading) {
+    return {.node = node,
+            .sent_at = reading.sent_at,
+            .answered_at = reading.answered_at,
+            .at = world.now(),
+            .registers = {reading.registers.begin(), reading.registers.end()}};
+  }
   Task<> watching(std::uint8_t node, Request request, Duration every) {
     std::optional<std::uint16_t> first;
     bool over = false;
-    auto result = co_await bus->watch(
-        std::move(request),
-        {.period = every, .goes_on = [this, node, &first, &over](const Reading& reading) {
-           EXPECT_FALSE(over) << "it had said that it is the last";
-           told.push_back({.node = node,
-                           .sent_at = reading.sent_at,
-                           .answered_at = reading.answered_at,
-                           .at = world.now(),
-                           .registers = {reading.registers.begin(), reading.registers.end()}});
-           if (!first) first = reading.registers.front();
-           over = *first != reading.registers.front();
-           return !over;
-         }});
+    int unproven = 0;
+    Repetition repetition{.period = every};
+    repetition.goes_on = [this, node, &first, &over, &unproven](const Reading& reading) {
+      EXPECT_FALSE(over) << "it had said that it is the last";
+      told.push_back(told_now(node, reading));
+      if (!first) first = reading.registers.front();
+      over = *first != reading.registers.front();
+      ++unproven;
+      return !over;
+    };
+    if (proof_every.contains(node))
+      repetition.proof = {.request = {.node = node, .address = proof, .count = proof_count},
+                          .due =
+                              [this, node, &unproven](TimePoint next) {
+                                return unproven >= proof_every.at(node) ? next - proof_before
+                                                                        : TimePoint::max();
+                              },
+                          .holds =
+                              [this, node, &unproven, &over](const Reading& reading) {
+                                EXPECT_FALSE(over);
+                                proofs.push_back(told_now(node, reading));
+                                unproven = 0;
+                                over = reading.registers.front() != value_of(node, proof - watched);
+                                return !over;
+                              }};
+    auto result = co_await bus->watch(std::move(request), std::move(repetition));
     ends[node].push_back({.result = std::move(result), .at = world.now()});
   }
 };
