@@ -138,7 +138,8 @@ std::size_t reply_size(const Request& request) {
 std::size_t reply_size(std::span<const std::uint8_t> head) {
   const auto function = head[1];
   if ((function & exception_bit) != 0) return exception_size;
-  if (function <= 0x04 || function == 0x11 || function == 0x17) return 5U + head[2];  // with a byte count
+  const bool reads = function >= 0x01 && function <= 0x04;
+  if (reads || function == 0x11 || function == 0x17) return 5U + head[2];  // with a byte count
   if (function == 0x16) return write_reply_size + 2;
   return function == 0x05 || function == 0x06 || function == 0x0F || function == 0x10 ? write_reply_size : 0;
 }

@@ -182,7 +182,7 @@ bool RtuWorker::prepare(WireSession& session, const Exchange& exchange, int& los
 
 void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) {
   if (!prepare(session, exchange, lost)) return;
-  const auto now = monotonic_now();
+  const auto now = session.finish_silence();
   const auto verdict = now > exchange.deadline ? Verdict::expired : may_send(exchange.guard, now);
   if (verdict != Verdict::send) {
     report(exchange, ExchangeResult{.status = ExchangeStatus::not_sent,

@@ -23,6 +23,8 @@ constexpr Duration echo_latency = milliseconds(100);
 constexpr int echo_attempts = 3;
 /// A shorter sleep saves nothing.
 constexpr Duration shortest_sleep = milliseconds(1);
+/// Longest that a worker which is to end is waited for.
+constexpr Duration longest_deaf = milliseconds(100);
 
 bool is_paced(const Exchange& exchange) {
   return exchange.request.function == Function::read_holding_registers;
@@ -54,20 +56,21 @@ WireSession::WireSession(SerialPort port, const LineSettings& line, Wakeup& wake
 
 WireSession::~WireSession() { block_until(request_end_ + wire_time(serial_, 1)); }
 
-void WireSession::touch() {
-  progress_.store(monotonic_now().time_since_epoch().count(), std::memory_order_relaxed);
+TimePoint WireSession::touch() {
+  const auto now = monotonic_now();
+  progress_.store(now.time_since_epoch().count(), std::memory_order_relaxed);
+  return now;
 }
 
 /// Waits for bytes until `until`, or with `for_bytes` false for the time alone; with `cut_from` a cut ends
 /// the wait from that moment on.
 WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes) {
   for (;;) {
-    touch();
+    const auto now = touch();
     if (wakeup_.quit.load(std::memory_order_acquire)) return Wait::quit;
     const bool cut = cut_from != nullptr && wakeup_.cut.load(std::memory_order_acquire);
     const auto end = cut ? std::min(until, *cut_from) : until;
-    const auto left = end - monotonic_now();
-    const auto timeout = to_timespec(std::min<Duration>(left, longest_wait));
+    const auto timeout = to_timespec(std::min<Duration>(end - now, longest_wait));
     // A negative descriptor is not looked at.
     std::array<pollfd, 2> watched{
         {{.fd = for_bytes ? port_.descriptor() : -1, .events = POLLIN, .revents = 0},
@@ -233,9 +236,17 @@ void WireSession::sleep_before_reply(const Exchange& exchange, const ExchangeRes
   if (!is_paced(exchange)) return;
   const auto quiet = pace_.quiet(exchange.request.node, wire_time(serial_, reply_size(exchange.request)));
   const auto until = reply_latency_.asked_for(std::min(result.request_end + quiet, reply_deadline_));
-  if (until - monotonic_now() < shortest_sleep) return;
+  const auto begin = monotonic_now();
+  if (until - begin < shortest_sleep) return;
   const auto cut_from = result.request_end + exchange.turnaround_max;
-  if (wait_until(until, &cut_from, false) == Wait::timeout) reply_latency_.note(until, monotonic_now());
+  // Before that nothing ends it, and a sleep that nothing ends costs less.
+  block_until(std::min({until, cut_from, begin + longest_deaf}));
+  auto woken = touch();
+  if (woken < until) {
+    wait_until(until, &cut_from, false);
+    woken = monotonic_now();
+  }
+  if (woken >= until) reply_latency_.note(until, woken);
   slept_ = true;
   reply_awaited_ = false;
 }
@@ -257,7 +268,7 @@ WireSession::Wait WireSession::wait_for_more() {
 /// it comes in, where libmodbus needs six system calls at least. Other sound frames before it are passed
 /// over. After damage the node's replies are left to libmodbus for a while. True: the exchange has ended.
 bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result) {
-  const auto first_byte = monotonic_now();
+  TimePoint first_byte{};
   const bool awaited = std::exchange(reply_awaited_, true);
   constexpr std::size_t head = 3;
   std::array<std::uint8_t, Frame::capacity> buffer;
@@ -271,7 +282,8 @@ bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result
       end(result, ExchangeStatus::io_error, got ? EIO : got.error());
       return true;
     }
-    if (*got > 0) last_byte_ = monotonic_now();
+    if (*got > 0) last_byte_ = touch();
+    if (count == 0) first_byte = last_byte_;
     count += *got;
     while (count >= head) {
       const auto bytes = std::span(buffer).first(count);
@@ -296,7 +308,6 @@ bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result
 }
 
 void WireSession::end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte) {
-  touch();
   result.reply = std::move(reply);
   result.reply_frame = frame;
   result.reply_begin = begin_of(frame, first_byte);

@@ -35,12 +35,15 @@ class WireSession {
   /// Brings the port to other serial settings; the line must be silent. 0, EINVAL (the port cannot do them)
   /// or the errno with which it was lost.
   int use(const SerialSettings& serial);
-  /// Blocks until the line has been silent for as long as must be before a request, but for what comes
-  /// between waking and sending; run() waits for the rest.
+  /// Blocks until the line has been silent for as long as must be before a request, but for the time that
+  /// waking and sending take.
   int keep_silence();
+  /// Passes what is left of the silence. Returns the time.
+  TimePoint finish_silence() { return silence_.finish(); }
   /// Blocks until the wakeup is notified, bytes that nobody asked for come, or `limit` has passed.
   int idle(Duration limit);
-  /// Sends `exchange` and waits for its end. Precondition: keep_silence() has just returned.
+  /// Sends `exchange`, when the silence is over, and waits for its end. Precondition: keep_silence() has just
+  /// returned.
   ExchangeResult run(const Exchange& exchange);
 
   [[nodiscard]] const std::string& path() const { return port_.path(); }
@@ -68,7 +71,7 @@ class WireSession {
   Bytes absorb();
   void settle(ExchangeResult& result);
   void end(ExchangeResult& result, ExchangeStatus status, int native_error = 0);
-  void touch();
+  TimePoint touch();
 
   SerialPort port_;
   const LineSettings& line_;
