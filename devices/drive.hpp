@@ -147,10 +147,10 @@ struct StateWatch {
   Duration period{};  ///< from one reading to the next
   /// This one tells nothing new, and nobody waits for another.
   std::function<bool(const DriveSample&)> goes_on;
-  /// When Drive::check_continuity() is asked for, if the next reading is at `next`; after that: not before
-  /// that reading.
-  std::function<TimePoint(TimePoint next)> proof_due;
-  /// It succeeded; its reply had come then.
+  /// When Drive::check_continuity() is to be asked for, where the next reading is asked for at `next` and the
+  /// last request waited for so long until it was sent. Not before that reading: later than `next`.
+  std::function<TimePoint(TimePoint next, Duration waited)> proof_due;
+  /// It succeeded; it was sent then.
   std::function<void(TimePoint)> proven;
 };
 

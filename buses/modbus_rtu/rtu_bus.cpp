@@ -86,6 +86,8 @@ void RtuBus::submit(TransactionPtr transaction) {
   const auto transaction_class = transaction->transaction_class;
   if (must_wait(*transaction, clock_->now()))
     queue_.hold(std::move(transaction));
+  else if (transaction->watch != nullptr && transaction->watch->proves())
+    queue_.push_again(std::move(transaction));  // a reading of its own follows, which waits its turn again
   else
     queue_.push(std::move(transaction));
   statistics_.queued(transaction_class, waiting(transaction_class));

@@ -53,8 +53,8 @@ class RtuBus final : public Bus {
   Task<Result<Answer>> transact(Request request, TransactionOptions options);
   /// A reading in class idle_state that the bus repeats by itself, so that whoever polls a node is woken for
   /// news alone. Ends with the answer of which `repetition` says so, with nothing where end_repetition() came
-  /// between two readings or a proof was not answered as it should be, or with an error of transact(). Of
-  /// several for one node only the first is repeated.
+  /// between two readings or a proof was answered that does not hold or is the last of it, or with an error
+  /// of transact(). Of several for one node only the first is repeated.
   Task<Result<std::optional<Answer>>> watch(Request request, Repetition repetition);
   void end_repetition(std::uint8_t node) override;
 

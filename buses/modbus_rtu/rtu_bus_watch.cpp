@@ -21,26 +21,28 @@ Task<Result<std::optional<Answer>>> RtuBus::watch(Request request, Repetition re
   if (!transaction) co_return fail(transaction.error());
   std::optional<Exchange> proof;
   if (repetition.proof) {
-    const auto prepared = prepare(repetition.proof->request, options);
+    const auto prepared = prepare(std::move(repetition.proof->request), options);
     if (!prepared) co_return fail(prepared.error());
     proof = (*prepared)->exchange;
   }
   Promise<Result<std::optional<Answer>>> promise(executor_, *clock_);
   Watch* watch = nullptr;
   if (auto& own = watches_[node]; !own) {
+    auto& [known_reading, known_proof] = known_[node];
+    know((*transaction)->exchange, known_reading);
+    if (proof) know(*proof, known_proof);
     own = std::make_unique<Watch>(std::move(repetition), std::move(proof),
                                   [&promise] { promise.set(std::nullopt); });
     (*transaction)->watch = watch = own.get();
-    auto& [reading, proof_known] = known_[node];
-    know((*transaction)->exchange, reading);
-    if (auto* exchange = watch->proof()) know(*exchange, proof_known);
   }
   (*transaction)
       ->on_end.emplace_back([this, &promise, watch](const Transaction& ended, const ExchangeResult& result) {
-        if (watch != nullptr && watch->proves())
-          promise.set(std::nullopt);  // it was a reading that was asked for
+        auto told = answer(ended, result);
+        // It was a reading that was asked for.
+        if (watch != nullptr && watch->proves() && told)
+          promise.set(std::nullopt);
         else
-          promise.set(answer(ended, result));
+          promise.set(std::move(told));
       });
   submit(*std::move(transaction));
   pump();
@@ -82,11 +84,14 @@ void RtuBus::note_known(const Exchange& exchange, const ExchangeResult& result) 
 
 /// What was hastened has somebody waiting.
 bool RtuBus::is_repeated(const Transaction& ended, const ExchangeResult& result) const {
-  return ended.watch != nullptr && ended.transaction_class == TransactionClass::idle_state &&
-         result.status == ExchangeStatus::replied && result.reply.kind == ReplyKind::match && port_.open &&
-         ended.watch->goes_on({.registers = result.reply.registers,
+  const bool awaited = ended.transaction_class != TransactionClass::idle_state;
+  if (ended.watch == nullptr || result.status != ExchangeStatus::replied ||
+      result.reply.kind != ReplyKind::match || !port_.open || (awaited && !ended.watch->proves()))
+    return false;
+  return ended.watch->goes_on({.registers = result.reply.registers,
                                .sent_at = result.request_begin,
-                               .answered_at = result.reply_end});
+                               .answered_at = result.reply_end}) &&
+         !awaited;
 }
 
 /// Puts what is next behind the first one, as long as nothing but axes at rest is asked for: to wake the core
@@ -119,7 +124,8 @@ void RtuBus::extend_round() {
 void RtuBus::repeat(TransactionPtr transaction, const ExchangeResult& result, TimePoint now) {
   note(*transaction, result);
   auto* watch = transaction->watch;
-  const auto due = std::max(watch->turn(*transaction), now);
+  const auto waited = std::max(result.request_begin - transaction->queued_at, Duration::zero());
+  const auto due = std::max(watch->turn(*transaction, waited), now);
   transaction->reserved = false;
   transaction->queued_at = due;
   if (due == now) return submit(std::move(transaction));

@@ -30,6 +30,10 @@ bool TransactionQueue::Order::operator()(const TransactionPtr& a, const Transact
 
 void TransactionQueue::push(TransactionPtr transaction) {
   transaction->sequence = ++last_sequence_;
+  push_again(std::move(transaction));
+}
+
+void TransactionQueue::push_again(TransactionPtr transaction) {
   if (is_read(*transaction) && merge(*transaction)) return;
   insert(std::move(transaction), false);
 }

@@ -47,6 +47,9 @@ class TransactionQueue {
 
   /// A read equal to one that waits joins it (and lends it its urgency); everything else is queued.
   void push(TransactionPtr transaction);
+  /// The same for one that was carried out and asks for something else now: in its old place, ahead of what
+  /// was queued since.
+  void push_again(TransactionPtr transaction);
   /// Returns one that pop() gave out but that was not sent, to its old place.
   void put_back(TransactionPtr transaction);
   /// The next one, or nullptr. Whether it may be sent still is the caller's to ask.

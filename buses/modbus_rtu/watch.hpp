@@ -22,10 +22,11 @@ struct Reading {
 /// A second request of a watch: its answer shows that the readings are worth what they seem to be.
 struct Proof {
   Request request;
-  /// When it is asked for, if the next reading is at `next`; after that: not before that reading. Called on
-  /// the core thread; must not block, and not call the bus.
-  std::function<TimePoint(TimePoint next)> due;
-  /// The readings go on. Likewise.
+  /// When it is to be asked for, where the next reading is asked for at `next` and the last exchange waited
+  /// for so long until it was sent. Not before that reading: later than `next`, whatever it is; it is asked
+  /// again behind each answer. Called on the core thread; must not block, and not call the bus.
+  std::function<TimePoint(TimePoint next, Duration waited)> due;
+  /// The readings go on. Called once per answer, though somebody else may wait for it by then. Likewise.
   std::function<bool(const Reading&)> holds;
 };
 
@@ -46,22 +47,24 @@ class Watch {
   Watch(Repetition repetition, std::optional<Exchange> proof, std::function<void()> woken)
       : repetition_(std::move(repetition)), other_(std::move(proof)), woken_(std::move(woken)) {}
 
-  [[nodiscard]] Exchange* proof() { return other_ && !proves_ ? &*other_ : nullptr; }
   /// Its transaction asks for the proof.
   [[nodiscard]] bool proves() const { return proves_; }
 
   /// The reading under way is the last one.
   [[nodiscard]] bool over() const { return over_; }
-  /// Whether another reading follows this answer.
+  /// Whether another reading follows this answer. A reading that is the last one is judged by whoever gets
+  /// it, a proof here in any case.
   [[nodiscard]] bool goes_on(const Reading& answer) const {
     if (proves_) return repetition_.proof->holds(answer) && !over_;
     return !over_ && repetition_.goes_on(answer);
   }
-  /// Gives `transaction` what it asks for next. Returns when it does.
-  [[nodiscard]] TimePoint turn(Transaction& transaction) {
+  /// Gives `transaction`, which has `waited` until it was sent, what it asks for next. Returns when it does.
+  [[nodiscard]] TimePoint turn(Transaction& transaction, Duration waited) {
     if (!proves_) next_reading_ = transaction.queued_at + repetition_.period;
-    const auto proof_at = other_ && !proves_ ? repetition_.proof->due(next_reading_) : TimePoint::max();
-    const bool proof_is_next = proof_at <= next_reading_;
+    const auto proof_at = other_ ? repetition_.proof->due(next_reading_, waited) : TimePoint::max();
+    // Behind a proof, another one only where readings are rarer than proofs: they keep none of them waiting.
+    const bool proof_is_next =
+        proves_ ? proof_at > transaction.queued_at && proof_at < next_reading_ : proof_at <= next_reading_;
     if (proof_is_next != proves_) std::swap(transaction.exchange, *other_);
     proves_ = proof_is_next;
     return proves_ ? proof_at : next_reading_;

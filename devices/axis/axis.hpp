@@ -157,9 +157,10 @@ class Axis {
 
   // axis_poll.cpp: its state, again and again
   struct Polling {
-    int failures = 0;       ///< in a row
-    bool woken = false;     ///< in place of a sample
-    bool unproven = false;  ///< continuity was to be proven beside a sample, and was not
+    int failures = 0;    ///< in a row
+    bool woken = false;  ///< in place of a sample
+    /// Continuity was to be proven then beside a sample, and was not yet.
+    TimePoint proof_due = TimePoint::max();
     bool repeated = false;  ///< the sample was asked for later than by the poll loop
   };
   Task<> poll();
@@ -168,7 +169,7 @@ class Axis {
   bool seen_again(const DriveSample& sample);
   [[nodiscard]] bool only_watches() const;
   [[nodiscard]] TimePoint canary_due(TimePoint next_reading) const;
-  [[nodiscard]] bool canary_would_be_late() const;
+  [[nodiscard]] TimePoint canary_latest() const;
   void wake();
   void watch_continuity();
   Task<Result<void>> prove_continuity(TransactionClass priority);
@@ -177,6 +178,7 @@ class Axis {
   [[nodiscard]] TimePoint next_poll(TimePoint began) const;
 
   // axis_drift.cpp
+  [[nodiscard]] bool drift_is_next() const;
   Task<> look_for_drift();
   Task<Result<void>> check_for_drift();
   void set_drift(const std::string& text);
@@ -369,7 +371,7 @@ class Axis {
   bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
   int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
-  Duration refresh_{};  ///< between the last two of the readings that the bus repeats
+  Duration waited_{};  ///< for the line, the longest of the last of what the bus repeats
   Clock::Timer continuity_watch_;
   TimePoint settle_by_{};
   std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon

@@ -12,6 +12,10 @@ constexpr int attempts_before_offline = 3;
 constexpr auto continuity_latest = milliseconds(950);
 /// M7.
 constexpr auto continuity_every = milliseconds(1000);
+/// At rest nothing is lost where it is asked for in good time: something else may need the line just then.
+constexpr auto continuity_latest_at_rest = milliseconds(850);
+/// Sooner it is not asked for, however well it would fit between two readings.
+constexpr auto continuity_soonest = milliseconds(700);
 /// So long after its reply, at most, a bus tells of a reading that it repeats.
 constexpr auto told_late = milliseconds(50);
 /// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
@@ -32,8 +36,7 @@ Task<> Axis::poll() {
     if (bus_loss_) co_return go_offline(Error(*bus_loss_));
     const auto began = env_.clock->now();
     if (!co_await poll_once(polling)) co_return;
-    if (polling.woken) continue;
-    if (polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
+    if (polling.woken || polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
     co_await look_for_drift();
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
     const auto next = std::min(next_poll(asked), continuity_checked_ + continuity_latest);
@@ -68,9 +71,9 @@ Task<bool> Axis::poll_once(Polling& polling) {
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
   const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
-  const bool asked_in_vain = std::exchange(polling.unproven, false);
-  const bool late_next = !busy() && canary_would_be_late();
-  if (asked_in_vain || late_next ||
+  const bool asked_in_vain = now >= polling.proof_due && continuity_checked_ < polling.proof_due;
+  const bool late = !busy() && now > canary_latest();
+  if (asked_in_vain || late ||
       now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
     result =
         co_await prove_continuity(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
@@ -114,21 +117,15 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
   if (polling.failures > 0) co_return co_await drive_->read_state(TransactionClass::idle_state);
   StateWatch watch{.period = settings_.poll_idle};
   watch.goes_on = [this, &polling](const DriveSample& sample) {
-    const auto before = sample_ ? sample_->asked_at : sample.asked_at;
-    refresh_ = sample.asked_at - before;
     const bool goes_on = seen_again(sample) && only_watches();
     polling.repeated = polling.repeated || goes_on;
     return goes_on;
   };
-  watch.proof_due = [this, &polling](TimePoint next) {
-    const auto due = canary_due(next);
-    polling.unproven = due <= next;
-    return due;
+  watch.proof_due = [this, &polling](TimePoint next, Duration waited) {
+    waited_ = std::max(waited, waited_ * 3 / 4);  // a canary waits less, a reading behind others' longer
+    return polling.proof_due = canary_due(next);
   };
-  watch.proven = [this, &polling](TimePoint at) {
-    continuity_checked_ = at;
-    polling.unproven = false;
-  };
+  watch.proven = [this](TimePoint at) { continuity_checked_ = std::max(continuity_checked_, at); };
   co_return co_await drive_->watch_state(std::move(watch));
 }
 
@@ -150,25 +147,24 @@ bool Axis::seen_again(const DriveSample& sample) {
   return true;
 }
 
-/// M7, if another reading went first: on a full line that one waits for its turn, and then the canary does.
-bool Axis::canary_would_be_late() const {
-  return refresh_ > settings_.poll_idle &&
-         env_.clock->now() + 2 * refresh_ + told_late > continuity_checked_ + continuity_every;
+/// At rest, so that M7 holds though a reading goes first that waits for the line: twice as long as others did
+/// where all axes ask for their canaries just then, and the canary behind those.
+TimePoint Axis::canary_latest() const {
+  return continuity_checked_ +
+         std::min<Duration>(continuity_latest_at_rest, continuity_every - told_late - 3 * waited_);
 }
 
-/// The canary goes before the reading at which it is due, and in time where readings are rare.
+/// With the last reading that is in time, or between two where they are rare.
 TimePoint Axis::canary_due(TimePoint next_reading) const {
-  if (canary_would_be_late()) return next_reading;
-  return next_reading < continuity_checked_ + continuity_period
-             ? TimePoint::max()
-             : std::min(next_reading, continuity_checked_ + continuity_latest);
+  const auto latest = canary_latest();
+  if (next_reading > latest) return latest;
+  const bool last_in_time = next_reading + settings_.poll_idle > latest;
+  return last_in_time && next_reading >= continuity_checked_ + continuity_soonest ? next_reading
+                                                                                  : TimePoint::max();
 }
 
 /// The poll loop has nothing to do but to read the state and the canary.
-bool Axis::only_watches() const {
-  return chains_ == 0 && !bus_loss_ && drift_.empty() &&
-         env_.clock->now() - drift_checked_ < settings_.drift_check;
-}
+bool Axis::only_watches() const { return chains_ == 0 && !bus_loss_ && drift_.empty() && !drift_is_next(); }
 
 /// The poll loop has something to look at.
 void Axis::wake() {

@@ -105,7 +105,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> write_canary(MotionBlock block, TransactionOptions options);
   Task<Result<void>> replace_canary(MotionBlock block);
   Task<Result<Answer>> read_canary(TransactionOptions options);
-  bool is_canary(std::span<const std::uint16_t> registers);
+  bool recognise_canary(std::span<const std::uint16_t> registers);
   [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
   /// A content that a power-up may leave: never a canary.
   void note_power_up_block(const MotionBlock& block);

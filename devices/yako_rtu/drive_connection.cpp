@@ -123,8 +123,8 @@ Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(StateWatch wa
   repetition.proof = {.request = node_.reading(reg::start_speed, canary_count),
                       .due = watch.proof_due,
                       .holds = [this, &watch](const modbus_rtu::Reading& reading) {
-                        const bool proven = is_canary(reading.registers);
-                        if (proven) watch.proven(reading.answered_at);
+                        const bool proven = recognise_canary(reading.registers);
+                        if (proven) watch.proven(reading.sent_at);
                         return proven;
                       }};
   const auto answer = co_await node_.watch(reg::mode, state_count, std::move(repetition));

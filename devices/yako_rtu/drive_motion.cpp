@@ -86,7 +86,7 @@ Task<Result<void>> YakoRtuDrive::replace_canary(MotionBlock block) {
 Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions options) {
   auto answer = co_await node_.read(reg::start_speed, canary_count, std::move(options));
   if (!answer) co_return failed(answer.error());
-  if (!is_canary(answer->registers)) {
+  if (!recognise_canary(answer->registers)) {
     MotionBlock found{};
     std::ranges::copy(answer->registers, found.begin());
     forget_power_cycle(found);
@@ -96,7 +96,7 @@ Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions op
 }
 
 /// What stands where the canary does may be it; then it is known from now on which.
-bool YakoRtuDrive::is_canary(std::span<const std::uint16_t> registers) {
+bool YakoRtuDrive::recognise_canary(std::span<const std::uint16_t> registers) {
   MotionBlock found{};
   std::ranges::copy(registers, found.begin());
   if (std::ranges::find(expected_, found) == expected_.end()) return false;

@@ -77,13 +77,13 @@ TEST_F(RtuBusWatchProof, OneThatDoesNotHoldEndsTheWatch) {
   EXPECT_TRUE(rig_.bus->idle());
 }
 
-TEST_F(RtuBusWatchProof, OneWithoutAnAnswerEndsTheWatch) {
+TEST_F(RtuBusWatchProof, OneWithoutAnAnswerEndsTheWatchWithTheError) {
   rig_.world.run_for(250ms);
   rig_.line->network().node(1)->set_power(false);
   rig_.world.run_for(2s);
   ASSERT_TRUE(rig_.ended(1));
-  ASSERT_TRUE(end().result);
-  EXPECT_FALSE(*end().result);
+  ASSERT_FALSE(end().result);
+  EXPECT_EQ(end().result.error().reason, Reason::no_reply);
   EXPECT_TRUE(rig_.proofs.empty());
 }
 
@@ -135,7 +135,7 @@ TEST_F(RtuBusWatchProof, JoinedByTheSameReadingOfAnotherEndsForBoth) {
   EXPECT_FALSE(*end().result) << "the registers are not those of the state";
 }
 
-TEST_F(RtuBusWatchProof, OneThatIsHastenedIsWaitedFor) {
+TEST_F(RtuBusWatchProof, OneThatIsHastenedIsJudgedAndWaitedFor) {
   rig_.world.run_for(299ms);
   rig_.read("busy", 2, TransactionClass::idle_state, 0x0003, 16);
   rig_.world.run_for(2ms);
@@ -143,6 +143,41 @@ TEST_F(RtuBusWatchProof, OneThatIsHastenedIsWaitedFor) {
   rig_.world.run_for(100ms);
   ASSERT_TRUE(rig_.ended(1));
   EXPECT_FALSE(*end().result);
+  ASSERT_EQ(rig_.proofs.size(), 1U);
+  EXPECT_EQ(end().at, rig_.proofs.front().answered_at);
+}
+
+TEST(RtuBusWatchProofs, SeveralGoBetweenReadingsThatAreRare) {
+  WatchRig rig(1);
+  rig.proof_every[1] = 0;
+  rig.proof_period = 300ms;
+  rig.watch(1, 1s);
+  rig.world.run_for(2500ms);
+  EXPECT_EQ(addresses(rig), (std::vector<std::uint16_t>{state, proof, proof, proof, state, proof, proof,
+                                                        proof, state, proof}));
+  std::vector<TimePoint> readings;
+  for (const auto& entry : rig.line->wire())
+    if (entry.address() == state) readings.push_back(entry.begin);
+  ASSERT_EQ(readings.size(), 3U);
+  EXPECT_EQ(readings[1] - readings[0], 1s) << "they keep no reading waiting";
+  EXPECT_EQ(readings[2] - readings[1], 1s);
+}
+
+TEST(RtuBusWatchProofs, GoAheadOfReadingsThatWereAskedForSince) {
+  WatchRig rig;
+  rig.proof_every[2] = 5;
+  for (std::uint8_t node = 1; node <= 4; ++node) rig.watch(node, 1ms, 16);
+  rig.world.run_for(2s);
+  const auto& wire = rig.line->wire();
+  int proofs = 0;
+  for (std::size_t i = 4; i + 5 < wire.size(); ++i) {
+    if (wire[i].address() != proof) continue;
+    ++proofs;
+    std::vector<int> around;
+    for (std::size_t j = i - 4; j <= i + 4; ++j) around.push_back(wire[j].node());
+    EXPECT_EQ(std::ranges::count(around, 2), 3) << "a reading before, and one in its turn behind";
+  }
+  EXPECT_GT(proofs, 5);
 }
 
 TEST_F(RtuBusWatchProof, AReadingThatSaysSomethingNewIsTheAnswerStill) {

@@ -49,6 +49,7 @@ struct WatchRig {
   std::vector<Told> proofs;
   std::map<std::uint8_t, int> proof_every;  ///< readings, by node: those are proven
   Duration proof_before{};                  ///< the next of them
+  Duration proof_period{};                  ///< if set: so long after each answer instead
   std::vector<TimePoint> noted;             ///< what the bus says that it has sent, in its order
   std::map<std::uint8_t, int> watches;      ///< begun, by node
   std::map<std::uint8_t, std::vector<WatchEnd>> ends;
@@ -178,7 +179,8 @@ struct WatchRig {
     if (proof_every.contains(node))
       repetition.proof = {.request = {.node = node, .address = proof, .count = proof_count},
                           .due =
-                              [this, node, &unproven](TimePoint next) {
+                              [this, node, &unproven](TimePoint next, Duration /*waited*/) {
+                                if (proof_period > Duration::zero()) return world.now() + proof_period;
                                 return unproven >= proof_every.at(node) ? next - proof_before
                                                                         : TimePoint::max();
                               },
