@@ -5,8 +5,6 @@
 
 namespace axisd {
 
-/// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
-/// once the drive is released, and forbids motion until then.
 /// Soon after the canary was read, if that can be: what a comparison reads would keep the next one waiting.
 bool Axis::drift_is_next() const {
   const auto now = env_.clock->now();
@@ -15,6 +13,8 @@ bool Axis::drift_is_next() const {
   return now >= due && (in_good_time || now >= due + 2 * continuity_period);
 }
 
+/// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
+/// once the drive is released, and forbids motion until then.
 Task<> Axis::look_for_drift() {
   if (link_ != LinkState::online || busy() || !maintenance_.expired()) co_return;
   if (drift_is_next() && !co_await check_for_drift()) co_return;
