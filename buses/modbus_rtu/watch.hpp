@@ -26,7 +26,7 @@ struct Proof {
   /// for so long until it was sent. Not before that reading: later than `next`, whatever it is; it is asked
   /// again behind each answer. Called on the core thread; must not block, and not call the bus.
   std::function<TimePoint(TimePoint next, Duration waited)> due;
-  /// The readings go on. Called once per answer, though somebody else may wait for it by then. Likewise.
+  /// The readings go on. Called once per answer at most, though somebody waits for it by then. Likewise.
   std::function<bool(const Reading&)> holds;
 };
 

@@ -10,13 +10,13 @@ bool Axis::drift_is_next() const {
   const auto now = env_.clock->now();
   const auto due = drift_checked_ + settings_.drift_check;
   const bool in_good_time = now - continuity_checked_ < continuity_period / 2;
-  return now >= due && (in_good_time || now >= due + 2 * continuity_period);
+  return now >= due && maintenance_.expired() && (in_good_time || now >= due + 2 * continuity_period);
 }
 
 /// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
 /// once the drive is released, and forbids motion until then.
 Task<> Axis::look_for_drift() {
-  if (link_ != LinkState::online || busy() || !maintenance_.expired()) co_return;
+  if (link_ != LinkState::online || busy()) co_return;
   if (drift_is_next() && !co_await check_for_drift()) co_return;
   const bool free = link_ == LinkState::online && !busy() && maintenance_.expired();
   if (!drift_.empty() && free && sample_ && !sample_->enabled) reconfigure(drift_, false);

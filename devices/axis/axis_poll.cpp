@@ -16,6 +16,8 @@ constexpr auto continuity_every = milliseconds(1000);
 constexpr auto continuity_latest_at_rest = milliseconds(850);
 /// Sooner it is not asked for, however well it would fit between two readings.
 constexpr auto continuity_soonest = milliseconds(700);
+/// However long others have kept the line.
+constexpr auto continuity_soonest_of_all = milliseconds(200);
 /// So long after its reply, at most, a bus tells of a reading that it repeats.
 constexpr auto told_late = milliseconds(50);
 /// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
@@ -39,7 +41,8 @@ Task<> Axis::poll() {
     if (polling.woken || polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
     co_await look_for_drift();
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
-    const auto next = std::min(next_poll(asked), continuity_checked_ + continuity_latest);
+    const auto canary = busy() ? continuity_checked_ + continuity_latest : canary_latest();
+    const auto next = std::min(next_poll(asked), canary);
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }
 }
@@ -61,6 +64,7 @@ TimePoint Axis::next_poll(TimePoint began) const {
 Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
   auto proof = co_await drive_->check_continuity(priority);
   if (proof) continuity_checked_ = env_.clock->now();
+  waited_ = waited_ * 3 / 4;  // nobody measures it while the bus repeats nothing
   co_return proof;
 }
 
@@ -71,8 +75,8 @@ Task<bool> Axis::poll_once(Polling& polling) {
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
   const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
-  const bool asked_in_vain = now >= polling.proof_due && continuity_checked_ < polling.proof_due;
-  const bool late = !busy() && now > canary_latest();
+  const bool asked_in_vain = !urgent && now >= polling.proof_due && continuity_checked_ < polling.proof_due;
+  const bool late = !busy() && now >= canary_latest();
   if (asked_in_vain || late ||
       now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
     result =
@@ -150,8 +154,8 @@ bool Axis::seen_again(const DriveSample& sample) {
 /// At rest, so that M7 holds though a reading goes first that waits for the line: twice as long as others did
 /// where all axes ask for their canaries just then, and the canary behind those.
 TimePoint Axis::canary_latest() const {
-  return continuity_checked_ +
-         std::min<Duration>(continuity_latest_at_rest, continuity_every - told_late - 3 * waited_);
+  return continuity_checked_ + std::clamp<Duration>(continuity_every - told_late - 3 * waited_,
+                                                    continuity_soonest_of_all, continuity_latest_at_rest);
 }
 
 /// With the last reading that is in time, or between two where they are rare.
@@ -169,6 +173,8 @@ bool Axis::only_watches() const { return chains_ == 0 && !bus_loss_ && drift_.em
 /// The poll loop has something to look at.
 void Axis::wake() {
   env_.bus->end_repetition(settings_.node);
+  // A reading that came due since the stop began is waited for like those before.
+  if (stopping_.running) env_.bus->hasten(settings_.node, TransactionClass::moving_state);
   wake_.notify_all();
 }
 

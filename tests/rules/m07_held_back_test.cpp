@@ -160,5 +160,41 @@ TEST(M04, TheFirstFrameAfterItWasHeldBackForTooLongIsAStop) {
   });
 }
 
+/// Somebody else's exchange kept the line: where readings are rare, nothing but the canaries themselves would
+/// notice that they come no more.
+TEST(M07, TheCanaryIsReadAgainInTimeOnceTheLineIsFree) {
+  for (const auto idle : {200ms, 2000ms, 5000ms, 10000ms})
+    for (const auto kept : {300ms, 450ms, 600ms, 900ms})
+      for (const auto after : {100ms, 790ms, 845ms}) {
+        SCOPED_TRACE(testing::Message() << idle.count() << ", " << kept.count() << ", " << after.count());
+        Rig rig({.adjust = [idle](AxisSettings& axis) { axis.poll_idle = idle; }});
+        rig.run(2s);
+        auto keep = [](modbus_rtu::RtuBus& bus, Duration turnaround) -> Task<> {
+          (void)co_await bus.transact(
+              {.node = 9, .address = 0x0003, .count = 1},
+              {.transaction_class = TransactionClass::stop, .turnaround_max = turnaround});
+        };
+        const auto is_canary = [](const WireEntry& entry) {
+          return entry.node() == 1 && entry.address() == 0x0020;
+        };
+        rig.line->forget_wire();
+        ASSERT_TRUE(rig.run_until(
+            [&] { return !rig.line->wire().empty() && is_canary(rig.line->wire().back()); }, 2s));
+        rig.run(after);
+        spawn(rig.world.executor(), keep(*rig.machine->find_line("line-a"), kept), "keep");
+        rig.run(22s);
+        std::optional<TimePoint> last;
+        for (const auto& entry : rig.line->wire()) {
+          if (!is_canary(entry)) continue;
+          if (last) EXPECT_LE(entry.begin - *last, 1s + kept);
+          if (last && entry.begin > rig.line->wire().front().begin + 4s) EXPECT_LE(entry.begin - *last, 1s);
+          last = entry.begin;
+        }
+        EXPECT_GE(rig.world.now() - *last, 0s);
+        EXPECT_LE(rig.world.now() - *last, 1s);
+        EXPECT_EQ(rig.state()->link, LinkState::online);
+      }
+}
+
 }  // namespace
 }  // namespace axisd::test
