@@ -211,9 +211,10 @@ TEST_F(Streams, OwnStreamsNeverLockOutAStop) {
 }
 
 TEST_F(Streams, ReaderThatNeverReadsIsCancelled) {
-  serve({.limits = {.calls = 8, .streams = 1}, .stalled_reader_limit = 500ms});
+  serve({.limits = {.calls = 8, .streams = 1}, .stalled_reader_limit = 3s});
   publish_large(1);
   Watch stalled(*axes_, 10ms, {"feeder"});
+  stalled.reader->WaitForInitialMetadata();  // it has the place, not the next one
   // The place of the stream becomes free when it has been cancelled.
   Watch refused(*axes_, 10ms);
   EXPECT_FALSE(refused.read());
