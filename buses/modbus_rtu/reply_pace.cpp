@@ -19,7 +19,7 @@ void ReplyPace::complete(std::uint8_t node, Duration on_wire, Duration took, boo
   if (slept) pace.unchecked = (pace.unchecked + 1) % check_every;
   if (slept && !checked && !awaited) return;  // as it was expected
   // One that lay ready came sooner: nobody knows by how much.
-  const auto turnaround = std::max(awaited ? took - on_wire : pace.soonest - margin, Duration::zero());
+  const auto turnaround = awaited ? took - on_wire : pace.soonest - margin;
   pace.to_measure = awaited ? std::max(pace.to_measure - 1, 0) : measured;
   if (pace.to_measure > 0) pace.unchecked = 0;
   pace.soonest = std::min(pace.soonest, turnaround);

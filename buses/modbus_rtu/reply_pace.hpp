@@ -33,7 +33,8 @@ class ReplyPace {
   void forget(std::uint8_t node) { nodes_.at(node) = {}; }
 
  private:
-  /// From the end of the request to the start of the reply.
+  /// From the end of the request to the start of the reply; less than nothing where bytes take no time on the
+  /// way, as between two ends of a pty.
   struct Pace {
     Duration soonest = Duration::max();
     Duration soonest_lately = Duration::max();  ///< of the last `lately` replies

@@ -88,10 +88,12 @@ TEST(ReplyPace, ReliesOnNothingAfterSilence) {
   EXPECT_EQ(pace.quiet(1, on_wire), Duration::zero());
 }
 
-TEST(ReplyPace, AReplyBeforeItsTimeOnTheWireIsOneWithoutTurnaround) {
+TEST(ReplyPace, AReplyBeforeItsTimeOnTheWireIsNotSleptOver) {
   ReplyPace pace;  // the adapter's clock, or the end of the request, is off
   for (int i = 0; i < ReplyPace::measured; ++i) pace.complete(1, on_wire, 1900us, true);
-  EXPECT_EQ(pace.quiet(1, on_wire), on_wire - ReplyPace::margin);
+  EXPECT_EQ(pace.quiet(1, on_wire), 1900us - ReplyPace::margin);
+  for (int i = 0; i < ReplyPace::measured; ++i) pace.complete(2, on_wire, -600us, true);  // no time at all
+  EXPECT_EQ(pace.quiet(2, on_wire), Duration::zero());
 }
 
 }  // namespace
