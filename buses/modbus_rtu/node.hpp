@@ -13,6 +13,7 @@ class Node {
   Node(RtuBus& bus, std::uint8_t address) : bus_(&bus), address_(address) {}
 
   Task<Result<Answer>> read(std::uint16_t address, std::uint16_t count, TransactionOptions options) const;
+  /// FC03, not sent: for whoever sends it later (Proof).
   [[nodiscard]] Request reading(std::uint16_t address, std::uint16_t count) const;
   /// Errors: as of RtuBus::watch().
   Task<Result<std::optional<Answer>>> watch(std::uint16_t address, std::uint16_t count,

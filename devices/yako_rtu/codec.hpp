@@ -13,6 +13,7 @@ namespace axisd::yako_rtu {
 inline constexpr std::uint16_t state_count = 10;
 /// Registers 0x0020..0x0025: what a start uses.
 using MotionBlock = std::array<std::uint16_t, 6>;
+/// As many are read to recognise it.
 inline constexpr std::uint16_t canary_count = std::tuple_size_v<MotionBlock>;
 /// Registers 0x0031..0x0036.
 using HomingBlock = std::array<std::uint16_t, 6>;
