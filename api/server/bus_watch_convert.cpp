@@ -128,9 +128,9 @@ void fill_nodes(const BusStatistics& from, v1::BusStatistics& to) {
       entry.mutable_unknown_starts()->set_unresolved(starts.unresolved);
     }
     if (from.line) {
-      const auto counted = from.line->nodes().find(node);
-      fill(counted == from.line->nodes().end() ? modbus_rtu::NodeStatistics{} : counted->second,
-           from.since_start, *entry.mutable_line());
+      const auto* counted = from.line->nodes().find(node);
+      fill(counted == nullptr ? modbus_rtu::NodeStatistics{} : *counted, from.since_start,
+           *entry.mutable_line());
       if (const auto there = from.quarantine.find(node); there != from.quarantine.end())
         fill(there->second, *entry.mutable_line()->mutable_quarantine());
     } else if (const auto counted = from.network.find(node); counted != from.network.end()) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
 
 namespace axisd::modbus_rtu {
@@ -12,7 +13,7 @@ constexpr std::uint8_t exception_bit = 0x80;
 constexpr std::size_t exception_size = 5;
 constexpr std::size_t write_reply_size = 8;
 constexpr std::size_t smallest_frame = 4;  // node, function, CRC
-constexpr std::size_t largest_read = 125;  // what fits into 256 bytes; the drives' own limit is lower (6.2.1)
+constexpr std::size_t read_head = 3;       // of the reply: node, function, byte count
 constexpr std::size_t largest_write = 123;
 constexpr std::uint8_t last_node = 247;  // 248..255 are reserved (Modbus over serial line 2.2)
 
@@ -86,6 +87,12 @@ Frame::Frame(std::span<const std::uint8_t> bytes) {
   size_ = bytes.size();
 }
 
+Frame& Frame::operator=(const Frame& other) {
+  std::memmove(bytes_.data(), other.bytes_.data(), other.size_);
+  size_ = other.size_;
+  return *this;
+}
+
 void Frame::append_word(std::uint16_t word) {
   append(static_cast<std::uint8_t>(word >> 8U));
   append(static_cast<std::uint8_t>(word & 0xFFU));
@@ -153,12 +160,16 @@ Reply decode(const Request& request, std::span<const std::uint8_t> reply) {
   if (reply[1] == (function | exception_bit) && reply.size() == exception_size)
     return {.kind = ReplyKind::exception, .exception_code = reply[2]};
   if (reply[1] != function || !answers(request, reply)) return {.kind = ReplyKind::foreign};
-  Reply match{.kind = ReplyKind::match};
-  if (is_write(request.function)) return match;
-  match.registers.reserve(request.count);
-  for (std::size_t index = 0; index < request.count; ++index)
-    match.registers.push_back(word_at(reply, 3 + 2 * index));
-  return match;
+  return {.kind = ReplyKind::match};
+}
+
+Registers::Registers(const Frame& reply) {
+  const auto bytes = reply.bytes();
+  constexpr auto read = static_cast<std::uint8_t>(Function::read_holding_registers);
+  if (bytes.size() < read_head || bytes[1] != read || reply_size(bytes) != bytes.size()) return;
+  const auto values = bytes.subspan(read_head, bytes[read_head - 1]);
+  size_ = values.size() / 2;
+  for (std::size_t index = 0; index < size_; ++index) values_.at(index) = word_at(values, 2 * index);
 }
 
 }  // namespace axisd::modbus_rtu

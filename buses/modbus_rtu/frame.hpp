@@ -21,20 +21,22 @@ enum class Function : std::uint8_t {
 class Frame {
  public:
   static constexpr std::size_t capacity = 256;
-  Frame() = default;
+  Frame() {}  // not defaulted: the bytes that are not in use stay as they are
   explicit Frame(std::span<const std::uint8_t> bytes);
+  Frame(const Frame& other) : Frame(other.bytes()) {}
+  Frame& operator=(const Frame& other);
+  ~Frame() = default;
   void append(std::uint8_t byte) { bytes_.at(size_++) = byte; }
   void append_word(std::uint16_t word);  ///< high byte first
   void append_crc();                     ///< low byte first
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {bytes_.data(), size_}; }
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] std::uint8_t node() const { return bytes_[0]; }
-  [[nodiscard]] std::uint8_t function() const { return bytes_[1]; }
   bool operator==(const Frame& other) const;
 
  private:
-  std::array<std::uint8_t, capacity> bytes_{};
+  // Only what is in use is copied, and stands close to its size: most frames are short.
   std::size_t size_ = 0;
+  std::array<std::uint8_t, capacity> bytes_;
 };
 
 std::uint16_t crc16(std::span<const std::uint8_t> bytes);
@@ -62,7 +64,7 @@ std::size_t reply_size(std::span<const std::uint8_t> head);
 
 /// What a reply turned out to be.
 enum class ReplyKind : std::uint8_t {
-  match,      ///< answers the request; for reads `registers` is filled
+  match,      ///< answers the request
   exception,  ///< `exception_code` is the drive's
   foreign,    ///< a sound frame that does not answer this request (other node, function, size or echo)
   corrupt,    ///< too short or wrong CRC
@@ -70,9 +72,22 @@ enum class ReplyKind : std::uint8_t {
 struct Reply {
   ReplyKind kind = ReplyKind::corrupt;
   std::uint8_t exception_code = 0;
-  std::vector<std::uint16_t> registers{};
 };
 /// Checks the whole reply against the request: node, function, byte count, and the complete echo of a write.
 Reply decode(const Request& request, std::span<const std::uint8_t> reply);
+
+/// The most registers that one read may ask for: what fits into 256 bytes. The drives' own limit is lower
+/// (6.2.1).
+inline constexpr std::size_t largest_read = 125;
+/// The values in a sound reply to a read; of anything else nothing.
+class Registers {
+ public:
+  explicit Registers(const Frame& reply);
+  [[nodiscard]] std::span<const std::uint16_t> values() const { return {values_.data(), size_}; }
+
+ private:
+  std::size_t size_ = 0;
+  std::array<std::uint16_t, largest_read> values_;
+};
 
 }  // namespace axisd::modbus_rtu

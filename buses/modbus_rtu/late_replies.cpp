@@ -63,9 +63,8 @@ bool LateReplies::may_echo(const Request& write, TimePoint now) const {
 }
 
 std::optional<Request> LateReplies::distinct_read(const Request& waiting, TimePoint now) const {
-  const auto known = answered_.find(waiting.node);
-  const auto block =
-      known == answered_.end() ? Block{.address = waiting.address, .count = waiting.count} : known->second;
+  const auto* known = answered_.find(waiting.node);
+  const auto block = known == nullptr ? Block{.address = waiting.address, .count = waiting.count} : *known;
   const auto of = [&](std::uint16_t count) {
     constexpr int addresses = 0x10000;
     return Request{.node = waiting.node,
@@ -92,8 +91,8 @@ TimePoint LateReplies::distinct_at(std::uint8_t node, TimePoint now) const {
 
 /// What has been answered may be longer: not every device is one of the drives.
 std::uint16_t LateReplies::longest(std::uint8_t node) const {
-  const auto known = answered_.find(node);
-  return known == answered_.end() ? longest_read : std::max(longest_read, known->second.count);
+  const auto* known = answered_.find(node);
+  return known == nullptr ? longest_read : std::max(longest_read, known->count);
 }
 
 }  // namespace axisd::modbus_rtu

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "buses/modbus_rtu/line.hpp"
+#include "buses/modbus_rtu/node_table.hpp"
 
 namespace axisd::modbus_rtu {
 
@@ -50,7 +51,7 @@ class LateReplies {
   /// Lengths of reads that timed out, by node, and until when their replies may still come.
   std::map<std::uint8_t, std::map<std::uint16_t, TimePoint>> reads_;
   std::map<std::uint8_t, std::map<Write, TimePoint>> echoes_;
-  std::map<std::uint8_t, Block> answered_;  ///< the longest read that each node has answered
+  NodeTable<Block> answered_;  ///< the longest read that each node has answered
 };
 
 }  // namespace axisd::modbus_rtu

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "buses/bus.hpp"
 #include "buses/modbus_rtu/frame.hpp"
@@ -18,7 +19,6 @@ namespace axisd::modbus_rtu {
 /// One exchange as the line sees it. The core owns it and leaves it alone while it is armed or under way.
 struct Exchange {
   Request request;
-  Frame frame;  ///< encoded request with CRC
   MotionGuard guard;
   TimePoint deadline = TimePoint::max();
   Duration reply_timeout{};   ///< from the last byte of the request to the last byte of the reply
@@ -29,8 +29,9 @@ struct Exchange {
   /// byte went out longer than `round_longest` before.
   const Exchange* then = nullptr;
   Duration round_longest{};
-  const Frame* known =
-      nullptr;  ///< the last reply to this request, if there is one; not the core's meanwhile
+  /// The last reply to this request, if there is one, a sound one; not the core's meanwhile.
+  const Frame* known = nullptr;
+  Frame frame{};  ///< encoded request with CRC; long, and last, so that all the rest stands together
 };
 
 enum class ExchangeStatus : std::uint8_t {
@@ -48,13 +49,18 @@ struct ExchangeResult {
   ExchangeStatus status = ExchangeStatus::io_error;
   Verdict verdict = Verdict::send;
   Reply reply{};
-  Frame reply_frame{};  ///< raw bytes, for traces
   int native_error = 0;
   int foreign_frames = 0;     ///< discarded while waiting
   TimePoint request_begin{};  ///< first byte out (at the bind)
   TimePoint request_end{};    ///< last byte out (computed from the baud rate)
   TimePoint reply_begin{};    ///< first byte in; unset without a reply
   TimePoint reply_end{};      ///< last byte in, or the end of the wait
+  Frame reply_frame{};        ///< raw bytes
+  /// Of a read that was answered.
+  [[nodiscard]] std::vector<std::uint16_t> registers() const {
+    const Registers read(reply_frame);
+    return {read.values().begin(), read.values().end()};
+  }
 };
 
 /// The reply is the one that is known, and nothing else was heard.

@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 
 #include "buses/bus_load.hpp"
 #include "buses/class_statistics.hpp"
+#include "buses/modbus_rtu/node_table.hpp"
 #include "buses/modbus_rtu/transaction_queue.hpp"
 
 namespace axisd::modbus_rtu {
@@ -50,7 +50,7 @@ class LineStatistics {
 
   [[nodiscard]] BusCounters counters() const;
   [[nodiscard]] const StatisticsByClass& classes() const { return classes_; }
-  [[nodiscard]] const std::map<std::uint8_t, NodeStatistics>& nodes() const { return nodes_; }
+  [[nodiscard]] const NodeTable<NodeStatistics>& nodes() const { return nodes_; }
   /// The line is occupied by an exchange from the silence before it to the end of the reply, or of the wait
   /// for it.
   [[nodiscard]] const BusLoad& load() const { return load_; }
@@ -68,8 +68,8 @@ class LineStatistics {
 
   SerialSettings serial_;
   StatisticsByClass classes_;
-  std::map<std::uint8_t, NodeStatistics> nodes_;
-  std::map<std::uint8_t, Asked> last_;  ///< by node
+  NodeTable<NodeStatistics> nodes_;
+  NodeTable<Asked> last_;
   std::uint64_t foreign_frames_ = 0;
   BusLoad load_;
 };

@@ -47,8 +47,8 @@ void Quarantine::forget() {
 }
 
 TimePoint Quarantine::ready_at(std::uint8_t node) const {
-  const auto known = nodes_.find(node);
-  return known == nodes_.end() ? TimePoint{} : known->second.next;
+  const auto* known = nodes_.find(node);
+  return known == nullptr ? TimePoint{} : known->next;
 }
 
 }  // namespace axisd::modbus_rtu

@@ -2,9 +2,9 @@
 
 #include <chrono>
 #include <cstdint>
-#include <map>
 
 #include "buses/clock.hpp"
+#include "buses/modbus_rtu/node_table.hpp"
 
 namespace axisd::modbus_rtu {
 
@@ -47,12 +47,12 @@ class Quarantine {
   /// No request but a new stop before this.
   [[nodiscard]] TimePoint ready_at(std::uint8_t node) const;
   /// By address; only those that were asked something.
-  [[nodiscard]] const std::map<std::uint8_t, Node>& nodes() const { return nodes_; }
+  [[nodiscard]] const NodeTable<Node>& nodes() const { return nodes_; }
 
  private:
   [[nodiscard]] Duration longest_hold(Duration cost) const;
 
-  std::map<std::uint8_t, Node> nodes_;
+  NodeTable<Node> nodes_;
 };
 
 }  // namespace axisd::modbus_rtu

@@ -54,13 +54,13 @@ Exchange RtuBus::exchange_for(Request request, const Frame& frame, TransactionOp
   const bool overrides = options.serial && options.serial != settings_.serial();
   if (overrides) options.guard = {.gate = override_gate_, .epoch = override_gate_->epoch()};
   return {.request = std::move(request),
-          .frame = frame,
           .guard = std::move(options.guard),
           .deadline = options.deadline,
           .reply_timeout = turnaround + reply + reply_margin,
           .turnaround_max = std::min(turnaround, usual),
           .serial = overrides ? options.serial : std::nullopt,
-          .stop = options.transaction_class == TransactionClass::stop};
+          .stop = options.transaction_class == TransactionClass::stop,
+          .frame = frame};
 }
 
 Result<TransactionPtr> RtuBus::prepare(Request request, TransactionOptions options) const {
@@ -118,7 +118,7 @@ void RtuBus::give_up_readings(std::uint8_t node) {
     for (const auto& one : round_) one->given_up = one->given_up || one->exchange.request.node == node;
   for (auto& reading : queue_.take_reads(node, TransactionClass::idle_state))
     end(std::move(reading), not_sent(Verdict::superseded, now));
-  if (const auto found = watches_.find(node); found != watches_.end()) found->second->end();
+  if (auto* const watch = watch_of(node)) watch->end();
   pump();
 }
 
@@ -356,7 +356,7 @@ void RtuBus::on_port(const PortStatus& status) {
     const ExchangeResult lost{.status = ExchangeStatus::not_sent, .verdict = Verdict::send};
     for (auto& transaction : queue_.take_all()) end(std::move(transaction), lost);
     for (const auto& [node, watch] : watches_)
-      if (auto transaction = watch->take_resting()) end(std::move(transaction), lost);
+      if (auto transaction = watch ? watch->take_resting() : nullptr) end(std::move(transaction), lost);
   }
   port_changed_.notify_all();
   pump();
@@ -373,10 +373,9 @@ void RtuBus::end(TransactionPtr transaction, const ExchangeResult& result) {
 }
 
 std::optional<QuarantinedNode> RtuBus::quarantined(std::uint8_t node) const {
-  const auto found = quarantine_.nodes().find(node);
-  if (found == quarantine_.nodes().end() || !found->second.quarantined()) return std::nullopt;
-  return QuarantinedNode{
-      .since = found->second.since, .next = found->second.next, .probes = found->second.probes};
+  const auto* found = quarantine_.nodes().find(node);
+  if (found == nullptr || !found->quarantined()) return std::nullopt;
+  return QuarantinedNode{.since = found->since, .next = found->next, .probes = found->probes};
 }
 
 }  // namespace axisd::modbus_rtu

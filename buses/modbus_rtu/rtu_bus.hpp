@@ -14,6 +14,7 @@
 #include "buses/modbus_rtu/late_replies.hpp"
 #include "buses/modbus_rtu/line.hpp"
 #include "buses/modbus_rtu/line_statistics.hpp"
+#include "buses/modbus_rtu/node_table.hpp"
 #include "buses/modbus_rtu/quarantine.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "buses/modbus_rtu/transaction_queue.hpp"
@@ -94,6 +95,8 @@ class RtuBus final : public Bus {
   struct Known {
     Frame request, reply;
   };
+  /// What the last repeated reading of a node says, and its proof.
+  using KnownOfNode = std::array<Known, 2>;
   [[nodiscard]] Exchange exchange_for(Request request, const Frame& frame, TransactionOptions options) const;
   Result<TransactionPtr> prepare(Request request, TransactionOptions options) const;
   void submit(TransactionPtr transaction);
@@ -105,6 +108,7 @@ class RtuBus final : public Bus {
   void finish(std::span<const ExchangeResult> results);
   void finish(TransactionPtr transaction, const ExchangeResult& result, TimePoint now);
   void extend_round();
+  [[nodiscard]] Watch* watch_of(std::uint8_t node) const;
   bool recall(std::uint8_t node);
   static void know(Exchange& exchange, Known& known);
   void note_known(const Exchange& exchange, const ExchangeResult& result);
@@ -133,10 +137,9 @@ class RtuBus final : public Bus {
   PortStatus port_;
   Signal port_changed_;
   TransactionQueue queue_;
-  std::vector<TransactionPtr> round_;  ///< armed or under way, in the order of the line
-  std::map<std::uint8_t, std::unique_ptr<Watch>> watches_;
-  /// What the last repeated reading of each node says, and its proof.
-  std::map<std::uint8_t, std::array<Known, 2>> known_;
+  std::vector<TransactionPtr> round_;          ///< armed or under way, in the order of the line
+  NodeTable<std::unique_ptr<Watch>> watches_;  ///< null: no more
+  NodeTable<std::unique_ptr<KnownOfNode>> known_;
   LateReplies late_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Quarantine quarantine_;

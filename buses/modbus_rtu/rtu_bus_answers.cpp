@@ -66,7 +66,7 @@ void RtuBus::note_garbled(const Request& request, const ExchangeResult& result) 
 Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResult& result) const {
   const auto& request = transaction.exchange.request;
   if (result.status == ExchangeStatus::replied && result.reply.kind != ReplyKind::exception)
-    return Answer{.registers = result.reply.registers,
+    return Answer{.registers = result.registers(),
                   .sent_at = result.request_begin,
                   .request_end = result.request_end,
                   .answered_at = result.reply_end,

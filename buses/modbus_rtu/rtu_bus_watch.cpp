@@ -28,7 +28,9 @@ Task<Result<std::optional<Answer>>> RtuBus::watch(Request request, Repetition re
   Promise<Result<std::optional<Answer>>> promise(executor_, *clock_);
   Watch* watch = nullptr;
   if (auto& own = watches_[node]; !own) {
-    auto& [known_reading, known_proof] = known_[node];
+    auto& of_node = known_[node];
+    if (!of_node) of_node = std::make_unique<KnownOfNode>();
+    auto& [known_reading, known_proof] = *of_node;
     know((*transaction)->exchange, known_reading);
     if (proof) know(*proof, known_proof);
     own = std::make_unique<Watch>(std::move(repetition), std::move(proof),
@@ -47,8 +49,13 @@ Task<Result<std::optional<Answer>>> RtuBus::watch(Request request, Repetition re
   submit(*std::move(transaction));
   pump();
   auto result = co_await promise.get();
-  if (watch != nullptr) watches_.erase(node);
+  if (watch != nullptr) watches_[node].reset();
   co_return result;
+}
+
+Watch* RtuBus::watch_of(std::uint8_t node) const {
+  const auto* found = watches_.find(node);
+  return found == nullptr ? nullptr : found->get();
 }
 
 /// From now on `exchange` is compared with what `known` holds.
@@ -59,9 +66,9 @@ void RtuBus::know(Exchange& exchange, Known& known) {
 
 /// Whoever ends it waits for its answer: it is not to be told with those of the round only.
 void RtuBus::end_repetition(std::uint8_t node) {
-  const auto found = watches_.find(node);
-  if (found == watches_.end()) return;
-  found->second->end();
+  auto* const watch = watch_of(node);
+  if (watch == nullptr) return;
+  watch->end();
   if (recall(node)) pump();
 }
 
@@ -74,12 +81,12 @@ bool RtuBus::recall(std::uint8_t node) {
 
 /// Whoever asked: a later reading that says the same says nothing new.
 void RtuBus::note_known(const Exchange& exchange, const ExchangeResult& result) {
-  if (result.status != ExchangeStatus::replied) return;
-  const auto of_node = known_.find(exchange.request.node);
-  if (of_node == known_.end()) return;
-  for (auto& known : of_node->second)
-    if (known.request == exchange.frame && known.reply != result.reply_frame)
-      known.reply = result.reply_frame;
+  if (result.status != ExchangeStatus::replied || result.reply.kind != ReplyKind::match) return;
+  if (exchange.known != nullptr && *exchange.known == result.reply_frame) return;
+  const auto* of_node = known_.find(exchange.request.node);
+  if (of_node == nullptr) return;
+  for (auto& known : **of_node)
+    if (known.request == exchange.frame) known.reply = result.reply_frame;
 }
 
 /// What was hastened has somebody waiting.
@@ -88,7 +95,8 @@ bool RtuBus::is_repeated(const Transaction& ended, const ExchangeResult& result)
   if (ended.watch == nullptr || result.status != ExchangeStatus::replied ||
       result.reply.kind != ReplyKind::match || !port_.open || (awaited && !ended.watch->proves()))
     return false;
-  return ended.watch->goes_on({.registers = result.reply.registers,
+  const Registers registers(result.reply_frame);
+  return ended.watch->goes_on({.registers = registers.values(),
                                .sent_at = result.request_begin,
                                .answered_at = result.reply_end}) &&
          !awaited;

@@ -43,13 +43,12 @@ void TransactionQueue::put_back(TransactionPtr transaction) { insert(std::move(t
 void TransactionQueue::hold(TransactionPtr transaction) { insert(std::move(transaction), true); }
 
 bool TransactionQueue::merge(Transaction& transaction) {
-  const auto waiting = by_node_.find(transaction.exchange.request.node);
-  if (waiting == by_node_.end()) return false;
-  const auto found = std::ranges::find_if(waiting->second, [&](const auto& one) {
-    return !one.second.held && sends_the_same(*one.second.transaction, transaction);
-  });
-  if (found == waiting->second.end()) return false;
-  auto known = take(found->second.transaction);
+  const auto* waiting = by_node_.find(transaction.exchange.request.node);
+  if (waiting == nullptr) return false;
+  const auto found = std::ranges::find_if(
+      *waiting, [&](const Place& one) { return !one.held && sends_the_same(*one.transaction, transaction); });
+  if (found == waiting->end()) return false;
+  auto known = take(found->transaction);
   known->watch = nullptr;  // somebody waits for it
   std::ranges::move(transaction.on_end, std::back_inserter(known->on_end));
   known->transaction_class = std::min(known->transaction_class, transaction.transaction_class);
@@ -71,12 +70,16 @@ void TransactionQueue::insert(TransactionPtr transaction, bool held) {
     held_[node].push_back(std::move(transaction));
   else
     place.in_lane = lane(one->transaction_class).insert(std::move(transaction)).first;
-  by_node_[node].emplace(one->sequence, place);
+  auto& places = by_node_[node];
+  places.insert(std::ranges::upper_bound(places, one->sequence, {}, sequence_of), place);
 }
 
 TransactionPtr TransactionQueue::take(Transaction* transaction) {
   const auto node = transaction->exchange.request.node;
-  const auto place = by_node_.at(node).extract(transaction->sequence).mapped();
+  auto& places = by_node_[node];
+  const auto found_place = std::ranges::lower_bound(places, transaction->sequence, {}, sequence_of);
+  const auto place = *found_place;
+  places.erase(found_place);
   expiries_.erase({expiry_of(*transaction), transaction->sequence});
   if (const auto guarded = guarded_.find(transaction->exchange.guard.gate.get()); guarded != guarded_.end()) {
     std::erase(guarded->second, transaction);
@@ -120,10 +123,10 @@ TransactionQueue::Lane* TransactionQueue::next_below(std::size_t top) {
 }
 
 void TransactionQueue::hasten(std::uint8_t node, TransactionClass to) {
-  const auto waiting = by_node_.find(node);
-  if (waiting == by_node_.end()) return;
+  const auto* waiting = by_node_.find(node);
+  if (waiting == nullptr) return;
   std::vector<Place> late;
-  for (const auto& [sequence, place] : waiting->second)
+  for (const auto& place : *waiting)
     if (place.transaction->transaction_class > to) late.push_back(place);
   for (const auto& place : late) {
     auto hastened = take(place.transaction);
@@ -159,10 +162,10 @@ std::vector<TransactionPtr> TransactionQueue::take_forbidden(const AxisGate& gat
 
 std::vector<TransactionPtr> TransactionQueue::take_reads(std::uint8_t node, TransactionClass lowest) {
   std::vector<TransactionPtr> taken;
-  const auto waiting = by_node_.find(node);
-  if (waiting == by_node_.end()) return taken;
+  const auto* waiting = by_node_.find(node);
+  if (waiting == nullptr) return taken;
   std::vector<Transaction*> reads;
-  for (const auto& [sequence, place] : waiting->second)
+  for (const auto& place : *waiting)
     if (is_read(*place.transaction) && place.transaction->transaction_class <= lowest)
       reads.push_back(place.transaction);
   for (auto* read : reads) taken.push_back(take(read));
@@ -194,7 +197,7 @@ std::vector<std::uint8_t> TransactionQueue::held_nodes() const {
 std::vector<TransactionPtr> TransactionQueue::take_all() {
   std::vector<Transaction*> all;
   for (const auto& [node, places] : by_node_)
-    for (const auto& [sequence, place] : places) all.push_back(place.transaction);
+    for (const auto& place : places) all.push_back(place.transaction);
   std::vector<TransactionPtr> taken;
   taken.reserve(all.size());
   for (auto* transaction : all) taken.push_back(take(transaction));

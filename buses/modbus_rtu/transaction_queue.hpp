@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "buses/modbus_rtu/line.hpp"
+#include "buses/modbus_rtu/node_table.hpp"
 #include "buses/transaction.hpp"
 
 namespace axisd::modbus_rtu {
@@ -94,6 +95,7 @@ class TransactionQueue {
     Lane::iterator in_lane{};  ///< unless held
   };
 
+  static std::uint64_t sequence_of(const Place& place) { return place.transaction->sequence; }
   Lane& lane(TransactionClass transaction_class) {
     return lanes_.at(static_cast<std::size_t>(transaction_class));
   }
@@ -105,7 +107,7 @@ class TransactionQueue {
   std::array<Lane, transaction_class_count> lanes_;
   std::map<std::uint8_t, std::vector<TransactionPtr>> held_;
   // Where everything is that waits for one node, or that one gate guards, and what ends by itself.
-  std::map<std::uint8_t, std::map<std::uint64_t, Place>> by_node_;  ///< in the order of arrival
+  NodeTable<std::vector<Place>> by_node_;  ///< in the order of arrival
   std::unordered_map<const AxisGate*, std::vector<Transaction*>> guarded_;
   std::map<std::pair<TimePoint, std::uint64_t>, Transaction*> expiries_;
   int reservation_;

@@ -140,18 +140,22 @@ void VirtualLine::hear(std::span<const std::uint8_t> bytes) {
   if (under_way_ == nullptr || world_->now() < result_.request_end) return;
   // The reply proper comes last; an echo or a foreign frame may stand before it.
   Reply best;
+  auto proper = bytes;
   for (std::size_t skip = 0;
        skip < bytes.size() && best.kind != ReplyKind::match && best.kind != ReplyKind::exception; ++skip)
-    if (auto decoded = decode(under_way_->request, bytes.subspan(skip)); decoded.kind != ReplyKind::corrupt)
-      best = std::move(decoded);
+    if (const auto decoded = decode(under_way_->request, bytes.subspan(skip));
+        decoded.kind != ReplyKind::corrupt) {
+      best = decoded;
+      proper = bytes.subspan(skip);
+    }
   if (best.kind == ReplyKind::foreign) {
     ++result_.foreign_frames;
     reply_coming_ = false;
     return;
   }
   const bool answered = best.kind == ReplyKind::match || best.kind == ReplyKind::exception;
-  result_.reply = std::move(best);
-  result_.reply_frame = Frame(bytes.first(std::min(bytes.size(), Frame::capacity)));
+  result_.reply = best;
+  result_.reply_frame = Frame(proper.first(std::min(proper.size(), Frame::capacity)));
   end(answered ? ExchangeStatus::replied : ExchangeStatus::corrupt);
 }
 

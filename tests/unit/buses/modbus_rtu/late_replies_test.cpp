@@ -8,7 +8,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr TimePoint start{1h};
-constexpr ExchangeResult lost{.status = ExchangeStatus::timeout};
+const ExchangeResult lost{.status = ExchangeStatus::timeout};
 
 ExchangeResult answered(ReplyKind kind = ReplyKind::match) {
   return {.status = ExchangeStatus::replied, .reply = {.kind = kind}};

@@ -24,7 +24,7 @@ class RtuWorkerPace : public ::testing::Test {
     for (int i = 0; i < ReplyPace::measured; ++i) {
       const auto result = bench_.run(read_);
       ASSERT_EQ(result.status, ExchangeStatus::replied);
-      ASSERT_EQ(result.reply.registers, registers_);
+      ASSERT_EQ(result.registers(), registers_);
     }
   }
   /// To the next request.
@@ -81,7 +81,7 @@ TEST_F(RtuWorkerPace, AReplyThatComesSoonerIsHeardAndTheNextOneInItsTime) {
   learn();
   pause_ms_ = 0;
   const auto sooner = bench_.run(read_);
-  EXPECT_EQ(sooner.reply.registers, (std::vector<std::uint16_t>{0x20, 0x21, 0x22, 0x23}));
+  EXPECT_EQ(sooner.registers(), (std::vector<std::uint16_t>{0x20, 0x21, 0x22, 0x23}));
   const auto next = bench_.run(read_);
   EXPECT_EQ(next.status, ExchangeStatus::replied);
 }
@@ -154,7 +154,7 @@ TEST_F(RtuWorkerPace, AReplyInTwoPiecesIsHeardToItsEnd) {
           in_pieces(proper_reply, count, milliseconds(times.first_ms), milliseconds(times.between_ms)));
       const auto result = bench_.run(read_);
       EXPECT_EQ(result.status, ExchangeStatus::replied);
-      EXPECT_EQ(result.reply.registers, registers_);
+      EXPECT_EQ(result.registers(), registers_);
       EXPECT_EQ(result.foreign_frames, 0);
       learn_again();
     }
@@ -202,7 +202,7 @@ TEST_F(RtuWorkerPace, AnothersReplyOfTheSameSizeIsCountedAndItsOwnTaken) {
     });
     const auto result = bench_.run(read_);
     EXPECT_EQ(result.status, ExchangeStatus::replied);
-    EXPECT_EQ(result.reply.registers, registers_);
+    EXPECT_EQ(result.registers(), registers_);
     EXPECT_EQ(result.foreign_frames, 1);
     learn_again();
   }
@@ -220,12 +220,12 @@ TEST_F(RtuWorkerPace, AnothersReplyOfAnotherSizeIsTakenForNoReplyOfItsOwn) {
       });
       const auto result = bench_.run(read_);
       if (result.status == ExchangeStatus::replied)
-        EXPECT_EQ(result.reply.registers, registers_);
+        EXPECT_EQ(result.registers(), registers_);
       else
         EXPECT_EQ(result.status, ExchangeStatus::corrupt);
       const auto next = bench_.run(read_of(0x0040, 2));
       EXPECT_EQ(next.status, ExchangeStatus::replied);
-      EXPECT_EQ(next.reply.registers, (std::vector<std::uint16_t>{0x40, 0x41}));
+      EXPECT_EQ(next.registers(), (std::vector<std::uint16_t>{0x40, 0x41}));
       learn_again();
     }
 }

@@ -61,7 +61,7 @@ TEST(RtuWorkerRound, IsCarriedOutInOrderAndToldOnce) {
   for (std::uint16_t i = 0; i < 3; ++i) {
     const auto& result = bench.results.at(i);
     EXPECT_EQ(result.status, ExchangeStatus::replied);
-    EXPECT_EQ(result.reply.registers, (std::vector<std::uint16_t>{static_cast<std::uint16_t>(0x20 + i)}));
+    EXPECT_EQ(result.registers(), (std::vector<std::uint16_t>{static_cast<std::uint16_t>(0x20 + i)}));
     if (i > 0) EXPECT_GE(result.request_begin - bench.results.at(i - 1).reply_end, silence(line_at(fast)));
   }
   expect_sent_and_nothing_else(bench, node, {round.sent(0), round.sent(1), round.sent(2)});
@@ -76,7 +76,7 @@ TEST(RtuWorkerRound, AChangedReplyIsToldWithThoseBeforeItAndTheRestIsNotSent) {
   bench.worker->arm(round.exchanges.front());
   bench.next_result();
   EXPECT_EQ(bench.rounds, Rounds{2});
-  EXPECT_EQ(bench.results.back().reply.registers, std::vector<std::uint16_t>{0x21});
+  EXPECT_EQ(bench.results.back().registers(), std::vector<std::uint16_t>{0x21});
   expect_sent_and_nothing_else(bench, node, {round.sent(0), round.sent(1)});
 }
 
@@ -189,7 +189,7 @@ TEST(RtuWorkerRound, TakenBackInTheSilenceGivesTheResultsSoFar) {
     in_silence = results && results->size() == 1;
     if (in_silence) {
       EXPECT_EQ(bench.results.size(), told) << "told by the one that took it back, alone";
-      EXPECT_EQ(results->front().reply.registers, std::vector<std::uint16_t>{0x20});
+      EXPECT_EQ(results->front().registers(), std::vector<std::uint16_t>{0x20});
     }
     if (!results) bench.next_result();
     sent = node.seen();
@@ -215,7 +215,7 @@ TEST(RtuWorkerRound, TakenBackWhileOneIsUnderWayItEndsWithThatOne) {
     EXPECT_FALSE(bench.worker->revoke());
     EXPECT_TRUE(bench.results.empty());
     released = true;
-    EXPECT_EQ(bench.next_result().reply.registers,
+    EXPECT_EQ(bench.next_result().registers(),
               std::vector<std::uint16_t>{static_cast<std::uint16_t>(0x20 + under_way)});
     EXPECT_EQ(bench.rounds, Rounds{under_way + 1U});
     Sent sent;

@@ -21,7 +21,7 @@ TEST(RtuWorker, ReadsAndWrites) {
   bench.start_and_open();
   const auto read = bench.run(read_of(0x0020, 4));
   EXPECT_EQ(read.status, ExchangeStatus::replied);
-  EXPECT_EQ(read.reply.registers, (std::vector<std::uint16_t>{0x20, 0x21, 0x22, 0x23}));
+  EXPECT_EQ(read.registers(), (std::vector<std::uint16_t>{0x20, 0x21, 0x22, 0x23}));
   EXPECT_EQ(read.reply_frame, framed({1, 3, 8, 0, 0x20, 0, 0x21, 0, 0x22, 0, 0x23}));
   EXPECT_LT(read.request_begin, read.request_end);
   EXPECT_LE(read.reply_begin, read.reply_end);
@@ -52,7 +52,7 @@ TEST(RtuWorker, AssemblesRepliesFromAnyPieces) {
   for (piece = 1; piece <= 17; piece += 4) {
     const auto result = bench.run(exchange);
     EXPECT_EQ(result.status, ExchangeStatus::replied) << piece;
-    EXPECT_EQ(result.reply.registers.size(), 6U);
+    EXPECT_EQ(result.registers().size(), 6U);
   }
 }
 
@@ -67,7 +67,7 @@ TEST(RtuWorker, PassesOverForeignFrames) {
   bench.start_and_open();
   const auto result = bench.run(read_of(0x0020, 2));
   EXPECT_EQ(result.status, ExchangeStatus::replied);
-  EXPECT_EQ(result.reply.registers, (std::vector<std::uint16_t>{0x20, 0x21}));
+  EXPECT_EQ(result.registers(), (std::vector<std::uint16_t>{0x20, 0x21}));
   EXPECT_EQ(result.foreign_frames, 3);
 }
 
@@ -93,7 +93,7 @@ TEST(RtuWorker, LateReplyDoesNotAnswerTheNextRequest) {
   bench.let_worker_notice();
   const auto result = bench.run(read_of(0x0030, 1));
   EXPECT_EQ(result.status, ExchangeStatus::replied);
-  EXPECT_EQ(result.reply.registers, std::vector<std::uint16_t>{0x30});
+  EXPECT_EQ(result.registers(), std::vector<std::uint16_t>{0x30});
   EXPECT_EQ(result.foreign_frames, 1);
 }
 
@@ -120,7 +120,7 @@ TEST(RtuWorker, EchoIsDiscardedBeforeTheReply) {
   bench.start_and_open();
   for (int round = 0; round < 3; ++round) {
     EXPECT_EQ(bench.run(write_of(0x0027, 1)).reply.kind, ReplyKind::match);
-    EXPECT_EQ(bench.run(read_of(0x0020, 2)).reply.registers, (std::vector<std::uint16_t>{0x20, 0x21}));
+    EXPECT_EQ(bench.run(read_of(0x0020, 2)).registers(), (std::vector<std::uint16_t>{0x20, 0x21}));
     EXPECT_EQ(bench
                   .run(exchange_of({.node = 1,
                                     .function = Function::write_multiple_registers,
@@ -140,7 +140,7 @@ TEST(RtuWorker, EchoThatTheProbeMissedIsLearntFromARead) {
   WorkerBench bench(line_at(fast, node.path()));
   bench.start_and_open();
   for (int round = 0; round < 2; ++round)
-    EXPECT_EQ(bench.run(read_of(0x0020, 2)).reply.registers, (std::vector<std::uint16_t>{0x20, 0x21}));
+    EXPECT_EQ(bench.run(read_of(0x0020, 2)).registers(), (std::vector<std::uint16_t>{0x20, 0x21}));
   EXPECT_EQ(bench.run(write_of(0x0027, 1)).reply.kind, ReplyKind::match);
   EXPECT_EQ(node.probes(), 1);
   // The adapter stops echoing: one exchange is lost, then a new probe has found out.
@@ -170,7 +170,7 @@ TEST(RtuWorker, DamagedRepliesAreCorruptAndHarmNoLaterOne) {
   EXPECT_EQ(first.reply_frame.bytes()[4], 0x30);
   for (int number = 1; number <= 3; ++number)
     EXPECT_EQ(bench.run(read_of(0x0020, 2, milliseconds(300))).status, ExchangeStatus::corrupt) << number;
-  EXPECT_EQ(bench.run(read_of(0x0020, 2)).reply.registers, (std::vector<std::uint16_t>{0x20, 0x21}));
+  EXPECT_EQ(bench.run(read_of(0x0020, 2)).registers(), (std::vector<std::uint16_t>{0x20, 0x21}));
 }
 
 TEST(RtuWorker, ExceptionCodesComeThroughUnchanged) {
