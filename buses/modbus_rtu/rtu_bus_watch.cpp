@@ -10,7 +10,7 @@ namespace {
 
 /// So much later than by itself the core hears of a reading that says nothing new, and of what was carried
 /// out behind it.
-constexpr Duration longest_round = std::chrono::milliseconds(40);
+constexpr Duration longest_round = std::chrono::milliseconds(100);
 
 }  // namespace
 

@@ -19,12 +19,14 @@ constexpr auto continuity_soonest = milliseconds(700);
 /// However long others have kept the line.
 constexpr auto continuity_soonest_of_all = milliseconds(200);
 /// So long after its reply, at most, a bus tells of a reading that it repeats.
-constexpr auto told_late = milliseconds(50);
+constexpr auto told_late = milliseconds(110);
 /// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
 /// trusted meanwhile.
 constexpr auto continuity_longest = milliseconds(2500);
 /// How soon the watch looks again at an axis that is beyond it, but is being asked.
 constexpr auto continuity_look = milliseconds(50);
+/// At multiples of this the watch looks at all axes whose time is not near: they wake the core together.
+constexpr Duration continuity_grid = milliseconds(500);
 
 }  // namespace
 
@@ -189,8 +191,9 @@ void Axis::watch_continuity() {
                      "check power, wiring, address and baud rate of the node"));
     return;
   }
-  continuity_watch_ =
-      env_.clock->call_at(std::max(limit, now + continuity_look), [this] { watch_continuity(); });
+  const auto on_grid = limit - limit.time_since_epoch() % continuity_grid;
+  const auto next = on_grid > now ? on_grid : std::max(limit, now + continuity_look);
+  continuity_watch_ = env_.clock->call_at(next, [this] { watch_continuity(); });
 }
 
 }  // namespace axisd
