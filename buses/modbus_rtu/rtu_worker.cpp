@@ -192,21 +192,26 @@ void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) 
                                     .reply_end = now});
     return;
   }
-  auto result = session.run(exchange);
+  const auto result = session.run(exchange);
   if (result.status == ExchangeStatus::io_error) {
     lost = result.native_error;
     // First the port, then the result: the core must not arm the next exchange on it.
     report(PortStatus{.open = false, .error = lost_error(settings_, session.path(), lost)});
   }
-  report(exchange, std::move(result));
+  report(exchange, result);
 }
 
 /// A stop that is on its way to the core is let in before whatever was armed without knowing of it. Once per
 /// exchange, so that no flood of stops keeps the others off the line. True: time has passed, which may have
 /// brought bytes.
 bool RtuWorker::yield_to_stop() {
-  const auto until = stop_notice_->given() + longest_yield;
-  if (yielded_ || stop_armed_.load() || monotonic_now() >= until) return false;
+  const auto given = stop_notice_->given();
+  const auto until = given + longest_yield;
+  if (yielded_ || given == notice_passed_ || stop_armed_.load()) return false;
+  if (monotonic_now() >= until) {
+    notice_passed_ = given;
+    return false;
+  }
   yielded_ = true;
   for (auto now = monotonic_now(); now < until && !stop_armed_.load() && !quitting(); now = monotonic_now()) {
     idle_.store(true);
@@ -238,8 +243,8 @@ void RtuWorker::wait_closed(Duration duration, int native_error) {
 }
 
 /// Of a round that says nothing new the core hears at its end: to wake it costs as much as an exchange.
-void RtuWorker::report(const Exchange& exchange, ExchangeResult result) {
-  results_.push_back(std::move(result));
+void RtuWorker::report(const Exchange& exchange, const ExchangeResult& result) {
+  results_.push_back(result);
   const Exchange* empty = nullptr;
   // From then on all of it is the core's again, if it takes the next one back.
   if (round_goes_on(exchange, results_) && slot_.compare_exchange_strong(empty, exchange.then)) return;

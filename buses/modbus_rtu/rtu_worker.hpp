@@ -65,7 +65,7 @@ class RtuWorker final : public Line {
   bool yield_to_stop();
   void idle(WireSession& session, int& lost);
   void wait_closed(Duration duration, int native_error);
-  void report(const Exchange& exchange, ExchangeResult result);
+  void report(const Exchange& exchange, const ExchangeResult& result);
   [[nodiscard]] bool armed() const;
   const Exchange* take();
   void tell();
@@ -86,6 +86,7 @@ class RtuWorker final : public Line {
   std::atomic<bool> stop_armed_ = false;  ///< what is in the slot, or was last, is a stop
   std::shared_ptr<StopNotice> stop_notice_ = std::make_shared<StopNotice>();
   bool yielded_ = false;            ///< of the worker: since the last exchange it has waited for a stop
+  TimePoint notice_passed_{};       ///< of the worker: a notice that nobody waits for any more
   std::atomic<bool> idle_ = false;  ///< the worker sleeps (or is about to) and must be woken for the slot
   Wakeup wakeup_;
   std::atomic<TimePoint::rep> progress_;

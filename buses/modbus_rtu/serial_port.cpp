@@ -3,6 +3,7 @@
 #include <asm/termbits.h>  // termios2 and BOTHER; clashes with <termios.h>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/select.h>
@@ -19,6 +20,8 @@
 #include <optional>
 #include <system_error>
 #include <utility>
+
+#include "buses/modbus_rtu/wakeup.hpp"
 
 namespace axisd::modbus_rtu {
 namespace {
@@ -205,11 +208,10 @@ int SerialPort::set_serial(const SerialSettings& serial) {
 }
 
 int SerialPort::send(const Frame& request) {
-  constexpr int crc_size = 2;  // libmodbus appends the CRC itself
-  const auto size = static_cast<int>(request.size());
-  const int sent = modbus_send_raw_request(context_.get(), request.bytes().data(), size - crc_size);
-  if (sent == size) return 0;
-  return errno >= MODBUS_ENOBASE ? EIO : errno;  // a partial write: the rest of the frame is lost
+  const auto bytes = request.bytes();
+  const auto sent = write(descriptor_, bytes.data(), bytes.size());
+  if (sent < 0) return errno;
+  return std::cmp_equal(sent, bytes.size()) ? 0 : EIO;  // of a part, the rest of the frame is lost
 }
 
 Received SerialPort::receive(std::uint8_t node, Duration timeout) {
@@ -242,6 +244,17 @@ Received SerialPort::receive(std::uint8_t node, Duration timeout) {
 std::size_t SerialPort::waiting() const {
   int count = 0;
   return ioctl(descriptor_, FIONREAD, &count) == 0 && count > 0 ? static_cast<std::size_t>(count) : 0;
+}
+
+bool SerialPort::empty() const {
+  int count = 0;
+  return ioctl(descriptor_, FIONREAD, &count) == 0 && count == 0;
+}
+
+bool SerialPort::comes_within(Duration limit) const {
+  const timespec timeout = to_timespec(limit);
+  pollfd watched{.fd = descriptor_, .events = POLLIN, .revents = 0};
+  return ppoll(&watched, 1, &timeout, nullptr) == 1 && watched.revents == POLLIN;
 }
 
 std::expected<std::size_t, int> SerialPort::read_available(std::span<std::uint8_t> buffer) {

@@ -56,6 +56,10 @@ class SerialPort {
   Received receive(std::uint8_t node, Duration timeout);
   /// Bytes that lie ready; 0 also where the port cannot tell.
   [[nodiscard]] std::size_t waiting() const;
+  /// Nothing lies ready; false where the port cannot tell.
+  [[nodiscard]] bool empty() const;
+  /// Something lies ready, or comes before `limit` has passed; false also where the port fails.
+  [[nodiscard]] bool comes_within(Duration limit) const;
   /// Reads what is there, at most `buffer`, without waiting. Error: errno (EIO once the port hung up).
   std::expected<std::size_t, int> read_available(std::span<std::uint8_t> buffer);
 

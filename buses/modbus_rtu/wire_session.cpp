@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <optional>
 #include <utility>
 
 namespace axisd::modbus_rtu {
@@ -23,8 +24,17 @@ constexpr Duration echo_latency = milliseconds(100);
 constexpr int echo_attempts = 3;
 /// A shorter sleep saves nothing.
 constexpr Duration shortest_sleep = milliseconds(1);
+/// After the sleep a reply is waited for so long without regard to anything else, which costs less.
+constexpr Duration shortly = milliseconds(1);
 /// Longest that a worker which is to end is waited for.
 constexpr Duration longest_deaf = milliseconds(100);
+
+/// What is known has been checked before.
+Reply reply_in(const Exchange& exchange, std::span<const std::uint8_t> bytes) {
+  if (exchange.known != nullptr && std::ranges::equal(exchange.known->bytes(), bytes))
+    return {.kind = ReplyKind::match};
+  return decode(exchange.request, bytes);
+}
 
 bool is_paced(const Exchange& exchange) {
   return exchange.request.function == Function::read_holding_registers;
@@ -97,6 +107,7 @@ int WireSession::idle(Duration limit) {
 
 /// Takes the bytes that nobody waits for off the port.
 WireSession::Bytes WireSession::absorb() {
+  if (port_.empty()) return {};
   std::array<std::uint8_t, Frame::capacity> buffer;
   Bytes total;
   for (;;) {
@@ -113,13 +124,15 @@ WireSession::Bytes WireSession::absorb() {
 }
 
 int WireSession::keep_silence() {
-  const auto give_up = monotonic_now() + babble_limit;
+  std::optional<TimePoint> give_up;
   for (;;) {
     silence_.begin(last_byte_ + silence(serial_));
     const auto heard = absorb();
     if (heard.native_error != 0) return heard.native_error;
     if (heard.count == 0) return 0;
-    if (monotonic_now() < give_up) continue;
+    const auto now = monotonic_now();
+    if (!give_up) give_up = now + babble_limit;
+    if (now < *give_up) continue;
     silence_.abandon();
     return 0;
   }
@@ -223,32 +236,29 @@ bool WireSession::is_own_echo(const Exchange& exchange, const Frame& damaged) {
 
 WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const ExchangeResult& result) {
   const auto cut_from = result.request_end + exchange.turnaround_max;
+  if (slept_ && request_end_ + *slept_ + shortly < cut_from && port_.comes_within(shortly))
+    return Wait::bytes;
   const auto wait = wait_until(reply_deadline_, &cut_from);
   // One that began during the sleep is heard to its end.
   return wait == Wait::quit && port_.waiting() > 0 ? Wait::bytes : wait;
 }
 
 /// No byte of the reply is needed before it is complete, and each piece of it would wake this thread. Only
-/// for reads: a write may take a drive a thousand times as long as the one before.
-void WireSession::sleep_before_reply(const Exchange& exchange, const ExchangeResult& result) {
-  slept_ = false;
-  reply_awaited_ = true;
-  if (!is_paced(exchange)) return;
-  const auto quiet = pace_.quiet(exchange.request.node, wire_time(serial_, reply_size(exchange.request)));
-  const auto until = reply_latency_.asked_for(std::min(result.request_end + quiet, reply_deadline_));
-  const auto begin = monotonic_now();
-  if (until - begin < shortest_sleep) return;
-  const auto cut_from = result.request_end + exchange.turnaround_max;
+/// for reads: a write may take a drive a thousand times as long as the one before. `quiet`: from the end of
+/// the request.
+void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
+  const auto until = reply_latency_.asked_for(std::min(request_end_ + quiet, reply_deadline_));
+  if (until - sent_ < shortest_sleep) return;
+  const auto cut_from = request_end_ + exchange.turnaround_max;
   // Before that nothing ends it, and a sleep that nothing ends costs less.
-  block_until(std::min({until, cut_from, begin + longest_deaf}));
+  block_until(std::min({until, cut_from, sent_ + longest_deaf}));
   auto woken = touch();
   if (woken < until) {
     wait_until(until, &cut_from, false);
     woken = monotonic_now();
   }
   if (woken >= until) reply_latency_.note(until, woken);
-  slept_ = true;
-  reply_awaited_ = false;
+  slept_ = woken - request_end_;
 }
 
 /// For the rest of a reply that has begun: nothing but its deadline ends this.
@@ -269,7 +279,6 @@ WireSession::Wait WireSession::wait_for_more() {
 /// over. After damage the node's replies are left to libmodbus for a while. True: the exchange has ended.
 bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result) {
   TimePoint first_byte{};
-  const bool awaited = std::exchange(reply_awaited_, true);
   constexpr std::size_t head = 3;
   std::array<std::uint8_t, Frame::capacity> buffer;
   std::size_t size = reply_size(exchange.request);
@@ -290,11 +299,10 @@ bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result
       size = std::min(reply_size(bytes), buffer.size());
       if (size == 0) return end_damaged(result, Frame(bytes), first_byte);
       if (count < size) break;
-      auto reply = decode(exchange.request, bytes.first(size));
+      const auto reply = reply_in(exchange, bytes.first(size));
       if (reply.kind == ReplyKind::corrupt) return end_damaged(result, Frame(bytes), first_byte);
       if (reply.kind != ReplyKind::foreign) {
-        if (first) reply_awaited_ = awaited;
-        end_replied(result, std::move(reply), Frame(bytes.first(size)), first_byte);
+        end_replied(result, reply, Frame(bytes.first(size)), first_byte);
         return true;
       }
       ++result.foreign_frames;
@@ -308,7 +316,7 @@ bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result
 }
 
 void WireSession::end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte) {
-  result.reply = std::move(reply);
+  result.reply = reply;
   result.reply_frame = frame;
   result.reply_begin = begin_of(frame, first_byte);
   end(result, ExchangeStatus::replied);
@@ -320,7 +328,7 @@ void WireSession::note_pace(const Exchange& exchange, const ExchangeResult& resu
     pace_.forget(node);
   else if (is_paced(exchange) && result.reply.kind == ReplyKind::match)
     pace_.complete(node, wire_time(serial_, result.reply_frame.size()), result.reply_end - result.request_end,
-                   reply_awaited_);
+                   slept_);
 }
 
 /// When a frame began whose last byte has just come: what arrived during the sleep was seen only after it.
@@ -367,23 +375,25 @@ bool WireSession::end_damaged(ExchangeResult& result, const Frame& bytes, TimePo
 ExchangeResult WireSession::run(const Exchange& exchange) {
   ExchangeResult result{.foreign_frames = std::exchange(stray_frames_, 0)};
   damaged_ = false;
+  slept_.reset();
+  // Before the request, where there is time: a terminal carries its bytes on when this thread sleeps again.
+  const auto request_time = wire_time(serial_, exchange.frame.size());
+  const auto quiet = is_paced(exchange) ? pace_.quiet(exchange.request.node,
+                                                      wire_time(serial_, reply_size(exchange.request)))
+                                        : Duration::zero();
   result.request_begin = silence_.finish();
   if (const int lost = port_.send(exchange.frame); lost != 0) {
     end(result, ExchangeStatus::io_error, lost);
     return result;
   }
-  result.request_end = monotonic_now() + wire_time(serial_, exchange.frame.size());
-  request_end_ = last_byte_ = result.request_end;
+  sent_ = monotonic_now();
+  request_end_ = last_byte_ = result.request_end = sent_ + request_time;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
   if (echo_ && !pass_echo(exchange, result)) {
     note_pace(exchange, result);
     return result;
   }
-  sleep_before_reply(exchange, result);
-  if (slept_ && take_expected(exchange, result)) {
-    note_pace(exchange, result);
-    return result;
-  }
+  sleep_before_reply(exchange, quiet);
   for (;;) {
     const auto wait = wait_for_reply(exchange, result);
     if (wait == Wait::bytes) {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "buses/modbus_rtu/line.hpp"
@@ -57,7 +58,7 @@ class WireSession {
 
   Wait wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes = true);
   Wait wait_for_reply(const Exchange& exchange, const ExchangeResult& result);
-  void sleep_before_reply(const Exchange& exchange, const ExchangeResult& result);
+  void sleep_before_reply(const Exchange& exchange, Duration quiet);
   bool take_expected(const Exchange& exchange, ExchangeResult& result);
   void end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte);
   bool end_damaged(ExchangeResult& result, const Frame& bytes, TimePoint first_byte);
@@ -80,14 +81,15 @@ class WireSession {
   Wakeup& wakeup_;
   std::atomic<TimePoint::rep>& progress_;
   TimePoint last_byte_;       ///< end of the last character on the wire, sent or received
-  TimePoint request_end_;     ///< when the last request has left the adapter
+  TimePoint sent_{};          ///< when the last request was handed to the port
+  TimePoint request_end_;     ///< when it has left the adapter
   TimePoint reply_deadline_;  ///< of the exchange under way
   PunctualWait silence_;      ///< before a request
   WakeLatency reply_latency_;
   ReplyPace pace_;
-  bool slept_ = false;          ///< before the reply, as its node's pace is known
-  bool reply_awaited_ = false;  ///< it was not complete when that sleep ended
-  bool damaged_ = false;        ///< unsound bytes came during the exchange under way
+  /// Before the reply, as its node's pace is known: until so long after the end of the request.
+  std::optional<Duration> slept_;
+  bool damaged_ = false;  ///< unsound bytes came during the exchange under way
   bool echo_known_ = false;
   bool echo_ = false;
   int stray_frames_ = 0;  ///< bursts that nobody asked for, not yet reported
