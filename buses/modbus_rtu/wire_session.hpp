@@ -74,6 +74,13 @@ class WireSession {
   void end(ExchangeResult& result, ExchangeStatus status, int native_error = 0);
   TimePoint touch();
 
+  /// A line that never falls silent (a stuck transmitter, a second master) must not keep a stop from being
+  /// tried.
+  static constexpr Duration babble_limit = std::chrono::milliseconds(250);
+  /// Within this an adapter has delivered its own echo: 16 ms latency of an FTDI adapter, hubs and a busy
+  /// host.
+  static constexpr Duration echo_latency = std::chrono::milliseconds(100);
+
   SerialPort port_;
   const LineSettings& line_;
   SerialSettings serial_;     ///< as the port is set: of the last bytes, and of the next
