@@ -191,8 +191,8 @@ def stops(build, given, rows):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--seconds", type=float, default=5, help="of each measurement")
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--seconds", type=float, default=3, help="of each measurement")
     parser.add_argument("--nodes", type=int, default=16, help="4 to 127")
     parser.add_argument("--baud", type=int, nargs="*", default=[115200, 19200])
     parser.add_argument("--stops", type=int, default=1000, help="of each kind")
