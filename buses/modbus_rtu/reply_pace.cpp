@@ -24,6 +24,7 @@ void ReplyPace::complete(std::uint8_t node, Duration on_wire, Duration took, std
   if (++pace.lately < remembered) return;
   pace.soonest = std::exchange(pace.soonest_lately, Duration::max());
   pace.lately = 0;
+  pace.to_measure = 1;
 }
 
 }  // namespace axisd::modbus_rtu

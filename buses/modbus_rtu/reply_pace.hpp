@@ -22,7 +22,9 @@ class ReplyPace {
   static constexpr Duration prompt = std::chrono::microseconds(10);
   /// after so many of them in a row one is measured without a sleep.
   static constexpr int suspicious = 4;
-  /// Replies after which a node that has become slower is taken for that.
+  /// Replies after which a node that has become slower is taken for that, and one is measured in any case:
+  /// where it takes long from the end of a sleep to reading what lies ready, that looks like a reply that was
+  /// waited for.
   static constexpr int remembered = 64;
 
   /// From the end of the request until about when its reply, `on_wire` long, can be complete; zero where too

@@ -247,14 +247,15 @@ std::size_t SerialPort::waiting() const {
 }
 
 bool SerialPort::empty() const {
-  int count = 0;
-  return ioctl(descriptor_, FIONREAD, &count) == 0 && count == 0;
+  // Not FIONREAD: it does not count what the kernel is about to hand over.
+  pollfd watched{.fd = descriptor_, .events = POLLIN, .revents = 0};
+  return poll(&watched, 1, 0) == 0;
 }
 
 bool SerialPort::comes_within(Duration limit) const {
   const timespec timeout = to_timespec(limit);
   pollfd watched{.fd = descriptor_, .events = POLLIN, .revents = 0};
-  return ppoll(&watched, 1, &timeout, nullptr) == 1 && watched.revents == POLLIN;
+  return ppoll(&watched, 1, &timeout, nullptr) == 1 && (watched.revents & POLLIN) != 0;
 }
 
 std::expected<std::size_t, int> SerialPort::read_available(std::span<std::uint8_t> buffer) {

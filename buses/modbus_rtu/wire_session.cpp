@@ -107,7 +107,7 @@ int WireSession::keep_silence() {
     if (heard.native_error != 0) return heard.native_error;
     if (heard.count == 0) return 0;
     const auto now = monotonic_now();
-    if (!give_up) give_up = now + babble_limit;
+    if (!give_up) give_up = now - silence(serial_) + babble_limit;
     if (now < *give_up) continue;
     silence_.abandon();
     return 0;

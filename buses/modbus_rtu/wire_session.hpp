@@ -88,7 +88,7 @@ class WireSession {
   Wakeup& wakeup_;
   std::atomic<TimePoint::rep>& progress_;
   TimePoint last_byte_;       ///< end of the last character on the wire, sent or received
-  TimePoint sent_{};          ///< when the last request was handed to the port
+  TimePoint sent_{};          ///< when the last request was handed to the port, or its echo had come
   TimePoint request_end_;     ///< when it has left the adapter
   TimePoint reply_deadline_;  ///< of the exchange under way
   PunctualWait silence_;      ///< before a request
@@ -96,7 +96,8 @@ class WireSession {
   ReplyPace pace_;
   /// Before the reply, as its node's pace is known: until so long after the end of the request.
   std::optional<Duration> slept_;
-  bool damaged_ = false;  ///< unsound bytes came during the exchange under way
+  bool expected_ = false;  ///< the reply, any moment: nothing else need be looked at for a while
+  bool damaged_ = false;   ///< unsound bytes came during the exchange under way
   bool echo_known_ = false;
   bool echo_ = false;
   int stray_frames_ = 0;  ///< bursts that nobody asked for, not yet reported

@@ -86,8 +86,7 @@ bool WireSession::is_own_echo(const Exchange& exchange, const Frame& damaged) {
 
 WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const ExchangeResult& result) {
   const auto cut_from = result.request_end + exchange.turnaround_max;
-  if (slept_ && request_end_ + *slept_ + shortly < cut_from && port_.comes_within(shortly))
-    return Wait::bytes;
+  if (std::exchange(expected_, false) && port_.comes_within(shortly)) return Wait::bytes;
   const auto wait = wait_until(reply_deadline_, &cut_from);
   // One that began during the sleep is heard to its end.
   return wait == Wait::quit && port_.waiting() > 0 ? Wait::bytes : wait;
@@ -97,6 +96,7 @@ WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const Ex
 /// for reads: a write may take a drive a thousand times as long as the one before. `quiet`: from the end of
 /// the request.
 void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
+  if (quiet == Duration::zero()) return;
   const auto until = reply_latency_.asked_for(std::min(request_end_ + quiet, reply_deadline_));
   if (until - sent_ < shortest_sleep) return;
   const auto cut_from = request_end_ + exchange.turnaround_max;
@@ -109,6 +109,7 @@ void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
   }
   if (woken >= until) reply_latency_.note(until, woken);
   slept_ = woken - request_end_;
+  expected_ = woken + shortly < cut_from;
 }
 
 /// For the rest of a reply that has begun: nothing but its deadline ends this.
@@ -226,6 +227,7 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
   ExchangeResult result{.foreign_frames = std::exchange(stray_frames_, 0)};
   damaged_ = false;
   slept_.reset();
+  expected_ = false;
   // Before the request, where there is time: a terminal carries its bytes on when this thread sleeps again.
   const auto request_time = wire_time(serial_, exchange.frame.size());
   const auto quiet = is_paced(exchange) ? pace_.quiet(exchange.request.node,
@@ -239,9 +241,12 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
   sent_ = monotonic_now();
   request_end_ = last_byte_ = result.request_end = sent_ + request_time;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
-  if (echo_ && !pass_echo(exchange, result)) {
-    note_pace(exchange, result);
-    return result;
+  if (echo_) {
+    if (!pass_echo(exchange, result)) {
+      note_pace(exchange, result);
+      return result;
+    }
+    sent_ = monotonic_now();
   }
   sleep_before_reply(exchange, quiet);
   for (;;) {

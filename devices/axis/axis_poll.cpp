@@ -18,8 +18,9 @@ constexpr auto continuity_latest_at_rest = milliseconds(850);
 constexpr auto continuity_soonest = milliseconds(700);
 /// However long others have kept the line.
 constexpr auto continuity_soonest_of_all = milliseconds(200);
-/// So long after its reply, at most, a bus tells of a reading that it repeats.
-constexpr auto told_late = milliseconds(110);
+/// So long after its reply, at most, a bus tells of a reading that it repeats: others are carried out behind
+/// it, and the last of them may have no answer.
+constexpr auto told_late = milliseconds(140);
 /// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
 /// trusted meanwhile.
 constexpr auto continuity_longest = milliseconds(2500);

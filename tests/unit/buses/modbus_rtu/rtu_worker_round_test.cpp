@@ -171,10 +171,14 @@ TEST(RtuWorkerRound, TakenBackBeforeItsFirstByteNothingIsSent) {
 /// Where the line is silent for long, the core finds the second one in the slot; how long the first takes to
 /// be told off is the machine's.
 TEST(RtuWorkerRound, TakenBackInTheSilenceGivesTheResultsSoFar) {
-  const ScriptedNode node(answering());
+  const Round round;
+  const auto request = wire_time(line_at(slow), round.exchanges.front().frame.size());
+  const ScriptedNode node([&](ScriptedNode& self, const Bytes& asked) {
+    if (self.pause(request))
+      self.say(proper_reply(asked));  // not before the request can have left the adapter
+  });
   WorkerBench bench(line_at(slow, node.path()));
   bench.start_and_open();
-  const Round round;
   Sent sent;
   bool in_silence = false;
   for (int attempt = 0; attempt < 5 && !in_silence; ++attempt) {
@@ -182,7 +186,6 @@ TEST(RtuWorkerRound, TakenBackInTheSilenceGivesTheResultsSoFar) {
     const auto requests = node.seen().size();
     bench.worker->arm(round.exchanges.front());
     ASSERT_TRUE(bench.run_until([&] { return node.seen().size() > requests; }));
-    const auto request = wire_time(line_at(slow), round.exchanges.front().frame.size());
     const auto until = monotonic_now() + request + silence(line_at(slow)) / 4;
     ASSERT_TRUE(bench.run_until([&] { return monotonic_now() >= until; }));
     const auto results = bench.worker->revoke();

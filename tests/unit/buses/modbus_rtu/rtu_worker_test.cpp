@@ -150,6 +150,23 @@ TEST(RtuWorker, EchoThatTheProbeMissedIsLearntFromARead) {
   EXPECT_EQ(node.probes(), 2);
 }
 
+TEST(RtuWorker, EchoThatTheProbeMissedIsLearntWhereARequestTakesLong) {
+  const auto block = exchange_of({.node = 1,
+                                  .function = Function::write_multiple_registers,
+                                  .address = 0x20,
+                                  .values = {10, 100, 100, 500, 0, 1000}});
+  for (const auto& first : {read_of(0x0020, 2), block}) {
+    const ScriptedNode node([&](ScriptedNode& self, const Bytes& request) {
+      self.say(request);
+      self.say(proper_reply(request));
+    });
+    WorkerBench bench(line_at(9600, node.path()));
+    bench.start_and_open();
+    EXPECT_EQ(bench.run(first).reply.kind, ReplyKind::match) << hex(first.frame);
+    EXPECT_EQ(bench.run(block).reply.kind, ReplyKind::match);
+  }
+}
+
 TEST(RtuWorker, DamagedRepliesAreCorruptAndHarmNoLaterOne) {
   std::atomic<int> requests = 0;
   const ScriptedNode node([&](ScriptedNode& self, const Bytes& request) {
