@@ -22,7 +22,6 @@ class NodeTable {
     const auto place = places_.at(node);
     return place == 0 ? nullptr : &entries_.at(place - 1U).second;
   }
-  [[nodiscard]] T* find(std::uint8_t node) { return const_cast<T*>(std::as_const(*this).find(node)); }
   /// Throws std::out_of_range where there is none.
   [[nodiscard]] const T& at(std::uint8_t node) const {
     return entries_.at(places_.at(node) - std::size_t{1}).second;

@@ -205,13 +205,8 @@ void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) 
 /// exchange, so that no flood of stops keeps the others off the line. True: time has passed, which may have
 /// brought bytes.
 bool RtuWorker::yield_to_stop() {
-  const auto given = stop_notice_->given();
-  const auto until = given + longest_yield;
-  if (yielded_ || given == notice_passed_ || stop_armed_.load()) return false;
-  if (monotonic_now() >= until) {
-    notice_passed_ = given;
-    return false;
-  }
+  const auto until = stop_notice_->given() + longest_yield;
+  if (yielded_ || stop_armed_.load() || monotonic_now() >= until) return false;
   yielded_ = true;
   for (auto now = monotonic_now(); now < until && !stop_armed_.load() && !quitting(); now = monotonic_now()) {
     idle_.store(true);

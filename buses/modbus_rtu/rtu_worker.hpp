@@ -86,7 +86,6 @@ class RtuWorker final : public Line {
   std::atomic<bool> stop_armed_ = false;  ///< what is in the slot, or was last, is a stop
   std::shared_ptr<StopNotice> stop_notice_ = std::make_shared<StopNotice>();
   bool yielded_ = false;            ///< of the worker: since the last exchange it has waited for a stop
-  TimePoint notice_passed_{};       ///< of the worker: a notice that nobody waits for any more
   std::atomic<bool> idle_ = false;  ///< the worker sleeps (or is about to) and must be woken for the slot
   Wakeup wakeup_;
   std::atomic<TimePoint::rep> progress_;

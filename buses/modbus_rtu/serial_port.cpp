@@ -241,11 +241,6 @@ Received SerialPort::receive(std::uint8_t node, Duration timeout) {
   }
 }
 
-std::size_t SerialPort::waiting() const {
-  int count = 0;
-  return ioctl(descriptor_, FIONREAD, &count) == 0 && count > 0 ? static_cast<std::size_t>(count) : 0;
-}
-
 bool SerialPort::empty() const {
   // Not FIONREAD: it does not count what the kernel is about to hand over.
   pollfd watched{.fd = descriptor_, .events = POLLIN, .revents = 0};

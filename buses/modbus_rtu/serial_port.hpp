@@ -54,8 +54,6 @@ class SerialPort {
   int send(const Frame& request);
   /// Lets libmodbus read one frame. `timeout` counts until the frame's last byte.
   Received receive(std::uint8_t node, Duration timeout);
-  /// Bytes that lie ready; 0 also where the port cannot tell.
-  [[nodiscard]] std::size_t waiting() const;
   /// Nothing lies ready; false where the port cannot tell.
   [[nodiscard]] bool empty() const;
   /// Something lies ready, or comes before `limit` has passed; false also where the port fails.

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <optional>
 #include <utility>
 
 namespace axisd::modbus_rtu {
@@ -100,15 +99,13 @@ WireSession::Bytes WireSession::absorb() {
 }
 
 int WireSession::keep_silence() {
-  std::optional<TimePoint> give_up;
+  const auto give_up = monotonic_now() + babble_limit;
   for (;;) {
     silence_.begin(last_byte_ + silence(serial_));
     const auto heard = absorb();
     if (heard.native_error != 0) return heard.native_error;
     if (heard.count == 0) return 0;
-    const auto now = monotonic_now();
-    if (!give_up) give_up = now - silence(serial_) + babble_limit;
-    if (now < *give_up) continue;
+    if (monotonic_now() < give_up) continue;
     silence_.abandon();
     return 0;
   }

@@ -58,7 +58,7 @@ class WireSession {
 
   Wait wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes = true);
   Wait wait_for_reply(const Exchange& exchange, const ExchangeResult& result);
-  void sleep_before_reply(const Exchange& exchange, Duration quiet);
+  void sleep_before_reply(const Exchange& exchange, Duration quiet, TimePoint now);
   bool take_expected(const Exchange& exchange, ExchangeResult& result);
   void end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte);
   bool end_damaged(ExchangeResult& result, const Frame& bytes, TimePoint first_byte);
@@ -88,8 +88,7 @@ class WireSession {
   Wakeup& wakeup_;
   std::atomic<TimePoint::rep>& progress_;
   TimePoint last_byte_;       ///< end of the last character on the wire, sent or received
-  TimePoint sent_{};          ///< when the last request was handed to the port, or its echo had come
-  TimePoint request_end_;     ///< when it has left the adapter
+  TimePoint request_end_;     ///< when the last request has left the adapter
   TimePoint reply_deadline_;  ///< of the exchange under way
   PunctualWait silence_;      ///< before a request
   WakeLatency reply_latency_;

@@ -89,19 +89,19 @@ WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const Ex
   if (std::exchange(expected_, false) && port_.comes_within(shortly)) return Wait::bytes;
   const auto wait = wait_until(reply_deadline_, &cut_from);
   // One that began during the sleep is heard to its end.
-  return wait == Wait::quit && port_.waiting() > 0 ? Wait::bytes : wait;
+  return wait == Wait::quit && !port_.empty() ? Wait::bytes : wait;
 }
 
 /// No byte of the reply is needed before it is complete, and each piece of it would wake this thread. Only
 /// for reads: a write may take a drive a thousand times as long as the one before. `quiet`: from the end of
 /// the request.
-void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
+void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet, TimePoint now) {
   if (quiet == Duration::zero()) return;
   const auto until = reply_latency_.asked_for(std::min(request_end_ + quiet, reply_deadline_));
-  if (until - sent_ < shortest_sleep) return;
+  if (until - now < shortest_sleep) return;
   const auto cut_from = request_end_ + exchange.turnaround_max;
   // Before that nothing ends it, and a sleep that nothing ends costs less.
-  block_until(std::min({until, cut_from, sent_ + longest_deaf}));
+  block_until(std::min({until, cut_from, now + longest_deaf}));
   auto woken = touch();
   if (woken < until) {
     wait_until(until, &cut_from, false);
@@ -238,17 +238,17 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
     end(result, ExchangeStatus::io_error, lost);
     return result;
   }
-  sent_ = monotonic_now();
-  request_end_ = last_byte_ = result.request_end = sent_ + request_time;
+  auto now = monotonic_now();
+  request_end_ = last_byte_ = result.request_end = now + request_time;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
   if (echo_) {
     if (!pass_echo(exchange, result)) {
       note_pace(exchange, result);
       return result;
     }
-    sent_ = monotonic_now();
+    now = monotonic_now();
   }
-  sleep_before_reply(exchange, quiet);
+  sleep_before_reply(exchange, quiet, now);
   for (;;) {
     const auto wait = wait_for_reply(exchange, result);
     if (wait == Wait::bytes) {
