@@ -51,7 +51,7 @@ TimePoint WireSession::touch() {
 /// the wait from that moment on.
 WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes) {
   for (;;) {
-    const auto now = touch();
+    const auto now = looked_ = touch();
     if (wakeup_.quit.load(std::memory_order_acquire)) return Wait::quit;
     const bool cut = cut_from != nullptr && wakeup_.cut.load(std::memory_order_acquire);
     const auto end = cut ? std::min(until, *cut_from) : until;

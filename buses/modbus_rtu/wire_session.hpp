@@ -58,7 +58,8 @@ class WireSession {
 
   Wait wait_until(TimePoint until, const TimePoint* cut_from, bool for_bytes = true);
   Wait wait_for_reply(const Exchange& exchange, const ExchangeResult& result);
-  void sleep_before_reply(const Exchange& exchange, Duration quiet, TimePoint now);
+  void sleep_before_reply(const Exchange& exchange, Duration quiet);
+  void take_reply(const Exchange& exchange, ExchangeResult& result);
   bool take_expected(const Exchange& exchange, ExchangeResult& result);
   void end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte);
   bool end_damaged(ExchangeResult& result, const Frame& bytes, TimePoint first_byte);
@@ -90,6 +91,7 @@ class WireSession {
   TimePoint last_byte_;       ///< end of the last character on the wire, sent or received
   TimePoint request_end_;     ///< when the last request has left the adapter
   TimePoint reply_deadline_;  ///< of the exchange under way
+  TimePoint looked_;          ///< when the bytes were waited for that were read last; far off: they were not
   PunctualWait silence_;      ///< before a request
   WakeLatency reply_latency_;
   ReplyPace pace_;

@@ -86,17 +86,21 @@ bool WireSession::is_own_echo(const Exchange& exchange, const Frame& damaged) {
 
 WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const ExchangeResult& result) {
   const auto cut_from = result.request_end + exchange.turnaround_max;
-  if (std::exchange(expected_, false) && port_.comes_within(shortly)) return Wait::bytes;
+  if (std::exchange(expected_, false)) {
+    looked_ = monotonic_now();
+    if (port_.comes_within(shortly)) return Wait::bytes;
+  }
   const auto wait = wait_until(reply_deadline_, &cut_from);
-  // One that began during the sleep is heard to its end.
+  // One that has begun is heard to its end.
   return wait == Wait::quit && !port_.empty() ? Wait::bytes : wait;
 }
 
 /// No byte of the reply is needed before it is complete, and each piece of it would wake this thread. Only
 /// for reads: a write may take a drive a thousand times as long as the one before. `quiet`: from the end of
 /// the request.
-void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet, TimePoint now) {
+void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
   if (quiet == Duration::zero()) return;
+  const auto now = monotonic_now();
   const auto until = reply_latency_.asked_for(std::min(request_end_ + quiet, reply_deadline_));
   if (until - now < shortest_sleep) return;
   const auto cut_from = request_end_ + exchange.turnaround_max;
@@ -115,7 +119,8 @@ void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet, T
 /// For the rest of a reply that has begun: nothing but its deadline ends this.
 WireSession::Wait WireSession::wait_for_more() {
   for (;;) {
-    const auto left = reply_deadline_ - monotonic_now();
+    looked_ = monotonic_now();
+    const auto left = reply_deadline_ - looked_;
     const auto timeout = to_timespec(left);
     pollfd watched{.fd = port_.descriptor(), .events = POLLIN, .revents = 0};
     if (ppoll(&watched, 1, &timeout, nullptr) < 0 && errno != EINTR) return Wait::failed;
@@ -142,7 +147,7 @@ bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result
       end(result, ExchangeStatus::io_error, got ? EIO : got.error());
       return true;
     }
-    if (*got > 0) last_byte_ = touch();
+    if (*got > 0) last_byte_ = reply_latency_.came_by(looked_, touch());
     if (count == 0) first_byte = last_byte_;
     count += *got;
     while (count >= head) {
@@ -223,6 +228,23 @@ bool WireSession::end_damaged(ExchangeResult& result, const Frame& bytes, TimePo
   return true;
 }
 
+/// Waits for the reply, and for what else ends the exchange.
+void WireSession::take_reply(const Exchange& exchange, ExchangeResult& result) {
+  looked_ = TimePoint::max();
+  if (slept_ && take_expected(exchange, result)) return;  // of a long one, most lies ready
+  for (;;) {
+    const auto wait = wait_for_reply(exchange, result);
+    if (wait == Wait::bytes) {
+      if (slept_ ? take_expected(exchange, result) : take_frame(exchange, result)) return;
+      continue;
+    }
+    last_byte_ = std::max(last_byte_, request_end_);
+    if (wait == Wait::failed) return end(result, ExchangeStatus::io_error, EIO);
+    const auto silent = wait == Wait::timeout ? ExchangeStatus::timeout : ExchangeStatus::cut;
+    return end(result, damaged_ ? ExchangeStatus::corrupt : silent);
+  }
+}
+
 ExchangeResult WireSession::run(const Exchange& exchange) {
   ExchangeResult result{.foreign_frames = std::exchange(stray_frames_, 0)};
   damaged_ = false;
@@ -238,34 +260,14 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
     end(result, ExchangeStatus::io_error, lost);
     return result;
   }
-  auto now = monotonic_now();
-  request_end_ = last_byte_ = result.request_end = now + request_time;
+  request_end_ = last_byte_ = result.request_end = monotonic_now() + request_time;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
-  if (echo_) {
-    if (!pass_echo(exchange, result)) {
-      note_pace(exchange, result);
-      return result;
-    }
-    now = monotonic_now();
+  if (!echo_ || pass_echo(exchange, result)) {
+    sleep_before_reply(exchange, quiet);
+    take_reply(exchange, result);
   }
-  sleep_before_reply(exchange, quiet, now);
-  for (;;) {
-    const auto wait = wait_for_reply(exchange, result);
-    if (wait == Wait::bytes) {
-      if (!(slept_ ? take_expected(exchange, result) : take_frame(exchange, result))) continue;
-      note_pace(exchange, result);
-      return result;
-    }
-    last_byte_ = std::max(last_byte_, request_end_);
-    if (wait == Wait::failed) {
-      end(result, ExchangeStatus::io_error, EIO);
-    } else {
-      const auto silent = wait == Wait::timeout ? ExchangeStatus::timeout : ExchangeStatus::cut;
-      end(result, damaged_ ? ExchangeStatus::corrupt : silent);
-    }
-    note_pace(exchange, result);
-    return result;
-  }
+  note_pace(exchange, result);
+  return result;
 }
 
 }  // namespace axisd::modbus_rtu

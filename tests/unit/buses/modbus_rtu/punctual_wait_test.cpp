@@ -49,6 +49,21 @@ TEST(WakeLatency, AWaitThatEndedTooSoonWasNotLate) {
   EXPECT_EQ(latency.asked_for(when), when);
 }
 
+TEST(WakeLatency, WhatWokeAThreadCameBeforeItWasSeen) {
+  WakeLatency latency;
+  EXPECT_EQ(latency.came_by(when - 1ms, when), when) << "nothing is known yet";
+  for (int i = 0; i < WakeLatency::remembered; ++i) wait(latency, 3us);
+  EXPECT_EQ(latency.came_by(when - 1ms, when), when - 3us);
+  EXPECT_EQ(latency.came_by(when - 3us, when), when) << "it did not sleep: it may have come just now";
+  EXPECT_EQ(latency.came_by(TimePoint::max(), when), when) << "it was not waited for";
+}
+
+TEST(WakeLatency, ShortensNoSilenceByMoreThanNobodyNotices) {
+  WakeLatency latency;
+  for (int i = 0; i < WakeLatency::remembered; ++i) wait(latency, 90us);
+  EXPECT_EQ(latency.came_by(when - 1ms, when), when - WakeLatency::surely);
+}
+
 TEST(PunctualWait, NeverEndsTooSoon) {
   PunctualWait wait;
   for (int i = 0; i < 3 * WakeLatency::remembered; ++i) {
