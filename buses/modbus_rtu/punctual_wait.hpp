@@ -8,7 +8,7 @@
 namespace axisd::modbus_rtu {
 
 /// A wait for the moment from which on something may begin, with work between waking and beginning: it is
-/// woken so much sooner as both have taken at the least. Never ends too soon. Thread: the line's worker.
+/// woken so much sooner as both usually take. Never ends too soon. Thread: the line's worker.
 class PunctualWait {
  public:
   /// Blocks until shortly before `when`.
@@ -21,7 +21,7 @@ class PunctualWait {
  private:
   TimePoint when_{};
   std::optional<TimePoint> asked_;  ///< to be woken
-  WakeLatency latency_;
+  UsualLatency latency_;
 };
 
 }  // namespace axisd::modbus_rtu

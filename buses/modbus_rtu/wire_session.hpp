@@ -93,7 +93,7 @@ class WireSession {
   TimePoint reply_deadline_;  ///< of the exchange under way
   TimePoint looked_;          ///< when the bytes were waited for that were read last; far off: they were not
   PunctualWait silence_;      ///< before a request
-  WakeLatency reply_latency_;
+  LeastLatency reply_latency_;
   ReplyPace pace_;
   /// Before the reply, as its node's pace is known: until so long after the end of the request.
   std::optional<Duration> slept_;

@@ -9,11 +9,43 @@ using namespace std::chrono_literals;
 
 constexpr TimePoint when{10s};
 
-void wait(WakeLatency& latency, Duration late) { latency.note(when, when + late); }
+void wait(LeastLatency& latency, Duration late) { latency.note(when, when + late); }
 
-TEST(WakeLatency, AsksForNothingSoonerUntilItIsKnown) {
-  WakeLatency latency;
-  for (int i = 1; i < WakeLatency::remembered; ++i) {
+TEST(UsualLatency, HalfOfTheWaitsEndLater) {
+  UsualLatency latency;
+  EXPECT_EQ(latency.asked_for(when), when);
+  int too_soon = 0;
+  constexpr int waits = 1000, begun = 200, counted = waits - begun;
+  for (int i = 0; i < waits; ++i) {
+    const auto asked = latency.asked_for(when);
+    const auto woken = asked + 20us + (i * 7919 % 100) * 100ns + 50ns;  // 20 to 30 us late
+    if (i >= begun && woken < when) ++too_soon;
+    latency.note(asked, woken);
+  }
+  EXPECT_NEAR(too_soon, 0.5 * counted, 0.05 * counted);
+}
+
+TEST(UsualLatency, OneLateWaitIsNotUsual) {
+  UsualLatency latency;
+  latency.note(when, when + 5ms);
+  EXPECT_EQ(latency.asked_for(when), when - UsualLatency::step);
+}
+
+TEST(UsualLatency, NeverAsksForMuchSooner) {
+  UsualLatency latency;
+  for (int i = 0; i < 1000; ++i) latency.note(when, when + 5ms);
+  EXPECT_EQ(latency.asked_for(when), when - longest_latency);
+}
+
+TEST(UsualLatency, AWaitThatEndedTooSoonWasNotLate) {
+  UsualLatency latency;
+  latency.note(when, when - 1us);
+  EXPECT_EQ(latency.asked_for(when), when);
+}
+
+TEST(LeastLatency, AsksForNothingSoonerUntilItIsKnown) {
+  LeastLatency latency;
+  for (int i = 1; i < LeastLatency::remembered; ++i) {
     EXPECT_EQ(latency.asked_for(when), when);
     wait(latency, 40us);
   }
@@ -21,52 +53,52 @@ TEST(WakeLatency, AsksForNothingSoonerUntilItIsKnown) {
   EXPECT_EQ(latency.asked_for(when), when - 40us);
 }
 
-TEST(WakeLatency, KeepsToTheLeastAtOnce) {
-  WakeLatency latency;
-  for (int i = 0; i < WakeLatency::remembered; ++i) wait(latency, 40us);
+TEST(LeastLatency, KeepsToTheLeastAtOnce) {
+  LeastLatency latency;
+  for (int i = 0; i < LeastLatency::remembered; ++i) wait(latency, 40us);
   wait(latency, 7us);
   EXPECT_EQ(latency.asked_for(when), when - 7us);
 }
 
-TEST(WakeLatency, FollowsAMachineThatBecameSlower) {
-  WakeLatency latency;
-  for (int i = 0; i < WakeLatency::remembered; ++i) wait(latency, 10us);
-  for (int i = 1; i < WakeLatency::remembered; ++i) wait(latency, 60us);
+TEST(LeastLatency, FollowsAMachineThatBecameSlower) {
+  LeastLatency latency;
+  for (int i = 0; i < LeastLatency::remembered; ++i) wait(latency, 10us);
+  for (int i = 1; i < LeastLatency::remembered; ++i) wait(latency, 60us);
   EXPECT_EQ(latency.asked_for(when), when - 10us) << "not slower for long enough yet";
   wait(latency, 60us);
   EXPECT_EQ(latency.asked_for(when), when - 60us);
 }
 
-TEST(WakeLatency, NeverAsksForMuchSooner) {
-  WakeLatency latency;
-  for (int i = 0; i < 2 * WakeLatency::remembered; ++i) wait(latency, 5ms);
-  EXPECT_EQ(latency.asked_for(when), when - WakeLatency::most);
+TEST(LeastLatency, NeverAsksForMuchSooner) {
+  LeastLatency latency;
+  for (int i = 0; i < 2 * LeastLatency::remembered; ++i) wait(latency, 5ms);
+  EXPECT_EQ(latency.asked_for(when), when - longest_latency);
 }
 
-TEST(WakeLatency, AWaitThatEndedTooSoonWasNotLate) {
-  WakeLatency latency;
-  for (int i = 0; i < WakeLatency::remembered; ++i) wait(latency, -1us);
+TEST(LeastLatency, AWaitThatEndedTooSoonWasNotLate) {
+  LeastLatency latency;
+  for (int i = 0; i < LeastLatency::remembered; ++i) wait(latency, -1us);
   EXPECT_EQ(latency.asked_for(when), when);
 }
 
-TEST(WakeLatency, WhatWokeAThreadCameBeforeItWasSeen) {
-  WakeLatency latency;
+TEST(LeastLatency, WhatWokeAThreadCameBeforeItWasSeen) {
+  LeastLatency latency;
   EXPECT_EQ(latency.came_by(when - 1ms, when), when) << "nothing is known yet";
-  for (int i = 0; i < WakeLatency::remembered; ++i) wait(latency, 3us);
+  for (int i = 0; i < LeastLatency::remembered; ++i) wait(latency, 3us);
   EXPECT_EQ(latency.came_by(when - 1ms, when), when - 3us);
   EXPECT_EQ(latency.came_by(when - 3us, when), when) << "it did not sleep: it may have come just now";
   EXPECT_EQ(latency.came_by(TimePoint::max(), when), when) << "it was not waited for";
 }
 
-TEST(WakeLatency, ShortensNoSilenceByMoreThanNobodyNotices) {
-  WakeLatency latency;
-  for (int i = 0; i < WakeLatency::remembered; ++i) wait(latency, 90us);
-  EXPECT_EQ(latency.came_by(when - 1ms, when), when - WakeLatency::surely);
+TEST(LeastLatency, ShortensNoSilenceByMoreThanNobodyNotices) {
+  LeastLatency latency;
+  for (int i = 0; i < LeastLatency::remembered; ++i) wait(latency, 90us);
+  EXPECT_EQ(latency.came_by(when - 1ms, when), when - LeastLatency::surely);
 }
 
 TEST(PunctualWait, NeverEndsTooSoon) {
   PunctualWait wait;
-  for (int i = 0; i < 3 * WakeLatency::remembered; ++i) {
+  for (int i = 0; i < 3 * LeastLatency::remembered; ++i) {
     const auto due = monotonic_now() + 200us;
     wait.begin(due);
     EXPECT_GE(wait.finish(), due) << i;
