@@ -148,7 +148,7 @@ Error RtuWorker::serve(SerialPort port) {
     if (lost == 0) lost = session.keep_silence();
     if (lost != 0) break;
     if (yield_to_stop()) continue;
-    // The latest possible moment: until here a stop could take the exchange back.
+    // As late as possible, the rest of the silence before: until here a stop could take the exchange back.
     if (const auto* exchange = take()) {
       yielded_ = false;
       bind(session, *exchange, lost);

@@ -7,7 +7,7 @@
 
 namespace axisd::modbus_rtu {
 
-/// A wait that ended later than this is not taken as a measure.
+/// A wait that ended later than this counts as one that ended so late.
 constexpr Duration longest_latency = std::chrono::microseconds(100);
 
 /// How late the timed waits of a thread usually end: half of them later, half of them sooner. For whom waking
@@ -45,8 +45,9 @@ class LeastLatency {
     return when - (known_ ? least_ : Duration::zero());
   }
 
-  /// When that has come at the latest for which a thread waited from `looked` on, and which it saw at `seen`:
-  /// to be woken by it took no less time than to be woken by a clock.
+  /// When that came for which a thread waited from `looked` on, and which it saw at `seen`: to be woken by it
+  /// took about as long as to be woken by a clock, and more. No more than `surely` too soon, whatever
+  /// happened.
   [[nodiscard]] TimePoint came_by(TimePoint looked, TimePoint seen) const {
     const auto late = known_ ? std::min(least_, surely) : Duration::zero();
     return seen - looked > late ? seen - late : seen;  // else it did not sleep

@@ -36,7 +36,7 @@ bool is_paced(const Exchange& exchange) {
 void WireSession::end(ExchangeResult& result, ExchangeStatus status, int native_error) {
   result.status = status;
   result.native_error = native_error;
-  // Of a reply, when its last byte was read: the silence before the next request counts from there.
+  // Of a reply, when its last byte came: the silence before the next request counts from there.
   result.reply_end = status == ExchangeStatus::replied ? last_byte_ : monotonic_now();
 }
 
@@ -147,7 +147,10 @@ bool WireSession::take_expected(const Exchange& exchange, ExchangeResult& result
       end(result, ExchangeStatus::io_error, got ? EIO : got.error());
       return true;
     }
-    if (*got > 0) last_byte_ = reply_latency_.came_by(looked_, touch());
+    if (*got > 0) {
+      last_byte_ = reply_latency_.came_by(looked_, touch());
+      expected_ = false;  // of what comes after it, nothing is known
+    }
     if (count == 0) first_byte = last_byte_;
     count += *got;
     while (count >= head) {

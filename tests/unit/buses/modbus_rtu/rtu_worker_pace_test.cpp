@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "buses/modbus_rtu/reply_pace.hpp"
+#include "buses/modbus_rtu/wake_latency.hpp"
 #include "worker_bench.hpp"
 
 namespace axisd::modbus_rtu {
@@ -130,6 +131,23 @@ TEST_F(RtuWorkerPace, ACutDuringTheSleepLosesNoReplyThatHasCome) {
   bench_.worker->cut_wait();
   ASSERT_TRUE(bench_.run_until([&] { return bench_.results.size() > results; }));
   EXPECT_EQ(bench_.results.back().status, ExchangeStatus::replied);
+}
+
+TEST_F(RtuWorkerPace, TheSilenceIsKeptFromWhenTheNodeFellSilent) {
+  pause_ms_ = 3;
+  learn();
+  TimePoint said{};
+  for (int i = 0; i < LeastLatency::remembered + 20; ++i) {
+    const auto before = said;
+    answer_once([&](ScriptedNode& node, const Bytes& request) {
+      if (!node.pause(milliseconds(3))) return;
+      said = monotonic_now();  // looked at when the reply is here
+      node.say(proper_reply(request));
+    });
+    const auto result = bench_.run(read_);
+    ASSERT_EQ(result.status, ExchangeStatus::replied);
+    if (i > 0) EXPECT_GE(result.request_begin - before, silence(line_at(fast)) - LeastLatency::surely);
+  }
 }
 
 TEST_F(RtuWorkerPace, TheTimeoutStillHolds) {
