@@ -136,12 +136,12 @@ TEST_F(RtuWorkerPace, ACutDuringTheSleepLosesNoReplyThatHasCome) {
 TEST_F(RtuWorkerPace, TheSilenceIsKeptFromWhenTheNodeFellSilent) {
   pause_ms_ = 3;
   learn();
-  TimePoint said{};
+  std::atomic<TimePoint> said{};
   for (int i = 0; i < LeastLatency::remembered + 20; ++i) {
-    const auto before = said;
+    const auto before = said.load();
     answer_once([&](ScriptedNode& node, const Bytes& request) {
       if (!node.pause(milliseconds(3))) return;
-      said = monotonic_now();  // looked at when the reply is here
+      said = monotonic_now();
       node.say(proper_reply(request));
     });
     const auto result = bench_.run(read_);
