@@ -8,23 +8,28 @@ namespace axisd::modbus_rtu {
 Duration ReplyPace::quiet(std::uint8_t node, Duration on_wire) const {
   const auto& pace = nodes_.at(node);
   if (pace.to_measure > 0) return Duration::zero();
-  return std::max(pace.soonest + on_wire - margin, Duration::zero());
+  const auto whole = pace.soonest + on_wire;
+  return std::max(whole > long_wait ? whole - awake_after_long : whole + after_, Duration::zero());
 }
 
-void ReplyPace::complete(std::uint8_t node, Duration on_wire, Duration took, std::optional<Duration> slept) {
+void ReplyPace::complete(std::uint8_t node, Duration on_wire, Duration took, Met met) {
   auto& pace = nodes_.at(node);
+  const bool ready = met == Met::ready;
+  if (met != Met::awake && pace.soonest + on_wire <= long_wait)
+    after_ = std::clamp(after_ + (ready ? -sooner : later), earliest, latest);
   pace.to_measure = std::max(pace.to_measure - 1, 0);
-  pace.prompt_in_a_row = slept && took - *slept < prompt ? pace.prompt_in_a_row + 1 : 0;
-  if (pace.prompt_in_a_row == suspicious) {
-    pace.prompt_in_a_row = 0;
+  pace.ready_in_a_row = ready ? pace.ready_in_a_row + 1 : 0;
+  if (pace.ready_in_a_row == suspicious) {
+    pace.ready_in_a_row = 0;
     pace.to_measure = 1;
   }
   pace.soonest = std::min(pace.soonest, took - on_wire);
   pace.soonest_lately = std::min(pace.soonest_lately, took - on_wire);
+  if (ready) ++pace.ready_lately;
   if (++pace.lately < remembered) return;
-  pace.soonest = std::exchange(pace.soonest_lately, Duration::max());
+  const auto soonest_lately = std::exchange(pace.soonest_lately, Duration::max());
+  if (std::exchange(pace.ready_lately, 0) < ready_at_least) pace.soonest = soonest_lately;
   pace.lately = 0;
-  pace.to_measure = 1;
 }
 
 }  // namespace axisd::modbus_rtu

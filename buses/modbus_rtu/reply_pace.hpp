@@ -2,36 +2,51 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 
 #include "buses/clock.hpp"
 
 namespace axisd::modbus_rtu {
 
+/// How a reply was met that took part of the wait in sleep, if it did.
+enum class Met : std::uint8_t {
+  awake,    ///< the wait was not slept through
+  awaited,  ///< at the end of the sleep, part of it or all was still to come
+  ready,    ///< at the end of the sleep, all of it lay there, nobody knows since when
+};
+
 /// How soon nodes have answered, and so which part of the wait for a reply can be slept through: a terminal
-/// hands a reply over in pieces, and each would wake the thread for nothing. Keeps to the soonest of the last
-/// replies, and to a moment before it: a thread that waits for bytes is woken by them sooner than one that
-/// sleeps until they must be there. Pure.
+/// hands a reply over in pieces, and each would wake the thread for nothing. One reply in three is to lie
+/// ready when the sleep ends: to read it takes one wake, where to wait for the rest of it takes two. How long
+/// after their soonest reply that is depends on how late the thread wakes, and is the same for all nodes.
+/// Pure.
 class ReplyPace {
  public:
-  /// Woken so long before the soonest reply would be complete.
-  static constexpr Duration margin = std::chrono::microseconds(20);
   /// Replies that are measured without a sleep, at first.
   static constexpr int measured = 3;
-  /// A reply that is complete so soon after the sleep may have lain ready before, nobody knows for how long;
-  static constexpr Duration prompt = std::chrono::microseconds(10);
-  /// after so many of them in a row one is measured without a sleep.
-  static constexpr int suspicious = 4;
-  /// Replies after which a node that has become slower is taken for that, and one is measured in any case:
-  /// where it takes long from the end of a sleep to reading what lies ready, that looks like a reply that was
-  /// waited for.
+  /// After so many in a row that lay ready one is measured without a sleep: the node may have become faster.
+  static constexpr int suspicious = 8;
+  /// Replies after which a node that has become slower is taken for that: unless every eighth of them lay
+  /// ready.
   static constexpr int remembered = 64;
+  static constexpr int ready_at_least = remembered / 8;
+  /// The sleep ends so long after the soonest reply of its node would be complete: at first; so much sooner
+  /// after one that lay ready, and so much later after one that did not;
+  static constexpr Duration at_first = -std::chrono::microseconds(20);
+  static constexpr Duration sooner = std::chrono::nanoseconds(500), later = std::chrono::nanoseconds(250);
+  /// within these: as much before it as a thread wakes late, and no more after it than may be lost on a reply
+  /// of a node that answers irregularly.
+  static constexpr Duration earliest = -std::chrono::microseconds(100);
+  static constexpr Duration latest = std::chrono::microseconds(20);
+  /// After a longer sleep a thread wakes late, by a clock or by bytes; not so where the last pieces of the
+  /// reply have woken it before.
+  static constexpr Duration long_wait = std::chrono::milliseconds(10);
+  static constexpr Duration awake_after_long = std::chrono::milliseconds(4);
 
-  /// From the end of the request until about when its reply, `on_wire` long, can be complete; zero where too
+  /// How long to sleep from the end of the request to `node`, if its reply is `on_wire` long; zero where too
   /// little is known.
   [[nodiscard]] Duration quiet(std::uint8_t node, Duration on_wire) const;
-  /// The reply was complete `took` after the end of the request. `slept`: nobody looked before that.
-  void complete(std::uint8_t node, Duration on_wire, Duration took, std::optional<Duration> slept);
+  /// The reply was complete `took` after the end of the request.
+  void complete(std::uint8_t node, Duration on_wire, Duration took, Met met);
   /// No reply came: what answers next may be another drive.
   void forget(std::uint8_t node) { nodes_.at(node) = {}; }
 
@@ -42,10 +57,12 @@ class ReplyPace {
     Duration soonest = Duration::max();
     Duration soonest_lately = Duration::max();  ///< of the last `lately` replies
     int lately = 0;
+    int ready_lately = 0;
+    int ready_in_a_row = 0;
     int to_measure = measured;
-    int prompt_in_a_row = 0;
   };
   std::array<Pace, 256> nodes_{};
+  Duration after_ = at_first;
 };
 
 }  // namespace axisd::modbus_rtu

@@ -29,8 +29,8 @@ class UsualLatency {
   Duration usual_{};
 };
 
-/// How late they end at the least: so much sooner a thread may ask to be woken, and will not be woken too
-/// soon. Keeps to the least of the last waits. Pure.
+/// How late they end at the least: so long the bytes that woke a thread have lain there, too. Keeps to the
+/// least of the last waits. Pure.
 class LeastLatency {
  public:
   /// Waits after which a machine that has become slower is taken for that.
@@ -39,11 +39,6 @@ class LeastLatency {
   /// it be wrong, that is 0.3 % of the 1.75 ms, where a receiver bears 2 % in the bit rate (Modbus over
   /// serial line 3.2).
   static constexpr Duration surely = std::chrono::microseconds(5);
-
-  /// What to ask for in place of `when`.
-  [[nodiscard]] TimePoint asked_for(TimePoint when) const {
-    return when - (known_ ? least_ : Duration::zero());
-  }
 
   /// When that came for which a thread waited from `looked` on, and which it saw at `seen`: to be woken by it
   /// took about as long as to be woken by a clock, and more. No more than `surely` too soon, whatever

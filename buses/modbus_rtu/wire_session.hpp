@@ -95,8 +95,7 @@ class WireSession {
   PunctualWait silence_;      ///< before a request
   LeastLatency reply_latency_;
   ReplyPace pace_;
-  /// Before the reply, as its node's pace is known: until so long after the end of the request.
-  std::optional<Duration> slept_;
+  bool slept_ = false;     ///< before the reply, as its node's pace is known
   bool expected_ = false;  ///< the reply, any moment: nothing else need be looked at for a while
   bool damaged_ = false;   ///< unsound bytes came during the exchange under way
   bool echo_known_ = false;

@@ -101,7 +101,7 @@ WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const Ex
 void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
   if (quiet == Duration::zero()) return;
   const auto now = monotonic_now();
-  const auto until = reply_latency_.asked_for(std::min(request_end_ + quiet, reply_deadline_));
+  const auto until = std::min(request_end_ + quiet, reply_deadline_);
   if (until - now < shortest_sleep) return;
   const auto cut_from = request_end_ + exchange.turnaround_max;
   // Before that nothing ends it, and a sleep that nothing ends costs less.
@@ -112,7 +112,7 @@ void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
     woken = monotonic_now();
   }
   if (woken >= until) reply_latency_.note(until, woken);
-  slept_ = woken - request_end_;
+  slept_ = true;
   expected_ = woken + shortly < cut_from;
 }
 
@@ -183,11 +183,12 @@ void WireSession::end_replied(ExchangeResult& result, Reply reply, const Frame& 
 
 void WireSession::note_pace(const Exchange& exchange, const ExchangeResult& result) {
   const auto node = exchange.request.node;
+  const auto after_sleep = looked_ == TimePoint::max() ? Met::ready : Met::awaited;
   if (result.status != ExchangeStatus::replied)
     pace_.forget(node);
   else if (is_paced(exchange) && result.reply.kind == ReplyKind::match)
     pace_.complete(node, wire_time(serial_, result.reply_frame.size()), result.reply_end - result.request_end,
-                   slept_);
+                   slept_ ? after_sleep : Met::awake);
 }
 
 /// When a frame began whose last byte has just come: what arrived during the sleep was seen only after it.
@@ -251,7 +252,7 @@ void WireSession::take_reply(const Exchange& exchange, ExchangeResult& result) {
 ExchangeResult WireSession::run(const Exchange& exchange) {
   ExchangeResult result{.foreign_frames = std::exchange(stray_frames_, 0)};
   damaged_ = false;
-  slept_.reset();
+  slept_ = false;
   expected_ = false;
   // Before the request, where there is time: a terminal carries its bytes on when this thread sleeps again.
   const auto request_time = wire_time(serial_, exchange.frame.size());
