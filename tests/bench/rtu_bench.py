@@ -2,7 +2,7 @@
 in turns, at the same simulated drives; stops on such a line, silent nodes, four lines. One table, with what is asked of
 each figure. README.md says what is measured.
 
-    rtu_bench.py BUILD [--rounds N] [--seconds S] [--nodes N] [--baud BAUD ...] [--stops N]
+    rtu_bench.py BUILD [--turns N] [--rounds N] [--seconds S] [--nodes N] [--baud BAUD ...] [--stops N]
 """
 import argparse
 import contextlib
@@ -21,6 +21,7 @@ from rtu_cell import Cell, Line, silence
 STATUS = "030003000A"  # FC03, registers 0x0003..0x000C: what all three ask, and axisd's reading of an axis
 FULL_SPEED = "1 ms"  # a refresh period that no line of 16 can keep: it is never idle
 SETTLE = 1.0  # s
+TURN = 2.0  # s: short, and many of them, for what a virtual machine costs changes within minutes
 
 
 class Loops:
@@ -103,14 +104,15 @@ def in_turns(build, given, baud, untimed=False):
     with tempfile.TemporaryDirectory() as directory, \
             Line(build, directory, baud, given.nodes, untimed=untimed).open() as line:
         loops = Loops(build, line)
-        turns = {"axisd": Cell(build, [line], FULL_SPEED).online, "libmodbus": loops.libmodbus,
-                 "pymodbus": loops.pymodbus}
+        programs = {"axisd": Cell(build, [line], FULL_SPEED).online, "libmodbus": loops.libmodbus,
+                    "pymodbus": loops.pymodbus}
         found = {}
-        for _ in range(given.rounds):
-            for name, program in turns.items():
-                for what, figure in measure(program, line, given.seconds).items():
+        for turn in range(given.turns):
+            names = ["axisd", "libmodbus"] if turn % 2 == 0 else ["libmodbus", "axisd"]
+            for name in names + ["pymodbus"] * (turn % 3 == 0):
+                for what, figure in measure(programs[name], line, TURN).items():
                     found.setdefault(what, {}).setdefault(name, []).append(figure)
-    return found
+    return {what: {name: figures[name] for name in programs} for what, figures in found.items()}
 
 
 def ratios(found):
@@ -191,8 +193,9 @@ def stops(build, given, rows):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
-    parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--seconds", type=float, default=3, help="of each measurement")
+    parser.add_argument("--turns", type=int, default=15, help="of axisd and libmodbus at the same line")
+    parser.add_argument("--rounds", type=int, default=7, help="of the other measurements")
+    parser.add_argument("--seconds", type=float, default=3, help="of each of those")
     parser.add_argument("--nodes", type=int, default=16, help="4 to 127")
     parser.add_argument("--baud", type=int, nargs="*", default=[115200, 19200])
     parser.add_argument("--stops", type=int, default=1000, help="of each kind")
