@@ -9,7 +9,8 @@ Duration ReplyPace::quiet(std::uint8_t node, Duration on_wire) const {
   const auto& pace = nodes_.at(node);
   if (pace.to_measure > 0) return Duration::zero();
   const auto whole = pace.soonest + on_wire;
-  return std::max(whole > long_wait ? whole - awake_after_long : whole + after_, Duration::zero());
+  return std::max(whole > long_wait ? whole - std::min(awake_after_long, on_wire) : whole + after_,
+                  Duration::zero());
 }
 
 void ReplyPace::complete(std::uint8_t node, Duration on_wire, Duration took, Met met) {
@@ -23,12 +24,13 @@ void ReplyPace::complete(std::uint8_t node, Duration on_wire, Duration took, Met
     pace.ready_in_a_row = 0;
     pace.to_measure = 1;
   }
-  pace.soonest = std::min(pace.soonest, took - on_wire);
-  pace.soonest_lately = std::min(pace.soonest_lately, took - on_wire);
-  if (ready) ++pace.ready_lately;
+  const auto began = took - on_wire;
+  // One that lay ready may have come as soon as the soonest: else they would seem later and later.
+  const bool soon = ready && began < pace.soonest + on_time;
+  pace.soonest = std::min(pace.soonest, began);
+  pace.soonest_lately = std::min(pace.soonest_lately, soon ? pace.soonest : began);
   if (++pace.lately < remembered) return;
-  const auto soonest_lately = std::exchange(pace.soonest_lately, Duration::max());
-  if (std::exchange(pace.ready_lately, 0) < ready_at_least) pace.soonest = soonest_lately;
+  pace.soonest = std::exchange(pace.soonest_lately, Duration::max());
   pace.lately = 0;
 }
 

@@ -25,16 +25,16 @@ class ReplyPace {
   static constexpr int measured = 3;
   /// After so many in a row that lay ready one is measured without a sleep: the node may have become faster.
   static constexpr int suspicious = 8;
-  /// Replies after which a node that has become slower is taken for that: unless every eighth of them lay
-  /// ready.
+  /// Replies after which a node that has become slower is taken for that, if none came as soon as before;
   static constexpr int remembered = 64;
-  static constexpr int ready_at_least = remembered / 8;
+  /// of one that lay ready later than this nobody knows: the thread was woken late.
+  static constexpr Duration on_time = std::chrono::microseconds(200);
   /// The sleep ends so long after the soonest reply of its node would be complete: at first; so much sooner
   /// after one that lay ready, and so much later after one that did not;
   static constexpr Duration at_first = -std::chrono::microseconds(20);
   static constexpr Duration sooner = std::chrono::nanoseconds(500), later = std::chrono::nanoseconds(250);
-  /// within these: as much before it as a thread wakes late, and no more after it than may be lost on a reply
-  /// of a node that answers irregularly.
+  /// within these: as much before it as a thread wakes late, and little after it, which may be lost on a
+  /// reply of a node that answers irregularly.
   static constexpr Duration earliest = -std::chrono::microseconds(100);
   static constexpr Duration latest = std::chrono::microseconds(20);
   /// After a longer sleep a thread wakes late, by a clock or by bytes; not so where the last pieces of the
@@ -57,7 +57,6 @@ class ReplyPace {
     Duration soonest = Duration::max();
     Duration soonest_lately = Duration::max();  ///< of the last `lately` replies
     int lately = 0;
-    int ready_lately = 0;
     int ready_in_a_row = 0;
     int to_measure = measured;
   };

@@ -41,7 +41,7 @@ class LeastLatency {
   static constexpr Duration surely = std::chrono::microseconds(5);
 
   /// When that came for which a thread waited from `looked` on, and which it saw at `seen`: to be woken by it
-  /// took about as long as to be woken by a clock, and more. No more than `surely` too soon, whatever
+  /// took about as long as to be woken by a clock. No more than `surely` too soon, whatever
   /// happened.
   [[nodiscard]] TimePoint came_by(TimePoint looked, TimePoint seen) const {
     const auto late = known_ ? std::min(least_, surely) : Duration::zero();

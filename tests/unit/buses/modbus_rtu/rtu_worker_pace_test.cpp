@@ -1,6 +1,7 @@
 // Replies of a node whose pace the worker knows: part of the wait for them is slept through.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 
@@ -87,6 +88,22 @@ TEST_F(RtuWorkerPace, AReplyThatComesSoonerIsHeardAndTheNextOneInItsTime) {
   EXPECT_EQ(next.status, ExchangeStatus::replied);
 }
 
+TEST_F(RtuWorkerPace, ANodeThatBecameFasterIsNoticed) {
+  constexpr auto before = milliseconds(400);
+  pause_ms_ = before / milliseconds(1);
+  learn();
+  pause_ms_ = 0;
+  const auto took = [&] {
+    const auto result = bench_.run(read_);
+    EXPECT_EQ(result.status, ExchangeStatus::replied);
+    return result.reply_end - result.request_end;
+  };
+  EXPECT_GT(took(), before / 2) << "nobody knows yet";
+  for (int i = 1; i < ReplyPace::suspicious; ++i) took();
+  // A busy machine stalls, but not each time.
+  EXPECT_LT(std::min({took(), took(), took(), took(), took()}), before / 2);
+}
+
 TEST_F(RtuWorkerPace, AReplyThatCameDuringTheSleepBeganBefore) {
   learn();
   pause_ms_ = 0;
@@ -159,7 +176,7 @@ TEST_F(RtuWorkerPace, TheTimeoutStillHolds) {
   EXPECT_LT(result.reply_end, result.request_end + long_pause);
 }
 
-/// During the sleep, which lasts 100 ms, across its end, and after it.
+/// During the sleep, which lasts nearly 100 ms, across its end, and after it.
 TEST_F(RtuWorkerPace, AReplyInTwoPiecesIsHeardToItsEnd) {
   struct Times {
     int first_ms, between_ms;
