@@ -15,10 +15,10 @@ enum class Met : std::uint8_t {
 };
 
 /// How soon nodes have answered, and so which part of the wait for a reply can be slept through: a terminal
-/// hands a reply over in pieces, and each would wake the thread for nothing. One reply in three is to lie
-/// ready when the sleep ends: to read it takes one wake, where to wait for the rest of it takes two. How long
-/// after their soonest reply that is depends on how late the thread wakes, and is the same for all nodes.
-/// Pure.
+/// hands a reply over in pieces, and each would wake the thread for nothing. Of a line's replies one in three
+/// is to lie ready when the sleep ends: to read it takes one wake, where to wait for the rest of it takes
+/// two. How long after the soonest reply of its node that is depends on how late the thread wakes, and is
+/// learnt from all nodes together. Pure.
 class ReplyPace {
  public:
   /// Replies that are measured without a sleep, at first.
@@ -33,12 +33,12 @@ class ReplyPace {
   /// after one that lay ready, and so much later after one that did not;
   static constexpr Duration at_first = -std::chrono::microseconds(20);
   static constexpr Duration sooner = std::chrono::nanoseconds(500), later = std::chrono::nanoseconds(250);
-  /// within these: as much before it as a thread wakes late, and little after it, which may be lost on a
-  /// reply of a node that answers irregularly.
+  /// within these: as much before it as a thread wakes late, and little after it, which is lost on some
+  /// replies of a node that answers irregularly.
   static constexpr Duration earliest = -std::chrono::microseconds(100);
   static constexpr Duration latest = std::chrono::microseconds(20);
-  /// After a longer sleep a thread wakes late, by a clock or by bytes; not so where the last pieces of the
-  /// reply have woken it before.
+  /// After a longer sleep a thread wakes late, by a clock or by bytes; not so where pieces of the reply have
+  /// woken it before: so much of it, at the most, is waited for awake.
   static constexpr Duration long_wait = std::chrono::milliseconds(10);
   static constexpr Duration awake_after_long = std::chrono::milliseconds(4);
 
