@@ -34,8 +34,8 @@ if(AXISD_GRPC)
   string(APPEND text
     "add_test(bench.sync_in_guest ${CMAKE_SOURCE_DIR}/tests/guest/run.sh -t 200 /usr/bin/python3 -B "
     "${CMAKE_CURRENT_LIST_DIR}/can_bench.py ${CMAKE_BINARY_DIR} --rounds 1 --seconds 1 --nodes 2)\n"
-    "add_test(bench.rtu /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rtu_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
-    "--seconds 1 --nodes 4 --baud 115200 --stops 5)\n"
+    "add_test(bench.rtu /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rtu_bench.py ${CMAKE_BINARY_DIR} --turns 1 "
+    "--rounds 1 --seconds 1 --nodes 4 --baud 115200 --stops 5)\n"
     "add_test(bench.rpc /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rpc_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
     "--seconds 1)\n"
     "add_test(bench.machine /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/machine_bench.py ${CMAKE_BINARY_DIR} "
