@@ -345,7 +345,7 @@ class Axis {
   void note_stop_sent(TimePoint end);
   Task<Result<void>> stop_and_confirm();
   Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
-  Task<bool> standstill_unpolled(TimePoint deadline);
+  Task<bool> standstill_unpolled(TimePoint deadline, std::optional<int> requests);
   void keep_deceleration(const Activity& activity);
   [[nodiscard]] Duration deceleration_bound() const;
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;

@@ -113,7 +113,7 @@ Task<Result<void>> Axis::settle_found_motion() {
       if (!sent) co_return sent;
       if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
       const auto deadline = env_.clock->now() + deceleration_bound() + settings_.stop_margin;
-      rests = co_await standstill_unpolled(deadline);
+      rests = co_await standstill_unpolled(deadline, std::nullopt);
       if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
         co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",
                              "check power and wiring"));

@@ -135,9 +135,9 @@ Task<Result<void>> Axis::stop_and_confirm() {
     poll_fast(since, patience);
     // Only an axis that is online is polled.
     const bool polled = link_ == LinkState::online;
-    const bool rests =
-        polled ? co_await standstill_by(since, since + patience, requests)
-               : (sent || link_ != LinkState::offline) && co_await standstill_unpolled(since + patience);
+    const bool rests = polled ? co_await standstill_by(since, since + patience, requests)
+                              : (sent || link_ != LinkState::offline) &&
+                                    co_await standstill_unpolled(since + patience, requests);
     if (requests != stopping_.requests) continue;  // each gets a frame of its own
     if (rests && no_reply && ++rounds < unacknowledged_rounds) continue;
     if (rests) co_return Result<void>{};
@@ -189,18 +189,19 @@ Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests
 }
 
 /// The same for a node that nobody polls, because it is not (or not yet) online. What its samples tell beside
-/// the standstill is heard nowhere else (M5).
-Task<bool> Axis::standstill_unpolled(TimePoint deadline) {
+/// the standstill is heard nowhere else (M5). `requests`: another stop than that of them ends it.
+Task<bool> Axis::standstill_unpolled(TimePoint deadline, std::optional<int> requests) {
   constexpr auto pause = milliseconds(30);
   constexpr int resting_in_homing = 6;  // samples; between its phases the motor rests, too
+  const auto another = [&] { return requests && *requests != stopping_.requests; };
   int resting = 0, silent = 0;
   std::int32_t resting_at = 0;
   for (;;) {
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
-    if (!sample && ++silent == stop_attempts) co_return false;
+    if (sample) on_sample(*sample);
+    if (another() || (!sample && ++silent == stop_attempts)) co_return false;
     if (sample) {
       silent = 0;
-      on_sample(*sample);
       const bool rests = !sample->moving && (resting == 0 || sample->position_pulses == resting_at);
       resting = rests ? resting + 1 : 0;
       resting_at = sample->position_pulses;
@@ -208,7 +209,7 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline) {
       if (resting >= resting_in_homing) co_return true;
       if (sample->asked_at >= deadline && resting == 0) co_return false;
     }
-    co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + pause);
+    if (!another()) co_await sampled_.wait_until(env_.clock->now() + pause);
   }
 }
 

@@ -118,6 +118,29 @@ TEST(M13, ARampLongerThanTheMarginIsNotEscalated) {
   });
 }
 
+/// Nobody polls an axis that is not online: its stop looks for the standstill itself.
+TEST(M13, AQuickStopWaitsForNoRampOfAnAxisThatIsNotOnline) {
+  RigOptions options{.limits = false, .connect = false};
+  options.before_start = [](simulation::SimulatedRtuNode& drive, VirtualWorld& world) {
+    write_register(drive, 0x0029, 1);
+    write_register(drive, 0x0022, 2000);  // ms
+    write_register(drive, 0x0023, 600);
+    write_register(drive, 0x0027, 2);
+    world.run_for(500ms);
+    drive.advance(world.now());
+    EXPECT_TRUE(drive.shaft_moving());
+  };
+  Rig rig(options);
+  ASSERT_TRUE(rig.run_until([&] { return rig.writes_of(0x0028) > 0; }, 1s)) << "found moving";
+  rig.submit(StopRequest{.kind = StopKind::halt});
+  rig.run(200ms);
+  ASSERT_NE(rig.state()->link, LinkState::online);
+  ASSERT_TRUE(rig.drive->shaft_moving());
+  rig.submit(StopRequest{.kind = StopKind::quick_stop});
+  rig.run(100ms);
+  EXPECT_EQ(stop_values(rig).back(), 1);
+}
+
 /// The stop itself never arrives: it is repeated, then escalated, and never silently given up.
 TEST(M13, AStopThatNeverArrives) {
   for (const auto kind : {FaultKind::drop_request, FaultKind::drop_reply, FaultKind::corrupt_reply}) {
