@@ -40,6 +40,10 @@ class AxisGate {
   }
   /// Stops were requested that the core has not served yet: nothing new may be accepted before them.
   [[nodiscard]] bool stop_pending() const { return pending_stops_.load(std::memory_order_acquire) > 0; }
+  /// Thread: core. One stop that was asked for by request_stop() has been served to the end.
+  void stop_passed_on() {
+    if (bus_) bus_->take();
+  }
   /// Thread: core. One stop is being served (also one that came without request_stop()).
   void stop_served() {
     auto pending = pending_stops_.load(std::memory_order_acquire);

@@ -13,10 +13,10 @@ void PunctualWait::begin(TimePoint when) {
   asked_ = asked;
 }
 
-TimePoint PunctualWait::finish() {
-  auto now = monotonic_now();
+/// Learns from a sleep how long waking took. The time.
+TimePoint PunctualWait::woken() {
+  const auto now = monotonic_now();
   if (asked_) latency_.note(*std::exchange(asked_, std::nullopt), now);
-  while (now < when_) now = monotonic_now();
   return now;
 }
 

@@ -13,12 +13,23 @@ class PunctualWait {
  public:
   /// Blocks until shortly before `when`.
   void begin(TimePoint when);
-  /// Passes what is left without sleeping, which is shorter than to sleep would take. Returns the time then.
-  TimePoint finish();
+  /// Passes what is left without sleeping, which is shorter than to sleep would take, or less of it once
+  /// `enough()`, which is asked again and again. Returns the time then.
+  template <class Enough>
+  TimePoint finish(Enough enough) {
+    auto now = woken();
+    while (now < when_ && !enough()) now = monotonic_now();
+    return now;
+  }
+  TimePoint finish() {
+    return finish([] { return false; });
+  }
   /// `when` does not matter any more.
   void abandon() { when_ = {}; }
 
  private:
+  TimePoint woken();
+
   TimePoint when_{};
   std::optional<TimePoint> asked_;  ///< to be woken
   UsualLatency latency_;

@@ -19,8 +19,11 @@ namespace {
 constexpr Duration first_back_off = std::chrono::milliseconds(100);
 constexpr Duration longest_back_off = std::chrono::seconds(1);
 constexpr Duration longest_idle = std::chrono::seconds(1);
-/// A stop needs some 0.1 ms from its arrival to the slot, when the core has nothing else to do.
-constexpr Duration longest_yield = std::chrono::milliseconds(1);
+/// A stop needs some 0.1 ms from its arrival to the slot. Where the core is later than this, the line goes
+/// on.
+constexpr Duration longest_yield = std::chrono::milliseconds(5);
+/// How often a worker that waits for a stop looks whether it is still on its way.
+constexpr Duration between_looks = std::chrono::microseconds(200);
 
 /// Signals are the main thread's; those that a thread raises by its own fault must stay deliverable.
 sigset_t all_but_faults() {
@@ -147,12 +150,14 @@ Error RtuWorker::serve(SerialPort port) {
     lost = session.find_echo();
     if (lost == 0) lost = session.keep_silence();
     if (lost != 0) break;
+    session.finish_silence([this] { return awaits_stop(); });
     if (yield_to_stop()) continue;
-    // As late as possible, the rest of the silence before: until here a stop could take the exchange back.
+    // As late as possible, when the silence is over: until here a stop could take the exchange back.
     if (const auto* exchange = take()) {
       yielded_ = false;
       bind(session, *exchange, lost);
     } else {
+      yielded_ = false;
       idle(session, lost);
     }
   }
@@ -201,18 +206,21 @@ void RtuWorker::bind(WireSession& session, const Exchange& exchange, int& lost) 
   report(exchange, result);
 }
 
-/// A stop that is on its way to the core is let in before whatever was armed without knowing of it. Once per
-/// exchange, so that no flood of stops keeps the others off the line. True: time has passed, which may have
-/// brought bytes.
+/// A stop is on its way to the core, and what is armed knows nothing of it.
+bool RtuWorker::awaits_stop() const { return !yielded_ && !stop_armed_.load() && stop_notice_->pending(); }
+
+/// Such a stop is let in first. Once per exchange, so that no flood of stops keeps the others off the line.
+/// True: time has passed, which may have brought bytes.
 bool RtuWorker::yield_to_stop() {
-  const auto until = stop_notice_->given() + longest_yield;
-  if (yielded_ || stop_armed_.load() || monotonic_now() >= until) return false;
-  yielded_ = true;
-  for (auto now = monotonic_now(); now < until && !stop_armed_.load() && !quitting(); now = monotonic_now()) {
+  if (!awaits_stop()) return false;
+  const auto until = stop_notice_->given() + longest_yield;  // one that is given meanwhile prolongs nothing
+  for (auto now = monotonic_now(); now < until && awaits_stop() && !quitting(); now = monotonic_now()) {
+    touch();
     idle_.store(true);
-    if (!stop_armed_.load()) wakeup_.wait(until - now);
+    if (!stop_armed_.load()) wakeup_.wait(std::min(until - now, between_looks));
     idle_.store(false);
   }
+  yielded_ = true;
   return true;
 }
 

@@ -26,9 +26,10 @@ class WireSession;
 ///
 /// Between the threads stand a one-place atomic slot, the Wakeup and post(); there are no locks. A lost port
 /// is reported before the result of the exchange that it cost. `not_sent` with the verdict `send` means that
-/// the port was gone before a byte went out. Where a stop was announced that the core has not armed yet, what
-/// is armed waits for it, at most 1 ms. An exchange with serial settings of its own has the port changed
-/// between the slot and its first byte, and so has the next one without; the gate is asked after that.
+/// the port was gone before a byte went out. Where a stop was announced that the core has not served yet,
+/// what is armed waits for it, at most 5 ms. An exchange with serial settings of its
+/// own has the port changed between the slot and its first byte, and so has the next one without; the gate is
+/// asked after that.
 class RtuWorker final : public Line {
  public:
   /// Where the port is now; asked before each opening. Thread: the worker's.
@@ -62,6 +63,7 @@ class RtuWorker final : public Line {
   Error serve(SerialPort port);
   void bind(WireSession& session, const Exchange& exchange, int& lost);
   bool prepare(WireSession& session, const Exchange& exchange, int& lost);
+  [[nodiscard]] bool awaits_stop() const;
   bool yield_to_stop();
   void idle(WireSession& session, int& lost);
   void wait_closed(Duration duration, int native_error);

@@ -40,6 +40,11 @@ class WireSession {
   int keep_silence();
   /// Passes what is left of the silence. Returns the time.
   TimePoint finish_silence() { return silence_.finish(); }
+  /// Less of it once `enough()`.
+  template <class Enough>
+  void finish_silence(Enough enough) {
+    silence_.finish(enough);
+  }
   /// Blocks until the wakeup is notified, bytes that nobody asked for come, or `limit` has passed.
   int idle(Duration limit);
   /// Sends `exchange`, when the silence is over, and waits for its end. Precondition: keep_silence() has just

@@ -12,33 +12,39 @@ constexpr int most_ready = 32;
 
 }  // namespace
 
-void StopLane::request(AxisGate& gate, std::function<void()> serve) {
-  gate.request_stop();
+void StopLane::request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve) {
+  for (const auto& gate : gates) gate->request_stop();
   {
     const std::lock_guard lock(mutex_);
-    requests_.push_back(std::move(serve));
+    requests_.push_back({.gates = std::move(gates), .serve = std::move(serve)});
   }
   waiting_.store(true, std::memory_order_release);
-  post(core_, [] {});  // wakes the loop, which looks at the lane first
+  post(core_->io(), [] {});  // wakes the loop, which looks at the lane first
 }
 
-void StopLane::drain() {
-  if (!waiting_.exchange(false, std::memory_order_acq_rel)) return;
-  std::vector<std::function<void()>> requests;
+bool StopLane::drain() {
+  if (!waiting_.exchange(false, std::memory_order_acq_rel)) return false;
+  std::vector<Request> requests;
   {
     const std::lock_guard lock(mutex_);
     requests = std::exchange(requests_, {});
   }
-  for (const auto& serve : requests) serve();
+  for (auto& request : requests) {
+    core_->run_first(request.serve);
+    // A sequence that was waiting already is resumed by a handler, which comes before this one.
+    core_->push([gates = std::move(request.gates)] {
+      for (const auto& gate : gates) gate->stop_passed_on();
+    });
+  }
+  return true;
 }
 
 CoreLoop::CoreLoop()
     : work_(boost::asio::make_work_guard(io_)),
       clock_(&own_clock_.emplace(io_, AsioClock::Served::by_loop)),
-      lane_(io_.get_executor()) {}
+      lane_(ready_) {}
 
-CoreLoop::CoreLoop(Clock& clock)
-    : work_(boost::asio::make_work_guard(io_)), clock_(&clock), lane_(io_.get_executor()) {}
+CoreLoop::CoreLoop(Clock& clock) : work_(boost::asio::make_work_guard(io_)), clock_(&clock), lane_(ready_) {}
 
 CoreLoop::~CoreLoop() { ready_.clear(); }
 
@@ -61,12 +67,12 @@ void CoreLoop::run() {
   auto began = monotonic_now();
   while (!io_.stopped()) {
     last_progress_.store(began, std::memory_order_relaxed);
-    lane_.drain();
+    const bool stopped = lane_.drain();
     // What is due comes before handlers: frames that wait to be read can be read a little later, SYNC cannot
     // be sent late.
     const bool served = own_clock_->serve(began);
     const bool ran = run_ready();
-    if (served || ran) {
+    if (stopped || served || ran) {
       const auto ended = monotonic_now();
       const auto took = (ended - std::exchange(began, ended)).count();
       if (took > longest_.load(std::memory_order_relaxed)) longest_.store(took, std::memory_order_relaxed);

@@ -4,6 +4,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -16,20 +17,27 @@
 
 namespace axisd::core {
 
-/// Stops overtake everything that waits for the core thread: the lane is emptied before each handler. Asking
-/// for a stop makes the axis's prepared motion unsendable at once, from the asking thread. Thread: any.
+/// Stops overtake everything that waits for the core thread: the lane is emptied before each handler, and
+/// the sequences that serve a stop run at once to their first wait. Asking for a stop makes the axes'
+/// prepared motion unsendable at once, from the asking thread. Thread: any.
 class StopLane {
  public:
-  explicit StopLane(Executor core) : core_(std::move(core)) {}
-  void request(AxisGate& gate, std::function<void()> serve);
-  /// Thread: core.
-  void drain();
+  explicit StopLane(ReadyQueue& core) : core_(&core) {}
+  /// `serve` stops the axes of all `gates`.
+  void request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve);
+  /// False: there was none. Thread: core.
+  bool drain();
 
  private:
-  Executor core_;
+  struct Request {
+    std::vector<std::shared_ptr<AxisGate>> gates;
+    std::function<void()> serve;
+  };
+
+  ReadyQueue* core_;
   std::atomic<bool> waiting_{false};
   std::mutex mutex_;
-  std::vector<std::function<void()>> requests_;
+  std::vector<Request> requests_;
 };
 
 /// The core thread's loop.

@@ -95,10 +95,9 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
     gathering->missing = commands.size();
     for (std::size_t i = 0; i < commands.size(); ++i) gather(gathering, known + i, commands[i], until);
   };
-  // Every gate is raised here and now; one visit of the core serves all.
-  for (const auto& axis : axes)
-    if (axis != axes.back()) table->find(axis)->gate->request_stop();
-  loop_->lane().request(*table->find(axes.back())->gate, std::move(serve));
+  std::vector<std::shared_ptr<AxisGate>> gates;
+  for (const auto& axis : axes) gates.push_back(table->find(axis)->gate);
+  loop_->lane().request(std::move(gates), std::move(serve));
 }
 
 void GroupAccessService::gather(const std::shared_ptr<Gathering>& gathering, std::size_t index,

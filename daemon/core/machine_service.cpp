@@ -81,7 +81,7 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
     answer(machine_->submit(axis, action, options), until, std::move(callback));
   };
   if (found != nullptr && (stop != nullptr || disable))
-    loop_->lane().request(*found->gate, std::move(serve));
+    loop_->lane().request({found->gate}, std::move(serve));
   else
     post(loop_->executor(), std::move(serve));
 }
@@ -126,10 +126,9 @@ void MachineService::stop_all(std::string client, WaitUntil until,
   };
   const auto table = machine_->table();
   if (table->faces.empty()) return post(loop_->executor(), std::move(serve));
-  // Every gate is raised here and now; one visit of the core serves all.
-  auto last = std::prev(table->faces.end());
-  for (auto axis = table->faces.begin(); axis != last; ++axis) axis->second->gate->request_stop();
-  loop_->lane().request(*last->second->gate, std::move(serve));
+  std::vector<std::shared_ptr<AxisGate>> gates;
+  for (const auto& [name, axis] : table->faces) gates.push_back(axis->gate);
+  loop_->lane().request(std::move(gates), std::move(serve));
 }
 
 void MachineService::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {

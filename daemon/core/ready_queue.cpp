@@ -15,9 +15,9 @@ void ReadyQueue::clear() {
 void ReadyQueue::run_one() {
   auto next = std::move(waiting_.front());
   waiting_.pop_front();
-  in_handler_ = true;
-  next();
-  in_handler_ = false;
+  run(next);
 }
+
+void ReadyQueue::run_first(const std::function<void()>& handler) { run(handler); }
 
 }  // namespace axisd::core

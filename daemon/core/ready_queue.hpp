@@ -36,6 +36,9 @@ class ReadyQueue {
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
   /// Runs the oldest. Precondition: not empty. Thread: core.
   void run_one();
+  /// Runs `handler` before those that wait; sequences that it starts run to their first wait in it. Thread:
+  /// core, in no handler.
+  void run_first(const std::function<void()>& handler);
   /// Runs nothing any more; what handlers ask for when they are dropped goes to the io_context.
   void clear();
   /// Thread: any.
@@ -51,6 +54,12 @@ class ReadyQueue {
   [[nodiscard]] boost::asio::io_context& io() const { return *io_; }
 
  private:
+  void run(auto& handler) {
+    in_handler_ = true;
+    handler();
+    in_handler_ = false;
+  }
+
   static thread_local const ReadyQueue* here_;
   boost::asio::io_context* io_;
   std::deque<std::move_only_function<void()>> waiting_;

@@ -102,6 +102,20 @@ TEST(PunctualWait, NeverEndsTooSoon) {
   }
 }
 
+TEST(PunctualWait, LastsNoLongerThanIsEnough) {
+  PunctualWait wait;
+  bool asked = false;
+  TimePoint due;
+  // A sleep that took too long leaves nothing to be asked in: another one.
+  for (const auto give_up = monotonic_now() + 30s; !asked && monotonic_now() < give_up;) {
+    wait.begin(due = monotonic_now() + 1ms);
+    const auto ended = wait.finish([&] { return asked = true; });
+    if (asked) EXPECT_LT(ended, due);
+  }
+  EXPECT_TRUE(asked);
+  EXPECT_GE(wait.finish(), due) << "the rest of it";
+}
+
 TEST(PunctualWait, AMomentThatHasPassedIsNotWaitedFor) {
   PunctualWait wait;
   const auto past = monotonic_now() - 1s;

@@ -57,13 +57,47 @@ TEST(RtuWorkerStop, WhatIsArmedWaitsForAnAnnouncedStopButNotForLong) {
   const auto far = monotonic_now() + ample;
   notice->give(far);
   bench.worker->arm(read);
+  bench.let_worker_notice();
   EXPECT_TRUE(bench.worker->revoke()) << "the stop is on its way";
   bench.worker->arm(stop);
   EXPECT_LT(bench.next_result().request_begin, far);
   EXPECT_EQ(node.seen(), std::vector<std::string>{hex(stop.frame)});
+  notice->take();
   const auto given = monotonic_now();
   notice->give(given);
-  EXPECT_GE(bench.run(read).request_begin, given + milliseconds(1)) << "it did not come";
+  EXPECT_GE(bench.run(read).request_begin, given + milliseconds(5)) << "it did not come";
+}
+
+TEST(RtuWorkerStop, WhatIsArmedGoesOnceTheAnnouncedStopAskedNothingOfTheLine) {
+  const ScriptedNode node(answering());
+  WorkerBench bench(line_at(fast, node.path()));
+  bench.start_and_open();
+  const auto notice = bench.worker->stop_notice();
+  const auto read = read_of(0x0020, 1);
+  const auto far = monotonic_now() + ample;
+  notice->give(far);
+  bench.worker->arm(read);
+  bench.let_worker_notice();
+  EXPECT_TRUE(bench.results.empty());
+  notice->take();
+  EXPECT_LT(bench.next_result().request_begin, far);
+}
+
+TEST(RtuWorkerStop, AnAnnouncedStopShortensNoSilence) {
+  constexpr int baud = 1200;
+  const ScriptedNode node(answering());
+  const auto line = line_at(baud, node.path());
+  WorkerBench bench(line);
+  bench.start_and_open();
+  const auto notice = bench.worker->stop_notice();
+  const auto read = read_of(0x0020, 1);
+  for (int i = 0; i < 3; ++i) {
+    const auto before = bench.run(read).reply_end;
+    notice->give();
+    bench.worker->arm(read);
+    notice->take();
+    EXPECT_GE(bench.next_result().request_begin, before + silence(line));
+  }
 }
 
 TEST(RtuWorkerStop, AFloodOfAnnouncedStopsLetsEveryExchangeThrough) {

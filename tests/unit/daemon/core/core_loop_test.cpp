@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
+
+#include "buses/signal.hpp"
 
 namespace axisd::core {
 namespace {
@@ -29,7 +33,7 @@ TEST(CoreLoop, WhatIsDueComesBeforeHandlersThatWait) {
 
 TEST(CoreLoop, AStopComesBeforeWhatIsDue) {
   CoreLoop loop;
-  AxisGate gate;
+  const auto gate = std::make_shared<AxisGate>();
   Texts order;
   Clock::Timer timer;
   post(loop.executor(), [&] {
@@ -37,7 +41,7 @@ TEST(CoreLoop, AStopComesBeforeWhatIsDue) {
       order.emplace_back("cycle");
       loop.stop();
     });
-    loop.lane().request(gate, [&] { order.emplace_back("stop"); });
+    loop.lane().request({gate}, [&] { order.emplace_back("stop"); });
   });
   loop.run();
   EXPECT_EQ(order, (Texts{"stop", "cycle"}));
@@ -85,18 +89,75 @@ TEST(CoreLoop, HandlersThatAskForMoreStarveNoInput) {
 
 TEST(CoreLoop, AStopGoesBetweenTwoHandlersThatAreReady) {
   CoreLoop loop;
-  AxisGate gate;
+  const auto gate = std::make_shared<AxisGate>();
   Texts order;
   post(loop.executor(), [&] {
     post(loop.executor(), [&] {
       order.emplace_back("first");
-      std::thread([&] { loop.lane().request(gate, [&] { order.emplace_back("stop"); }); }).join();
+      std::thread([&] { loop.lane().request({gate}, [&] { order.emplace_back("stop"); }); }).join();
     });
     post(loop.executor(), [&] { order.emplace_back("second"); });
     post(loop.executor(), [&] { loop.stop(); });
   });
   loop.run();
   EXPECT_EQ(order, (Texts{"first", "stop", "second"}));
+}
+
+/// The frames of a stop are not put off by handlers that came before it.
+TEST(CoreLoop, AStopIsServedToItsFirstWaitBeforeHandlersThatAreReady) {
+  CoreLoop loop;
+  Texts order;
+  const auto sequence = [&]() -> Task<> {
+    order.emplace_back("stop frame");
+    co_return;
+  };
+  post(loop.executor(), [&] {
+    post(loop.executor(), [&] { order.emplace_back("ready"); });
+    loop.lane().request({std::make_shared<AxisGate>()}, [&] { spawn(loop.executor(), sequence(), "stop"); });
+    post(loop.executor(), [&] { loop.stop(); });
+  });
+  loop.run();
+  EXPECT_EQ(order, (Texts{"stop frame", "ready"}));
+}
+
+/// The worker of a line waits for what is announced, and not longer than until it was served.
+TEST(CoreLoop, AStopIsAnnouncedToTheBusesOfItsAxesUntilItWasServed) {
+  CoreLoop loop;
+  const auto first = std::make_shared<StopNotice>();
+  const auto second = std::make_shared<StopNotice>();
+  const auto announced = [&] { return std::pair(first->pending(), second->pending()); };
+  std::vector<std::pair<bool, bool>> seen{announced()};
+  loop.lane().request({std::make_shared<AxisGate>(first), std::make_shared<AxisGate>(first),
+                       std::make_shared<AxisGate>(second), std::make_shared<AxisGate>()},
+                      [&] { seen.push_back(announced()); });
+  seen.push_back(announced());
+  post(loop.executor(), [&] { loop.stop(); });
+  loop.run();
+  seen.push_back(announced());
+  EXPECT_EQ(seen,
+            (std::vector<std::pair<bool, bool>>{{false, false}, {true, true}, {true, true}, {false, false}}));
+}
+
+/// A second stop is sent by the sequence of the first.
+TEST(CoreLoop, AStopIsAnnouncedUntilTheSequenceThatWaitedForItHasGoneOn) {
+  CoreLoop loop;
+  const auto notice = std::make_shared<StopNotice>();
+  Signal asked(loop.executor(), loop.clock());
+  std::vector<bool> seen;
+  const auto sequence = [&]() -> Task<> {
+    co_await asked.wait();
+    seen.push_back(notice->pending());
+  };
+  spawn(loop.executor(), sequence(), "stop");
+  post(loop.executor(), [&] {
+    post(loop.executor(), [] {});
+    loop.lane().request({std::make_shared<AxisGate>(notice)}, [&] { asked.notify_all(); });
+    post(loop.executor(),
+         [&] { post(loop.executor(), [&] { post(loop.executor(), [&] { loop.stop(); }); }); });
+  });
+  loop.run();
+  seen.push_back(notice->pending());
+  EXPECT_EQ(seen, (std::vector<bool>{true, false}));
 }
 
 TEST(CoreLoop, AHandlerIsNeverRunWithinAnother) {
