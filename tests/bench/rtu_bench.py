@@ -1,6 +1,6 @@
 """An RS-485 line of 16 drives that is asked as fast as it allows: axisd, a tight loop on libmodbus and python3-pymodbus
-in turns, at the same simulated drives; stops on such a line, silent nodes, four lines. One table, with what is asked of
-each figure. README.md says what is measured.
+in turns, at the same simulated drives; axisd and the loop at the same time, each on a line of its own; stops on such a
+line, silent nodes, four lines. One table, with what is asked of each figure. README.md says what is measured.
 
     rtu_bench.py BUILD [--turns N] [--rounds N] [--seconds S] [--nodes N] [--baud BAUD ...] [--stops N]
 """
@@ -42,13 +42,18 @@ class Loops:
         return self._run(sys.executable, "-B", pathlib.Path(__file__).with_name("pymodbus_loop.py"))
 
 
+def look_at(pids, seconds):
+    """Begin, end, and the CPU time in s that each process took in between."""
+    begin, before = time.monotonic(), [cpu_seconds(pid) for pid in pids]
+    time.sleep(seconds)
+    return begin, time.monotonic(), [cpu_seconds(pid) - cpu for pid, cpu in zip(pids, before)]
+
+
 def watch(program, lines, seconds):
     """Lets `program` run: its CPU time in s, and what went over each line meanwhile."""
     with program() as pid:
         time.sleep(SETTLE)
-        begin, cpu = time.monotonic(), cpu_seconds(pid)
-        time.sleep(seconds)
-        end, cpu = time.monotonic(), cpu_seconds(pid) - cpu
+        begin, end, (cpu,) = look_at([pid], seconds)
     return cpu, [line.frames(begin, end) for line in lines]
 
 
@@ -88,8 +93,7 @@ class Table:
         self.rows.append([what, figure, "", "", asked, "" if met is None else "yes" if met else "NO"])
 
 
-def measure(program, line, seconds):
-    cpu, (frames,) = watch(program, [line], seconds)
+def figures_of(line, frames, cpu, seconds):
     excess = excesses(line, frames)
     requests = sum(asked for _, asked, _ in frames)
     if len(excess) < 10:
@@ -97,6 +101,11 @@ def measure(program, line, seconds):
     median, ideal = statistics.median(excess), line.ideal() * 1e6
     return {"excess": median, "p99": percentile(excess, 0.99), "efficiency": ideal / (ideal + median),
             "rate": requests / seconds, "cpu": cpu / requests * 1e6, "violations": violations(line, frames)}
+
+
+def measure(program, line, seconds):
+    cpu, (frames,) = watch(program, [line], seconds)
+    return figures_of(line, frames, cpu, seconds)
 
 
 def in_turns(build, given, baud, untimed=False):
@@ -115,6 +124,23 @@ def in_turns(build, given, baud, untimed=False):
     return {what: {name: figures[name] for name in programs} for what, figures in found.items()}
 
 
+def side_by_side(build, given, baud):
+    """As in_turns(), of axisd and libmodbus at the same time: whatever the computer does, it does to both."""
+    with tempfile.TemporaryDirectory() as directory, contextlib.ExitStack() as stack:
+        lines = {name: stack.enter_context(Line(build, directory, baud, given.nodes, name=name).open())
+                 for name in ("axisd", "libmodbus")}
+        pids = [stack.enter_context(Cell(build, [lines["axisd"]], FULL_SPEED).online()),
+                stack.enter_context(Loops(build, lines["libmodbus"]).libmodbus())]
+        time.sleep(SETTLE)
+        slices = [look_at(pids, TURN) for _ in range(given.turns)]
+        found = {}
+        for begin, end, cpu in slices:
+            for (name, line), used in zip(lines.items(), cpu):
+                for what, figure in figures_of(line, line.frames(begin, end), used, TURN).items():
+                    found.setdefault(what, {}).setdefault(name, []).append(figure)
+    return found
+
+
 def ratios(found):
     return {"axisd": [one / bare for one, bare in zip(found["axisd"], found["libmodbus"])]}
 
@@ -131,6 +157,14 @@ def compare(build, given, baud, rows):
     rows.add(title + "CPU, of libmodbus's", ratios(found["cpu"]), 2, "<= 1.25", lambda ratio: ratio <= 1.25)
     rows.add(title + "t3.5 violated", found["violations"], 0, "0",
              lambda axisd, *_: max(found["violations"]["axisd"]) == axisd == 0)
+
+
+def compare_side_by_side(build, given, baud, rows):
+    found, title = side_by_side(build, given, baud), f"{baud} bit/s, at the same time: "
+    rows.add(title + "excess of a reading, us, median", found["excess"], 0, "<= libmodbus",
+             lambda axisd, bare: axisd <= bare)
+    rows.add(title + "CPU per transaction, us", found["cpu"])
+    rows.add(title + "CPU, of libmodbus's", ratios(found["cpu"]), 2, "<= 1.25", lambda ratio: ratio <= 1.25)
 
 
 def compare_untimed(build, given, rows):
@@ -181,13 +215,21 @@ def stops(build, given, rows):
     for silent in (0, 1):
         found = rtu_stops.measure(build, given.nodes, silent, given.stops)
         title = f"stop, 115200 bit/s, {'one' if silent else 'none'} silent: "
+        excess, from_call = ([get(stop) * 1e6 for stop in found.stops]
+                             for get in (lambda stop: stop.excess, lambda stop: stop.from_call))
         for name, share, bar in (("p50", 0.5, 200), ("p99", 0.99, 1000), ("p99.9", 0.999, None), ("maximum", 1, None)):
-            figure = percentile(found.excess, share)
+            figure = percentile(excess, share)
             rows.say(f"{title}{name}, us", f"{figure:.0f}", f"<= {bar}" if bar else "", figure <= bar if bar else None)
         for name, share in (("p50", 0.5), ("p99", 0.99)):
-            rows.say(f"{title}{name} from the client's call, us", f"{percentile(found.from_call, share):.0f}")
-        rows.say(f"{title}longest to its last byte, ms", f"{found.longest:.1f}",
-                 f"<= {found.bound:.1f} (published)", found.longest <= found.bound)
+            rows.say(f"{title}{name} from the client's call, us", f"{percentile(from_call, share):.0f}")
+        bound, asked = found.bound * 1e3, f"<= {found.bound * 1e3:.1f} (published)"
+        longest = max(stop.whole for stop in found.stops) * 1e3
+        rows.say(f"{title}longest to its last byte, ms", f"{longest:.1f}", asked, longest <= bound)
+        longest = max(stop.less_stall() for stop in found.stops) * 1e3
+        rows.say(f"{title}less what bare threads were held back beyond host_allowance", f"{longest:.1f}", asked,
+                 longest <= bound)
+        rows.say(f"{title}longest that a bare thread was held back during a stop, ms",
+                 f"{max(0.0, *(stop.stall for stop in found.stops)) * 1e3:.1f}")
 
 
 def main():
@@ -203,6 +245,7 @@ def main():
     build, rows = os.path.abspath(given.build), Table()
     for baud in given.baud:
         compare(build, given, baud, rows)
+        compare_side_by_side(build, given, baud, rows)
     compare_untimed(build, given, rows)
     four_lines(build, given, rows)
     stops(build, given, rows)

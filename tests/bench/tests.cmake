@@ -7,6 +7,7 @@ add_executable(bench_can EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/can_bench.cp
 target_include_directories(bench_can PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(bench_can PRIVATE axisd_test_support axisd_core)
 add_executable(bench_bare_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_loop.cpp)
+add_executable(bench_bare_waits EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_waits.cpp)
 add_executable(bench_modbus_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/modbus_loop.cpp)
 target_link_libraries(bench_modbus_loop PRIVATE PkgConfig::MODBUS)
 add_executable(bench_untimed_line EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/untimed_line.cpp)
@@ -18,7 +19,7 @@ if(AXISD_GRPC)
     add_executable(bench_${program} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/${program}.cpp)
     target_link_libraries(bench_${program} PRIVATE axisd_proto)
   endforeach()
-  add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop bench_modbus_loop bench_untimed_line bench_rpc_client
+  add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop bench_bare_waits bench_modbus_loop bench_untimed_line bench_rpc_client
                                            bench_bare_server axisd axisd-sim axisctl)
   set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
   set(text "")
