@@ -209,7 +209,9 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline, std::optional<int> requ
       if (resting >= resting_in_homing) co_return true;
       if (sample->asked_at >= deadline && resting == 0) co_return false;
     }
-    if (!another()) co_await sampled_.wait_until(env_.clock->now() + pause);
+    // Samples of somebody else who looks do not shorten it.
+    for (const auto until = env_.clock->now() + pause; !another() && env_.clock->now() < until;)
+      co_await sampled_.wait_until(until);
   }
 }
 

@@ -207,6 +207,27 @@ TEST(M04, FoundBetweenTwoPhasesOfHoming) {
   EXPECT_FALSE(rig.drive->shaft_moving());
 }
 
+/// A client's stop and the one that is owed look for the standstill at the same time. Neither takes the
+/// other's samples for time that has passed.
+TEST(M04, FoundHomingAClientsStopIsNotDoneBetweenTwoPhases) {
+  for (const auto after : {0ms, 50ms, 100ms, 300ms, 700ms}) {
+    SCOPED_TRACE(after.count());
+    Rig rig({.switches = {{"homing_pauses", true}, {"stop_ignored_in_homing", true}}});
+    rig.ready();
+    (void)rig.submit(HomeRequest{});
+    rig.run(200ms);
+    rig.stop_daemon();
+    rig.start_daemon(false);
+    ASSERT_TRUE(rig.run_until([&] { return rig.writes_of(0x0028) > 0; }, 2s));
+    rig.run(after);
+    const auto stop = rig.submit(StopRequest{});
+    ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 60s));
+    const auto at = rig.load_mm();
+    rig.run(3s);
+    if (stop->value().state == CommandState::done) EXPECT_NEAR(rig.load_mm(), at, 0.01);
+  }
+}
+
 /// The sample that looks whether the counter was zeroed may be the only one that shows an alarm.
 TEST(M05, AnAlarmWhileTheCounterIsZeroed) {
   const RigOptions rotary{
