@@ -40,7 +40,7 @@ class AxisGate {
   }
   /// Stops were requested that the core has not served yet: nothing new may be accepted before them.
   [[nodiscard]] bool stop_pending() const { return pending_stops_.load(std::memory_order_acquire) > 0; }
-  /// Thread: core. One stop that was asked for by request_stop() has been served to the end.
+  /// Thread: core. One stop that was asked for by request_stop() has been passed on to its bus.
   void stop_passed_on() {
     if (bus_) bus_->take();
   }

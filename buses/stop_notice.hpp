@@ -16,7 +16,7 @@ class StopNotice {
   }
   /// One that was given has been served: what it asks of the bus is in the bus's hands. Thread: core.
   void take() { pending_.fetch_sub(1, std::memory_order_release); }
-  /// One is on its way; given() is of that one, or of a later one.
+  /// One is on its way; given() is of that one, or of another.
   [[nodiscard]] bool pending() const { return pending_.load(std::memory_order_acquire) > 0; }
   /// When the last was given; long ago if never.
   [[nodiscard]] TimePoint given() const { return given_.load(std::memory_order_relaxed); }

@@ -150,8 +150,9 @@ Error RtuWorker::serve(SerialPort port) {
     lost = session.find_echo();
     if (lost == 0) lost = session.keep_silence();
     if (lost != 0) break;
-    session.finish_silence([this] { return awaits_stop(); });
-    if (yield_to_stop()) continue;
+    bool announced = false;
+    session.finish_silence([&] { return announced = awaits_stop(); });
+    if (yield_to_stop() || announced) continue;
     // As late as possible, when the silence is over: until here a stop could take the exchange back.
     if (const auto* exchange = take()) {
       yielded_ = false;

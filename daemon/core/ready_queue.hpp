@@ -11,7 +11,7 @@ namespace axisd::core {
 
 /// What the core thread has to do. An io_context would look for input before each handler, which costs a
 /// system call each time: a sequence that is resumed takes several steps. What comes in by the io_context is
-/// only entered here, so that each handler of the core runs in run_one(), one at a time.
+/// only entered here, so that the core's handlers run one at a time, and in their order but for run_first().
 class ReadyQueue {
  public:
   /// What other threads ask for comes by `io`, and wakes it.
