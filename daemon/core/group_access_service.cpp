@@ -96,6 +96,7 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
     for (std::size_t i = 0; i < commands.size(); ++i) gather(gathering, known + i, commands[i], until);
   };
   std::vector<std::shared_ptr<AxisGate>> gates;
+  gates.reserve(axes.size());
   for (const auto& axis : axes) gates.push_back(table->find(axis)->gate);
   loop_->lane().request(std::move(gates), std::move(serve));
 }

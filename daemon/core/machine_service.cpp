@@ -127,6 +127,7 @@ void MachineService::stop_all(std::string client, WaitUntil until,
   const auto table = machine_->table();
   if (table->faces.empty()) return post(loop_->executor(), std::move(serve));
   std::vector<std::shared_ptr<AxisGate>> gates;
+  gates.reserve(table->faces.size());
   for (const auto& [name, axis] : table->faces) gates.push_back(axis->gate);
   loop_->lane().request(std::move(gates), std::move(serve));
 }
