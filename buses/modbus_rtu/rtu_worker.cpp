@@ -154,13 +154,12 @@ Error RtuWorker::serve(SerialPort port) {
     session.finish_silence([&] { return announced = awaits_stop(); });
     if (yield_to_stop() || announced) continue;
     // As late as possible, when the silence is over: until here a stop could take the exchange back.
-    if (const auto* exchange = take()) {
-      yielded_ = false;
+    const auto* exchange = take();
+    yielded_ = false;
+    if (exchange != nullptr)
       bind(session, *exchange, lost);
-    } else {
-      yielded_ = false;
+    else
       idle(session, lost);
-    }
   }
   return lost_error(settings_, path, lost);
 }
