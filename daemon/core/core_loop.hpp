@@ -23,7 +23,7 @@ namespace axisd::core {
 class StopLane {
  public:
   explicit StopLane(ReadyQueue& core) : core_(&core) {}
-  /// `serve` stops the axes of all `gates`.
+  /// `serve` stops the axes of all `gates`; none where only the core knows which.
   void request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve);
   /// False: there was none. Thread: core.
   bool drain();

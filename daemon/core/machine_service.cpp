@@ -125,7 +125,6 @@ void MachineService::stop_all(std::string client, WaitUntil until,
       });
   };
   const auto table = machine_->table();
-  if (table->faces.empty()) return post(loop_->executor(), std::move(serve));
   std::vector<std::shared_ptr<AxisGate>> gates;
   gates.reserve(table->faces.size());
   for (const auto& [name, axis] : table->faces) gates.push_back(axis->gate);
@@ -161,8 +160,9 @@ std::shared_ptr<void> MachineService::watch_command(std::string id, CommandCallb
   return token;
 }
 
+/// Halts an axis, which only the core knows.
 void MachineService::cancel_command(std::string id, CommandCallback callback) {
-  post(loop_->executor(), [this, id = std::move(id), callback = std::move(callback)]() mutable {
+  loop_->lane().request({}, [this, id = std::move(id), callback = std::move(callback)]() mutable {
     const auto command = machine_->book().find(id);
     if (!command) return callback(unknown_command(id));
     auto* axis = machine_->find(command->value().axis);

@@ -1,7 +1,11 @@
 #include "daemon/core/machine_core.hpp"
 
 #include <stdexcept>
+#include <thread>
+#include <vector>
 
+#include "daemon/core/core_loop.hpp"
+#include "daemon/core/machine_service.hpp"
 #include "tests/unit/daemon/core/machine_rig.hpp"
 
 namespace axisd::core {
@@ -55,6 +59,26 @@ TEST_F(ThreeAxes, StopAllStopsMovingAxesFirstAndSilentOnesLast) {
   EXPECT_EQ((*stops[2])->value().state, CommandState::unknown) << "nobody answered";
   EXPECT_EQ(*machine_->inhibited_by(), "operator");
   EXPECT_TRUE(store_.saved.inhibit.active);
+}
+
+/// It halts the axis, so it comes before whatever else waits for the core.
+TEST_F(ThreeAxes, ACancelledCommandHaltsBeforeHandlersThatAreReady) {
+  start();
+  const auto run = machine_->submit("a1", MoveVelocityRequest{.velocity = 50}, {});
+  ASSERT_TRUE(run);
+  world_.run_for(500ms);
+  CoreLoop loop;
+  MachineService service(loop, *machine_, "three", "t");
+  std::vector<CommandState> seen_by_ready;
+  post(loop.executor(), [&] {
+    post(loop.executor(), [&] { seen_by_ready.push_back((*run)->value().state); });
+    std::thread([&] { service.cancel_command((*run)->value().id, [](const Result<Command>&) {}); }).join();
+    post(loop.executor(), [&] { loop.stop(); });
+  });
+  loop.run();
+  EXPECT_EQ(seen_by_ready, std::vector{CommandState::aborted});
+  world_.run_for(2s);
+  EXPECT_FALSE(line_->network().node(1)->shaft_moving());
 }
 
 TEST_F(ThreeAxes, AFullDiskDoesNotDelayStopAll) {
