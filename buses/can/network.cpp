@@ -43,9 +43,7 @@ void Network::set_stalled(bool stalled) {
   arbitrate();
 }
 
-Duration Network::frame_time(const Frame& frame) const {
-  return std::chrono::nanoseconds(worst_case_bits(frame) * std::int64_t{1'000'000'000} / bitrate_);
-}
+Duration Network::frame_time(const Frame& frame) const { return worst_case_time(frame, bitrate_); }
 
 void Network::arbitrate() {
   if (on_wire_ || stalled_) return;

@@ -70,6 +70,10 @@ int worst_case_bits(const Frame& frame) {
   return stuffed + (stuffed - 1) / 4 + 13;
 }
 
+Duration worst_case_time(const Frame& frame, int bit_rate) {
+  return std::chrono::nanoseconds(worst_case_bits(frame) * std::int64_t{1'000'000'000} / bit_rate);
+}
+
 std::string_view to_string(SendStatus status) {
   switch (status) {
     case SendStatus::sent:
