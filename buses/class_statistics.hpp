@@ -22,7 +22,7 @@ struct ClassStatistics {
   std::size_t waiting = 0;  ///< now
   std::size_t most_waiting = 0;
   /// From being asked for to the first byte, with the silence before it; on CAN to the end of the first
-  /// frame.
+  /// frame. What waits for a silent node's next probe counts from there.
   LatencyHistogram queueing;
   /// From there to the end of the reply, or of the wait for it.
   LatencyHistogram exchange;

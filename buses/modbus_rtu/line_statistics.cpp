@@ -43,13 +43,15 @@ void LineStatistics::sent(const Transaction& transaction, const ExchangeResult& 
   const auto& exchange = transaction.exchange;
   auto& of_class = classes_.at(std::to_underlying(transaction.transaction_class));
   ++of_class.sent;
-  of_class.queueing.add(result.request_begin - transaction.queued_at);
+  of_class.queueing.add(result.request_begin - std::max(transaction.queued_at, transaction.released_at));
   of_class.exchange.add(result.reply_end - result.request_begin);
   auto& node = nodes_[exchange.request.node];
   const auto begin = result.request_begin - silence(exchange.serial.value_or(serial_));
   const auto before = load_.occupied();
   load_.add(begin, result.reply_end);
   node.occupied += load_.occupied() - before;
+  count(node, result);
+  if (transaction.resync) return;
   Asked asked{.function = exchange.request.function,
               .address = exchange.request.address,
               .count = exchange.request.count,
@@ -58,7 +60,6 @@ void LineStatistics::sent(const Transaction& transaction, const ExchangeResult& 
   if (asked == last) ++node.repeats;
   asked.in_vain = result.status != ExchangeStatus::replied;
   last = asked;
-  count(node, result);
 }
 
 void LineStatistics::count(NodeStatistics& node, const ExchangeResult& result) {

@@ -22,7 +22,8 @@ struct BusCounters {
 struct NodeStatistics {
   std::uint64_t replies = 0;  ///< exceptions included
   std::uint64_t timeouts = 0, corrupt = 0, io_errors = 0;
-  /// Exchanges that asked for the same as the one before, which had no sound reply.
+  /// Exchanges that asked for the same as the one before, which had no sound reply. What tells late replies
+  /// apart in between counts as neither.
   std::uint64_t repeats = 0;
   /// Replies that refused, by exception code; what is above 15 is no code of the standard: under 0.
   std::array<std::uint64_t, 16> exceptions{};

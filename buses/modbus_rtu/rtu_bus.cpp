@@ -262,7 +262,7 @@ void RtuBus::await_release() {
 void RtuBus::release_ready() {
   const auto now = clock_->now();
   for (const auto node : queue_.held_nodes())
-    if (ready_at(node, now) <= now) queue_.release(node);
+    if (ready_at(node, now) <= now) queue_.release(node, now);
 }
 
 void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result) {
@@ -278,7 +278,7 @@ void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result
     case ExchangeStatus::replied:
     case ExchangeStatus::corrupt:  // somebody is there
       quarantine_.answered(node);
-      queue_.release(node);
+      queue_.release(node, clock_->now());
       break;
     default:
       break;
@@ -295,6 +295,8 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   resync->sequence = waiting->sequence;
   resync->reserved = waiting->reserved;
   resync->queued_at = waiting->queued_at;
+  resync->released_at = waiting->released_at;
+  resync->resync = true;
   resync->exchange = waiting->exchange;
   resync->exchange.then = nullptr;
   resync->exchange.known = nullptr;

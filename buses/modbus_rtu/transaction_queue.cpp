@@ -178,13 +178,16 @@ std::vector<TransactionPtr> TransactionQueue::take_expired(TimePoint now) {
   return taken;
 }
 
-void TransactionQueue::release(std::uint8_t node) {
+void TransactionQueue::release(std::uint8_t node, TimePoint now) {
   const auto found = held_.find(node);
   if (found == held_.end()) return;
   std::vector<Transaction*> aside;
   aside.reserve(found->second.size());
   for (const auto& one : found->second) aside.push_back(one.get());
-  for (auto* transaction : aside) insert(take(transaction), false);
+  for (auto* transaction : aside) {
+    transaction->released_at = now;
+    insert(take(transaction), false);
+  }
 }
 
 std::vector<std::uint8_t> TransactionQueue::held_nodes() const {

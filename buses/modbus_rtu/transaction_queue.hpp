@@ -25,6 +25,8 @@ struct Transaction {
   TransactionClass transaction_class = TransactionClass::parameters;
   std::uint64_t sequence = 0;  ///< order of arrival, unique; set by the queue
   TimePoint queued_at{};       ///< when it was asked for
+  TimePoint released_at{};     ///< when it needed to wait for its node no more; long ago if it never did
+  bool resync = false;         ///< nobody asked for it: it tells late replies from that of the next
   bool patient = false;        ///< though a stop, it waits as others do for a node in quarantine
   bool reserved = false;       ///< it was given out by the reservation: only a stop may take its place
   Watch* watch = nullptr;      ///< that may repeat it
@@ -62,7 +64,7 @@ class TransactionQueue {
   /// Puts one aside: it is not given out before release() of its node.
   void hold(TransactionPtr transaction);
   /// What was put aside for `node` takes its places again.
-  void release(std::uint8_t node);
+  void release(std::uint8_t node, TimePoint now);
   /// Nodes for which something was put aside.
   [[nodiscard]] std::vector<std::uint8_t> held_nodes() const;
   /// Class of the next one by strict order.

@@ -87,6 +87,41 @@ TEST(LineStatistics, RepeatIsTheSameRequestAfterOneInVain) {
   EXPECT_EQ(statistics.nodes().at(1).repeats, 1U);
 }
 
+/// A read that has to tell late replies apart goes in between, and is not what was asked for.
+TEST(LineStatistics, AReadThatTellsLateRepliesApartHidesNoRepeat) {
+  BusRig rig;
+  rig.read("sound", 0, 3);
+  rig.world.run_for(1s);
+  rig.line->network().faults().add({.kind = simulation::FaultKind::drop_reply});
+  rig.read("lost", 0, 2);
+  rig.world.run_for(1s);
+  rig.read("again", 0, 2);
+  rig.world.run_for(1s);
+  const auto statistics = rig.bus->statistics();
+  EXPECT_EQ(statistics.nodes().at(1).timeouts, 1U);
+  EXPECT_EQ(statistics.nodes().at(1).replies, 3U);
+  EXPECT_EQ(statistics.nodes().at(1).repeats, 1U);
+}
+
+/// What a silent node has to wait for of purpose says nothing of how soon its class has its turn.
+TEST(LineStatistics, WaitingForTheNextProbeOfASilentNodeIsNotQueueing) {
+  BusRig rig;
+  for (int i = 0; i < 6; ++i) {
+    rig.read("silent", 0, 1, 9);
+    while (rig.results.erase("silent") == 0) rig.world.run_for(1ms);
+  }
+  rig.transact("stop",
+               {.node = 9, .function = Function::write_single_register, .address = 0x0028, .values = {0}},
+               {.transaction_class = TransactionClass::stop, .patient = true});
+  rig.world.run_for(10s);
+  const auto statistics = rig.bus->statistics();
+  EXPECT_EQ(parameters(statistics).sent, 6U);
+  EXPECT_LT(parameters(statistics).queueing.longest(), 50ms);
+  const auto& stops = statistics.classes().at(std::to_underlying(TransactionClass::stop));
+  EXPECT_EQ(stops.sent, 1U);
+  EXPECT_LT(stops.queueing.longest(), 50ms);
+}
+
 TEST(LineStatistics, CountsDropsByCause) {
   LineStatistics statistics({}, TimePoint{});
   Transaction motion;

@@ -157,8 +157,8 @@ TEST(TransactionQueue, WhatIsHeldWaitsForItsNodeAndIsHastenedWithIt) {
   EXPECT_EQ(queue.held_nodes(), (std::vector<std::uint8_t>{7, 8}));
   queue.hasten(8, Class::motion);
   EXPECT_EQ(queue.size(Class::motion), 0U);
-  queue.release(8);
-  queue.release(9);
+  queue.release(8, {});
+  queue.release(9, {});
   EXPECT_EQ(queue.held_nodes(), std::vector<std::uint8_t>{7});
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{8, 1}));
   EXPECT_EQ(queue.take_all().size(), 1U);
@@ -180,7 +180,7 @@ TEST(TransactionQueue, ReadsOfOneNodeAreTakenOutDownToAClassHeldOrNot) {
   EXPECT_TRUE(queue.take_reads(1, Class::idle_state).empty());
   EXPECT_TRUE(queue.take_reads(3, Class::idle_state).empty());
   EXPECT_EQ(queue.held_nodes(), (std::vector<std::uint8_t>{1, 2}));
-  queue.release(1);
+  queue.release(1, {});
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{6, 3, 4}));
 }
 
