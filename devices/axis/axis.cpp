@@ -129,7 +129,7 @@ void Axis::on_sample(const DriveSample& sample) {
       sample.mode != DriveMode::homing && limit_active(last_positive_))
     lose_trust();  // open loop: the overtravel stop has no ramp (M20)
   if (!sample.enabled) on_released(sample, before && before->enabled);
-  if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = false;
+  if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = left_running_ = false;
   if (link_ == LinkState::online)
     observed_.on_sample(sample, busy());
   else

@@ -346,7 +346,7 @@ class Axis {
   Task<Result<void>> stop_and_confirm();
   Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
   Task<bool> standstill_unpolled(TimePoint deadline, std::optional<int> requests);
-  void keep_deceleration(const Activity& activity);
+  void leave_running(const Activity& activity);
   [[nodiscard]] Duration deceleration_bound() const;
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
   /// "{what} alarm 2 (overvoltage)", with what there is to do.
@@ -403,6 +403,8 @@ class Axis {
   ObservedTimes observed_;
   std::optional<Error> bus_loss_;  ///< not yet acted upon
   bool stop_owed_ = false;         ///< M4: to a silent node, until standstill is confirmed
+  bool left_running_ = false;      ///< a command has ended, and what it began may go on
+  std::string arrival_;            ///< what connecting found, to be told when the drive is online
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed

@@ -267,7 +267,7 @@ void Axis::Member::end(Error cause, bool aborted) {
   if (activity_->may_run) {
     // The stop of one that may move goes out whatever is known of its start.
     axis.tracker_.forget_target();
-    axis.keep_deceleration(*activity_);
+    axis.leave_running(*activity_);
     axis.stopping_.shown = activity_->state;
     if (unknown) {
       ++axis.unknown_starts_.unresolved;

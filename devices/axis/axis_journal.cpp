@@ -33,13 +33,13 @@ void Axis::take_over() {
     const auto& command = earlier.command->value();
     spdlog::warn("{}: the daemon ended while {} {} was being executed; asking the drive", settings_.name,
                  to_string(command.kind), command.id);
-    if (moves(command.kind)) stop_owed_ = true;
+    if (moves(command.kind)) stop_owed_ = left_running_ = true;
     if (command.kind == CommandKind::home) position_unsettled_ = true;
   }
   if (auto cause = env_.book->take_unknown_outcome(settings_.name)) {
     spdlog::error("{}", to_string(*cause));
     fault_ = std::move(cause);
-    stop_owed_ = true;
+    stop_owed_ = left_running_ = true;
   }
   publish();
 }

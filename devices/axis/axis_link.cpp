@@ -39,8 +39,8 @@ Task<> Axis::connect() {
       link_ = LinkState::online;
       link_error_.reset();
       watch_continuity();
-      spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
-                   identity_ ? identity_->version : "");
+      spdlog::info("{}: online ({} {}){}{}", settings_.name, settings_.model,
+                   identity_ ? identity_->version : "", arrival_.empty() ? "" : ": ", arrival_);
       break;
     }
     const bool answers =
@@ -104,8 +104,12 @@ bool Axis::found_by_terminal() const {
 
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
+  std::string arrival = stop_owed_ ? "the stop that was owed to it was sent; it rests" : "";
   if (found_in_motion() && !found_by_terminal()) {
-    if (!stop_owed_) spdlog::warn("{}: found moving; stopping it", settings_.name);
+    if (!stop_owed_) {
+      spdlog::warn("{}: found moving; stopping it", settings_.name);
+      arrival = "it was found moving, and was stopped";
+    }
     stop_owed_ = true;
     bool rests = false;
     for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
@@ -125,7 +129,8 @@ Task<Result<void>> Axis::settle_found_motion() {
                            "look at the machine; cut its power if it moves"));
     }
   }
-  stop_owed_ = false;
+  if (!arrival.empty()) arrival_ = std::move(arrival);
+  stop_owed_ = left_running_ = false;
   co_return Result<void>{};
 }
 
@@ -250,7 +255,7 @@ void Axis::go_offline(const Error& cause) {
                          "check power and wiring; then reset the axis");
     unknown.outcome = Outcome::unknown;
     if (activity->state != AxisState::standstill && !fault_) fault_ = unknown;
-    keep_deceleration(*activity);
+    leave_running(*activity);
     activity->command->unknown(unknown);
     drop_buffer(unknown);
   }

@@ -56,7 +56,7 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
   revoke_motion();
   tracker_.forget_target();
-  keep_deceleration(activity);
+  leave_running(activity);
   stopping_.shown = activity.state;
   begin_stop(StopKind::stop, false, nullptr);
   finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
@@ -67,7 +67,7 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
 void Axis::abort_at_rest(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
   revoke_motion();
-  keep_deceleration(activity);
+  leave_running(activity);
   begin_stop(StopKind::halt, false, nullptr);
   finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
@@ -79,7 +79,7 @@ void Axis::enter_error_stop(const Error& cause) {
     fault_ = cause;
   }
   if (auto activity = std::exchange(activity_, nullptr)) {
-    keep_deceleration(*activity);
+    leave_running(*activity);
     activity->command->error(cause);
     drop_buffer(cause);
   }
@@ -309,7 +309,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       const bool jog = activity->command->value().kind == CommandKind::jog;
       stopping_.shown = activity->state;
       revoke_motion();
-      keep_deceleration(*activity);
+      leave_running(*activity);
       begin_stop(StopKind::halt, false, nullptr);
       auto cause =
           error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");

@@ -56,10 +56,11 @@ void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
 
 void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
   if (!env_.event) return;
-  if (before.link != now.link)
-    env_.event(
-        settings_.name,
-        LinkChange{.to = now.link, .detail = now.link_error ? now.link_error->message : std::string()});
+  if (before.link != now.link) {
+    auto detail = now.link_error ? now.link_error->message : std::string();
+    if (now.link == LinkState::online) detail = std::exchange(arrival_, {});
+    env_.event(settings_.name, LinkChange{.to = now.link, .detail = std::move(detail)});
+  }
   if (before.state != now.state)
     env_.event(settings_.name, StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});
   if (before.drift != now.drift) env_.event(settings_.name, ConfigurationDrift{.text = now.drift});
@@ -67,9 +68,9 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
 
 MotionCause Axis::motion_cause() const {
   if (terminal_motion_) return MotionCause::terminal;
-  if ((activity_ && activity_->state != AxisState::standstill) || stopping_.running)
-    return sample_ && sample_->moving ? MotionCause::command : MotionCause::none;
-  return sample_ && sample_->moving ? MotionCause::unknown : MotionCause::none;
+  if (!sample_ || !sample_->moving) return MotionCause::none;
+  const bool ours = (activity_ && activity_->state != AxisState::standstill) || left_running_;
+  return ours ? MotionCause::command : MotionCause::unknown;
 }
 
 /// False: nothing was written since the last look. Else the next sample is published, whatever it says.

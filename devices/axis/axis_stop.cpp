@@ -29,7 +29,7 @@ void Axis::supersede(const Error& cause) {
   ++accept_epoch_;
   revoke_motion();
   if (auto activity = std::exchange(activity_, nullptr)) {
-    keep_deceleration(*activity);
+    leave_running(*activity);
     if (activity->state != AxisState::standstill) tracker_.forget_target();
     auto told = cause;
     const bool enabling = activity->noted && activity->command->value().kind == CommandKind::enable;
@@ -57,9 +57,12 @@ void Axis::begin_stop(StopKind kind, bool hold, CommandPtr command) {
   }
 }
 
-/// A command that never started leaves the ramps of the motion before it in force.
-void Axis::keep_deceleration(const Activity& activity) {
-  if (activity.may_run) last_deceleration_ = activity.plan.deceleration_time;
+/// What the drive may go on with after its command has ended. A command that never started leaves the ramps
+/// of the motion before it in force.
+void Axis::leave_running(const Activity& activity) {
+  if (!activity.may_run) return;
+  last_deceleration_ = activity.plan.deceleration_time;
+  left_running_ = left_running_ || activity.state != AxisState::standstill;
 }
 
 /// What a stop may take: the drive keeps the deceleration time that was set before the motion (7.6.2).
@@ -75,7 +78,7 @@ Task<> Axis::run_stop() {
   tracker_.forget_target();
   if (confirmed) {
     observed_.standstill_confirmed(env_.clock->now());
-    stop_owed_ = false;
+    stop_owed_ = left_running_ = false;
     // Open loop: a stop without a ramp may have lost steps (M12).
     if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
     remember_position();

@@ -1,0 +1,107 @@
+// M4: what is known and told of a motion that nobody watched, and of the stop that is owed to it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+template <class Content>
+std::vector<Content> told(const Rig& rig) {
+  std::vector<Content> all;
+  for (const auto& event : rig.machine->events().events_after(0, 1000).events)
+    if (const auto* content = std::get_if<Content>(&event.content)) all.push_back(*content);
+  return all;
+}
+
+/// What was told when the drive came online last.
+std::string arrival(const Rig& rig) {
+  auto changes = told<LinkChange>(rig);
+  std::erase_if(changes, [](const LinkChange& change) { return change.to != LinkState::online; });
+  return changes.empty() ? "never" : changes.back().detail;
+}
+
+void restore_cable(Rig& rig) {
+  rig.line->network().set_connected(true);
+  rig.reconnect();
+  rig.run(2s);
+}
+
+TEST(M04, AMotionThatIsNotWatchedAnyMoreIsStillThatOfItsCommand) {
+  for (const auto after : {50ms, 400ms}) {  // before and after it was seen
+    Rig rig;
+    rig.ready();
+    rig.submit(MoveVelocityRequest{.velocity = 50});
+    rig.run(after);
+    rig.line->network().set_connected(false);
+    rig.run(600ms);
+    ASSERT_EQ(rig.state()->link, LinkState::offline);
+    EXPECT_NE(rig.state()->motion_cause, MotionCause::unknown);
+    restore_cable(rig);
+    EXPECT_EQ(rig.state()->motion_cause, MotionCause::none);
+    for (const auto& change : told<StateChange>(rig)) EXPECT_NE(change.cause, MotionCause::unknown);
+  }
+}
+
+TEST(M04, SoIsOneWhoseStopWasNotConfirmed) {
+  Rig rig;
+  rig.ready();
+  rig.submit(MoveVelocityRequest{.velocity = 20});
+  rig.run(400ms);
+  rig.fault({.kind = simulation::FaultKind::drop_request, .register_address = 0x0028, .count = -1});
+  EXPECT_EQ(rig.complete(StopRequest{}).state, CommandState::error);
+  ASSERT_TRUE(rig.state()->moving);
+  EXPECT_EQ(rig.state()->motion_cause, MotionCause::command);
+  rig.faults().clear();
+  rig.run(5s);
+  EXPECT_EQ(rig.state()->motion_cause, MotionCause::none);
+}
+
+TEST(M04, SoIsOneThatAnEarlierDaemonBegan) {
+  Rig rig({.persistence = true, .journal = true});
+  rig.ready();
+  rig.submit(MoveVelocityRequest{.velocity = 50}, {.client = "c", .request_id = "r"});
+  rig.run(400ms);
+  rig.kill_daemon();
+  rig.start_daemon();
+  rig.run(5s);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  for (const auto& change : told<StateChange>(rig)) EXPECT_NE(change.cause, MotionCause::unknown);
+}
+
+TEST(M04, AMotionOfNobodyIsNotOurs) {
+  Rig rig;
+  rig.ready();
+  rig.submit(MoveVelocityRequest{.velocity = 50});
+  rig.run(400ms);
+  rig.complete(StopRequest{});
+  rig.write_behind(0x0023, 100);
+  rig.write_behind(0x0027, 2);
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->motion_cause == MotionCause::unknown; }, 2s));
+}
+
+TEST(M04, AnOwedStopThatCameThroughIsTold) {
+  Rig rig;
+  rig.ready();
+  EXPECT_EQ(arrival(rig), "");
+  rig.submit(MoveVelocityRequest{.velocity = 50});
+  rig.run(400ms);
+  rig.line->network().set_connected(false);
+  rig.run(600ms);
+  restore_cable(rig);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  EXPECT_EQ(arrival(rig), "the stop that was owed to it was sent; it rests");
+  rig.cycle_power(3s);
+  restore_cable(rig);
+  EXPECT_EQ(arrival(rig), "") << "it rested before";
+}
+
+}  // namespace
+}  // namespace axisd::test
