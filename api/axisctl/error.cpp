@@ -29,6 +29,11 @@ Failure unreachable(const grpc::Status& status, std::string_view server, bool tl
   return {ExitCode::unreachable, fmt::format("cannot reach axisd at {}: {}; {}", server, reason, remedy)};
 }
 
+/// In the words of the daemon's log.
+std::string object_text(std::uint32_t object) {
+  return fmt::format("{} {}", object <= 0xFFFF ? "register" : "object", address_text(object));
+}
+
 }  // namespace
 
 std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status) {
@@ -49,7 +54,7 @@ std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
   std::string text;
   if (!detail.bus().empty()) text = detail.bus();
   if (detail.has_node()) text += fmt::format("{}node {}", text.empty() ? "" : " ", detail.node());
-  if (detail.has_object()) text += (text.empty() ? "object " : " object ") + address_text(detail.object());
+  if (detail.has_object()) text += fmt::format("{}{}", text.empty() ? "" : " ", object_text(detail.object()));
   if (!text.empty()) text += ": ";
   text += message.empty() ? lower_word(v1::Reason_Name(detail.reason()), "REASON_") : message;
   if (detail.has_permitted() && !message.contains("permitted"))

@@ -49,7 +49,13 @@ TEST(ErrorText, AddressLeads) {
   detail.set_bus("line-a");
   detail.set_node(3);
   detail.set_object(0x27);
-  EXPECT_EQ(describe(detail), "line-a node 3 object 0x0027: refused");
+  EXPECT_EQ(describe(detail), "line-a node 3 register 0x0027: refused");
+  detail.set_bus("can0");
+  detail.set_object(0x604100);
+  EXPECT_EQ(describe(detail), "can0 node 3 object 6041h:00: refused");
+  detail.clear_bus();
+  detail.clear_node();
+  EXPECT_EQ(describe(detail), "object 6041h:00: refused");
 }
 
 TEST(ErrorText, DetailComesFromTheTrailer) {
