@@ -83,6 +83,8 @@ struct LoadResult {
   std::optional<Configuration> configuration;  ///< set if there is no diagnostic
   std::vector<Diagnostic> diagnostics;         ///< all errors at once, in the order of the file
   std::string text{};                          ///< of load_file(): what was read
+  /// What was read where nothing but `budget: refuse` is against it: not to be served, but has figures.
+  std::optional<Configuration> over_budget{};
 };
 
 /// Reads and checks a file completely. Never throws.

@@ -55,8 +55,10 @@ LoadResult load_text(std::string_view text, const std::string& file_name) try {
   for (auto& entry : configuration.axes) complete_axis(entry, diagnostics, places);
   check_devices(configuration, diagnostics, places);
   check_machine(configuration, diagnostics, places);
-  if (diagnostics.empty()) check_budgets(configuration, diagnostics, places);
   if (!diagnostics.empty()) return {{}, diagnostics.sorted()};
+  check_budgets(configuration, diagnostics, places);
+  if (!diagnostics.empty())
+    return {.diagnostics = diagnostics.sorted(), .over_budget = std::move(configuration)};
   return {std::move(configuration), {}};
 } catch (const std::exception& error) {  // out of memory
   return {{}, {{file_name, 0, 0, fmt::format("cannot be loaded: {}", printable(error.what())), ""}}};

@@ -26,16 +26,14 @@ void show(const Invocation& invocation, const v1::GetBudgetResponse& response) {
 
 void budget_of_file(Invocation& invocation, const std::string& path) {
   const auto result = config::load_file(path);
-  if (!result.configuration) {
-    invocation.status = ExitCode::usage;
-    for (const auto& diagnostic : result.diagnostics)
-      fmt::print(stderr, "{}\n", config::to_string(diagnostic));
-    return;
+  const auto& configuration = result.configuration ? result.configuration : result.over_budget;
+  if (configuration) {
+    v1::GetBudgetResponse response;
+    for (const auto& report : config::budgets(*configuration)) api::to_proto(report, *response.add_budgets());
+    show(invocation, response);
   }
-  v1::GetBudgetResponse response;
-  for (const auto& report : config::budgets(*result.configuration))
-    api::to_proto(report, *response.add_budgets());
-  show(invocation, response);
+  if (!result.configuration) invocation.status = ExitCode::usage;
+  for (const auto& diagnostic : result.diagnostics) fmt::print(stderr, "{}\n", config::to_string(diagnostic));
 }
 
 }  // namespace

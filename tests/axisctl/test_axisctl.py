@@ -76,13 +76,6 @@ class Reading(AxisctlTest):
         self.assertIn("not cycled after bus-off: there is no link helper; enable axisd-link.socket", text)
         self.assertEqual(self.json("buses")[0]["buses"][0]["transactions"], "1234")
 
-    def test_budget_shows_predicted_beside_seen(self):
-        text = self.ok("budget")
-        self.assertRegex(text, r"\n +0 +0\.25 +0\.50 +- +300\.0 ms\n")
-        self.assertRegex(text, r"\nfeeder +alone +28\.0 ms +7\.0 ms +- \+ 150\.0 ms +10\.5 mm\n")
-        self.assertIn("exceeded (stop_bound): too late; raise it\nnote: a note\n", text)
-        self.assertEqual(self.json("budget")[0]["budgets"][0]["axes"][0]["observed"]["stop_frame"], "0.007s")
-
     def test_info(self):
         self.assertRegex(self.ok("info"), r"machine: +press-1\n(.*\n)*motion: +permitted")
         self.assertEqual(self.json("info")[0]["instance_id"], "fake")
@@ -323,16 +316,6 @@ class Offline(AxisctlTest):
             listed = self.run_axisctl("--json", "check", str(path))
             self.assertEqual(listed.returncode, 2)
             self.assertIn('"valid":false', listed.stdout)
-
-    def test_budget_of_a_file(self):
-        source = pathlib.Path(__file__).parents[2]
-        text = self.ok("budget", str(source / "config/examples/demo.yaml"))
-        self.assertRegex(text, r"(?s)^line-a\nMOVING +UTILISATION.*\nSTOPPED +LAST FRAME.*\nfeeder +all .*\ncan0\n")
-        buses = self.json("budget", str(source / "config/examples/demo.yaml"))[0]["budgets"]
-        self.assertEqual([len(bus["stops"]) for bus in buses], [5, 1])
-        refused = self.run_axisctl("budget", str(source / "tests/broken/budget.yaml"))
-        self.assertEqual((refused.returncode, refused.stdout), (2, ""))
-        self.assertRegex(refused.stderr, r"budget\.yaml:8:19: bus 'line-a': the last stop frame of all axes may take")
 
     def test_schema(self):
         self.assertTrue(self.ok("schema").startswith("{"))

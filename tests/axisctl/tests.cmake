@@ -7,6 +7,8 @@ if(AXISD_GRPC)
   find_program(AXISD_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
   add_test(NAME axisctl.against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl.py)
+  add_test(NAME axisctl.budgets
+           COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_budget.py)
   add_test(NAME axisctl.drives_against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_drives.py)
   add_test(NAME axisctl.scripts_and_plots
@@ -17,7 +19,7 @@ if(AXISD_GRPC)
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_leases.py)
   add_test(NAME explain.against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_explain.py)
-  set_tests_properties(axisctl.against_fake_daemon axisctl.drives_against_fake_daemon
+  set_tests_properties(axisctl.against_fake_daemon axisctl.budgets axisctl.drives_against_fake_daemon
                        axisctl.scripts_and_plots explain.against_fake_daemon leases.against_fake_daemon python_client.against_fake_daemon PROPERTIES
                        ENVIRONMENT "AXISCTL=$<TARGET_FILE:axisctl>" TIMEOUT 600)
 endif()

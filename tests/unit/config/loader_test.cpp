@@ -34,6 +34,15 @@ TEST(Loader, SaysExactlyWhatIsBroken) {
   }
 }
 
+TEST(Loader, WhatOnlyItsBudgetForbidsHasFiguresAllTheSame) {
+  const auto text = read_text(source_path("tests/broken/budget.yaml"));
+  const auto refused = load_text(text, "budget.yaml");
+  EXPECT_FALSE(refused.configuration);
+  ASSERT_TRUE(refused.over_budget);
+  EXPECT_EQ(refused.over_budget->axes.size(), 3U);
+  EXPECT_FALSE(load_text(text + "nonsense: 1\n", "budget.yaml").over_budget);
+}
+
 TEST(Loader, DemoIsSixSimulatedAxesOfFourModels) {
   const auto result = load_file(source_path("config/examples/demo.yaml"));
   ASSERT_TRUE(result.configuration) << findings(result);
