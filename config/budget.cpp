@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "buses/budget_can.hpp"
 #include "buses/budget_rtu.hpp"
@@ -128,6 +129,7 @@ BusBudgetReport report_on(BusKind kind, const BudgetPolicy& policy, const Demand
 
 std::vector<BusBudgetReport> budgets(const Configuration& configuration) {
   std::vector<BusBudgetReport> reports;
+  reports.reserve(configuration.lines.size() + configuration.networks.size());
   for (const auto& line : configuration.lines)
     reports.push_back(
         report_on(BusKind::modbus_rtu, line.budget, demand_of(line, configuration), configuration));
@@ -147,6 +149,21 @@ std::string summary(const BusBudgetReport& report) {
       budget.bus, budget.load.front().utilisation, budget.load.back().utilisation,
       shown(budget.stops.front().last_frame), budget.stops.size(), shown(budget.stops.back().last_frame),
       shown(budget.load.back().refresh_moving));
+}
+
+std::vector<std::string> warnings(const BusBudgetReport& report) {
+  std::vector<std::string> lines;
+  lines.reserve(report.excess.size());
+  for (const auto& [key, text, remedy] : report.excess)
+    lines.push_back(fmt::format("{}: {}; {}", report.predicted.bus, text, remedy));
+  return lines;
+}
+
+std::vector<std::string> warnings(const Configuration& configuration) {
+  std::vector<std::string> lines;
+  for (const auto& report : budgets(configuration))
+    std::ranges::move(warnings(report), std::back_inserter(lines));
+  return lines;
 }
 
 void check_budgets(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {

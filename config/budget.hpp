@@ -16,4 +16,10 @@ std::vector<BusBudgetReport> budgets(const Configuration& configuration);
 /// "line-a: utilisation 0.31 (all axes moving 2.87), last stop frame of 8 axes within 220 ms, ..."
 std::string summary(const BusBudgetReport& report);
 
+/// What a bus does not meet, one line each: "line-a: the last stop frame of all axes may take ...; lower
+/// ...".
+std::vector<std::string> warnings(const BusBudgetReport& report);
+/// The same of all buses. Precondition: that of budgets().
+std::vector<std::string> warnings(const Configuration& configuration);
+
 }  // namespace axisd::config

@@ -130,8 +130,7 @@ server::ServerOptions server_options(const config::ServerSettings& settings) {
 
 void log_budget(const BusBudgetReport& budget) {
   spdlog::info("budget of {}", config::summary(budget));
-  for (const auto& [key, text, remedy] : budget.excess)
-    spdlog::warn("{}: {}; {}", budget.predicted.bus, text, remedy);
+  for (const auto& warning : config::warnings(budget)) spdlog::warn("{}", warning);
 }
 
 /// Precondition: the directory is locked.

@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "config/budget.hpp"
 #include "config/configuration.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/options.hpp"
@@ -16,6 +17,8 @@ int main(int argc, char** argv) {
   if (!loaded.configuration) return 2;
   auto& configuration = *loaded.configuration;
   if (options.check) {
+    for (const auto& warning : axisd::config::warnings(configuration))
+      std::cerr << options.config << ": warning: " << warning << '\n';
     std::cout << options.config << ": ok (" << configuration.axes.size() << " axes on "
               << configuration.lines.size() + configuration.networks.size() << " buses)\n";
     return 0;

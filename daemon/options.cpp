@@ -12,7 +12,7 @@ Options parse_options(int argc, char** argv) {
   app.footer("Exit status: 0 ended in order; 1 failed while running; 2 bad command line or configuration.");
   app.set_version_flag("--version", std::string("axisd ") + AXISD_VERSION);
   app.add_option("--config", options.config, "configuration file")->capture_default_str();
-  app.add_flag("--check", options.check, "check the configuration, print every error, and exit");
+  app.add_flag("--check", options.check, "check the configuration, print every error and warning, and exit");
   app.add_flag("--schema", options.schema, "print the JSON Schema of the configuration, and exit");
   app.add_option("--quiesce", options.quiesce, "stop every drive of this configuration, report, and exit");
   app.add_option("--state-directory", options.state_directory,

@@ -5,18 +5,22 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "api/axisctl/completion.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/man_page.hpp"
 #include "api/axisctl/terminal.hpp"
+#include "config/budget.hpp"
 #include "config/configuration.hpp"
 
 namespace axisd::axisctl {
 namespace {
 
-google::protobuf::Struct as_message(const config::LoadResult& result) {
+google::protobuf::Struct as_message(const config::LoadResult& result,
+                                    const std::vector<std::string>& warnings) {
   google::protobuf::Struct message;
   (*message.mutable_fields())["valid"].set_bool_value(result.configuration.has_value());
   auto& list = *(*message.mutable_fields())["diagnostics"].mutable_list_value();
@@ -28,14 +32,19 @@ google::protobuf::Struct as_message(const config::LoadResult& result) {
     fields["message"].set_string_value(diagnostic.message);
     fields["suggestion"].set_string_value(diagnostic.suggestion);
   }
+  auto& warned = *(*message.mutable_fields())["warnings"].mutable_list_value();
+  for (const auto& warning : warnings) warned.add_values()->set_string_value(warning);
   return message;
 }
 
 void check(Invocation& invocation, const std::string& path) {
   const auto result = config::load_file(path);
   if (!result.configuration) invocation.status = ExitCode::usage;
-  if (invocation.json) return print_line(json(as_message(result)));
+  const auto warnings =
+      result.configuration ? config::warnings(*result.configuration) : std::vector<std::string>();
+  if (invocation.json) return print_line(json(as_message(result, warnings)));
   for (const auto& diagnostic : result.diagnostics) fmt::print(stderr, "{}\n", config::to_string(diagnostic));
+  for (const auto& warning : warnings) fmt::print(stderr, "{}: warning: {}\n", path, warning);
   if (result.configuration)
     print_line(fmt::format("{}: ok, machine '{}', axes: {}, buses: {}", path, result.configuration->machine,
                            result.configuration->axes.size(),

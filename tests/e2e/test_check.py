@@ -33,6 +33,20 @@ class Check(Scenario):
                 self.assertEqual((done.returncode, done.stderr), (0, ""))
                 self.assertRegex(done.stdout, r"\A" + str(path) + r": ok \(\d+ axes on \d+ buses\)\n\Z")
 
+    def test_a_budget_that_is_only_warned_of(self):
+        path = pathlib.Path(self.machine({}).path("warned.yaml"))
+        path.write_text((ROOT / "tests" / "broken" / "budget.yaml").read_text().replace("budget: refuse", "budget: warn"))
+        done, ctl = run([AXISD, "--check", "--config", str(path)]), run([AXISCTL, "check", str(path)])
+        for checked in (done, ctl):
+            self.assertEqual(checked.returncode, 0, checked)
+            self.assertRegex(checked.stdout, r"\A" + str(path) + r": ok[^\n]*\n\Z")
+            self.assertEqual(len(checked.stderr.splitlines()), 7, checked)
+            self.assertIn(f"{path}: warning: line-b: the last stop frame of all axes may take 88.0 ms, longer than 1 ms; "
+                          "lower turnaround_max, put axes on another bus, or raise stop_bound\n", checked.stderr)
+        self.assertEqual(done.stderr, ctl.stderr)
+        listed = json.loads(run([AXISCTL, "--json", "check", str(path)]).stdout)
+        self.assertEqual((listed["valid"], listed["diagnostics"], len(listed["warnings"])), (True, [], 7))
+
     def test_axisctl_agrees(self):
         for path in (BROKEN[0], BROKEN[-1], EXAMPLES[0]):
             daemon = run([AXISD, "--check", "--config", str(path)])
