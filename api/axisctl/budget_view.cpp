@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 
 #include "api/axisctl/format.hpp"
@@ -24,6 +25,11 @@ std::string seen(const google::protobuf::Duration& time) {
 /// Of many rows the first ones, then ever fewer, and the last.
 bool is_shown(std::uint32_t count, std::uint32_t last) {
   return count == 0 || std::has_single_bit(count) || count == last;
+}
+bool leaves_out(std::uint32_t last) {
+  for (std::uint32_t count = 0; count < last; ++count)
+    if (!is_shown(count, last)) return true;
+  return false;
 }
 
 std::string joined(const Table& table, bool colour) {
@@ -52,6 +58,30 @@ Table stop_table(const v1::BusBudget& budget) {
   return table;
 }
 
+/// How many of a group's axes are on this bus.
+int count_here(const v1::Group& group, const v1::BusBudget& budget) {
+  const auto is_here = [&budget](const std::string& name) {
+    return std::ranges::find(budget.axes(), name, &v1::AxisBudget::axis) != budget.axes().end();
+  };
+  return static_cast<int>(std::ranges::count_if(group.axes(), is_here));
+}
+
+/// A stop of a group is one of as many axes as it has here: those on other buses do not delay it. Empty:
+/// none.
+std::string group_text(const v1::BusBudget& budget, const v1::ListGroupsResponse& groups, bool colour) {
+  Table table({"GROUP", "AXES", "LAST FRAME", "STANDSTILL"}, {1, 2, 3});
+  bool any = false;
+  for (const auto& group : groups.groups()) {
+    const auto count = count_here(group, budget);
+    if (count == 0 || count > budget.stops_size()) continue;
+    any = true;
+    const auto& stop = budget.stops(count - 1);
+    table.add(
+        {group.name(), std::to_string(count), predicted(stop.last_frame()), predicted(stop.standstill())});
+  }
+  return any ? joined(table, colour) + '\n' : "";
+}
+
 Table refresh_table(const v1::BusBudget& budget) {
   Table table({"AXIS", "IDLE", "SEEN", "MOVING", "ALL MOVING", "SEEN"}, {1, 2, 3, 4, 5});
   for (const auto& axis : budget.axes())
@@ -68,7 +98,7 @@ void add_stop(Table& table, const v1::AxisBudget& axis, bool all) {
              seen(all ? observed.stop_frame_all() : observed.stop_frame()),
              fmt::format("{} + {}", predicted(stop.standstill()), milliseconds(axis.deceleration_time())),
              seen(all ? observed.standstill_all() : observed.standstill()),
-             with_unit(all ? axis.way_all() : axis.way_alone(), axis.unit())});
+             stop.has_last_frame() ? with_unit(all ? axis.way_all() : axis.way_alone(), axis.unit()) : "-"});
 }
 
 Table axis_stop_table(const v1::BusBudget& budget) {
@@ -80,11 +110,15 @@ Table axis_stop_table(const v1::BusBudget& budget) {
 
 }  // namespace
 
-std::string budget_text(const v1::BusBudget& budget, bool colour) {
+std::string budget_text(const v1::BusBudget& budget, const v1::ListGroupsResponse& groups, bool colour) {
   auto text = fmt::format("{}\n{}", budget.bus(), joined(load_table(budget), colour));
-  if (!budget.axes().empty())
-    text += fmt::format("\n{}\n{}\n{}", joined(stop_table(budget), colour),
+  if (!budget.axes().empty()) {
+    text += '\n' + joined(stop_table(budget), colour);
+    if (leaves_out(static_cast<std::uint32_t>(budget.stops_size())))
+      text += "MOVING, STOPPED: not all numbers of axes are shown; --json has them\n";
+    text += fmt::format("\n{}{}\n{}", group_text(budget, groups, colour),
                         joined(refresh_table(budget), colour), joined(axis_stop_table(budget), colour));
+  }
   for (const auto& one : budget.excess())
     text += fmt::format("exceeded ({}): {}; {}\n", one.key(), one.message(), one.remedy());
   for (const auto& note : budget.notes()) text += fmt::format("note: {}\n", note);

@@ -4,10 +4,12 @@
 #include <string>
 
 #include "axisd/v1/budget.pb.h"
+#include "axisd/v1/group_service.pb.h"
 
 namespace axisd::axisctl {
 
-/// Tables of load, of stops, and of each axis; beside the predicted times those that were seen, if any were.
-std::string budget_text(const v1::BusBudget& budget, bool colour);
+/// Tables of load, of stops, of each of `groups` with axes on this bus, and of each axis; beside the
+/// predicted times those that were seen, if any were.
+std::string budget_text(const v1::BusBudget& budget, const v1::ListGroupsResponse& groups, bool colour);
 
 }  // namespace axisd::axisctl

@@ -16,12 +16,23 @@
 namespace axisd::axisctl {
 namespace {
 
-void show(const Invocation& invocation, const v1::GetBudgetResponse& response) {
+void show(const Invocation& invocation, const v1::GetBudgetResponse& response,
+          const v1::ListGroupsResponse& groups) {
   if (invocation.json) return print_line(json(response));
   std::string text;
   for (const auto& budget : response.budgets())
-    text += (text.empty() ? "" : "\n") + budget_text(budget, use_colour());
+    text += (text.empty() ? "" : "\n") + budget_text(budget, groups, use_colour());
   print(text);
+}
+
+v1::ListGroupsResponse groups_of(const config::Configuration& configuration) {
+  v1::ListGroupsResponse response;
+  for (const auto& from : configuration.groups) {
+    auto& group = *response.add_groups();
+    group.set_name(from.name);
+    group.mutable_axes()->Assign(from.axes.begin(), from.axes.end());
+  }
+  return response;
 }
 
 void budget_of_file(Invocation& invocation, const std::string& path) {
@@ -30,7 +41,7 @@ void budget_of_file(Invocation& invocation, const std::string& path) {
   if (configuration) {
     v1::GetBudgetResponse response;
     for (const auto& report : config::budgets(*configuration)) api::to_proto(report, *response.add_budgets());
-    show(invocation, response);
+    show(invocation, response, groups_of(*configuration));
   }
   if (!result.configuration) invocation.status = ExitCode::usage;
   for (const auto& diagnostic : result.diagnostics) fmt::print(stderr, "{}\n", config::to_string(diagnostic));
@@ -47,8 +58,10 @@ void add_budget_command(CLI::App& app, Invocation& invocation) {
   command->add_option("FILE", *path, "The YAML file");
   command->callback([&invocation, path] {
     if (!path->empty()) return budget_of_file(invocation, *path);
-    show(invocation, invocation.client().call(&v1::BusService::Stub::GetBudget, v1::GetBudgetRequest(),
-                                              std::string_view()));
+    show(invocation,
+         invocation.client().call(&v1::BusService::Stub::GetBudget, v1::GetBudgetRequest(),
+                                  std::string_view()),
+         {});
   });
 }
 

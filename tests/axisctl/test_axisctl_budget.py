@@ -28,6 +28,8 @@ class OfAFile(AxisctlTest):
     def test_each_bus(self):
         text = self.ok("budget", DEMO)
         self.assertRegex(text, r"(?s)^line-a\nMOVING +UTILISATION.*\nSTOPPED +LAST FRAME.*\nfeeder +all .*\ncan0\n")
+        self.assertEqual(text.count("MOVING, STOPPED: not all numbers of axes are shown; --json has them\n"), 1)
+        self.assertRegex(text, r"(?s)\nGROUP .*\ntransfer +2 +\d+\.\d ms +\d+\.\d ms\n.*\ncan0\n.*\ntransfer +1 +\d+\.\d ms ")
         buses = self.json("budget", DEMO)[0]["budgets"]
         self.assertEqual([len(bus["stops"]) for bus in buses], [5, 1])
 
