@@ -85,8 +85,8 @@ void reload_at_a_signal(ConfigurationService& served) {
   });
 }
 
-/// Tells systemd that core and workers make progress, until a signal asks for the end.
-void supervise(core::CoreLoop& loop, const core::MachineCore& machine, ConfigurationService& served) {
+/// Tells systemd that core and workers make progress, until a signal asks for the end: which one.
+int supervise(core::CoreLoop& loop, const core::MachineCore& machine, ConfigurationService& served) {
   const auto signals = ending_signals();
   std::uint64_t interval_us = 0;
   const bool watched = sd_watchdog_enabled(0, &interval_us) > 0;
@@ -95,7 +95,7 @@ void supervise(core::CoreLoop& loop, const core::MachineCore& machine, Configura
                           .tv_nsec = watched ? 300'000'000 : 0};
     const int number = sigtimedwait(&signals, nullptr, &period);
     if (number == SIGHUP) reload_at_a_signal(served);
-    if (number == SIGTERM || number == SIGINT) return;
+    if (number == SIGTERM || number == SIGINT) return number;
     const auto oldest = monotonic_now() - stalled_after;
     bool alive = loop.last_progress() > oldest;
     for (const auto& bus : machine.buses()) alive = alive && bus->last_progress() > oldest;
@@ -108,10 +108,8 @@ void supervise(core::CoreLoop& loop, const core::MachineCore& machine, Configura
 
 /// Stops what moves; true: everything rests.
 bool stop_axes(core::CoreLoop& loop, core::MachineCore& machine) {
-  ask_core(loop, [&] {
-    machine.stop_moving_axes();
-    return true;
-  });
+  const auto stopped = ask_core(loop, [&] { return machine.stop_moving_axes(); });
+  if (!stopped.empty()) spdlog::info("stopping what moves: {}", fmt::join(stopped, ", "));
   return wait_until([&] { return ask_core(loop, [&] { return machine.at_rest(); }); }, stop_patience);
 }
 
@@ -238,7 +236,8 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
                  *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
                  configuration.axes.size());
     sd_notify(0, "READY=1");
-    supervise(loop, machine, served);
+    const int number = supervise(loop, machine, served);
+    spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");
     sd_notify(0, "STOPPING=1");
     service.close();
     const bool rests = stop_axes(loop, machine);
@@ -260,6 +259,7 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
   loop.stop();
   core_thread.join();
   published_to = nullptr;
+  spdlog::info("ended with status {}", status);
   end_logging();
   return status;
 }

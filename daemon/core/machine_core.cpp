@@ -241,11 +241,15 @@ void MachineCore::release_inhibit(const std::string& client, std::function<void(
       {.active = false, .by = client, .since = parts_.clock->wall(parts_.clock->now())}, std::move(release));
 }
 
-void MachineCore::stop_moving_axes() {
+std::vector<std::string> MachineCore::stop_moving_axes() {
   ending_ = true;
-  for (const auto& axis : axes_)
-    if (!axis->at_rest())
-      (void)submit(axis->settings().name, StopRequest{.kind = StopKind::stop}, {.client = "shutdown"});
+  std::vector<std::string> stopped;
+  for (const auto& axis : axes_) {
+    if (axis->at_rest()) continue;
+    (void)submit(axis->settings().name, StopRequest{.kind = StopKind::stop}, {.client = "shutdown"});
+    stopped.push_back(axis->settings().name);
+  }
+  return stopped;
 }
 
 bool MachineCore::at_rest() const {

@@ -86,8 +86,8 @@ class MachineCore {
   void release_inhibit(const std::string& client, std::function<void(Result<void>)> done);
   /// Who latched the inhibit, or nullptr. Thread: any.
   [[nodiscard]] boost::shared_ptr<const std::string> inhibited_by() const { return inhibited_by_.load(); }
-  /// Halts what moves, for the end of the daemon.
-  void stop_moving_axes();
+  /// Stops what moves, for the end of the daemon. Returns the names of these axes.
+  std::vector<std::string> stop_moving_axes();
   [[nodiscard]] bool at_rest() const;
   // machine_reload.cpp
   /// Why the machine cannot become this now: all reasons, each with what to do; empty: it can.

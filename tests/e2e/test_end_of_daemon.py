@@ -13,6 +13,8 @@ class Terminated(Scenario):
         self.move_under_way(machine)
         at = time.monotonic_ns()
         self.assertEqual(machine.daemon.terminate(), 0)
+        self.assertRegex(machine.daemon.log(), r"(?s) info ending: SIGTERM\n.* info stopping what moves: feeder\n.*"
+                                               r" info ended with status 0\n\Z")
         self.assertFalse(machine.sim.shaft().moving)
         self.assertLess(machine.sim.shaft().position, 590000)
         self.assertEqual([frame.values for frame in machine.wire.writes(STOP, since=at)], [[0]])
@@ -33,6 +35,7 @@ class Terminated(Scenario):
         machine.sim.wait_moving()
         machine.daemon.process.send_signal(signal.SIGINT)
         self.assertEqual(machine.daemon.wait(), 0)
+        self.assertIn(" info ending: SIGINT\n", machine.daemon.log())
         self.assertFalse(machine.sim.shaft().moving)
 
 
@@ -118,6 +121,7 @@ class Systemd(Scenario):
         machine.client.wait_online("feeder")
         machine.notify.forget()
         self.assertEqual(daemon.terminate(), 0)
+        self.assertNotIn("stopping what moves", daemon.log())
         machine.notify.wait_for("STOPPING=1", daemon)
         self.assertNotIn("READY=1", machine.notify.received())
 

@@ -98,7 +98,7 @@ TEST_F(ThreeAxes, TheEndOfTheDaemonStopsWhatMovesOnly) {
   world_.run_for(500ms);
   EXPECT_FALSE(machine_->at_rest());
   line_->forget_wire();
-  machine_->stop_moving_axes();
+  EXPECT_EQ(machine_->stop_moving_axes(), std::vector<std::string>{"a1"});
   EXPECT_TRUE(world_.run_until([this] { return machine_->at_rest(); }, 3s));
   EXPECT_FALSE(line_->network().node(1)->shaft_moving());
   for (const auto& entry : line_->wire())
