@@ -345,9 +345,9 @@ TEST(Loader, NamesTheFileThatItCannotRead) {
 TEST(Loader, RefusesHugeFiles) {
   EXPECT_EQ(findings(load_file("/dev/zero")),
             "/dev/zero:1:1: the file is too large; at most 1048576 bytes\n");
-  EXPECT_EQ(findings(load_text(std::string(1024 * 1024 + 1, '#'), "big.yaml")),
+  EXPECT_EQ(findings(load_text(std::string(1024UZ * 1024 + 1, '#'), "big.yaml")),
             "big.yaml:1:1: the file is too large; at most 1048576 bytes\n");
-  EXPECT_EQ(findings(load_text(std::string(1024 * 1024, '#'), "big.yaml")),
+  EXPECT_EQ(findings(load_text(std::string(1024UZ * 1024, '#'), "big.yaml")),
             "big.yaml:1:1: the file is empty; start from config/examples/demo.yaml\n");
 }
 
