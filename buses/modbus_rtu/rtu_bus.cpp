@@ -364,7 +364,15 @@ void RtuBus::on_port(const PortStatus& status) {
   pump();
 }
 
+std::optional<TimePoint> RtuBus::stop_sent_at(std::uint8_t node) const {
+  const auto* found = stops_sent_.find(node);
+  return found == nullptr ? std::nullopt : std::optional(*found);
+}
+
 void RtuBus::note(const Transaction& transaction, const ExchangeResult& result) {
+  const bool sent = result.status != ExchangeStatus::not_sent && result.status != ExchangeStatus::unsupported;
+  if (sent && transaction.transaction_class == TransactionClass::stop && result.request_end != TimePoint{})
+    stops_sent_[transaction.exchange.request.node] = result.request_end;
   statistics_.ended(transaction, result);
   if (observer_) observer_(transaction, result);
 }

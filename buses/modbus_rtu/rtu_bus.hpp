@@ -81,6 +81,9 @@ class RtuBus final : public Bus {
   /// With how many wait now.
   [[nodiscard]] LineStatistics statistics() const;
   [[nodiscard]] BusCounters counters() const { return statistics_.counters(); }
+  /// When the last stop frame to `node` had gone out, answered or not: its last byte. nullopt: there was
+  /// none.
+  [[nodiscard]] std::optional<TimePoint> stop_sent_at(std::uint8_t node) const;
   /// Damaged replies of `node` in a row, without a sound one or silence between them.
   [[nodiscard]] int garbled(std::uint8_t node) const;
   /// Nodes that do not answer are probed with back-off. Bus scans, and exchanges with serial settings of
@@ -141,6 +144,7 @@ class RtuBus final : public Bus {
   NodeTable<std::unique_ptr<Watch>> watches_;  ///< null: no more
   NodeTable<std::unique_ptr<KnownOfNode>> known_;
   LateReplies late_;
+  NodeTable<TimePoint> stops_sent_;
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Quarantine quarantine_;
   Clock::Timer expiry_, release_;

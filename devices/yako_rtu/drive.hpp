@@ -55,7 +55,9 @@ class YakoRtuDrive final : public Drive {
   Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<void>> stop(StopKind kind) override;
   Task<Result<void>> repeat_stop() override;
-  [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stop_sent_at_; }
+  [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override {
+    return node_.bus().stop_sent_at(node_.address());
+  }
   Task<Result<void>> clear_alarm(MotionGuard guard) override;
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
@@ -143,7 +145,6 @@ class YakoRtuDrive final : public Drive {
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
   std::set<std::uint16_t> unsaved_;   ///< saved registers that did not hold what was written
   std::uint64_t eeprom_writes_ = 0;
-  std::optional<TimePoint> stop_sent_at_;
 };
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);

@@ -221,7 +221,6 @@ Task<Result<void>> YakoRtuDrive::send_stop(StopKind kind, bool patient) {
     const auto written = co_await node_.write(
         reg::stop, value, {.transaction_class = TransactionClass::stop, .patient = patient});
     if (written) {
-      stop_sent_at_ = written->request_end;
       if (written->certain) co_return Result<void>{};
       // After the reply to a read no older one can follow: the next echo is its own.
       const auto read = co_await node_.read(reg::moving, 1, {.transaction_class = TransactionClass::motion});

@@ -124,6 +124,9 @@ TEST(M15, RepeatedStopsToSilentNodesCostLittle) {
       wire, [](const WireEntry& entry) { return entry.node() == 16 && entry.address() == 0x0028; });
   ASSERT_NE(first, wire.end());
   EXPECT_LE(first->begin - asked, 45ms) << "the first attempt is never held back";
+  const auto frame = modbus_rtu::wire_time(modbus_rtu::SerialSettings{.baud = 115200}, first->request.size());
+  EXPECT_EQ(line.machine().find("a16")->observed().stop_frame, first->begin + frame - asked)
+      << "answered or not";
   Duration in_vain{};
   int stops = 0;
   for (const auto& entry : wire) {

@@ -58,7 +58,7 @@ class SharedLine {
   }
   core::MachineCore& machine() { return *machine_; }
   CommandPtr submit(int axis, const Action& action) {
-    auto command = machine_->submit("a" + std::to_string(axis), action, {});
+    auto command = machine_->submit("a" + std::to_string(axis), action, {.arrived = world.now()});
     EXPECT_TRUE(command) << (command ? "" : to_string(command.error()));
     return command.value_or(nullptr);
   }
