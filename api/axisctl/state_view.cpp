@@ -65,6 +65,11 @@ std::string foreign_motion(const v1::AxisState& state) {
   return "";
 }
 
+/// A value that its drive said; "-" where it never said any.
+std::string measured(const v1::AxisState& state, double value, std::string_view unit) {
+  return state.has_age() ? with_unit(value, unit) : "-";
+}
+
 std::string power(const v1::AxisState& state) {
   if (!state.enabled()) return "off";
   return state.enabled_by_daemon() ? "on" : "on, found so: nobody enabled it through this daemon";
@@ -75,6 +80,8 @@ std::string power(const v1::AxisState& state) {
 std::string remarks(const v1::AxisState& state) {
   std::string text;
   if (state.simulated()) append(text, "simulated");
+  if (state.link() != v1::LINK_STATE_ONLINE && state.has_age())
+    append(text, fmt::format("last measured {} ago", duration_text(seconds(state.age()))));
   if (state.inhibited()) append(text, "all stopped");
   if (state.stop_held()) append(text, "stop held");
   if (!state.lease_holder().empty()) append(text, "leased by " + state.lease_holder());
@@ -93,13 +100,14 @@ Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes) 
   Table table(
       {"AXIS", "STATE", "POSITION", "", "VELOCITY", "", "TRUST", "LINK", "MODEL", "BUS", "NODE", "REMARKS"},
       {2, 4, 10});
-  for (const auto& state : axes)
+  for (const auto& state : axes) {
+    const bool known = state.has_age();
     table.add({state.axis(),
                {state_text(state), state_colour(state)},
-               number(state.position()),
-               state.unit(),
-               number(state.velocity()),
-               state.unit() + "/s",
+               known ? number(state.position()) : "-",
+               known ? state.unit() : "",
+               known ? number(state.velocity()) : "-",
+               known ? state.unit() + "/s" : "",
                trust(state),
                link(state),
                state.model(),
@@ -108,6 +116,7 @@ Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes) 
                {remarks(state), state.has_fault() || state.has_link_error() || !state.drift().empty()
                                     ? Colour::red
                                     : Colour::none}});
+  }
   return table;
 }
 
@@ -125,12 +134,14 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   if (!state.drift().empty()) details.add("drift", coloured(state.drift(), Colour::red, colour));
   details.add("power", power(state));
   details.add("position",
-              fmt::format("{} ({}{})", with_unit(state.position(), state.unit()), trust(state),
-                          state.position_source() == v1::POSITION_SOURCE_COMMANDED ? ", counted pulses"
-                          : state.position_source() == v1::POSITION_SOURCE_ENCODER ? ", encoder"
-                                                                                   : ""));
+              !state.has_age()
+                  ? "never measured"
+                  : fmt::format("{} ({}{})", with_unit(state.position(), state.unit()), trust(state),
+                                state.position_source() == v1::POSITION_SOURCE_COMMANDED ? ", counted pulses"
+                                : state.position_source() == v1::POSITION_SOURCE_ENCODER ? ", encoder"
+                                                                                         : ""));
   if (state.has_target()) details.add("target", with_unit(state.target(), state.unit()));
-  details.add("velocity", with_unit(state.velocity(), state.unit() + "/s"));
+  if (state.has_age()) details.add("velocity", with_unit(state.velocity(), state.unit() + "/s"));
   if (state.moving())
     details.add("motion", foreign_motion(state).empty() ? "by command" : foreign_motion(state));
   details.add("command", state.command_id());
@@ -155,8 +166,8 @@ std::string tick_line(const v1::WatchAxesResponse& batch) {
   std::string text = std::to_string(batch.tick());
   for (const auto& state : batch.axes())
     text += fmt::format("  {} {} {} {}", state.axis(), state_text(state),
-                        with_unit(state.position(), state.unit()),
-                        with_unit(state.velocity(), state.unit() + "/s"));
+                        measured(state, state.position(), state.unit()),
+                        measured(state, state.velocity(), state.unit() + "/s"));
   return text;
 }
 

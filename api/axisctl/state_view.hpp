@@ -14,7 +14,7 @@
 
 namespace axisd::axisctl {
 
-/// One row per axis.
+/// One row per axis. What its drive never said is "-".
 Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes);
 /// Everything known about one axis, a line per item, ending in a line end.
 std::string state_details(const v1::AxisState& state, bool colour);

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "api/axisctl/state_view.hpp"
-
 namespace axisd::axisctl {
 namespace {
 
@@ -63,28 +61,6 @@ TEST(Progress, OnlyDoneIsSuccess) {
     command.set_state(state);
     EXPECT_EQ(outcome(command), code) << state;
   }
-}
-
-TEST(StateView, RemarksNameWhatAPersonMustKnow) {
-  v1::AxisState state;
-  EXPECT_EQ(remarks(state), "");
-  state.set_simulated(true);
-  state.set_inhibited(true);
-  state.set_alarm_code(3);
-  state.set_alarm_name("overcurrent");
-  state.set_enabled(true);
-  EXPECT_EQ(remarks(state), "simulated, all stopped, alarm 3 overcurrent, not enabled by us");
-}
-
-TEST(StateView, TickIsOneLine) {
-  v1::WatchAxesResponse batch;
-  batch.set_tick(7);
-  auto& state = *batch.add_axes();
-  state.set_axis("feeder");
-  state.set_unit("mm");
-  state.set_state(v1::STATE_STANDSTILL);
-  state.set_position(1.5);
-  EXPECT_EQ(tick_line(batch), "7  feeder Standstill 1.5 mm 0 mm/s");
 }
 
 }  // namespace

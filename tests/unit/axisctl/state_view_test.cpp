@@ -1,0 +1,72 @@
+#include "api/axisctl/state_view.hpp"
+
+#include <gmock/gmock.h>
+
+namespace axisd::axisctl {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// At 12.5 mm, offline; measured 90 s ago, unless it never was.
+v1::AxisState offline(bool measured) {
+  v1::AxisState state;
+  state.set_axis("feeder");
+  state.set_unit("mm");
+  state.set_link(v1::LINK_STATE_OFFLINE);
+  if (!measured) return state;
+  state.set_position(12.5);
+  state.set_velocity(3);
+  state.mutable_age()->set_seconds(90);
+  return state;
+}
+
+std::string table(const v1::AxisState& state) {
+  google::protobuf::RepeatedPtrField<v1::AxisState> axes;
+  *axes.Add() = state;
+  return axis_table(axes).lines(false).at(1);
+}
+
+TEST(StateView, RemarksNameWhatAPersonMustKnow) {
+  v1::AxisState state;
+  EXPECT_EQ(remarks(state), "");
+  state.set_simulated(true);
+  state.set_inhibited(true);
+  state.set_alarm_code(3);
+  state.set_alarm_name("overcurrent");
+  state.set_enabled(true);
+  EXPECT_EQ(remarks(state), "simulated, all stopped, alarm 3 overcurrent, not enabled by us");
+}
+
+TEST(StateView, TickIsOneLine) {
+  v1::WatchAxesResponse batch;
+  batch.set_tick(7);
+  auto& state = *batch.add_axes();
+  state.set_axis("feeder");
+  state.set_unit("mm");
+  state.set_state(v1::STATE_STANDSTILL);
+  state.set_position(1.5);
+  state.mutable_age();
+  EXPECT_EQ(tick_line(batch), "7  feeder Standstill 1.5 mm 0 mm/s");
+}
+
+TEST(StateView, WhatWasNeverMeasuredIsNotShownAsZero) {
+  EXPECT_THAT(table(offline(false)), Not(HasSubstr("mm")));
+  EXPECT_THAT(state_details(offline(false), false), HasSubstr("position:   never measured"));
+  EXPECT_THAT(state_details(offline(false), false), Not(HasSubstr("velocity:")));
+  v1::WatchAxesResponse batch;
+  batch.set_tick(7);
+  *batch.add_axes() = offline(false);
+  EXPECT_EQ(tick_line(batch), "7  feeder Offline - -");
+}
+
+TEST(StateView, WhatADriveThatFellSilentSaidLastIsMarked) {
+  EXPECT_THAT(table(offline(true)), HasSubstr("last measured 1 min 30 s ago"));
+  EXPECT_THAT(table(offline(true)), HasSubstr("12.5"));
+  auto online = offline(true);
+  online.set_link(v1::LINK_STATE_ONLINE);
+  EXPECT_THAT(table(online), Not(HasSubstr("ago")));
+}
+
+}  // namespace
+}  // namespace axisd::axisctl
