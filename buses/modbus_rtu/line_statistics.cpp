@@ -45,10 +45,13 @@ void LineStatistics::sent(const Transaction& transaction, const ExchangeResult& 
   ++of_class.sent;
   of_class.queueing.add(result.request_begin - std::max(transaction.queued_at, transaction.released_at));
   of_class.exchange.add(result.reply_end - result.request_begin);
-  auto& node = nodes_[exchange.request.node];
   const auto begin = result.request_begin - silence(exchange.serial.value_or(serial_));
   const auto before = load_.occupied();
   load_.add(begin, result.reply_end);
+  const bool scanned_in_vain =
+      transaction.transaction_class == TransactionClass::scan && result.status == ExchangeStatus::timeout;
+  if (scanned_in_vain && nodes_.find(exchange.request.node) == nullptr) return;
+  auto& node = nodes_[exchange.request.node];
   node.occupied += load_.occupied() - before;
   count(node, result);
   if (transaction.resync) return;

@@ -51,6 +51,7 @@ class LineStatistics {
 
   [[nodiscard]] BusCounters counters() const;
   [[nodiscard]] const StatisticsByClass& classes() const { return classes_; }
+  /// Not of addresses where only a scan asked, and nobody answered.
   [[nodiscard]] const NodeTable<NodeStatistics>& nodes() const { return nodes_; }
   /// The line is occupied by an exchange from the silence before it to the end of the reply, or of the wait
   /// for it.

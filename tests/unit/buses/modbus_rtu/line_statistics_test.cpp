@@ -122,6 +122,20 @@ TEST(LineStatistics, WaitingForTheNextProbeOfASilentNodeIsNotQueueing) {
   EXPECT_LT(stops.queueing.longest(), 50ms);
 }
 
+/// Else each scan would leave a row for every address of the standard.
+TEST(LineStatistics, AddressesWhereAScanHeardNobodyAreNoNodes) {
+  BusRig rig;
+  for (const std::uint8_t node : {1, 9})
+    rig.transact("scan", {.node = node, .address = 0, .count = 1},
+                 {.transaction_class = TransactionClass::scan});
+  rig.world.run_for(1s);
+  const auto statistics = rig.bus->statistics();
+  EXPECT_EQ(statistics.classes().at(std::to_underlying(TransactionClass::scan)).sent, 2U);
+  EXPECT_GT(statistics.load().occupied(), 20ms);
+  EXPECT_NE(statistics.nodes().find(1), nullptr);
+  EXPECT_EQ(statistics.nodes().find(9), nullptr);
+}
+
 TEST(LineStatistics, CountsDropsByCause) {
   LineStatistics statistics({}, TimePoint{});
   Transaction motion;
