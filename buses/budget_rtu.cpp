@@ -200,7 +200,7 @@ LoadBudget Analysis::load(int moving) const {
   return load;
 }
 
-/// A stop overtakes all but what is under way, which it cuts at turnaround_max; another stop it does not cut.
+/// A stop overtakes all but what is under way, which it cuts at turnaround_max; another stop not always.
 StopBudget Analysis::stop(const AxisDemand& last, int axes) const {
   const auto stops = [this](const AxisDemand& axis) { return cost(axis.set.stop, axis); };
   const auto others = static_cast<std::size_t>(axes - 1);
