@@ -86,7 +86,7 @@ class Axis {
   [[nodiscard]] std::vector<Obstacle> explain(const std::optional<Action>& action,
                                               const CommandOptions& options) const;
   /// Halts the axis if `command` is being executed.
-  Result<CommandPtr> cancel(const CommandPtr& command);
+  Result<CommandPtr> cancel(const CommandPtr& command, TimePoint arrived = {});
   /// The lease under which the axis was commanded is over, and the gate knows it: does what the
   /// configuration says (M16). Motion that has not started by then never does.
   void lease_lost(const Error& cause);
@@ -389,6 +389,7 @@ class Axis {
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
   int sequences_ = 0;               ///< coroutines that still run
+  TimePoint stop_arrived_{};        ///< at the server: the newest stop, disable or cancel
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
   bool closing_ = false;
   bool reloading_ = false;  ///< it was told to make room

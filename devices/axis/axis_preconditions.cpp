@@ -114,6 +114,10 @@ void Axis::look_at_maintenance(Obstacles& found) const {
 void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
   if (reloading_) return found.block(reloading());
   look_at_options(options, found);
+  // Stops overtake what waits for the core: their order is that in which they arrived (M14).
+  if (options.arrived != TimePoint{} && options.arrived < stop_arrived_)
+    found.block(
+        error(Reason::superseded, "a stop that arrived later was served first", "send a new request"));
   // A stop that the core has not seen yet comes before everything that is accepted now.
   if (stopping_.hold)
     found.block(error(Reason::stopping, "a stop is held", "release it: " + shell("release-stop")));

@@ -14,6 +14,7 @@ Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& opti
   // Stops and disables are never deduplicated: each one is executed.
   if (std::holds_alternative<StopRequest>(action) || std::holds_alternative<DisableRequest>(action)) {
     gate_->stop_served();
+    stop_arrived_ = std::max(stop_arrived_, options.arrived);
     auto always = options;
     always.request_id.clear();
     return std::visit([&](const auto& request) { return accept(request, always); }, action);
@@ -258,10 +259,11 @@ Result<CommandPtr> Axis::release_stop() {
   return stopping_.last;
 }
 
-Result<CommandPtr> Axis::cancel(const CommandPtr& command) {
+Result<CommandPtr> Axis::cancel(const CommandPtr& command, TimePoint arrived) {
   if (cancel_buffered(command)) {
     publish();
   } else if (activity_ && activity_->command == command) {
+    stop_arrived_ = std::max(stop_arrived_, arrived);
     if (activity_->state != AxisState::standstill) stopping_.shown = activity_->state;
     supersede(error(Reason::cancelled, "cancelled by a client"));
     begin_stop(StopKind::halt, false, nullptr);
