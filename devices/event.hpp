@@ -30,7 +30,7 @@ struct StateChange {
 
 struct LinkChange {
   LinkState to = LinkState::offline;
-  std::string detail;  ///< why it is not online; where it is: what it was found doing, if anything
+  std::string detail;  ///< why it is not online, or what a drive was found doing that is being connected
 };
 
 /// The drive no longer holds what the configuration says; or holds it again (`text` empty).

@@ -342,7 +342,7 @@ class Axis {
   void supersede(const Error& cause);
   void begin_stop(StopKind kind, bool hold, CommandPtr command);
   Task<> run_stop();
-  void note_stop_sent(TimePoint end);
+  void note_stop_sent(TimePoint end, bool answered);
   Task<Result<void>> stop_and_confirm();
   Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
   Task<bool> standstill_unpolled(TimePoint deadline, std::optional<int> requests);
@@ -405,7 +405,6 @@ class Axis {
   std::optional<Error> bus_loss_;  ///< not yet acted upon
   bool stop_owed_ = false;         ///< M4: to a silent node, until standstill is confirmed
   bool left_running_ = false;      ///< a command has ended, and what it began may go on
-  std::string arrival_;            ///< what connecting found, to be told when the drive is online
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed

@@ -61,7 +61,7 @@ Task<Result<void>> Axis::settle_earlier() {
   on_sample(*sample);
   if (closing_) co_return fail(error(Reason::cancelled, "the daemon ends"));
   if (found_in_motion()) {
-    stop_owed_ = true;
+    stop_owed_ = left_running_ = true;
     co_return fail(error(Reason::moving, "it began to move; stopping it", "wait"));
   }
   for (const auto& earlier : unsettled_) settle_as(earlier, continuous);

@@ -39,8 +39,8 @@ Task<> Axis::connect() {
       link_ = LinkState::online;
       link_error_.reset();
       watch_continuity();
-      spdlog::info("{}: online ({} {}){}{}", settings_.name, settings_.model,
-                   identity_ ? identity_->version : "", arrival_.empty() ? "" : ": ", arrival_);
+      spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
+                   identity_ ? identity_->version : "");
       break;
     }
     const bool answers =
@@ -104,11 +104,11 @@ bool Axis::found_by_terminal() const {
 
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
-  std::string arrival = stop_owed_ ? "the stop that was owed to it was sent; it rests" : "";
+  std::string_view found = stop_owed_ ? "the stop that was owed to it was sent, and it came to rest" : "";
   if (found_in_motion() && !found_by_terminal()) {
     if (!stop_owed_) {
       spdlog::warn("{}: found moving; stopping it", settings_.name);
-      arrival = "it was found moving, and was stopped";
+      found = "it was found moving, was stopped, and came to rest";
     }
     stop_owed_ = true;
     bool rests = false;
@@ -129,8 +129,11 @@ Task<Result<void>> Axis::settle_found_motion() {
                            "look at the machine; cut its power if it moves"));
     }
   }
-  if (!arrival.empty()) arrival_ = std::move(arrival);
   stop_owed_ = left_running_ = false;
+  if (!found.empty()) {
+    spdlog::info("{}: {}", settings_.name, found);
+    if (env_.event) env_.event(settings_.name, LinkChange{.to = link_, .detail = std::string(found)});
+  }
   co_return Result<void>{};
 }
 
@@ -276,6 +279,7 @@ void Axis::on_reboot(const Error& cause) {
   auto told = cause;
   if (activity_ && activity_->may_run) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);
+  left_running_ = false;
   lose_trust();
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();

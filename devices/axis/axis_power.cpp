@@ -19,6 +19,7 @@ constexpr auto sample_patience = std::chrono::seconds(5);
 /// M1, M23: power, or the end of a halt, never moves. Whatever this is, it ends here.
 void Axis::on_turned_by_power(const Error& cause) {
   enter_error_stop(cause);
+  left_running_ = true;
   begin_stop(StopKind::stop, false, nullptr);
   publish();
 }

@@ -56,11 +56,10 @@ void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
 
 void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
   if (!env_.event) return;
-  if (before.link != now.link) {
-    auto detail = now.link_error ? now.link_error->message : std::string();
-    if (now.link == LinkState::online) detail = std::exchange(arrival_, {});
-    env_.event(settings_.name, LinkChange{.to = now.link, .detail = std::move(detail)});
-  }
+  if (before.link != now.link)
+    env_.event(
+        settings_.name,
+        LinkChange{.to = now.link, .detail = now.link_error ? now.link_error->message : std::string()});
   if (before.state != now.state)
     env_.event(settings_.name, StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});
   if (before.drift != now.drift) env_.event(settings_.name, ConfigurationDrift{.text = now.drift});
@@ -69,8 +68,9 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
 MotionCause Axis::motion_cause() const {
   if (terminal_motion_) return MotionCause::terminal;
   if (!sample_ || !sample_->moving) return MotionCause::none;
-  const bool ours = (activity_ && activity_->state != AxisState::standstill) || left_running_;
-  return ours ? MotionCause::command : MotionCause::unknown;
+  if (activity_ && activity_->state != AxisState::standstill) return MotionCause::command;
+  const bool by_terminal = sample_->mode >= DriveMode::multi_position || start_terminal_active(*sample_);
+  return left_running_ && !by_terminal ? MotionCause::command : MotionCause::unknown;
 }
 
 /// False: nothing was written since the last look. Else the next sample is published, whatever it says.

@@ -100,8 +100,8 @@ Task<> Axis::run_stop() {
   wake();
 }
 
-void Axis::note_stop_sent(TimePoint end) {
-  const auto late = observed_.stop_sent(end);
+void Axis::note_stop_sent(TimePoint end, bool answered) {
+  const auto late = observed_.stop_sent(end, answered);
   if (!late) return;
   const auto in_ms = [](Duration time) { return std::chrono::duration<double, std::milli>(time).count(); };
   spdlog::warn(
@@ -120,7 +120,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto kind = stopping_.kind;
     const auto sent = co_await drive_->stop(kind);
     wake();
-    if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out);
+    if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out, sent.has_value());
     const bool no_reply = !sent && sent.error().reason == Reason::no_reply;
     if (no_reply && link_ != LinkState::offline && ++silent < stop_attempts) continue;
     silent = 0;

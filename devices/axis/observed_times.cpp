@@ -20,13 +20,14 @@ void ObservedTimes::stop_requested(TimePoint arrived, bool all) {
   if (!stop_) stop_ = {.arrived = arrived, .all = all};
 }
 
-std::optional<ObservedTimes::Late> ObservedTimes::stop_sent(TimePoint end) {
-  if (!stop_ || stop_->sent || end < stop_->arrived) return std::nullopt;
+std::optional<ObservedTimes::Late> ObservedTimes::stop_sent(TimePoint end, bool answered) {
+  if (!stop_ || end < stop_->arrived || stop_->answered || (stop_->sent && !answered)) return std::nullopt;
   stop_->sent = true;
+  stop_->answered = answered;
   const auto seen = end - stop_->arrived;
   auto& longest = stop_->all ? values_.stop_frame_all : values_.stop_frame;
   longest = std::max(longest, seen);
-  if (seen <= expected_stop_) return std::nullopt;
+  if (!answered || seen <= expected_stop_) return std::nullopt;
   return Late{.seen = seen, .expected = std::exchange(expected_stop_, Duration::max())};
 }
 

@@ -22,8 +22,9 @@ class ObservedTimes {
   struct Late {
     Duration seen, expected;
   };
-  /// The stop frame's last byte or bit. Returns the first that took longer than expected.
-  std::optional<Late> stop_sent(TimePoint end);
+  /// The stop frame's last byte or bit, of the first one and of the first that was `answered`. Returns the
+  /// first answered one that took longer than expected: what a drive does not hear it cannot get in time.
+  std::optional<Late> stop_sent(TimePoint end, bool answered);
   void standstill_confirmed(TimePoint at);
   /// Standstill was not confirmed, and will not be for this request.
   void stop_failed() { stop_.reset(); }
@@ -37,7 +38,7 @@ class ObservedTimes {
   };
   struct Stop {
     TimePoint arrived;
-    bool all = false, sent = false;
+    bool all = false, sent = false, answered = false;
   };
   std::optional<Last> last_;
   std::optional<Stop> stop_;

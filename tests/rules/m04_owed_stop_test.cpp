@@ -21,11 +21,13 @@ std::vector<Content> told(const Rig& rig) {
   return all;
 }
 
-/// What was told when the drive came online last.
-std::string arrival(const Rig& rig) {
-  auto changes = told<LinkChange>(rig);
-  std::erase_if(changes, [](const LinkChange& change) { return change.to != LinkState::online; });
-  return changes.empty() ? "never" : changes.back().detail;
+/// What was told of the drive while it was being connected, in all.
+std::vector<std::string> found(const Rig& rig) {
+  std::vector<std::string> details;
+  for (auto& change : told<LinkChange>(rig))
+    if (change.to == LinkState::configuring && !change.detail.empty())
+      details.push_back(std::move(change.detail));
+  return details;
 }
 
 void restore_cable(Rig& rig) {
@@ -87,20 +89,40 @@ TEST(M04, AMotionOfNobodyIsNotOurs) {
   EXPECT_TRUE(rig.run_until([&] { return rig.state()->motion_cause == MotionCause::unknown; }, 2s));
 }
 
+/// What runs by a terminal is not the command's that was cut off before.
+TEST(M04, AMotionThatATerminalTookOverIsNotOurs) {
+  Rig rig({.switches = {{"enabled_at_power_up", false}}, .adjust = [](AxisSettings& axis) {
+             axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+           }});
+  rig.ready();
+  rig.submit(MoveVelocityRequest{.velocity = 20});
+  rig.run(400ms);
+  rig.line->network().set_connected(false);
+  rig.run(600ms);
+  rig.set_input("X4", true);
+  rig.run(100ms);
+  rig.line->network().set_connected(true);
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->link != LinkState::offline; }, 5s));
+  rig.run(2s);
+  EXPECT_NE(rig.state()->motion_cause, MotionCause::command);
+}
+
 TEST(M04, AnOwedStopThatCameThroughIsTold) {
   Rig rig;
   rig.ready();
-  EXPECT_EQ(arrival(rig), "");
+  EXPECT_EQ(found(rig), std::vector<std::string>{});
   rig.submit(MoveVelocityRequest{.velocity = 50});
   rig.run(400ms);
   rig.line->network().set_connected(false);
   rig.run(600ms);
   restore_cable(rig);
   EXPECT_FALSE(rig.drive->shaft_moving());
-  EXPECT_EQ(arrival(rig), "the stop that was owed to it was sent; it rests");
-  rig.cycle_power(3s);
+  const std::vector<std::string> once{"the stop that was owed to it was sent, and it came to rest"};
+  EXPECT_EQ(found(rig), once);
+  rig.line->network().set_connected(false);
+  rig.run(600ms);
   restore_cable(rig);
-  EXPECT_EQ(arrival(rig), "") << "it rested before";
+  EXPECT_EQ(found(rig), once) << "it rested before";
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ constexpr TimePoint asked{10s};
 /// A stop whose frame ended so long after its request.
 std::optional<ObservedTimes::Late> stopped(ObservedTimes& times, Duration after, bool all = false) {
   times.stop_requested(asked, all);
-  const auto late = times.stop_sent(asked + after);
+  const auto late = times.stop_sent(asked + after, true);
   times.standstill_confirmed(asked + after + 100ms);
   return late;
 }
@@ -43,10 +43,25 @@ TEST(ObservedTimes, OnlyTheFirstFrameOfAStopCounts) {
   ObservedTimes times;
   times.expect_stop_within(6ms);
   times.stop_requested(asked, false);
-  EXPECT_FALSE(times.stop_sent(asked - 1ms)) << "that of an earlier stop";
-  EXPECT_FALSE(times.stop_sent(asked + 4ms));
-  EXPECT_FALSE(times.stop_sent(asked + 40ms)) << "its repetition";
+  EXPECT_FALSE(times.stop_sent(asked - 1ms, true)) << "that of an earlier stop";
+  EXPECT_FALSE(times.stop_sent(asked + 4ms, true));
+  EXPECT_FALSE(times.stop_sent(asked + 40ms, true)) << "its repetition";
   EXPECT_EQ(times.values().stop_frame, 4ms);
+}
+
+/// A frame that nobody answered counts once, and accuses nobody; the first that was answered counts, too.
+TEST(ObservedTimes, StopFramesThatNobodyAnswered) {
+  ObservedTimes times;
+  times.expect_stop_within(10ms);
+  times.stop_requested(asked, false);
+  EXPECT_FALSE(times.stop_sent(asked + 20ms, false));
+  EXPECT_EQ(times.values().stop_frame, 20ms);
+  EXPECT_FALSE(times.stop_sent(asked + 30ms, false)) << "its repetition";
+  EXPECT_EQ(times.values().stop_frame, 20ms);
+  EXPECT_TRUE(times.stop_sent(asked + 40ms, true));
+  EXPECT_EQ(times.values().stop_frame, 40ms);
+  EXPECT_FALSE(times.stop_sent(asked + 50ms, true));
+  EXPECT_EQ(times.values().stop_frame, 40ms);
 }
 
 }  // namespace
