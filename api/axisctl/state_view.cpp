@@ -70,7 +70,13 @@ std::string measured(const v1::AxisState& state, double value, std::string_view 
   return state.has_age() ? with_unit(value, unit) : "-";
 }
 
+/// A drive that never said anything is in no state that is known.
+std::string state_of(const v1::AxisState& state) {
+  return state.has_age() || state.link() == v1::LINK_STATE_OFFLINE ? state_text(state) : "-";
+}
+
 std::string power(const v1::AxisState& state) {
+  if (!state.has_age()) return "not known";
   if (!state.enabled()) return "off";
   return state.enabled_by_daemon() ? "on" : "on, found so: nobody enabled it through this daemon";
 }
@@ -103,7 +109,7 @@ Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes) 
   for (const auto& state : axes) {
     const bool known = state.has_age();
     table.add({state.axis(),
-               {state_text(state), state_colour(state)},
+               {state_of(state), state_colour(state)},
                known ? number(state.position()) : "-",
                known ? state.unit() : "",
                known ? number(state.velocity()) : "-",
@@ -123,7 +129,7 @@ Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes) 
 std::string state_details(const v1::AxisState& state, bool colour) {
   Details details;
   details.add("axis", state.axis() + (state.simulated() ? " (simulated)" : ""));
-  details.add("state", coloured(state_text(state), state_colour(state), colour) +
+  details.add("state", coloured(state_of(state), state_colour(state), colour) +
                            (state.in_position() ? ", in position" : "") +
                            (state.stop_held() ? ", stop held" : "") +
                            (state.inhibited() ? ", all axes stopped: release-stop --all" : ""));
@@ -146,8 +152,10 @@ std::string state_details(const v1::AxisState& state, bool colour) {
     details.add("motion", foreign_motion(state).empty() ? "by command" : foreign_motion(state));
   details.add("command", state.command_id());
   if (!state.lease_holder().empty()) details.add("lease", state.lease_holder());
-  details.add("inputs", terminals(state.inputs()));
-  details.add("outputs", terminals(state.outputs()));
+  if (state.has_age()) {
+    details.add("inputs", terminals(state.inputs()));
+    details.add("outputs", terminals(state.outputs()));
+  }
   details.add("drive",
               fmt::format("{}{}{} on {} node {}", state.model(), state.drive_version().empty() ? "" : " ",
                           state.drive_version(), state.bus(), state.node()));

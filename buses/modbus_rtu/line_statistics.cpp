@@ -49,7 +49,7 @@ void LineStatistics::sent(const Transaction& transaction, const ExchangeResult& 
   const auto before = load_.occupied();
   load_.add(begin, result.reply_end);
   const bool scanned_in_vain =
-      transaction.transaction_class == TransactionClass::scan && result.status == ExchangeStatus::timeout;
+      transaction.transaction_class == TransactionClass::scan && result.status != ExchangeStatus::replied;
   if (scanned_in_vain && nodes_.find(exchange.request.node) == nullptr) return;
   auto& node = nodes_[exchange.request.node];
   node.occupied += load_.occupied() - before;

@@ -370,7 +370,8 @@ std::optional<TimePoint> RtuBus::stop_sent_at(std::uint8_t node) const {
 }
 
 void RtuBus::note(const Transaction& transaction, const ExchangeResult& result) {
-  const bool sent = result.status != ExchangeStatus::not_sent && result.status != ExchangeStatus::unsupported;
+  using enum ExchangeStatus;
+  const bool sent = result.status != not_sent && result.status != unsupported && result.status != io_error;
   if (sent && transaction.transaction_class == TransactionClass::stop && result.request_end != TimePoint{})
     stops_sent_[transaction.exchange.request.node] = result.request_end;
   statistics_.ended(transaction, result);

@@ -54,6 +54,14 @@ TEST(StateView, WhatWasNeverMeasuredIsNotShownAsZero) {
   EXPECT_THAT(table(offline(false)), Not(HasSubstr("mm")));
   EXPECT_THAT(state_details(offline(false), false), HasSubstr("position:   never measured"));
   EXPECT_THAT(state_details(offline(false), false), Not(HasSubstr("velocity:")));
+  auto connecting = offline(false);
+  connecting.set_link(v1::LINK_STATE_CONFIGURING);
+  connecting.set_state(v1::STATE_DISABLED);
+  connecting.add_inputs()->set_name("X0");
+  const auto details = state_details(connecting, false);
+  EXPECT_THAT(details, HasSubstr("power:      not known"));
+  EXPECT_THAT(details, Not(HasSubstr("Disabled")));
+  EXPECT_THAT(details, Not(HasSubstr("X0")));
   v1::WatchAxesResponse batch;
   batch.set_tick(7);
   *batch.add_axes() = offline(false);
