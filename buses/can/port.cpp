@@ -70,7 +70,7 @@ int worst_case_bits(const Frame& frame) {
   return stuffed + (stuffed - 1) / 4 + 13;
 }
 
-Duration worst_case_time(const Frame& frame, int bit_rate) {
+Duration worst_case_time(const Frame& frame, std::uint32_t bit_rate) {
   return std::chrono::nanoseconds(worst_case_bits(frame) * std::int64_t{1'000'000'000} / bit_rate);
 }
 

@@ -39,7 +39,7 @@ std::string to_string(const Frame& frame);
 /// Bits on the wire at most (with all stuff bits and the 3 of interframe space).
 int worst_case_bits(const Frame& frame);
 /// How long they take. Precondition: bit_rate > 0, in bit/s.
-Duration worst_case_time(const Frame& frame, int bit_rate);
+Duration worst_case_time(const Frame& frame, std::uint32_t bit_rate);
 
 struct ReceivedFrame {
   Frame frame;

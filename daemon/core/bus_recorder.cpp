@@ -124,7 +124,7 @@ void BusRecorder::on_sent(const can::Frame& sent, TransactionClass transaction_c
 
 void BusRecorder::occupy(const can::Frame& frame, TimePoint end) {
   if (bit_rate_ <= 0) return;
-  load_.add(end - can::worst_case_time(frame, bit_rate_), end);
+  load_.add(end - can::worst_case_time(frame, static_cast<std::uint32_t>(bit_rate_)), end);
 }
 
 }  // namespace axisd::core
