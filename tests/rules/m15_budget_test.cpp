@@ -111,9 +111,10 @@ TEST_F(Budget, NothingTakesLongerThanPredicted) {
     EXPECT_LE(seen.stop_frame_all, predicted.all.last_frame) << name;
     EXPECT_LE(seen.standstill_all, predicted.all.standstill + deceleration) << name;
     const bool off = name == "off";
-    for (const auto time : {seen.refresh_idle, seen.refresh_moving, seen.stop_frame, seen.standstill,
-                            seen.stop_frame_all, seen.standstill_all})
+    for (const auto time :
+         {seen.refresh_idle, seen.refresh_moving, seen.stop_frame, seen.standstill, seen.standstill_all})
       EXPECT_EQ(time == Duration{}, off) << name;
+    EXPECT_GT(seen.stop_frame_all, Duration{}) << name << ": it went out to all, answered or not";
   }
 }
 
