@@ -30,6 +30,18 @@ std::vector<std::string> found(const Rig& rig) {
   return details;
 }
 
+/// For 400 ms: it was seen to move.
+void jog(Rig& rig, double velocity) {
+  rig.submit(MoveVelocityRequest{.velocity = velocity});
+  rig.run(400ms);
+}
+
+/// For longer than it takes to be noticed.
+void cut_cable(Rig& rig) {
+  rig.line->network().set_connected(false);
+  rig.run(600ms);
+}
+
 void restore_cable(Rig& rig) {
   rig.line->network().set_connected(true);
   rig.reconnect();
@@ -42,8 +54,7 @@ TEST(M04, AMotionThatIsNotWatchedAnyMoreIsStillThatOfItsCommand) {
     rig.ready();
     rig.submit(MoveVelocityRequest{.velocity = 50});
     rig.run(after);
-    rig.line->network().set_connected(false);
-    rig.run(600ms);
+    cut_cable(rig);
     ASSERT_EQ(rig.state()->link, LinkState::offline);
     EXPECT_NE(rig.state()->motion_cause, MotionCause::unknown);
     restore_cable(rig);
@@ -55,8 +66,7 @@ TEST(M04, AMotionThatIsNotWatchedAnyMoreIsStillThatOfItsCommand) {
 TEST(M04, SoIsOneWhoseStopWasNotConfirmed) {
   Rig rig;
   rig.ready();
-  rig.submit(MoveVelocityRequest{.velocity = 20});
-  rig.run(400ms);
+  jog(rig, 20);
   rig.fault({.kind = simulation::FaultKind::drop_request, .register_address = 0x0028, .count = -1});
   EXPECT_EQ(rig.complete(StopRequest{}).state, CommandState::error);
   ASSERT_TRUE(rig.state()->moving);
@@ -81,8 +91,7 @@ TEST(M04, SoIsOneThatAnEarlierDaemonBegan) {
 TEST(M04, AMotionOfNobodyIsNotOurs) {
   Rig rig;
   rig.ready();
-  rig.submit(MoveVelocityRequest{.velocity = 50});
-  rig.run(400ms);
+  jog(rig, 50);
   rig.complete(StopRequest{});
   rig.write_behind(0x0023, 100);
   rig.write_behind(0x0027, 2);
@@ -95,10 +104,8 @@ TEST(M04, AMotionThatATerminalTookOverIsNotOurs) {
              axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
            }});
   rig.ready();
-  rig.submit(MoveVelocityRequest{.velocity = 20});
-  rig.run(400ms);
-  rig.line->network().set_connected(false);
-  rig.run(600ms);
+  jog(rig, 20);
+  cut_cable(rig);
   rig.set_input("X4", true);
   rig.run(100ms);
   rig.line->network().set_connected(true);
@@ -111,16 +118,13 @@ TEST(M04, AnOwedStopThatCameThroughIsTold) {
   Rig rig;
   rig.ready();
   EXPECT_EQ(found(rig), std::vector<std::string>{});
-  rig.submit(MoveVelocityRequest{.velocity = 50});
-  rig.run(400ms);
-  rig.line->network().set_connected(false);
-  rig.run(600ms);
+  jog(rig, 50);
+  cut_cable(rig);
   restore_cable(rig);
   EXPECT_FALSE(rig.drive->shaft_moving());
   const std::vector<std::string> once{"the stop that was owed to it was sent, and it came to rest"};
   EXPECT_EQ(found(rig), once);
-  rig.line->network().set_connected(false);
-  rig.run(600ms);
+  cut_cable(rig);
   restore_cable(rig);
   EXPECT_EQ(found(rig), once) << "it rested before";
 }
