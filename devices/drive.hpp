@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "buses/error.hpp"
@@ -218,12 +219,12 @@ class Drive {
   /// start_move() up to the trigger. Errors: as of that, never `unknown`.
   virtual Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) = 0;
   /// Why this drive cannot start in the same instant as others on its bus; empty: it can, which was proven in
-  /// this power cycle (M24).
-  [[nodiscard]] virtual std::string no_common_start() const { return "its bus has no common trigger"; }
+  /// this power cycle (M24). Valid until the drive is asked for anything else.
+  [[nodiscard]] virtual std::string_view no_common_start() const { return "its bus has no common trigger"; }
   /// start_move() up to the trigger. Errors: as of that, never `unknown`; not_supported: no_common_start().
   virtual Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile /*profile*/,
                                                                    MotionGuard /*guard*/) {
-    co_return fail(Reason::not_supported, no_common_start(), "start it by itself");
+    co_return fail(Reason::not_supported, std::string(no_common_start()), "start it by itself");
   }
 
   /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop does not) in class `stop`.

@@ -75,6 +75,14 @@ std::string state_of(const v1::AxisState& state) {
   return state.has_age() || state.link() == v1::LINK_STATE_OFFLINE ? state_text(state) : "-";
 }
 
+std::string position(const v1::AxisState& state) {
+  if (!state.has_age()) return "never measured";
+  const auto text = with_unit(state.position(), state.unit()) + " (" + trust(state);
+  if (state.position_source() == v1::POSITION_SOURCE_COMMANDED) return text + ", counted pulses)";
+  if (state.position_source() == v1::POSITION_SOURCE_ENCODER) return text + ", encoder)";
+  return text + ")";
+}
+
 std::string power(const v1::AxisState& state) {
   if (!state.has_age()) return "not known";
   if (!state.enabled()) return "off";
@@ -139,13 +147,7 @@ std::string state_details(const v1::AxisState& state, bool colour) {
     details.add("alarm", fmt::format("{} {}", state.alarm_code(), state.alarm_name()));
   if (!state.drift().empty()) details.add("drift", coloured(state.drift(), Colour::red, colour));
   details.add("power", power(state));
-  details.add("position",
-              !state.has_age()
-                  ? "never measured"
-                  : fmt::format("{} ({}{})", with_unit(state.position(), state.unit()), trust(state),
-                                state.position_source() == v1::POSITION_SOURCE_COMMANDED ? ", counted pulses"
-                                : state.position_source() == v1::POSITION_SOURCE_ENCODER ? ", encoder"
-                                                                                         : ""));
+  details.add("position", position(state));
   if (state.has_target()) details.add("target", with_unit(state.target(), state.unit()));
   if (state.has_age()) details.add("velocity", with_unit(state.velocity(), state.unit() + "/s"));
   if (state.moving())
@@ -162,6 +164,9 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   details.add("link", link(state));
   if (state.has_link_error())
     details.add("link error", coloured(describe(state.link_error(), state.axis()), Colour::red, colour));
+  if (state.link() == v1::LINK_STATE_ONLINE)
+    details.add("in a group",
+                "starts " + (state.start_note().empty() ? "by SYNC" : "by itself: " + state.start_note()));
   if (state.has_age()) details.add("measured", duration_text(seconds(state.age())) + " ago");
   if (state.eeprom_writes() > 0)
     details.add("EEPROM", fmt::format("{} register{} saved", state.eeprom_writes(),
@@ -173,7 +178,7 @@ std::string state_details(const v1::AxisState& state, bool colour) {
 std::string tick_line(const v1::WatchAxesResponse& batch) {
   std::string text = std::to_string(batch.tick());
   for (const auto& state : batch.axes())
-    text += fmt::format("  {} {} {} {}", state.axis(), state_text(state),
+    text += fmt::format("  {} {} {} {}", state.axis(), state_of(state),
                         measured(state, state.position(), state.unit()),
                         measured(state, state.velocity(), state.unit() + "/s"));
   return text;

@@ -141,7 +141,8 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
 bool Axis::seen_again(const DriveSample& sample) {
   if (sample.asked_at - continuity_checked_ > continuity_forgotten) return false;  // to be proven first
   if (link_ != LinkState::online || revision_ != sampled_revision_ || busy() || release_owed_ || !sample_ ||
-      note_eeprom_writes() || shown_->link_note != drive_->link_note())
+      note_eeprom_writes() || shown_->link_note != drive_->link_note() ||
+      shown_->start_note != drive_->no_common_start())
     return false;
   auto known = *sample_;
   known.asked_at = sample.asked_at;

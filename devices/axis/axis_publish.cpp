@@ -97,6 +97,7 @@ void Axis::publish() {
   next->link = link_;
   next->link_error = link_error_;
   next->link_note = drive_->link_note();
+  next->start_note = drive_->no_common_start();
   next->fault = fault_;
   next->stop_held = stopping_.hold;
   next->inhibited = env_.inhibited != nullptr && *env_.inhibited;

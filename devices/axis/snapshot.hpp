@@ -105,6 +105,7 @@ struct AxisSnapshot {
   LinkState link = LinkState::offline;
   std::optional<Error> link_error{};  ///< why it is not online
   std::string link_note{};            ///< what is not as it should be about the way the state comes
+  std::string start_note{};           ///< Drive::no_common_start()
   std::optional<Error> fault{};       ///< why it is in ErrorStop
   std::string drift{};                ///< what the drive no longer holds as configured; empty: nothing
   bool enabled = false;               ///< the drive's power stage

@@ -78,7 +78,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
   // drive_group_start.cpp
-  [[nodiscard]] std::string no_common_start() const override { return no_common_start_; }
+  [[nodiscard]] std::string_view no_common_start() const override { return no_common_start_; }
   Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
 

@@ -17,6 +17,8 @@ class Groups(unittest.TestCase):
         self.client.to_done("Disable", "pusher")
         for axis in TRANSFER:
             self.client.wait_online(axis)
+        # That it follows SYNC it shows while it is released, and on a slow computer at the second attempt only.
+        self.client.wait_state("carousel", lambda s: not s.start_note, "the carousel is known to start by SYNC")
         for axis in TRANSFER:
             self.client.to_done("Enable", axis)
         self.client.to_done("Home", "pusher")  # its segments count from there
@@ -37,6 +39,8 @@ class Groups(unittest.TestCase):
         listed = self.axisctl("group", "list").stdout
         self.assertIn("transfer", listed)
         self.assertIn("50 ms", listed)
+        for axis, start in {"carousel": "starts by SYNC", "feeder": "starts by itself: its bus has no"}.items():
+            self.assertIn(start, self.axisctl("state", axis).stdout)
         done = self.axisctl("--json", "group", "move", "transfer", "feeder=110mm", "carousel=100deg", "pusher=40mm",
                             "--together", "--wait")
         self.assertEqual(done.returncode, 0, done.stderr)

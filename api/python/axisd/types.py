@@ -201,6 +201,7 @@ class AxisState:
     eeprom_writes: int
     link_note: str
     lease_holder: str
+    start_note: str
     raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -220,7 +221,7 @@ class AxisState:
             simulated=raw.simulated, command_id=raw.command_id, model=raw.model, bus=raw.bus, node=raw.node,
             motion_cause=_member(MotionCause, types_pb2.MotionCause.DESCRIPTOR, "MOTION_CAUSE_", raw.motion_cause),
             drift=raw.drift, eeprom_writes=raw.eeprom_writes, link_note=raw.link_note,
-            lease_holder=raw.lease_holder, raw=raw)
+            lease_holder=raw.lease_holder, start_note=raw.start_note, raw=raw)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -85,6 +85,7 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   snapshot.drift = "X1 has no function";
   snapshot.eeprom_writes = 5;
   snapshot.link_note = "state by SDO polling";
+  snapshot.start_note = "its bus has no common trigger";
   snapshot.lease_holder = "operator (panel 2)";
 
   v1::AxisState state;
