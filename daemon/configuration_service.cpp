@@ -96,8 +96,11 @@ std::string ConfigurationService::file_revision() const {
 }
 
 ConfigurationCheck ConfigurationService::check(std::string_view yaml) const {
-  return {.findings = findings_of(config::load_text(yaml, parts_.path).diagnostics),
-          .revision = revision_of(yaml)};
+  auto loaded = config::load_text(yaml, parts_.path);
+  return {
+      .findings = findings_of(std::move(loaded.diagnostics)),
+      .warnings = loaded.configuration ? config::warnings(*loaded.configuration) : std::vector<std::string>(),
+      .revision = revision_of(yaml)};
 }
 
 void ConfigurationService::reload(std::string client, bool dry_run,
@@ -143,6 +146,7 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
     return result;
   }
   auto& configuration = *loaded.configuration;
+  result.warnings = config::warnings(configuration);
   result.changes = config::differences(parts_.configuration, configuration);
   core::Reload reload{.client = request.client,
                       .configuration = configuration,
@@ -157,7 +161,9 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
   for (const auto& refusal : result.refusals)
     spdlog::warn("{} reloads the configuration, which is refused: {}", request.client, to_string(refusal));
   result.applied = result.refusals.empty() && !request.dry_run;
-  if (result.applied) adopt(std::move(configuration), loaded.text);
+  if (!result.applied) return result;
+  for (const auto& warning : result.warnings) spdlog::warn("{}", warning);
+  adopt(std::move(configuration), loaded.text);
   return result;
 }
 

@@ -30,6 +30,7 @@ struct ConfigurationFinding {
 
 struct ConfigurationCheck {
   std::vector<ConfigurationFinding> findings;  ///< in the order of the file; none: it could be served
+  std::vector<std::string> warnings;           ///< what its buses do not meet, where they only warn
   std::string revision;
 };
 
@@ -37,6 +38,7 @@ struct ConfigurationCheck {
 struct ConfigurationReload {
   bool applied = false;                        ///< the file is served now; all of it, or else nothing
   std::vector<ConfigurationFinding> findings;  ///< of a file that cannot be served; then nothing else
+  std::vector<std::string> warnings;           ///< as in ConfigurationCheck
   std::vector<ConfigurationChange> changes;    ///< from what was served before
   std::vector<Error> refusals;                 ///< what stands against it, all, each with what to do
   std::string before, revision;                ///< of the texts

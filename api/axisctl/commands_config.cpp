@@ -41,15 +41,22 @@ std::string read(const std::string& path) {
   return text;
 }
 
+/// What keeps the file `path` from being served, and what is to be known of it when it is.
+template <class Response>
+void print_judgement(const Response& response, const std::string& path) {
+  for (const auto& found : response.findings())
+    fmt::print(stderr, "{}:{}:{}: {}{}{}\n", path, found.line(), found.column(), found.message(),
+               found.suggestion().empty() ? "" : "; ", found.suggestion());
+  for (const auto& warning : response.warnings()) fmt::print(stderr, "{}: warning: {}\n", path, warning);
+}
+
 void check(Invocation& invocation, const std::string& path) {
   v1::CheckConfigRequest request;
   request.set_yaml(read(path));
   const auto response = invocation.client().call(&Stub::CheckConfig, request, std::string_view());
   if (!response.findings().empty()) invocation.status = ExitCode::usage;
   if (invocation.json) return print_line(json(response));
-  for (const auto& found : response.findings())
-    fmt::print(stderr, "{}:{}:{}: {}{}{}\n", path, found.line(), found.column(), found.message(),
-               found.suggestion().empty() ? "" : "; ", found.suggestion());
+  print_judgement(response, path);
   if (!response.findings().empty()) return;
   const bool same = response.revision() == served(invocation).revision();
   print_line(fmt::format("{}: ok, {}", path, same ? "and it is what is served" : "not served yet"));
@@ -67,9 +74,8 @@ void reload(Invocation& invocation, bool dry_run) {
   if (!response.refusals().empty()) invocation.status = ExitCode::refused;
   if (!response.findings().empty()) invocation.status = ExitCode::usage;
   if (invocation.json) return print_line(json(response));
-  for (const auto& found : response.findings())
-    fmt::print(stderr, "{}:{}:{}: {}{}{}\n", served(invocation).path(), found.line(), found.column(),
-               found.message(), found.suggestion().empty() ? "" : "; ", found.suggestion());
+  if (!response.findings().empty() || !response.warnings().empty())
+    print_judgement(response, served(invocation).path());
   for (const auto& refusal : response.refusals()) fmt::print(stderr, "refused: {}\n", refusal_text(refusal));
   if (!response.findings().empty()) return print_line("not reloaded: nothing was changed");
   for (const auto& change : response.changes()) print_line(text_of(change));

@@ -48,6 +48,7 @@ void to_proto(const ConfigurationFinding& from, v1::ConfigFinding& to) {
 void to_proto(const ConfigurationReload& from, v1::ReloadConfigResponse& to) {
   to.set_applied(from.applied);
   for (const auto& found : from.findings) to_proto(found, *to.add_findings());
+  for (const auto& warning : from.warnings) to.add_warnings(warning);
   for (const auto& change : from.changes) server::to_proto(change, *to.add_changes());
   for (const auto& refusal : from.refusals) server::to_proto(refusal, *to.add_refusals());
   to.set_previous_revision(from.before);
@@ -152,6 +153,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::CheckConfig(Context* context,
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
   const auto checked = services_.configuration->check(request->yaml());
   for (const auto& found : checked.findings) to_proto(found, *response->add_findings());
+  for (const auto& warning : checked.warnings) response->add_warnings(warning);
   response->set_revision(checked.revision);
   return answer(context, grpc::Status::OK);
 }

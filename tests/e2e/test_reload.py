@@ -95,6 +95,18 @@ class Reload(Scenario):
         self.assertEqual(self.events(machine), [])
         self.assert_state(machine.client.state("feeder"), "DISABLED")
 
+    def test_warns_of_what_the_line_cannot_do(self):
+        machine = self.cell()
+        self.edit(machine, "    node: 2\n", "    node: 2\n    poll: { moving: 5 ms, idle: 5 ms }\n")
+        judged = machine.axisctl("config", "check", machine.config)
+        self.assertEqual(judged.returncode, 0, judged.stderr)
+        self.assertRegex(judged.stderr, rf"^{machine.config}: warning: line: reading everything .* raise poll.idle")
+        reloaded = self.reload(machine)
+        self.assertEqual((reloaded.returncode, reloaded.stderr), (0, judged.stderr))
+        self.assertIn("line: reading everything", machine.daemon.log())
+        self.edit(machine, "    poll: { moving: 5 ms, idle: 5 ms }\n", "")
+        self.assertEqual(list(self.answer(machine).warnings), [])
+
     def test_refuses_to_change_what_moves_and_says_all_that_is_in_the_way(self):
         machine = self.ready_feeder()
         move = self.move_under_way(machine)

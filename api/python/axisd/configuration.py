@@ -70,9 +70,11 @@ class Reload:
     refusals: tuple[ErrorDetail, ...]
     previous_revision: str
     revision: str
+    warnings: tuple[str, ...]
 
     @classmethod
     def of(cls, raw: system_service_pb2.ReloadConfigResponse) -> Reload:
         return cls(raw.applied, tuple(ConfigFinding.of(found) for found in raw.findings),
                    tuple(ConfigChange.of(change) for change in raw.changes),
-                   tuple(ErrorDetail.of(refusal) for refusal in raw.refusals), raw.previous_revision, raw.revision)
+                   tuple(ErrorDetail.of(refusal) for refusal in raw.refusals), raw.previous_revision, raw.revision,
+                   tuple(raw.warnings))

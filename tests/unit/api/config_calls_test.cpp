@@ -92,12 +92,14 @@ TEST_F(ConfigCalls, AReloadTellsWhatChanged) {
   serve({.configuration = &configuration_});
   configuration_.answer = ConfigurationReload{
       .applied = true,
+      .warnings = {"line-a: slow"},
       .changes = {{.section = "axes", .name = "feeder", .keys = {"limits.velocity", "scale.invert"}},
                   {.section = "groups", .name = "both", .kind = ConfigurationChangeKind::removed}},
       .before = "r1",
       .revision = "r2"};
   ASSERT_TRUE(reload().ok());
   EXPECT_TRUE(reloaded_.applied());
+  EXPECT_THAT(reloaded_.warnings(), ::testing::ElementsAre("line-a: slow"));
   EXPECT_EQ(reloaded_.previous_revision(), "r1");
   EXPECT_EQ(reloaded_.revision(), "r2");
   ASSERT_EQ(reloaded_.changes_size(), 2);
