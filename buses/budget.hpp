@@ -11,6 +11,9 @@
 
 namespace axisd {
 
+/// "12.5 ms"; of Duration::max(): "any time".
+std::string bound_text(Duration bound);
+
 /// What a configuration demands of a bus's budget.
 struct BudgetPolicy {
   bool refuse = false;  ///< a configuration that exceeds it; else it is said at start

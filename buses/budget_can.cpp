@@ -196,18 +196,15 @@ AxisBudget Analysis::axis(const AxisDemand& axis) const {
           .all = stop(axis, count())};
 }
 
-double milliseconds_of(Duration time) { return std::chrono::duration<double, std::milli>(time).count(); }
-
 /// Whether a drive takes its PDOs is only known when it was asked.
 std::string note_on_polling(NetworkDemand demand) {
   demand.by_sdo = true;
   const auto polled = budget_of(demand);
   return fmt::format(
-      "with drives that refuse their PDOs: utilisation {:.2f}, last stop frame of all axes {:.1f} ms, "
-      "refresh "
-      "while all move {:.1f} ms",
-      polled.load.back().utilisation, milliseconds_of(polled.stops.back().last_frame),
-      milliseconds_of(polled.load.back().refresh_moving));
+      "with drives that refuse their PDOs: utilisation {:.2f}, last stop frame of all axes {}, refresh while "
+      "all move {}",
+      polled.load.back().utilisation, bound_text(polled.stops.back().last_frame),
+      bound_text(polled.load.back().refresh_moving));
 }
 
 }  // namespace

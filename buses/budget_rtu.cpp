@@ -33,6 +33,9 @@ class Analysis {
   [[nodiscard]] LoadBudget load(int moving) const;
   [[nodiscard]] StopBudget stop(const AxisDemand& last, int axes) const;
   [[nodiscard]] AxisBudget axis(const AxisDemand& axis) const;
+  /// Why times are long on a line that has time to spare as long as its nodes answer at once; empty: they are
+  /// not.
+  [[nodiscard]] std::string note_on_turnaround() const;
   [[nodiscard]] std::string note_on_transact() const;
 
  private:
@@ -229,11 +232,19 @@ AxisBudget Analysis::axis(const AxisDemand& axis) const {
           .all = stop(axis, count())};
 }
 
-std::string Analysis::note_on_transact() const {
-  const auto more = answered(longest_of_all, slowest_) - in_flight_;
+std::string Analysis::note_on_turnaround() const {
+  const auto at_most = utilisation(0, true);
+  if (at_most <= 1 || utilisation(0, false) > 1) return {};
   return fmt::format(
-      "while somebody reads 125 registers at once over the API, a stop may take {:.0f} ms more",
-      std::chrono::duration<double, std::milli>(more).count());
+      "the times above presume that each reply takes its turnaround_max ({}): even while all axes "
+      "rest, reading everything as often as it says would then take {:.0f} % of the wire's time; lower it to "
+      "what the drives need",
+      bound_text(slowest_), 100 * at_most);
+}
+
+std::string Analysis::note_on_transact() const {
+  return fmt::format("while somebody reads 125 registers at once over the API, a stop may take {} more",
+                     bound_text(answered(longest_of_all, slowest_) - in_flight_));
 }
 
 }  // namespace
@@ -253,6 +264,7 @@ BusBudget budget_of(const LineDemand& demand) {
     budget.stops.push_back(worst);
   }
   for (const auto& axis : demand.axes) budget.axes.push_back(analysis.axis(axis));
+  if (auto note = analysis.note_on_turnaround(); !note.empty()) budget.notes.push_back(std::move(note));
   budget.notes.push_back(analysis.note_on_transact());
   return budget;
 }

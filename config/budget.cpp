@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 
 #include "buses/budget_can.hpp"
 #include "buses/budget_rtu.hpp"
@@ -59,6 +60,7 @@ canopen::NetworkDemand demand_of(const canopen::NetworkSettings& network,
 
 /// At full speed until the stop frame is out, then along the ramp.
 double way_of(const AxisSettings& axis, Duration deceleration, const StopBudget& stop) {
+  if (stop.last_frame == Duration::max()) return std::numeric_limits<double>::infinity();
   const auto seconds = [](Duration time) { return std::chrono::duration<double>(time).count(); };
   return axis.limits.velocity * (seconds(stop.last_frame) + seconds(deceleration) / 2);
 }
@@ -77,11 +79,6 @@ std::vector<AxisBudgetReport> axis_reports(const BusBudget& budget, const Config
                        .way_all = way_of(axis, deceleration, predicted.all)});
   }
   return reports;
-}
-
-std::string shown(Duration time) {
-  if (time == Duration::max()) return "any time";
-  return fmt::format("{:.1f} ms", std::chrono::duration<double, std::milli>(time).count());
 }
 
 std::vector<BudgetExcess> excess_of(const BusBudget& budget, const BudgetPolicy& policy) {
@@ -103,15 +100,15 @@ std::vector<BudgetExcess> excess_of(const BusBudget& budget, const BudgetPolicy&
   const auto last = budget.stops.back().last_frame;
   if (policy.stop_bound && last > *policy.stop_bound)
     found.push_back({"stop_bound",
-                     fmt::format("the last stop frame of all axes may take {}, longer than {}", shown(last),
-                                 format_duration(*policy.stop_bound)),
+                     fmt::format("the last stop frame of all axes may take {}, longer than {}",
+                                 bound_text(last), format_duration(*policy.stop_bound)),
                      "lower turnaround_max, put axes on another bus, or raise stop_bound"});
   const auto refresh = budget.load.back().refresh_moving;
   if (policy.refresh_bound && refresh > *policy.refresh_bound)
     found.push_back(
         {"refresh_bound",
          fmt::format("while all axes move, {} may pass between two readings of one, longer than {}",
-                     shown(refresh), format_duration(*policy.refresh_bound)),
+                     bound_text(refresh), format_duration(*policy.refresh_bound)),
          "lower turnaround_max, put axes on another bus, or raise refresh_bound"});
   return found;
 }
@@ -147,8 +144,8 @@ std::string summary(const BusBudgetReport& report) {
       "{}: utilisation {:.2f} (all axes moving: {:.2f}), last stop frame of one axis within {}, of all {} "
       "within {}, refresh within {} while all move",
       budget.bus, budget.load.front().utilisation, budget.load.back().utilisation,
-      shown(budget.stops.front().last_frame), budget.stops.size(), shown(budget.stops.back().last_frame),
-      shown(budget.load.back().refresh_moving));
+      bound_text(budget.stops.front().last_frame), budget.stops.size(),
+      bound_text(budget.stops.back().last_frame), bound_text(budget.load.back().refresh_moving));
 }
 
 std::vector<std::string> warnings(const BusBudgetReport& report) {

@@ -11,14 +11,13 @@
 #include "api/axisctl/terminal.hpp"
 #include "api/budget/convert.hpp"
 #include "axisd/v1/bus_service.grpc.pb.h"
+#include "axisd/v1/group_service.grpc.pb.h"
 #include "config/budget.hpp"
 
 namespace axisd::axisctl {
 namespace {
 
-void show(const Invocation& invocation, const v1::GetBudgetResponse& response,
-          const v1::ListGroupsResponse& groups) {
-  if (invocation.json) return print_line(json(response));
+void print_tables(const v1::GetBudgetResponse& response, const v1::ListGroupsResponse& groups) {
   std::string text;
   for (const auto& budget : response.budgets())
     text += (text.empty() ? "" : "\n") + budget_text(budget, groups, use_colour());
@@ -41,10 +40,22 @@ void budget_of_file(Invocation& invocation, const std::string& path) {
   if (configuration) {
     v1::GetBudgetResponse response;
     for (const auto& report : config::budgets(*configuration)) api::to_proto(report, *response.add_budgets());
-    show(invocation, response, groups_of(*configuration));
+    if (invocation.json)
+      print_line(json(response));
+    else
+      print_tables(response, groups_of(*configuration));
   }
   if (!result.configuration) invocation.status = ExitCode::usage;
   for (const auto& diagnostic : result.diagnostics) fmt::print(stderr, "{}\n", config::to_string(diagnostic));
+}
+
+void budget_of_daemon(Invocation& invocation) {
+  auto& client = invocation.client();
+  const auto response =
+      client.call(&v1::BusService::Stub::GetBudget, v1::GetBudgetRequest(), std::string_view());
+  if (invocation.json) return print_line(json(response));
+  print_tables(response,
+               client.call(&v1::GroupService::Stub::ListGroups, v1::ListGroupsRequest(), std::string_view()));
 }
 
 }  // namespace
@@ -58,10 +69,7 @@ void add_budget_command(CLI::App& app, Invocation& invocation) {
   command->add_option("FILE", *path, "The YAML file");
   command->callback([&invocation, path] {
     if (!path->empty()) return budget_of_file(invocation, *path);
-    show(invocation,
-         invocation.client().call(&v1::BusService::Stub::GetBudget, v1::GetBudgetRequest(),
-                                  std::string_view()),
-         {});
+    budget_of_daemon(invocation);
   });
 }
 

@@ -14,6 +14,7 @@ from google.protobuf import duration_pb2
 from fake_axis import ENDS, STEP, FakeAxis, offline_detail, refuse  # makes axisd importable
 from fake_drives import SERVICES, FakeDrives, FakeEvents, FakeNodes
 from fake_explain import FakeExplain
+from fake_groups import SERVICES as GROUP_SERVICES, FakeGroups
 from fake_leases import SERVICES as LEASE_SERVICES, FakeLeases
 from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes_rpc,
                       budget_pb2 as budget_pb, bus_service_pb2 as bus_pb, bus_service_pb2_grpc as bus_rpc,
@@ -23,8 +24,8 @@ from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes
 GRANTED_STEP = 3.0
 
 
-class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeLeases, FakeExplain, axes_rpc.AxisServiceServicer,
-                  command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer, system_rpc.SystemServiceServicer):
+class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, FakeExplain,
+                  axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer, system_rpc.SystemServiceServicer):
     """All services. `calls` records (method, request, peer) of every call, for assertions."""
 
     def __init__(self):
@@ -351,7 +352,7 @@ async def serve(machine, addresses):
                                       ("grpc.http2.max_ping_strikes", 0)))
     for add in (axes_rpc.add_AxisServiceServicer_to_server, command_rpc.add_CommandServiceServicer_to_server,
                 bus_rpc.add_BusServiceServicer_to_server, system_rpc.add_SystemServiceServicer_to_server, *SERVICES,
-                *LEASE_SERVICES):
+                *GROUP_SERVICES, *LEASE_SERVICES):
         add(machine, server)
     ports = [server.add_insecure_port(address) for address in addresses]
     await server.start()

@@ -16,6 +16,7 @@ class OfTheDaemon(AxisctlTest):
         text = self.ok("budget")
         self.assertRegex(text, r"\n +0 +0\.25 +0\.50 +- +300\.0 ms\n")
         self.assertRegex(text, r"\nfeeder +alone +28\.0 ms +7\.0 ms +- \+ 150\.0 ms +10\.5 mm\n")
+        self.assertRegex(text, r"\ntransfer +1 +28\.0 ms +-\n")
         self.assertIn("exceeded (stop_bound): too late; raise it\nnote: a note\n", text)
         self.assertEqual(self.json("budget")[0]["budgets"][0]["axes"][0]["observed"]["stop_frame"], "0.007s")
 
@@ -30,6 +31,7 @@ class OfAFile(AxisctlTest):
         self.assertRegex(text, r"(?s)^line-a\nMOVING +UTILISATION.*\nSTOPPED +LAST FRAME.*\nfeeder +all .*\ncan0\n")
         self.assertEqual(text.count("MOVING, STOPPED: not all numbers of axes are shown; --json has them\n"), 1)
         self.assertRegex(text, r"(?s)\nGROUP .*\ntransfer +2 +\d+\.\d ms +\d+\.\d ms\n.*\ncan0\n.*\ntransfer +1 +\d+\.\d ms ")
+        self.assertEqual(text.count("note: the times above presume that each reply takes its turnaround_max (200.0 ms)"), 1)
         buses = self.json("budget", DEMO)[0]["budgets"]
         self.assertEqual([len(bus["stops"]) for bus in buses], [5, 1])
 

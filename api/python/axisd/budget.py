@@ -27,7 +27,7 @@ class StopBudget:
 @dataclasses.dataclass(frozen=True)
 class AxisBudget:
     """Worst cases of one axis; `seen_*` are the longest since the daemon started. `way_alone` and `way_all` are in
-    `unit`, from the stop request on at the highest velocity."""
+    `unit`, from the stop request on at the highest velocity; infinite where that stop has no bound."""
     axis: str
     refresh_idle: float | None
     refresh_moving: float | None

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <google/protobuf/util/time_util.h>
 
+#include <cstdint>
 #include <initializer_list>
+#include <limits>
 #include <string>
 
 namespace axisd::axisctl {
@@ -25,8 +27,8 @@ v1::BusBudget line_with(int axes) {
   for (int count = 1; count <= axes; ++count) {
     auto& stop = *budget.add_stops();
     stop.set_axes(static_cast<std::uint32_t>(count));
-    *stop.mutable_last_frame() = TimeUtil::MillisecondsToDuration(10 * count);
-    *stop.mutable_standstill() = TimeUtil::MillisecondsToDuration(100 * count);
+    *stop.mutable_last_frame() = TimeUtil::MillisecondsToDuration(std::int64_t{10} * count);
+    *stop.mutable_standstill() = TimeUtil::MillisecondsToDuration(std::int64_t{100} * count);
     budget.add_axes()->set_axis("a" + std::to_string(count));
   }
   return budget;
@@ -61,7 +63,7 @@ TEST(BudgetView, NoBoundIsNoWay) {
   auto budget = line_with(1);
   auto& axis = *budget.mutable_axes(0);
   axis.set_unit("mm");
-  axis.set_way_alone(9e11);
+  axis.set_way_alone(std::numeric_limits<double>::infinity());
   axis.set_way_all(12.5);
   *axis.mutable_stop_all()->mutable_last_frame() = TimeUtil::MillisecondsToDuration(10);
   EXPECT_THAT(budget_text(budget, {}, false),

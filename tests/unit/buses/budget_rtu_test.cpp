@@ -145,6 +145,20 @@ TEST(RtuBudget, ASlowDriveCostsTheOthersOnlyWhatItTakes) {
   EXPECT_LT(budget_of(demand).load[0].utilisation_max, before.load[0].utilisation_max);
 }
 
+TEST(RtuBudget, SaysWhenItIsTheTurnaroundThatMakesTimesLong) {
+  const auto notes_with = [](int axes, Duration turnaround_max) {
+    auto demand = demand_of(axes, 115200);
+    demand.line.turnaround_max = turnaround_max;
+    std::string all;
+    for (const auto& note : budget_of(demand).notes) all += note + "\n";
+    return all;
+  };
+  EXPECT_NE(notes_with(8, 200ms).find("turnaround_max (200.0 ms)"), std::string::npos)
+      << notes_with(8, 200ms);
+  EXPECT_EQ(notes_with(8, 5ms).find("turnaround_max"), std::string::npos) << "there is time for it";
+  EXPECT_EQ(notes_with(60, 200ms).find("turnaround_max"), std::string::npos) << "too much without it, too";
+}
+
 TEST(RtuBudget, TheHostsShareIsPartOfEachStop) {
   auto demand = demand_of(2, 115200);
   const auto before = budget_of(demand);
