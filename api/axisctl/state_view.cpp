@@ -164,9 +164,10 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   details.add("link", link(state));
   if (state.has_link_error())
     details.add("link error", coloured(describe(state.link_error(), state.axis()), Colour::red, colour));
-  if (state.link() == v1::LINK_STATE_ONLINE)
-    details.add("in a group",
-                "starts " + (state.start_note().empty() ? "by SYNC" : "by itself: " + state.start_note()));
+  if (state.starts_by_sync())
+    details.add("in a group", "starts by SYNC");
+  else if (!state.start_note().empty())
+    details.add("in a group", "starts alone, not by SYNC: " + state.start_note());
   if (state.has_age()) details.add("measured", duration_text(seconds(state.age())) + " ago");
   if (state.eeprom_writes() > 0)
     details.add("EEPROM", fmt::format("{} register{} saved", state.eeprom_writes(),

@@ -155,7 +155,10 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   to.set_eeprom_writes(from.eeprom_writes);
   to.set_link_note(from.link_note);
   to.set_lease_holder(from.lease_holder);
-  to.set_start_note(from.start_note);
+  if (from.link == LinkState::online) {
+    to.set_start_note(from.start_note);
+    to.set_starts_by_sync(from.start_note.empty());
+  }
   to.set_revision(from.revision);
 }
 

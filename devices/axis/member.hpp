@@ -43,7 +43,7 @@ class Axis::Member {
   [[nodiscard]] Duration predicted() const { return there_ ? Duration{} : activity_->plan.predicted; }
   /// Waits for a SYNC, together with the others of its network; nullptr: it has a trigger of its own.
   [[nodiscard]] PreparedMove* prepared() const { return prepared_.get(); }
-  /// Why it does not start by a SYNC; empty: it does, or its bus has none.
+  /// Why it does not start by a SYNC; empty: it does, or it needs no start.
   [[nodiscard]] const std::string& start_note() const { return start_note_; }
   Task<Result<void>> verify();
   /// From now on its start may have been sent.

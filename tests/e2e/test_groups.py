@@ -18,7 +18,7 @@ class Groups(unittest.TestCase):
         for axis in TRANSFER:
             self.client.wait_online(axis)
         # That it follows SYNC it shows while it is released, and on a slow computer at the second attempt only.
-        self.client.wait_state("carousel", lambda s: not s.start_note, "the carousel is known to start by SYNC")
+        self.client.wait_state("carousel", lambda s: s.starts_by_sync, "the carousel is known to start by SYNC")
         for axis in TRANSFER:
             self.client.to_done("Enable", axis)
         self.client.to_done("Home", "pusher")  # its segments count from there
@@ -39,7 +39,7 @@ class Groups(unittest.TestCase):
         listed = self.axisctl("group", "list").stdout
         self.assertIn("transfer", listed)
         self.assertIn("50 ms", listed)
-        for axis, start in {"carousel": "starts by SYNC", "feeder": "starts by itself: its bus has no"}.items():
+        for axis, start in {"carousel": "starts by SYNC", "feeder": "starts alone, not by SYNC: its bus has no"}.items():
             self.assertIn(start, self.axisctl("state", axis).stdout)
         done = self.axisctl("--json", "group", "move", "transfer", "feeder=110mm", "carousel=100deg", "pusher=40mm",
                             "--together", "--wait")

@@ -111,5 +111,20 @@ TEST(M24, ANodeWhoseAxisIsExchangedIsSettledAnew) {
   EXPECT_NE(rig.shaft(), at);
 }
 
+/// An energised drive shows it once it is released; whatever the release changed was published before that.
+TEST(M24, WhetherItStartsBySyncIsPublishedAsSoonAsItIsKnown) {
+  CanRig rig({.sync_period = 10ms, .before_start = [](auto& node) {
+                write(node, 0x6060, 0, 1, 1);
+                for (const std::uint32_t word : {0x00U, 0x06U, 0x07U, 0x0FU}) write(node, 0x6040, 0, 2, word);
+              }});
+  rig.run(3s);
+  EXPECT_NE(rig.state()->start_note.find("released"), std::string::npos) << rig.state()->start_note;
+  rig.done(DisableRequest{});
+  EXPECT_NE(rig.state()->start_note, "");
+  EXPECT_TRUE(rig.run_until([&] { return rig.state()->start_note.empty(); }, 5s)) << rig.state()->start_note;
+  CanRig without({.sync_period = 0ms});
+  EXPECT_NE(without.state()->start_note.find("sync_period is 0"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace axisd::test

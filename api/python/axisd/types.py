@@ -202,6 +202,7 @@ class AxisState:
     link_note: str
     lease_holder: str
     start_note: str
+    starts_by_sync: bool
     raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -221,7 +222,8 @@ class AxisState:
             simulated=raw.simulated, command_id=raw.command_id, model=raw.model, bus=raw.bus, node=raw.node,
             motion_cause=_member(MotionCause, types_pb2.MotionCause.DESCRIPTOR, "MOTION_CAUSE_", raw.motion_cause),
             drift=raw.drift, eeprom_writes=raw.eeprom_writes, link_note=raw.link_note,
-            lease_holder=raw.lease_holder, start_note=raw.start_note, raw=raw)
+            lease_holder=raw.lease_holder, start_note=raw.start_note,
+            starts_by_sync=raw.starts_by_sync, raw=raw)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -90,16 +90,32 @@ TEST(Convert, SnapshotKeepsEveryValue) {
 
   v1::AxisState state;
   to_proto(snapshot, TimePoint(10s + 20ms), state);
-  // No singular field may be left at its default, so that a field that nobody fills is noticed.
+  // No singular field may be left at its default, so that a field that nobody fills is noticed; but what
+  // starts by SYNC has no start_note.
   std::vector<const google::protobuf::FieldDescriptor*> set;
   state.GetReflection()->ListFields(state, &set);
-  EXPECT_EQ(static_cast<int>(set.size()), v1::AxisState::descriptor()->field_count());
+  EXPECT_EQ(static_cast<int>(set.size()), v1::AxisState::descriptor()->field_count() - 1);
   EXPECT_EQ(state.age().nanos(), 20'000'000);
   EXPECT_EQ(state.measured_at().seconds(), 1);
   EXPECT_EQ(state.measured_at().nanos(), 500'000'000);
   EXPECT_EQ(state.fault().reason(), v1::REASON_ALARM);
   EXPECT_TRUE(state.has_target());
   EXPECT_EQ(state.motion_cause(), v1::MOTION_CAUSE_TERMINAL);
+}
+
+TEST(Convert, HowItStartsInAGroupIsSaidOfADriveThatIsOnlineOnly) {
+  AxisSnapshot snapshot{.name = "feeder", .link = LinkState::online, .start_note = "not proven yet"};
+  v1::AxisState unproven, proven, offline;
+  to_proto(snapshot, TimePoint(10s), unproven);
+  EXPECT_EQ(unproven.start_note(), "not proven yet");
+  EXPECT_FALSE(unproven.starts_by_sync());
+  snapshot.start_note.clear();
+  to_proto(snapshot, TimePoint(10s), proven);
+  EXPECT_EQ(proven.start_note(), "");
+  EXPECT_TRUE(proven.starts_by_sync());
+  snapshot.link = LinkState::offline;
+  to_proto(snapshot, TimePoint(10s), offline);
+  EXPECT_FALSE(offline.starts_by_sync());
 }
 
 TEST(Convert, AxisThatNeverAnsweredHasNoAge) {

@@ -65,7 +65,8 @@ TEST(StateView, WhatWasNeverMeasuredIsNotShownAsZero) {
   v1::WatchAxesResponse batch;
   batch.set_tick(7);
   *batch.add_axes() = offline(false);
-  EXPECT_EQ(tick_line(batch), "7  feeder Offline - -");
+  *batch.add_axes() = connecting;
+  EXPECT_EQ(tick_line(batch), "7  feeder Offline - -  feeder - - -");
 }
 
 TEST(StateView, WhatADriveThatFellSilentSaidLastIsMarked) {
