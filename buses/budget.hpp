@@ -11,12 +11,14 @@
 
 namespace axisd {
 
-/// "12.5 ms"; of Duration::max(): "any time".
+/// How long something may take: "12.5 ms"; of Duration::max(): "any time".
 std::string bound_text(Duration bound);
+/// "within 12.5 ms"; of Duration::max(): "without bound".
+std::string within_text(Duration bound);
 
 /// What a configuration demands of a bus's budget.
 struct BudgetPolicy {
-  bool refuse = false;  ///< a configuration that exceeds it; else it is said at start
+  bool refuse = false;  ///< a configuration that exceeds it; else it is warned of
   /// What threads and operating system may take of a stop's time. An ordinary kernel promises nothing; on two
   /// busy processors 3 ms were seen.
   Duration host_allowance = std::chrono::milliseconds(5);

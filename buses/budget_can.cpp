@@ -203,8 +203,8 @@ std::string note_on_polling(NetworkDemand demand) {
   return fmt::format(
       "with drives that refuse their PDOs: utilisation {:.2f}, last stop frame of all axes {}, refresh while "
       "all move {}",
-      polled.load.back().utilisation, bound_text(polled.stops.back().last_frame),
-      bound_text(polled.load.back().refresh_moving));
+      polled.load.back().utilisation, within_text(polled.stops.back().last_frame),
+      within_text(polled.load.back().refresh_moving));
 }
 
 }  // namespace

@@ -33,8 +33,8 @@ class Analysis {
   [[nodiscard]] LoadBudget load(int moving) const;
   [[nodiscard]] StopBudget stop(const AxisDemand& last, int axes) const;
   [[nodiscard]] AxisBudget axis(const AxisDemand& axis) const;
-  /// Why times are long on a line that has time to spare as long as its nodes answer at once; empty: they are
-  /// not.
+  /// Why bounds are long on a line whose axes rest, and that would have time to spare if its nodes answered
+  /// at once; empty: it has time to spare either way.
   [[nodiscard]] std::string note_on_turnaround() const;
   [[nodiscard]] std::string note_on_transact() const;
 
@@ -235,11 +235,14 @@ AxisBudget Analysis::axis(const AxisDemand& axis) const {
 std::string Analysis::note_on_turnaround() const {
   const auto at_most = utilisation(0, true);
   if (at_most <= 1 || utilisation(0, false) > 1) return {};
+  Duration slowest{};
+  for (const auto& axis : demand_.axes) slowest = std::max(slowest, turnaround(axis));
+  for (const auto& device : demand_.devices) slowest = std::max(slowest, turnaround(device));
   return fmt::format(
-      "the times above presume that each reply takes its turnaround_max ({}): even while all axes "
-      "rest, reading everything as often as it says would then take {:.0f} % of the wire's time; lower it to "
-      "what the drives need",
-      bound_text(slowest_), 100 * at_most);
+      "all bounds presume that each reply takes its turnaround_max (up to {}): even while all axes rest, "
+      "reading everything as often as configured would then take {:.0f} % of the wire's time; lower "
+      "turnaround_max to what the drives need",
+      bound_text(slowest), 100 * at_most);
 }
 
 std::string Analysis::note_on_transact() const {

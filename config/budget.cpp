@@ -141,11 +141,11 @@ std::string summary(const BusBudgetReport& report) {
   if (budget.stops.empty())
     return fmt::format("{}: utilisation {:.2f}, no axes", budget.bus, budget.load.front().utilisation);
   return fmt::format(
-      "{}: utilisation {:.2f} (all axes moving: {:.2f}), last stop frame of one axis within {}, of all {} "
-      "within {}, refresh within {} while all move",
+      "{}: utilisation {:.2f} (all axes moving: {:.2f}), last stop frame of one axis {}, of all {} {}, "
+      "refresh {} while all move",
       budget.bus, budget.load.front().utilisation, budget.load.back().utilisation,
-      bound_text(budget.stops.front().last_frame), budget.stops.size(),
-      bound_text(budget.stops.back().last_frame), bound_text(budget.load.back().refresh_moving));
+      within_text(budget.stops.front().last_frame), budget.stops.size(),
+      within_text(budget.stops.back().last_frame), within_text(budget.load.back().refresh_moving));
 }
 
 std::vector<std::string> warnings(const BusBudgetReport& report) {
@@ -156,11 +156,14 @@ std::vector<std::string> warnings(const BusBudgetReport& report) {
   return lines;
 }
 
-std::vector<std::string> warnings(const Configuration& configuration) {
+std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports) {
   std::vector<std::string> lines;
-  for (const auto& report : budgets(configuration))
-    std::ranges::move(warnings(report), std::back_inserter(lines));
+  for (const auto& report : reports) std::ranges::move(warnings(report), std::back_inserter(lines));
   return lines;
+}
+
+std::vector<std::string> warnings(const Configuration& configuration) {
+  return warnings(budgets(configuration));
 }
 
 void check_budgets(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {

@@ -146,12 +146,13 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
     return result;
   }
   auto& configuration = *loaded.configuration;
-  result.warnings = config::warnings(configuration);
+  auto budgets = config::budgets(configuration);
+  result.warnings = config::warnings(budgets);
   result.changes = config::differences(parts_.configuration, configuration);
   core::Reload reload{.client = request.client,
                       .configuration = configuration,
                       .changes = result.changes,
-                      .budgets = config::budgets(configuration),
+                      .budgets = std::move(budgets),
                       .before = result.before,
                       .revision = result.revision};
   auto answer = std::make_shared<std::promise<std::vector<Error>>>();

@@ -21,9 +21,8 @@ struct AxisBudgetReport {
   AxisBudget predicted;
   Duration deceleration{};  ///< by the limits, from the highest velocity
   std::string unit;
-  double way_alone = 0,
-         way_all =
-             0;  ///< from the stop request on at the highest velocity, at most; user units; may be infinite
+  /// From the stop request on at the highest velocity, at most; user units; may be infinite.
+  double way_alone = 0, way_all = 0;
   ObservedAxis observed{};
 };
 

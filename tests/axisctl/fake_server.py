@@ -25,7 +25,8 @@ GRANTED_STEP = 3.0
 
 
 class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, FakeExplain,
-                  axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer, system_rpc.SystemServiceServicer):
+                  axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer,
+                  system_rpc.SystemServiceServicer):
     """All services. `calls` records (method, request, peer) of every call, for assertions."""
 
     def __init__(self):

@@ -31,7 +31,7 @@ class OfAFile(AxisctlTest):
         self.assertRegex(text, r"(?s)^line-a\nMOVING +UTILISATION.*\nSTOPPED +LAST FRAME.*\nfeeder +all .*\ncan0\n")
         self.assertEqual(text.count("MOVING, STOPPED: not all numbers of axes are shown; --json has them\n"), 1)
         self.assertRegex(text, r"(?s)\nGROUP .*\ntransfer +2 +\d+\.\d ms +\d+\.\d ms\n.*\ncan0\n.*\ntransfer +1 +\d+\.\d ms ")
-        self.assertEqual(text.count("note: the times above presume that each reply takes its turnaround_max (200.0 ms)"), 1)
+        self.assertEqual(text.count("note: all bounds presume that each reply takes its turnaround_max (up to 200.0 ms)"), 1)
         buses = self.json("budget", DEMO)[0]["budgets"]
         self.assertEqual([len(bus["stops"]) for bus in buses], [5, 1])
 

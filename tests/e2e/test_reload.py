@@ -103,7 +103,7 @@ class Reload(Scenario):
         self.assertRegex(judged.stderr, rf"^{machine.config}: warning: line: reading everything .* raise poll.idle")
         reloaded = self.reload(machine)
         self.assertEqual((reloaded.returncode, reloaded.stderr), (0, judged.stderr))
-        self.assertIn("line: reading everything", machine.daemon.log())
+        wait_for(lambda: "line: reading everything" in machine.daemon.log(), "the warning is in the log")
         self.edit(machine, "    poll: { moving: 5 ms, idle: 5 ms }\n", "")
         self.assertEqual(list(self.answer(machine).warnings), [])
 
@@ -200,6 +200,11 @@ class Reload(Scenario):
 
         async def use():
             async with axisd.connect(f"unix:{machine.socket}") as connection:
+                text = pathlib.Path(machine.config).read_text()
+                busy = await connection.check_configuration(text.replace("    node: 2\n", "    node: 2\n    poll: { moving: 5 ms, idle: 5 ms }\n"))
+                self.assertEqual((busy.findings, len(busy.warnings)), ((), 1), busy)
+                wrong = await connection.check_configuration(text.replace("velocity:", "velocty:"))
+                self.assertIn("did you mean 'velocity'", str(wrong.findings))
                 asked = await connection.reload_configuration(dry_run=True)
                 done = await connection.reload_configuration()
                 configuration = await connection.configuration()

@@ -31,7 +31,7 @@ std::vector<std::string> found(const Rig& rig) {
 }
 
 /// For 400 ms: it was seen to move.
-void jog(Rig& rig, double velocity) {
+void run_at(Rig& rig, double velocity) {
   rig.submit(MoveVelocityRequest{.velocity = velocity});
   rig.run(400ms);
 }
@@ -66,7 +66,7 @@ TEST(M04, AMotionThatIsNotWatchedAnyMoreIsStillThatOfItsCommand) {
 TEST(M04, SoIsOneWhoseStopWasNotConfirmed) {
   Rig rig;
   rig.ready();
-  jog(rig, 20);
+  run_at(rig, 20);
   rig.fault({.kind = simulation::FaultKind::drop_request, .register_address = 0x0028, .count = -1});
   EXPECT_EQ(rig.complete(StopRequest{}).state, CommandState::error);
   ASSERT_TRUE(rig.state()->moving);
@@ -91,7 +91,7 @@ TEST(M04, SoIsOneThatAnEarlierDaemonBegan) {
 TEST(M04, AMotionOfNobodyIsNotOurs) {
   Rig rig;
   rig.ready();
-  jog(rig, 50);
+  run_at(rig, 50);
   rig.complete(StopRequest{});
   rig.write_behind(0x0023, 100);
   rig.write_behind(0x0027, 2);
@@ -104,7 +104,7 @@ TEST(M04, AMotionThatATerminalTookOverIsNotOurs) {
              axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
            }});
   rig.ready();
-  jog(rig, 20);
+  run_at(rig, 20);
   cut_cable(rig);
   rig.set_input("X4", true);
   rig.run(100ms);
@@ -118,7 +118,7 @@ TEST(M04, AnOwedStopThatCameThroughIsTold) {
   Rig rig;
   rig.ready();
   EXPECT_EQ(found(rig), std::vector<std::string>{});
-  jog(rig, 50);
+  run_at(rig, 50);
   cut_cable(rig);
   restore_cable(rig);
   EXPECT_FALSE(rig.drive->shaft_moving());

@@ -8,7 +8,7 @@
 """
 from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
-from .configuration import ConfigChange, ConfigFinding, Configuration, Reload
+from .configuration import ConfigChange, ConfigCheck, ConfigFinding, Configuration, Reload
 from .drive import Drive
 from .drives import (Alarm, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
@@ -24,7 +24,7 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 
 __all__ = [
     "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
-    "ClassStatistics", "Command", "CommandState", "ConfigChange", "ConfigFinding", "Configuration",
+    "ClassStatistics", "Command", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
     "ConfigurationDrift", "ConfigurationReloaded", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "Jog", "Latency", "Lease",

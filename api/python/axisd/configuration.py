@@ -42,6 +42,18 @@ class ConfigFinding:
 
 
 @dataclasses.dataclass(frozen=True)
+class ConfigCheck:
+    """What would keep the daemon from serving a text; no finding: it could, and `warnings` are what its buses could not do
+    then."""
+    findings: tuple[ConfigFinding, ...]
+    warnings: tuple[str, ...]
+
+    @classmethod
+    def of(cls, raw: system_service_pb2.CheckConfigResponse) -> ConfigCheck:
+        return cls(tuple(ConfigFinding.of(found) for found in raw.findings), tuple(raw.warnings))
+
+
+@dataclasses.dataclass(frozen=True)
 class ConfigChange:
     """One part of the configuration that says something else than before. `kind`: "added", "removed" or "changed"; then
     `keys` names what, unless the section is a single value."""

@@ -15,7 +15,7 @@ from google.protobuf.field_mask_pb2 import FieldMask
 from .axis import Axis
 from .budget import BusBudget
 from .calls import Seconds, done, duration
-from .configuration import ConfigFinding, Configuration, Reload
+from .configuration import ConfigCheck, Configuration, Reload
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, translate
 from .group import Group
@@ -305,11 +305,10 @@ class Machine:
         """What is served: the daemon's file as it was at its start or at the last reload."""
         return Configuration.of(await self._call(self._system.GetConfig, system_service_pb2.GetConfigRequest(), ""))
 
-    async def check_configuration(self, yaml: str) -> list[ConfigFinding]:
-        """What would keep the daemon from serving this text; nothing: it could. Changes nothing."""
+    async def check_configuration(self, yaml: str) -> ConfigCheck:
+        """What the daemon would say to this text. Changes nothing."""
         request = system_service_pb2.CheckConfigRequest(yaml=yaml)
-        response = await self._call(self._system.CheckConfig, request, "check configuration")
-        return [ConfigFinding.of(found) for found in response.findings]
+        return ConfigCheck.of(await self._call(self._system.CheckConfig, request, "check configuration"))
 
     async def reload_configuration(self, dry_run: bool = False) -> Reload:
         """Serves what the daemon's file says now: all of it or nothing, and only what changed is touched. What stands

@@ -6,6 +6,7 @@
 #include <array>
 #include <map>
 #include <numeric>
+#include <optional>
 
 #include "tests/unit/buses/line_load.hpp"
 
@@ -146,15 +147,18 @@ TEST(RtuBudget, ASlowDriveCostsTheOthersOnlyWhatItTakes) {
 }
 
 TEST(RtuBudget, SaysWhenItIsTheTurnaroundThatMakesTimesLong) {
-  const auto notes_with = [](int axes, Duration turnaround_max) {
+  const auto notes_with = [](int axes, Duration turnaround_max, std::optional<Duration> of_each = {}) {
     auto demand = demand_of(axes, 115200);
+    for (auto& axis : demand.axes) axis.turnaround_max = of_each;
     demand.line.turnaround_max = turnaround_max;
     std::string all;
     for (const auto& note : budget_of(demand).notes) all += note + "\n";
     return all;
   };
-  EXPECT_NE(notes_with(8, 200ms).find("turnaround_max (200.0 ms)"), std::string::npos)
+  EXPECT_NE(notes_with(8, 200ms).find("turnaround_max (up to 200.0 ms)"), std::string::npos)
       << notes_with(8, 200ms);
+  EXPECT_NE(notes_with(8, 200ms, 100ms).find("turnaround_max (up to 100.0 ms)"), std::string::npos)
+      << "what no node takes is no cause: " << notes_with(8, 200ms, 100ms);
   EXPECT_EQ(notes_with(8, 5ms).find("turnaround_max"), std::string::npos) << "there is time for it";
   EXPECT_EQ(notes_with(60, 200ms).find("turnaround_max"), std::string::npos) << "too much without it, too";
 }

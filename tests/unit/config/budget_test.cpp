@@ -24,7 +24,7 @@ TEST(Budget, AStopWithoutBoundHasAWayWithoutBound) {
           node);
     const auto result = load_text(text, "m.yaml");
     EXPECT_TRUE(result.configuration) << findings(result);
-    return budgets(*result.configuration).at(0).axes.at(0).way_all;
+    return budgets(result.configuration.value()).at(0).axes.at(0).way_all;
   };
   EXPECT_TRUE(std::isfinite(furthest_way(1)));
   EXPECT_TRUE(std::isinf(furthest_way(32)));
