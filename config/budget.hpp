@@ -19,6 +19,7 @@ std::string summary(const BusBudgetReport& report);
 /// What a bus does not meet, one line each: "line-a: the last stop frame of all axes may take ...; lower
 /// ...".
 std::vector<std::string> warnings(const BusBudgetReport& report);
+/// The same of all of them.
 std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports);
 /// The same of all buses. Precondition: that of budgets().
 std::vector<std::string> warnings(const Configuration& configuration);

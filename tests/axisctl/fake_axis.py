@@ -32,7 +32,8 @@ class FakeAxis:
         self.state = types_pb2.AxisState(
             axis=name, unit=unit, state=types_pb2.STATE_DISABLED, link=types_pb2.LINK_STATE_ONLINE,
             trust=types_pb2.POSITION_TRUST_UNKNOWN, position_source=types_pb2.POSITION_SOURCE_COMMANDED,
-            simulated=True, bus="line-a", node=node, start_note="its bus has no common trigger", model="ykd2405pr", drive_version="1.0",
+            simulated=True, bus="line-a", node=node, model="ykd2405pr", drive_version="1.0",
+            start_note="its bus has no common trigger",
             inputs=[types_pb2.Terminal(name="X0", function="home", active=False)],
             outputs=[types_pb2.Terminal(name="Y0", function="alarm", active=False)])
         if name == "turntable":
