@@ -10,6 +10,10 @@ namespace axisd::config {
 /// Server, buses, and how axes and devices share them.
 void check_machine(const Configuration& configuration, Diagnostics& diagnostics, const Places& places);
 
+/// The files of `server.tls`, where its keys are right.
+void check_tls_files(const Configuration& configuration, const TlsCheck& check, Diagnostics& diagnostics,
+                     const Places& places);
+
 /// Each device by itself.
 void check_devices(const Configuration& configuration, Diagnostics& diagnostics, const Places& places);
 

@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "buses/canopen/settings.hpp"
+#include "buses/error.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/generic/settings.hpp"
@@ -87,10 +90,17 @@ struct LoadResult {
   std::optional<Configuration> over_budget{};
 };
 
+/// Looks at the files that `server.tls` names: under which of its keys stands what is wrong. Handed in,
+/// because it needs a library that is confined elsewhere, and because only who serves cares: a stop must not
+/// fail for a certificate.
+using TlsCheck = std::function<std::vector<std::pair<std::string_view, Error>>(const TlsSettings&)>;
+
 /// Reads and checks a file completely. Never throws.
 /// `original`: the file is a copy of that one, whose folder relative paths count from.
-LoadResult load_file(const std::string& path, const std::string& original = {});
-LoadResult load_text(std::string_view text, const std::string& file_name);
+/// `check_tls`: empty: the files that it names are not looked at.
+LoadResult load_file(const std::string& path, const std::string& original = {},
+                     const TlsCheck& check_tls = {});
+LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls = {});
 
 /// JSON Schema (draft 2020-12) of the file, generated from the definitions that the loader uses.
 std::string json_schema();

@@ -42,7 +42,7 @@ std::expected<std::string, std::error_code> read_file(const std::string& path) {
 
 }  // namespace
 
-LoadResult load_text(std::string_view text, const std::string& file_name) try {
+LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls) try {
   Diagnostics diagnostics(file_name);
   const auto document = parse_document(text);
   if (!document) {
@@ -55,6 +55,7 @@ LoadResult load_text(std::string_view text, const std::string& file_name) try {
   for (auto& entry : configuration.axes) complete_axis(entry, diagnostics, places);
   check_devices(configuration, diagnostics, places);
   check_machine(configuration, diagnostics, places);
+  if (check_tls) check_tls_files(configuration, check_tls, diagnostics, places);
   if (!diagnostics.empty()) return {{}, diagnostics.sorted()};
   check_budgets(configuration, diagnostics, places);
   if (!diagnostics.empty())
@@ -64,14 +65,14 @@ LoadResult load_text(std::string_view text, const std::string& file_name) try {
   return {{}, {{file_name, 0, 0, fmt::format("cannot be loaded: {}", printable(error.what())), ""}}};
 }
 
-LoadResult load_file(const std::string& path, const std::string& original) try {
+LoadResult load_file(const std::string& path, const std::string& original, const TlsCheck& check_tls) try {
   const auto text = read_file(path);
   if (!text) {
     return {{},
             {{path, 0, 0, fmt::format("cannot be read: {}", text.error().message()),
               "check path and permissions"}}};
   }
-  auto result = load_text(*text, original.empty() ? path : original);
+  auto result = load_text(*text, original.empty() ? path : original, check_tls);
   result.text = *text;
   return result;
 } catch (const std::exception& error) {

@@ -238,6 +238,13 @@ void check_groups(const Configuration& configuration, Diagnostics& diagnostics, 
 
 }  // namespace
 
+void check_tls_files(const Configuration& configuration, const TlsCheck& check, Diagnostics& diagnostics,
+                     const Places& places) {
+  if (!configuration.server.tls || !places.clean("server.tls")) return;
+  for (const auto& [key, error] : check(*configuration.server.tls))
+    diagnostics.add(places.mark(fmt::format("server.tls.{}", key)), error.message, error.remedy);
+}
+
 void check_machine(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   const auto all = buses(configuration);
   check_server(configuration, diagnostics, places);

@@ -96,7 +96,7 @@ std::string ConfigurationService::file_revision() const {
 }
 
 ConfigurationCheck ConfigurationService::check(std::string_view yaml) const {
-  auto loaded = config::load_text(yaml, parts_.path);
+  auto loaded = config::load_text(yaml, parts_.path, parts_.check_tls);
   return {
       .findings = findings_of(std::move(loaded.diagnostics)),
       .warnings = loaded.configuration ? config::warnings(*loaded.configuration) : std::vector<std::string>(),

@@ -24,6 +24,8 @@ class ConfigurationService final : public ConfigurationAccess {
     WallTime since{};
     /// Reads the file as the start of the daemon did, options of the command line included.
     std::function<config::LoadResult()> load;
+    /// Looks at the files of the server's certificates.
+    config::TlsCheck check_tls;
     /// Copy of what is served; it is written anew after a reload.
     std::filesystem::path last_good;
     /// Makes the machine follow, or only asks whether it could. Calls back once, as core::ReloadDone.

@@ -7,6 +7,7 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -15,6 +16,7 @@
 #include <thread>
 
 #include "api/server/server.hpp"
+#include "api/tls/pem_files.hpp"
 #include "config/budget.hpp"
 #include "daemon/configuration_service.hpp"
 #include "daemon/core/core_loop.hpp"
@@ -139,30 +141,34 @@ Result<std::unique_ptr<store::JournalFile>> open_journal(const std::string& stat
   return store::JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), loop.executor());
 }
 
+/// What cannot be served as it is asked for would fail at the next start, too.
 int give_up(const Error& error) {
   spdlog::critical("{}", to_string(error));
-  end_logging();
-  return 1;
+  return error.reason == Reason::invalid_argument ? exit_status::configuration : exit_status::failed;
 }
 
-}  // namespace
+/// The core's own thread, for as long as this lives.
+class CoreThread {
+ public:
+  explicit CoreThread(core::CoreLoop& loop)
+      : loop_(&loop), thread_([&loop] {
+          pthread_setname_np(pthread_self(), "axisd-core");
+          loop.run();
+        }) {}
+  CoreThread(const CoreThread&) = delete;
+  ~CoreThread() {
+    loop_->stop();
+    thread_.join();
+  }
 
-config::LoadResult load_configuration(const Options& options) {
-  auto loaded = config::load_file(options.config);
-  if (!loaded.configuration) return loaded;
-  if (!options.state_directory.empty()) loaded.configuration->state_directory = options.state_directory;
-  if (!options.listen.empty()) loaded.configuration->server.listen = options.listen;
-  return loaded;
-}
+ private:
+  core::CoreLoop* loop_;
+  std::thread thread_;
+};
 
-int run_daemon(const Options& options, config::Configuration configuration, const std::string& yaml) {
-  const auto signals = ending_signals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  // Both are errors of a write, which are told where it is made.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-  start_logging(options.log_level);
-
+/// From the first thread to the last: all that were started have ended when it returns. Exit status.
+int serve(const Options& options, const config::Configuration& configuration, const std::string& yaml,
+          Logging& logging) {
   core::CoreLoop loop;
   auto store = store::FileStore::open(configuration.state_directory, loop.executor());
   if (!store) return give_up(store.error());
@@ -171,7 +177,7 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
   if (!journal) return give_up(journal.error());
   core::FrameObserver wire_log;
   if (!options.wire_log.empty()) {
-    auto opened = open_wire_log(options.wire_log);
+    auto opened = logging.open_wire_log(options.wire_log);
     if (!opened) return give_up(opened.error());
     wire_log = std::move(*opened);
   }
@@ -211,6 +217,7 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
                                .configuration = configuration,
                                .since = std::chrono::system_clock::now(),
                                .load = [&options] { return load_configuration(options); },
+                               .check_tls = check_tls,
                                .last_good = last_good(configuration.state_directory),
                                .apply =
                                    [&service](core::Reload reload, bool dry_run, core::ReloadDone done) {
@@ -220,14 +227,11 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
   serving.configuration = &served;
   server::Server server(service, std::move(serving));
   machine.start();
-  std::thread core_thread([&loop] {
-    pthread_setname_np(pthread_self(), "axisd-core");
-    loop.run();
-  });
+  const CoreThread core_thread(loop);
 
-  int status = 1;
+  int status = exit_status::failed;
   if (const auto port = server.start(); !port) {
-    spdlog::critical("{}", to_string(port.error()));
+    status = give_up(port.error());
   } else {
     wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },
                std::chrono::seconds(1));
@@ -242,25 +246,51 @@ int run_daemon(const Options& options, config::Configuration configuration, cons
     service.close();
     const bool rests = stop_axes(loop, machine);
     if (!rests) spdlog::error("not every axis has confirmed its standstill; run axisd --quiesce");
-    status = rests ? 0 : 1;
+    status = rests ? exit_status::in_order : exit_status::failed;
   }
 
   server.shutdown();
   ask_core(loop, [&] {
+    published_to = nullptr;
     machine.close();
     return true;
   });
   served.close();  // after that, which ends a reload that waits
   if (!wait_until([&] { return ask_core(loop, [&] { return machine.closed(); }); }, close_patience)) {
     spdlog::critical("sequences did not end; leaving at once");
-    end_logging();
-    std::_Exit(1);
+    logging.leave_at_once(exit_status::failed);
   }
-  loop.stop();
-  core_thread.join();
-  published_to = nullptr;
+  return status;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string_view, Error>> check_tls(const config::TlsSettings& tls) {
+  return tls::check({.certificate = tls.certificate, .key = tls.key, .client_ca = tls.client_ca});
+}
+
+config::LoadResult load_configuration(const Options& options) {
+  auto loaded = config::load_file(options.config, {}, check_tls);
+  if (!loaded.configuration) return loaded;
+  if (!options.state_directory.empty()) loaded.configuration->state_directory = options.state_directory;
+  if (!options.listen.empty()) loaded.configuration->server.listen = options.listen;
+  return loaded;
+}
+
+int run_daemon(const Options& options, const config::Configuration& configuration, const std::string& yaml) {
+  const auto signals = ending_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  // Both are errors of a write, which are told where it is made.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  Logging logging(options.log_level);
+  int status = exit_status::failed;
+  try {
+    status = serve(options, configuration, yaml, logging);
+  } catch (const std::exception& error) {  // no memory, no more threads
+    spdlog::critical("{}", error.what());
+  }
   spdlog::info("ended with status {}", status);
-  end_logging();
   return status;
 }
 
@@ -276,7 +306,7 @@ int run_quiesce(const Options& options) {
   }
   if (!loaded.configuration) {
     std::cerr << "axisd: no usable configuration: nothing was stopped\n";
-    return 2;
+    return exit_status::configuration;
   }
   spdlog::set_level(spdlog::level::off);
   const auto& configuration = *loaded.configuration;
@@ -284,7 +314,7 @@ int run_quiesce(const Options& options) {
   auto ports = Ports::open(loop, configuration, options.link_helper);
   if (!ports) {
     std::cerr << "axisd: " << to_string(ports.error()) << '\n';
-    return 1;
+    return exit_status::failed;
   }
   std::vector<core::QuiesceReport> reports;
   core::QuiesceParts parts{.executor = loop.executor(),
@@ -304,7 +334,7 @@ int run_quiesce(const Options& options) {
     std::cout << report.axis << ": " << report.detail << '\n';
     confirmed = confirmed && report.confirmed;
   }
-  return confirmed ? 0 : 1;
+  return confirmed ? exit_status::in_order : exit_status::failed;
 }
 
 }  // namespace axisd

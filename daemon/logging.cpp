@@ -16,34 +16,44 @@ namespace {
 
 constexpr std::size_t queue_size = 16'384;
 
-std::shared_ptr<spdlog::logger> make_async(const char* name, spdlog::sink_ptr sink) {
-  return std::make_shared<spdlog::async_logger>(name, std::move(sink), spdlog::thread_pool(),
+std::shared_ptr<spdlog::logger> make_async(const char* name, spdlog::sink_ptr sink,
+                                           std::weak_ptr<spdlog::details::thread_pool> writer) {
+  return std::make_shared<spdlog::async_logger>(name, std::move(sink), std::move(writer),
                                                 spdlog::async_overflow_policy::overrun_oldest);
 }
 
 }  // namespace
 
-void start_logging(const std::string& level) {
-  spdlog::init_thread_pool(queue_size, 1);
+Logging::Logging(const std::string& level)
+    : writer_(std::make_shared<spdlog::details::thread_pool>(queue_size, 1)) {
   const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;
   spdlog::sink_ptr sink;
   if (journal)
     sink = std::make_shared<spdlog::sinks::systemd_sink_mt>("axisd");
   else
     sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
-  auto logger = make_async("axisd", std::move(sink));
+  auto logger = make_async("axisd", std::move(sink), writer_);
   logger->set_pattern(journal ? "%v" : "%Y-%m-%d %H:%M:%S.%e %^%l%$ %v");
   logger->set_level(spdlog::level::from_str(level == "warn" ? "warning" : level));
   logger->flush_on(spdlog::level::warn);
   spdlog::set_default_logger(std::move(logger));
 }
 
-void end_logging() { spdlog::shutdown(); }
+Logging::~Logging() {
+  writer_.reset();
+  spdlog::shutdown();
+}
 
-Result<core::FrameObserver> open_wire_log(const std::string& path) {
+void Logging::leave_at_once(int status) {
+  spdlog::set_level(spdlog::level::off);
+  writer_.reset();  // the loggers stay: whoever is just using one must find it
+  std::_Exit(status);
+}
+
+Result<core::FrameObserver> Logging::open_wire_log(const std::string& path) const {
   std::shared_ptr<spdlog::logger> log;
   try {
-    log = make_async("wire", std::make_shared<spdlog::sinks::basic_file_sink_mt>(path));
+    log = make_async("wire", std::make_shared<spdlog::sinks::basic_file_sink_mt>(path), writer_);
   } catch (const spdlog::spdlog_ex& error) {
     return fail(Reason::storage, error.what(), "choose another --wire-log");
   }

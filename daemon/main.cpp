@@ -14,8 +14,8 @@ int main(int argc, char** argv) {
   if (options.quiesce) return axisd::run_quiesce(options);
   auto loaded = axisd::load_configuration(options);
   for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
-  if (!loaded.configuration) return 2;
-  auto& configuration = *loaded.configuration;
+  if (!loaded.configuration) return axisd::exit_status::configuration;
+  const auto& configuration = *loaded.configuration;
   if (options.check) {
     for (const auto& warning : axisd::config::warnings(configuration))
       std::cerr << options.config << ": warning: " << warning << '\n';
@@ -23,5 +23,5 @@ int main(int argc, char** argv) {
               << configuration.lines.size() + configuration.networks.size() << " buses)\n";
     return 0;
   }
-  return axisd::run_daemon(options, std::move(configuration), loaded.text);
+  return axisd::run_daemon(options, configuration, loaded.text);
 }

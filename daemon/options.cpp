@@ -9,7 +9,13 @@ namespace axisd {
 Options parse_options(int argc, char** argv) {
   Options options;
   CLI::App app("axisd: owns a machine's drive buses and serves their axes over gRPC.", "axisd");
-  app.footer("Exit status: 0 ended in order; 1 failed while running; 2 bad command line or configuration.");
+  app.footer(
+      "Exit status: 0 ended in order; 1 could not start (an address or a state directory in use, no "
+      "permission) or "
+      "failed while running: trying again may help; 2 bad command line or configuration, certificates "
+      "included. "
+      "--quiesce: 0 every standstill is confirmed; 1 not every one; 2 no usable configuration, nothing was "
+      "stopped.");
   app.set_version_flag("--version", std::string("axisd ") + AXISD_VERSION);
   app.add_option("--config", options.config, "configuration file")->capture_default_str();
   app.add_flag("--check", options.check, "check the configuration, print every error and warning, and exit");

@@ -13,6 +13,7 @@
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/man_page.hpp"
 #include "api/axisctl/terminal.hpp"
+#include "api/tls/pem_files.hpp"
 #include "config/budget.hpp"
 #include "config/configuration.hpp"
 
@@ -37,8 +38,13 @@ google::protobuf::Struct as_message(const config::LoadResult& result,
   return message;
 }
 
-void check(Invocation& invocation, const std::string& path) {
-  const auto result = config::load_file(path);
+tls::Findings check_tls(const config::TlsSettings& tls) {
+  return tls::check({.certificate = tls.certificate, .key = tls.key, .client_ca = tls.client_ca});
+}
+
+/// `elsewhere`: the file is for another computer, where its certificates are.
+void check(Invocation& invocation, const std::string& path, bool elsewhere) {
+  const auto result = config::load_file(path, {}, elsewhere ? config::TlsCheck() : check_tls);
   if (!result.configuration) invocation.status = ExitCode::usage;
   const auto warnings =
       result.configuration ? config::warnings(*result.configuration) : std::vector<std::string>();
@@ -61,7 +67,10 @@ void add_offline_commands(CLI::App& app, Invocation& invocation) {
       app.add_subcommand("check", "Check a configuration file without a daemon; status 2 on errors");
   const auto path = std::make_shared<std::string>();
   check_command->add_option("FILE", *path, "The YAML file")->required();
-  check_command->callback([&invocation, path] { check(invocation, *path); });
+  const auto elsewhere = std::make_shared<bool>(false);
+  check_command->add_flag("--elsewhere", *elsewhere,
+                          "The file is for another computer: do not look for its certificates here");
+  check_command->callback([&invocation, path, elsewhere] { check(invocation, *path, *elsewhere); });
 
   app.add_subcommand("schema", "JSON Schema of the configuration file, for editors")->callback([] {
     print_line(config::json_schema());

@@ -105,7 +105,7 @@ Result<std::vector<ListeningSocket>> listen_tcp(const std::string& name, bool re
   hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
   addrinfo* list = nullptr;
   if (const int failed = getaddrinfo(parts->host.c_str(), parts->port.c_str(), &hints, &list); failed != 0)
-    return fail(Reason::invalid_argument, fmt::format("{}: cannot resolve: {}", name, gai_strerror(failed)),
+    return fail(Reason::offline, fmt::format("{}: cannot resolve: {}", name, gai_strerror(failed)),
                 "check the host in server.listen");
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(list, freeaddrinfo);
   std::vector<ListeningSocket> sockets;

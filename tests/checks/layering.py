@@ -17,14 +17,15 @@ OURS = {
     "devices": ["buses/", "devices/"],
     "config": ["buses/", "devices/", "config/"],
     "api/budget": ["buses/", "devices/", "api/budget/", "axisd/v1/"],
-    "api/server": ["buses/", "devices/", "api/budget/", "api/server/", "axisd/v1/"],
+    "api/tls": ["buses/", "api/tls/"],
+    "api/server": ["buses/", "devices/", "api/budget/", "api/tls/", "api/server/", "axisd/v1/"],
     "api/cell": ["buses/", "devices/", "api/cell/", "axisd/v1/"],
-    "api/axisctl": ["api/budget/", "api/axisctl/", "config/", "axisd/v1/"],
+    "api/axisctl": ["api/budget/", "api/tls/", "api/axisctl/", "config/", "axisd/v1/"],
     "api/examples": ["axisd/v1/"],
     "daemon/store": ["buses/", "devices/", "daemon/store/"],
     "daemon/core": ["buses/", "devices/", "config/", "daemon/core/", "daemon/store/"],
     "daemon/sim": ["buses/", "devices/", "config/", "daemon/sim/"],
-    "daemon": ["buses/", "devices/", "config/", "api/server/", "api/cell/", "daemon/", "axisd/v1/"],
+    "daemon": ["buses/", "devices/", "config/", "api/server/", "api/tls/", "api/cell/", "daemon/", "axisd/v1/"],
 }
 
 # Third party -> the folders that may include it. "daemon/*" means the folder itself, not those below.
@@ -36,7 +37,7 @@ THIRD_PARTY = {
     "grpc": ["api/server", "api/cell", "api/axisctl", "daemon/*"],
     "grpcpp": ["api/server", "api/cell", "api/axisctl", "api/examples", "daemon/*"],
     "google": ["api/budget", "api/server", "api/cell", "api/axisctl", "daemon/*"],
-    "openssl": ["api/server", "api/axisctl"],
+    "openssl": ["api/tls"],
     "CLI": ["api/axisctl", "daemon/sim", "daemon/*"],
     "systemd": ["daemon"],
 }

@@ -1,4 +1,5 @@
-"""SIGTERM and SIGKILL in mid-move, --quiesce, and the systemd protocol."""
+"""SIGTERM and SIGKILL in mid-move, starts that fail, --quiesce, and the systemd protocol."""
+import pathlib
 import signal
 import socket
 import time
@@ -37,6 +38,58 @@ class Terminated(Scenario):
         self.assertEqual(machine.daemon.wait(), 0)
         self.assertIn(" info ending: SIGINT\n", machine.daemon.log())
         self.assertFalse(machine.sim.shaft().moving)
+
+
+class NotStarted(Scenario):
+    """Starts that fail while simulated lines and their workers run already: in order, with a status that says whether
+    trying again may help."""
+
+    def setUp(self):
+        super().setUp()
+        self.subject = self.machine({"feeder": feeder(1), "other": spinner(1, bus="second")})
+        self.simulate(self.subject)
+
+    def simulate(self, machine):
+        config = pathlib.Path(machine.config)
+        text = config.read_text()
+        for bus in machine.buses():
+            text = text.replace(f"port: {machine.path(bus)},", "port: sim,")
+        config.write_text(text)
+
+    def ends(self, status, words, *options, machine=None):
+        """Several times: whether a thread is still busy at the end is a matter of luck."""
+        for _ in range(3):
+            daemon = (machine or self.subject).start_daemon(wait=False, options=options)
+            self.assertEqual(daemon.wait(), status, daemon.log())
+            self.assertRegex(daemon.log(), rf"(?s) critical [^\n]*{words}[^\n]*\n(.*\n)?[^\n]* info ended with status {status}\n\Z")
+        self.assertNotIn("READY=1", (machine or self.subject).notify.received())
+
+    def test_address_in_use(self):
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen()
+            address = f"127.0.0.1:{taken.getsockname()[1]}"
+            self.ends(1, f"{address}: cannot bind: Address already in use", "--listen", address)
+
+    def test_plaintext_by_the_command_line(self):
+        self.ends(2, "plaintext is refused", "--listen", "0.0.0.0:0")
+
+    def test_wire_log_that_cannot_be_written(self):
+        self.subject.wire.path = f"{self.subject.config}/wire.log"
+        self.ends(1, self.subject.wire.path)
+
+    def test_state_directory_in_use(self):
+        self.subject.start_daemon()
+        second = self.machine({"feeder": feeder(1)})
+        self.simulate(second)
+        self.ends(1, self.subject.state_directory, "--state-directory", self.subject.state_directory, machine=second)
+
+    def test_a_signal_in_the_start(self):
+        for _ in range(3):
+            daemon = self.subject.start_daemon(wait=False)
+            wait_for(lambda: "budget of" in daemon.log(), "it has begun")
+            self.assertEqual(daemon.terminate(), 0)
+            self.assertRegex(daemon.log(), r" info ended with status 0\n\Z")
 
 
 class Killed(Scenario):

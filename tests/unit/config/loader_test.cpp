@@ -34,6 +34,25 @@ TEST(Loader, SaysExactlyWhatIsBroken) {
   }
 }
 
+TEST(Loader, WhatIsWrongWithAFileStandsAtItsKey) {
+  const std::string name = source_path("config/examples/reference.yaml"), text = read_text(name);
+  std::vector<std::string> asked;
+  const auto check = [&](const TlsSettings& tls) -> std::vector<std::pair<std::string_view, Error>> {
+    asked.push_back(tls.key);
+    return {
+        {"key", {.reason = Reason::invalid_argument, .message = tls.key + ": is bad", .remedy = "mend it"}}};
+  };
+  const auto refused = load_text(text, name, check);
+  EXPECT_FALSE(refused.configuration);
+  EXPECT_EQ(findings(refused), name + ":9:10: /etc/axisd/tls/server.key: is bad; mend it\n");
+  // Of paths that are none, nothing more is said.
+  auto relative = text;
+  relative.replace(relative.find("/etc/axisd/tls/server.key"), 1, "");
+  EXPECT_FALSE(findings(load_text(relative, name, check)).contains("is bad"));
+  EXPECT_EQ(asked.size(), 1U);
+  EXPECT_TRUE(load_text(text, name).configuration);
+}
+
 TEST(Loader, WhatOnlyItsBudgetForbidsHasFiguresAllTheSame) {
   const auto text = read_text(source_path("tests/broken/budget.yaml"));
   const auto refused = load_text(text, "budget.yaml");
