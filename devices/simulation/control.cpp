@@ -14,7 +14,9 @@ namespace {
 using Words = std::span<const std::string_view>;
 
 constexpr std::string_view usage =
-    "power N on|off; input N TERMINAL on|off|auto; alarm N CODE; block N on|off; push N PULSES; shaft N; "
+    "power N on|off; input N TERMINAL on|off|auto; alarm N CODE; block N on|off; push N PULSES; lean N "
+    "COUNTS; shaft N; "
+    "encoder N KEY=VALUE...; "
     "peek N ADDRESS; poke N ADDRESS VALUE; eeprom N; fault KIND key=value...; fault clear; cut; join; "
     "hangup; replug; help (N: an address, or @K for the K-th drive)";
 
@@ -56,6 +58,26 @@ std::string push(SimulatedNode& node, Words words) {
   return node.push_shaft(*pulses) ? "ok" : "error the shaft is held; release the drive or switch it off";
 }
 
+std::string lean(SimulatedNode& node, Words words) {
+  const auto counts = words.size() == 1 ? parse_number<int>(words[0]) : std::nullopt;
+  if (!counts) return "error use: lean N COUNTS";
+  return node.lean_on_shaft(*counts) ? "ok" : "error the shaft is held; see encoder N compliance=COUNTS";
+}
+
+std::string encoder(SimulatedNode& node, Words words) {
+  if (node.encoder() == nullptr) return "error it has no encoder";
+  auto settings = node.encoder()->settings();
+  for (const auto word : words) {
+    const auto [key, value] = key_value(word);
+    if (!set_encoder_option(settings, key, value))
+      return fmt::format(
+          "error \"{}\": use noise=N, following_ms=N, quantised=on|off, backlash=N, compliance=N, slip=N",
+          word);
+  }
+  node.encoder()->set(settings);
+  return "ok";
+}
+
 std::string shaft(SimulatedNode& node, Words words) {
   if (!words.empty()) return "error use: shaft N";
   return fmt::format("ok position={} moving={} starts={}", node.shaft_pulses(), node.shaft_moving() ? 1 : 0,
@@ -86,9 +108,10 @@ struct NodeCommand {
   std::string_view name;
   std::string (*run)(SimulatedNode& node, Words words);
 };
-constexpr NodeCommand node_commands[] = {{"power", &power}, {"input", &input}, {"alarm", &alarm},
-                                         {"block", &block}, {"push", &push},   {"shaft", &shaft},
-                                         {"peek", &peek},   {"poke", &poke},   {"eeprom", &eeprom}};
+constexpr NodeCommand node_commands[] = {{"power", &power},   {"input", &input},    {"alarm", &alarm},
+                                         {"block", &block},   {"push", &push},      {"lean", &lean},
+                                         {"shaft", &shaft},   {"peek", &peek},      {"poke", &poke},
+                                         {"eeprom", &eeprom}, {"encoder", &encoder}};
 
 /// "5": address; "@2": the second drive of the line. nullptr: there is none.
 template <class Network>

@@ -63,6 +63,7 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
   };
   if (named("switch.")) return parse_switch(key.substr(7), value, settings.switches);
   if (named("eeprom.")) return parse_eeprom(key.substr(7), value, settings);
+  if (named("encoder.")) return set_encoder_option(settings.encoder, key.substr(8), value);
   if (named("wire.")) return parse_wire(key.substr(5), value, settings);
   if (key == "home") return parse_range(value, settings.mechanics);
   if (key == "turn") {
@@ -112,7 +113,8 @@ Result<DriveOption> parse_drive(std::string_view text) {
       return fail(
           Reason::invalid_argument, fmt::format("\"{}\" is not understood", part),
           "use node=, model=, home=FROM:TO, turn=, positive_limit=, negative_limit=, switch.NAME=on|off, "
-          "eeprom.REGISTER=VALUE, wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
+          "eeprom.REGISTER=VALUE, encoder.noise|following_ms|quantised|backlash|compliance|slip=, "
+          "wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
           "dip_baud=BAUD|custom, boot_ms=, powered=on|off");
   }
   if (option.model.empty() || option.settings.address == 0)

@@ -1,6 +1,7 @@
 #include "devices/simulation/motor.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace axisd::simulation {
 
@@ -10,7 +11,7 @@ std::int64_t whole_pulses(double distance) { return static_cast<std::int64_t>(st
 }  // namespace
 
 bool Motor::advance(TimePoint now, bool follows) {
-  now_ = now;
+  const auto from = std::exchange(now_, now);
   const auto before = commanded_;
   const bool ended = moving_ && now >= ends();
   if (moving_)
@@ -18,15 +19,33 @@ bool Motor::advance(TimePoint now, bool follows) {
         from_ + direction_ * whole_pulses(ended ? profile_.total() : profile_.distance_at(elapsed()));
   if (blocked_)
     lag_ += commanded_ - before;
-  else if (follows)
+  else if (follows) {
+    behind_ += static_cast<double>(lag_);
     lag_ = 0;
+  }
+  fall_behind(from);
   if (ended) moving_ = false;
   return ended;
+}
+
+void Motor::fall_behind(TimePoint from) {
+  if (following_ <= 0) {
+    behind_ = 0;
+    return;
+  }
+  if (!moving_ && std::abs(behind_) < 1e-3) return;
+  if (moving_ && !blocked_)
+    behind_ = direction_ * profile_.lag_after(behind_ * direction_,
+                                              std::chrono::duration<double>(from - begin_).count(), elapsed(),
+                                              following_);
+  else
+    behind_ *= std::exp(-std::chrono::duration<double>(now_ - from).count() / following_);
 }
 
 void Motor::power_up() {
   commanded_ = shaft();
   lag_ = 0;
+  behind_ = 0;
   clear_counter();
 }
 

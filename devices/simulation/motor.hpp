@@ -31,6 +31,9 @@ class Motor {
   void set_counter(std::int32_t pulses) { offset_ = pulses - commanded_; }
   /// While blocked the shaft stays where it is, and pulses do not turn it.
   void block(bool blocked) { blocked_ = blocked; }
+  /// An energised closed loop needs time: its shaft is behind the pulses by speed x `time`, and comes to rest
+  /// exponentially. 0: at once. It concerns what an encoder shows (behind()); switches see shaft().
+  void follow_within(Duration time) { following_ = std::chrono::duration<double>(time).count(); }
   /// The load turns the shaft. `seen`: the counters follow (an encoder); else the origin moves along.
   void push(std::int64_t pulses, bool seen);
 
@@ -43,8 +46,10 @@ class Motor {
   [[nodiscard]] bool blocked() const { return blocked_; }
   [[nodiscard]] std::int64_t shaft() const { return commanded_ - lag_; }
   [[nodiscard]] std::int64_t commanded() const { return commanded_; }
-  /// Pulses that the shaft is behind.
+  /// Pulses that the shaft is behind, because it is blocked or has slipped.
   [[nodiscard]] std::int64_t lag() const { return lag_; }
+  /// Pulses that it is behind beyond that, because it follows with delay; signed.
+  [[nodiscard]] double behind() const { return behind_; }
   [[nodiscard]] std::int32_t counter() const { return static_cast<std::int32_t>(commanded_ + offset_); }
   [[nodiscard]] std::int32_t encoder() const { return static_cast<std::int32_t>(shaft() + offset_); }
   /// Pulses that it takes to stop from the present speed with `rates`.
@@ -58,6 +63,7 @@ class Motor {
 
  private:
   void begin(int direction, const Profile& profile, const Rates& rates);
+  void fall_behind(TimePoint from);
   [[nodiscard]] double elapsed() const;
   [[nodiscard]] TimePoint after(double seconds) const;
   [[nodiscard]] TimePoint commands(std::int64_t position) const;
@@ -68,6 +74,8 @@ class Motor {
   int direction_ = 1;
   bool moving_ = false, braking_ = false, blocked_ = false;
   std::int64_t commanded_ = 0, lag_ = 0, from_ = 0, offset_ = 0;
+  double following_ = 0;  ///< seconds
+  double behind_ = 0;
 };
 
 }  // namespace axisd::simulation

@@ -98,6 +98,21 @@ double Profile::speed_at(double t) const {
   return ramp == nullptr ? 0 : ramp->speed + ramp->acceleration * std::max(0.0, t - ramp->begin);
 }
 
+double Profile::lag_after(double lag, double from, double to, double tau) const {
+  for (std::size_t i = 0; i < count_; ++i) {
+    const auto& ramp = ramps_.at(i);
+    const double begin = std::max(from, ramp.begin), end = std::min(to, ramp.begin + ramp.duration);
+    if (end <= begin) continue;
+    // Behind a steady ramp it is by tau * speed - tau^2 * acceleration; what differs from that fades.
+    const auto steady = [&](double t) {
+      return tau * (ramp.speed + ramp.acceleration * (t - ramp.begin)) - tau * tau * ramp.acceleration;
+    };
+    lag = steady(end) + (lag - steady(begin)) * std::exp((begin - end) / tau);
+  }
+  const double rest = to - std::max(from, std::min(to, duration_));
+  return rest > 0 ? lag * std::exp(-rest / tau) : lag;
+}
+
 double Profile::time_at(double distance) const {
   if (distance > total_) return infinite;
   for (std::size_t i = 0; i < count_; ++i) {

@@ -35,6 +35,9 @@ class Profile {
   [[nodiscard]] double total() const { return total_; }        ///< infinite for run()
   [[nodiscard]] double distance_at(double t) const;
   [[nodiscard]] double speed_at(double t) const;
+  /// How far something that follows with time constant `tau` is behind at `to`, if it was `lag` behind at
+  /// `from` (both >= 0, in order; seconds). Exact, so that steps in between change nothing.
+  [[nodiscard]] double lag_after(double lag, double from, double to, double tau) const;
   /// When `distance` has been covered; infinite if never.
   [[nodiscard]] double time_at(double distance) const;
 

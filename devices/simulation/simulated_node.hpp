@@ -13,6 +13,7 @@
 #include "buses/can/port.hpp"
 #include "buses/clock.hpp"
 #include "buses/modbus_rtu/settings.hpp"
+#include "devices/simulation/encoder.hpp"
 
 namespace axisd::simulation {
 
@@ -56,6 +57,11 @@ class SimulatedNode {
   virtual void block_shaft(bool /*blocked*/) {}
   /// The load turns the shaft by so many pulses. False: it does not give way (energised or blocked).
   virtual bool push_shaft(std::int64_t /*pulses*/) { return false; }
+  /// A hand presses on the energised shaft: it bends by so many counts of its encoder, until it is told 0.
+  /// False: it does not give way so far, or has no encoder.
+  virtual bool lean_on_shaft(int /*counts*/) { return false; }
+  /// Its encoder, to be changed while it runs; nullptr: it has none.
+  [[nodiscard]] virtual Encoder* encoder() { return nullptr; }
   /// Position of the virtual machine in pulses, independent of the drive's counter: where the load really is.
   [[nodiscard]] virtual std::int64_t shaft_pulses() const = 0;
   [[nodiscard]] virtual bool shaft_moving() const = 0;
@@ -126,6 +132,7 @@ struct SimulatedNodeSettings {
   /// joins, and so are 0x0014 and 0x0015 unless `eeprom` holds them.
   std::optional<int> dip_baud{};
   Mechanics mechanics{};
+  EncoderSettings encoder{};  ///< of the models that have one
   Switches switches{};
   bool powered = true;
   /// EEPROM contents that differ from the factory's (register, or object as index << 8 | sub-index -> value),

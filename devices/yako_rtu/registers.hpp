@@ -28,7 +28,7 @@ inline constexpr std::uint16_t segment_pulses_high = 0x0090, segment_pulses_low 
                                performance = 0x0110, last = 0x0119;
 // SSD2608PR and ESS42-R.
 inline constexpr std::uint16_t signal_polarity = 0x0010, loop_mode = 0x0012, encoder_resolution = 0x0110,
-                               deviation_threshold = 0x0116;
+                               deviation_threshold = 0x0116, positioning_accuracy = 0x011F;
 }  // namespace reg
 
 }  // namespace axisd::yako_rtu

@@ -46,6 +46,7 @@ SimulatedDrive::SimulatedDrive(const SimulatedModel& model, simulation::Simulate
       settings_(with_defaults(model, std::move(settings), behaviour_)),
       memory_(model, behaviour_, settings_.eeprom),
       terminals_(model, behaviour_, settings_),
+      encoder_(settings_.encoder, settings_.address),
       node_(settings_.address),
       dip_baud_(settings_.dip_baud) {
   if (!settings_.powered) return;
@@ -135,6 +136,7 @@ TimePoint SimulatedDrive::next_event() const {
 void SimulatedDrive::step(TimePoint now) {
   now_ = now;
   const bool ended = motor_.advance(now, in_control());
+  follow(now);
   if (boot_end_ && now >= *boot_end_) {
     boot_end_.reset();
     terminals_.settle(motor_.shaft(), memory_);
@@ -152,6 +154,16 @@ void SimulatedDrive::step(TimePoint now) {
     motor_.clear_counter();
   }
   update_multi_speed();
+}
+
+/// What the load and the encoder do meanwhile.
+void SimulatedDrive::follow(TimePoint now) {
+  encoder_.set_resolution(pulses_of_counts(1));
+  motor_.follow_within(closed_loop() ? encoder_.settings().following : Duration{});
+  if (!in_control()) encoder_.relax();
+  const bool held = motor_.blocked() || motor_.moving() || (ready() && enabled());
+  if (const auto pulses = encoder_.slipped(now, !held); pulses != 0)
+    motor_.push(pulses, ready() && closed_loop() && !behaviour_.released_position_frozen);
 }
 
 void SimulatedDrive::set_input(std::string_view terminal, std::optional<bool> active) {
@@ -185,6 +197,8 @@ void SimulatedDrive::block_shaft(bool blocked) {
   step(now_);
 }
 
+bool SimulatedDrive::lean_on_shaft(int counts) { return in_control() && encoder_.lean(counts); }
+
 bool SimulatedDrive::push_shaft(std::int64_t pulses) {
   if (motor_.blocked() || (ready() && enabled())) return false;
   motor_.push(pulses, ready() && closed_loop() && !behaviour_.released_position_frozen);
@@ -192,14 +206,26 @@ bool SimulatedDrive::push_shaft(std::int64_t pulses) {
   return true;
 }
 
+double SimulatedDrive::pulses_of_counts(double counts) const {
+  return counts * memory_.pulses_per_revolution() /
+         (memory_.get(reg::encoder_resolution) == 1 ? 10000 : 4000);
+}
+
 /// In pulses. 0x0116 gives no unit: taken as counts of the encoder, so that its default is one revolution.
 std::int64_t SimulatedDrive::deviation_limit() const {
-  const std::int64_t counts = memory_.get(reg::encoder_resolution) == 1 ? 10000 : 4000;
-  return memory_.get(reg::deviation_threshold) * std::int64_t{memory_.pulses_per_revolution()} / counts + 1;
+  return static_cast<std::int64_t>(pulses_of_counts(memory_.get(reg::deviation_threshold))) + 1;
 }
 
 std::int32_t SimulatedDrive::position() const {
-  return closed_loop() && !behaviour_.position_is_commanded ? motor_.encoder() : motor_.counter();
+  return shows_encoder() ? encoder_.position(motor_, now_) : motor_.counter();
+}
+
+/// 0x011F gives no unit: taken as counts of the encoder, as 0x0116.
+bool SimulatedDrive::in_position() const {
+  if (!in_position_ || !closed_loop()) return in_position_;
+  const auto window =
+      static_cast<std::int64_t>(std::ceil(pulses_of_counts(memory_.get(reg::positioning_accuracy))));
+  return std::llabs(encoder_.deviation(motor_, now_)) <= window;
 }
 
 void SimulatedDrive::clear_alarm() {
@@ -212,7 +238,7 @@ void SimulatedDrive::configuration_changed() {
 }
 
 std::uint16_t SimulatedDrive::status() const {
-  const unsigned bits = (in_position_ ? 1U : 0U) | (homed_ ? 2U : 0U) | (motor_.moving() ? 4U : 0U) |
+  const unsigned bits = (in_position() ? 1U : 0U) | (homed_ ? 2U : 0U) | (motor_.moving() ? 4U : 0U) |
                         (alarm_ != 0 ? 8U : 0U) | (enabled() ? 0U : 16U);  // bit 4: 1 is released
   return static_cast<std::uint16_t>(bits);
 }
@@ -230,7 +256,7 @@ bool SimulatedDrive::output_active(int index) const {
     case Output::homed:
       return homed_;
     case Output::in_position:
-      return in_position_;
+      return in_position();
     case Output::pt_mode:
       return activity_ == Activity::pt;
     case Output::none:

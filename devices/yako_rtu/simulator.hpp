@@ -40,6 +40,8 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   [[nodiscard]] std::span<const int> alarms() const override { return model_->alarms; }
   void block_shaft(bool blocked) override;
   bool push_shaft(std::int64_t pulses) override;
+  bool lean_on_shaft(int counts) override;
+  [[nodiscard]] simulation::Encoder* encoder() override { return model_->closed_loop ? &encoder_ : nullptr; }
   [[nodiscard]] std::int64_t shaft_pulses() const override { return motor_.shaft(); }
   [[nodiscard]] bool shaft_moving() const override { return motor_.moving() && !motor_.blocked(); }
   [[nodiscard]] int starts() const override { return starts_; }
@@ -66,12 +68,18 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   [[nodiscard]] bool ready() const { return powered_ && !boot_end_; }
   [[nodiscard]] bool enabled() const { return enabled_ && !terminals_.active(Input::motor_free); }
   [[nodiscard]] std::uint16_t status() const;
+  /// The bit of 0x0007: a motion ended as it should, and the encoder is within 0x011F of its end.
+  [[nodiscard]] bool in_position() const;
   [[nodiscard]] bool output_active(int index) const;
   [[nodiscard]] bool closed_loop() const { return model_->closed_loop && !open_loop_; }
   /// A closed loop that has the motor: the shaft follows the pulses.
   [[nodiscard]] bool in_control() const { return closed_loop() && ready() && enabled() && alarm_ == 0; }
+  /// Pulses of the motor for so many counts of the encoder.
+  [[nodiscard]] double pulses_of_counts(double counts) const;
   [[nodiscard]] std::int64_t deviation_limit() const;
+  [[nodiscard]] bool shows_encoder() const { return closed_loop() && !behaviour_.position_is_commanded; }
   [[nodiscard]] std::int32_t position() const;
+  void follow(TimePoint now);
   void power_up();
   void set_serial();
   void show_alarm(int code);
@@ -123,6 +131,7 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   Memory memory_;
   Terminals terminals_;
   Motor motor_;
+  simulation::Encoder encoder_;
   TimePoint now_{};
   std::uint8_t node_ = 0;
   std::optional<simulation::Serial> serial_;  ///< since the last power-up; nothing: never joined a line

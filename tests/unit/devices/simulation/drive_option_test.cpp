@@ -13,7 +13,8 @@ TEST(DriveOption, ReadsEveryPart) {
       "in_motion="
       "on,"
       "switch.unsigned_speed=off,eeprom.0x0011=13,wire.X1=positive_limit:nc,dip=0,dip_baud=custom,boot_ms="
-      "250,powered=off");
+      "250,powered=off,encoder.noise=2,encoder.following_ms=8,encoder.quantised=on,encoder.backlash=3,"
+      "encoder.compliance=5,encoder.slip=-40");
   ASSERT_TRUE(option);
   EXPECT_EQ("ykd2405pr", option->model);
   const auto& settings = option->settings;
@@ -29,16 +30,40 @@ TEST(DriveOption, ReadsEveryPart) {
   EXPECT_TRUE(settings.wires.at("X1").normally_closed);
   EXPECT_EQ(std::chrono::milliseconds(250), settings.boot_time);
   EXPECT_FALSE(settings.powered);
+  EXPECT_EQ(2, settings.encoder.noise);
+  EXPECT_EQ(std::chrono::milliseconds(8), settings.encoder.following);
+  EXPECT_TRUE(settings.encoder.quantised);
+  EXPECT_EQ(3, settings.encoder.backlash);
+  EXPECT_EQ(5, settings.encoder.compliance);
+  EXPECT_EQ(-40, settings.encoder.slip);
   EXPECT_EQ(0, settings.dip_address);
   EXPECT_EQ(0, settings.dip_baud);
   EXPECT_EQ(38400, parse_drive("node=1,model=ess42-r,dip_baud=38400")->settings.dip_baud);
 }
 
 TEST(DriveOption, NamesThePartThatIsWrong) {
-  for (const std::string wrong :
-       {"node=0x1FF", "home=5", "home=6:5", "turn=0", "turn=x", "positive_limit=far", "switch.a=maybe",
-        "eeprom.1=x", "eeprom.1=5000000000", "wire.X0=somewhere", "boot_ms=-1", "dip=x", "dip=256",
-        "dip_baud=0", "dip_baud=fast", "powered=1", "color=red", "model="}) {
+  for (const std::string wrong : {"node=0x1FF",
+                                  "home=5",
+                                  "home=6:5",
+                                  "turn=0",
+                                  "turn=x",
+                                  "positive_limit=far",
+                                  "switch.a=maybe",
+                                  "eeprom.1=x",
+                                  "eeprom.1=5000000000",
+                                  "wire.X0=somewhere",
+                                  "boot_ms=-1",
+                                  "dip=x",
+                                  "dip=256",
+                                  "dip_baud=0",
+                                  "dip_baud=fast",
+                                  "powered=1",
+                                  "encoder.noise=-1",
+                                  "encoder.following_ms=x",
+                                  "encoder.quantised=1",
+                                  "encoder.color=1",
+                                  "color=red",
+                                  "model="}) {
     const auto option = parse_drive("node=1,model=ykd2405pr," + wrong);
     ASSERT_FALSE(option) << wrong;
     EXPECT_NE(std::string::npos, option.error().message.find(wrong));

@@ -119,6 +119,82 @@ TEST_P(ClosedLoop, TheCounterFollowsAReleasedShaftUnlessTheSwitchSaysOtherwise) 
   }
 }
 
+/// Everything that a real encoder does, with 10000 pulses and 4000 counts per revolution.
+simulation::SimulatedNodeSettings noisy(int noise) {
+  simulation::SimulatedNodeSettings settings;
+  settings.encoder = {.noise = noise, .following = 8ms, .quantised = true, .compliance = 4};
+  settings.eeprom[reg::microstep] = 13;
+  return settings;
+}
+
+TEST_P(ClosedLoop, TheCounterIsMeasured) {
+  Bench bench(noisy(2), GetParam());
+  bench.move(10'000, true, 60);
+  bench.wait(600ms);
+  const auto commanded = [&] { return bench.drive().shaft_pulses(); };
+  EXPECT_NEAR(80, commanded() - bench.position(), 7) << "behind in motion";
+  while (bench.reg(reg::moving) == 1) bench.wait(1ms);
+  EXPECT_EQ(10'000, bench.drive().shaft_pulses());
+  int differs = 0;
+  for (int i = 0; i < 100; ++i) {
+    bench.wait(5ms);
+    if (i >= 20) {
+      EXPECT_NEAR(10'000, bench.position(), 6);
+      EXPECT_TRUE(bench.status(0));
+    }
+    differs += bench.position() != 10'000 ? 1 : 0;
+  }
+  EXPECT_GT(differs, 50);
+  bench.write(reg::position_clear, 1);
+  EXPECT_NEAR(0, bench.position(), 6);
+}
+
+TEST_P(ClosedLoop, InPositionIsWithinTheWindowOf0x011F) {
+  auto settings = noisy(0);
+  settings.encoder.following = 50ms;
+  settings.encoder.compliance = 20;
+  Bench bench(settings, GetParam());
+  bench.move(10'000, true, 60);
+  while (bench.reg(reg::moving) == 1) bench.wait(1ms);
+  EXPECT_FALSE(bench.status(0)) << "still settling, off by " << 10'000 - bench.position();
+  bench.wait(500ms);
+  EXPECT_TRUE(bench.status(0));
+  EXPECT_TRUE(bench.drive().lean_on_shaft(11));
+  EXPECT_FALSE(bench.status(0)) << "10 counts by default";
+  ASSERT_EQ(0, bench.write(reg::positioning_accuracy, 11));
+  EXPECT_TRUE(bench.status(0));
+}
+
+TEST_P(ClosedLoop, AnOpenLoopHasNoEncoderToShow) {
+  Bench bench(noisy(2), GetParam());
+  ASSERT_EQ(0, bench.write(reg::loop_mode, 1));
+  bench.move(5000, true, 60);
+  bench.wait(300ms);
+  EXPECT_EQ(bench.drive().shaft_pulses(), bench.position());
+  bench.wait(5s);
+  for (int i = 0; i < 20; ++i) {
+    bench.wait(5ms);
+    EXPECT_EQ(5000, bench.position());
+    EXPECT_TRUE(bench.status(0));
+  }
+}
+
+TEST_P(ClosedLoop, ALoadSlipsWhileReleased) {
+  auto settings = noisy(0);
+  settings.encoder.slip = -1000;
+  Bench bench(settings, GetParam());
+  bench.wait(1s);
+  EXPECT_EQ(0, bench.drive().shaft_pulses()) << "held";
+  bench.write(reg::enable, 0);
+  bench.wait(1s);
+  EXPECT_NEAR(-1000, bench.drive().shaft_pulses(), 2);
+  EXPECT_NEAR(-1000, bench.position(), 2);
+  bench.write(reg::enable, 1);
+  const auto there = bench.drive().shaft_pulses();
+  bench.wait(1s);
+  EXPECT_EQ(there, bench.drive().shaft_pulses());
+}
+
 INSTANTIATE_TEST_SUITE_P(Models, ClosedLoop, ::testing::Values("ssd2608pr", "ess42-r"));
 
 TEST(OpenLoop, ABlockedShaftLosesStepsThatNobodySees) {
@@ -137,6 +213,17 @@ TEST(OpenLoop, ABlockedShaftLosesStepsThatNobodySees) {
   bench.move(0, false);
   bench.wait(10s);
   EXPECT_EQ(-lost, bench.drive().shaft_pulses()) << "and stays lost";
+}
+
+TEST(OpenLoop, CountsItsPulsesExactly) {
+  Bench bench(noisy(2));
+  EXPECT_EQ(nullptr, bench.drive().encoder());
+  bench.move(1000);
+  for (int i = 0; i < 300; ++i) {
+    bench.wait(5ms);
+    EXPECT_EQ(bench.drive().shaft_pulses(), bench.position());
+  }
+  EXPECT_EQ(1000, bench.position());
 }
 
 TEST(OpenLoop, AReleasedShaftMovesUnseen) {

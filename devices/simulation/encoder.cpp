@@ -1,0 +1,93 @@
+#include "devices/simulation/encoder.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "devices/simulation/motor.hpp"
+#include "devices/simulation/text.hpp"
+
+namespace axisd::simulation {
+
+namespace {
+
+/// How long a reading at rest stays as it is: about as long as a fast poll, so that most readings differ.
+constexpr Duration noise_period = std::chrono::milliseconds(3);
+
+std::uint64_t scramble(std::uint64_t value) {  // splitmix64
+  value += 0x9E3779B97F4A7C15U;
+  value = (value ^ (value >> 30U)) * 0xBF58476D1CE4E5B9U;
+  value = (value ^ (value >> 27U)) * 0x94D049BB133111EBU;
+  return value ^ (value >> 31U);
+}
+
+bool take(int& into, std::string_view value, int most) {
+  const auto number = parse_number<int>(value);
+  if (!number || *number < 0 || *number > most) return false;
+  into = *number;
+  return true;
+}
+
+}  // namespace
+
+bool set_encoder_option(EncoderSettings& settings, std::string_view name, std::string_view value) {
+  if (name == "noise") return take(settings.noise, value, 1000);
+  if (name == "backlash") return take(settings.backlash, value, 100'000);
+  if (name == "compliance") return take(settings.compliance, value, 100'000);
+  if (name == "following_ms") {
+    int milliseconds = 0;
+    if (!take(milliseconds, value, 1000)) return false;
+    settings.following = std::chrono::milliseconds(milliseconds);
+    return true;
+  }
+  if (name == "quantised") {
+    const auto on = parse_on_off(value);
+    if (on) settings.quantised = *on;
+    return on.has_value();
+  }
+  if (name != "slip") return false;
+  const auto rate = parse_number<std::int32_t>(value);
+  if (rate) settings.slip = *rate;
+  return rate.has_value();
+}
+
+std::int64_t Encoder::noise(TimePoint now) const {
+  if (settings_.noise <= 0) return 0;
+  const auto period = static_cast<std::uint64_t>(now.time_since_epoch() / noise_period);
+  const auto width = static_cast<std::uint64_t>(settings_.noise) * 2 + 1;
+  return static_cast<std::int64_t>(scramble(seed_ ^ scramble(period)) % width) - settings_.noise;
+}
+
+std::int64_t Encoder::deviation(const Motor& motor, TimePoint now) const {
+  const auto short_by = motor.direction() < 0 ? -settings_.backlash : 0;
+  const auto off = noise(now) + leaning_ - short_by;
+  if (!settings_.quantised)
+    return motor.lag() + std::llround(motor.behind() - static_cast<double>(off) * pulses_per_count_);
+  const auto shaft = static_cast<double>(motor.shaft()) - motor.behind();
+  const auto counts = std::llround(shaft / pulses_per_count_) + off;
+  return motor.commanded() - std::llround(static_cast<double>(counts) * pulses_per_count_);
+}
+
+std::int32_t Encoder::position(const Motor& motor, TimePoint now) const {
+  return static_cast<std::int32_t>(motor.counter() - deviation(motor, now));
+}
+
+bool Encoder::lean(int counts) {
+  if (std::abs(counts) > settings_.compliance) return false;
+  leaning_ = counts;
+  return true;
+}
+
+std::int64_t Encoder::slipped(TimePoint now, bool released) {
+  const auto passed = std::chrono::duration<double>(now - std::exchange(slipped_until_, now)).count();
+  if (!released || settings_.slip == 0) {
+    slip_rest_ = 0;
+    return 0;
+  }
+  const auto total = slip_rest_ + settings_.slip * passed;
+  const auto pulses = std::trunc(total);
+  slip_rest_ = total - pulses;
+  return static_cast<std::int64_t>(pulses);
+}
+
+}  // namespace axisd::simulation
