@@ -64,7 +64,10 @@ void LinkTracker::stalled() {
 
 void LinkTracker::conclude() {
   const auto cycle =
-      fmt::format("mend the cause; then the link goes down and up (ip link set {} down, up)", interface_);
+      interface_ == simulated_interface
+          ? std::string("a simulated link goes down and up by itself")
+          : fmt::format("mend the cause; then the link goes down and up (ip link set {} down, up)",
+                        interface_);
   if (bus_off_) {
     state_ = {.link = LinkState::bus_off,
               .error = error(Reason::bus_down,

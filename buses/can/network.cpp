@@ -1,5 +1,6 @@
 #include "buses/can/network.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <utility>
 #include <vector>
@@ -25,10 +26,10 @@ Network::Id Network::join(Receiver receiver) {
 
 void Network::leave(Id participant) { participants_.erase(participant); }
 
-void Network::transmit(Id participant, const Frame& frame) {
+void Network::transmit(Id participant, const Frame& frame, TimePoint ready) {
   assert(valid(frame));
-  participants_.at(participant).queue.push_back(frame);
-  arbitrate();
+  participants_.at(participant).queue.push_back({.frame = frame, .ready = ready});
+  arbitrate(std::min(ready, clock_->now()));
 }
 
 void Network::flush(Id participant) { participants_.at(participant).queue.clear(); }
@@ -40,44 +41,65 @@ std::size_t Network::waiting(Id participant) const {
 
 void Network::set_stalled(bool stalled) {
   stalled_ = stalled;
-  arbitrate();
+  arbitrate(clock_->now());
+}
+
+void Network::catch_up(TimePoint now) {
+  while (on_wire_ && on_wire_->ends <= now) finish();
 }
 
 Duration Network::frame_time(const Frame& frame) const { return worst_case_time(frame, bitrate_); }
 
-void Network::arbitrate() {
+/// Of the frames that are ready at `at`, or when the wire is free.
+void Network::arbitrate(TimePoint at) {
   if (on_wire_ || stalled_) return;
+  const auto begins = std::max(at, free_since_);
+  auto first_ready = TimePoint::max();
   auto winner = participants_.end();
   for (auto each = participants_.begin(); each != participants_.end(); ++each) {
     if (each->second.queue.empty()) continue;
+    const auto& head = each->second.queue.front();
+    first_ready = std::min(first_ready, head.ready);
+    if (head.ready > begins) continue;
     if (winner == participants_.end() ||
-        arbitration(each->second.queue.front()) < arbitration(winner->second.queue.front()))
+        arbitration(head.frame) < arbitration(winner->second.queue.front().frame))
       winner = each;
   }
-  if (winner == participants_.end()) return;
-  const auto frame = winner->second.queue.front();
+  next_.reset();
+  if (winner == participants_.end()) {
+    if (first_ready != TimePoint::max())
+      next_ = clock_->call_at(first_ready, [this, first_ready] { arbitrate(first_ready); });
+    return;
+  }
+  const auto frame = winner->second.queue.front().frame;
   winner->second.queue.pop_front();
-  on_wire_ = true;
-  const auto fault = fault_ ? fault_(frame) : Fault{};
-  busy_ = clock_->call_at(clock_->now() + frame_time(frame),
-                          [this, sender = winner->first, frame, fault] { finish(sender, frame, fault); });
+  on_wire_ = {.sender = winner->first,
+              .frame = frame,
+              .fault = fault_ ? fault_(frame) : Fault{},
+              .ends = begins + frame_time(frame)};
+  next_ = clock_->call_at(on_wire_->ends, [this] { finish(); });
 }
 
-void Network::finish(Id sender, const Frame& frame, Fault fault) {
+void Network::finish() {
+  const auto ended = *on_wire_;
+  const auto sender = ended.sender;
+  const auto& frame = ended.frame;
+  const auto at = ended.ends;
+  on_wire_.reset();
+  free_since_ = at;
   ++frames_;
-  on_wire_ = false;
-  arbitrate();  // first, so that whatever the receivers send now has not begun before it
-  const auto now = clock_->now();
+  arbitrate(at);  // first, so that whatever the receivers send now has not begun before it
   if (const auto found = participants_.find(sender); found != participants_.end()) {
     const auto receiver = found->second.receiver;  // it may leave
-    receiver(frame, now, true);
+    receiver(frame, at, true);
   }
-  if (fault.drop) return;
-  if (fault.delay == Duration{}) return deliver(sender, frame, now);
+  if (ended.fault.drop) return;
+  if (ended.fault.delay == Duration{}) return deliver(sender, frame, at);
   const auto key = ++last_delayed_;
-  delayed_[key] = clock_->call_at(now + fault.delay, [this, key, sender, frame] {
+  const auto when = at + ended.fault.delay;
+  delayed_[key] = clock_->call_at(when, [this, key, when, sender, frame] {
     delayed_.erase(key);
-    deliver(sender, frame, clock_->now());
+    deliver(sender, frame, when);
   });
 }
 
@@ -150,9 +172,10 @@ void NetworkPort::report(Controller controller) {
   settle_later();
 }
 
-void NetworkPort::cycle() {
+bool NetworkPort::cycle() {
   set_up(false);
   set_up(true);
+  return true;
 }
 
 PortCore::Written NetworkPort::write(const Frame& frame) {

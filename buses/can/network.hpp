@@ -6,17 +6,22 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "buses/can/port_core.hpp"
 
 namespace axisd::can {
 
 /// Carries one frame at a time, as long as it takes at the bit rate (with all stuff bits), the lowest id
-/// first. What is transmitted comes to every other participant at its end. Thread: core.
+/// first. What is transmitted comes to every other participant at its end.
+///
+/// Its time is the wire's: a frame that follows another begins where that one ended, and a frame begins when
+/// its node had it ready, however late the host runs the callbacks. A slow host is told late of what happened
+/// on the wire, but makes the wire no slower. Thread: core.
 class Network {
  public:
   using Id = int;  ///< of a participant
-  /// A frame ended. `own`: it is the participant's, which is thereby confirmed.
+  /// A frame ended, at `at` on the wire. `own`: it is the participant's, which is thereby confirmed.
   using Receiver = std::function<void(const Frame& frame, TimePoint at, bool own)>;
 
   /// What happens to one frame; its sender sees it confirmed all the same.
@@ -32,7 +37,9 @@ class Network {
   /// What the participant had still to transmit is gone; a frame on the wire ends.
   void leave(Id participant);
   /// Queues behind the participant's earlier frames. Precondition: valid(frame).
-  void transmit(Id participant, const Frame& frame);
+  void transmit(Id participant, const Frame& frame) { transmit(participant, frame, clock_->now()); }
+  /// The same for a simulated node that had the frame ready at `ready`, which a late host may be past.
+  void transmit(Id participant, const Frame& frame, TimePoint ready);
   /// Empties the participant's queue; a frame on the wire ends.
   void flush(Id participant);
   [[nodiscard]] std::size_t waiting(Id participant) const;
@@ -41,18 +48,31 @@ class Network {
   void set_fault(std::function<Fault(const Frame&)> fault) { fault_ = std::move(fault); }
   /// Nobody acknowledges: nothing is transmitted until this ends, and then all that still waits is.
   void set_stalled(bool stalled);
+  /// Carries at once what has ended on the wire until `now`, and would be carried as soon as the host runs
+  /// the callbacks that are due.
+  void catch_up(TimePoint now);
 
   [[nodiscard]] Duration frame_time(const Frame& frame) const;
   [[nodiscard]] std::uint32_t bitrate() const { return bitrate_; }
   [[nodiscard]] std::uint64_t frames() const { return frames_; }  ///< transmitted since start
 
  private:
+  struct Waiting {
+    Frame frame;
+    TimePoint ready;
+  };
   struct Participant {
     Receiver receiver;
-    std::deque<Frame> queue;
+    std::deque<Waiting> queue;
   };
-  void arbitrate();
-  void finish(Id sender, const Frame& frame, Fault fault);
+  struct OnWire {
+    Id sender;
+    Frame frame;
+    Fault fault;
+    TimePoint ends;
+  };
+  void arbitrate(TimePoint at);
+  void finish();
   void deliver(Id sender, const Frame& frame, TimePoint at);
 
   Clock* clock_;
@@ -62,8 +82,9 @@ class Network {
   std::function<Fault(const Frame&)> fault_;
   bool stalled_ = false;
   std::uint64_t frames_ = 0;
-  Clock::Timer busy_;  ///< ends with the frame on the wire
-  bool on_wire_ = false;
+  std::optional<OnWire> on_wire_;
+  TimePoint free_since_{};  ///< end of the last frame
+  Clock::Timer next_;       ///< end of the frame on the wire, else when the next may begin
   std::map<std::uint64_t, Clock::Timer> delayed_;
   std::uint64_t last_delayed_ = 0;
 };
@@ -82,14 +103,14 @@ class NetworkPort final : public PortCore {
   /// The controller says so. After bus_off what is written vanishes, as with the kernel, until the link was
   /// cycled.
   void report(Controller controller);
-  /// Takes the link down and up, as it takes privileges with a real interface.
-  void cycle();
+  /// True: this interface is the process's own.
+  bool cycle() override;
 
  private:
   void open() override;
   void shut() override;
   Written write(const Frame& frame) override;
-  void catch_up() override {}  // the network reports at once
+  void catch_up() override { network_->catch_up(clock().now()); }
   void leave();
 
   static constexpr std::size_t interface_queue = 10;  ///< as txqueuelen of a CAN interface

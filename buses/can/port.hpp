@@ -99,6 +99,9 @@ struct PortState {
   [[nodiscard]] bool needs_cycle() const { return link == LinkState::bus_off || link == LinkState::stalled; }
 };
 
+/// The name that stands for a network in this process.
+inline constexpr std::string_view simulated_interface = "sim";
+
 /// Settings of one CAN network.
 struct PortSettings {
   std::string bus;                ///< name in the YAML, for errors
@@ -148,6 +151,8 @@ class Port {
   /// No handler is called after it. The destructor calls nothing at all: close first. A handler may
   /// call it, but not destroy the port.
   virtual void close() = 0;
+  /// Takes the link down and up, which empties its queue (M26). False: somebody with privileges has to.
+  virtual bool cycle() { return false; }
 
   [[nodiscard]] virtual const PortState& state() const = 0;
   [[nodiscard]] virtual const PortCounters& counters() const = 0;

@@ -92,6 +92,8 @@ class CanopenBus final : public Bus {
   [[nodiscard]] const NetworkSettings& settings() const { return settings_; }
   /// Of the port, more precise than port(): bus-off and stall need a cycle of the link (M26).
   [[nodiscard]] const can::PortState& link() const { return master_.port().state(); }
+  /// Takes the link of a simulated network down and up. False: it is a real one, which takes privileges.
+  bool cycle_link() { return simulated() && master_.cycle_link(); }
   /// How often the port ceased to be able to send: an outage may be over before somebody looks at the port.
   [[nodiscard]] std::uint64_t losses() const { return losses_; }
   /// Why it did so the last time.

@@ -86,6 +86,8 @@ class Master {
   [[nodiscard]] const NmtMonitor& nmt() const { return nmt_; }
   [[nodiscard]] const EmergencyHistory& emergencies() const { return emergencies_; }
   [[nodiscard]] const can::Port& port() const { return *port_; }
+  /// As Port::cycle().
+  bool cycle_link() { return port_->cycle(); }
   [[nodiscard]] const MasterCounters& counters() const { return counters_; }
   [[nodiscard]] const NodeTraffic& traffic(std::uint8_t node) const { return traffic_.at(node); }
   /// Nodes that were added.

@@ -55,6 +55,7 @@ Task<> LinkCycler::cycle() {
 }
 
 Task<std::optional<Result<void>>> LinkCycler::ask() {
+  if (bus_->cycle_link()) co_return Result<void>{};
   if (!helper_.cycle)
     co_return fail(Reason::not_supported, "nobody here can take a CAN link down and up",
                    "set it down and up by hand");

@@ -24,8 +24,9 @@ struct LinkHelper {
 };
 
 /// Has the link of one CAN network cycled when it is bus-off or stalled, because nothing else empties the
-/// kernel's queue of frames that would go out when the network comes back (M26). What follows, stops first,
-/// is the axes' business: they see the port come back. Thread: core.
+/// kernel's queue of frames that would go out when the network comes back (M26). A simulated link needs
+/// nobody with privileges. What follows, stops first, is the axes' business: they see the port come back.
+/// Thread: core.
 class LinkCycler {
  public:
   /// It is asked at once, but not more often than this; doubled each time that the link needs it again.

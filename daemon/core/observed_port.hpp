@@ -27,6 +27,7 @@ class ObservedPort final : public can::Port {
   void send(const can::Frame& frame, const can::SendOptions& options, can::Completion completion) override;
   void purge_superseded(const AxisGate& gate) override { inner_->purge_superseded(gate); }
   void close() override { inner_->close(); }
+  bool cycle() override { return inner_->cycle(); }
   [[nodiscard]] const can::PortState& state() const override { return inner_->state(); }
   [[nodiscard]] const can::PortCounters& counters() const override { return inner_->counters(); }
   [[nodiscard]] const can::PortSettings& settings() const override { return inner_->settings(); }

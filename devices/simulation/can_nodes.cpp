@@ -267,7 +267,7 @@ TimePoint CanNodes::next_event() const {
 void CanNodes::set_timer() {
   timer_.reset();
   const auto next = next_event();
-  if (next != TimePoint::max()) timer_ = clock_->call_at(next, [this] { advance(); });
+  if (next != TimePoint::max()) timer_ = clock_->call_at(next, [this, next] { pass_time(next); });
 }
 
 NetworkNodes::NetworkNodes(Clock& clock, can::Network& network)
@@ -293,7 +293,7 @@ void NetworkNodes::transmit() {
   const auto frame = waiting_.begin()->second;
   waiting_.erase(waiting_.begin());
   on_wire_ = true;
-  network_->transmit(id_, frame);
+  network_->transmit(id_, frame, nodes_.now());
 }
 
 }  // namespace axisd::simulation

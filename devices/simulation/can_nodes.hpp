@@ -48,6 +48,8 @@ class CanNodes {
   /// Lets time pass until now, sends what is to be sent, and sets the timer. To be called after anything was
   /// done to a node directly.
   void advance() { pass_time(clock_->now()); }
+  /// When the nodes do what they do now: of a late host the time at which it was due, not the clock's.
+  [[nodiscard]] TimePoint now() const { return now_; }
 
   /// Strikes at once, or waits for its frame.
   void add_fault(const Fault& fault);

@@ -137,6 +137,50 @@ TEST(CanPort, InAStallAllEndsAndNothingIsSentLater) {
   EXPECT_EQ(bench.port.counters().stalls, 1U);
 }
 
+TEST(CanNetwork, ALateHostMakesTheWireNoSlower) {
+  Bench bench;
+  const auto begin = bench.world.now();
+  for (const auto id : {0x100U, 0x101U}) bench.network.transmit(bench.node, frame_of(id));
+  bench.send(0x300);
+  bench.send(0x301);
+  bench.world.clock().advance_to(begin + 250ms);  // the process was not run meanwhile
+  bench.world.run_for(0ms);
+  EXPECT_EQ(bench.others, (Texts{"300#", "301#"}));
+  EXPECT_EQ(bench.at, (std::vector{begin + 165us, begin + 220us}));
+  EXPECT_EQ(bench.endings.texts(), (Texts{"768:sent", "769:sent"}));
+  EXPECT_EQ(bench.endings.results().at(1).sent_at, begin + 220us);
+}
+
+TEST(CanNetwork, AFrameThatIsReadyLaterLeavesTheWireToOthers) {
+  Bench bench;
+  const auto begin = bench.world.now();
+  Texts all;
+  std::vector<TimePoint> at;
+  bench.network.join([&](const Frame& frame, TimePoint when, bool) {
+    all.push_back(to_string(frame));
+    at.push_back(when);
+  });
+  bench.network.transmit(bench.node, frame_of(0x100), begin + 1ms);
+  bench.send(0x300);
+  bench.world.run_for(2ms);
+  EXPECT_EQ(all, (Texts{"300#", "100#"}));
+  EXPECT_EQ(at, (std::vector{begin + 55us, begin + 1ms + 55us}));
+}
+
+TEST(CanPort, ALateHostIsNoStall) {
+  Bench bench;
+  for (int turn = 0; turn < 20; ++turn) {
+    // The node's frame is on the wire, ours waits for it, and the process is not run for a while.
+    bench.network.transmit(bench.node, frame_of(0x180));
+    bench.send(0x600);
+    bench.world.clock().advance_to(bench.world.now() + 150ms);
+    bench.world.run_for(1ms);
+  }
+  EXPECT_EQ(bench.states, States{LinkState::up});
+  EXPECT_EQ(bench.port.counters().stalls, 0U);
+  EXPECT_EQ(bench.port.counters().sent, 20U);
+}
+
 TEST(CanPort, BusOffEndsAllUntilTheLinkWasCycled) {
   Bench bench;
   for (std::uint32_t id = 1; id <= 6; ++id) bench.send(id);

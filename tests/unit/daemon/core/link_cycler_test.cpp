@@ -299,5 +299,36 @@ TEST(LinkCycler, SaysWhyALinkIsNotCycled) {
   world.run_for(1ms);
 }
 
+TEST(LinkCycler, ASimulatedLinkNeedsNoHelper) {
+  test::VirtualWorld world;
+  can::Network network(world.clock(), 1'000'000);
+  auto port = std::make_unique<can::NetworkPort>(
+      world.clock(), can::PortSettings{.bus = "cell", .interface = "sim"}, network);
+  auto* const link = port.get();
+  canopen::CanopenBus bus(world.executor(), world.clock(), {.name = "cell", .interface = "sim"},
+                          std::move(port));
+  LinkCycler cycler(world.executor(), world.clock(), bus, {});
+  bus.start();
+  spawn(world.executor(), cycler.run(), "cycler");
+  world.run_for(1s);
+  link->report(Controller::bus_off);
+  EXPECT_EQ(bus.link().error->remedy.find("ip link"), std::string::npos);
+  world.run_for(1ms);
+  EXPECT_EQ(bus.link().link, LinkState::up);
+  network.set_stalled(true);
+  link->send(can::make_frame(0x123, {}), {}, {});
+  world.run_for(99ms);
+  EXPECT_EQ(link->counters().stalls, 0U);
+  world.run_for(1s);
+  EXPECT_EQ(link->counters().stalls, 1U);
+  network.set_stalled(false);
+  world.run_for(LinkCycler::longest_pause);
+  EXPECT_EQ(bus.link().link, LinkState::up);
+  EXPECT_FALSE(cycler.trouble());
+  cycler.close();
+  bus.close();
+  world.run_for(1ms);
+}
+
 }  // namespace
 }  // namespace axisd::core

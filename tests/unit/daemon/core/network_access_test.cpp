@@ -298,8 +298,13 @@ TEST_F(NetworkAccess, TheStatusSaysWhatIsOnTheNetwork) {
   EXPECT_GT(network.frames.received, 0U);
   EXPECT_EQ(network.sync_period, 10ms);
   port_->report(can::Controller::bus_off);
-  world_.run_for(50ms);
   EXPECT_EQ(machine_->bus_status()[0].network->link, can::LinkState::bus_off);
+  world_.run_for(50ms);
+  EXPECT_EQ(machine_->bus_status()[0].network->link, can::LinkState::up);  // a simulated one needs nobody
+  EXPECT_TRUE(machine_->bus_status()[0].open);
+  port_->set_up(false);
+  world_.run_for(50ms);
+  EXPECT_EQ(machine_->bus_status()[0].network->link, can::LinkState::down);
   EXPECT_FALSE(machine_->bus_status()[0].open);
   EXPECT_TRUE(machine_->bus_status()[0].error);
 }
