@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "config/text.hpp"
+#include "config/unit_conversion.hpp"
 
 namespace axisd::config {
 
@@ -54,8 +55,10 @@ std::unexpected<QuantityError> wrong(std::string message, std::string suggestion
 }
 
 std::unexpected<QuantityError> not_a_number(std::string_view text) {
+  // With which of its commas it would be the number that was meant, nobody can say.
   if (text.find(',') != std::string_view::npos) {
-    return wrong(fmt::format("{} is not a number", quoted(text)), "use a point for decimals: 0.5");
+    return wrong(fmt::format("{} is not a number", quoted(text)),
+                 "use a point for decimals, and nothing between thousands");
   }
   return wrong(fmt::format("{} is not a number", quoted(text)),
                "write a finite decimal number, such as 12.5");
@@ -106,9 +109,17 @@ QuantityError missing_unit(std::string_view text, std::string_view unit) {
   return {fmt::format("{} has no unit", quoted(text)), fmt::format("write {} {}", printable(text), unit)};
 }
 
-QuantityError wrong_unit(std::string_view number, std::string_view unit, std::string_view expected) {
+/// A number of another unit is shown converted or not at all: "12 mm" is not what "12 cm" was to say.
+QuantityError wrong_unit(const Decimal& number, std::string_view unit, std::string_view expected) {
+  const auto same = converted(number, unit, expected);
   return {fmt::format("unit {} does not fit here", quoted(unit)),
-          fmt::format("expected {}, as in {} {}", expected, printable(number), expected)};
+          same ? fmt::format("write {} {}", *same, expected) : fmt::format("expected {}", expected)};
+}
+
+QuantityError wrong_time_unit(const Decimal& number, std::string_view unit) {
+  const auto same = converted_time(number, unit);
+  return {fmt::format("unit {} does not fit here", quoted(unit)),
+          same ? "write " + *same : "expected a time in us, ms, s or min"};
 }
 
 struct TimeUnit {
@@ -181,7 +192,7 @@ QuantityResult<Decimal> parse_in_unit(std::string_view text, std::string_view un
   if (quantity->unit.empty()) {
     if (rule == UnitRule::required) return std::unexpected(missing_unit(all, unit));
   } else if (quantity->unit != unit) {
-    return std::unexpected(wrong_unit(all.substr(0, decimal_length(all)), quantity->unit, unit));
+    return std::unexpected(wrong_unit(quantity->number, quantity->unit, unit));
   }
   return quantity->number;
 }
@@ -189,14 +200,10 @@ QuantityResult<Decimal> parse_in_unit(std::string_view text, std::string_view un
 QuantityResult<Duration> parse_duration(std::string_view text) {
   const auto quantity = parse_quantity(text);
   if (!quantity) return std::unexpected(quantity.error());
-  const auto all = trim(text);
-  const auto number = all.substr(0, decimal_length(all));
-  if (quantity->unit.empty()) return std::unexpected(missing_unit(all, "ms"));
+  if (quantity->unit.empty())
+    return wrong(fmt::format("{} has no unit", quoted(text)), "add it: us, ms, s or min");
   const auto unit = std::ranges::find(time_units, quantity->unit, &TimeUnit::name);
-  if (unit == time_units.end()) {
-    return wrong(fmt::format("unit {} does not fit here", quoted(quantity->unit)),
-                 fmt::format("expected a time in us, ms, s or min, as in {} ms", printable(number)));
-  }
+  if (unit == time_units.end()) return std::unexpected(wrong_time_unit(quantity->number, quantity->unit));
   if (quantity->number.value < 0)
     return wrong(fmt::format("{} is negative", quoted(text)), "write a time >= 0");
   const double nanoseconds = quantity->number.value * static_cast<double>(unit->nanoseconds);
@@ -235,7 +242,7 @@ QuantityResult<Decimal> parse_ratio_in_unit(std::string_view text, std::string_v
   if (slash == std::string_view::npos || letter <= slash) {
     const auto number = parse_in_unit(text, unit);
     if (number && number->numerator <= 0) {
-      return wrong(fmt::format("{} is not positive", quoted(text)), fmt::format("write 5 {}", unit));
+      return wrong(fmt::format("{} is not positive", quoted(text)), "write a number above 0");
     }
     return number;
   }
@@ -243,7 +250,7 @@ QuantityResult<Decimal> parse_ratio_in_unit(std::string_view text, std::string_v
   if (!ratio) return ratio;
   const auto written = without_spaces(all.substr(letter));
   if (written.empty()) return std::unexpected(missing_unit(all, unit));
-  if (written != unit) return std::unexpected(wrong_unit(trim(all.substr(0, letter)), written, unit));
+  if (written != unit) return std::unexpected(wrong_unit(*ratio, written, unit));
   return ratio;
 }
 

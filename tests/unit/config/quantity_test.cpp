@@ -72,12 +72,46 @@ TEST(Quantity, SaysHowToWriteIt) {
   EXPECT_EQ(parse_in_unit("50", "mm/s").error().message, "'50' has no unit");
   EXPECT_EQ(parse_in_unit("50", "mm/s").error().suggestion, "write 50 mm/s");
   EXPECT_EQ(parse_in_unit("50 mm", "mm/s").error().message, "unit 'mm' does not fit here");
-  EXPECT_EQ(parse_in_unit("50 mm", "mm/s").error().suggestion, "expected mm/s, as in 50 mm/s");
-  EXPECT_EQ(parse_in_unit("0,5 mm", "mm").error().suggestion, "use a point for decimals: 0.5");
+  EXPECT_EQ(parse_in_unit("50 mm", "mm/s").error().suggestion, "expected mm/s");
+  EXPECT_EQ(parse_in_unit("0,5 mm", "mm").error().suggestion,
+            "use a point for decimals, and nothing between thousands");
   EXPECT_EQ(parse_in_unit("fast", "mm/s").error().message, "'fast' is not a number");
   EXPECT_EQ(parse_in_unit("5 mm/s/s", "mm/s").error().message, "'mm/s/s' is not a unit");
   EXPECT_EQ(parse_in_unit("5", "mm", UnitRule::optional)->value, 5);
   EXPECT_FALSE(parse_in_unit("5 deg", "mm", UnitRule::optional));
+}
+
+TEST(Quantity, SaysWhatAnotherUnitComesTo) {
+  const auto hint = [](std::string_view text, std::string_view unit) {
+    return parse_in_unit(text, unit).error().suggestion;
+  };
+  EXPECT_EQ(hint("12cm", "mm"), "write 120 mm");
+  EXPECT_EQ(hint("-0.05 m", "mm"), "write -50 mm");
+  EXPECT_EQ(hint("120 MM", "mm"), "write 120 mm");
+  EXPECT_EQ(hint("1.5 inches", "mm"), "write 38.1 mm");
+  EXPECT_EQ(hint("0.25 rev", "deg"), "write 90 deg");
+  EXPECT_EQ(hint("90 degrees", "rev"), "write 0.25 rev");
+  EXPECT_EQ(hint("3 m/min", "mm/s"), "write 50 mm/s");
+  EXPECT_EQ(hint("50 mm/sec", "mm/s"), "write 50 mm/s");
+  EXPECT_EQ(hint("120 rpm", "r/min"), "write 120 r/min");
+  EXPECT_EQ(hint("2 rev/s", "r/min"), "write 120 r/min");
+  EXPECT_EQ(hint("0 cm", "mm"), "write 0 mm");
+  for (const auto* text : {"12 deg", "12 mm/s", "12 m/min", "12 x", "12 cm/x", "12 s/mm"})
+    EXPECT_EQ(hint(text, "mm"), "expected mm") << text;
+  EXPECT_EQ(hint("1 mm/min", "mm/s"), "expected mm/s") << "1/60 is no decimal";
+  EXPECT_EQ(hint("5 steps/rev", "pulses/rev"), "expected pulses/rev");
+  EXPECT_EQ(parse_ratio_in_unit("1/4 cm/rev", "mm/rev").error().suggestion, "write 2.5 mm/rev");
+  EXPECT_EQ(parse_ratio_in_unit("1/3 cm/rev", "mm/rev").error().suggestion, "expected mm/rev");
+}
+
+TEST(Quantity, SaysWhatAnotherUnitOfTimeComesTo) {
+  const auto hint = [](std::string_view text) { return parse_duration(text).error().suggestion; };
+  EXPECT_EQ(hint("2 h"), "write 120 min");
+  EXPECT_EQ(hint("90 sec"), "write 90 s");
+  EXPECT_EQ(hint("2 Seconds"), "write 2 s");
+  EXPECT_EQ(hint("1500 ns"), "write 1.5 us");
+  for (const auto* text : {"2 mm", "2 m", "2 days"})
+    EXPECT_EQ(hint(text), "expected a time in us, ms, s or min") << text;
 }
 
 TEST(Quantity, Durations) {
@@ -87,7 +121,7 @@ TEST(Quantity, Durations) {
   EXPECT_EQ(*parse_duration("20 us"), 20us);
   EXPECT_EQ(*parse_duration("0.5 min"), 30s);
   EXPECT_EQ(*parse_duration("0 ms"), 0ms);
-  EXPECT_EQ(parse_duration("150").error().suggestion, "write 150 ms");
+  EXPECT_EQ(parse_duration("150").error().suggestion, "add it: us, ms, s or min");
   EXPECT_FALSE(parse_duration("-1 ms"));
   EXPECT_FALSE(parse_duration("1 h"));
   EXPECT_FALSE(parse_duration("1e17 s"));
