@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <thread>
 
 namespace axisd::axisctl {
 namespace {
@@ -49,8 +50,11 @@ grpc::ChannelArguments arguments() {
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   // A machine is on the local network; an http_proxy of the environment must not redirect its commands.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  // A call that failed is reported, never sent again behind the user's back.
+  // A call that failed is reported, never sent again behind the user's back: only stops are (repetition.hpp).
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
+  // A daemon that is being restarted is found again soon; gRPC's own pauses grow to two minutes.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   // Without this, two channel objects of one process share one connection.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return arguments;
@@ -64,6 +68,13 @@ Client::Client(Connection connection) : connection_(std::move(connection)) {
   const auto trusted = credentials(connection_);
   channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
   stop_channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
+}
+
+void Client::wait_for_connection(Lane lane, std::chrono::milliseconds limit) const {
+  if (channel(lane)->GetState(true) == GRPC_CHANNEL_READY)
+    std::this_thread::sleep_for(limit);
+  else
+    channel(lane)->WaitForConnected(std::chrono::system_clock::now() + limit);
 }
 
 Failure Client::failure(const grpc::Status& status, std::string_view subject) const {

@@ -57,7 +57,11 @@ class Client {
   [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel(Lane lane = Lane::ordinary) const {
     return lane == Lane::stop ? stop_channel_ : channel_;
   }
+  /// Lets so much time pass, or less if there is a connection again before. gRPC connects only while somebody
+  /// waits.
+  void wait_for_connection(Lane lane, std::chrono::milliseconds limit) const;
   [[nodiscard]] Failure failure(const grpc::Status& status, std::string_view subject) const;
+  [[nodiscard]] std::chrono::nanoseconds timeout() const { return connection_.timeout; }
 
  private:
   Connection connection_;

@@ -6,6 +6,7 @@
 #include "api/axisctl/interrupt.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/progress.hpp"
+#include "api/axisctl/repetition.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/command_service.grpc.pb.h"
 
@@ -50,7 +51,8 @@ void get(Invocation& invocation, const std::string& id) {
 void cancel(Invocation& invocation, const std::string& id) {
   v1::CancelCommandRequest request;
   request.set_id(id);
-  show(invocation, invocation.client().call(&Stub::CancelCommand, request, id, Lane::stop).command());
+  const auto& client = invocation.client();
+  show(invocation, repeat_stop(client, &Stub::CancelCommand, request, id, client.timeout()).command());
 }
 
 }  // namespace

@@ -2,7 +2,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <initializer_list>
 #include <memory>
+#include <string_view>
+#include <utility>
 
 #include "api/axisctl/explain_view.hpp"
 #include "api/axisctl/format.hpp"
@@ -58,7 +62,27 @@ void ask_with_value(Invocation& invocation, const Arguments& arguments, v1::Expl
   }
 }
 
+/// What a command does not take would be left out of the question without a word.
+void check_belonging(const Arguments& arguments) {
+  const auto is_one_of = [&](std::initializer_list<std::string_view> commands) {
+    return std::ranges::find(commands, arguments.command) != commands.end();
+  };
+  const bool ramps = !arguments.acceleration_time.empty() || !arguments.deceleration_time.empty();
+  const std::pair<std::string_view, bool> wrong[] = {
+      {"VALUE", !arguments.value.empty() && !is_one_of({"move", "velocity", "jog", "set-position"})},
+      {"--relative", arguments.relative && !is_one_of({"move"})},
+      {"--velocity", !arguments.velocity.empty() && !is_one_of({"move"})},
+      {"--hold", !arguments.hold.empty() && !is_one_of({"velocity", "jog"})},
+      {"--acceleration-time or --deceleration-time", ramps && !is_one_of({"move", "velocity", "jog"})}};
+  for (const auto& [what, given] : wrong)
+    if (given)
+      throw Failure(ExitCode::usage,
+                    fmt::format("explain {} takes no {}",
+                                arguments.command.empty() ? "without a command" : arguments.command, what));
+}
+
 void explain(Invocation& invocation, const Arguments& arguments) {
+  check_belonging(arguments);
   v1::ExplainRequest request;
   request.set_axis(arguments.axis());
   request.set_lease_token(arguments.lease_token);

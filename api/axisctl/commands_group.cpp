@@ -4,12 +4,14 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <memory>
+#include <optional>
 
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/motion_arguments.hpp"
 #include "api/axisctl/quantity.hpp"
+#include "api/axisctl/repetition.hpp"
 #include "api/axisctl/table.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/group_service.grpc.pb.h"
@@ -52,7 +54,7 @@ void add_target(Invocation& invocation, const Arguments& arguments, const std::s
   auto& target = *request.add_targets();
   target.set_axis(word.substr(0, equals));
   auto value = word.substr(equals + 1);
-  std::string velocity;
+  std::optional<std::string> velocity;
   if (const auto at = value.find('@'); at != std::string::npos) {
     velocity = value.substr(at + 1);
     value = value.substr(0, at);
@@ -62,7 +64,7 @@ void add_target(Invocation& invocation, const Arguments& arguments, const std::s
     target.set_distance(parse_value(value, unit, "distance"));
   else
     target.set_position(parse_value(value, unit, "position"));
-  if (!velocity.empty()) target.set_velocity(parse_value(velocity, unit + "/s", "velocity"));
+  if (velocity) target.set_velocity(parse_value(*velocity, unit + "/s", "velocity"));
   if (!arguments.acceleration_time.empty())
     set(*target.mutable_acceleration_time(),
         parse_duration(arguments.acceleration_time, "--acceleration-time"));
@@ -128,7 +130,7 @@ void move(Invocation& invocation, const Arguments& arguments) {
     for (const auto& member : response.move().members()) invocation.started.push_back(member.command());
     print_move(invocation, response.move());
   } catch (const Failure& failure) {
-    if (failure.code() != ExitCode::unreachable) throw;
+    if (failure.code() != ExitCode::unreachable || failure.nothing_sent()) throw;
     throw Failure(failure.code(),
                   fmt::format("{}; if the move may have arrived, repeat it with --request-id {}",
                               failure.what(), request.options().request_id()));
@@ -143,9 +145,10 @@ void stop(Invocation& invocation, const Arguments& arguments,
   for (const auto& axis : arguments.axes) request.add_axes(axis);
   if constexpr (requires { request.set_hold(true); }) request.set_hold(arguments.keep);
   request.set_wait_until(arguments.wait ? v1::WAIT_UNTIL_DONE : v1::WAIT_UNTIL_ACCEPTED);
-  const auto response = arguments.wait ? invocation.client().call_within(std::chrono::nanoseconds(0), method,
-                                                                         request, "", Lane::stop)
-                                       : invocation.client().call(method, request, "", Lane::stop);
+  if constexpr (requires { request.set_request_id(""); }) request.set_request_id(random_uuid());
+  const auto& client = invocation.client();
+  const auto response =
+      repeat_stop(client, method, request, arguments.group, client.timeout(), arguments.wait);
   if (invocation.json) print_line(json(response));
   for (const auto& result : response.results()) {
     const bool aborted =

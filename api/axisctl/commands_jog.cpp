@@ -76,7 +76,7 @@ void jog(Invocation& invocation, const JogArguments& arguments) {
     // Without renewal the hold expires and the daemon halts the axis; asking for it as well is quicker if it
     // can.
     try {
-      halt_axis(invocation, arguments.axis());
+      halt_axis(invocation, arguments.axis(), hold);
     } catch (const Failure&) {
       throw Failure(failure.code(), fmt::format("{}; the axis halts when its hold of {} ends", failure.what(),
                                                 arguments.hold));
@@ -88,7 +88,8 @@ void jog(Invocation& invocation, const JogArguments& arguments) {
     return;
   }
   invocation.status =
-      follow(invocation, halt_axis(invocation, arguments.axis()), {.unit = before.unit(), .start = {}});
+      follow(invocation, halt_axis(invocation, arguments.axis(), invocation.client().timeout()),
+             {.unit = before.unit(), .start = {}});
 }
 
 }  // namespace

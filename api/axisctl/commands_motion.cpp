@@ -1,6 +1,10 @@
 // enable, disable, home, move, velocity, reset, set-position.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <memory>
+#include <type_traits>
 
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/invocation.hpp"
@@ -58,22 +62,57 @@ void set_position(Invocation& invocation, const MotionArguments& arguments) {
   finish(invocation, arguments, {send(invocation, &Stub::SetPosition, request)}, before);
 }
 
-/// Commands that need nothing but the axis: all are sent before the first is followed.
+template <class Request, class Response>
+v1::Command send_simple(Invocation& invocation, const MotionArguments& arguments, const std::string& axis,
+                        grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  Request request;
+  request.set_axis(axis);
+  *request.mutable_options() = command_options(arguments);
+  return send(invocation, method, request);
+}
+
+void check_request_id(const MotionArguments& arguments) {
+  if (!arguments.request_id.empty() && arguments.axes.size() > 1)
+    throw Failure(ExitCode::usage, "--request-id belongs to one command: name one axis with it");
+}
+
+/// Commands that need nothing but the axis: none is sent unless all axes are known, and all are sent before
+/// the first is followed.
 template <class Request, class Response>
 void simple(Invocation& invocation, const MotionArguments& arguments,
             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
-  if (!arguments.request_id.empty() && arguments.axes.size() > 1)
-    throw Failure(ExitCode::usage, "--request-id belongs to one command: name one axis with it");
-  std::vector<v1::Command> commands;
+  check_request_id(arguments);
   v1::AxisState before;
-  for (const auto& axis : arguments.axes) {
-    before = invocation.state(axis);
-    Request request;
-    request.set_axis(axis);
-    *request.mutable_options() = command_options(arguments);
-    commands.push_back(send(invocation, method, request));
+  for (const auto& axis : arguments.axes) before = invocation.state(axis);
+  std::vector<v1::Command> commands;
+  try {
+    for (const auto& axis : arguments.axes)
+      commands.push_back(send_simple(invocation, arguments, axis, method));
+  } catch (const Failure&) {
+    report(invocation, commands, false,
+           {.unit = before.unit(), .start = {}});  // these were accepted, and go on
+    throw;
   }
   finish(invocation, arguments, commands, before);
+}
+
+/// A stop, too: asks nothing before, and leaves none out because of another one's trouble.
+template <class Request, class Response>
+void disable(Invocation& invocation, const MotionArguments& arguments,
+             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  check_request_id(arguments);
+  std::vector<v1::Command> commands;
+  auto worst = ExitCode::ok;
+  for (const auto& axis : arguments.axes) {
+    try {
+      commands.push_back(send_simple(invocation, arguments, axis, method));
+    } catch (const Failure& failure) {
+      fmt::print(stderr, "axisctl: {}\n", failure.what());
+      worst = failure.code();
+    }
+  }
+  invocation.status = report(invocation, commands, arguments.wait, {.unit = {}, .start = {}});
+  if (worst != ExitCode::ok) invocation.status = worst;
 }
 
 CLI::App* add(CLI::App& app, const std::string& name, const std::string& help, const Arguments& arguments) {
@@ -98,7 +137,12 @@ void add_simple(CLI::App& app, Invocation& invocation, const std::string& name, 
   add_several_axes(*command, *arguments);
   command->get_option("AXIS")->required();
   if (name == "home") add_halt_on_interrupt(*command, *arguments);
-  command->callback([&invocation, arguments, method] { simple(invocation, *arguments, method); });
+  command->callback([&invocation, arguments, method] {
+    if constexpr (std::is_same_v<Request, v1::DisableRequest>)
+      disable(invocation, *arguments, method);
+    else
+      simple(invocation, *arguments, method);
+  });
 }
 
 void add_move(CLI::App& app, Invocation& invocation) {
@@ -111,7 +155,7 @@ void add_move(CLI::App& app, Invocation& invocation) {
       ->add_option("VALUE", arguments->value,
                    "Position or distance, with or without the axis's unit: 120mm, -10")
       ->required();
-  command->add_flag("--relative", *relative, "VALUE is a distance from the last commanded target");
+  command->add_flag("--relative", *relative, "VALUE is a distance");
   command->add_option("--velocity", arguments->velocity, "Per second: 50mm/s (default: the axis's limit)")
       ->type_name("VALUE");
   add_ramps(*command, *arguments);

@@ -134,7 +134,7 @@ class Script {
         const auto now = invocation_.client().call(&v1::CommandService::Stub::GetCommand, request,
                                                    command.axis(), Lane::stop);
         if (ended(now.command())) continue;
-        const auto halt = halt_axis(invocation_, command.axis());
+        const auto halt = halt_axis(invocation_, command.axis(), invocation_.client().timeout());
         print_line(invocation_.json ? json(halt) : command_line(halt, {}));
       } catch (const Failure& failure) {
         fmt::print(stderr, "axisctl: NOT halted: {}\n", failure.what());

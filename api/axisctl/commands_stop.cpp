@@ -4,11 +4,15 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/motion_arguments.hpp"
 #include "api/axisctl/progress.hpp"
+#include "api/axisctl/repetition.hpp"
 #include "api/axisctl/table.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
@@ -30,23 +34,66 @@ void check_axes(const StopArguments& arguments) {
                 arguments.all ? "name axes or use --all, not both" : "name an axis, or use --all");
 }
 
-/// Sends to every axis even if one fails: no stop may be missing because of another one's trouble.
+/// What became of the stop of one axis; neither: it has not been answered yet.
+struct Answer {
+  std::optional<v1::Command> command;
+  std::optional<Failure> refusal;
+};
+
+/// Releasing a stop is none: it may be somebody else's stop by the time it is repeated.
+template <class Request>
+constexpr bool is_stop = requires(Request request) { request.mutable_options(); };
+
+/// Each axis in turn, whatever becomes of the others: no stop may be missing because of another one's
+/// trouble. Those that did not reach the daemon are repeated, all together.
+template <class Request, class Response>
+std::vector<Answer> ask_each(const Client& client, const std::vector<Request>& requests,
+                             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  std::vector<Answer> answers(requests.size());
+  for (Repetition repetition(client.timeout());;) {
+    std::optional<Failure> lost;
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      auto& answer = answers[i];
+      if (answer.command || (answer.refusal && answer.refusal->code() != ExitCode::unreachable)) continue;
+      try {
+        answer.command = client
+                             .call_within(is_stop<Request> ? repetition.left() : client.timeout(), method,
+                                          requests[i], requests[i].axis(), Lane::stop)
+                             .command();
+      } catch (const Failure& failure) {
+        answer.refusal = failure;
+        if (failure.code() == ExitCode::unreachable) lost = failure;
+      }
+    }
+    if (!lost || !is_stop<Request>) return answers;
+    if (repetition.again(client, *lost)) continue;
+    for (std::size_t i = 0; i < requests.size(); ++i)
+      if (auto& answer = answers[i]; !answer.command && answer.refusal->code() == ExitCode::unreachable)
+        answer.refusal = repetition.in_vain(Failure(
+            answer.refusal->code(), fmt::format("{}: {}", requests[i].axis(), answer.refusal->what())));
+    return answers;
+  }
+}
+
 template <class Request, class Response>
 void stop_each(Invocation& invocation, const StopArguments& arguments,
                grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
-  std::vector<v1::Command> commands;
-  ExitCode worst = ExitCode::ok;
+  std::vector<Request> requests;
   for (const auto& axis : arguments.axes) {
-    Request request;
+    auto& request = requests.emplace_back();
     request.set_axis(axis);
     if constexpr (requires { request.set_hold(true); }) request.set_hold(arguments.keep);
     if constexpr (requires { request.mutable_options(); })
       *request.mutable_options() = command_options(arguments);
-    try {
-      commands.push_back(invocation.client().call(method, request, axis, Lane::stop).command());
-    } catch (const Failure& failure) {
-      fmt::print(stderr, "axisctl: {}\n", failure.what());
-      worst = failure.code();
+  }
+  std::vector<v1::Command> commands;
+  ExitCode worst = ExitCode::ok;
+  for (auto& answer : ask_each(invocation.client(), requests, method)) {
+    if (answer.command) {
+      commands.push_back(*std::move(answer.command));
+    } else {
+      fmt::print(stderr, "axisctl: {}\n", answer.refusal->what());
+      worst = answer.refusal->code();
     }
   }
   invocation.status = report(invocation, commands, arguments.wait, {.unit = {}, .start = {}});
@@ -59,8 +106,7 @@ void stop_all(Invocation& invocation, bool wait) {
   const auto call = &v1::SystemService::Stub::StopAll;
   // Confirming standstill takes as long as the slowest axis decelerates.
   const auto response =
-      wait ? invocation.client().call_within(std::chrono::nanoseconds(0), call, request, "", Lane::stop)
-           : invocation.client().call(call, request, "", Lane::stop);
+      repeat_stop(invocation.client(), call, request, "", invocation.client().timeout(), wait);
   if (invocation.json) print_line(json(response));
   for (const auto& result : response.results()) {
     const bool failed = result.has_error() || outcome(result.command()) != ExitCode::ok;
@@ -83,10 +129,8 @@ CLI::App* add(CLI::App& app, Invocation& invocation, const std::shared_ptr<StopA
   if constexpr (requires(Request request) { request.mutable_options(); }) add_wait(*command, *arguments);
   if constexpr (requires(Request request) { request.set_hold(true); })
     command->add_flag("--hold", arguments->keep, "Stay in Stopping until release-stop");
-  command->callback([&invocation, arguments, method] {
-    check_axes(*arguments);
-    stop_each(invocation, *arguments, method);
-  });
+  command->get_option("AXIS")->required();  // of those with --all it is not: they check it
+  command->callback([&invocation, arguments, method] { stop_each(invocation, *arguments, method); });
   return command;
 }
 
@@ -107,6 +151,7 @@ void add_stop_commands(CLI::App& app, Invocation& invocation) {
       add(app, invocation, stopping, "stop",
           "Decelerate; nothing takes over before standstill. An operational stop, without safety rating",
           &Stub::Stop);
+  stop->get_option("AXIS")->required(false);
   stop->add_flag("--all", stopping->all, "Stop every axis and refuse all motion until release-stop --all");
   stop->callback([&invocation, stopping] {
     check_axes(*stopping);
@@ -119,6 +164,7 @@ void add_stop_commands(CLI::App& app, Invocation& invocation) {
 
   const auto releasing = fresh();
   auto* release = add(app, invocation, releasing, "release-stop", "End a held stop", &Stub::ReleaseStop);
+  release->get_option("AXIS")->required(false);
   release->add_flag("--all", releasing->all, "Release what stop --all holds");
   release->callback([&invocation, releasing] {
     check_axes(*releasing);

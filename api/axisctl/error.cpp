@@ -13,20 +13,37 @@ constexpr std::string_view detail_type = "axisd.v1.ErrorDetail";
 std::string_view innermost(std::string_view text) {
   constexpr std::string_view mark = "last error: ";
   if (const auto at = text.rfind(mark); at != text.npos) text.remove_prefix(at + mark.size());
+  // Its resolver tells of its libraries before it comes to the point.
+  constexpr std::string_view resolver = "is_balancer=0: ";
+  if (const auto at = text.rfind(resolver); at != text.npos) text.remove_prefix(at + resolver.size());
   for (const std::string_view noise : {"UNKNOWN: ", "UNAVAILABLE: ", "INTERNAL: "})
     if (text.starts_with(noise)) text.remove_prefix(noise.size());
   return text;
 }
 
+/// gRPC's words for a call that never had a connection.
+bool never_connected(std::string_view message) {
+  return message.starts_with("failed to connect") || message.starts_with("DNS resolution failed");
+}
+
+/// The daemon's end cut the call off: what it was to do may have been accepted.
+bool cut_off(const grpc::Status& status, const v1::ErrorDetail& detail) {
+  return status.error_code() == grpc::StatusCode::UNAVAILABLE && detail.reason() == v1::REASON_CANCELLED;
+}
+
 Failure unreachable(const grpc::Status& status, std::string_view server, bool tls) {
   const std::string message = status.error_message();
   const std::string_view reason = innermost(message);
+  if (!never_connected(message))
+    return {ExitCode::unreachable,
+            fmt::format("lost axisd at {}: {}; what it has done is not known", server, reason)};
   const bool refused = reason.contains("refused") || reason.contains("No such file");
   const std::string_view remedy =
       refused ? "is the daemon running there? --server HOST:PORT or AXISD_SERVER names another one"
       : tls   ? "check the certificates (--tls-ca, --tls-cert, --tls-key) and the address"
               : "check the address (--server); a daemon with TLS needs --tls-ca, --tls-cert and --tls-key";
-  return {ExitCode::unreachable, fmt::format("cannot reach axisd at {}: {}; {}", server, reason, remedy)};
+  return {ExitCode::unreachable, fmt::format("cannot reach axisd at {}: {}; {}", server, reason, remedy),
+          true};
 }
 
 /// In the words of the daemon's log.
@@ -67,7 +84,9 @@ std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
 
 Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls) {
   const std::string lead = subject.empty() ? "" : fmt::format("{}: ", subject);
-  if (const auto detail = detail_of(status)) return {ExitCode::refused, lead + describe(*detail, subject)};
+  if (const auto detail = detail_of(status))
+    return {cut_off(status, *detail) ? ExitCode::unreachable : ExitCode::refused,
+            lead + describe(*detail, subject)};
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return unreachable(status, server, tls);
   if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
     return {

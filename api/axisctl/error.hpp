@@ -26,11 +26,15 @@ enum class ExitCode : int {
 /// first failure and CLI11 reports by exception as well.
 class Failure : public std::runtime_error {
  public:
-  Failure(ExitCode code, const std::string& text) : std::runtime_error(text), code_(code) {}
+  Failure(ExitCode code, const std::string& text, bool nothing_sent = false)
+      : std::runtime_error(text), code_(code), nothing_sent_(nothing_sent) {}
   [[nodiscard]] ExitCode code() const { return code_; }
+  /// `unreachable` only: there was no connection to send it on, so that it cannot have arrived.
+  [[nodiscard]] bool nothing_sent() const { return nothing_sent_; }
 
  private:
   ExitCode code_;
+  bool nothing_sent_;
 };
 
 /// The typed detail of the grpc-status-details-bin trailer, if the daemon sent one.

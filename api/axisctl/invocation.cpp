@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "api/axisctl/quantity.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
+#include "config/text.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -55,12 +58,28 @@ std::string with_leading_zero(std::string word) {
   return word;
 }
 
-Failure usage_error(const CLI::App& app, const CLI::ParseError& error) {
+/// CLI11 says of a misspelt subcommand only that one is missing. `words` as they were given.
+std::string misspelt(const CLI::App& app, const CLI::App& command, const std::vector<std::string>& words) {
+  const auto known = command.get_subcommands([](const CLI::App*) { return true; });
+  const auto names =
+      config::names_of(known, [](const CLI::App* each) -> std::string_view { return each->get_name(); });
+  const auto left = app.remaining(true);
+  for (const auto& word : words)
+    if (!word.starts_with('-') && std::ranges::find(left, word) != left.end())
+      return fmt::format("there is no command {}; {}", config::quoted(word), config::suggest(word, names));
+  return {};
+}
+
+Failure usage_error(const CLI::App& app, const CLI::ParseError& error,
+                    const std::vector<std::string>& words) {
   std::string help = "axisctl";
-  for (const auto* command = &app; !command->get_subcommands().empty();) {
+  const auto* command = &app;
+  while (!command->get_subcommands().empty()) {
     command = command->get_subcommands().front();
     help += " " + command->get_name();
   }
+  if (command->get_require_subcommand_min() > 0)
+    if (const auto text = misspelt(app, *command, words); !text.empty()) return {ExitCode::usage, text};
   return {ExitCode::usage, fmt::format("{}; see '{} --help'", error.what(), help)};
 }
 
@@ -117,7 +136,7 @@ void execute(CLI::App& app, const std::vector<std::string>& words) {
   } catch (const CLI::Success&) {
     throw;
   } catch (const CLI::ParseError& error) {
-    throw usage_error(app, error);
+    throw usage_error(app, error, words);
   }
 }
 

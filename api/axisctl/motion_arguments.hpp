@@ -57,7 +57,7 @@ v1::Command send(Invocation& invocation,
     invocation.started.push_back(invocation.client().call(method, request, request.axis(), lane).command());
     return invocation.started.back();
   } catch (const Failure& failure) {
-    if (failure.code() != ExitCode::unreachable) throw;
+    if (failure.code() != ExitCode::unreachable || failure.nothing_sent()) throw;
     throw Failure(failure.code(), std::string(failure.what()) +
                                       "; if the command may have arrived, repeat it with " + "--request-id " +
                                       request.options().request_id());

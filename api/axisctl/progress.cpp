@@ -11,6 +11,7 @@
 
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/interrupt.hpp"
+#include "api/axisctl/repetition.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/command_service.grpc.pb.h"
@@ -70,7 +71,7 @@ class Painter {
 ExitCode interrupted(Invocation& invocation, const v1::Command& command, const Follow& options) {
   if (invocation.in_script) return ExitCode::interrupted;
   if (options.halt_on_interrupt) {
-    const auto halt = halt_axis(invocation, command.axis());
+    const auto halt = halt_axis(invocation, command.axis(), invocation.client().timeout());
     print_line(invocation.json ? json(halt) : command_line(halt, options.unit));
     return ExitCode::interrupted;
   }
@@ -83,11 +84,11 @@ ExitCode interrupted(Invocation& invocation, const v1::Command& command, const F
 
 }  // namespace
 
-v1::Command halt_axis(Invocation& invocation, const std::string& axis) {
+v1::Command halt_axis(Invocation& invocation, const std::string& axis, std::chrono::nanoseconds limit) {
   v1::HaltRequest request;
   request.set_axis(axis);
   request.mutable_options()->set_request_id(random_uuid());
-  return invocation.client().call(&v1::AxisService::Stub::Halt, request, axis, Lane::stop).command();
+  return repeat_stop(invocation.client(), &v1::AxisService::Stub::Halt, request, axis, limit).command();
 }
 
 std::optional<double> percent_of_way(std::optional<double> start, std::optional<double> target,

@@ -24,8 +24,9 @@ std::optional<double> target_of(const v1::Command& command, std::optional<double
 std::string progress_text(const v1::AxisState& state, const v1::Command& command,
                           std::optional<double> start);
 
-/// Halts an axis, on the connection that stops have to themselves. Throws Failure.
-v1::Command halt_axis(Invocation& invocation, const std::string& axis);
+/// Halts an axis, on the connection that stops have to themselves; repeated for as long as `limit` while the
+/// daemon cannot be reached. Throws Failure.
+v1::Command halt_axis(Invocation& invocation, const std::string& axis, std::chrono::nanoseconds limit);
 
 /// Follows `command` until it has ended, with a progress line if standard output is a terminal. Prints the
 /// result. Returns ok only for Done. Ctrl-C leaves the command alone unless `halt_on_interrupt`. Throws

@@ -104,7 +104,8 @@ grpc::Status shutting_down() {
   return with_details(grpc::StatusCode::UNAVAILABLE,
                       {.reason = Reason::cancelled,
                        .message = "axisd is shutting down",
-                       .remedy = "connect again; ask GetCommand what became of an accepted command"});
+                       .remedy = "connect again; ask GetCommand what became of an accepted command",
+                       .outcome = Outcome::unknown});
 }
 
 }  // namespace axisd::server

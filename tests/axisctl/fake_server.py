@@ -27,7 +27,8 @@ GRANTED_STEP = 3.0
 class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, FakeExplain,
                   axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer,
                   system_rpc.SystemServiceServicer):
-    """All services. `calls` records (method, request, peer) of every call, for assertions."""
+    """All services. `calls` records (method, request, peer) of every call, for assertions. `losing`: of how many calls
+    of a method the answer is lost, after it was carried out."""
 
     def __init__(self):
         FakeDrives.__init__(self)
@@ -35,6 +36,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         FakeLeases.__init__(self)
         self.inhibited = False
         self.calls = []
+        self.losing = {}
         self.commands = {}
         self.by_request = {}
         self.changed = asyncio.Condition()
@@ -347,9 +349,28 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         return system_pb.ReleaseStopAllResponse()
 
 
+class Losing(grpc.aio.ServerInterceptor):
+    """Cuts the connection, as far as a client can tell, before the answer."""
+
+    def __init__(self, machine):
+        self._machine = machine
+
+    async def intercept_service(self, continuation, details):
+        handler = await continuation(details)
+        method = details.method.rpartition("/")[2]
+        if not self._machine.losing.get(method):
+            return handler
+        self._machine.losing[method] -= 1
+
+        async def lose(request, context):
+            await handler.unary_unary(request, context)
+            await context.abort(grpc.StatusCode.UNAVAILABLE, "the connection was cut")
+        return grpc.unary_unary_rpc_method_handler(lose, handler.request_deserializer, handler.response_serializer)
+
+
 async def serve(machine, addresses):
     """Starts a server; returns it and the port of the first address (0 for a socket's path)."""
-    server = grpc.aio.server(options=(("grpc.http2.min_recv_ping_interval_without_data_ms", 900),
+    server = grpc.aio.server(interceptors=[Losing(machine)], options=(("grpc.http2.min_recv_ping_interval_without_data_ms", 900),
                                       ("grpc.http2.max_ping_strikes", 0)))
     for add in (axes_rpc.add_AxisServiceServicer_to_server, command_rpc.add_CommandServiceServicer_to_server,
                 bus_rpc.add_BusServiceServicer_to_server, system_rpc.add_SystemServiceServicer_to_server, *SERVICES,
@@ -361,9 +382,10 @@ async def serve(machine, addresses):
 
 
 class ThreadedServer:
-    """The fake daemon on a thread of its own, on a free TCP port and optionally on a socket."""
+    """The fake daemon on a thread of its own, on a free TCP port or at an address, and optionally on a socket."""
 
-    def __init__(self, socket_path=None):
+    def __init__(self, address="127.0.0.1:0", socket_path=None):
+        self._wanted = address
         self._socket_path = socket_path
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
@@ -383,7 +405,7 @@ class ThreadedServer:
         self._loop = asyncio.get_running_loop()
         self._end = asyncio.Event()
         self.machine = FakeMachine()
-        addresses = ["127.0.0.1:0"] + ([f"unix:{self._socket_path}"] if self._socket_path else [])
+        addresses = [self._wanted] + ([f"unix:{self._socket_path}"] if self._socket_path else [])
         server, port = await serve(self.machine, addresses)
         self.address = f"127.0.0.1:{port}"
         self._ready.set()

@@ -259,7 +259,7 @@ class Connecting(AxisctlTest):
     def test_unix_socket_and_environment(self):
         with tempfile.TemporaryDirectory() as directory:
             path = pathlib.Path(directory) / "s"
-            with fake_server.ThreadedServer(path):
+            with fake_server.ThreadedServer(socket_path=path):
                 done = subprocess.run([AXISCTL, "list", "--names"], capture_output=True, text=True, timeout=LIMIT,
                                       env=environment() | {"AXISD_SERVER": f"unix:{path}"}, check=False)
         self.assertEqual((done.returncode, done.stdout.split()[0]), (0, "feeder"), done.stderr)
@@ -274,7 +274,8 @@ class Connecting(AxisctlTest):
             address = f"127.0.0.1:{taken.getsockname()[1]}"
             self.assertRegex(self.fails(3, "list", server=address),
                              rf"cannot reach axisd at {address}: .*refused; is the daemon running")
-            self.assertIn(f"cannot reach axisd at {address}", self.fails(3, "stop", "--all", server=address))
+            self.assertIn(f"cannot reach axisd at {address}", self.fails(3, "--timeout", "300ms", "stop", "--all",
+                                                                            server=address))
         self.assertIn("cannot reach axisd at unix:/nonexistent/s", self.fails(3, "list", server="unix:/nonexistent/s"))
 
     def test_a_silent_daemon_ends_with_the_time_limit(self):
@@ -290,7 +291,7 @@ class Connecting(AxisctlTest):
         self.server.__exit__()
         _, error = move.communicate(timeout=LIMIT)
         self.assertEqual(move.returncode, 3, error)
-        self.assertIn(f"cannot reach axisd at {self.server.address}", error)
+        self.assertIn(f"lost axisd at {self.server.address}", error)
         self.assertIn("command c-1 may go on", error)
 
     def test_certificates(self):

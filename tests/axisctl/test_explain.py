@@ -80,7 +80,7 @@ class Python(unittest.IsolatedAsyncioTestCase):
             self.assertEqual(self.question().WhichOneof("command"), field)
         await feeder.explain("jog", -2, hold=0.5, acceleration_time=0.1)
         self.assertEqual((self.question().jog.velocity, self.question().jog.hold.nanos), (-2, 500_000_000))
-        with self.assertRaisesRegex(ValueError, "is none of enable, disable"):
+        with self.assertRaisesRegex(ValueError, "is no command; there are disable, enable"):
             await feeder.explain("fly")
 
     async def test_it_is_asked_under_the_lease(self):

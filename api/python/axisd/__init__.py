@@ -13,24 +13,26 @@ from .drive import Drive
 from .drives import (Alarm, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
                      StateChange, TerminalCapability, TerminalEdge, VelocitySegment)
-from .errors import AxisdError, LeaseLostError, MotionError, RefusedError, UnreachableError
+from .errors import (ArgumentError, AxisdError, LeaseLostError, MotionError, RefusedError, StopError,
+                     UnreachableError)
 from .group import Group, GroupMember, GroupMove
 from .lease import Lease, LeaseInfo
 from .machine import Machine, connect
+from .reasons import Outcome, Reason
 from .traffic import (BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, Quarantine, TracedFrame,
                       UnknownOutcomes)
 from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
                     Network, NetworkLink, Obstacle, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
-    "Alarm", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
+    "Alarm", "ArgumentError", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
     "ClassStatistics", "Command", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
     "ConfigurationDrift", "ConfigurationReloaded", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "Jog", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
-    "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle",
-    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "RefusedError", "Reload", "ScanProgress", "Segments",
-    "SerialProgress", "State", "StateChange", "StopBudget", "StopResult", "Terminal", "TerminalCapability",
+    "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle", "Outcome",
+    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Reload", "ScanProgress", "Segments",
+    "SerialProgress", "State", "StateChange", "StopBudget", "StopError", "StopResult", "Terminal", "TerminalCapability",
     "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",
 ]

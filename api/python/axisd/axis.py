@@ -8,9 +8,9 @@ from collections.abc import AsyncGenerator, Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from .calls import Seconds, command_options, done, duration
+from .calls import Seconds, command_options, did_you_mean, done, duration
 from .drive import Drive
-from .errors import AxisdError, MotionError
+from .errors import ArgumentError, AxisdError, MotionError
 from .types import AxisState, Command, Link, Obstacle
 from .v1 import axis_service_pb2, system_service_pb2
 
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from .machine import Machine
 
 Explainable = Literal["enable", "disable", "home", "move", "move_relative", "velocity", "jog", "reset", "set_position"]
+_RAMPS = ("acceleration_time", "deceleration_time")
+# What explain() takes for a command, beside its name.
+_EXPLAINED = {"move": ("value", "velocity", *_RAMPS), "move_relative": ("value", "velocity", *_RAMPS),
+              "velocity": ("value", "hold", *_RAMPS), "jog": ("value", "hold", *_RAMPS), "set_position": ("value",)}
 
 
 class Axis:
@@ -37,6 +41,9 @@ class Axis:
     async def _command(self, method: Any, request: Any, wait: bool) -> Command:
         request.options.lease_token = self._lease_token
         return done(Command.of((await self._machine._call(method, request, self.name, wait)).command))
+
+    async def _stop(self, method: Any, request: Any, wait: bool) -> Command:
+        return done(Command.of((await self._machine._stop_call(method, request, self.name, wait)).command))
 
     async def state(self) -> AxisState:
         """The latest state, without touching the bus."""
@@ -85,7 +92,7 @@ class Axis:
     async def move_relative(self, distance: float, *, velocity: float | None = None,
                             acceleration_time: Seconds | None = None, deceleration_time: Seconds | None = None,
                             wait: bool = True, buffered: bool = False, request_id: str | None = None) -> Command:
-        """Moves by a distance from the last commanded target."""
+        """Moves by a distance."""
         request = axis_service_pb2.MoveRelativeRequest(
             axis=self.name, distance=distance, velocity=velocity, acceleration_time=duration(acceleration_time),
             deceleration_time=duration(deceleration_time), options=command_options(request_id, wait, buffered))
@@ -107,19 +114,20 @@ class Axis:
         return Jog(self, velocity, hold, acceleration_time, deceleration_time)
 
     async def halt(self, *, wait: bool = True) -> Command:
-        """Decelerates; a new move may take over."""
+        """Decelerates; a new move may take over. As stop() and quick_stop() repeated, up to the machine's `timeout`,
+        while the daemon cannot be reached: what was commanded meanwhile is stopped, too."""
         request = axis_service_pb2.HaltRequest(axis=self.name, options=command_options(None, wait))
-        return await self._command(self._machine._stops.Halt, request, wait)
+        return await self._stop(self._machine._stops.Halt, request, wait)
 
     async def stop(self, *, hold: bool = False, wait: bool = True) -> Command:
         """Decelerates; nothing takes over before standstill (with `hold`: before release_stop)."""
         request = axis_service_pb2.StopRequest(axis=self.name, hold=hold, options=command_options(None, wait))
-        return await self._command(self._machine._stops.Stop, request, wait)
+        return await self._stop(self._machine._stops.Stop, request, wait)
 
     async def quick_stop(self, *, hold: bool = False, wait: bool = True) -> Command:
         """Stops at once, without deceleration. Open loop: the position is no longer trusted."""
         request = axis_service_pb2.QuickStopRequest(axis=self.name, hold=hold, options=command_options(None, wait))
-        return await self._command(self._machine._stops.QuickStop, request, wait)
+        return await self._stop(self._machine._stops.QuickStop, request, wait)
 
     async def release_stop(self) -> None:
         """Ends a stop with `hold`."""
@@ -134,6 +142,13 @@ class Axis:
         refusals. `command` is the name of a method of this class (stops are never refused); `value` is what that takes:
         a position, a distance or a velocity. Asks no drive."""
         request = system_service_pb2.ExplainRequest(axis=self.name, lease_token=self._lease_token)
+        given = {"value": value, "velocity": velocity, "hold": hold, "acceleration_time": acceleration_time,
+                 "deceleration_time": deceleration_time}
+        if command is not None and command not in get_args(Explainable):
+            raise ArgumentError(f"{command!r} is no command", did_you_mean(command, get_args(Explainable)))
+        for name, argument in given.items():
+            if argument is not None and name not in _EXPLAINED.get(command or "", ()):
+                raise ArgumentError(f"{name} does not belong to {command or 'motion in general'}", "leave it out")
         ramps = {"acceleration_time": duration(acceleration_time), "deceleration_time": duration(deceleration_time)}
         if command == "move":
             request.move_absolute.CopyFrom(
@@ -148,10 +163,8 @@ class Axis:
             request.jog.CopyFrom(axis_service_pb2.JogRequest(velocity=value, hold=duration(hold), **ramps))
         elif command == "set_position":
             request.set_position.CopyFrom(axis_service_pb2.SetPositionRequest(position=value))
-        elif command in ("enable", "disable", "home", "reset"):
-            getattr(request, command).SetInParent()
         elif command is not None:
-            raise ValueError(f"{command!r} is none of {', '.join(get_args(Explainable))}")
+            getattr(request, command).SetInParent()
         response = await self._machine._call(self._machine._system.Explain, request, self.name)
         return [Obstacle.of(obstacle) for obstacle in response.obstacles]
 

@@ -2,7 +2,9 @@
 from __future__ import annotations
 
 import datetime
+import difflib
 import uuid
+from collections.abc import Iterable
 
 from google.protobuf.duration_pb2 import Duration
 
@@ -20,6 +22,18 @@ def duration(value: Seconds | None) -> Duration | None:
     message = Duration()
     message.FromTimedelta(delta)
     return message
+
+
+def names(axes: Iterable[str]) -> list[str]:
+    """A single name is one name, not its letters."""
+    return [axes] if isinstance(axes, str) else list(axes)
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """What to do about a name that is none of these."""
+    known = sorted(candidates)
+    near = difflib.get_close_matches(name.lower(), known, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"there are {', '.join(known)}"
 
 
 def command_options(request_id: str | None, wait: bool, buffered: bool = False) -> types_pb2.CommandOptions:

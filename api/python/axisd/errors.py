@@ -4,10 +4,13 @@ from __future__ import annotations
 import grpc
 import grpc.aio
 
-from .types import Command, ErrorDetail
+from .reasons import Reason
+from .types import Command, ErrorDetail, StopResult
 from .v1 import error_pb2
 
 _TRAILER = "grpc-status-details-bin"
+# How gRPC's texts begin for a call that never had a connection.
+_NEVER_CONNECTED = ("failed to connect", "DNS resolution failed")
 
 
 class AxisdError(Exception):
@@ -15,12 +18,15 @@ class AxisdError(Exception):
 
 
 class UnreachableError(AxisdError):
-    """The daemon did not answer. Whether a command arrived is not known: repeat the call with `request_id`, which
-    attaches to the command if it did and starts it if it did not."""
+    """The daemon did not answer. Whether a command arrived is not known, unless `nothing_sent` says that it did not:
+    repeat the call with `request_id`, which attaches to the command if it did and starts it if it did not. Stops were
+    repeated before this was raised."""
 
-    def __init__(self, message: str, request_id: str = "") -> None:
+    def __init__(self, message: str, request_id: str = "", nothing_sent: bool = False) -> None:
         super().__init__(message)
         self.request_id = request_id
+        self.nothing_sent = nothing_sent
+        """There was no connection to send it on."""
 
 
 class RefusedError(AxisdError):
@@ -32,9 +38,9 @@ class RefusedError(AxisdError):
         self.detail = detail
 
     @property
-    def reason(self) -> str:
-        """Lower case: "soft_limit", "disabled", "offline" ...; empty if the daemon gave none."""
-        return self.detail.reason if self.detail else ""
+    def reason(self) -> Reason:
+        """UNSPECIFIED if the daemon gave none."""
+        return self.detail.reason if self.detail else Reason.UNSPECIFIED
 
     @property
     def message(self) -> str:
@@ -43,6 +49,30 @@ class RefusedError(AxisdError):
     @property
     def remedy(self) -> str:
         return self.detail.remedy if self.detail else ""
+
+
+class ArgumentError(RefusedError, ValueError):
+    """This package refused the call: an argument is wrong in itself, a name that is no member, say. Nothing was sent."""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        raw = error_pb2.ErrorDetail(reason=error_pb2.REASON_INVALID_ARGUMENT, message=message, remedy=remedy,
+                                    outcome=error_pb2.OUTCOME_NOT_SENT)
+        detail = ErrorDetail.of(raw)
+        super().__init__(str(detail), grpc.StatusCode.INVALID_ARGUMENT, detail)
+
+
+class StopError(AxisdError):
+    """A stop of several axes of which some did not confirm it: look at these. The others did, or accepted it, where the
+    call did not wait."""
+
+    def __init__(self, subject: str, results: tuple[StopResult, ...], failed: tuple[StopResult, ...]) -> None:
+        lead = f"{subject}: " if subject else ""
+        causes = " | ".join(str(result) for result in failed)
+        super().__init__(f"{lead}the stop is not confirmed for {len(failed)} of {len(results)}: {causes}")
+        self.results = results
+        """Of every axis."""
+        self.failed = {result.axis: result for result in failed}
+        """Of those that did not confirm, by name."""
 
 
 class LeaseLostError(AxisdError):
@@ -60,8 +90,8 @@ class MotionError(AxisdError):
         self.command = command
 
     @property
-    def reason(self) -> str:
-        return self.command.cause.reason if self.command.cause else ""
+    def reason(self) -> Reason:
+        return self.command.cause.reason if self.command.cause else Reason.UNSPECIFIED
 
     @property
     def remedy(self) -> str:
@@ -83,7 +113,12 @@ def translate(error: grpc.aio.AioRpcError, subject: str, server: str, request_id
     """The error of this package for one of gRPC."""
     detail = detail_of(error)
     lead = f"{subject}: " if subject else ""
+    text = error.details() or error.code().name
     if detail is None and error.code() in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED):
-        return UnreachableError(f"{lead}no answer from axisd at {server}: {error.details()}", request_id)
+        unsent = error.code() is grpc.StatusCode.UNAVAILABLE and text.startswith(_NEVER_CONNECTED)
+        return UnreachableError(f"{lead}no answer from axisd at {server}: {text}"
+                                + ("; nothing was sent" if unsent else ""), request_id, unsent)
+    if detail is not None and detail.reason is Reason.CANCELLED and error.code() is grpc.StatusCode.UNAVAILABLE:
+        return UnreachableError(f"{lead}{detail}", request_id)  # the daemon's end cut the call off
     text = str(detail or error.details()).removeprefix(lead)  # the daemon's text may name the axis as well
     return RefusedError(lead + text, error.code(), detail)

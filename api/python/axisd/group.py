@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import dataclasses
 import datetime
 import uuid
@@ -10,9 +9,10 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from .calls import Seconds, duration
-from .errors import AxisdError, MotionError
-from .types import Command, CommandState, ErrorDetail, _member, _optional_error
+from .calls import Seconds, did_you_mean, duration
+from .errors import ArgumentError, AxisdError, MotionError, RefusedError, StopError
+from .reasons import Outcome, Reason
+from .types import Command, CommandState, ErrorDetail, StopResult, _member, _optional_error
 from .v1 import group_service_pb2, types_pb2
 
 if TYPE_CHECKING:
@@ -67,9 +67,11 @@ class GroupMove:
                    _seconds(raw, "arrival_error"))
 
     def _worst(self) -> Command:
+        """Of several that ended alike, one that was not only taken along."""
         order = (CommandState.UNKNOWN, CommandState.ERROR, CommandState.ABORTED)
         commands = [member.command for member in self.members.values()]
-        return min(commands, key=lambda c: order.index(c.state) if c.state in order else len(order))
+        return min(commands, key=lambda c: (order.index(c.state) if c.state in order else len(order),
+                                            c.cause is not None and c.cause.reason is Reason.SUPERSEDED))
 
 
 class Group:
@@ -90,16 +92,37 @@ class Group:
                         traceback: TracebackType | None) -> None:
         if kind is None:
             return
-        with contextlib.suppress(AxisdError):
+        try:
             await asyncio.shield(self.stop())
+        except AxisdError as failure:
+            # That something may still move comes before what ended the block; a cancellation has to go on.
+            if isinstance(error, Exception):
+                raise failure from error
+            if error is not None:
+                error.add_note(str(failure))
+
+    @property
+    def _subject(self) -> str:
+        return self.name or ", ".join(sorted(self._targets))
+
+    def _check_names(self, targets: Mapping[str, float], velocity: Mapping[str, float]) -> None:
+        """What no daemon sees: a velocity for nobody, and the members of a group that this program made up."""
+        for axis in targets:
+            if self._axes and not self.name and axis not in self._axes:
+                raise ArgumentError(f"{self._subject}: '{axis}' is no member", did_you_mean(axis, self._axes))
+        for axis in velocity:
+            if axis not in targets:
+                raise ArgumentError(f"a velocity is given for '{axis}', which has no target", did_you_mean(axis, targets))
 
     async def move(self, targets: Mapping[str, float], *, relative: bool = False, arrive_together: bool = False,
                    max_arrival_error: Seconds | None = None, velocity: Mapping[str, float] | None = None,
                    acceleration_time: Seconds | None = None, deceleration_time: Seconds | None = None,
                    wait: bool = True, request_id: str | None = None) -> GroupMove:
         """Moves axes, by name, to positions (or by distances). Waits until all members have ended, unless
-        `wait` is False. `velocity`: of single axes, in place of their limits. Raises RefusedError where it is refused,
-        MotionError with the command of the member that failed where the move ended otherwise than Done."""
+        `wait` is False. `velocity`: of single axes, in place of their limits. Raises RefusedError where it is refused
+        (ArgumentError for a name that is no member), MotionError with the command of the member that failed where the
+        move ended otherwise than Done."""
+        self._check_names(targets, velocity or {})
         request = group_service_pb2.MoveGroupRequest(
             group=self.name, arrive_together=arrive_together, max_arrival_error=duration(max_arrival_error),
             options=types_pb2.CommandOptions(
@@ -114,24 +137,46 @@ class Group:
                 target.position = value
             if velocity is not None and axis in velocity:
                 target.velocity = velocity[axis]
-        if not self.name:
-            self._targets.update(targets)
-        response = await self._machine._call(self._machine._groups.MoveGroup, request, self.name, wait)
+        added = set() if self.name else set(targets) - self._targets
+        self._targets |= added
+        try:
+            response = await self._machine._call(self._machine._groups.MoveGroup, request, self._subject, wait)
+        except RefusedError as refusal:
+            if refusal.detail is not None and refusal.detail.outcome is Outcome.NOT_SENT:
+                self._targets -= added  # nothing of it may move: a stop need not look for a name that there is not
+            raise
         move = GroupMove.of(response.move)
         if move.state.ended and move.state is not CommandState.DONE:
             raise MotionError(move._worst())
         return move
 
-    async def halt(self, wait: bool = True) -> None:
-        """Decelerates each axis. A new move may take over."""
+    async def halt(self, wait: bool = True) -> dict[str, Command]:
+        """Decelerates each axis. A new move may take over. As stop() otherwise."""
         request = group_service_pb2.GroupHaltRequest(group=self.name, axes=sorted(self._targets),
                                                      wait_until=types_pb2.WAIT_UNTIL_DONE if wait
                                                      else types_pb2.WAIT_UNTIL_ACCEPTED)
-        await self._machine._call(self._machine._group_stops.GroupHalt, request, self.name, wait)
+        return await self._stop(self._machine._group_stops.GroupHalt, request, wait)
 
-    async def stop(self, hold: bool = False, wait: bool = True) -> None:
-        """Stops each axis; nothing takes over before standstill, with `hold` before Axis.release_stop()."""
+    async def stop(self, hold: bool = False, wait: bool = True) -> dict[str, Command]:
+        """Stops each axis; nothing takes over before standstill, with `hold` before Axis.release_stop(). Raises StopError
+        unless every one has confirmed its standstill (without `wait`: has accepted the stop); all that are known are
+        stopped in any case. Repeated, up to the machine's `timeout`, while the daemon cannot be reached."""
         request = group_service_pb2.GroupStopRequest(group=self.name, axes=sorted(self._targets), hold=hold,
+                                                     request_id=str(uuid.uuid4()),
                                                      wait_until=types_pb2.WAIT_UNTIL_DONE if wait
                                                      else types_pb2.WAIT_UNTIL_ACCEPTED)
-        await self._machine._call(self._machine._group_stops.GroupStop, request, self.name, wait)
+        return await self._stop(self._machine._group_stops.GroupStop, request, wait)
+
+    async def _stop(self, method: Any, request: Any, wait: bool) -> dict[str, Command]:
+        response = await self._machine._stop_call(method, request, self._subject, wait)
+        results = tuple(StopResult.of(result) for result in response.results)
+        commands: dict[str, Command] = {}
+        failed: list[StopResult] = []
+        for result in results:
+            if result.command is not None and (result.confirmed or not wait and not result.command.state.ended):
+                commands[result.axis] = result.command
+            else:
+                failed.append(result)
+        if failed:
+            raise StopError(self._subject, results, tuple(failed))
+        return commands

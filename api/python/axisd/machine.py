@@ -1,6 +1,7 @@
 """A machine and its axes."""
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
 import pathlib
@@ -14,12 +15,13 @@ from google.protobuf.field_mask_pb2 import FieldMask
 
 from .axis import Axis
 from .budget import BusBudget
-from .calls import Seconds, done, duration
+from .calls import Seconds, done, duration, names
 from .configuration import ConfigCheck, Configuration, Reload
 from .drives import Cursor, Device, Event, ScanProgress
-from .errors import AxisdError, translate
+from .errors import AxisdError, RefusedError, UnreachableError, translate
 from .group import Group
 from .lease import Lease, LeaseInfo
+from .reasons import Reason
 from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
@@ -35,11 +37,19 @@ _OPTIONS = (
     ("grpc.http2.max_pings_without_data", 0),
     # A machine is on the local network; a proxy of the environment must not redirect its commands.
     ("grpc.enable_http_proxy", 0),
-    # A call that failed is reported, never sent again by itself.
+    # A call that failed is reported, never sent again by itself: only stops are, by Machine._stop_call().
     ("grpc.enable_retries", 0),
+    # A daemon that is being restarted is found again soon; gRPC's own pauses grow to two minutes.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
     # Two channels of one process would share a connection otherwise: stops have one of their own.
     ("grpc.use_local_subchannel_pool", 1),
 )
+
+
+# Between two attempts of a stop (s).
+_FIRST_PAUSE = 0.05
+_LONGEST_PAUSE = 0.5
 
 
 def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = None,
@@ -47,7 +57,7 @@ def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = No
             timeout: float = 10.0) -> Machine:
     """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
     localhost:7443. Connects with the first call. `timeout` limits how long the daemon may take to answer, not how long
-    a motion may take."""
+    a motion may take. Stops are repeated until then while the daemon cannot be reached."""
     if server is None:
         server = os.environ.get("AXISD_SERVER", "localhost:7443")
     return Machine(server, tls_ca, tls_certificate, tls_key, timeout)
@@ -97,14 +107,37 @@ class Machine:
             return grpc.aio.insecure_channel(self.server, options=_OPTIONS)
         return grpc.aio.secure_channel(self.server, self._credentials, options=_OPTIONS)
 
-    async def _call(self, method: Any, request: Any, subject: str, wait: bool = False) -> Any:
+    async def _call(self, method: Any, request: Any, subject: str, wait: bool = False,
+                    limit: float | None = None) -> Any:
         """One call; waiting for a motion has no time limit, keep-alive notices a daemon that is gone."""
         try:
-            return await method(request, timeout=None if wait else self.timeout)
+            return await method(request, timeout=None if wait else limit or self.timeout)
         except grpc.aio.AioRpcError as error:
             options = getattr(request, "options", None)
             request_id = options.request_id if options is not None else ""
             raise translate(error, subject, self.server, request_id) from None
+
+    async def _stop_call(self, method: Any, request: Any, subject: str, wait: bool = False) -> Any:
+        """A stop: repeated as it is, until one call is answered or `timeout` is over. To stop twice is harmless."""
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + self.timeout
+        pause = _FIRST_PAUSE
+        unsent = True
+        while True:
+            try:
+                return await self._call(method, request, subject, wait, max(deadline - loop.time(), _FIRST_PAUSE))
+            except UnreachableError as error:
+                unsent = unsent and error.nothing_sent
+                if loop.time() + pause > deadline:
+                    known = "it never arrived" if unsent else "whether it arrived is not known"
+                    raise UnreachableError(f"{error}; the stop was repeated for {self.timeout:g} s: {known}",
+                                           error.request_id, unsent) from None
+            except RefusedError as error:
+                unsent = False
+                if error.reason is not Reason.CANCELLED or loop.time() + pause > deadline:
+                    raise
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, _LONGEST_PAUSE)
 
     async def _stream(self, method: Any, request: Any, subject: str) -> AsyncGenerator[Any, None]:
         call = method(request)
@@ -123,7 +156,7 @@ class Machine:
     def group(self, name: str = "", *, axes: Iterable[str] = (), lease: Lease | None = None) -> Group:
         """Axes that start and stop together: a group of the configuration by its name, or these axes. As an `async with`
         block it stops them when the block ends by an error. `lease`: that its moves are given under."""
-        return Group(self, name, tuple(axes), lease.token if lease is not None else 0)
+        return Group(self, name, tuple(names(axes)), lease.token if lease is not None else 0)
 
     def lease(self, *axes: str, ttl: Seconds | None = None, label: str = "", take: bool = False) -> Lease:
         """The exclusive right to command these axes (or all axes of the groups named) inside an `async with` block,
@@ -145,8 +178,8 @@ class Machine:
                     fields: Iterable[str] = ()) -> AsyncGenerator[Tick, None]:
         """Latest states at a steady rate; a slow reader misses ticks, never gets old ones. None: all axes. With `fields`
         only those are sent ("position", "fault.message"; names as in types.proto): the others read as if unset."""
-        request = axis_service_pb2.WatchAxesRequest(axes=list(axes), period=duration(period),
-                                                    fields=FieldMask(paths=list(fields)))
+        request = axis_service_pb2.WatchAxesRequest(axes=names(axes), period=duration(period),
+                                                    fields=FieldMask(paths=names(fields)))
         async with contextlib.aclosing(self._stream(self._axes.WatchAxes, request, "watch")) as stream:
             async for batch in stream:
                 yield Tick.of(batch)
@@ -174,14 +207,14 @@ class Machine:
     async def cancel(self, command_id: str) -> Command:
         """Halts the axis if it executes this command."""
         request = command_service_pb2.CancelCommandRequest(id=command_id)
-        return Command.of((await self._call(self._cancels.CancelCommand, request, command_id)).command)
+        return Command.of((await self._stop_call(self._cancels.CancelCommand, request, command_id)).command)
 
     async def stop_all(self, *, wait: bool = True) -> list[StopResult]:
         """Stops every axis and refuses all motion until release_stop_all(). An operational stop, without safety
         rating. Never raises for a single axis: look at each result."""
         request = system_service_pb2.StopAllRequest(
             wait_until=types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED)
-        response = await self._call(self._system_stops.StopAll, request, "stop all", wait)
+        response = await self._stop_call(self._system_stops.StopAll, request, "stop all", wait)
         return [StopResult.of(result) for result in response.results]
 
     async def release_stop_all(self) -> None:
@@ -285,7 +318,7 @@ class Machine:
                      kept: bool = False) -> AsyncGenerator[Event, None]:
         """What happens from now on, in order and without end. `after`: the cursor of the last event that was seen, to go
         on there, also after a lost connection. `kept`: first everything that the daemon still keeps."""
-        request = event_service_pb2.WatchEventsRequest(axes=list(axes))
+        request = event_service_pb2.WatchEventsRequest(axes=names(axes))
         if after is not None:
             request.instance_id, request.after_sequence = after.instance_id, after.sequence
         elif kept:

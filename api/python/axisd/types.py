@@ -10,7 +10,8 @@ from typing import Any
 from google.protobuf.duration_pb2 import Duration
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from .v1 import axis_service_pb2, bus_service_pb2, error_pb2, system_service_pb2, types_pb2
+from .reasons import Outcome, Reason
+from .v1 import axis_service_pb2, bus_service_pb2, error_pb2, group_service_pb2, system_service_pb2, types_pb2
 
 
 class State(enum.Enum):
@@ -103,11 +104,11 @@ class PermittedRange:
 
 @dataclasses.dataclass(frozen=True)
 class ErrorDetail:
-    """What happened, where, and what to do. `reason` is lower case: "soft_limit", "disabled" ..."""
-    reason: str
+    """What happened, where, and what to do."""
+    reason: Reason
     message: str
     remedy: str
-    outcome: str
+    outcome: Outcome
     bus: str
     node: int | None
     object: int | None
@@ -117,12 +118,10 @@ class ErrorDetail:
 
     @classmethod
     def of(cls, raw: error_pb2.ErrorDetail) -> ErrorDetail:
-        reason = error_pb2.Reason.DESCRIPTOR.values_by_number.get(raw.reason)
-        outcome = error_pb2.Outcome.DESCRIPTOR.values_by_number.get(raw.outcome)
         permitted = raw.permitted
         return cls(
-            reason.name.removeprefix("REASON_").lower() if reason else str(raw.reason), raw.message, raw.remedy,
-            outcome.name.removeprefix("OUTCOME_").lower() if outcome else str(raw.outcome), raw.bus,
+            _member(Reason, error_pb2.Reason.DESCRIPTOR, "REASON_", raw.reason), raw.message, raw.remedy,
+            _member(Outcome, error_pb2.Outcome.DESCRIPTOR, "OUTCOME_", raw.outcome), raw.bus,
             _optional(raw, "node"), _optional(raw, "object"), _optional(raw, "native_code"),
             PermittedRange(permitted.minimum, permitted.maximum, permitted.unit) if raw.HasField("permitted") else None,
             raw)
@@ -139,7 +138,7 @@ class Obstacle:
     """Something that stands in the way of a command, with what to do about it. Not `blocking`: the command is not refused
     for it, but would wait for it, end it, or may be ended by it."""
     blocking: bool
-    reason: str
+    reason: Reason
     message: str
     remedy: str
     permitted: PermittedRange | None
@@ -299,15 +298,29 @@ class Info:
 
 @dataclasses.dataclass(frozen=True)
 class StopResult:
-    """What a stop of all axes did to one of them: a command or an error."""
+    """What a stop of several axes did to one of them: a command or an error."""
     axis: str
+    """Of a group's stop also a name that there is not."""
     command: Command | None
     error: ErrorDetail | None
 
     @classmethod
-    def of(cls, raw: system_service_pb2.StopResult) -> StopResult:
-        return cls(raw.axis, Command.of(raw.command) if raw.HasField("command") else None,
+    def of(cls, raw: system_service_pb2.StopResult | group_service_pb2.GroupStopResult) -> StopResult:
+        name = raw.name if isinstance(raw, group_service_pb2.GroupStopResult) else raw.axis
+        return cls(name, Command.of(raw.command) if raw.HasField("command") else None,
                    _optional_error(raw, "error"))
+
+    @property
+    def confirmed(self) -> bool:
+        """It stands still, as the daemon has seen."""
+        return self.command is not None and self.command.state is CommandState.DONE
+
+    def __str__(self) -> str:
+        cause = self.error if self.command is None else self.command.cause
+        text = str(cause).removeprefix(f"{self.axis}: ") if cause is not None else ""
+        if self.command is not None:
+            text = f"{self.command.kind} {self.command.state.value}{': ' if text else ''}{text}"
+        return f"{self.axis}: {text}"
 
 
 class BusKind(enum.Enum):
