@@ -16,6 +16,7 @@
 #include "api/server/progress_stream.hpp"
 #include "api/server/status.hpp"
 #include "api/server/value_reply.hpp"
+#include "devices/nearest.hpp"
 
 namespace axisd::server {
 
@@ -47,9 +48,11 @@ BusServiceImpl::Reactor* BusServiceImpl::GetBudget(Context* context, const v1::G
         for (const auto& budget : budgets)
           if (bus.empty() || budget.predicted.bus == bus) api::to_proto(budget, *response->add_budgets());
         if (bus.empty() || !response->budgets().empty()) return grpc::Status::OK;
+        std::vector<std::string> known;
+        for (const auto& budget : budgets) known.push_back(budget.predicted.bus);
         return to_status({.reason = Reason::invalid_argument,
                           .message = fmt::format("there is no bus '{}'", bus),
-                          .remedy = "list them: axisctl bus list"});
+                          .remedy = did_you_mean(bus, known, "list them: axisctl bus list, or ListBuses")});
       });
     });
   });

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "api/server/convert.hpp"
+#include "devices/nearest.hpp"
 
 namespace axisd::server {
 namespace {
@@ -349,9 +350,10 @@ Result<google::protobuf::FieldMask> watched_fields(const v1::WatchAxesRequest& f
       std::vector<std::string> known;
       known.reserve(static_cast<std::size_t>(state->field_count()));
       for (int i = 0; i < state->field_count(); ++i) known.push_back(state->field(i)->name());
+      const auto near = did_you_mean(path, known, "");
       return fail(Reason::invalid_argument,
                   fmt::format("fields: AxisState has no field {:?}", path.substr(0, longest_axis_name)),
-                  fmt::format("known are {}", fmt::join(known, ", ")));
+                  fmt::format("{}{}known are {}", near, near.empty() ? "" : " ", fmt::join(known, ", ")));
     }
   auto named = from.fields();
   named.add_paths("axis");
@@ -361,10 +363,13 @@ Result<google::protobuf::FieldMask> watched_fields(const v1::WatchAxesRequest& f
 }
 
 Result<AxisSnapshotPtr> find_axis(const Machine& machine, const std::string& name) {
-  if (const auto valid = check_axis_name(name); !valid) return fail(valid.error());
+  if (const auto valid = check_axis_name(name); !valid) {
+    auto error = valid.error();
+    if (!name.empty()) error.remedy = did_you_mean(name, machine.axis_names(), error.remedy);
+    return fail(std::move(error));
+  }
   if (auto snapshot = machine.snapshot(name)) return snapshot;
-  return fail(Reason::unknown_axis, fmt::format("there is no axis {}", name),
-              "ListAxes names the configured axes");
+  return fail(no_such_axis(name, machine.axis_names()));
 }
 
 }  // namespace axisd::server

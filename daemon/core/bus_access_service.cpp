@@ -9,6 +9,7 @@
 
 #include "buses/modbus_rtu/node.hpp"
 #include "daemon/core/bus_access_network_scan.hpp"
+#include "devices/nearest.hpp"
 
 namespace axisd::core {
 
@@ -42,11 +43,12 @@ void tell(const std::weak_ptr<void>& alive, const std::function<void(Result<Scan
 }  // namespace
 
 Error no_such_bus(const MachineCore& machine, const std::string& name) {
-  std::string known;
-  for (const auto& bus : machine.buses()) known += (known.empty() ? "" : ", ") + bus->name();
-  return {.reason = Reason::invalid_argument,
-          .message = fmt::format("there is no bus '{}'", name),
-          .remedy = fmt::format("the configuration has: {}", known)};
+  std::vector<std::string> known;
+  for (const auto& bus : machine.buses()) known.push_back(bus->name());
+  return {
+      .reason = Reason::invalid_argument,
+      .message = fmt::format("there is no bus '{}'", name),
+      .remedy = did_you_mean(name, known, fmt::format("the configuration has: {}", fmt::join(known, ", ")))};
 }
 
 BusAccessService::BusAccessService(Executor executor, Clock& clock, MachineCore& machine)

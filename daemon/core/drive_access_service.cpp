@@ -7,18 +7,13 @@
 
 #include "buses/signal.hpp"
 #include "daemon/core/bus_access_network_scan.hpp"
+#include "devices/nearest.hpp"
 
 namespace axisd::core {
 
 namespace {
 
 constexpr auto look_again = std::chrono::milliseconds(500);
-
-Error no_such_axis(const std::string& axis) {
-  return {.reason = Reason::unknown_axis,
-          .message = fmt::format("there is no axis '{}'", axis),
-          .remedy = "list them: axisctl list"};
-}
 
 /// Holds what the sequence needs until it has ended; the axis is not exchanged meanwhile.
 template <class T>
@@ -42,7 +37,7 @@ void DriveAccessService::run(std::string axis,
   post(executor_, [this, axis = std::move(axis), operation = std::move(operation),
                    callback = std::move(callback), name]() mutable {
     auto* found = machine_->find(axis);
-    if (found == nullptr) return callback(fail(no_such_axis(axis)));
+    if (found == nullptr) return callback(fail(no_such_axis(axis, machine_->table()->axes)));
     auto use = found->use();
     if (!use) return callback(fail(use.error()));
     machine_->launch(
@@ -90,7 +85,7 @@ Result<void> DriveAccessService::check_bus_rests(const Axis& axis) const {
 void DriveAccessService::drive_info(std::string axis, std::function<void(Result<DriveInfo>)> callback) {
   post(executor_, [this, axis = std::move(axis), callback = std::move(callback)] {
     auto* found = machine_->find(axis);
-    if (found == nullptr) return callback(fail(no_such_axis(axis)));
+    if (found == nullptr) return callback(fail(no_such_axis(axis, machine_->table()->axes)));
     callback(DriveOperations(*found).info());
   });
 }
@@ -157,7 +152,7 @@ std::shared_ptr<void> DriveAccessService::change_serial(std::string axis, Serial
   post(executor_, [this, axis = std::move(axis), requester = std::move(requester), change,
                    callback = std::move(callback), alive = std::weak_ptr<void>(token)]() mutable {
     auto* found = machine_->find(axis);
-    if (found == nullptr) return callback(fail(no_such_axis(axis)));
+    if (found == nullptr) return callback(fail(no_such_axis(axis, machine_->table()->axes)));
     auto use = found->use();
     if (!use) return callback(fail(use.error()));
     machine_->launch(run_serial_change(*found, *std::move(use), std::move(requester), change,

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "devices/nearest.hpp"
+
 namespace axisd::core {
 
 namespace {
@@ -58,17 +60,13 @@ std::vector<std::string> GroupAccessService::resolve(const MachineTable& table,
     if (group != table.groups.end())
       names.insert(names.begin(), group->axes.begin(), group->axes.end());
     else
-      unknown.push_back(
-          {.axis = request.group,
-           .command = fail(Reason::unknown_axis, fmt::format("there is no group '{}'", request.group),
-                           "list them: axisctl group list")});
+      unknown.push_back({.axis = request.group,
+                         .command = fail(no_such_group(request.group, names_of(table.groups), table.axes))});
   }
   std::vector<std::string> axes;
   for (const auto& name : names) {
     if (table.find(name) == nullptr)
-      unknown.push_back({.axis = name,
-                         .command = fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", name),
-                                         "list them: axisctl list")});
+      unknown.push_back({.axis = name, .command = fail(no_such_axis(name, table.axes))});
     else if (std::ranges::find(axes, name) == axes.end())
       axes.push_back(name);
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "devices/group/arrival.hpp"
+#include "devices/nearest.hpp"
 
 namespace axisd::core {
 
@@ -52,15 +53,13 @@ const GroupSettings* GroupKeeper::find(std::string_view group) const {
 Result<void> GroupKeeper::check(const GroupMoveRequest& request) const {
   const auto* group = find(request.group);
   if (group == nullptr && !request.group.empty())
-    return fail(Reason::unknown_axis, fmt::format("there is no group '{}'", request.group),
-                "list them: axisctl group list");
+    return fail(no_such_group(request.group, names_of(groups_), parts_.axes()));
   if (request.targets.empty())
     return fail(Reason::invalid_argument, "no member is given a target", "name at least one axis");
   for (std::size_t i = 0; i < request.targets.size(); ++i) {
     const auto& target = request.targets[i];
     if (parts_.find(target.axis) == nullptr)
-      return fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", target.axis),
-                  "list them: axisctl list");
+      return fail(no_such_axis(target.axis, group != nullptr ? group->axes : parts_.axes()));
     if (group != nullptr && std::ranges::find(group->axes, target.axis) == group->axes.end())
       return fail(Reason::invalid_argument,
                   fmt::format("{} is no member of group {}", target.axis, group->name),
@@ -70,7 +69,7 @@ Result<void> GroupKeeper::check(const GroupMoveRequest& request) const {
                   "give each axis one target");
     if (target.position.has_value() == target.distance.has_value())
       return fail(Reason::invalid_argument,
-                  fmt::format("{}: give either a position or a distance", target.axis));
+                  fmt::format("{}: give either a position or a distance", target.axis), "0 is a value, too");
   }
   if (request.max_arrival_error && !request.arrive_together)
     return fail(Reason::invalid_argument, "max_arrival_error without arrive_together",
@@ -85,7 +84,7 @@ Result<GroupRunPtr> GroupKeeper::find_repeat(const GroupMoveRequest& request,
   for (std::size_t i = 0; i < actions.size(); ++i) {
     const auto found =
         parts_.book->find_repeat(request.targets[i].axis, actions[i], options_of(request, i, options));
-    if (!found) return fail(found.error());
+    if (!found) return fail(named(found.error(), request.targets[i].axis));
     if (*found) known.push_back(*found);
   }
   if (known.empty()) return nullptr;
@@ -111,7 +110,7 @@ Result<std::vector<Plan>> GroupKeeper::plan(const GroupMoveRequest& request,
   for (std::size_t i = 0; i < actions.size(); ++i) {
     auto* axis = parts_.find(request.targets[i].axis);
     auto plan = axis->plan_member(std::get<GroupMemberRequest>(actions[i]), options);
-    if (!plan) return fail(plan.error());
+    if (!plan) return fail(named(plan.error(), request.targets[i].axis));
     const auto way = axis->way_of(*plan);
     arrivals.push_back({.planner = &axis->planner(), .plan = *std::move(plan), .pulses = way});
   }

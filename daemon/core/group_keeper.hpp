@@ -20,7 +20,8 @@ class GroupKeeper {
     Clock* clock = nullptr;
     CommandBook* book = nullptr;
     std::string instance_id;
-    std::function<Axis*(std::string_view)> find;  ///< an axis, or nullptr
+    std::function<Axis*(std::string_view)> find;     ///< an axis, or nullptr
+    std::function<std::vector<std::string>()> axes;  ///< the names of all
     std::function<void(Task<>, const char*)> launch;
   };
   GroupKeeper(Parts parts, std::vector<GroupSettings> groups)

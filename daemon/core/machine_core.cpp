@@ -7,6 +7,8 @@
 #include <boost/smart_ptr/make_shared.hpp>
 #include <utility>
 
+#include "devices/nearest.hpp"
+
 namespace axisd::core {
 
 namespace {
@@ -59,6 +61,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                .book = &book_,
                .instance_id = parts_.instance_id,
                .find = [this](std::string_view axis) { return find(axis); },
+               .axes = [this] { return table()->axes; },
                .launch = [this](Task<> task, const char* name) { launch(std::move(task), name); }},
               configuration.groups) {
   if (parts_.persistence != nullptr) {
@@ -189,8 +192,7 @@ Axis* MachineCore::find(std::string_view axis) const {
 Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& action,
                                        const CommandOptions& options) {
   auto* found = find(axis);
-  if (found == nullptr)
-    return fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis), "list them: axisctl list");
+  if (found == nullptr) return fail(no_such_axis(axis, table()->axes));
   const auto* stop = std::get_if<StopRequest>(&action);
   if (const auto leaving = leaving_.find(axis); leaving != leaving_.end() && stop != nullptr)
     return hold_stop(leaving->second, axis, *stop, options);

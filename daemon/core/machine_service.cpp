@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "devices/nearest.hpp"
+
 namespace axisd::core {
 
 namespace {
@@ -91,8 +93,7 @@ void MachineService::explain(std::string axis, std::optional<Action> action, Com
   post(loop_->executor(), [this, axis = std::move(axis), action = std::move(action),
                            options = std::move(options), callback = std::move(callback)] {
     const auto* found = machine_->find(axis);
-    if (found == nullptr)
-      return callback(fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis)));
+    if (found == nullptr) return callback(fail(no_such_axis(axis, machine_->table()->axes)));
     callback(found->explain(action, options));
   });
 }
@@ -100,8 +101,7 @@ void MachineService::explain(std::string axis, std::optional<Action> action, Com
 void MachineService::release_stop(std::string axis, CommandCallback callback) {
   post(loop_->executor(), [this, axis = std::move(axis), callback = std::move(callback)]() mutable {
     auto* found = machine_->find(axis);
-    if (found == nullptr)
-      return callback(fail(Reason::unknown_axis, fmt::format("there is no axis '{}'", axis)));
+    if (found == nullptr) return callback(fail(no_such_axis(axis, machine_->table()->axes)));
     answer(found->release_stop(), WaitUntil::accepted, std::move(callback));
   });
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "buses/clock.hpp"
@@ -55,6 +56,12 @@ struct GroupMove {
   std::optional<Duration> start_skew{};     ///< between the first and the last start frame
   std::optional<Duration> arrival_error{};  ///< between the first and the last arrival seen
 };
+
+/// The names of these groups.
+[[nodiscard]] std::vector<std::string> names_of(const std::vector<GroupSettings>& groups);
+
+/// An error of one member as one of the whole move: its text begins with the member's name.
+[[nodiscard]] Error named(Error error, std::string_view axis);
 
 /// What is to be stopped: groups by name, axes, or both.
 struct GroupStopRequest {

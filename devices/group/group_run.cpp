@@ -16,10 +16,8 @@ namespace {
 constexpr auto assembly_limit = std::chrono::seconds(10);
 
 Error because_of(const Error& cause, const std::string& axis) {
-  auto text = cause.message;
-  if (!text.starts_with(axis)) text = fmt::format("{}: {}", axis, text);
   return {.reason = Reason::superseded,
-          .message = "the group move ended: " + text,
+          .message = "the group move ended: " + named(cause, axis).message,
           .remedy = cause.remedy,
           .outcome = Outcome::not_executed,
           .where = cause.where};
@@ -231,7 +229,7 @@ void GroupRun::give_up(const Failure& failure) {
   const std::string axis(axis_of(commands_[failure.member]));
   if (std::ranges::any_of(commands_, [](const auto& command) { return !command->has_ended(); }))
     spdlog::warn("group move {} ends: {}", parts_.id, to_string(failure.cause));
-  cause_ = failure.cause;
+  cause_ = named(failure.cause, axis);
   const auto others = because_of(failure.cause, axis);
   const bool culprit_may_run = members_[failure.member]->may_run();
   if (culprit_may_run) members_[failure.member]->end_failed(failure.cause);

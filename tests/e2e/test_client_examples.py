@@ -39,7 +39,7 @@ class ClientExamples(unittest.TestCase):
     def check_example(self, words):
         output = self.finish(self.start(words, "turntable", "30"), 0)
         self.assertRegex(output, r"\A(STATE_DISCRETE_MOTION -?[\d.]+ deg\n)+turntable: done\n\Z")
-        self.assertIn("there is no axis nobody; ListAxes", self.finish(self.start(words, "nobody"), 1))
+        self.assertIn("there is no axis 'nobody'; list them", self.finish(self.start(words, "nobody"), 1))
 
         def moving():
             return self.demo.client.state("turntable").moving

@@ -10,6 +10,7 @@ namespace {
 
 using simulation::FaultKind;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 constexpr std::uint16_t start_register = 0x0027, stop_register = 0x0028;
 
@@ -93,8 +94,13 @@ TEST(M22Group, WhatForbidsOneForbidsAll) {
     for (const auto* axis : {"x", "y", "z"}) EXPECT_EQ(rig.state(axis)->state, AxisState::standstill);
     return run ? Error{} : run.error();
   };
-  EXPECT_EQ(refused(GroupRig::to({{"x", 20}, {"y", 500}, {"z", 20}})).reason, Reason::soft_limit);
-  EXPECT_EQ(refused(GroupRig::to({{"x", 20}, {"q", 5}})).reason, Reason::unknown_axis);
+  const auto beyond = refused(GroupRig::to({{"x", 20}, {"y", 500}, {"z", 20}}));
+  EXPECT_EQ(beyond.reason, Reason::soft_limit);
+  EXPECT_THAT(beyond.message, StartsWith("y: "));
+  const auto nobody = refused(GroupRig::to({{"x", 20}, {"q", 5}}));
+  EXPECT_EQ(nobody.reason, Reason::unknown_axis);
+  EXPECT_EQ(nobody.message, "there is no axis 'q'");
+  EXPECT_THAT(nobody.remedy, StartsWith("did you mean '"));
   EXPECT_EQ(refused(GroupRig::to({})).reason, Reason::invalid_argument);
   auto twice = GroupRig::to({{"x", 20}});
   twice.targets.push_back({.axis = "x", .distance = 1});
@@ -113,6 +119,7 @@ TEST(M22Group, WhatForbidsOneForbidsAll) {
   const auto disabled = rig.try_move(GroupRig::to({{"x", 20}, {"y", 20}, {"z", 20}}));
   ASSERT_FALSE(disabled);
   EXPECT_EQ(disabled.error().reason, Reason::disabled);
+  EXPECT_THAT(disabled.error().message, StartsWith("y: "));
 }
 
 TEST(M22Group, AMemberThatMovesIsWaitedFor) {
@@ -122,6 +129,7 @@ TEST(M22Group, AMemberThatMovesIsWaitedFor) {
   const auto run = rig.try_move(GroupRig::to({{"x", 20}, {"y", 20}}));
   ASSERT_FALSE(run);
   EXPECT_EQ(run.error().reason, Reason::moving);
+  EXPECT_THAT(run.error().message, StartsWith("y: "));
 }
 
 /// y's start gets no reply: it may have been executed, and everything that may move is stopped at once.
@@ -140,6 +148,7 @@ TEST(M22Group, AnUnknownStartStopsAll) {
     EXPECT_EQ(move.state, CommandState::unknown);
     ASSERT_TRUE(move.cause);
     EXPECT_EQ(move.cause->where.node, 2);
+    EXPECT_THAT(move.cause->message, StartsWith("y: "));
     EXPECT_EQ(member(move, "y").command.state, CommandState::unknown);
     EXPECT_EQ(member(move, "y").command.cause->outcome, Outcome::unknown);
     for (const auto* axis : {"x", "z", "w"}) {
@@ -213,6 +222,7 @@ TEST(M22Group, AFaultOnTheWayStopsAll) {
   EXPECT_EQ(member(move, "y").command.cause->reason, Reason::alarm);
   ASSERT_TRUE(move.cause);
   EXPECT_EQ(move.cause->where.node, 2);
+  EXPECT_THAT(move.cause->message, StartsWith("y: "));
   EXPECT_EQ(member(move, "x").command.state, CommandState::aborted);
   EXPECT_THAT(member(move, "z").command.cause->message, HasSubstr("alarm"));
   EXPECT_TRUE(rig.rests(3s));
@@ -287,6 +297,7 @@ TEST(M22Group, ARepeatGetsTheSameMove) {
     const auto conflict = rig.try_move(other, options);
     ASSERT_FALSE(conflict);
     EXPECT_EQ(conflict.error().reason, Reason::request_id_conflict);
+    EXPECT_THAT(conflict.error().message, StartsWith("x: "));
   }
   const auto alone = rig.machine->submit("x", MoveAbsoluteRequest{.position = 20}, options);
   ASSERT_FALSE(alone);
@@ -311,6 +322,7 @@ TEST(M22Group, EveryMemberNeedsTheLease) {
   const auto none = rig.try_move(request, {.client = "b"});
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().reason, Reason::lease_required);
+  EXPECT_THAT(none.error().message, StartsWith("x: "));
   const auto run = rig.move(request, {.client = "a", .lease_token = grant->lease.token});
   ASSERT_TRUE(rig.run_until([&] { return ended(run->state()); }, 5s)) << "it is not renewed";
   for (const auto& one : run->value().members) EXPECT_EQ(one.command.state, CommandState::aborted);

@@ -96,6 +96,16 @@ TEST_F(Calls, EveryMotionReachesTheMachineAndReturnsItsCommand) {
   EXPECT_THAT(machine_.log(), ElementsAre("release_stop feeder"));
 }
 
+TEST_F(Calls, AMisspeltAxisIsAnsweredWithTheNearestName) {
+  serve();
+  const auto status = call<v1::HomeRequest>(&Stub::Home, [](auto& r) { r.set_axis("feedr"); });
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(detail_of(status).remedy(), "did you mean 'feeder'?");
+  const auto capital = call<v1::StopRequest>(&Stub::Stop, [](auto& r) { r.set_axis("Feeder"); });
+  EXPECT_EQ(detail_of(capital).remedy(), "did you mean 'feeder'?");
+  EXPECT_TRUE(machine_.submitted().empty());
+}
+
 TEST_F(Calls, WaitUntilIsPassedOn) {
   serve();
   EXPECT_TRUE(call<v1::HomeRequest>(&Stub::Home, [](auto& r) {
