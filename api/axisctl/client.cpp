@@ -10,7 +10,6 @@
 #include <fstream>
 #include <iterator>
 #include <random>
-#include <thread>
 
 namespace axisd::axisctl {
 namespace {
@@ -71,10 +70,11 @@ Client::Client(Connection connection) : connection_(std::move(connection)) {
 }
 
 void Client::wait_for_connection(Lane lane, std::chrono::milliseconds limit) const {
+  const auto until = std::chrono::system_clock::now() + limit;
   if (channel(lane)->GetState(true) == GRPC_CHANNEL_READY)
-    std::this_thread::sleep_for(limit);
+    channel(lane)->WaitForStateChange(GRPC_CHANNEL_READY, until);
   else
-    channel(lane)->WaitForConnected(std::chrono::system_clock::now() + limit);
+    channel(lane)->WaitForConnected(until);
 }
 
 Failure Client::failure(const grpc::Status& status, std::string_view subject) const {

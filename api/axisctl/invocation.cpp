@@ -58,15 +58,21 @@ std::string with_leading_zero(std::string word) {
   return word;
 }
 
-/// CLI11 says of a misspelt subcommand only that one is missing. `words` as they were given.
-std::string misspelt(const CLI::App& app, const CLI::App& command, const std::vector<std::string>& words) {
+/// CLI11 says of a misspelt subcommand only that one is missing. `words` as they were given; empty: none of
+/// them is it.
+std::string misspelt(const CLI::App& app, const CLI::App& command, std::string_view help,
+                     const std::vector<std::string>& words) {
   const auto known = command.get_subcommands([](const CLI::App*) { return true; });
   const auto names =
       config::names_of(known, [](const CLI::App* each) -> std::string_view { return each->get_name(); });
   const auto left = app.remaining(true);
-  for (const auto& word : words)
-    if (!word.starts_with('-') && std::ranges::find(left, word) != left.end())
-      return fmt::format("there is no command {}; {}", config::quoted(word), config::suggest(word, names));
+  for (const auto& word : words) {
+    if (word.starts_with('-') || std::ranges::find(left, word) == left.end()) continue;
+    const auto near = config::nearest(word, names);
+    return fmt::format(
+        "there is no command {}; {}", config::quoted(word),
+        near.empty() ? fmt::format("see '{} --help'", help) : fmt::format("did you mean '{}'?", near));
+  }
   return {};
 }
 
@@ -79,7 +85,7 @@ Failure usage_error(const CLI::App& app, const CLI::ParseError& error,
     help += " " + command->get_name();
   }
   if (command->get_require_subcommand_min() > 0)
-    if (const auto text = misspelt(app, *command, words); !text.empty()) return {ExitCode::usage, text};
+    if (const auto text = misspelt(app, *command, help, words); !text.empty()) return {ExitCode::usage, text};
   return {ExitCode::usage, fmt::format("{}; see '{} --help'", error.what(), help)};
 }
 

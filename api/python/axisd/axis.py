@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Explainable = Literal["enable", "disable", "home", "move", "move_relative", "velocity", "jog", "reset", "set_position"]
 _RAMPS = ("acceleration_time", "deceleration_time")
+_LONGEST_HOLD = 2.0  # s
 # What explain() takes for a command, beside its name.
 _EXPLAINED = {"move": ("value", "velocity", *_RAMPS), "move_relative": ("value", "velocity", *_RAMPS),
               "velocity": ("value", "hold", *_RAMPS), "jog": ("value", "hold", *_RAMPS), "set_position": ("value",)}
@@ -209,8 +210,10 @@ class Jog:
         # A jog that ended by itself may have been followed by somebody else's motion: that is not ours to halt.
         if not failed or isinstance(failure, AxisdError) and not isinstance(failure, MotionError):
             try:
-                await self._axis.halt()
-            except AxisdError:
+                # Where its renewal failed nobody has to wait for the daemon: the axis halts when its hold ends.
+                async with asyncio.timeout(_LONGEST_HOLD if failed else None):
+                    await self._axis.halt()
+            except (AxisdError, TimeoutError):
                 if not failed:
                     raise
         if failed and error is None and isinstance(failure, Exception):
