@@ -1,5 +1,7 @@
 #include "daemon/store/journal_file.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -26,6 +28,11 @@ Result<std::unique_ptr<JournalFile>> JournalFile::open(std::unique_ptr<JournalDi
     if (load.newer_format)
       return fail(Reason::storage, "the command journal was written by a newer axisd",
                   "run that version, or move journal.v1 away 10 minutes after the last command");
+    if (load.torn > 0)
+      spdlog::warn(
+          "the command journal ends in {} bytes of a line that a crash cut short before it was durable: left "
+          "out, as nothing was sent for it",
+          load.torn);
     journal->model_ = std::move(load.model);
     if (!load.damage.empty()) {
       journal->model_.apply(DoubtLine{.until = now + longest_validity, .damage = load.damage},

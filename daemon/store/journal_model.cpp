@@ -128,12 +128,10 @@ JournalLoad load_journal(std::string_view text, TimePoint now) {
     ++at;
     const auto end = text.find('\n');
     const auto line = decode_line(text.substr(0, end));
-    if (end == std::string_view::npos) {
-      damaged("the last line has no end");
-      text = {};
-    } else {
-      text.remove_prefix(end + 1);
-    }
+    // A line is made durable with its end only: what has none is left of a write that a crash cut short.
+    if (end == std::string_view::npos && !line) load.torn = text.size();
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (load.torn > 0) break;
     if (!line) {
       damaged("checksum or content is wrong");
       continue;

@@ -48,7 +48,10 @@ class JournalModel {
 /// What a whole file says.
 struct JournalLoad {
   JournalModel model;
-  std::string damage{};       ///< what was wrong with it; empty: nothing
+  std::string damage{};  ///< what was wrong with it; empty: nothing
+  /// Bytes of a last line that was never written whole, and so never made durable: nothing was sent for it.
+  /// Left out, and no damage.
+  std::size_t torn = 0;
   bool newer_format = false;  ///< intact as far as can be told, but not to be read by this build
 };
 JournalLoad load_journal(std::string_view text, TimePoint now);

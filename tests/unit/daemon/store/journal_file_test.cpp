@@ -163,7 +163,7 @@ TEST_F(JournalFileTest, DamageIsRememberedForAsLongAsARequestIsValid) {
     journal->sending(command("1"), {}, record());
     wait_for(1);
   }
-  temporary_.write("journal.v1", text().substr(0, text().size() - 10));
+  temporary_.write("journal.v1", text().substr(0, text().size() - 10) + "\n");
   const auto torn = text();
   for (const auto minutes : {0, 1, 9}) {
     const auto content = open(start + std::chrono::minutes(minutes))->take_loaded();
@@ -176,6 +176,24 @@ TEST_F(JournalFileTest, DamageIsRememberedForAsLongAsARequestIsValid) {
   EXPECT_TRUE(open(start - std::chrono::hours(1))->take_loaded().doubtful_until) << "the clock was set back";
   EXPECT_FALSE(open(start + longest_validity)->take_loaded().doubtful_until);
   EXPECT_FALSE(open(start)->take_loaded().doubtful_until) << "it is over for good";
+}
+
+TEST_F(JournalFileTest, ALineThatACrashCutShortLocksNothing) {
+  {
+    const auto journal = open();
+    journal->accepted(command("1"), "one");
+    journal->sending(command("1"), {}, record());
+    wait_for(1);
+    journal->accepted(command("2"), "two");
+  }
+  temporary_.write("journal.v1", text().substr(0, text().size() - 10));
+  for (int start = 0; start < 2; ++start) {
+    const auto content = open()->take_loaded();
+    EXPECT_FALSE(content.doubtful_until);
+    ASSERT_EQ(content.commands.size(), 1);
+    EXPECT_TRUE(content.commands[0].sent);
+  }
+  EXPECT_EQ(load_journal(text(), {}).torn, 0);
 }
 
 TEST_F(JournalFileTest, ItDoesNotGrowWithoutEndAndKeepsWhatIsStillNeeded) {
