@@ -36,12 +36,18 @@ void Clock::cancel(std::uint64_t id) {
   due_.erase(found);
 }
 
-TimePoint monotonic_now() { return std::chrono::steady_clock::now(); }
+// Not CLOCK_MONOTONIC, which stands still while the computer is suspended: what was accepted before that is
+// late after it (M31), and leases are over.
+TimePoint monotonic_now() {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return TimePoint(std::chrono::seconds(now.tv_sec) + std::chrono::nanoseconds(now.tv_nsec));
+}
 
 void block_until(TimePoint when) {
   const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(when.time_since_epoch()).count();
   const timespec deadline{.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
+  while (clock_nanosleep(CLOCK_BOOTTIME, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
   }
 }
 

@@ -296,6 +296,17 @@ const KeySpec axis_keys[] = {
      .minimum = 10,
      .maximum = 1000,
      .apply = [](Target& t, const Value& v) { t.axis->axis.reboot_guard = v.duration; }},
+    {.key = "start_within",
+     .kind = Kind::duration,
+     .description = "From the acceptance of a command to its first start frame, at most: what waits longer "
+                    "for disk, line "
+                    "or processor ends as expired, and nothing is sent. A command that waits in the buffer: "
+                    "from its turn.",
+     .example = "1 s",
+     .default_value = "2 s",
+     .minimum = 50,
+     .maximum = 60000,
+     .apply = [](Target& t, const Value& v) { t.axis->axis.start_within = v.duration; }},
     {.key = "stop_margin",
      .kind = Kind::duration,
      .description = "How much longer than its deceleration time a stop may take before it is escalated.",

@@ -122,6 +122,7 @@ void add_policies(Fields& fields, const AxisSettings& axis) {
   fields.add("poll.idle", axis.poll_idle);
   fields.add("reboot_guard", axis.reboot_guard);
   fields.add("stop_margin", axis.stop_margin);
+  fields.add("start_within", axis.start_within);
   fields.add("drift_check", axis.drift_check);
   fields.add("persist", to_text(axis.persist));
   fields.add("brake.release_time", axis.brake.release_time);

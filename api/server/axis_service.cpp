@@ -36,6 +36,8 @@ AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request&
   if (!action) return refuse(context, client, what, action.error());
   auto submission = motion_options(request.options(), client, services_.machine);
   if (!submission) return refuse(context, client, what, submission.error());
+  if (const auto patience = patience_of(*context))
+    submission->options.call_deadline = services_.machine.now() + *patience;
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return refuse(context, client, what, ticket.error());
   return submit(context, request.axis(), *std::move(action), *std::move(submission), *std::move(ticket),

@@ -32,6 +32,8 @@ GroupServiceImpl::Reactor* GroupServiceImpl::MoveGroup(Context* context, const v
   if (!wanted) return answer(context, to_status(wanted.error()));
   auto submission = motion_options(request->options(), client, services_.machine);
   if (!submission) return answer(context, to_status(submission.error()));
+  if (const auto patience = patience_of(*context))
+    submission->options.call_deadline = services_.machine.now() + *patience;
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(

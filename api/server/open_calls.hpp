@@ -47,7 +47,7 @@ class OpenCalls {
     for (const auto& call : calls) call->close(status);
     calls.clear();
     lock.lock();
-    empty_.wait_until(lock, until, [this] { return calls_.empty(); });
+    empty_.wait_for(lock, until - monotonic_now(), [this] { return calls_.empty(); });
   }
 
  private:

@@ -40,7 +40,7 @@ void ReplyThread::run(const Ticker& ticker) {
       if (next == TimePoint::max()) {
         wake_.wait(lock, woken);
       } else {
-        wake_.wait_until(lock, next, woken);
+        wake_.wait_for(lock, next - monotonic_now(), woken);
       }
       if (stopping_ && jobs_.empty()) return;
       std::swap(batch, jobs_);

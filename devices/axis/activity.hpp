@@ -15,6 +15,14 @@
 
 namespace axisd {
 
+/// What a command is waiting for before its start (M31).
+enum class StartWait : std::uint8_t {
+  halt,   ///< the end of the motion before it (M9)
+  disk,   ///< its durable record, or that of the position
+  line,   ///< its frames are with the bus, whose gate decides
+  begun,  ///< nothing any more
+};
+
 /// A command that is being executed.
 struct Activity {
   CommandPtr command;
@@ -27,6 +35,10 @@ struct Activity {
   bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
   bool lease_over = false;                ///< goes on without its lease, and starts nothing more
   bool noted = false;                     ///< durably, or that is under way
+  TimePoint start_by = TimePoint::max();  ///< no start frame goes out later (M31)
+  TimePoint waits_since{};                ///< the time from which start_by counts
+  StartWait waits_for = StartWait::line;
+  Clock::Timer late{};  ///< at start_by
 };
 using ActivityPtr = std::shared_ptr<Activity>;
 

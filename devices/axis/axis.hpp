@@ -300,7 +300,15 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   bool may_start(Activity& activity);
-  void end_unsent(Activity& activity, const Error& cause);
+
+  // axis_lateness.cpp: nothing starts late (M31)
+  void bound_start(const ActivityPtr& activity, bool waited, bool halting);
+  void start_by(const ActivityPtr& activity, TimePoint since, TimePoint latest);
+  [[nodiscard]] Error late(const Activity& activity, Error cause) const;
+  void end_late(Activity& activity);
+  [[nodiscard]] bool too_late(const CommandOptions& options) const;
+
+  void end_unsent(Activity& activity, Error cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
   Task<bool> is_no_reboot(ActivityPtr activity);

@@ -83,6 +83,11 @@ bool Axis::Member::ready() const {
          may_send_alone(guard(), axis_->env_.clock->now()) == Verdict::send;
 }
 
+void Axis::Member::wait_for_others(Duration more) {
+  const auto latest = std::min(activity_->start_by + more, activity_->options.call_deadline);
+  axis_->start_by(activity_, activity_->waits_since, latest);
+}
+
 void Axis::Member::tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after) {
   all_ = std::move(all);
   not_after_ = not_after;
@@ -102,6 +107,8 @@ Error Axis::Member::gone() const {
   const auto verdict = may_send_alone(guard(), axis_->env_.clock->now());
   if (verdict == Verdict::lease_lost)
     return axis_->error(Reason::lease_lost, "the lease is over", "acquire a lease again");
+  if (verdict == Verdict::expired && axis_->env_.clock->now() > activity_->start_by)
+    return axis_->late(*activity_, {});
   if (verdict == Verdict::expired)
     return axis_->error(Reason::expired, "the request's validity has passed", "repeat it");
   if (axis_->bus_loss_) return *axis_->bus_loss_;
@@ -260,6 +267,8 @@ void Axis::Member::end(Error cause, bool aborted) {
   chain_.reset();
   if (axis.activity_ != activity_) return;  // something else ended it, with what that needs
   const bool own = cause.where.bus == axis.settings_.bus && cause.where.node == axis.settings_.node;
+  if (own && cause.reason == Reason::expired && axis.env_.clock->now() > activity_->start_by)
+    cause = axis.late(*activity_, cause);
   if (!aborted && own && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
   if (!aborted && own && cause.reason == Reason::terminal) return axis.on_turned_by_power(cause);
   const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->may_run;

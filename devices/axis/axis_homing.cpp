@@ -31,11 +31,17 @@ Task<> Axis::run_home(ActivityPtr activity) {
     });
     co_return;
   }
-  if (input_active(homing_switch()) && !co_await back_off(activity)) co_return;
+  if (input_active(homing_switch())) {
+    if (!co_await back_off(activity)) co_return;
+    const auto now = env_.clock->now();
+    start_by(activity, now, now + settings_.start_within);
+  }
 
   // Before it can come true again: homing may end where the saved record says that the axis stood (M20).
+  activity->waits_for = StartWait::disk;
   auto forgotten = co_await forget_saved_position();
   if (!current(*activity)) co_return;
+  activity->waits_for = StartWait::line;
   if (!forgotten) {
     tell_part(*activity, forgotten.error());
     finish(*activity, [&](CommandRecord& command) { command.error(forgotten.error()); });

@@ -37,7 +37,8 @@ MotionGuard Axis::guard(const Activity& activity) const {
   return {.gate = gate_,
           .epoch = activity.epoch,
           .fencing_token = token,
-          .not_after = std::min(activity.options.not_after, activity.hold_until.value_or(TimePoint::max()))};
+          .not_after = std::min({activity.options.not_after, activity.start_by,
+                                 activity.hold_until.value_or(TimePoint::max())})};
 }
 
 void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>& how) {
@@ -106,6 +107,7 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
     co_return false;
   }
   activity->may_run = true;
+  activity->waits_for = StartWait::line;
   co_return true;
 }
 
@@ -232,7 +234,8 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
 }
 
 /// What the gate no longer let out was overtaken by time or by another client: nobody's error.
-void Axis::end_unsent(Activity& activity, const Error& cause) {
+void Axis::end_unsent(Activity& activity, Error cause) {
+  if (cause.reason == Reason::expired && env_.clock->now() > activity.start_by) cause = late(activity, cause);
   const bool aborted = cause.reason == Reason::expired || cause.reason == Reason::lease_lost;
   finish(activity, [&](CommandRecord& command) { aborted ? command.abort(cause) : command.error(cause); });
 }
@@ -241,6 +244,7 @@ void Axis::end_unsent(Activity& activity, const Error& cause) {
 /// read back until it shows what it did (M8).
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
   if (!current(*activity)) co_return false;
+  if (result || result.error().outcome == Outcome::unknown) activity->waits_for = StartWait::begun;
   if (result) {
     activity->command->activate();
     publish();

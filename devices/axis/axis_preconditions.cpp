@@ -42,6 +42,12 @@ void Axis::look_at_options(const CommandOptions& options, Obstacles& found) cons
   if (options.not_after <= env_.clock->now())
     found.block(
         error(Reason::expired, "the request's validity has passed", "repeat it with a later not_after"));
+  if (too_late(options))
+    found.block(error(Reason::expired,
+                      fmt::format("accepted too late: it may start within {} ms of its arrival, and no later "
+                                  "than the deadline of its call",
+                                  std::chrono::duration_cast<milliseconds>(settings_.start_within).count()),
+                      "repeat it, if it is still wanted"));
   found.block_on(check_lease({.client = options.client, .lease_token = options.lease_token}));
 }
 

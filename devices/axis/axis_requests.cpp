@@ -42,7 +42,8 @@ Result<void> Axis::permit(const Request& request, const CommandOptions& options)
 /// Enters a command and makes it the one that is executed; whatever was executed before is aborted and
 /// halted.
 ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan) {
-  auto command = next_ ? std::exchange(next_, nullptr) : env_.book->open(settings_.name, action, options);
+  const bool waited = next_ != nullptr;
+  auto command = waited ? std::exchange(next_, nullptr) : env_.book->open(settings_.name, action, options);
   const auto replaced = activity_;
   const bool moving = (replaced && replaced->state != AxisState::standstill) || (sample_ && sample_->moving);
   if (replaced)
@@ -56,6 +57,7 @@ ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, Axi
                                                   .epoch = accept_epoch_,
                                                   .options = options,
                                                   .plan = std::move(plan)});
+  bound_start(activity_, waited, moving || stopping_.running);
   publish();
   return activity_;
 }

@@ -74,6 +74,9 @@ struct CommandOptions {
   std::uint64_t lease_token = 0;  ///< 0: under no lease
   TimePoint not_after = TimePoint::max();
   TimePoint arrived{};  ///< at the server; not set: the daemon's own
+  /// Deadline of the call, as it was known when it arrived: what does not wait in a buffer starts by then, or
+  /// not at all (M31). How the call ends changes nothing.
+  TimePoint call_deadline = TimePoint::max();
   BufferMode buffer_mode = BufferMode::aborting;
 };
 

@@ -29,6 +29,8 @@ class Axis::Member {
   /// Nothing forbids its start, as far as is known without asking the drive.
   [[nodiscard]] bool ready() const;
 
+  /// The members before it are loaded and looked at first: its start may come so much later (M31).
+  void wait_for_others(Duration more);
   /// Nothing goes out any more where one of `all` forbids it, nor after `not_after`.
   void tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after);
   /// Makes room at the drive, and the move known to a restart of the daemon, before anything of it is sent.

@@ -128,6 +128,7 @@ struct AxisSettings {
   Duration poll_idle = milliseconds(200);
   Duration reboot_guard = milliseconds(100);        ///< M6; below the drive's shortest boot time
   Duration stop_margin = milliseconds(300);         ///< beyond the deceleration time, before escalating
+  Duration start_within = std::chrono::seconds(2);  ///< from acceptance to the first start frame (M31)
   Duration drift_check = std::chrono::seconds(10);  ///< how often the terminals' functions are read again
   PersistSettings persist{};
   BrakeSettings brake{};

@@ -14,6 +14,8 @@ namespace {
 
 /// All members are started within this from the acceptance, or none is. A slow line takes some 150 ms each.
 constexpr auto assembly_limit = std::chrono::seconds(10);
+/// Beyond what a start may wait for alone (M31), for each further member.
+constexpr auto assembly_of_one = std::chrono::milliseconds(200);
 
 Error because_of(const Error& cause, const std::string& axis) {
   return {.reason = Reason::superseded,
@@ -41,6 +43,7 @@ GroupRun::GroupRun(Parts parts, std::vector<std::unique_ptr<Axis::Member>> membe
     : parts_(std::move(parts)), members_(std::move(members)), by_sync_(members_.size()) {
   auto guards = std::make_shared<std::vector<MotionGuard>>();
   for (const auto& member : members_) {
+    member->wait_for_others(assembly_of_one * (members_.size() - 1));
     commands_.push_back(member->command());
     guards->push_back(member->guard());
   }

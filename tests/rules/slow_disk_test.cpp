@@ -37,7 +37,12 @@ TEST(SlowDisk, WhatBeganToMoveMeanwhileIsNotStarted) {
 }
 
 TEST(SlowDisk, WhatLostItsPositionMeanwhileIsNotStarted) {
-  Rig rig(homed_by_a_terminal());
+  auto options = homed_by_a_terminal();
+  options.adjust = [base = options.adjust](AxisSettings& axis) {
+    base(axis);
+    axis.start_within = 60s;
+  };
+  Rig rig(options);
   rig.ready();
   rig.journal.slow = true;
   const auto move = rig.submit(MoveAbsoluteRequest{.position = 100}, {.client = "a", .request_id = "r"});

@@ -1,0 +1,96 @@
+// Nothing starts late (M31). Between the acceptance of a command and its first start frame lies at most
+// `start_within`, by a clock that a paused process and a suspended computer do not stop; the deadline of its
+// call, as it was known at acceptance, shortens that. The gate decides at the bind; what waits for something
+// else than the line ends when the time is over.
+// What counts from where:
+// - A command that had to wait in the buffer: from its turn. The call's deadline says nothing of that.
+// - One that first has to end a motion (M9): a deceleration and `stop_margin` more, as the ramp is the
+// drive's.
+// - Homing that backs off first: each of its two starts on its own, the second from the end of the first.
+// - A group: its members together, axis_group.cpp.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// Of the others none begins a motion, or gives power.
+bool may_be_late(CommandKind kind) {
+  return kind == CommandKind::disable || kind == CommandKind::reset || kind == CommandKind::set_position;
+}
+
+std::string_view to_string(StartWait wait) {
+  switch (wait) {
+    case StartWait::halt:
+      return "for the motion before it to end";
+    case StartWait::disk:
+      return "for the disk";
+    default:
+      return "for its line";
+  }
+}
+
+double in_seconds(Duration time) { return std::chrono::duration<double>(time).count(); }
+
+}  // namespace
+
+/// It arrived longer ago than it may wait, or its caller has given up. What is buffered may wait.
+bool Axis::too_late(const CommandOptions& options) const {
+  if (next_ || (options.buffer_mode == BufferMode::buffered && activity_)) return false;
+  const auto now = env_.clock->now();
+  return now > options.call_deadline ||
+         (options.arrived != TimePoint{} && now > options.arrived + settings_.start_within);
+}
+
+void Axis::bound_start(const ActivityPtr& activity, bool waited, bool halting) {
+  if (halting) activity->waits_for = StartWait::halt;
+  if (may_be_late(activity->command->value().kind)) return;
+  const auto& options = activity->options;
+  auto since = env_.clock->now();
+  if (!waited && options.arrived != TimePoint{}) since = options.arrived;
+  auto latest = since + settings_.start_within;
+  if (halting) latest += deceleration_bound() + settings_.stop_margin;
+  if (!waited) latest = std::min(latest, options.call_deadline);
+  start_by(activity, since, latest);
+}
+
+/// No start frame of the activity goes out after `latest`.
+void Axis::start_by(const ActivityPtr& activity, TimePoint since, TimePoint latest) {
+  activity->waits_since = since;
+  activity->start_by = latest;
+  activity->late = env_.clock->call_at(latest + Duration(1), [this, weak = std::weak_ptr(activity)] {
+    if (const auto waiting = weak.lock()) end_late(*waiting);
+  });
+}
+
+/// What is with the bus is ended by its gate.
+void Axis::end_late(Activity& activity) {
+  if (activity.waits_for != StartWait::halt && activity.waits_for != StartWait::disk) return;
+  if (!current(activity)) return;
+  revoke_motion();
+  auto cause = late(activity, {});
+  tell_part(activity, cause);
+  finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
+}
+
+/// Nothing was sent for it, as it would have been too late. `cause`: where that was found.
+Error Axis::late(const Activity& activity, Error cause) const {
+  const auto waited = env_.clock->now() - activity.waits_since;
+  auto told =
+      error(Reason::expired,
+            fmt::format("too late to start: it waited {:.3f} s {}, at most {:.3f} s are allowed "
+                        "(start_within{})",
+                        in_seconds(waited), to_string(activity.waits_for),
+                        in_seconds(activity.start_by - activity.waits_since),
+                        activity.start_by == activity.options.call_deadline ? ", the call's deadline" : ""),
+            "repeat it, if it is still wanted; if it is often so, look at the load of disk and line");
+  if (!cause.where.bus.empty()) told.where = std::move(cause.where);
+  return told;
+}
+
+}  // namespace axisd
