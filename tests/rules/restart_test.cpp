@@ -134,7 +134,7 @@ TEST(Restart, NothingIsSentBeforeItIsDurable) {
   const auto triggers = rig.triggers();
   rig.journal.slow = true;
   const auto move = rig.submit(MoveRelativeRequest{.distance = 5}, request("r1"));
-  rig.run(seconds(3));
+  rig.run(seconds(1));
   EXPECT_EQ(rig.triggers(), triggers);
   EXPECT_EQ(move->value().state, CommandState::accepted);
   rig.journal.release();
@@ -307,6 +307,7 @@ TEST(Restart, DamageRefusesWhatItMayHaveLost) {
   EXPECT_EQ(repeat(rig, move, "r2").state, CommandState::done);
   rig.kill_daemon();
   rig.journal.text.resize(rig.journal.text.find(" accepted", rig.journal.text.find("request=r1")) + 20);
+  rig.journal.text += "\n";
   for (int restart = 0; restart < 2; ++restart) {
     rig.start_daemon();
     const auto lost = rig.try_submit(move, request("r2"));
