@@ -6,6 +6,7 @@
 #include <map>
 
 #include "tests/conformance/scenario.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::conformance {
 
@@ -246,7 +247,7 @@ std::string other_nodes(const Setup& setup) {
 /// Empty: the model needs none.
 std::string data_sheet_line(const Manual& manual) {
   if (!manual.has("data_sheet")) return {};
-  return fmt::format("    drive: {{ eds: {}/{} }}\n", AXISD_SOURCE_DIR, manual.text("data_sheet"));
+  return fmt::format("    drive: {{ eds: {} }}\n", test::in_source_tree(manual.text("data_sheet")));
 }
 
 /// Switches and, where it has outputs, two of them, as the lines of an axis.

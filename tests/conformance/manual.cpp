@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "devices/descriptor.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::conformance {
 
@@ -25,7 +26,7 @@ using Row = std::map<std::string, std::string>;
 
 /// The rows below the heading, by its names.
 std::vector<Row> read(const std::string& name) {
-  std::ifstream file(std::string(AXISD_SOURCE_DIR "/tests/conformance/manual/") + name);
+  std::ifstream file(test::in_source_tree("tests/conformance/manual/") + name);
   if (!file)
     throw std::runtime_error("tests/conformance/manual/" + name + " is missing: read the manual, write it");
   std::vector<Row> rows;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tests/support/source_tree.hpp"
+
 namespace axisd::conformance {
 
 namespace {
@@ -135,8 +137,8 @@ Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& rec
             terminal_lines(chosen(manual, manual.list("outputs"), recipe.outputs, false), recipe.outputs);
   std::string settings = recipe.settings;
   if (manual.has("data_sheet"))
-    settings += fmt::format("{}eds: {}/{}", settings.empty() ? "" : ", ", AXISD_SOURCE_DIR,
-                            manual.text("data_sheet"));
+    settings += fmt::format("{}eds: {}", settings.empty() ? "" : ", ",
+                            test::in_source_tree(manual.text("data_sheet")));
   for (const auto& one : other_readings)
     if (variant.switches.contains(std::string(one.switch_name)))
       settings += fmt::format("{}{}: {}", settings.empty() ? "" : ", ", one.key, one.value);

@@ -10,6 +10,7 @@
 
 #include "devices/simulation/simulator.hpp"
 #include "tests/conformance/scenario.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::conformance {
 
@@ -115,7 +116,7 @@ TEST(Conformance, TheReadmeShowsTheMatrix) {
   std::vector<std::string> failures;
   const auto matrix = capability_matrix(failures);
   for (const auto& failure : failures) ADD_FAILURE() << failure;
-  std::ifstream file(AXISD_SOURCE_DIR "/README.md");
+  std::ifstream file(test::in_source_tree("README.md"));
   const std::string readme{std::istreambuf_iterator<char>(file), {}};
   const std::string_view begin = "<!-- capability matrix -->\n",
                          end = "<!-- end of the capability matrix -->";

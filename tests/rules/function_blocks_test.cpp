@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "tests/rules/m23_can_rig.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::test {
 namespace {
@@ -22,7 +23,7 @@ struct Step {
 };
 
 std::vector<Step> transcription() {
-  std::ifstream file(AXISD_SOURCE_DIR "/tests/golden/yss-c.function-blocks.csv");
+  std::ifstream file(test::in_source_tree("tests/golden/yss-c.function-blocks.csv"));
   std::vector<Step> steps;
   std::string line;
   std::getline(file, line);  // the titles

@@ -6,11 +6,12 @@
 #include <string>
 
 #include "config/configuration.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::config {
 
 inline std::filesystem::path source_path(const std::string& relative) {
-  return std::filesystem::path(AXISD_SOURCE_DIR) / relative;
+  return test::in_source_tree(relative);
 }
 
 inline std::string read_text(const std::filesystem::path& path) {

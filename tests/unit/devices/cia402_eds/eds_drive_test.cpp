@@ -9,6 +9,7 @@
 
 #include "devices/cia402/objects.hpp"
 #include "devices/cia402_eds/simulator_dictionary.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::cia402_eds {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const std::string path = AXISD_SOURCE_DIR "/config/examples/standard-drive.eds";
+const std::string path = test::in_source_tree("config/examples/standard-drive.eds");
 
 std::string example() {
   std::ifstream file(path);

@@ -2,6 +2,7 @@
 // its model, byte for byte.
 #include <fstream>
 
+#include "tests/support/source_tree.hpp"
 #include "tests/unit/devices/yako_rtu/simulator_fixture.hpp"
 
 namespace axisd::yako_rtu {
@@ -14,7 +15,7 @@ struct Exchange {
 
 /// The format is described at the head of each file.
 std::vector<Exchange> read_exchanges(std::string_view model) {
-  std::ifstream file(std::string(AXISD_SOURCE_DIR "/tests/golden/") + std::string(model) + ".frames");
+  std::ifstream file(test::in_source_tree("tests/golden/") + std::string(model) + ".frames");
   std::vector<Exchange> all;
   for (std::string line; std::getline(file, line);) {
     const std::string_view text = line;

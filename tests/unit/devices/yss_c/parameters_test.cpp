@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "devices/yss_c/objects.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::yss_c {
 namespace {
@@ -26,7 +27,7 @@ struct Printed {
 };
 
 std::vector<Printed> transcription() {
-  std::ifstream file(AXISD_SOURCE_DIR "/tests/conformance/manual/yss-c.csv");
+  std::ifstream file(test::in_source_tree("tests/conformance/manual/yss-c.csv"));
   std::vector<Printed> rows;
   std::string line;
   std::getline(file, line);

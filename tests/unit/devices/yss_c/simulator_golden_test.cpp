@@ -2,6 +2,7 @@
 // its order.
 #include <fstream>
 
+#include "tests/support/source_tree.hpp"
 #include "tests/unit/devices/yss_c/simulator_fixture.hpp"
 
 namespace axisd::yss_c {
@@ -12,7 +13,7 @@ struct Exchange {
 };
 
 std::vector<Exchange> read_exchanges() {
-  std::ifstream file(AXISD_SOURCE_DIR "/tests/golden/yss-c.frames");
+  std::ifstream file(test::in_source_tree("tests/golden/yss-c.frames"));
   std::vector<Exchange> all;
   for (std::string line; std::getline(file, line);) {
     if (line.starts_with("# section: "))
