@@ -3,7 +3,7 @@
 namespace axisd {
 
 MoveProfile profile_of(const Plan& plan) {
-  return {.target_pulses = static_cast<std::int32_t>(plan.target_counter),
+  return {.target_pulses = static_cast<std::int32_t>(plan.target.value().counter),
           .velocity_rpm = plan.velocity_rpm,
           .start_rpm = plan.start_rpm,
           .acceleration_time = plan.acceleration_time,

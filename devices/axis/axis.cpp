@@ -114,7 +114,9 @@ void Axis::on_sample(const DriveSample& sample) {
   const auto before = sample_;
   sample_ = sample;
   if (before) tell_edges(*before, sample);
-  if (!rezeroing_) tracker_.update(sample.position_pulses);
+  if (!rezeroing_) tracker_.update(sample.position_pulses, target_tolerance());
+  // What nothing holds may be turned by hand, and back again.
+  if (sample.moving || !sample.enabled) tracker_.forget_base();
   if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
   // Open loop: the overtravel stop at a limit has no ramp (M20). Homing runs onto limits by design.
   const bool homing = activity_ && activity_->state == AxisState::homing;
@@ -125,9 +127,9 @@ void Axis::on_sample(const DriveSample& sample) {
   if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
-  if (before && before->moving && !sample.moving && before->mode != DriveMode::homing &&
-      sample.mode != DriveMode::homing && limit_active(last_positive_))
-    lose_trust();  // open loop: the overtravel stop has no ramp (M20)
+  if (!drive_->closed_loop() && before && before->moving && !sample.moving &&
+      before->mode != DriveMode::homing && sample.mode != DriveMode::homing && limit_active(last_positive_))
+    lose_trust();  // the overtravel stop has no ramp (M20)
   if (!sample.enabled) on_released(sample, before && before->enabled);
   if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = left_running_ = false;
   if (link_ == LinkState::online)
@@ -136,7 +138,6 @@ void Axis::on_sample(const DriveSample& sample) {
     observed_.interrupted();
   if (terminal_motion_ && !sample.moving) {
     terminal_motion_ = false;
-    tracker_.forget_target();
   }
   if (sample.moving && !activity_ && !stopping_.running && link_ == LinkState::online)
     on_unexplained_motion(sample, before);
@@ -206,9 +207,9 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
 }
 
 void Axis::lose_trust() {
+  tracker_.forget_base();
   if (tracker_.trust() == PositionTrust::unknown) return;
   tracker_.lose_trust();
-  tracker_.forget_target();
   if (env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
 }
 
@@ -233,7 +234,8 @@ AxisState Axis::state() const {
   if (fault_) return AxisState::error_stop;
   if (stopping_.hold || (stopping_.running && stopping_.kind > StopKind::halt)) return AxisState::stopping;
   if (activity_ && activity_->state != AxisState::standstill) return activity_->state;
-  if (stopping_.running && stopping_.shown != AxisState::standstill) return stopping_.shown;
+  // MC_Halt shows DiscreteMotion until the axis rests (PLCopen part 1, 3.6).
+  if (stopping_.running && stopping_.from_motion) return AxisState::discrete_motion;
   if (terminal_motion_ && sample_) {
     if (sample_->mode == DriveMode::homing) return AxisState::homing;
     return sample_->mode == DriveMode::multi_velocity ? AxisState::continuous_motion

@@ -75,7 +75,7 @@ class Axis {
   [[nodiscard]] const Planner& planner() const { return planner_; }
   /// Pulses from where it stands to the plan's target.
   [[nodiscard]] std::int64_t way_of(const Plan& plan) const {
-    return plan.target_counter - tracker_.counter();
+    return plan.target.value().counter - tracker_.counter();
   }
 
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
@@ -300,6 +300,11 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   bool may_start(Activity& activity);
+  Task<Result<void>> look(Duration oldest);
+  [[nodiscard]] bool looks_restarted(const DriveSample& sample) const;
+  [[nodiscard]] Duration oldest_before_start() const;
+  Result<void> aim(Activity& activity);
+  [[nodiscard]] Result<void> check_way(const Plan& plan) const;
 
   // axis_lateness.cpp: nothing starts late (M31)
   void bound_start(const ActivityPtr& activity, bool waited, bool halting);
@@ -348,6 +353,8 @@ class Axis {
   /// Nothing of motion that was prepared so far is sent any more.
   void revoke_motion();
   void supersede(const Error& cause);
+  /// Before the activity ends: the stop that follows shows what it ends.
+  void note_motion_to_stop();
   void begin_stop(StopKind kind, bool hold, CommandPtr command);
   Task<> run_stop();
   void note_stop_sent(TimePoint end, bool answered);

@@ -37,8 +37,7 @@ std::optional<PositionTracker> Axis::expected_end() const {
     }
     case CommandKind::move_absolute:
     case CommandKind::move_relative:
-      return tracker_.after(
-          {.position = plan.target, .counter = plan.target_counter, .exact = plan.exact_target});
+      return tracker_.after(*plan.target);
     default:
       return std::nullopt;
   }
@@ -62,9 +61,7 @@ Result<Plan> Axis::plan_behind(const Action& action, const PositionTracker& from
   if (const auto* request = std::get_if<MoveRelativeRequest>(&action)) {
     if (!std::isfinite(request->distance))
       return fail(error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
-    auto plan = plan_to(from.plan_relative(request->distance), request->with);
-    if (plan) plan->granted.distance = *plan->granted.position - from.position();
-    return plan;
+    return plan_to(from.plan_relative(request->distance), request->with);
   }
   if (const auto* request = std::get_if<MoveVelocityRequest>(&action)) {
     if (request->hold)
@@ -114,9 +111,7 @@ Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOpti
   auto plan = plan_behind(action, *from);
   if (!plan) return fail(plan.error());
   auto end = *from;
-  if (plan->exact_target)
-    end =
-        from->after({.position = plan->target, .counter = plan->target_counter, .exact = plan->exact_target});
+  if (plan->target) end = from->after(*plan->target);
   if (kind_of(action) == CommandKind::home)
     end.set_position(settings_.homing->position, PositionTrust::homed);
   auto command = env_.book->open(settings_.name, action, options);

@@ -27,11 +27,7 @@ Result<Plan> Axis::plan_member(const GroupMemberRequest& request, const CommandO
                           : tracker_.plan_relative(request.distance.value_or(0));
   auto plan = plan_move(target, request.with);
   if (!plan) return plan;
-  if (request.position)
-    plan->trusted = settings_.require_trust;
-  else
-    plan->granted.distance = *plan->granted.position - tracker_.position();
-  plan->predicted = planner_.duration(*plan, way_of(*plan));
+  if (request.position) plan->trusted = settings_.require_trust;
   return plan;
 }
 
@@ -60,7 +56,7 @@ Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since
     *arrived = sample_->measured_at;
   }
   if (!co_await is_no_reboot(activity)) co_return;
-  tracker_.reached(activity->plan.exact_target);
+  tracker_.reached(*activity->plan.target);
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
@@ -121,7 +117,10 @@ Error Axis::Member::gone() const {
 Task<Result<void>> Axis::Member::note() {
   auto& axis = *axis_;
   if (!ready()) co_return axisd::fail(gone());
-  if (const auto room = co_await axis.make_room(activity_); !room) co_return room;
+  if (auto seen = co_await axis.look(axis.settings_.reboot_guard); !seen) co_return seen;
+  if (!ready()) co_return axisd::fail(gone());
+  if (auto aimed = axis.aim(*activity_); !aimed) co_return aimed;
+  if (auto room = co_await axis.make_room(activity_); !room) co_return room;
   if (!ready()) co_return axisd::fail(gone());
   const auto profile = profile_of(activity_->plan);
   if (!co_await axis.noted(activity_, axis.note_of(*activity_, axis.drive_->marks_until(profile))))
@@ -153,8 +152,9 @@ Task<Result<void>> Axis::Member::load() {
 void Axis::Member::aim() {
   auto& plan = activity_->plan;
   base_ = axis_->tracker_.counter();
-  const auto distance = plan.target_counter - base_;
-  there_ = distance == 0 || (there_ && std::abs(distance) <= axis_->target_tolerance());
+  const auto distance = plan.target->counter - base_;
+  there_ =
+      axis_->tracker_.rests_at(*plan.target) || (there_ && std::abs(distance) <= axis_->target_tolerance());
   plan.positive = (distance >= 0) != axis_->settings_.scale.invert;
   plan.predicted = axis_->planner_.duration(plan, distance);
 }
@@ -179,6 +179,7 @@ Task<Result<void>> Axis::Member::look() {
   if (was_there && !there_)
     co_return axisd::fail(
         axis_->error(Reason::moving, "the axis left its position before the start", "repeat the move"));
+  if (auto way = axis_->check_way(activity_->plan); !way) co_return way;
   co_return judge(*sample);
 }
 
@@ -275,9 +276,8 @@ void Axis::Member::end(Error cause, bool aborted) {
   axis.revoke_motion();
   if (activity_->may_run) {
     // The stop of one that may move goes out whatever is known of its start.
-    axis.tracker_.forget_target();
     axis.leave_running(*activity_);
-    axis.stopping_.shown = activity_->state;
+    axis.note_motion_to_stop();
     if (unknown) {
       ++axis.unknown_starts_.unresolved;
       if (!axis.fault_) axis.fault_ = cause;

@@ -86,11 +86,8 @@ Task<bool> Axis::back_off(ActivityPtr activity) {
   const auto velocity = std::max(settings_.homing->search_velocity, planner_.minimum_velocity());
   auto plan = planner_.profile(velocity, {.acceleration_time = settings_.homing->acceleration_time});
   if (plan) {
-    const auto target = tracker_.plan_relative(distance);
-    plan->positive = distance > 0;
-    plan->target = target.position;
-    plan->target_counter = target.counter;
-    plan->exact_target = target.exact;
+    // Away from an active switch is right, wherever the software limits are.
+    plan = planner_.aimed(*std::move(plan), tracker_.plan_relative(distance), tracker_);
   }
   if (!plan) {
     finish(*activity, [&](CommandRecord& command) { command.error(plan.error()); });
@@ -98,7 +95,7 @@ Task<bool> Axis::back_off(ActivityPtr activity) {
   }
   activity->plan = *plan;
   if (!co_await positioned(activity)) co_return false;
-  tracker_.forget_target();
+  tracker_.forget_base();
   if (!input_active(homing_switch())) co_return true;
   finish(*activity, [this](CommandRecord& command) {
     command.error(error(Reason::limit_switch,

@@ -146,7 +146,7 @@ SendingNote Axis::note_of(const Activity& activity, std::vector<ContinuityMark> 
     if (const auto mark = drive_->continuity_mark(); mark && note.marks.empty()) note.marks = {*mark};
     return note;
   }
-  if (!activity.plan.endless) note.target_pulses = static_cast<std::int32_t>(activity.plan.target_counter);
+  if (activity.plan.target) note.target_pulses = static_cast<std::int32_t>(activity.plan.target->counter);
   return note;
 }
 

@@ -54,13 +54,11 @@ void Axis::lease_lost(const Error& cause) {
   // What a terminal moves was not commanded under the lease.
   const bool moves =
       motion || stopping_.running || stop_owed_ || (sample_ && sample_->moving && !terminal_motion_);
-  const auto shown = motion ? activity_->state : stopping_.shown;
+  note_motion_to_stop();
   supersede(error(cause.reason, cause.message, cause.remedy));
   release_as_owed();
-  if (moves && !activity_) {
-    stopping_.shown = shown;
+  if (moves && !activity_)
     begin_stop(policy == LeaseLoss::halt ? StopKind::halt : StopKind::stop, false, nullptr);
-  }
   publish();
 }
 

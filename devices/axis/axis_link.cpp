@@ -225,7 +225,7 @@ void Axis::reconfigure(const std::string& why, bool position_lost) {
   link_error_ = error(Reason::configuring, "the configuration is applied again: " + why, "wait");
   if (position_lost) {
     lose_trust();
-    tracker_.forget_target();
+    tracker_.forget_base();
   }
   publish();
   sampled_.notify_all();
@@ -262,7 +262,7 @@ void Axis::go_offline(const Error& cause) {
     activity->command->unknown(unknown);
     drop_buffer(unknown);
   }
-  if (moved) tracker_.forget_target();
+  tracker_.forget_base();  // nobody sees whether somebody turns it
   terminal_motion_ = false;
   publish();
   sampled_.notify_all();

@@ -53,14 +53,20 @@ void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>&
   publish();
 }
 
+/// A motion that ends by an error of its own leaves the axis in ErrorStop (PLCopen part 1, 3.2); a start that
+/// is known not to have been executed does not.
 void Axis::fail_with_stop(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
-  revoke_motion();
-  tracker_.forget_target();
-  leave_running(activity);
-  stopping_.shown = activity.state;
+  if (cause.outcome != Outcome::not_executed) {
+    enter_error_stop(cause);
+  } else {
+    revoke_motion();
+    leave_running(activity);
+    note_motion_to_stop();
+    finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+  }
   begin_stop(StopKind::stop, false, nullptr);
-  finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+  publish();
 }
 
 /// A terminal brought the drive to rest, and may let go of it again: what the drive was told would still
@@ -84,7 +90,7 @@ void Axis::enter_error_stop(const Error& cause) {
     activity->command->error(cause);
     drop_buffer(cause);
   }
-  tracker_.forget_target();
+  tracker_.forget_base();
 }
 
 /// Waits for a sample whose request went out at `since` or later.
@@ -113,7 +119,7 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
 
 Task<> Axis::run_move(ActivityPtr activity) {
   if (!co_await positioned(activity)) co_return;
-  tracker_.reached(activity->plan.exact_target);
+  tracker_.reached(*activity->plan.target);
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
@@ -133,26 +139,100 @@ bool Axis::may_start(Activity& activity) {
   return false;
 }
 
+/// Reads the drive's state, unless the last reading is not older than `oldest`. Errors: as of
+/// Drive::read_state().
+Task<Result<void>> Axis::look(Duration oldest) {
+  constexpr int attempts = 3;
+  if (sample_ && sample_->asked_at >= env_.clock->now() - oldest) co_return Result<void>{};
+  const Chain chain(*this);
+  for (int attempt = 1;; ++attempt) {
+    auto sample = co_await drive_->read_state(TransactionClass::motion);
+    if (sample) {
+      // What a restart leaves behind must not be taken for a release, or for a shaft that was turned.
+      if (looks_restarted(*sample))
+        if (auto proof = co_await prove_continuity(TransactionClass::motion); !proof) co_return proof;
+      on_sample(*sample);
+      co_return Result<void>{};
+    }
+    if (sample.error().reason != Reason::no_reply || attempt == attempts) {
+      sample.error().outcome = Outcome::not_executed;
+      co_return fail(sample.error());
+    }
+  }
+}
+
+/// It may be the first reading of another power cycle.
+bool Axis::looks_restarted(const DriveSample& sample) const {
+  if (!sample_) return false;
+  const auto step = std::int64_t{sample.position_pulses} - sample_->position_pulses;
+  return sample.enabled != sample_->enabled || (!sample.moving && std::abs(step) > target_tolerance());
+}
+
+/// How old a reading may be from which a start is judged. Without terminals that could move or release the
+/// drive by themselves, only what the canary would show happens between two.
+Duration Axis::oldest_before_start() const {
+  const bool by_terminal = std::ranges::any_of(settings_.inputs, [this](const TerminalSettings& input) {
+    return starts_motion(input) || input.function == "motor_free";
+  });
+  return by_terminal || drive_->moves_by_itself() ? Duration{0} : settings_.reboot_guard;
+}
+
+/// Plans the activity's motion anew, from where the shaft is: the counter may mean something else since it
+/// was accepted (homing, SetPosition, zeroing), and the shaft may have been moved (M19). Errors: as of
+/// Planner::move().
+Result<void> Axis::aim(Activity& activity) {
+  auto& plan = activity.plan;
+  tracker_.settle_base();
+  const auto velocity = plan.granted.velocity;
+  const auto target = tracker_.again(*plan.target);
+  // What backs off from a switch before homing is bounded by itself.
+  if (activity.state == AxisState::homing) {
+    plan = planner_.aimed(std::move(plan), target, tracker_);
+    return {};
+  }
+  auto aimed = planner_.move(plan, target, tracker_);
+  if (!aimed) return fail(aimed.error());
+  plan = *std::move(aimed);
+  plan.granted.velocity = velocity;  // with its sign
+  activity.command->grant(plan.granted);
+  return {};
+}
+
+/// The drive would go as far as was asked (M19). Errors: moving.
+Result<void> Axis::check_way(const Plan& plan) const {
+  if (tracker_.deviation(*plan.target) <= target_tolerance() + 1) return {};
+  return fail(
+      error(Reason::moving,
+            fmt::format("the shaft was moved before the start: from {:.6g} {} the way would be another "
+                        "than the one that was asked for",
+                        tracker_.position(), settings_.scale.unit),
+            "see what moves it; then repeat the move"));
+}
+
 /// One positioning motion to the plan's target. False: the activity has ended.
 Task<bool> Axis::positioned(ActivityPtr activity) {
-  if (!co_await reach_standstill(activity) || !may_start(*activity)) co_return false;
-  auto result = co_await make_room(activity);
+  if (!co_await reach_standstill(activity)) co_return false;
+  auto result = co_await look(settings_.reboot_guard);
+  if (!current(*activity) || !may_start(*activity)) co_return false;
+  if (result) result = aim(*activity);
+  if (result) result = co_await make_room(activity);
   if (!current(*activity)) co_return false;
   if (result &&
       !co_await noted(activity, note_of(*activity, drive_->marks_until(profile_of(activity->plan)))))
     co_return false;
-  if (!may_start(*activity)) co_return false;
   std::int64_t base = 0;
   bool there = false;
   {
     const Chain chain(*this);
+    if (result) result = co_await look(oldest_before_start());
+    if (!current(*activity) || !may_start(*activity)) co_return false;
+    if (result) result = check_way(activity->plan);
     base = tracker_.counter();
-    there = result && activity->plan.target_counter == base;
+    const auto& target = *activity->plan.target;
+    there = result && tracker_.rests_at(target);
     if (result && !there) {
-      // From where it really starts: a motion before it may have ended anywhere.
-      const auto distance = activity->plan.target_counter - base;
-      activity->plan.positive = (distance >= 0) != settings_.scale.invert;
-      activity->plan.predicted = planner_.duration(activity->plan, distance);
+      activity->plan.predicted = planner_.duration(activity->plan, target.counter - base);
+      tracker_.forget_base();
       result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
     }
   }
@@ -169,7 +249,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
 /// A drive that was restarted, on the way or before, shows the counter 0: only where that is the target, too,
 /// it has to prove that it is the same one.
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
-  if (std::abs(activity->plan.target_counter) > target_tolerance()) co_return true;
+  if (std::abs(activity->plan.target->counter) > target_tolerance()) co_return true;
   co_return co_await proven_continuous(activity);
 }
 
@@ -199,9 +279,10 @@ std::int64_t Axis::target_tolerance() const {
 
 Task<> Axis::run_velocity(ActivityPtr activity) {
   if (!activity->plan.endless) {
+    // Without a known position a jog is bounded by its travel alone: from where the shaft is (M16).
+    if (activity->plan.target->distance) tracker_.forget_base();
     if (!co_await positioned(activity)) co_return;
     remember_position();
-    tracker_.forget_target();
     const bool jog = activity->command->value().kind == CommandKind::jog;
     const auto& limits = settings_.limits;
     const auto left = activity->plan.positive ? *limits.position_maximum - tracker_.position()
@@ -310,15 +391,13 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
     if (!current(*activity)) co_return false;
     const auto now = env_.clock->now();
     if (activity->hold_until && now >= *activity->hold_until) {
-      const bool jog = activity->command->value().kind == CommandKind::jog;
-      stopping_.shown = activity->state;
+      note_motion_to_stop();
       revoke_motion();
       leave_running(*activity);
       begin_stop(StopKind::halt, false, nullptr);
       auto cause =
           error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");
-      finish(*activity,
-             [&](CommandRecord& command) { jog ? command.done() : command.abort(std::move(cause)); });
+      finish(*activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
       co_return false;
     }
     if (sample_ && sample_->asked_at >= since) {
@@ -331,7 +410,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       }
       if (!sample.moving) {
         // Before it moved it may rest within the tolerance, too.
-        const bool there = !plan.endless && std::abs(tracker_.counter() - plan.target_counter) <= tolerance;
+        const bool there = !plan.endless && std::abs(tracker_.counter() - plan.target->counter) <= tolerance;
         if (there && activity->started) co_return true;
         if (activity->started && judge_rest(*activity)) co_return false;
       }
@@ -353,10 +432,9 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
 
 /// The drive rests, but not at the target: says why, and ends the activity.
 bool Axis::judge_rest(Activity& activity) {
-  tracker_.forget_target();
   const auto positive = activity.plan.positive;
   if (limit_active(positive)) {
-    lose_trust();  // open loop: the overtravel stop has no ramp (M20)
+    if (!drive_->closed_loop()) lose_trust();  // the overtravel stop has no ramp (M20)
     abort_at_rest(activity, error(Reason::limit_switch,
                                   fmt::format("the {} limit switch ended the motion",
                                               positive ? "positive" : "negative"),

@@ -29,7 +29,9 @@ Task<> Axis::run_enable(ActivityPtr activity) {
   Result<void> result;
   {
     const Chain chain(*this);
-    result = co_await drive_->enable(guard(*activity));
+    result = co_await look(Duration{});  // the shaft may have been turned since it was read
+    if (!current(*activity)) co_return;
+    if (result) result = co_await drive_->enable(guard(*activity));
   }
   if (!current(*activity)) co_return;
   if (!result && result.error().reason == Reason::rebooted) {

@@ -119,7 +119,7 @@ void Axis::publish() {
   next->positive_direction = last_positive_;
   if (activity_) {
     next->command_id = activity_->command->value().id;
-    if (activity_->plan.granted.position) next->target = activity_->plan.target;
+    if (activity_->plan.target) next->target = activity_->plan.target->position;
   }
   const auto bits = sample_.value_or(DriveSample{});
   next->inputs = inputs(bits.inputs);

@@ -116,7 +116,6 @@ Result<CommandPtr> Axis::accept(const MoveRelativeRequest& request, const Comman
   if (auto permitted = permit(request, options); !permitted) return fail(permitted.error());
   auto plan = plan_move(tracker_.plan_relative(request.distance), request.with);
   if (!plan) return fail(plan.error());
-  plan->granted.distance = *plan->granted.position - tracker_.position();
   const auto activity = begin(request, options, AxisState::discrete_motion, *plan);
   launch(run_move(activity), "move");
   return activity->command;
@@ -148,8 +147,8 @@ Result<std::optional<PositionTracker::Target>> Axis::end_of_velocity(bool positi
   // The limit may be further away than the drive takes as a target: then the motion ends before it.
   const auto way = static_cast<double>(target.counter - tracker_.counter());
   if (const auto longest = static_cast<double>(planner_.longest_move()); std::abs(way) > longest)
-    target = tracker_.plan_absolute(tracker_.position() + (target.position - tracker_.position()) *
-                                                              (longest / std::abs(way)) * 0.999);
+    target =
+        tracker_.plan_relative((target.position - tracker_.position()) * (longest / std::abs(way)) * 0.999);
   return target;
 }
 
@@ -228,7 +227,7 @@ Result<CommandPtr> Axis::accept(const StopRequest& request, const CommandOptions
 }
 
 void Axis::execute_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command) {
-  if (activity_) stopping_.shown = activity_->state;
+  note_motion_to_stop();
   supersede(error(Reason::superseded,
                   fmt::format("{} {} by {}", to_string(command->value().kind), command->value().id,
                               options.client.empty() ? "the daemon" : options.client)));
@@ -266,7 +265,7 @@ Result<CommandPtr> Axis::cancel(const CommandPtr& command, TimePoint arrived) {
     publish();
   } else if (activity_ && activity_->command == command) {
     stop_arrived_ = std::max(stop_arrived_, arrived);
-    if (activity_->state != AxisState::standstill) stopping_.shown = activity_->state;
+    note_motion_to_stop();
     supersede(error(Reason::cancelled, "cancelled by a client"));
     begin_stop(StopKind::halt, false, nullptr);
     publish();

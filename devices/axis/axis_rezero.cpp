@@ -14,7 +14,7 @@ constexpr auto zeroing_poll = milliseconds(5);
 
 /// Zeroes the drive's counter before a target could leave its 32 bit, or what the drive takes (M19).
 Task<Result<void>> Axis::make_room(ActivityPtr activity) {
-  if (planner_.reachable(activity->plan.target_counter)) co_return Result<void>{};
+  if (planner_.reachable(activity->plan.target->counter)) co_return Result<void>{};
   // After it the saved record speaks of another zero, and would fit again where the counter comes by (M20).
   activity->waits_for = StartWait::disk;
   if (auto forgotten = co_await forget_saved_position(); !forgotten) co_return forgotten;
@@ -33,13 +33,13 @@ Task<Result<void>> Axis::make_room(ActivityPtr activity) {
   const bool zero = co_await counter_shows_zero();
   rezeroing_ = false;
   if (zero) {
-    activity->plan.target_counter -= tracker_.counter();
     tracker_.rezero(0);
+    activity->plan.target = tracker_.again(*activity->plan.target);
     co_return Result<void>{};
   }
   // It may become zero at any time, which would look like a motion.
   lose_trust();
-  tracker_.forget_target();
+  tracker_.forget_base();
   auto cause =
       error(Reason::not_confirmed, "the drive's position counter could not be zeroed", "repeat the move");
   cause.outcome = Outcome::not_executed;

@@ -30,13 +30,16 @@ void Axis::supersede(const Error& cause) {
   revoke_motion();
   if (auto activity = std::exchange(activity_, nullptr)) {
     leave_running(*activity);
-    if (activity->state != AxisState::standstill) tracker_.forget_target();
     auto told = cause;
     const bool enabling = activity->noted && activity->command->value().kind == CommandKind::enable;
     if (activity->may_run || enabling) told.outcome = Outcome::unknown;  // its start may be under way
     activity->command->abort(std::move(told));
     drop_buffer(cause);
   }
+}
+
+void Axis::note_motion_to_stop() {
+  if (activity_ && activity_->state != AxisState::standstill) stopping_.from_motion = true;
 }
 
 void Axis::begin_stop(StopKind kind, bool hold, CommandPtr command) {
@@ -74,8 +77,7 @@ Task<> Axis::run_stop() {
   auto commands = std::exchange(stopping_.commands, {});
   stopping_.running = false;
   stopping_.kind = StopKind::none;
-  stopping_.shown = AxisState::standstill;
-  tracker_.forget_target();
+  stopping_.from_motion = false;
   if (confirmed) {
     observed_.standstill_confirmed(env_.clock->now());
     stop_owed_ = left_running_ = false;

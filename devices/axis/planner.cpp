@@ -146,11 +146,15 @@ Result<Plan> Planner::move(Plan plan, const PositionTracker::Target& target,
   Obstacles found;
   check_move(target, tracker, found);
   if (auto allowed = found.verdict(); !allowed) return fail(allowed.error());
-  plan.target = target.position;
-  plan.target_counter = target.counter;
-  plan.exact_target = target.exact;
+  return aimed(std::move(plan), target, tracker);
+}
+
+Plan Planner::aimed(Plan plan, const PositionTracker::Target& target, const PositionTracker& tracker) const {
+  plan.target = target;
   plan.positive = positive(target, tracker);
   plan.granted.position = scale_->to_units(target.counter + tracker.offset());
+  if (target.distance) plan.granted.distance = *plan.granted.position - tracker.position();
+  plan.predicted = duration(plan, target.counter - tracker.counter());
   return plan;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "devices/axis/command.hpp"
 #include "devices/axis/obstacles.hpp"
@@ -18,9 +19,7 @@ struct Plan {
   int velocity_rpm = 0;  ///< drive direction: signed for velocity, positive for positioning
   int start_rpm = 0;
   Duration acceleration_time{}, deceleration_time{};
-  std::int64_t target_counter = 0;  ///< unwrapped; positioning only
-  double target = 0;                ///< user units
-  std::shared_ptr<const PositionTracker::Exactly> exact_target{};
+  std::optional<PositionTracker::Target> target{};  ///< positioning only
   bool trusted = false;  ///< the target means a place only while the position is trusted
   bool positive = true;  ///< axis direction
   bool endless = false;  ///< drive speed mode
@@ -37,6 +36,9 @@ class Planner {
   /// Completes a profile for a move to `target`. Errors: out_of_range, soft_limit.
   [[nodiscard]] Result<Plan> move(Plan plan, const PositionTracker::Target& target,
                                   const PositionTracker& tracker) const;
+  /// move() without its limits. Precondition: as of that, `target` is within a long move's reach.
+  [[nodiscard]] Plan aimed(Plan plan, const PositionTracker::Target& target,
+                           const PositionTracker& tracker) const;
   /// All that forbids what profile() and move() are asked for: they fail with the first.
   void check_profile(double velocity, const MotionValues& asked, Obstacles& found) const;
   void check_move(const PositionTracker::Target& target, const PositionTracker& tracker,

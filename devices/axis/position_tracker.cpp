@@ -1,5 +1,6 @@
 #include "devices/axis/position_tracker.hpp"
 
+#include <cstdlib>
 #include <limits>
 
 #include "devices/units/exact_scale.hpp"
@@ -13,7 +14,7 @@ struct PositionTracker::Exactly {
 PositionTracker::PositionTracker(const Scale& scale) : scale_(scale) {}
 PositionTracker::~PositionTracker() = default;
 
-void PositionTracker::update(std::int32_t counter) {
+void PositionTracker::update(std::int32_t counter, std::int64_t window) {
   if (!known_) {
     counter_ = counter;
     known_ = true;
@@ -24,6 +25,7 @@ void PositionTracker::update(std::int32_t counter) {
   const auto step = static_cast<std::int32_t>(
       static_cast<std::uint32_t>(counter) - static_cast<std::uint32_t>(static_cast<std::uint64_t>(counter_)));
   counter_ += step;
+  if (base_ && std::abs(counter_ - base_->counter) > window) forget_base();
 }
 
 void PositionTracker::restart(std::int32_t counter) {
@@ -31,7 +33,7 @@ void PositionTracker::restart(std::int32_t counter) {
   known_ = true;
   offset_ = 0;
   trust_ = PositionTrust::unknown;
-  forget_target();
+  forget_base();
 }
 
 double PositionTracker::position() const { return scale_.to_units(counter_ + offset_); }
@@ -43,21 +45,22 @@ std::int64_t PositionTracker::offset_for(double position) const {
 void PositionTracker::set_position(double position, PositionTrust trust) {
   offset_ = offset_for(position);
   trust_ = trust;
-  commanded_ = std::make_shared<const Exactly>(Exact(position));
+  forget_base();
 }
 
 void PositionTracker::restore(std::int64_t offset) {
   offset_ = offset;
   trust_ = PositionTrust::restored;
-  forget_target();
+  forget_base();
 }
 
 void PositionTracker::rezero(std::int32_t counter_after) {
-  offset_ += counter_ - counter_after;
+  // What the drive clears is where it was told to stand.
+  const auto before = base_ ? base_->counter : counter_;
+  offset_ += before - counter_after;
   counter_ = counter_after;
+  if (base_) base_->counter = counter_after;
 }
-
-void PositionTracker::forget_target() { commanded_.reset(); }
 
 PositionTracker::Target PositionTracker::plan(Exactly target) const {
   constexpr auto limits = std::numeric_limits<std::int64_t>{};
@@ -76,17 +79,44 @@ PositionTracker::Target PositionTracker::plan_absolute(double position) const {
 }
 
 PositionTracker::Target PositionTracker::plan_relative(double distance) const {
-  const auto base = commanded_ ? commanded_->units : to_exact_units(scale_, counter_ + offset_);
-  return plan({base + Exact(distance)});
+  Target target{.distance = std::make_shared<const Exactly>(Exactly{Exact(distance)})};
+  return again(target);
+}
+
+PositionTracker::Target PositionTracker::again(const Target& target) const {
+  if (!target.distance) return plan(*target.exact);
+  const auto base = base_ ? base_->units->units : to_exact_units(scale_, counter_ + offset_);
+  auto planned = plan({base + target.distance->units});
+  planned.distance = target.distance;
+  return planned;
+}
+
+void PositionTracker::settle_base() {
+  if (base_) return;
+  base_ = {.units = std::make_shared<const Exactly>(Exactly{to_exact_units(scale_, counter_ + offset_)}),
+           .counter = counter_};
+}
+
+bool PositionTracker::rests_at(const Target& target) const {
+  return target.counter == (base_ ? base_->counter : counter_);
+}
+
+std::int64_t PositionTracker::deviation(const Target& target) const {
+  if (!target.distance) return 0;
+  const auto asked = to_pulses(scale_, target.distance->units);
+  if (!asked) return std::numeric_limits<std::int64_t>::max();
+  return std::abs(target.counter - counter_ - *asked);
 }
 
 PositionTracker PositionTracker::after(const Target& target) const {
   auto then = *this;
   then.counter_ = target.counter;
-  then.commanded_ = target.exact;
+  then.base_ = {.units = target.exact, .counter = target.counter};
   return then;
 }
 
-void PositionTracker::reached(std::shared_ptr<const Exactly> target) { commanded_ = std::move(target); }
+void PositionTracker::reached(const Target& target) {
+  base_ = {.units = target.exact, .counter = target.counter};
+}
 
 }  // namespace axisd

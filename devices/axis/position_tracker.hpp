@@ -14,13 +14,17 @@ namespace axisd {
 /// axis position = scale(unwrapped drive counter + offset). The counter is 32 bit wide and starts at 0 with
 /// each power-up; here it is unwrapped to 64 bit. Commanded positions are kept as exact rationals, so that
 /// any number of relative moves adds up without drift.
+///
+/// A relative move starts from its base: the target that was reached last, for as long as the shaft stays
+/// there; else the position that is measured.
 class PositionTracker {
  public:
   explicit PositionTracker(const Scale& scale);
   ~PositionTracker();
 
-  /// A new reading of the drive's counter.
-  void update(std::int32_t counter);
+  /// A new reading of the drive's counter. A base that lies further away than `window` pulses is void: the
+  /// shaft was moved. The window is 0 for a counted position, else the drive's in-position window.
+  void update(std::int32_t counter, std::int64_t window = 0);
   /// The drive restarted: its counter began anew, the old position is void.
   void restart(std::int32_t counter);
 
@@ -35,27 +39,40 @@ class PositionTracker {
   [[nodiscard]] std::int64_t offset_for(double position) const;
   /// Takes over a journalled offset after a restart of the daemon.
   void restore(std::int64_t offset);
-  /// The drive's counter was cleared at standstill: the position stays what it was.
+  /// The drive's counter was cleared at standstill: the position stays what it was, and so does the base.
   void rezero(std::int32_t counter_after);
 
   struct Exactly;
   struct Target {
-    double position;       ///< user units, for people
-    std::int64_t counter;  ///< unwrapped drive counter
-    std::shared_ptr<const Exactly> exact;
+    double position = 0;       ///< user units, for people
+    std::int64_t counter = 0;  ///< unwrapped drive counter
+    std::shared_ptr<const Exactly> exact{};
+    std::shared_ptr<const Exactly> distance{};  ///< of a relative move, as asked; user units
   };
-  /// Plans a move. The base of a relative move is the last commanded target at
-  /// standstill, or the present position after anything that ended elsewhere. Precondition: finite numbers.
+  /// Plans a move. Precondition: finite numbers.
   [[nodiscard]] Target plan_absolute(double position) const;
   [[nodiscard]] Target plan_relative(double distance) const;
+  /// The same move, by what is known at this moment: the counter may mean something else by now, and the
+  /// shaft stand elsewhere.
+  [[nodiscard]] Target again(const Target& target) const;
+  /// Where there is no base, the position that was measured last becomes it.
+  void settle_base();
+  /// The drive was told to go there, and rests there.
+  [[nodiscard]] bool rests_at(const Target& target) const;
+  /// Pulses by which the way to `target` differs from the distance that was asked for; 0 for an absolute one.
+  [[nodiscard]] std::int64_t deviation(const Target& target) const;
   /// How it will be once that target is reached: what is planned behind a move starts from there.
   [[nodiscard]] PositionTracker after(const Target& target) const;
   /// That target was reached and is the base of the next relative move.
-  void reached(std::shared_ptr<const Exactly> target);
-  /// The axis came to rest elsewhere.
-  void forget_target();
+  void reached(const Target& target);
+  /// The shaft moves, or nothing holds it where it stands.
+  void forget_base() { base_.reset(); }
 
  private:
+  struct Base {
+    std::shared_ptr<const Exactly> units;
+    std::int64_t counter = 0;  ///< what the drive was told; measured where it was told nothing
+  };
   [[nodiscard]] Target plan(Exactly target) const;
 
   Scale scale_;
@@ -63,7 +80,7 @@ class PositionTracker {
   bool known_ = false;
   std::int64_t offset_ = 0;
   PositionTrust trust_ = PositionTrust::unknown;
-  std::shared_ptr<const Exactly> commanded_;  ///< exact user units
+  std::optional<Base> base_;
 };
 
 }  // namespace axisd

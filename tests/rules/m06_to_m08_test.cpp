@@ -49,7 +49,7 @@ TEST(M06, EachStartIsCanaryBlockTrigger) {
     EXPECT_EQ(rig.writes_of(0x0027), 5);
     rig.run(100ms);
     const auto jog = rig.complete(JogRequest{.velocity = 20, .hold = 200ms});
-    EXPECT_EQ(jog.state, CommandState::done) << describe(jog);
+    EXPECT_EQ(jog.cause->reason, Reason::expired) << describe(jog);
     EXPECT_EQ(rig.writes_of(0x0027), 6);
   });
 }

@@ -120,7 +120,9 @@ TEST(M07, PowerCycleWhileNoReplyCouldBeToldFromALateOne) {
       rig.ready();
       EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
       witness.await_proof();
-      rig.run(20ms);  // the reading after it; the next is 200 ms away
+      // To just after a reading: the next is 200 ms away.
+      const auto read = rig.state()->sampled.after();
+      ASSERT_TRUE(rig.run_until([&] { return rig.state()->sampled.after() != read; }, 1s));
       ASSERT_NO_FATAL_FAILURE(use_up_all_lengths(rig));
       ASSERT_NO_FATAL_FAILURE(witness.run(wait));
       rig.cycle_power(300ms);

@@ -160,6 +160,7 @@ TEST(M10, DidNotStart) {
     const auto move = rig.complete(MoveAbsoluteRequest{.position = 30});
     EXPECT_EQ(move.state, CommandState::error) << describe(move);
     EXPECT_EQ(move.cause->reason, Reason::did_not_start);
+    EXPECT_EQ(rig.state()->state, AxisState::error_stop);
     rig.run(1s);
     EXPECT_GE(rig.writes_of(0x0028), 1);
     EXPECT_EQ(rig.writes_of(0x0027), 1);
@@ -179,6 +180,8 @@ TEST(M10, TookTooLong) {
   rig.run(15s);
   EXPECT_EQ(move->value().state, CommandState::error) << describe(move->value());
   EXPECT_EQ(move->value().cause->reason, Reason::took_too_long);
+  EXPECT_EQ(rig.state()->state, AxisState::error_stop);
+  EXPECT_EQ(rig.try_submit(MoveRelativeRequest{.distance = 1}).error().reason, Reason::fault);
   EXPECT_GE(rig.writes_of(0x0028), 1);
   EXPECT_FALSE(rig.drive->shaft_moving());
 }
@@ -193,6 +196,8 @@ TEST(M10, StoppedByAnotherMaster) {
     rig.run(2s);
     EXPECT_EQ(move->value().state, CommandState::error);
     EXPECT_EQ(move->value().cause->reason, Reason::not_reached) << describe(move->value());
+    EXPECT_EQ(rig.state()->state, AxisState::error_stop);
+    EXPECT_EQ(rig.complete(ResetRequest{}).state, CommandState::done);
     // The base of the next relative move is where it is, not where it should have been.
     const auto here = rig.load_mm();
     if (rig.state()->trust == PositionTrust::unknown) rig.complete(SetPositionRequest{.position = 50});

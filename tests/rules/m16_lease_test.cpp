@@ -237,7 +237,7 @@ TEST(M16Lease, AJogNeedsLeaseAndRenewal) {
   }
   EXPECT_EQ(rig.state()->state, AxisState::continuous_motion);
   rig.run(1s);
-  EXPECT_EQ(first->value().state, CommandState::done) << "its hold ended, though the lease did not";
+  EXPECT_EQ(first->value().cause->reason, Reason::expired) << "its hold ended, though the lease did not";
   const auto second = rig.submit(jog, {.client = "a", .request_id = "k", .lease_token = token});
   rig.run(100ms);
   EXPECT_TRUE(rig.machine->leases().release({.client = "a", .lease_token = token}));

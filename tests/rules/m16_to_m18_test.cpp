@@ -39,7 +39,7 @@ TEST(M16, AtTheSoftLimitOnlyTheOtherWay) {
     EXPECT_EQ(rig.try_submit(MoveVelocityRequest{.velocity = -10}).error().reason, Reason::soft_limit);
     EXPECT_EQ(rig.try_submit(MoveAbsoluteRequest{.position = -1}).error().reason, Reason::soft_limit);
     EXPECT_EQ(rig.try_submit(MoveAbsoluteRequest{.position = 400.1}).error().reason, Reason::soft_limit);
-    EXPECT_EQ(rig.complete(JogRequest{.velocity = 10}).state, CommandState::done);
+    EXPECT_EQ(rig.complete(JogRequest{.velocity = 10}).state, CommandState::aborted);
     EXPECT_GT(rig.load_mm(), 0);
     rig.run(1s);
     // Beyond a limit already: towards the range is allowed.
@@ -77,7 +77,8 @@ TEST(M16, AJogRunsWhileRenewedAndHaltsAtExpiry) {
     }
     const auto last = rig.world.now();
     ASSERT_TRUE(rig.run_until([&] { return jog->has_ended(); }, 2s));
-    EXPECT_EQ(jog->value().state, CommandState::done);
+    EXPECT_EQ(jog->value().state, CommandState::aborted);
+    EXPECT_EQ(jog->value().cause->reason, Reason::expired);
     EXPECT_NEAR(std::chrono::duration<double>(rig.world.now() - last).count(), 0.3, 0.03);
     rig.run(1s);
     EXPECT_FALSE(rig.drive->shaft_moving());

@@ -12,7 +12,7 @@ namespace {
 constexpr double pulses_per_mm = 100;
 
 AxisSettings feeder(const RigOptions& options) {
-  AxisSettings axis{.name = "feeder", .bus = "line-a", .node = 1, .model = "ykd2405pr"};
+  AxisSettings axis{.name = "feeder", .bus = "line-a", .node = 1, .model = options.model};
   axis.scale = {
       .pulses_per_revolution = 1000, .travel_numerator = 10, .invert = options.invert, .unit = "mm"};
   if (options.limits) {
@@ -59,7 +59,7 @@ Rig::Rig(RigOptions options)
   configuration.machine = "test";
   configuration.lines.push_back({.name = "line-a", .port = "sim"});
   configuration.axes.push_back({.axis = feeder(options_)});
-  drive = simulation::find_simulator("ykd2405pr")->make(drive_of(options_));
+  drive = simulation::find_simulator(options_.model)->make(drive_of(options_));
   drive->advance(world.now());
   if (options_.before_start) options_.before_start(*drive, world);
   start_daemon(options_.connect);

@@ -1,4 +1,4 @@
-// A whole machine with one simulated YKD2405PR in virtual time.
+// A whole machine with one simulated RS-485 drive in virtual time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,6 +21,7 @@ namespace axisd::test {
 
 struct RigOptions {
   bool invert = false;
+  std::string model = "ykd2405pr";
   simulation::Switches switches{};
   std::function<void(AxisSettings&)> adjust{};
   std::function<void(simulation::SimulatedNodeSettings&)> adjust_drive{};

@@ -21,7 +21,7 @@ TEST(PositionTracker, AHundredThousandThirdsDoNotDrift) {
     for (int i = 0; i < 100'000; ++i) {
       auto target = tracker.plan_relative(1.0 / 3);
       tracker.update(static_cast<std::int32_t>(target.counter));
-      tracker.reached(std::move(target.exact));
+      tracker.reached(target);
     }
     EXPECT_EQ(tracker.counter(), (invert ? -1 : 1) * std::llround(100'000 * (1.0 / 3) * 2));
   }
@@ -34,7 +34,7 @@ TEST(PositionTracker, APlanThatIsNotCarriedOutChangesNothing) {
   auto first = tracker.plan_absolute(10);
   (void)tracker.plan_absolute(500);
   tracker.update(20);
-  tracker.reached(std::move(first.exact));
+  tracker.reached(first);
   EXPECT_EQ(tracker.plan_relative(1).counter, 22);
 }
 
