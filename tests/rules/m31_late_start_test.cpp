@@ -96,7 +96,7 @@ TEST(M31, APausedProcessStartsNothingLate) {
 
 TEST(M31, AFullLineIsTold) {
   auto base = kept();
-  base.adjust = [](AxisSettings& axis) { axis.start_within = 12ms; };  // less than its chain takes
+  base.adjust = [](AxisSettings& axis) { axis.start_within = 16ms; };  // less than its chain takes
   Rig rig(base);
   rig.complete(SetPositionRequest{.position = 0});
   rig.line->forget_wire();
