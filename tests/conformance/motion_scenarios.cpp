@@ -107,7 +107,7 @@ std::string jogging(const Setup& setup) {
   }
   expect_state(bench.state(), v1::STATE_CONTINUOUS_MOTION);
   bench.pass(1s);
-  expect_command(bench.client.look_up(jog.response), v1::COMMAND_STATE_DONE);
+  expect_command(bench.client.look_up(jog.response), v1::COMMAND_STATE_ABORTED);
   expect_state(bench.state(), v1::STATE_STANDSTILL);
   EXPECT_NEAR(bench.state().position(), bench.shaft().mm, close);
   EXPECT_NEAR(bench.shaft().mm, 30 * 1.5, 6);
