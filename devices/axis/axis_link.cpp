@@ -114,8 +114,9 @@ Task<Result<void>> Axis::settle_found_motion() {
     bool rests = false;
     for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
       const auto sent = co_await drive_->stop(kind);
+      const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
+      if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
       if (!sent) co_return sent;
-      if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
       const auto deadline = env_.clock->now() + deceleration_bound() + settings_.stop_margin;
       rests = co_await standstill_unpolled(deadline, std::nullopt);
       if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop

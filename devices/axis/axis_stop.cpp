@@ -73,7 +73,6 @@ Duration Axis::deceleration_bound() const { return last_deceleration_; }
 
 Task<> Axis::run_stop() {
   const auto confirmed = co_await stop_and_confirm();
-  const auto kind = stopping_.kind;
   auto commands = std::exchange(stopping_.commands, {});
   stopping_.running = false;
   stopping_.kind = StopKind::none;
@@ -81,8 +80,6 @@ Task<> Axis::run_stop() {
   if (confirmed) {
     observed_.standstill_confirmed(env_.clock->now());
     stop_owed_ = left_running_ = false;
-    // Open loop: a stop without a ramp may have lost steps (M12).
-    if (kind == StopKind::quick_stop && !drive_->closed_loop()) lose_trust();
     remember_position();
     for (const auto& command : commands) command->done();
   } else {
@@ -121,6 +118,9 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto requests = stopping_.requests;
     const auto kind = stopping_.kind;
     const auto sent = co_await drive_->stop(kind);
+    // Open loop: a stop without a ramp may have lost steps (M12), also one of which only the reply was lost.
+    const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
+    if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
     wake();
     if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out, sent.has_value());
     const bool no_reply = !sent && sent.error().reason == Reason::no_reply;
