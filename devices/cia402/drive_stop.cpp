@@ -178,7 +178,10 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
     const auto held = co_await held_control(urgent);
     if (!held) {
       co_await wake_unheard();
-      co_return fail(held.error());
+      // Whatever is wrong with the reading: it is no refusal of the stop, which was not sent yet.
+      auto unheard = held.error();
+      unheard.reason = Reason::no_reply;
+      co_return fail(std::move(unheard));
     }
     was_halted = (*held & control::halt) != 0;
     state_bits_ = static_cast<std::uint16_t>(*held & control::state_bits);
