@@ -91,7 +91,7 @@ class Network {
 
 /// A port on a Network that outlives it. Its interface is up from the start on, unless faults are set.
 /// Thread: core.
-class NetworkPort final : public PortCore {
+class NetworkPort : public PortCore {
  public:
   NetworkPort(Clock& clock, PortSettings settings, Network& network);
   ~NetworkPort() override { shut(); }
@@ -106,10 +106,12 @@ class NetworkPort final : public PortCore {
   /// True: this interface is the process's own.
   bool cycle() override;
 
- private:
-  void open() override;
-  void shut() override;
+ protected:
   Written write(const Frame& frame) override;
+
+ private:
+  void open() final;
+  void shut() final;
   void catch_up() override { network_->catch_up(clock().now()); }
   void leave();
 

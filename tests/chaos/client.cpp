@@ -41,13 +41,35 @@ void Client::act() {
     (void)station.axis->release_stop();
     return;
   }
+  if (what < 68 && plant_->machine->inhibited_by() == nullptr && dice_.chance(0.2)) return move_group();
   submit(station, sensible(station));
+}
+
+/// Some axes together, on any bus.
+void Client::move_group() {
+  GroupMoveRequest request{.arrive_together = dice_.chance(0.5)};
+  const double share = 2.5 / static_cast<double>(plant_->stations.size());
+  for (const auto& station : plant_->stations) {
+    if (!station.axis->snapshot()->enabled || !dice_.chance(share)) continue;
+    GroupTarget target{.axis = station.name, .with = {.velocity = static_cast<double>(10 + dice_.pick(90))}};
+    if (dice_.chance(0.5))
+      target.position = static_cast<double>(dice_.pick(60));
+    else
+      target.distance = (dice_.pick(4001) - 2000) / 100.0;
+    request.targets.push_back(std::move(target));
+  }
+  if (request.targets.empty()) return;
+  const auto run = plant_->machine->groups().move(
+      request, {.client = name_, .request_id = fmt::format("{}-{}", name_, ++requests_)});
+  if (!run) return;
+  for (const auto& command : (*run)->commands()) judge_->accepted(command);
 }
 
 /// What gets on from here, mostly.
 Action Client::sensible(const Station& station) {
   const auto state = station.axis->snapshot();
-  if (dice_.chance(0.03)) return DisableRequest{};
+  if (dice_.chance(0.06)) return DisableRequest{};
+  if (dice_.chance(0.05)) return SetPositionRequest{.position = static_cast<double>(dice_.pick(40))};
   if (state->state == AxisState::error_stop && dice_.chance(0.8)) return ResetRequest{};
   if (!state->enabled && dice_.chance(0.8)) return EnableRequest{};
   if (state->trust == PositionTrust::unknown && dice_.chance(0.6)) {
@@ -60,8 +82,8 @@ Action Client::sensible(const Station& station) {
 Action Client::motion(const Station& /*station*/) {
   const MotionValues with{.velocity = static_cast<double>(10 + dice_.pick(90))};
   const int kind = dice_.pick(100);
-  if (kind < 45) return MoveAbsoluteRequest{.position = static_cast<double>(dice_.pick(60)), .with = with};
-  if (kind < 75) return MoveRelativeRequest{.distance = (dice_.pick(4001) - 2000) / 100.0, .with = with};
+  if (kind < 35) return MoveAbsoluteRequest{.position = static_cast<double>(dice_.pick(60)), .with = with};
+  if (kind < 70) return MoveRelativeRequest{.distance = (dice_.pick(4001) - 2000) / 100.0, .with = with};
   const double velocity = dice_.chance(0.5) ? 40 : -40;
   if (kind < 85) return MoveVelocityRequest{.velocity = velocity};
   if (kind < 98) return JogRequest{.velocity = velocity, .hold = 50ms + dice_.up_to(600ms)};
@@ -71,6 +93,9 @@ Action Client::motion(const Station& /*station*/) {
 void Client::submit(const Station& station, const Action& action) {
   CommandOptions options{.client = name_, .request_id = fmt::format("{}-{}", name_, ++requests_)};
   if (dice_.chance(0.1)) options.not_after = plant_->world.now() + dice_.up_to(60ms);
+  const bool may_wait = std::holds_alternative<MoveRelativeRequest>(action) ||
+                        std::holds_alternative<MoveAbsoluteRequest>(action);
+  if (may_wait && dice_.chance(0.4)) options.buffer_mode = BufferMode::buffered;
   const bool disable = std::holds_alternative<DisableRequest>(action);
   if (disable && station.axis->snapshot()->link != LinkState::offline) judge_->stop_asked(station.name);
   auto command = plant_->machine->submit(station.name, action, options);
@@ -111,21 +136,20 @@ void Client::stop_all() {
 }
 
 void Client::read_marks(const Station& station) {
+  if (station.on_can() || station.wired == Wired::segment) return;  // they are its table of positions
   // Also as long as the readings of state and canary are.
   constexpr std::array<std::uint16_t, 6> lengths{1, 2, 6, 9, 10, 16};
   const auto count = lengths.at(static_cast<std::size_t>(dice_.pick(lengths.size())));
   const int offset = dice_.pick(16 - count + 1) + (dice_.chance(0.5) ? 16 : 0);
-  modbus_rtu::Request request{.node = station.node,
-                              .address = static_cast<std::uint16_t>(Plant::marked_registers + offset),
-                              .count = count};
+  modbus_rtu::Request request{
+      .node = station.node, .address = static_cast<std::uint16_t>(marked_registers + offset), .count = count};
   auto read = [](modbus_rtu::RtuBus& bus, Judge& judge, const Station& of, int at,
                  modbus_rtu::Request what) -> Task<> {
     const auto answer = co_await bus.transact(std::move(what), {});
     if (answer) judge.check_marks(of, at, answer->registers);
   };
   spawn(plant_->world.executor(),
-        read(*plant_->machine->find_line(station.line), *judge_, station, offset, std::move(request)),
-        "read");
+        read(*plant_->machine->find_line(station.bus), *judge_, station, offset, std::move(request)), "read");
 }
 
 }  // namespace axisd::chaos

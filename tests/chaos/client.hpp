@@ -25,6 +25,7 @@ class Client {
   void act();
   void stop(Station& station);
   void stop_all();
+  void move_group();
   void read_marks(const Station& station);
   void submit(const Station& station, const Action& action);
   void repeat();

@@ -28,6 +28,7 @@ class Looker {
  private:
   void wait() {
     next_ = plant_->world.clock().call_at(plant_->world.now() + look_period, [this] {
+      plant_->settle();
       judge_->look();
       wait();
     });
@@ -49,7 +50,10 @@ void settle(Plant& plant, Judge& judge) {
       },
       60s);
   for (auto& station : plant.stations) {
-    if (station.axis->snapshot()->link != LinkState::online) judge.violation(station.name, "stays offline");
+    const auto state = station.axis->snapshot();
+    if (state->link != LinkState::online)
+      judge.violation(station.name, fmt::format("stays {}: {}", to_string(state->link),
+                                                state->link_error ? to_string(*state->link_error) : ""));
     (void)station.axis->release_stop();
     judge.stop_asked(station.name);
   }
@@ -70,18 +74,17 @@ void settle(Plant& plant, Judge& judge) {
 void Outcome::add(const Outcome& other) {
   transactions += other.transactions;
   faulted += other.faulted;
-  commands += other.commands;
-  done += other.done;
-  not_executed += other.not_executed;
-  starts += other.starts;
-  stops += other.stops;
-  positions += other.positions;
-  marks += other.marks;
-  violations += other.violations;
+  can_transactions += other.can_transactions;
+  can_faulted += other.can_faulted;
+  for (const auto part :
+       {&Outcome::commands, &Outcome::done, &Outcome::not_executed, &Outcome::starts, &Outcome::stops,
+        &Outcome::positions, &Outcome::marks, &Outcome::departures, &Outcome::distances,
+        &Outcome::by_terminal, &Outcome::by_sync, &Outcome::violations})
+    this->*part += other.*part;
 }
 
-Outcome run_episode(std::uint64_t seed) {
-  Plant plant(seed);
+Outcome run_episode(PlantKind kind, std::uint64_t seed) {
+  Plant plant(kind, seed);
   Judge judge(plant);
   plant.set_faulty(true);
   {
@@ -94,10 +97,14 @@ Outcome run_episode(std::uint64_t seed) {
     settle(plant, judge);
   }
   for (const auto& violation : judge.violations()) ADD_FAILURE() << violation;
-  if (!judge.violations().empty()) ADD_FAILURE() << fmt::format("repeat it with: test_chaos --seed {}", seed);
+  if (!judge.violations().empty())
+    ADD_FAILURE() << fmt::format("repeat it with: test_chaos --seed{} {}",
+                                 kind == PlantKind::network ? "-can" : "", seed);
   const auto& tally = judge.tally();
-  return {.transactions = plant.transactions(),
-          .faulted = plant.faulted(),
+  return {.transactions = plant.on_lines().transactions,
+          .faulted = plant.on_lines().faulted,
+          .can_transactions = plant.on_can().transactions,
+          .can_faulted = plant.on_can().faulted,
           .commands = tally.commands,
           .done = tally.done,
           .not_executed = tally.not_executed,
@@ -105,13 +112,18 @@ Outcome run_episode(std::uint64_t seed) {
           .stops = tally.stops,
           .positions = tally.positions,
           .marks = tally.marks,
+          .departures = tally.departures,
+          .distances = tally.distances,
+          .by_terminal = tally.by_terminal,
+          .by_sync = tally.by_sync,
           .violations = static_cast<int>(judge.violations().size())};
 }
 
-Outcome run_episodes(std::uint64_t first_seed, std::uint64_t faulted) {
+Outcome run_episodes(PlantKind kind, std::uint64_t first_seed, std::uint64_t faulted) {
   Outcome all;
-  for (auto seed = first_seed; all.faulted < faulted && all.violations == 0; ++seed)
-    all.add(run_episode(seed));
+  const auto& struck = kind == PlantKind::network ? all.can_faulted : all.faulted;
+  for (auto seed = first_seed; struck < faulted && all.violations == 0; ++seed)
+    all.add(run_episode(kind, seed));
   return all;
 }
 

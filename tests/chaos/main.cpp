@@ -1,6 +1,7 @@
 // gtest's main, and:
-//   test_chaos --seed SEED           repeats one episode, with the log
+//   test_chaos --seed SEED               repeats one episode, with the log
 //   test_chaos --faulted NUMBER [SEED]   goes on until so many transactions were struck by a fault
+//   test_chaos --seed-can SEED, --faulted-can NUMBER [SEED]   the same with a CAN network; NUMBER of its own
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
@@ -13,13 +14,19 @@
 
 namespace {
 
+using axisd::chaos::PlantKind;
+
 int report(const axisd::chaos::Outcome& outcome) {
+  fmt::print("{} transactions on lines, {} of them faulted; {} on CAN, {} of them faulted\n",
+             outcome.transactions, outcome.faulted, outcome.can_transactions, outcome.can_faulted);
+  fmt::print("{} commands, {} done, {} not executed; {} starts ({} by SYNC), {} more by terminals\n",
+             outcome.commands, outcome.done, outcome.not_executed, outcome.starts, outcome.by_sync,
+             outcome.by_terminal);
   fmt::print(
-      "{} transactions, {} of them faulted; {} commands, {} done, {} not executed; {} starts, {} stops "
-      "confirmed, "
-      "{} positions and {} registers compared; {} violations\n",
-      outcome.transactions, outcome.faulted, outcome.commands, outcome.done, outcome.not_executed,
-      outcome.starts, outcome.stops, outcome.positions, outcome.marks, outcome.violations);
+      "{} stops confirmed; {} departures, {} distances, {} positions and {} registers compared; {} "
+      "violations\n",
+      outcome.stops, outcome.departures, outcome.distances, outcome.positions, outcome.marks,
+      outcome.violations);
   return outcome.violations == 0 ? 0 : 1;
 }
 
@@ -29,10 +36,11 @@ int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
   const std::span<char*> arguments(argv, static_cast<std::size_t>(argc));
   const std::string_view mode = argc > 2 ? arguments[1] : "";
-  if (mode == "--seed") return report(axisd::chaos::run_episode(std::stoull(arguments[2])));
+  const auto kind = mode.ends_with("-can") ? PlantKind::network : PlantKind::lines;
+  if (mode.starts_with("--seed")) return report(axisd::chaos::run_episode(kind, std::stoull(arguments[2])));
   spdlog::set_level(spdlog::level::off);
-  if (mode == "--faulted")
-    return report(
-        axisd::chaos::run_episodes(argc > 3 ? std::stoull(arguments[3]) : 1, std::stoull(arguments[2])));
+  if (mode.starts_with("--faulted"))
+    return report(axisd::chaos::run_episodes(kind, argc > 3 ? std::stoull(arguments[3]) : 1,
+                                             std::stoull(arguments[2])));
   return RUN_ALL_TESTS();
 }

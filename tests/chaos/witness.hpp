@@ -4,54 +4,147 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "tests/chaos/telegram.hpp"
+#include "tests/support/borrowed_can_node.hpp"
 #include "tests/support/borrowed_node.hpp"
 
 namespace axisd::chaos {
 
-/// What reached a drive.
+/// What reached a drive, and what it did at once.
 struct Executed {
   TimePoint when;
-  std::span<const std::uint8_t> frame;
-  int starts = 0;  ///< motions that it started
-  [[nodiscard]] bool writes(std::uint16_t address) const {
-    return frame.size() == 8 && frame[1] == 0x06 && (frame[2] << 8U | frame[3]) == address;
-  }
+  std::span<const std::uint8_t> frame;  ///< on CAN its data
+  Telegram telegram{};
+  int starts = 0;         ///< motions that it started
+  std::int64_t from = 0;  ///< where its shaft was, pulses
+  bool moving = false;
 };
 
-class Witness final : public test::BorrowedNode {
+/// What is known of any drive, whatever wire it is on.
+class Witness {
  public:
-  explicit Witness(std::unique_ptr<simulation::SimulatedRtuNode> drive)
-      : BorrowedNode(*drive), drive_(std::move(drive)) {}
+  virtual ~Witness() = default;
+  [[nodiscard]] virtual simulation::SimulatedNode& drive() = 0;
+  [[nodiscard]] virtual const simulation::SimulatedNode& drive() const = 0;
 
   std::function<void(const Executed&)> on_executed;  ///< of frames for this node
+  std::function<void()> on_own_start;                ///< it started, and no frame made it
+  [[nodiscard]] std::int64_t shaft_pulses() const { return drive().shaft_pulses(); }
+  [[nodiscard]] bool shaft_moving() const { return drive().shaft_moving(); }
   /// No later than the last movement of the shaft so far.
   [[nodiscard]] TimePoint last_moved() const { return last_moved_; }
   [[nodiscard]] TimePoint last_power_loss() const { return last_power_loss_; }
 
-  void advance(TimePoint now) override {
-    BorrowedNode::advance(now);
+ protected:
+  void time_passed(TimePoint now) {
     if (const auto shaft = shaft_pulses(); shaft != std::exchange(last_shaft_, shaft)) last_moved_ = now;
     now_ = now;
+    note_own_start();
+  }
+  void touched() {
+    if (const auto shaft = shaft_pulses(); shaft != std::exchange(last_shaft_, shaft)) last_moved_ = now_;
+    note_own_start();
+  }
+  void lost_power() { last_power_loss_ = now_; }
+  /// Of a frame that `hand_over` gives to the drive. True: it was for this node.
+  template <class HandOver>
+  void executes(std::span<const std::uint8_t> frame, const Telegram& telegram, HandOver hand_over) {
+    const auto from = shaft_pulses();
+    const bool own = hand_over();
+    const auto starts = drive().starts() - std::exchange(starts_, drive().starts());
+    if (own && on_executed)
+      on_executed({.when = now_,
+                   .frame = frame,
+                   .telegram = telegram,
+                   .starts = starts,
+                   .from = from,
+                   .moving = shaft_moving()});
+  }
+
+ private:
+  void note_own_start() {
+    if (drive().starts() != std::exchange(starts_, drive().starts()) && on_own_start) on_own_start();
+  }
+  std::int64_t last_shaft_ = 0;
+  int starts_ = 0;
+  TimePoint now_{}, last_moved_{}, last_power_loss_{};
+};
+
+class RtuWitness final : public test::BorrowedNode, public Witness {
+ public:
+  explicit RtuWitness(std::unique_ptr<simulation::SimulatedRtuNode> drive)
+      : BorrowedNode(*drive), drive_(std::move(drive)) {}
+
+  [[nodiscard]] simulation::SimulatedNode& drive() override { return *this; }
+  [[nodiscard]] const simulation::SimulatedNode& drive() const override { return *this; }
+  void advance(TimePoint now) override {
+    BorrowedNode::advance(now);
+    time_passed(now);
   }
   std::optional<std::vector<std::uint8_t>> on_frame(std::span<const std::uint8_t> frame) override {
-    const auto before = starts();
-    auto reply = BorrowedNode::on_frame(frame);
-    if (reply && on_executed) on_executed({.when = now_, .frame = frame, .starts = starts() - before});
+    std::optional<std::vector<std::uint8_t>> reply;
+    executes(frame, read_request(frame, *this), [&] {
+      reply = BorrowedNode::on_frame(frame);
+      return reply.has_value() && frame[0] == address();
+    });
     return reply;
   }
   void set_power(bool on) override {
-    if (!on) last_power_loss_ = now_;
+    if (!on) lost_power();
     BorrowedNode::set_power(on);
+  }
+  void set_input(std::string_view terminal, std::optional<bool> active) override {
+    BorrowedNode::set_input(terminal, active);
+    touched();
+  }
+  bool push_shaft(std::int64_t pulses) override {
+    const bool gave_way = BorrowedNode::push_shaft(pulses);
+    touched();
+    return gave_way;
   }
 
  private:
   std::unique_ptr<simulation::SimulatedRtuNode> drive_;
-  std::int64_t last_shaft_ = 0;
-  TimePoint now_{}, last_moved_{}, last_power_loss_{};
+};
+
+class CanWitness final : public test::BorrowedCanNode, public Witness {
+ public:
+  explicit CanWitness(std::unique_ptr<simulation::SimulatedCanNode> drive)
+      : BorrowedCanNode(*drive), drive_(std::move(drive)) {}
+
+  [[nodiscard]] simulation::SimulatedNode& drive() override { return *this; }
+  [[nodiscard]] const simulation::SimulatedNode& drive() const override { return *this; }
+  void advance(TimePoint now) override {
+    BorrowedCanNode::advance(now);
+    time_passed(now);
+  }
+  void on_frame(const can::Frame& frame) override {
+    executes(frame.bytes(), read_frame(frame, *this), [&] {
+      BorrowedCanNode::on_frame(frame);
+      return true;
+    });
+  }
+  void set_power(bool on) override {
+    if (!on) lost_power();
+    BorrowedCanNode::set_power(on);
+  }
+  void set_input(std::string_view terminal, std::optional<bool> active) override {
+    BorrowedCanNode::set_input(terminal, active);
+    touched();
+  }
+  bool push_shaft(std::int64_t pulses) override {
+    const bool gave_way = BorrowedCanNode::push_shaft(pulses);
+    touched();
+    return gave_way;
+  }
+
+ private:
+  std::unique_ptr<simulation::SimulatedCanNode> drive_;
 };
 
 }  // namespace axisd::chaos

@@ -29,6 +29,8 @@ class BorrowedNode : public simulation::SimulatedRtuNode {
   [[nodiscard]] std::span<const int> alarms() const override { return node_->alarms(); }
   void block_shaft(bool blocked) override { node_->block_shaft(blocked); }
   bool push_shaft(std::int64_t pulses) override { return node_->push_shaft(pulses); }
+  bool lean_on_shaft(int counts) override { return node_->lean_on_shaft(counts); }
+  [[nodiscard]] simulation::Encoder* encoder() override { return node_->encoder(); }
   [[nodiscard]] std::int64_t shaft_pulses() const override { return node_->shaft_pulses(); }
   [[nodiscard]] bool shaft_moving() const override { return node_->shaft_moving(); }
   [[nodiscard]] int starts() const override { return node_->starts(); }

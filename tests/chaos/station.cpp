@@ -1,0 +1,136 @@
+#include "tests/chaos/station.hpp"
+
+#include <array>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "devices/descriptor.hpp"
+#include "tests/support/source_tree.hpp"
+
+namespace axisd::chaos {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+/// 0x011F and 204Fh by default; in pulses, as the encoders of these drives are no coarser than their pulses.
+constexpr std::int64_t in_position_window = 10;
+
+/// A terminal that releases the motor is no more than the daemon can see where the position is measured: in
+/// open loop nothing tells what the load did meanwhile.
+Wired choose_wired(const Station& station, Dice& dice) {
+  constexpr std::array choices{Wired::nothing, Wired::jog, Wired::homing, Wired::segment, Wired::free};
+  const auto chosen = dice.pick(choices);
+  if (station.model == "cia402") return Wired::nothing;  // its inputs have one meaning each
+  if (chosen == Wired::free && !station.closed_loop()) return Wired::nothing;
+  const bool has_segments = station.model == "ykd2405pr" || station.model == "ssd2608pr";
+  return chosen == Wired::segment && !has_segments ? Wired::jog : chosen;
+}
+
+void assign_inputs(const Station& station, AxisSettings& axis) {
+  const bool standard = station.model == "cia402";
+  const auto use = [&](const char* terminal, const char* function) {
+    axis.inputs.push_back({.terminal = terminal, .function = function});
+  };
+  use(standard ? "HOME" : "X0", "home");
+  // Where a terminal has one meaning, it is that of the drive's direction.
+  use(standard ? "POS" : "X1", standard && station.invert ? "negative_limit" : "positive_limit");
+  use(standard ? "NEG" : "X2", standard && station.invert ? "positive_limit" : "negative_limit");
+  switch (station.wired) {
+    case Wired::nothing:
+      break;
+    case Wired::jog:
+      use("X3", "jog_positive");
+      break;
+    case Wired::homing:
+      use("X3", "homing_start");
+      break;
+    case Wired::free:
+      use("X3", "motor_free");
+      break;
+    case Wired::segment:
+      use("X3", "pt_enable");
+      use("X4", "pin0");
+      axis.segments = SegmentSettings{.positions = {{.number = 1, .target = -7, .velocity = 60}}};
+      break;
+  }
+}
+
+/// Its data sheet is read once.
+void describe(AxisSettings& axis) {
+  static const auto settings =
+      std::map<std::string, SettingValue>{{"eds", test::in_source_tree("config/examples/standard-drive.eds")},
+                                          {"velocity_unit", std::string("pulses_per_second")},
+                                          {"ramps", std::string("rate")},
+                                          {"loop_mode", std::string("closed")}};
+  static const auto made = [] {
+    const auto* model = find_drive_model("cia402");
+    auto special = model->specialise(*model, settings);
+    if (!special) throw std::runtime_error(to_string(special.error()));
+    return *special;
+  }();
+  axis.model_settings = settings;
+  axis.own_descriptor = made;
+}
+
+}  // namespace
+
+std::uint16_t mark(std::uint8_t node, int offset) {
+  return static_cast<std::uint16_t>(0x4000 + node * 0x100 + offset);
+}
+
+AxisSettings make_axis(Station& station, Dice& dice) {
+  AxisSettings axis{.name = station.name, .bus = station.bus, .node = station.node, .model = station.model};
+  axis.scale = {
+      .pulses_per_revolution = 1000, .travel_numerator = 10, .invert = station.invert, .unit = "mm"};
+  if (station.limited) {
+    axis.limits.position_minimum = 0;
+    axis.limits.position_maximum = 400;
+  }
+  axis.limits.velocity = 100;
+  // The closed loop models of this maker cannot home an inverted axis.
+  if (!station.invert || !station.closed_loop())
+    axis.homing = HomingSettings{.method = HomingMethod::home_negative,
+                                 .velocity = 20,
+                                 .search_velocity = 2,
+                                 .position = 0,
+                                 .backoff = 5,
+                                 .timeout = 30s};
+  axis.jog_travel = 10;
+  if (station.model == "cia402") describe(axis);
+  station.wired = choose_wired(station, dice);
+  assign_inputs(station, axis);
+  station.track = {.pulses_per_unit = station.invert ? -pulses_per_mm : pulses_per_mm,
+                   .slack = station.closed_loop() ? 1 + in_position_window : 1,
+                   .minimum = axis.limits.position_minimum,
+                   .maximum = axis.limits.position_maximum,
+                   .jog_travel = axis.jog_travel,
+                   .backoff = axis.homing ? *axis.homing->backoff : 0};
+  return axis;
+}
+
+simulation::SimulatedNodeSettings make_drive(const Station& station, Dice& dice) {
+  simulation::SimulatedNodeSettings settings{.address = station.node, .boot_time = 101ms + dice.up_to(300ms)};
+  const auto at = [](double mm) { return static_cast<std::int64_t>(mm * pulses_per_mm); };
+  settings.mechanics.home_switch_from = at(station.invert ? 50 : -52);
+  settings.mechanics.home_switch_to = at(station.invert ? 52 : -50);
+  settings.mechanics.positive_limit_from = at(150);
+  settings.mechanics.negative_limit_from = at(-150);
+  if (station.model == "cia402") return settings;
+  settings.switches["abrupt_stop_slips"] = dice.chance(0.3);
+  if (station.closed_loop()) {
+    settings.switches["position_is_commanded"] = dice.chance(0.2);
+    // What a terminal releases between two readings, only the counter can tell.
+    settings.switches["released_position_frozen"] = station.wired != Wired::free && dice.chance(0.3);
+  }
+  if (station.on_can()) return settings;
+  settings.switches["crc_error_answered"] = dice.chance(0.3);
+  // What can start motion is assigned to a terminal of a released drive only (M3).
+  const bool starts = station.wired != Wired::nothing && station.wired != Wired::free;
+  settings.switches["enabled_at_power_up"] = !starts && dice.chance(0.7);
+  for (int i = 0; i < marked_count; ++i) settings.eeprom[marked_registers + i] = mark(station.node, i);
+  return settings;
+}
+
+}  // namespace axisd::chaos
