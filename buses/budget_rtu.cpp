@@ -61,7 +61,7 @@ class Analysis {
   [[nodiscard]] Duration dearest(std::size_t among,
                                  const std::function<Duration(const AxisDemand&)>& of) const;
   [[nodiscard]] Duration reservations(std::int64_t overtaking) const;
-  [[nodiscard]] Duration wait_moving(int moving, int starting) const;
+  [[nodiscard]] Duration wait_moving(int moving, int starting, Duration late) const;
   [[nodiscard]] Duration wait_idle(int moving) const;
   [[nodiscard]] Duration refresh_moving(const AxisDemand& axis, Duration wait) const;
   [[nodiscard]] Duration refresh_idle(const AxisDemand& axis, Duration wait) const;
@@ -113,7 +113,8 @@ Duration Analysis::reservations(std::int64_t overtaking) const {
 
 /// From the queue to the first byte, in class moving_state. Each other axis has at most one exchange before
 /// it, or one chain while it starts; silent nodes may have to be stopped again.
-Duration Analysis::wait_moving(int moving, int starting) const {
+/// `late`: what silent ones among them cost more than ones that answer late.
+Duration Analysis::wait_moving(int moving, int starting, Duration late) const {
   const auto others = static_cast<std::size_t>(std::max(0, moving - 1));
   const auto chains = std::min(others, static_cast<std::size_t>(starting));
   const auto poll = [this](const AxisDemand& axis) { return cost(axis.set.state, axis); };
@@ -122,7 +123,7 @@ Duration Analysis::wait_moving(int moving, int starting) const {
   };
   const auto overtaking =
       static_cast<std::int64_t>(others - chains) + static_cast<std::int64_t>(chains) * longest_chain_ + 1;
-  return in_flight_ + late_ + dearest(chains, chain) + dearest(others - chains, poll) + late_ +
+  return in_flight_ + late_ + dearest(chains, chain) + dearest(others - chains, poll) + late +
          reservations(overtaking) + silence(demand_.line);
 }
 
@@ -190,7 +191,7 @@ LoadBudget Analysis::load(int moving) const {
   LoadBudget load{.moving = moving,
                   .utilisation = utilisation(moving, false),
                   .utilisation_max = utilisation(moving, true)};
-  const auto wait_while_moving = wait_moving(moving, moving - 1), wait_while_idle = wait_idle(moving);
+  const auto wait_while_moving = wait_moving(moving, moving - 1, late_), wait_while_idle = wait_idle(moving);
   for (const auto& axis : demand_.axes) {
     if (moving > 0)
       load.refresh_moving = std::max(load.refresh_moving, refresh_moving(axis, wait_while_moving));
@@ -203,31 +204,33 @@ LoadBudget Analysis::load(int moving) const {
   return load;
 }
 
-/// A stop overtakes all but what is under way, which it cuts at turnaround_max; another stop not always.
+/// A stop overtakes all but what is under way, which it cuts at turnaround_max; so does each stop with the
+/// one before it. That is what a late answer may take, too: it does not matter how many nodes are silent.
 StopBudget Analysis::stop(const AxisDemand& last, int axes) const {
   const auto stops = [this](const AxisDemand& axis) { return cost(axis.set.stop, axis); };
   const auto others = static_cast<std::size_t>(axes - 1);
   StopBudget stop{.axes = axes};
-  // Stops do not cut each other: the one of a silent node, which is owed it, may be under way.
   stop.last_frame = demand_.line.budget.host_allowance + in_flight_ + dearest(others, stops) +
-                    (count() > 1 ? late_ : Duration{}) + silence(demand_.line) + wire(last.set.stop.request);
+                    silence(demand_.line) + wire(last.set.stop.request);
   const auto acknowledged = turnaround(last) + wire(last.set.stop.reply);
+  // Those that do not answer are told again: twice, and once they are offline. Nothing need cut that.
+  const auto in_vain = [&](const AxisDemand& axis) { return stops(axis) + reply_margin; };
+  const auto told_again = 3 * dearest(std::max(others, std::size_t{1}), in_vain);
   // The first reading after the shaft rests; it may be asked for just before. Whatever is not stopped may
-  // start, and a silent node is told again, twice. What waits for a stopping axis anyway is hastened.
+  // start. What waits for a stopping axis anyway is hastened.
   const auto hastened = dearest(static_cast<std::size_t>(axes),
                                 [this](const AxisDemand& axis) { return cost(axis.set.longest, axis); });
-  stop.standstill =
-      stop.last_frame + acknowledged + refresh_moving(last, wait_moving(count(), count() - axes)) +
-      2 * demand_.silent_nodes * (silence(demand_.line) + answered(last.set.stop, slowest_) + reply_margin) +
-      hastened + answered(last.set.state, last);
+  const auto wait = wait_moving(count(), count() - axes, std::max(1, count() - 1) * reply_margin);
+  stop.standstill = stop.last_frame + acknowledged + refresh_moving(last, wait) + told_again + hastened +
+                    answered(last.set.state, last);
   return stop;
 }
 
 AxisBudget Analysis::axis(const AxisDemand& axis) const {
   return {.axis = axis.name,
           .refresh_idle = refresh_idle(axis, wait_idle(count() - 1)),
-          .refresh_moving = refresh_moving(axis, wait_moving(1, 0)),
-          .refresh_moving_all = refresh_moving(axis, wait_moving(count(), count() - 1)),
+          .refresh_moving = refresh_moving(axis, wait_moving(1, 0, late_)),
+          .refresh_moving_all = refresh_moving(axis, wait_moving(count(), count() - 1, late_)),
           .alone = stop(axis, 1),
           .all = stop(axis, count())};
 }

@@ -33,7 +33,8 @@ struct LineDemand {
   LineSettings line;
   std::vector<AxisDemand> axes;
   std::vector<DeviceDemand> devices{};
-  int silent_nodes = 1;  ///< so many may answer nothing at all
+  /// So many may answer nothing at all where axes are read; bounds of stops hold with any number of them.
+  int silent_nodes = 1;
 };
 
 /// Holds for any pattern of requests that keeps to the demand. Never fails.

@@ -7,6 +7,7 @@ namespace axisd::modbus_rtu {
 void Quarantine::silent(std::uint8_t node, TimePoint now, Duration cost, bool stop) {
   auto& known = nodes_[node];
   known.good = 0;
+  known.stop_in_vain = known.stop_in_vain || stop;
   // Stops alone do not put a node there: their repetitions are few, and urgent.
   if (stop && known.level == 0) return;
   const bool was_there = known.quarantined();
@@ -37,6 +38,7 @@ void Quarantine::answered(std::uint8_t node) {
   auto& known = nodes_[node];
   known.answered_once = true;
   known.silent = 0;
+  known.stop_in_vain = false;
   known.next = {};
   // Whoever is there again waits briefly only, so that an axis soon knows when it is gone once more.
   known.level = ++known.good >= quarantine_trust_after ? 0 : std::min(known.level, 1);
@@ -44,6 +46,11 @@ void Quarantine::answered(std::uint8_t node) {
 
 void Quarantine::forget() {
   for (auto& [address, node] : nodes_) node = {.entered = node.entered};
+}
+
+bool Quarantine::doubtful(std::uint8_t node) const {
+  const auto* known = nodes_.find(node);
+  return known != nullptr && (known->stop_in_vain || known->quarantined());
 }
 
 TimePoint Quarantine::ready_at(std::uint8_t node) const {

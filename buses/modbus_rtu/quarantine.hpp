@@ -35,6 +35,7 @@ class Quarantine {
     std::uint64_t probes = 0;   ///< requests in vain since then
     std::uint64_t entered = 0;  ///< times that it was put there; kept by forget()
     bool answered_once = false;
+    bool stop_in_vain = false;  ///< a stop was not answered, and nothing was since
     [[nodiscard]] bool quarantined() const { return level > 0 && silent > 0; }
   };
 
@@ -46,6 +47,9 @@ class Quarantine {
   void forget();
   /// No request but a new stop before this.
   [[nodiscard]] TimePoint ready_at(std::uint8_t node) const;
+  /// A stop to it is less likely to be heard than one to another: it did not answer the last, or is in
+  /// quarantine.
+  [[nodiscard]] bool doubtful(std::uint8_t node) const;
   /// By address; only those that were asked something.
   [[nodiscard]] const NodeTable<Node>& nodes() const { return nodes_; }
 

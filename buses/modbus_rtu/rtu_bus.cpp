@@ -84,6 +84,7 @@ Result<TransactionPtr> RtuBus::prepare(Request request, TransactionOptions optio
 
 void RtuBus::submit(TransactionPtr transaction) {
   const auto transaction_class = transaction->transaction_class;
+  transaction->doubtful = quarantine_.doubtful(transaction->exchange.request.node);
   if (must_wait(*transaction, clock_->now()))
     queue_.hold(std::move(transaction));
   else if (transaction->watch != nullptr && transaction->watch->proves())
@@ -165,8 +166,8 @@ void RtuBus::pump() {
     const auto& first = *round_.front();
     const auto top = queue_.top_class();
     // State reads do not overtake each other in the slot: a reservation would be taken back each time.
-    const bool urgent = top == TransactionClass::stop || (top == TransactionClass::motion && !first.reserved);
-    const bool overtaken = urgent && *top < first.transaction_class;
+    const bool motion_waits = top == TransactionClass::motion && !first.reserved;
+    const bool overtaken = queue_.has_stop_before(first) || (motion_waits && *top < first.transaction_class);
     const bool dead = may_send(first.exchange.guard, now) != Verdict::send;
     const bool disturbed = round_.size() > 1 && !queue_.only_idle();
     if (!((overtaken || dead || disturbed) && take_back()) && top == TransactionClass::stop)
@@ -223,6 +224,8 @@ void RtuBus::arm_next() {
   else
     extend_round();
   line_->arm(round_.front()->exchange);
+  // Of those that wait together, each has to be cut where its node is silent.
+  if (queue_.top_class() == TransactionClass::stop) line_->cut_wait();
 }
 
 /// The quarantine of its node forbids sending it now, or no answer to it could be told from a late one.

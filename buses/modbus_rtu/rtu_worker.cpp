@@ -143,11 +143,16 @@ Result<SerialPort> RtuWorker::open_port() {
 Error RtuWorker::serve(SerialPort port) {
   const auto path = port.path();
   WireSession session(std::move(port), settings_, wakeup_, progress_);
-  int lost = session.find_echo();
+  // One that was asked for just now goes out as soon as the core knows of the open port.
+  const auto began = monotonic_now();
+  int lost = session.find_echo([&] { return quitting() || stop_notice_->given() >= began; });
+  const std::function<bool()> stop_waits = [this] {
+    return quitting() || awaits_stop() || (stop_armed_.load() && armed());
+  };
   if (lost == 0) report(PortStatus{.open = true, .error = {}});
   while (lost == 0 && !quitting()) {
     touch();
-    lost = session.find_echo();
+    lost = session.find_echo(stop_waits);
     if (lost == 0) lost = session.keep_silence();
     if (lost != 0) break;
     bool announced = false;

@@ -1,6 +1,7 @@
 #include "buses/modbus_rtu/transaction_queue.hpp"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 namespace axisd::modbus_rtu {
@@ -24,8 +25,23 @@ TimePoint expiry_of(const Transaction& transaction) {
 
 }  // namespace
 
+bool TransactionQueue::Order::before(const Transaction& a, const Transaction& b) {
+  const auto turn = [](const Transaction& one) {
+    if (lane_class(one) != TransactionClass::stop) return TimePoint{};
+    return one.queued_at + (one.doubtful ? doubtful_patience : Duration{});
+  };
+  return std::tuple(a.exchange.deadline, turn(a), a.sequence) <
+         std::tuple(b.exchange.deadline, turn(b), b.sequence);
+}
+
 bool TransactionQueue::Order::operator()(const TransactionPtr& a, const TransactionPtr& b) const {
-  return std::pair(a->exchange.deadline, a->sequence) < std::pair(b->exchange.deadline, b->sequence);
+  return before(*a, *b);
+}
+
+bool TransactionQueue::has_stop_before(const Transaction& other) const {
+  const auto& stops = lanes_.front();
+  return !stops.empty() &&
+         (lane_class(other) != TransactionClass::stop || Order::before(**stops.begin(), other));
 }
 
 void TransactionQueue::push(TransactionPtr transaction) {
@@ -69,7 +85,7 @@ void TransactionQueue::insert(TransactionPtr transaction, bool held) {
   if (held)
     held_[node].push_back(std::move(transaction));
   else
-    place.in_lane = lane(one->transaction_class).insert(std::move(transaction)).first;
+    place.in_lane = lane(lane_class(*one)).insert(std::move(transaction)).first;
   auto& places = by_node_[node];
   places.insert(std::ranges::upper_bound(places, one->sequence, {}, sequence_of), place);
 }
@@ -85,7 +101,7 @@ TransactionPtr TransactionQueue::take(Transaction* transaction) {
     std::erase(guarded->second, transaction);
     if (guarded->second.empty()) guarded_.erase(guarded);
   }
-  if (!place.held) return std::move(lane(transaction->transaction_class).extract(place.in_lane).value());
+  if (!place.held) return std::move(lane(lane_class(*transaction)).extract(place.in_lane).value());
   auto& aside = held_.at(node);
   const auto found = std::ranges::find(aside, transaction, &TransactionPtr::get);
   auto taken = std::move(*found);
@@ -147,7 +163,7 @@ const Transaction* TransactionQueue::next_idle() const {
 
 std::optional<TransactionClass> TransactionQueue::top_class() const {
   for (const auto& candidate : lanes_)
-    if (!candidate.empty()) return (*candidate.begin())->transaction_class;
+    if (!candidate.empty()) return lane_class(**candidate.begin());
   return std::nullopt;
 }
 

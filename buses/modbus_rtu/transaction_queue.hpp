@@ -27,25 +27,31 @@ struct Transaction {
   TimePoint queued_at{};       ///< when it was asked for
   TimePoint released_at{};     ///< when it needed to wait for its node no more; long ago if it never did
   bool resync = false;         ///< nobody asked for it: it tells late replies from that of the next
-  bool patient = false;        ///< though a stop, it waits as others do for a node in quarantine
-  bool reserved = false;       ///< it was given out by the reservation: only a stop may take its place
-  Watch* watch = nullptr;      ///< that may repeat it
-  bool given_up = false;       ///< unless it goes out before it can be taken back
+  /// Though a stop, it waits as others do for a node in quarantine, and goes with the readings of moving
+  /// axes.
+  bool patient = false;
+  bool doubtful = false;   ///< a stop that is likely to go unanswered: it lets others go first
+  bool reserved = false;   ///< it was given out by the reservation: only a stop may take its place
+  Watch* watch = nullptr;  ///< that may repeat it
+  bool given_up = false;   ///< unless it goes out before it can be taken back
   /// Called exactly once each, unless its watch ends between two readings. Several: identical reads that were
   /// merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
 };
 using TransactionPtr = std::unique_ptr<Transaction>;
 
-/// Order of one bus: strict classes, earliest deadline within a class, then order of arrival. So that no
-/// class is ever starved, every `reservation`-th pop takes the head of a class *below* the one that would be
-/// next, the lower ones in turn (never instead of a stop). Pure: no I/O, no clock of its own.
+/// Order of one bus: strict classes, earliest deadline within a class, then order of arrival; among stops the
+/// doubtful ones last, as if they had come `doubtful_patience` later, so that no flood of others keeps them
+/// away for good. So that no class is ever starved, every `reservation`-th pop takes the head of a class
+/// *below* the one that would be next, the lower ones in turn (never instead of a stop). Pure: no I/O, no
+/// clock of its own.
 ///
 /// What a stop asks for (take_forbidden, hasten, push, pop) looks only at what waits for its own axis; the
 /// rest of the queue costs it the logarithm of its length.
 class TransactionQueue {
  public:
   static constexpr int default_reservation = 8;
+  static constexpr Duration doubtful_patience = std::chrono::seconds(2);
   explicit TransactionQueue(int reservation = default_reservation) : reservation_(reservation) {}
 
   /// A read equal to one that waits joins it (and lends it its urgency); everything else is queued.
@@ -67,6 +73,8 @@ class TransactionQueue {
   void release(std::uint8_t node, TimePoint now);
   /// Nodes for which something was put aside.
   [[nodiscard]] std::vector<std::uint8_t> held_nodes() const;
+  /// A stop waits that goes before this one, which is none of the queue's.
+  [[nodiscard]] bool has_stop_before(const Transaction& other) const;
   /// Class of the next one by strict order.
   [[nodiscard]] std::optional<TransactionClass> top_class() const;
   /// What waits for `node` in a lower class than `to` becomes that urgent.
@@ -88,6 +96,7 @@ class TransactionQueue {
 
  private:
   struct Order {
+    static bool before(const Transaction& a, const Transaction& b);
     bool operator()(const TransactionPtr& a, const TransactionPtr& b) const;
   };
   using Lane = std::set<TransactionPtr, Order>;
@@ -100,6 +109,10 @@ class TransactionQueue {
   static std::uint64_t sequence_of(const Place& place) { return place.transaction->sequence; }
   Lane& lane(TransactionClass transaction_class) {
     return lanes_.at(static_cast<std::size_t>(transaction_class));
+  }
+  static TransactionClass lane_class(const Transaction& transaction) {
+    const bool lower = transaction.patient && transaction.transaction_class == TransactionClass::stop;
+    return lower ? TransactionClass::moving_state : transaction.transaction_class;
   }
   void insert(TransactionPtr transaction, bool held);
   TransactionPtr take(Transaction* transaction);

@@ -14,6 +14,8 @@ namespace {
 /// Longest single wait, so that the watchdog sees an idle line alive.
 constexpr Duration longest_wait = std::chrono::seconds(1);
 constexpr int echo_attempts = 3;
+/// How often a wait for an echo asks whether it must end.
+constexpr Duration between_looks = std::chrono::milliseconds(1);
 /// 248..255 are reserved (Modbus over serial line 2.2): no node answers, so whatever comes back is an echo.
 constexpr std::uint8_t nobody = 248;
 
@@ -111,10 +113,11 @@ int WireSession::keep_silence() {
   }
 }
 
-WireSession::Bytes WireSession::read_until_full(std::span<std::uint8_t> buffer, TimePoint until) {
+WireSession::Bytes WireSession::read_until_full(std::span<std::uint8_t> buffer, TimePoint until,
+                                                const TimePoint* cut_from) {
   Bytes total;
   while (total.count < buffer.size()) {
-    const auto wait = wait_until(until, nullptr);
+    const auto wait = wait_until(until, cut_from);
     if (wait == Wait::failed) return {.count = total.count, .native_error = EIO};
     if (wait != Wait::bytes) break;
     const auto got = port_.read_available(buffer.subspan(total.count));
@@ -134,19 +137,37 @@ int WireSession::use(const SerialSettings& serial) {
   return 0;
 }
 
-int WireSession::find_echo() {
+/// What comes back of the request that was just sent.
+WireSession::Bytes WireSession::await_echo(std::span<std::uint8_t> buffer,
+                                           const std::function<bool()>& must_end) {
+  const auto until = request_end_ + echo_latency;
+  Bytes total;
+  for (auto now = monotonic_now(); now < until && total.count < buffer.size() && !must_end();
+       now = monotonic_now()) {
+    const auto heard = read_until_full(buffer.subspan(total.count), std::min(until, now + between_looks));
+    total.count += heard.count;
+    total.native_error = heard.native_error;
+    if (total.native_error != 0 || wakeup_.quit.load(std::memory_order_acquire)) break;
+  }
+  return total;
+}
+
+int WireSession::find_echo(const std::function<bool()>& must_end) {
   if (echo_known_) return 0;
   if (const int lost = use(line_.serial()); lost != 0) return lost;
   const auto probe = make_probe();
   for (int attempt = 0; attempt < echo_attempts && !echo_known_; ++attempt) {
     if (const int lost = keep_silence(); lost != 0) return lost;
-    silence_.finish();
+    silence_.finish(must_end);
+    if (must_end()) return 0;
     if (const int lost = port_.send(probe); lost != 0) return lost;
     request_end_ = last_byte_ = monotonic_now() + wire_time(serial_, probe.size());
     std::array<std::uint8_t, Frame::capacity> buffer;
-    const auto heard = read_until_full(std::span(buffer).first(probe.size()), request_end_ + echo_latency);
+    const auto heard = await_echo(std::span(buffer).first(probe.size()), must_end);
     if (heard.native_error != 0) return heard.native_error;
-    echo_ = std::ranges::equal(std::span(buffer).first(heard.count), probe.bytes());
+    const bool is_echo = std::ranges::equal(std::span(buffer).first(heard.count), probe.bytes());
+    if (!is_echo && must_end()) return 0;
+    echo_ = is_echo;
     echo_known_ = echo_ || heard.count == 0;  // other bytes: somebody else was talking, ask again
   }
   // An echo that is hidden by noise three times is not taken for one; ordinary reads would still find it.

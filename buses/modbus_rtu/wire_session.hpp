@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <span>
 
 #include "buses/modbus_rtu/line.hpp"
@@ -29,8 +30,9 @@ class WireSession {
   /// Waits until the last request has left: closing or re-opening the port would cut it off.
   ~WireSession();
 
-  /// Finds out whether the adapter hears what it sends, where that is not known.
-  int find_echo();
+  /// Finds out whether the adapter hears what it sends, where that is not known. Gives up at once where
+  /// `must_end()`, which is asked each millisecond: it is then found out later.
+  int find_echo(const std::function<bool()>& must_end);
   [[nodiscard]] bool uses(const SerialSettings& serial) const { return serial_known_ && serial_ == serial; }
   /// Brings the port to other serial settings; the line must be silent. 0, EINVAL (the port cannot do them)
   /// or the errno with which it was lost.
@@ -73,7 +75,8 @@ class WireSession {
   bool pass_echo(const Exchange& exchange, ExchangeResult& result);
   bool take_frame(const Exchange& exchange, ExchangeResult& result);
   bool is_own_echo(const Exchange& exchange, const Frame& damaged);
-  Bytes read_until_full(std::span<std::uint8_t> buffer, TimePoint until);
+  Bytes read_until_full(std::span<std::uint8_t> buffer, TimePoint until, const TimePoint* cut_from = nullptr);
+  Bytes await_echo(std::span<std::uint8_t> buffer, const std::function<bool()>& must_end);
   Bytes absorb();
   void settle(ExchangeResult& result);
   void end(ExchangeResult& result, ExchangeStatus status, int native_error = 0);
@@ -103,7 +106,7 @@ class WireSession {
   bool expected_ = false;  ///< the reply, any moment: nothing else need be looked at for a while
   bool damaged_ = false;   ///< unsound bytes came during the exchange under way
   bool echo_known_ = false;
-  bool echo_ = false;
+  bool echo_ = false;     ///< as far as known
   int stray_frames_ = 0;  ///< bursts that nobody asked for, not yet reported
 };
 

@@ -54,11 +54,14 @@ void WireSession::settle(ExchangeResult& result) {
   }
 }
 
-/// Takes the adapter's echo of the request off the port. False: the exchange has ended.
+/// Takes the adapter's echo of the request off the port. False: the exchange has ended. Where it is not known
+/// whether there is one, what comes first is taken for it: a write may then seem unanswered that was not, but
+/// never answered by its own echo.
 bool WireSession::pass_echo(const Exchange& exchange, ExchangeResult& result) {
   std::array<std::uint8_t, Frame::capacity> buffer;
   const auto echo = std::span(buffer).first(exchange.frame.size());
-  const auto heard = read_until_full(echo, std::min(reply_deadline_, request_end_ + echo_latency));
+  const auto cut_from = request_end_ + exchange.turnaround_max;
+  const auto heard = read_until_full(echo, std::min(reply_deadline_, request_end_ + echo_latency), &cut_from);
   if (heard.native_error != 0) {
     end(result, ExchangeStatus::io_error, heard.native_error);
     return false;
@@ -266,9 +269,10 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
   }
   request_end_ = last_byte_ = result.request_end = monotonic_now() + request_time;
   reply_deadline_ = result.request_end + exchange.reply_timeout;
-  if (!echo_ || pass_echo(exchange, result)) {
+  if ((echo_known_ && !echo_) || pass_echo(exchange, result)) {
     sleep_before_reply(exchange, quiet);
     take_reply(exchange, result);
+    if (!echo_known_ && result.status == ExchangeStatus::replied) echo_ = echo_known_ = true;
   }
   note_pace(exchange, result);
   return result;

@@ -56,7 +56,11 @@ void Axis::begin_stop(StopKind kind, bool hold, CommandPtr command) {
     stopping_.running = true;
     launch(run_stop(), "stop");
   } else {
-    sampled_.notify_all();  // the running sequence sends this one, too
+    // The running sequence sends this one, too. It may wait for a reading that is held back, or will be,
+    // because the node does not answer.
+    const bool held = link_ != LinkState::online && env_.bus->holds_back(settings_.node);
+    if (link_ == LinkState::offline || held) env_.bus->give_up_readings(settings_.node);
+    sampled_.notify_all();
   }
 }
 
@@ -217,6 +221,7 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline, std::optional<int> requ
     // Samples of somebody else who looks do not shorten it.
     for (const auto until = env_.clock->now() + pause; !another() && env_.clock->now() < until;)
       co_await sampled_.wait_until(until);
+    if (another()) co_return false;  // another reading might be held back
   }
 }
 

@@ -166,6 +166,33 @@ TEST(M13, AStopToASilentNodeIsNotTakenForTheOneBefore) {
   }
 }
 
+/// The look at the standstill of an axis that is not online is held back where the node answers no reading;
+/// the next stop is not.
+TEST(M15, AFurtherStopDoesNotWaitForALookThatIsHeldBack) {
+  SharedLine line(2, 115200);
+  ASSERT_TRUE(line.world.run_until(
+      [&] { return line.all([](const AxisSnapshot& axis) { return axis.link == LinkState::online; }); },
+      20s));
+  line.line->network().faults().add(
+      {.kind = simulation::FaultKind::drop_request, .node = 1, .function = 3, .count = -1});
+  ASSERT_TRUE(line.world.run_until(
+      [&] { return line.machine().find("a1")->snapshot()->link == LinkState::offline; }, 20s));
+  for (auto after = 10ms; after < 400ms; after += 13ms) {
+    line.world.run_for(3s);
+    line.submit(1, StopRequest{});
+    line.world.run_for(after);
+    line.line->forget_wire();
+    const auto asked = line.world.now();
+    line.submit(1, StopRequest{});
+    line.world.run_for(1s);
+    const auto& wire = line.line->wire();
+    const auto stop = std::ranges::find_if(
+        wire, [](const WireEntry& entry) { return entry.node() == 1 && entry.address() == 0x0028; });
+    ASSERT_NE(stop, wire.end()) << after.count();
+    EXPECT_LE(stop->begin - asked, 50ms) << after.count() << " ms after the first";
+  }
+}
+
 /// What is owed does not wait for its turn once anything is heard of the node.
 TEST(M4, AnOwedStopFollowsTheFirstReplyAtOnce) {
   SharedLine line(2, 115200);

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "buses/can/network.hpp"
@@ -54,6 +57,70 @@ TEST(M15, StopAllServesWhatMovesFirstAndWhatIsSilentLast) {
         << axis << ' ' << describe(stop->value());
   }
 }
+
+/// A cabinet has lost its supply: what its drives cost is in the published bounds, and nobody else waits for
+/// those of whom it is known.
+class StopAllWithSilentDrives : public testing::TestWithParam<std::tuple<int, int, bool>> {};
+
+TEST_P(StopAllWithSilentDrives, KeepsWhatIsPublished) {
+  const auto [baud, silent, just_now] = GetParam();
+  constexpr int count = 16, moving = 4;
+  SharedLine line(count, baud, [](AxisSettings& axis) { axis.poll_idle = 1ms; });  // a full queue
+  ASSERT_TRUE(line.world.run_until([&] { return line.all(online); }, 60s));
+  for (int axis = 1; axis <= moving; ++axis) {
+    const auto enabled = line.submit(axis, EnableRequest{});
+    ASSERT_TRUE(line.world.run_until([&] { return enabled->has_ended(); }, 10s));
+    line.submit(axis, MoveVelocityRequest{.velocity = 20});
+  }
+  line.world.run_for(3s);
+  // Every other one first, then the rest: moving ones among them.
+  std::vector<int> order;
+  for (const int first : {2, 1})
+    for (int axis = first; axis <= count; axis += 2) order.push_back(axis);
+  const std::set<int> dead(order.begin(), order.begin() + silent);
+  for (const int axis : dead) line.line->network().node(static_cast<std::uint8_t>(axis))->set_power(false);
+  line.world.run_for(just_now ? Duration(7ms) : 20s);
+  line.line->forget_wire();
+  const auto asked = line.world.now();
+  const auto stops = line.machine().stop_all("test", asked);
+  line.world.run_for(20s);
+  const auto host = modbus_rtu::LineSettings{}.budget.host_allowance;
+  const auto published = line.machine().budgets().at(0).axes;
+  const auto got = order_of_stops(line.line->wire());
+  ASSERT_EQ(got.size(), static_cast<std::size_t>(count));
+  std::map<int, Duration> sent;
+  for (const auto& entry : line.line->wire())
+    if (entry.is_write() && entry.address() == stop_register)
+      sent.emplace(entry.node(),
+                   entry.begin + modbus_rtu::wire_time(entry.serial, entry.request.size()) - asked);
+  for (int axis = 1; axis <= count; ++axis) {
+    const auto& [predicted, deceleration, unit, way_alone, way_all, seen] =
+        published.at(static_cast<std::size_t>(axis - 1));
+    EXPECT_LE(sent.at(axis) + host, predicted.all.last_frame) << axis;
+    if (dead.contains(axis)) continue;
+    const auto& stop = *stops.at(static_cast<std::size_t>(axis - 1));
+    EXPECT_EQ(stop->value().state, CommandState::done) << axis << ' ' << describe(stop->value());
+    EXPECT_EQ(seen.stop_frame_all, sent.at(axis)) << axis;
+    EXPECT_LE(seen.standstill_all + host, predicted.all.standstill + deceleration) << axis;
+  }
+  if (!just_now) {
+    // Who answers does not wait for who is known not to: its answers alone, some ms each, and what was under
+    // way.
+    const auto answering = static_cast<std::size_t>(count - silent);
+    EXPECT_EQ(std::set<int>(got.end() - silent, got.end()), dead);
+    const auto one = modbus_rtu::wire_time(modbus_rtu::SerialSettings{.baud = baud}, 16) + 12ms;
+    EXPECT_LE(sent.at(got.at(answering - 1)), 60ms + static_cast<int>(answering) * one);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(M15, StopAllWithSilentDrives,
+                         testing::Combine(testing::Values(115200, 9600), testing::Values(1, 4, 15),
+                                          testing::Bool()),
+                         [](const auto& info) {
+                           return std::to_string(std::get<1>(info.param)) + "At" +
+                                  std::to_string(std::get<0>(info.param)) +
+                                  (std::get<2>(info.param) ? "JustNow" : "");
+                         });
 
 /// It ends as unknown for whoever asked, but the drive gets it as its first frame when it is back.
 TEST(M15, StopAllKeepsTryingNodesThatAreSilent) {

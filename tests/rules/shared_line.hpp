@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "config/budget.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/simulation/simulator.hpp"
 #include "tests/support/virtual_line.hpp"
@@ -39,7 +40,8 @@ class SharedLine {
                                  auto made = std::make_unique<VirtualLine>(world, settings);
                                  line = made.get();
                                  return made;
-                               }},
+                               },
+                           .budgets = config::budgets(configuration_)},
         configuration_);
     for (int i = 1; i <= count; ++i)
       line->network().add(

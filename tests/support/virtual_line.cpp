@@ -40,7 +40,7 @@ void VirtualLine::set_open(bool open) {
 
 void VirtualLine::arm(const Exchange& exchange) {
   armed_ = &exchange;
-  revoked_ = false;
+  revoked_ = cut_wanted_ = false;
   await_bind();
 }
 
@@ -106,6 +106,7 @@ void VirtualLine::request_sent() {
   }
   const auto latest = result_.request_end + exchange.reply_timeout;
   timer_ = world_->clock().call_at(latest, [this] { end(ExchangeStatus::timeout); });
+  if (cut_wanted_) await_cut();
   if (!reply) return;
   const std::span<const std::uint8_t> bytes = reply->bytes;
   const auto first = bytes.size() - reply->repeated;
@@ -159,13 +160,20 @@ void VirtualLine::hear(std::span<const std::uint8_t> bytes) {
   end(answered ? ExchangeStatus::replied : ExchangeStatus::corrupt);
 }
 
+/// As the worker: what is armed is cut, too, when its time has come.
 void VirtualLine::cut_wait() {
-  if (under_way_ == nullptr || reply_coming_) return;
+  if (std::exchange(cut_wanted_, true)) return;
+  if (under_way_ != nullptr && world_->now() >= result_.request_end) await_cut();
+}
+
+void VirtualLine::await_cut() {
   const auto when = std::max(world_->now(), result_.request_end + under_way_->turnaround_max);
   cut_timer_ = world_->clock().call_at(when, [this] {
-    if (under_way_ != nullptr && !reply_coming_) end(ExchangeStatus::cut);
+    if (under_way_ != nullptr && !reply_has_begun()) end(ExchangeStatus::cut);
   });
 }
+
+bool VirtualLine::reply_has_begun() const { return reply_coming_ && result_.reply_begin <= world_->now(); }
 
 void VirtualLine::end(ExchangeStatus status, Verdict verdict) {
   timer_.reset();

@@ -71,6 +71,8 @@ class VirtualLine final : public modbus_rtu::Line {
   void bind();
   bool use(const modbus_rtu::SerialSettings& serial);
   void request_sent();
+  void await_cut();
+  [[nodiscard]] bool reply_has_begun() const;
   void arrive(TimePoint when, std::span<const std::uint8_t> bytes, TimePoint busy_until);
   void hear(std::span<const std::uint8_t> bytes);
   void end(modbus_rtu::ExchangeStatus status, Verdict verdict = Verdict::send);
@@ -90,6 +92,7 @@ class VirtualLine final : public modbus_rtu::Line {
   std::vector<modbus_rtu::ExchangeResult> results_, told_;  ///< of a round
   bool revoked_ = false;
   bool reply_coming_ = false;
+  bool cut_wanted_ = false;  ///< of what is armed or under way
   TimePoint quiet_since_{};
   TimePoint last_reply_end_{};
   Clock::Timer timer_, cut_timer_;

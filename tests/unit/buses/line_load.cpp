@@ -29,8 +29,7 @@ Request request_of(std::uint8_t node, std::uint16_t address, ExchangeSize size) 
 
 }  // namespace
 
-LineLoad::LineLoad(LineDemand demand, unsigned seed, std::optional<std::size_t> silent)
-    : demand_(std::move(demand)), engine_(seed) {
+LineLoad::LineLoad(LineDemand demand, unsigned seed, int silent) : demand_(std::move(demand)), engine_(seed) {
   auto line = std::make_unique<VirtualLine>(world_, demand_.line);
   line_ = line.get();
   std::map<std::uint16_t, std::uint16_t> registers;
@@ -38,17 +37,22 @@ LineLoad::LineLoad(LineDemand demand, unsigned seed, std::optional<std::size_t> 
   for (std::size_t i = 0; i < demand_.axes.size(); ++i) {
     auto& axis = *axes.emplace_back(std::make_unique<LoadedAxis>(world_));
     axis.node = static_cast<std::uint8_t>(i + 1);
-    axis.silent = silent == i;
     auto node = std::make_unique<RegisterNode>(axis.node, registers);
-    node->silent = axis.silent;
+    nodes_.push_back(node.get());
     line_->network().add(std::move(node));
   }
+  silence_last(silent);
   line_->set_on_bind([this](const WireEntry& entry) { on_bind(entry); });
   bus_ = std::make_unique<RtuBus>(world_.executor(), world_.clock(), demand_.line, std::move(line));
   for (std::size_t i = 0; i < demand_.axes.size(); ++i)
     if (const auto own = demand_.axes[i].turnaround_max) bus_->set_turnaround_max(axes[i]->node, *own);
   bus_->start();
   world_.run_for(10ms);
+}
+
+void LineLoad::silence_last(int silent) {
+  for (std::size_t i = axes.size() - static_cast<std::size_t>(silent); i < axes.size(); ++i)
+    axes[i]->silent = nodes_[i]->silent = true;
 }
 
 LineLoad::~LineLoad() {
@@ -60,7 +64,8 @@ LineLoad::~LineLoad() {
 
 /// Each reply comes as late as it may, or nearly, or sooner.
 void LineLoad::on_bind(const WireEntry& entry) {
-  const auto spare = bus_->turnaround_max(entry.node()) - 2ms;  // that late it comes by itself
+  const Duration by_itself = std::max<Duration>(2ms, silence(demand_.line));
+  const auto spare = bus_->turnaround_max(entry.node()) - by_itself;
   const auto late = random(0, 2) == 0 ? spare : spare * random(0, 100) / 100;
   line_->network().faults().clear();
   line_->network().faults().add({.kind = simulation::FaultKind::delay_reply, .delay = late});
@@ -198,6 +203,9 @@ LineLoad::Stopped LineLoad::stop(const std::vector<std::size_t>& which) {
   for (const auto i : which) {
     auto& axis = *axes[i];
     stopped.last_frame = std::max(stopped.last_frame, axis.stop_sent.value_or(TimePoint::max()) - asked);
+    if (!axis.silent)
+      stopped.last_answering =
+          std::max(stopped.last_answering, axis.stop_sent.value_or(TimePoint::max()) - asked);
     if (!axis.silent)
       stopped.standstill = std::max(stopped.standstill, axis.standstill.value_or(TimePoint::max()) - asked);
     axis.stopping = false;

@@ -34,7 +34,8 @@ struct LoadedAxis {
 
 class LineLoad {
  public:
-  LineLoad(LineDemand demand, unsigned seed, std::optional<std::size_t> silent);
+  /// The last `silent` axes have drives that answer nothing.
+  LineLoad(LineDemand demand, unsigned seed, int silent);
   ~LineLoad();
 
   [[nodiscard]] const LineDemand& demand() const { return demand_; }
@@ -43,11 +44,14 @@ class LineLoad {
   int late_frames = 0;                        ///< sent after their deadline
   std::map<TransactionClass, int> completed;  ///< by class
 
+  /// From now on.
+  void silence_last(int silent);
   /// Begins polling; the first `moving` axes move, and start anew now and then if `starting`.
   void begin(int moving, bool starting);
   /// Stops the axes at once; returns when all that answer have confirmed their standstill.
   struct Stopped {
     Duration last_frame{}, standstill{};
+    Duration last_answering{};  ///< to the last frame to an axis that answers
   };
   Stopped stop(const std::vector<std::size_t>& which);
   int random(int least, int most) { return std::uniform_int_distribution(least, most)(engine_); }
@@ -66,6 +70,7 @@ class LineLoad {
   VirtualWorld world_;
   VirtualLine* line_ = nullptr;
   std::unique_ptr<RtuBus> bus_;
+  std::vector<RegisterNode*> nodes_;
   std::map<std::uint16_t, TimePoint> deadlines_;  ///< by the address that a read of its own has
   std::uint16_t last_address_ = 0x1000;
   bool closing_ = false;

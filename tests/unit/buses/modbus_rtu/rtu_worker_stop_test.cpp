@@ -1,6 +1,7 @@
 // What a stop does to a worker that has something else to do, on a pty.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 
@@ -111,6 +112,103 @@ TEST(RtuWorkerStop, AFloodOfAnnouncedStopsLetsEveryExchangeThrough) {
   for (int i = 0; i < 5; ++i) EXPECT_EQ(bench.run(read_of(0x0020, 1)).status, ExchangeStatus::replied);
   over = true;
   flood.join();
+}
+
+/// A worker whose port was opened while a stop was announced: nobody has looked for an echo.
+class StopBeforeTheEchoIsKnown {
+ public:
+  StopBeforeTheEchoIsKnown(ScriptedNode::Script script, bool echo)
+      : node(std::move(script), echo), bench(line_at(fast, node.path())) {
+    stop.stop = true;
+    bench.worker->stop_notice()->give(monotonic_now() + ample);
+    bench.on_open = [this] { bench.worker->arm(stop); };
+    bench.start();
+    result = bench.next_result();
+    bench.worker->stop_notice()->take();
+  }
+
+  ScriptedNode node;
+  WorkerBench bench;
+  Exchange stop = write_of(0x0028, 0, milliseconds(300));
+  ExchangeResult result;
+};
+
+TEST(RtuWorkerStop, TheEchoProbeLetsAStopGoFirst) {
+  StopBeforeTheEchoIsKnown line(answering(), /*echo=*/false);
+  EXPECT_EQ(line.node.seen(), std::vector<std::string>{hex(line.stop.frame)});
+  EXPECT_EQ(line.node.probes(), 0);
+  EXPECT_EQ(line.result.status, ExchangeStatus::timeout) << "it might have been an echo";
+  EXPECT_EQ(line.bench.run(read_of(0x0020, 1)).status, ExchangeStatus::replied);
+  EXPECT_EQ(line.node.probes(), 1);
+  EXPECT_EQ(line.bench.run(line.stop).status, ExchangeStatus::replied);
+}
+
+TEST(RtuWorkerStop, AStopThatGoesFirstIsAnsweredBehindItsEcho) {
+  StopBeforeTheEchoIsKnown line(answering(), /*echo=*/true);
+  EXPECT_EQ(line.result.status, ExchangeStatus::replied);
+  EXPECT_EQ(line.bench.run(read_of(0x0020, 1)).status, ExchangeStatus::replied);
+  EXPECT_EQ(line.node.probes(), 0) << "there is nothing left to find out";
+}
+
+TEST(RtuWorkerStop, TheEchoOfAStopThatGoesFirstIsNoReply) {
+  StopBeforeTheEchoIsKnown line(silent(), /*echo=*/true);
+  EXPECT_EQ(line.result.status, ExchangeStatus::timeout);
+}
+
+/// An adapter that echoes no more is asked again, and that takes 0.1 s without an answer.
+TEST(RtuWorkerStop, AStopEndsTheWaitForAnEcho) {
+  std::atomic<bool> echoing = false;
+  const ScriptedNode node([&](ScriptedNode& self, const Bytes& request) {
+    if (echoing) self.say(request);
+    self.say(proper_reply(request));
+  });
+  WorkerBench bench(line_at(fast, node.path()));
+  bench.start_and_open();
+  auto stop = write_of(0x0028, 0, milliseconds(300));
+  stop.stop = true;
+  const auto is_in_time = [&] {
+    echoing = true;
+    EXPECT_TRUE(bench.run_until([&] {
+      return bench.run(read_of(0x0020, 2, milliseconds(300))).status == ExchangeStatus::replied;
+    })) << "an echo is known";
+    echoing = false;
+    const auto before = node.probes();
+    EXPECT_EQ(bench.run(read_of(0x0020, 2, milliseconds(300))).status, ExchangeStatus::corrupt);
+    EXPECT_TRUE(bench.run_until([&] { return node.probes() > before; }));
+    const auto asked = monotonic_now();
+    return bench.run(stop).request_begin - asked < milliseconds(50);
+  };
+  bool in_time = false;  // a busy computer may be late, but not each time
+  for (int round = 0; round < 20 && !in_time; ++round) in_time = is_in_time();
+  EXPECT_TRUE(in_time);
+}
+
+/// A known echo does not come where the adapter has lost its driver: the next stop does not wait longer.
+TEST(RtuWorkerStop, CutEndsTheWaitForAnEchoToo) {
+  std::atomic<bool> echoing = true;
+  const ScriptedNode node([&](ScriptedNode& self, const Bytes& request) {
+    if (!echoing) return;
+    self.say(request);
+    self.say(proper_reply(request));
+  });
+  WorkerBench bench(line_at(fast, node.path()));
+  bench.start_and_open();
+  const auto waits = [&] {
+    echoing = true;
+    EXPECT_EQ(bench.run(read_of(0x0020, 2)).status, ExchangeStatus::replied) << "an echo is known";
+    echoing = false;
+    const auto before = node.seen().size();
+    const auto read = read_of(0x0020, 2);
+    bench.worker->arm(read);
+    EXPECT_TRUE(bench.run_until([&] { return node.seen().size() > before; }));
+    bench.worker->cut_wait();
+    const auto result = bench.next_result();
+    EXPECT_GE(result.reply_end, result.request_end + read.turnaround_max);
+    return result.reply_end - result.request_end;
+  };
+  Duration least = ample;  // a busy computer may be late, but not each time
+  for (int round = 0; round < 20 && least > milliseconds(80); ++round) least = std::min(least, waits());
+  EXPECT_LE(least, milliseconds(80)) << "an echo may take longer";
 }
 
 TEST(RtuWorkerStop, CutEndsTheWaitForASilentNode) {
