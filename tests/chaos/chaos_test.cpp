@@ -27,6 +27,7 @@ void expect_often(const Outcome& outcome, int often) {
   EXPECT_GE(outcome.stops, often);
   EXPECT_GE(outcome.positions, often);
   EXPECT_GE(outcome.distances, often / 4);
+  EXPECT_GE(outcome.by_terminal, often / 50);
   EXPECT_GE(outcome.departures, often / 2);
   EXPECT_GE(outcome.not_executed, often / 50);
 }

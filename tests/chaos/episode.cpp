@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/chaos/client.hpp"
+#include "tests/chaos/hands.hpp"
 #include "tests/chaos/judge.hpp"
 #include "tests/chaos/plant.hpp"
 
@@ -92,7 +93,9 @@ Outcome run_episode(PlantKind kind, std::uint64_t seed) {
     std::vector<std::unique_ptr<Client>> clients;
     for (const auto* name : {"anna", "bert", "cora"})
       clients.push_back(std::make_unique<Client>(plant, judge, name, seed * 10 + clients.size() + 1));
+    Hands hands(plant, seed * 10 + 9);
     plant.world.run_for(faulty_time);
+    hands.rest();
     for (const auto& client : clients) client->rest();
     settle(plant, judge);
   }

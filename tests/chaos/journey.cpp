@@ -15,6 +15,11 @@ bool is_near(std::int64_t one, std::int64_t other, const Track& track) {
   return std::llabs(one - other) <= track.slack;
 }
 
+/// So far from one of these places.
+bool is_distance(std::int64_t to, const Stretch& from, std::int64_t distance, const Track& track) {
+  return to - distance >= from.low - track.slack && to - distance <= from.high + track.slack;
+}
+
 std::string as_units(const Track& track, std::int64_t distance) {
   return fmt::format("{:.3f}", static_cast<double>(distance) / track.pulses_per_unit);
 }
@@ -26,7 +31,9 @@ std::string wrong_run(const Command& command, const Track& track, const Departur
   if (std::llabs(way) > track.slack && (way > 0) != (asked > 0))
     return fmt::format("{} goes the other way, by {}", command.id, as_units(track, way));
   if (std::llabs(way) <= std::llabs(pulses(track, track.jog_travel)) + track.slack) return {};
-  if (!departure.trusted || !departure.origin) return {};
+  if (!departure.trusted)
+    return fmt::format("{} goes by {}, and nobody knows the position", command.id, as_units(track, way));
+  if (!departure.origin) return {};
   const auto end = static_cast<double>(departure.from + way - *departure.origin) / track.pulses_per_unit;
   const auto slack = std::abs(static_cast<double>(track.slack) / track.pulses_per_unit);
   if (end >= *track.minimum - slack && end <= *track.maximum + slack) return {};
@@ -45,7 +52,7 @@ std::string wrong_departure(const Command& command, const Track& track, const De
   const auto way = departure.way.value_or(0);
   const auto heading = departure.from + way;
   if (asked.distance) {
-    if (is_near(way, pulses(track, *asked.distance), track)) return {};
+    if (is_distance(heading, departure.lately, pulses(track, *asked.distance), track)) return {};
     return fmt::format("{} asks for a distance of {:.3f}, and the drive goes by {}", command.id,
                        *asked.distance, as_units(track, way));
   }
@@ -63,10 +70,11 @@ std::string wrong_departure(const Command& command, const Track& track, const De
   return asked.velocity ? wrong_run(command, track, departure, way) : std::string{};
 }
 
-std::string wrong_arrival(const Command& command, const Track& track, std::int64_t moved) {
-  if (!command.asked.distance || is_near(moved, pulses(track, *command.asked.distance), track)) return {};
+std::string wrong_arrival(const Command& command, const Track& track, const Stretch& from, std::int64_t to) {
+  const auto& distance = command.asked.distance;
+  if (!distance || is_distance(to, from, pulses(track, *distance), track)) return {};
   return fmt::format("{} is done, asked for a distance of {:.3f}, and the load moved by {}", command.id,
-                     *command.asked.distance, as_units(track, moved));
+                     *distance, as_units(track, to - from.low));
 }
 
 }  // namespace axisd::chaos

@@ -20,9 +20,16 @@ struct Track {
   double jog_travel = 0, backoff = 0;          ///< user units
 };
 
+/// Where a shaft was, from `low` to `high`, while its position was read for a start and the start was sent:
+/// what a terminal turns it by in that moment, no reading can tell.
+struct Stretch {
+  std::int64_t low = 0, high = 0;
+};
+
 /// What a drive did at a start.
 struct Departure {
   std::int64_t from = 0;              ///< the shaft
+  Stretch lately{};                   ///< with `from`
   std::optional<std::int64_t> way{};  ///< how far it goes; nothing: no end
   bool moving = false;
   bool trusted = false;                  ///< the axis says that it knows its position
@@ -32,10 +39,11 @@ struct Departure {
 /// Why this start is not what was asked for; empty: it is.
 ///  - a distance: as far from where the shaft is
 ///  - a position: there, where the axis knows its position
-///  - a jog, or a velocity on an axis with limits: in the direction asked for, to the limit at most
+///  - a jog, or a velocity on an axis with limits: in the direction asked for, to the limit at most; where
+///    nobody knows the position, no further than `jog_travel`
 ///  - homing: no further than `backoff` (the search for the switch is another start)
 std::string wrong_departure(const Command& command, const Track& track, const Departure& departure);
-/// Why a command that is done did not do it; empty: it did. `moved`: the shaft, since its start.
-std::string wrong_arrival(const Command& command, const Track& track, std::int64_t moved);
+/// Why a command that is done did not do it; empty: it did. `from`, `to`: the shaft, when it started and now.
+std::string wrong_arrival(const Command& command, const Track& track, const Stretch& from, std::int64_t to);
 
 }  // namespace axisd::chaos

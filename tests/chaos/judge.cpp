@@ -201,10 +201,15 @@ void Judge::on_executed(Station& station, const Executed& executed) {
 
 void Judge::on_departure(Station& station, const Subject& subject, const Executed& executed) {
   ++tally_.departures;
-  subject.triggered->departed = executed.from;
+  // Only a terminal turns a shaft that rested when it was read.
+  const auto lately = station.terminal_may_start(plant_->world.now())
+                          ? executed.lately
+                          : Stretch{.low = executed.from, .high = executed.from};
+  subject.triggered->departed = lately;
   const auto& command = subject.triggered->command->value();
   const auto wrong = wrong_departure(command, station.track,
                                      {.from = executed.from,
+                                      .lately = lately,
                                       .way = executed.telegram.way,
                                       .moving = executed.moving,
                                       .trusted = trusted(station),
@@ -263,7 +268,8 @@ void Judge::on_done(Station& station, Subject& subject, const Judged& judged, co
   if (command.asked.distance) {
     ++tally_.distances;
     const auto now = station.drive->shaft_pulses();
-    if (const auto wrong = wrong_arrival(command, station.track, now - judged.departed.value_or(now));
+    if (const auto wrong =
+            wrong_arrival(command, station.track, judged.departed.value_or(Stretch{now, now}), now);
         !wrong.empty())
       violation(station.name, wrong);
   } else if (positioned && is_motion(command.kind) && subject.origin && trusted(station) &&

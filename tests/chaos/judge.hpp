@@ -64,8 +64,8 @@ class Judge {
     CommandState last = CommandState::accepted;
     int ends = 0, moves = 0, homings = 0;  ///< triggers
     int starts = 0;
-    std::optional<std::int64_t> departed{};  ///< where the shaft was at its last start, pulses
-    std::uint64_t stop_frames = 0;           ///< that the drive had executed when this was accepted
+    std::optional<Stretch> departed{};  ///< where the shaft was at its last start, pulses
+    std::uint64_t stop_frames = 0;      ///< that the drive had executed when this was accepted
     TimePoint accepted_at{};
   };
   using JudgedPtr = std::shared_ptr<Judged>;

@@ -117,13 +117,14 @@ simulation::SimulatedNodeSettings make_drive(const Station& station, Dice& dice)
   settings.mechanics.home_switch_to = at(station.invert ? 52 : -50);
   settings.mechanics.positive_limit_from = at(150);
   settings.mechanics.negative_limit_from = at(-150);
+  if (station.closed_loop())
+    settings.encoder = {.noise = dice.pick(3),
+                        .following = dice.up_to(5ms),
+                        .quantised = dice.chance(0.5),
+                        .compliance = dice.pick(6)};
   if (station.model == "cia402") return settings;
   settings.switches["abrupt_stop_slips"] = dice.chance(0.3);
-  if (station.closed_loop()) {
-    settings.switches["position_is_commanded"] = dice.chance(0.2);
-    // What a terminal releases between two readings, only the counter can tell.
-    settings.switches["released_position_frozen"] = station.wired != Wired::free && dice.chance(0.3);
-  }
+  if (station.closed_loop()) settings.switches["position_is_commanded"] = dice.chance(0.2);
   if (station.on_can()) return settings;
   settings.switches["crc_error_answered"] = dice.chance(0.3);
   // What can start motion is assigned to a terminal of a released drive only (M3).

@@ -1,7 +1,10 @@
 // A simulated drive that is watched: what really happened to it.
 #pragma once
 
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -9,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/chaos/journey.hpp"
 #include "tests/chaos/telegram.hpp"
 #include "tests/support/borrowed_can_node.hpp"
 #include "tests/support/borrowed_node.hpp"
@@ -22,6 +26,7 @@ struct Executed {
   Telegram telegram{};
   int starts = 0;         ///< motions that it started
   std::int64_t from = 0;  ///< where its shaft was, pulses
+  Stretch lately{};       ///< and everywhere that it was shortly before
   bool moving = false;
 };
 
@@ -42,12 +47,11 @@ class Witness {
 
  protected:
   void time_passed(TimePoint now) {
-    if (const auto shaft = shaft_pulses(); shaft != std::exchange(last_shaft_, shaft)) last_moved_ = now;
     now_ = now;
-    note_own_start();
+    touched();
   }
   void touched() {
-    if (const auto shaft = shaft_pulses(); shaft != std::exchange(last_shaft_, shaft)) last_moved_ = now_;
+    note_shaft();
     note_own_start();
   }
   void lost_power() { last_power_loss_ = now_; }
@@ -55,6 +59,7 @@ class Witness {
   template <class HandOver>
   void executes(std::span<const std::uint8_t> frame, const Telegram& telegram, HandOver hand_over) {
     const auto from = shaft_pulses();
+    const auto stretch = lately();
     const bool own = hand_over();
     const auto starts = drive().starts() - std::exchange(starts_, drive().starts());
     if (own && on_executed)
@@ -63,15 +68,36 @@ class Witness {
                    .telegram = telegram,
                    .starts = starts,
                    .from = from,
+                   .lately = stretch,
                    .moving = shaft_moving()});
   }
 
  private:
+  /// A start is bound within this of the last reading (M6: reboot_guard).
+  static constexpr Duration start_time = std::chrono::milliseconds(100);
+  void note_shaft() {
+    const auto shaft = shaft_pulses();
+    if (shaft == last_shaft_) return;
+    last_moved_ = now_;
+    while (!places_.empty() && now_ - places_.front().first > start_time) places_.pop_front();
+    places_.emplace_back(now_, std::exchange(last_shaft_, shaft));
+  }
+  /// Everywhere the shaft was within that time.
+  [[nodiscard]] Stretch lately() const {
+    Stretch stretch{.low = last_shaft_, .high = last_shaft_};
+    for (const auto& [until, shaft] : places_) {
+      if (now_ - until > start_time) continue;
+      stretch.low = std::min(stretch.low, shaft);
+      stretch.high = std::max(stretch.high, shaft);
+    }
+    return stretch;
+  }
   void note_own_start() {
     if (drive().starts() != std::exchange(starts_, drive().starts()) && on_own_start) on_own_start();
   }
   std::int64_t last_shaft_ = 0;
   int starts_ = 0;
+  std::deque<std::pair<TimePoint, std::int64_t>> places_;  ///< where it was until when
   TimePoint now_{}, last_moved_{}, last_power_loss_{};
 };
 
