@@ -269,7 +269,9 @@ const KeySpec axis_keys[] = {
      .apply = [](Target& t, const Value& v) { t.axis->axis.jog_travel = v.number; }},
     {.key = "position_tolerance",
      .kind = Kind::position,
-     .description = "How far from its target a motion may end as done. 0: one pulse.",
+     .description =
+         "How far from its target a motion may end as done. At least what the drive itself takes for in "
+         "position: the in-position window of an encoder (0x011F, 204Fh), or exactly the counted pulse.",
      .example = "0.01 mm",
      .default_value = "0",
      .minimum = 0,

@@ -36,6 +36,8 @@ struct DriveSample {
   bool enabled = false;
   std::uint16_t alarm_code = 0;  ///< 0: none
   std::int32_t position_pulses = 0;
+  /// Where the drive wants the shaft now, if position_pulses is measured and the drive tells this, too.
+  std::optional<std::int32_t> commanded_pulses{};
   std::int32_t velocity_rpm = 0;  ///< signed as the drive reports it
   bool negative_direction = false;
   std::uint32_t inputs = 0;  ///< bit per terminal, in the descriptor's order; 1 active
@@ -192,6 +194,9 @@ class Drive {
 
   /// The drive follows its position by an encoder, as it is configured.
   [[nodiscard]] virtual bool closed_loop() const = 0;
+  /// Pulses by which a measured position may differ from where the drive holds the shaft, though nobody moved
+  /// it: the drive's in-position window (M10, M30). 0: the position is counted, and exact.
+  [[nodiscard]] virtual std::int64_t position_window() const { return 0; }
   /// It has told by itself of an alarm or a restart, which the next reading will show.
   [[nodiscard]] virtual bool in_trouble() const { return false; }
 

@@ -148,6 +148,10 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   if (!state.drift().empty()) details.add("drift", coloured(state.drift(), Colour::red, colour));
   details.add("power", power(state));
   details.add("position", position(state));
+  if (state.has_commanded_position())
+    details.add("commanded",
+                fmt::format("{} (following error {})", with_unit(state.commanded_position(), state.unit()),
+                            with_unit(state.following_error(), state.unit())));
   if (state.has_target()) details.add("target", with_unit(state.target(), state.unit()));
   if (state.has_age()) details.add("velocity", with_unit(state.velocity(), state.unit() + "/s"));
   if (state.moving())

@@ -124,6 +124,8 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   to.set_stop_held(from.stop_held);
   to.set_inhibited(from.inhibited);
   to.set_position(from.position);
+  if (from.commanded_position) to.set_commanded_position(*from.commanded_position);
+  if (from.following_error) to.set_following_error(*from.following_error);
   to.set_velocity(from.velocity);
   if (from.target) to.set_target(*from.target);
   to.set_moving(from.moving);

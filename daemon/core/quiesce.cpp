@@ -1,6 +1,7 @@
 #include "daemon/core/quiesce.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <optional>
 #include <utility>
 
@@ -24,18 +25,23 @@ struct Times {
 /// Within homing the motor rests between its phases: there it must have rested at one place for a while.
 class Rest {
  public:
+  explicit Rest(std::int64_t window) : window_(window) {}
   bool confirms(const DriveSample& sample) {
     if (sample.moving) {
       since_.reset();
       return false;
     }
     if (sample.mode != DriveMode::homing) return true;
-    if (!since_ || position_ != sample.position_pulses) since_ = sample.asked_at;
-    position_ = sample.position_pulses;
+    // A measured position wavers.
+    if (!since_ || std::llabs(std::int64_t{position_} - sample.position_pulses) > window_) {
+      since_ = sample.asked_at;
+      position_ = sample.position_pulses;
+    }
     return sample.asked_at - *since_ >= milliseconds(150);
   }
 
  private:
+  std::int64_t window_;  ///< Drive::position_window()
   std::optional<TimePoint> since_;
   std::int32_t position_ = 0;
 };
@@ -43,7 +49,7 @@ class Rest {
 Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, Drive& drive, Bus& bus,
                              Times times) {
   QuiesceReport report{.axis = std::move(axis)};
-  Rest rest;
+  Rest rest(drive.position_window());
   report.detail = "the port did not open";
   while (clock.now() < times.end) {
     if (!bus.port().open) {

@@ -215,8 +215,10 @@ void Axis::lose_trust() {
 
 OffsetRecord Axis::offset_record(std::int64_t offset, PositionTrust trust) const {
   // The record speaks of the 32-bit counter: unwrapping begins anew with each start of the daemon.
-  const auto raw = static_cast<std::int32_t>(tracker_.counter());
-  OffsetRecord record{.offset_pulses = offset + tracker_.counter() - raw,
+  // A measured position may not have settled yet.
+  const auto counter = tracker_.resting_counter();
+  const auto raw = static_cast<std::int32_t>(counter);
+  OffsetRecord record{.offset_pulses = offset + counter - raw,
                       .trust = trust,
                       .last_position_pulses = raw,
                       .pulses_per_revolution = settings_.scale.pulses_per_revolution,

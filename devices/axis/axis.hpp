@@ -316,9 +316,15 @@ class Axis {
   void end_unsent(Activity& activity, Error cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
+  [[nodiscard]] bool shows(const Plan& plan, std::int64_t base) const;
+  [[nodiscard]] bool held_back(const Plan& plan) const;
   Task<bool> is_no_reboot(ActivityPtr activity);
   Task<bool> proven_continuous(ActivityPtr activity);
+  /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
+  /// itself takes for in position.
   [[nodiscard]] std::int64_t target_tolerance() const;
+  /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
+  [[nodiscard]] bool moved_from(std::int64_t counter) const;
   bool judge_rest(Activity& activity);
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
   Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
@@ -344,6 +350,7 @@ class Axis {
   Task<bool> back_off(ActivityPtr activity);
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
   [[nodiscard]] std::string_view homing_switch() const;
+  [[nodiscard]] std::int64_t counter_at_home() const;
 
   // axis_lease.cpp: lease_lost() and what stands beside it
   void release_as_owed();

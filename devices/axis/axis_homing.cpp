@@ -64,16 +64,27 @@ Task<> Axis::run_home(ActivityPtr activity) {
 
   const auto position = settings_.homing->position;
   // Should the disk fail, the position holds for this run of the daemon; only a restart will not find it.
-  const auto counter = tracker_.counter();
-  (void)co_await journal_offset(tracker_.offset_for(position), PositionTrust::homed);
+  const auto counter = counter_at_home();
+  const auto offset = tracker_.offset_for(position) + tracker_.counter() - counter;
+  (void)co_await journal_offset(offset, PositionTrust::homed);
   if (!current(*activity)) co_return correct_saved_position();
-  if (counter != tracker_.counter()) {
+  if (moved_from(counter)) {
     fail_with_stop(*activity, error(Reason::moving, "the axis moved after it had reached home",
                                     "check terminals, and other masters on the bus; home again"));
     co_return;
   }
-  tracker_.set_position(position, PositionTrust::homed);
+  tracker_.declare(offset, PositionTrust::homed);
   finish(*activity, [](CommandRecord& command) { command.done(); });
+}
+
+/// Where the drive put its counter at home: a measured one only wavers about it. Which of the two it is after
+/// a compensation is not said (7.5).
+std::int64_t Axis::counter_at_home() const {
+  const auto measured = tracker_.counter();
+  const auto turns = measured - sample_->position_pulses;
+  for (const auto nominal : {std::int64_t{0}, scale_.to_pulses(settings_.homing->offset)})
+    if (!moved_from(turns + nominal)) return turns + nominal;
+  return measured;
 }
 
 /// The drive searches for the rising edge of the switch; on an active switch there is none. A bounded move
@@ -120,6 +131,7 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
   const auto latest = since + homing.timeout;
   const auto start_by = since + milliseconds(500);
   const auto offset = scale_.to_pulses(homing.offset);
+  const auto near = std::max<std::int64_t>(drive_->position_window(), 1);
   bool mode_seen = false;
   bool bit_was_low = !homed_before;
   for (;;) {
@@ -128,13 +140,14 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
     const auto now = env_.clock->now();
     if (sample_->asked_at >= since) {
       const auto& sample = *sample_;
-      if (sample.mode == DriveMode::homing) mode_seen = true;
       if (!sample.homed) bit_was_low = true;
+      // The bit rose for this homing, however short it was.
+      if (sample.mode == DriveMode::homing || (sample.homed && bit_was_low)) mode_seen = true;
       if (mode_seen && !sample.moving && sample.mode == DriveMode::positioning) {
         const bool rose = sample.homed && bit_was_low;
         // Which of the two it is after a compensation is not said (7.5).
         const auto counter = std::int64_t{sample.position_pulses};
-        const bool at_home = std::abs(counter) <= 1 || std::abs(counter - offset) <= 1;
+        const bool at_home = std::abs(counter) <= near || std::abs(counter - offset) <= near;
         const bool held_up = input_active("stop") || input_active("quick_stop");
         if (rose || (sample.homed && at_home && !held_up)) co_return true;
         fail_with_stop(*activity, error(Reason::not_reached, "homing ended without reaching home",
@@ -147,7 +160,8 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
       previous = tracker_.counter();
       const auto seconds = std::chrono::duration<double>(sample.measured_at - previous_asked).count();
       previous_asked = sample.asked_at;
-      if (std::abs(static_cast<double>(step)) > 1 + (1.1 * fastest * seconds)) origin += step;
+      if (std::abs(static_cast<double>(step)) > static_cast<double>(near) + (1.1 * fastest * seconds))
+        origin += step;
       const auto travel = std::abs(scale_.to_units(tracker_.counter()) - scale_.to_units(origin));
       if (homing.max_travel && travel > *homing.max_travel) {
         fail_with_stop(*activity, error(Reason::not_reached,

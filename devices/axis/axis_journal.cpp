@@ -101,7 +101,7 @@ void Axis::settle_as(const Unsettled& earlier, bool continuous) {
     return settle_as_unknown(earlier,
                              "the command journal was damaged, and does not tell what came after it");
   const auto at = tracker_.counter();
-  switch (settle(kind, earlier.note, sample_->position_pulses, continuous)) {
+  switch (settle(kind, earlier.note, sample_->position_pulses, continuous, drive_->position_window())) {
     case Settlement::done:
       return command.done();
     case Settlement::not_executed:

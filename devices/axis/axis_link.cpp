@@ -106,7 +106,7 @@ bool Axis::found_by_terminal() const {
 Task<Result<void>> Axis::settle_found_motion() {
   std::string_view found = stop_owed_ ? "the stop that was owed to it was sent, and it came to rest" : "";
   if (found_in_motion() && !found_by_terminal()) {
-    if (!stop_owed_) {
+    if (!stop_owed_ && sample_->moving) {  // else it may rest between the phases of homing, or for good
       spdlog::warn("{}: found moving; stopping it", settings_.name);
       found = "it was found moving, was stopped, and came to rest";
     }
@@ -155,7 +155,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     restorable = !position_unsettled_ && !has_input("homing_start") &&
                  record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
                  record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
-                 record.last_position_pulses == sample_->position_pulses &&
+                 !moved_from(tracker_.counter() - sample_->position_pulses + record.last_position_pulses) &&
                  (sample_->enabled || drive_->closed_loop());
     if (restorable) drive_->expect_marks({record.canary});
   }

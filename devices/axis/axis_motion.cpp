@@ -22,6 +22,10 @@ constexpr auto overrun_margin = std::chrono::seconds(1);
 constexpr auto end_window = milliseconds(300);
 /// And from so long before, at most: a motion too short for its velocity ends before its prediction.
 constexpr Duration longest_end_lead = milliseconds(100);
+/// A measured position comes to its target so late, at most, after the drive has sent its last pulse.
+constexpr auto settling_time = milliseconds(300);
+/// A motion that no sample can tell from noise is over so long after its predicted end.
+constexpr auto unseen_margin = milliseconds(100);
 
 }  // namespace
 
@@ -273,8 +277,12 @@ Task<bool> Axis::proven_continuous(ActivityPtr activity) {
 }
 
 std::int64_t Axis::target_tolerance() const {
-  return std::max<std::int64_t>(
-      0, std::llround(settings_.position_tolerance * std::abs(scale_.pulses_per_unit())));
+  return std::max<std::int64_t>(drive_->position_window(), std::llround(settings_.position_tolerance *
+                                                                        std::abs(scale_.pulses_per_unit())));
+}
+
+bool Axis::moved_from(std::int64_t counter) const {
+  return std::abs(tracker_.counter() - counter) > drive_->position_window();
 }
 
 Task<> Axis::run_velocity(ActivityPtr activity) {
@@ -354,7 +362,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
       co_return false;
     }
     if (sample_->asked_at >= since &&
-        (sample_->moving || tracker_.counter() != base || sample_->mode != DriveMode::positioning)) {
+        (sample_->moving || moved_from(base) || sample_->mode != DriveMode::positioning)) {
       ++unknown_starts_.executed;
       activity->command->activate();
       publish();
@@ -366,6 +374,12 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
     ++unknown_starts_.unresolved;
     co_return false;
   }
+  const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
+  if (moves_to_a_target && !shows(activity->plan, base)) {  // it may have gone there all the same
+    ++unknown_starts_.unresolved;
+    fail_with_stop(*activity, std::move(cause));
+    co_return false;
+  }
   ++unknown_starts_.not_executed;
   cause.outcome = Outcome::not_executed;
   cause.message = fmt::format("{}: the start frame got no reply, and the drive did not move: {}",
@@ -375,6 +389,17 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   co_return false;
 }
 
+/// A position tells whether the motion was executed.
+bool Axis::shows(const Plan& plan, std::int64_t base) const {
+  const auto window = drive_->position_window();
+  return window == 0 || std::abs(plan.target->counter - base) > window;
+}
+
+/// At rest, and not at the target.
+bool Axis::held_back(const Plan& plan) const {
+  return limit_active(plan.positive) || input_active("stop") || input_active("quick_stop");
+}
+
 /// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended
 /// otherwise.
 Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since) {
@@ -382,6 +407,9 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
   const auto latest =
       plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
   const auto tolerance = target_tolerance();
+  const bool unseen = !plan.endless && !shows(plan, base);
+  const auto settling = drive_->position_window() > 0 ? Duration(settling_time) : Duration{0};
+  std::optional<TimePoint> resting_since;
   // The end is expected: it is to be told at once.
   const auto end_lead = std::min(plan.predicted / 3, longest_end_lead);
   if (!plan.endless) poll_fast(since + plan.predicted - end_lead, end_lead + end_window);
@@ -402,7 +430,10 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
     }
     if (sample_ && sample_->asked_at >= since) {
       const auto& sample = *sample_;
-      if (sample.moving || tracker_.counter() != base) activity->started = true;
+      if (sample.moving || moved_from(base)) activity->started = true;
+      // Its motion was acknowledged, and may have begun and ended between two samples.
+      if (unseen && sample.asked_at >= since + plan.predicted + unseen_margin && !held_back(plan))
+        activity->started = true;
       if (sample.mode != DriveMode::positioning) {
         fail_with_stop(*activity, error(Reason::terminal, "a terminal of the drive took over the motion",
                                         "check the terminals"));
@@ -412,7 +443,11 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
         // Before it moved it may rest within the tolerance, too.
         const bool there = !plan.endless && std::abs(tracker_.counter() - plan.target->counter) <= tolerance;
         if (there && activity->started) co_return true;
-        if (activity->started && judge_rest(*activity)) co_return false;
+        if (!resting_since) resting_since = sample.asked_at;
+        const bool settles = !held_back(plan) && sample.asked_at - *resting_since < settling;
+        if (activity->started && !settles && judge_rest(*activity)) co_return false;
+      } else {
+        resting_since.reset();
       }
     }
     // Only who was asked after the window and still rests has not started: a silent drive may well run.

@@ -56,7 +56,7 @@ Task<> Axis::run_enable(ActivityPtr activity) {
     const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
     if (!current(*activity)) co_return;
     if (!sample) break;
-    if (sample->moving || tracker_.counter() != before) {
+    if (sample->moving || moved_from(before)) {
       on_turned_by_power(error(Reason::terminal, "the drive moved when it was enabled",
                                "check terminals that start motion; then reset the axis"));
       co_return;
@@ -161,9 +161,10 @@ Task<> Axis::run_set_position(ActivityPtr activity) {
   if (!co_await noted(activity, {})) co_return;
   // Journalled before it is used (M20): a restart must never meet a newer position with an older offset.
   const auto counter = tracker_.counter();
-  const auto saved = co_await journal_offset(tracker_.offset_for(position), PositionTrust::set);
+  const auto offset = tracker_.offset_for(position);
+  const auto saved = co_await journal_offset(offset, PositionTrust::set);
   if (!current(*activity)) co_return correct_saved_position();
-  if (!saved || counter != tracker_.counter()) {
+  if (!saved || moved_from(counter)) {
     lose_trust();
     finish(*activity, [&](CommandRecord& command) {
       command.error(saved ? error(Reason::moving, "the axis moved meanwhile", "repeat it at standstill")
@@ -171,7 +172,7 @@ Task<> Axis::run_set_position(ActivityPtr activity) {
     });
     co_return;
   }
-  tracker_.set_position(position, PositionTrust::set);
+  tracker_.declare(offset, PositionTrust::set);
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
 

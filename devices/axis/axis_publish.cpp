@@ -105,9 +105,18 @@ void Axis::publish() {
   next->trust = tracker_.trust();
   next->position_source = descriptor_->capabilities.position_source;
   next->position = tracker_.position();
+  if (sample_ && sample_->commanded_pulses) {
+    const auto ahead = static_cast<std::int32_t>(static_cast<std::uint32_t>(*sample_->commanded_pulses) -
+                                                 static_cast<std::uint32_t>(sample_->position_pulses));
+    next->commanded_position = scale_.to_units(tracker_.counter() + tracker_.offset() + ahead);
+    next->following_error = *next->commanded_position - next->position;
+  }
   if (settings_.scale.modulo) {
-    const auto turn = *settings_.scale.modulo;
-    next->position -= std::floor(next->position / turn) * turn;
+    const auto into_turn = [turn = *settings_.scale.modulo](double position) {
+      return position - std::floor(position / turn) * turn;
+    };
+    next->position = into_turn(next->position);
+    if (next->commanded_position) next->commanded_position = into_turn(*next->commanded_position);
   }
   next->identity = identity_;
   next->reboots = reboots_;

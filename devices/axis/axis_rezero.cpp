@@ -1,4 +1,6 @@
 // The drive's counter is zeroed before a target could leave it.
+#include <cstdlib>
+
 #include "devices/axis/axis.hpp"
 #include "devices/axis/chain.hpp"
 
@@ -55,7 +57,7 @@ Task<bool> Axis::counter_shows_zero() {
     if (sample) {
       on_sample(*sample);
       if (sample->moving) co_return false;
-      if (sample->position_pulses == 0) co_return true;
+      if (std::abs(std::int64_t{sample->position_pulses}) <= drive_->position_window()) co_return true;
     }
     if (env_.clock->now() >= latest) co_return false;
     co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + zeroing_poll);

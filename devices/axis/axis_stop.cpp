@@ -181,7 +181,7 @@ Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests
   std::int64_t resting_at = 0;
   while (link_ != LinkState::offline && requests == stopping_.requests) {
     if (sample_ && sample_->asked_at >= since) {
-      const bool settled = resting_since && resting_at == tracker_.counter();
+      const bool settled = resting_since && !moved_from(resting_at);
       const bool rested = settled && sample_->asked_at - *resting_since >= rest;
       if (!sample_->moving && (sample_->mode != DriveMode::homing || rested)) co_return true;
       if (sample_->moving) {
@@ -204,16 +204,16 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline, std::optional<int> requ
   constexpr int resting_in_homing = 6;  // samples; between its phases the motor rests, too
   const auto another = [&] { return requests && *requests != stopping_.requests; };
   int resting = 0, silent = 0;
-  std::int32_t resting_at = 0;
+  std::int64_t resting_at = 0;
   for (;;) {
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
     if (sample) on_sample(*sample);
     if (another() || (!sample && ++silent == stop_attempts)) co_return false;
     if (sample) {
       silent = 0;
-      const bool rests = !sample->moving && (resting == 0 || sample->position_pulses == resting_at);
+      const bool rests = !sample->moving && (resting == 0 || !moved_from(resting_at));
+      if (resting == 0) resting_at = tracker_.counter();
       resting = rests ? resting + 1 : 0;
-      resting_at = sample->position_pulses;
       if (resting > 0 && sample->mode != DriveMode::homing) co_return true;
       if (resting >= resting_in_homing) co_return true;
       if (sample->asked_at >= deadline && resting == 0) co_return false;

@@ -42,8 +42,8 @@ std::int64_t PositionTracker::offset_for(double position) const {
   return scale_.to_pulses(position) - counter_;
 }
 
-void PositionTracker::set_position(double position, PositionTrust trust) {
-  offset_ = offset_for(position);
+void PositionTracker::declare(std::int64_t offset, PositionTrust trust) {
+  offset_ = offset;
   trust_ = trust;
   forget_base();
 }

@@ -30,12 +30,16 @@ class PositionTracker {
 
   [[nodiscard]] double position() const;
   [[nodiscard]] std::int64_t counter() const { return counter_; }
+  /// Where the drive was told to stand, if the shaft rests there; else as counter().
+  [[nodiscard]] std::int64_t resting_counter() const { return base_ ? base_->counter : counter_; }
   [[nodiscard]] std::int64_t offset() const { return offset_; }
   [[nodiscard]] PositionTrust trust() const { return trust_; }
   void lose_trust() { trust_ = PositionTrust::unknown; }
 
   /// Declares the present counter to be at `position`; the caller journals offset_for() first.
-  void set_position(double position, PositionTrust trust);
+  void set_position(double position, PositionTrust trust) { declare(offset_for(position), trust); }
+  /// The same with the offset that was journalled: a measured counter may have wavered since.
+  void declare(std::int64_t offset, PositionTrust trust);
   [[nodiscard]] std::int64_t offset_for(double position) const;
   /// Takes over a journalled offset after a restart of the daemon.
   void restore(std::int64_t offset);

@@ -15,7 +15,9 @@ enum class Settlement : std::uint8_t {
 };
 
 /// Tells it by where the drive rests now. `continuous`: it was proven that the drive kept its memory since.
-/// Where that is not known only a counter that no power-up leaves says anything. Pure.
-Settlement settle(CommandKind kind, const SendingNote& note, std::int32_t counter, bool continuous);
+/// Where that is not known only a counter that no power-up leaves says anything. `window`: pulses within
+/// which a measured counter shows no motion, 0 for a counted one. Pure.
+Settlement settle(CommandKind kind, const SendingNote& note, std::int32_t counter, bool continuous,
+                  std::int64_t window = 0);
 
 }  // namespace axisd

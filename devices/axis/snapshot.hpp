@@ -114,6 +114,9 @@ struct AxisSnapshot {
   bool inhibited = false;             ///< StopAll holds the machine
 
   double position = 0;
+  /// Where the drive tells it beside a measured position: where it wants the shaft.
+  std::optional<double> commanded_position{};
+  std::optional<double> following_error{};  ///< commanded_position less position; not by modulo
   double velocity = 0;
   std::optional<double> target{};  ///< of the current motion
   bool moving = false;

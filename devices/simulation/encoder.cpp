@@ -1,5 +1,6 @@
 #include "devices/simulation/encoder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
@@ -60,12 +61,12 @@ std::int64_t Encoder::noise(TimePoint now) const {
 
 std::int64_t Encoder::deviation(const Motor& motor, TimePoint now) const {
   const auto short_by = motor.direction() < 0 ? -settings_.backlash : 0;
-  const auto off = noise(now) + leaning_ - short_by;
-  if (!settings_.quantised)
-    return motor.lag() + std::llround(motor.behind() - static_cast<double>(off) * pulses_per_count_);
-  const auto shaft = static_cast<double>(motor.shaft()) - motor.behind();
-  const auto counts = std::llround(shaft / pulses_per_count_) + off;
-  return motor.commanded() - std::llround(static_cast<double>(counts) * pulses_per_count_);
+  const auto bent = static_cast<double>(leaning_ - short_by) * pulses_per_count_;
+  auto shaft = static_cast<double>(motor.shaft()) - motor.behind() + bent;
+  if (settings_.quantised) shaft = std::round(shaft / pulses_per_count_) * pulses_per_count_;
+  // Counts finer than pulses: what is shown wavers by whole pulses all the same.
+  shaft += static_cast<double>(noise(now)) * std::max(1.0, pulses_per_count_);
+  return motor.commanded() - std::llround(shaft);
 }
 
 std::int32_t Encoder::position(const Motor& motor, TimePoint now) const {

@@ -13,7 +13,8 @@ class Motor;
 /// How far a measured position is from where the pulses sent should have brought the shaft. All of it 0 is an
 /// encoder that does not exist: it always shows the commanded position.
 struct EncoderSettings {
-  /// Counts that a reading is off at most, at rest as well; another value every few milliseconds.
+  /// Counts that a reading is off at most (pulses, where those are coarser), at rest as well; another value
+  /// every few milliseconds.
   int noise = 0;
   /// The shaft follows with this time constant: behind by speed x this in motion, and settling after it.
   Duration following{};

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "devices/drive_access.hpp"
 #include "devices/yako_rtu/codec.hpp"
 #include "devices/yako_rtu/configuration.hpp"
+#include "devices/yako_rtu/mode_watch.hpp"
 #include "devices/yako_rtu/model.hpp"
 
 namespace axisd::yako_rtu {
@@ -34,6 +36,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
   [[nodiscard]] bool moves_by_itself() const override;
   [[nodiscard]] bool closed_loop() const override;
+  [[nodiscard]] std::int64_t position_window() const override;
 
   // drive_motion.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
@@ -82,6 +85,11 @@ class YakoRtuDrive final : public Drive {
   class Loaded;
 
   // drive_connection.cpp
+  /// One reading of the state, in the order of the readings.
+  DriveSample sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at, TimePoint measured_at);
+  /// Reads how far from its target the drive takes itself for in position.
+  Task<Result<void>> read_window();
+  void note_register(std::uint16_t address, std::uint16_t value);
   Task<bool> has_register(std::uint16_t address, TransactionClass transaction_class) const;
   [[nodiscard]] Error wrong_model(std::uint16_t code, const std::string& found) const;
   [[nodiscard]] bool readable(std::uint32_t address) const;
@@ -143,7 +151,10 @@ class YakoRtuDrive final : public Drive {
   std::vector<MotionBlock> power_up_blocks_{factory_block};  ///< what a power-up may leave; the newest last
   std::optional<bool> saving_;                               ///< 0x0016, if it is known
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
-  std::set<std::uint16_t> unsaved_;   ///< saved registers that did not hold what was written
+  ModeWatch mode_;
+  /// 0x011F and the counts of a revolution by 0x0110, as the factory sets them until they were read.
+  std::int64_t accuracy_ = 10, counts_per_revolution_ = 4000;
+  std::set<std::uint16_t> unsaved_;  ///< saved registers that did not hold what was written
   std::uint64_t eeprom_writes_ = 0;
 };
 

@@ -29,13 +29,6 @@ std::vector<std::uint16_t> addresses_of(const std::vector<RegisterSetting>& sett
   return addresses;
 }
 
-DriveSample sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at, TimePoint measured_at) {
-  auto sample = decode_state(registers);
-  sample.asked_at = asked_at;
-  sample.measured_at = measured_at;
-  return sample;
-}
-
 }  // namespace
 
 YakoRtuDrive::YakoRtuDrive(const Model& model, DriveContext context)
@@ -107,7 +100,40 @@ bool YakoRtuDrive::closed_loop() const {
   return model_->descriptor->capabilities.closed_loop && !open && found_closed_.value_or(false);
 }
 
+/// 0x011F gives no unit: the larger of its readings as counts of the encoder and as pulses.
+std::int64_t YakoRtuDrive::position_window() const {
+  const auto mode = setup_.model_settings.find("loop_mode");
+  const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
+  if (!model_->descriptor->capabilities.closed_loop || open || !found_closed_.value_or(true)) return 0;
+  const auto in_counts =
+      (accuracy_ * setup_.pulses_per_revolution + counts_per_revolution_ - 1) / counts_per_revolution_;
+  return std::max(accuracy_, in_counts);
+}
+
+void YakoRtuDrive::note_register(std::uint16_t address, std::uint16_t value) {
+  if (address == reg::encoder_resolution) counts_per_revolution_ = value == 1 ? 10000 : 4000;
+  if (address == reg::positioning_accuracy) accuracy_ = std::max<std::uint16_t>(value, 1);
+}
+
+Task<Result<void>> YakoRtuDrive::read_window() {
+  if (!model_->descriptor->capabilities.closed_loop) co_return Result<void>{};
+  const auto found = co_await read_registers({reg::encoder_resolution, reg::positioning_accuracy},
+                                             in(TransactionClass::parameters));
+  if (!found) co_return fail(found.error());
+  for (const auto& [address, value] : *found) note_register(address, value);
+  co_return Result<void>{};
+}
+
 bool YakoRtuDrive::moves_by_itself() const { return !check_control_mode(); }
+
+DriveSample YakoRtuDrive::sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at,
+                                    TimePoint measured_at) {
+  auto sample = decode_state(registers);
+  sample.asked_at = asked_at;
+  sample.measured_at = measured_at;
+  sample.mode = mode_.judge(sample);
+  return sample;
+}
 
 Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class) {
   const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
@@ -117,7 +143,7 @@ Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_
 
 Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(StateWatch watch) {
   modbus_rtu::Repetition repetition{.period = watch.period};
-  repetition.goes_on = [&watch](const modbus_rtu::Reading& reading) {
+  repetition.goes_on = [this, &watch](const modbus_rtu::Reading& reading) {
     return watch.goes_on(sample_of(reading.registers, reading.sent_at, reading.answered_at));
   };
   repetition.proof = {.request = node_.reading(reg::start_speed, canary_count),
@@ -161,6 +187,7 @@ Task<Result<void>> YakoRtuDrive::configure() {
   // The canary goes first and is read last: a restart in between would undo what was found or written.
   if (const auto marked = co_await replace_canary(fresh_neutral_block()); !marked) co_return marked;
   if (const auto done = co_await bring_to(required_); !done) co_return done;
+  if (const auto known = co_await read_window(); !known) co_return known;
   co_return co_await check_continuity(TransactionClass::parameters);
 }
 

@@ -88,6 +88,9 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::ve
           error_at(Reason::misconfigured, static_cast<std::uint16_t>(values[i].address),
                    fmt::format("reads {} after {} was written", (*present)[i].value, values[i].value),
                    "check whether another master writes to this drive, or its EEPROM fails"));
+  for (const auto& value : *present)
+    note_register(static_cast<std::uint16_t>(value.address),
+                  static_cast<std::uint16_t>(value.value & 0xFFFF));
   co_return present;
 }
 

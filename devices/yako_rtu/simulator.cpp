@@ -73,7 +73,7 @@ void SimulatedDrive::power_up() {
   in_position_ = behaviour_.in_position_at_power_up;
   homed_ = false;
   alarm_ = cause_;
-  activity_ = Activity::none;
+  activity_ = last_activity_ = Activity::none;
   multi_speed_on_ = stopping_ = false;
   segment_due_ = clear_due_ = homing_due_ = TimePoint::max();
   terminals_.settle(motor_.shaft(), memory_);
@@ -237,6 +237,19 @@ void SimulatedDrive::configuration_changed() {
   step(now_);
 }
 
+std::uint16_t SimulatedDrive::mode() const {
+  switch (behaviour_.mode_stays && activity_ == Activity::none ? last_activity_ : activity_) {
+    case Activity::homing:
+      return 1;
+    case Activity::pt:
+      return 2;
+    case Activity::pv:
+      return 3;
+    default:
+      return 0;
+  }
+}
+
 std::uint16_t SimulatedDrive::status() const {
   const unsigned bits = (in_position() ? 1U : 0U) | (homed_ ? 2U : 0U) | (motor_.moving() ? 4U : 0U) |
                         (alarm_ != 0 ? 8U : 0U) | (enabled() ? 0U : 16U);  // bit 4: 1 is released
@@ -276,10 +289,7 @@ std::uint32_t SimulatedDrive::peek(std::uint32_t wide) const {
     case reg::node:
       return node_;
     case reg::mode:
-      return activity_ == Activity::homing ? 1
-             : activity_ == Activity::pt   ? 2
-             : activity_ == Activity::pv   ? 3
-                                           : 0;
+      return mode();
     case reg::moving:
       return motor_.moving() ? 1 : 0;
     case reg::direction:

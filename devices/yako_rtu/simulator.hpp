@@ -67,6 +67,7 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   [[nodiscard]] TimePoint next_event() const;
   [[nodiscard]] bool ready() const { return powered_ && !boot_end_; }
   [[nodiscard]] bool enabled() const { return enabled_ && !terminals_.active(Input::motor_free); }
+  [[nodiscard]] std::uint16_t mode() const;
   [[nodiscard]] std::uint16_t status() const;
   /// The bit of 0x0007: a motion ended as it should, and the encoder is within 0x011F of its end.
   [[nodiscard]] bool in_position() const;
@@ -145,11 +146,12 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   int starts_ = 0;
 
   Activity activity_ = Activity::none;
-  std::optional<Plan> pending_;   ///< begins when the motor has stopped
-  std::int64_t last_target_ = 0;  ///< shaft position of the last position move
-  bool stopping_ = false;         ///< the motion will not complete
-  bool multi_speed_on_ = false;   ///< PV is enabled
-  int multi_speed_rpm_ = 0;       ///< signed, what PV runs at
+  Activity last_activity_ = Activity::none;  ///< what was started last
+  std::optional<Plan> pending_;              ///< begins when the motor has stopped
+  std::int64_t last_target_ = 0;             ///< shaft position of the last position move
+  bool stopping_ = false;                    ///< the motion will not complete
+  bool multi_speed_on_ = false;              ///< PV is enabled
+  int multi_speed_rpm_ = 0;                  ///< signed, what PV runs at
   TimePoint pins_changed_{};
   TimePoint segment_due_ = TimePoint::max();  ///< PT start, 5 ms after its edge
   TimePoint clear_due_ = TimePoint::max();    ///< 0x002C takes effect

@@ -32,7 +32,7 @@ Fail SimulatedDrive::start_homing() {
       (terminals_.active(Input::stop) || terminals_.active(Input::emergency_stop)))
     return Fail::none;
   ++starts_;
-  activity_ = Activity::homing;
+  activity_ = last_activity_ = Activity::homing;
   homing_due_ = TimePoint::max();
   in_position_ = stopping_ = false;
   if (!behaviour_.homed_stays_during_homing) homed_ = false;

@@ -73,7 +73,7 @@ Fail SimulatedDrive::begin(const Plan& plan) {
 }
 
 void SimulatedDrive::launch(const Plan& plan) {
-  activity_ = plan.activity;
+  activity_ = last_activity_ = plan.activity;
   homing_due_ = TimePoint::max();
   in_position_ = stopping_ = false;
   pending_.reset();

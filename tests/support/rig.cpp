@@ -195,7 +195,7 @@ void both_directions(const RigOptions& base, const std::function<void(const RigO
 
 void for_each_switch(const RigOptions& base, const std::function<void(const RigOptions&)>& test) {
   both_directions(base, test);
-  for (const auto& spec : simulation::find_simulator("ykd2405pr")->switches) {
+  for (const auto& spec : simulation::find_simulator(base.model)->switches) {
     SCOPED_TRACE(std::string(spec.name) + (spec.default_value ? " off" : " on"));
     auto options = base;
     options.switches[std::string(spec.name)] = !spec.default_value;

@@ -21,7 +21,7 @@ namespace axisd::test {
 
 struct RigOptions {
   bool invert = false;
-  std::string model = "ykd2405pr";
+  std::string model = "ykd2405pr";  ///< any on RS-485
   simulation::Switches switches{};
   std::function<void(AxisSettings&)> adjust{};
   std::function<void(simulation::SimulatedNodeSettings&)> adjust_drive{};

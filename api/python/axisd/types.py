@@ -202,6 +202,8 @@ class AxisState:
     lease_holder: str
     start_note: str
     starts_by_sync: bool
+    commanded_position: float | None
+    following_error: float | None
     raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -222,7 +224,8 @@ class AxisState:
             motion_cause=_member(MotionCause, types_pb2.MotionCause.DESCRIPTOR, "MOTION_CAUSE_", raw.motion_cause),
             drift=raw.drift, eeprom_writes=raw.eeprom_writes, link_note=raw.link_note,
             lease_holder=raw.lease_holder, start_note=raw.start_note,
-            starts_by_sync=raw.starts_by_sync, raw=raw)
+            starts_by_sync=raw.starts_by_sync, commanded_position=_optional(raw, "commanded_position"),
+            following_error=_optional(raw, "following_error"), raw=raw)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -67,6 +67,8 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   snapshot.link_error = Error{.reason = Reason::offline};
   snapshot.fault = Error{.reason = Reason::alarm};
   snapshot.position = 1.5;
+  snapshot.commanded_position = 1.75;
+  snapshot.following_error = 0.25;
   snapshot.velocity = -2;
   snapshot.target = 0;
   snapshot.moving = snapshot.in_position = snapshot.homed = true;
@@ -100,6 +102,8 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   EXPECT_EQ(state.measured_at().nanos(), 500'000'000);
   EXPECT_EQ(state.fault().reason(), v1::REASON_ALARM);
   EXPECT_TRUE(state.has_target());
+  EXPECT_EQ(state.commanded_position(), 1.75);
+  EXPECT_EQ(state.following_error(), 0.25);
   EXPECT_EQ(state.motion_cause(), v1::MOTION_CAUSE_TERMINAL);
 }
 

@@ -22,6 +22,19 @@ TEST(Settlement, AMoveIsToldByWhereTheDriveRests) {
   EXPECT_EQ(settle(move, {}, 100, true), Settlement::unknown) << "nothing was noted";
 }
 
+TEST(Settlement, AMeasuredCounterThatOnlyWaversHasNotMoved) {
+  constexpr std::int64_t window = 10;
+  EXPECT_EQ(settle(move, note(100, 600, window), 102, true, window), Settlement::not_executed);
+  EXPECT_EQ(settle(move, note(100, 600, window), 598, true, window), Settlement::done);
+  EXPECT_EQ(settle(move, note(100, 600, window), 111, true, window), Settlement::in_part);
+  EXPECT_EQ(settle(move, note(100, 105, window), 103, true, window), Settlement::unknown)
+      << "both are within the window";
+  const auto home = CommandKind::home;
+  EXPECT_EQ(settle(home, note(500, 0, window), 497, true, window), Settlement::not_executed);
+  EXPECT_EQ(settle(home, note(500, 0, window), 3, true, window), Settlement::in_part);
+  EXPECT_EQ(settle(home, note(5, 0, window), 3, true, window), Settlement::unknown);
+}
+
 TEST(Settlement, ACounterThatAPowerUpLeavesProvesNothingByItself) {
   EXPECT_EQ(settle(move, note(0, 600), 0, false), Settlement::unknown);
   EXPECT_EQ(settle(move, note(600, 0), 0, false), Settlement::unknown);

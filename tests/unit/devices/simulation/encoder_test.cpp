@@ -135,6 +135,13 @@ TEST(Encoder, TheNoiseIsInCounts) {
     most = std::max(most, std::abs(shaft.position()));
   }
   EXPECT_EQ(5, most);
+  shaft.encoder.set_resolution(0.25);
+  most = 0;
+  for (int i = 0; i < 500; ++i) {
+    shaft.wait(5ms);
+    most = std::max(most, std::abs(shaft.position()));
+  }
+  EXPECT_EQ(2, most) << "counts finer than pulses do not hide it";
 }
 
 TEST(Encoder, PlayLeavesTheShaftShortAfterAMotionBackwards) {
