@@ -114,7 +114,7 @@ void Axis::on_sample(const DriveSample& sample) {
   const auto before = sample_;
   sample_ = sample;
   if (before) tell_edges(*before, sample);
-  if (!rezeroing_) tracker_.update(sample.position_pulses, target_tolerance());
+  if (!rezeroing_) tracker_.update(sample.position_pulses, drive_->position_window());
   // What nothing holds may be turned by hand, and back again.
   if (sample.moving || !sample.enabled) tracker_.forget_base();
   if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;

@@ -222,7 +222,9 @@ class Axis {
   void remember_position();
 
   // axis_requests.cpp: acceptance
-  void renew_hold(const CommandPtr& command);
+  [[nodiscard]] TimePoint held_until(const CommandOptions& options, Duration hold) const;
+  [[nodiscard]] bool holds() const;
+  void renew_hold(const CommandPtr& command, const CommandOptions& options);
   template <class Request>
   [[nodiscard]] Result<void> permit(const Request& request, const CommandOptions& options) const;
   Result<CommandPtr> accept(const EnableRequest& request, const CommandOptions& options);
@@ -329,6 +331,7 @@ class Axis {
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
   Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
   [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;
+  ActivityPtr take_activity();
   void finish(Activity& activity, const std::function<void(CommandRecord&)>& how);
   void fail_with_stop(Activity& activity, Error cause);
   void abort_at_rest(Activity& activity, Error cause);

@@ -56,7 +56,7 @@ Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since
     *arrived = sample_->measured_at;
   }
   if (!co_await is_no_reboot(activity)) co_return;
-  tracker_.reached(*activity->plan.target);
+  tracker_.reached(*activity->plan.target, drive_->position_window());
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
@@ -153,8 +153,8 @@ void Axis::Member::aim() {
   auto& plan = activity_->plan;
   base_ = axis_->tracker_.counter();
   const auto distance = plan.target->counter - base_;
-  there_ =
-      axis_->tracker_.rests_at(*plan.target) || (there_ && std::abs(distance) <= axis_->target_tolerance());
+  there_ = axis_->tracker_.rests_at(*plan.target) ||
+           (there_ && std::abs(distance) <= axis_->drive_->position_window());
   plan.positive = (distance >= 0) != axis_->settings_.scale.invert;
   plan.predicted = axis_->planner_.duration(plan, distance);
 }
@@ -212,6 +212,7 @@ Task<Result<TimePoint>> Axis::Member::trigger() { co_return co_await loaded_->tr
 void Axis::Member::started(TimePoint at) {
   started_at_ = at;
   axis_->continuity_checked_ = axis_->env_.clock->now();  // the canary was part of its start
+  axis_->tracker_.forget_base();
   activity_->command->activate();
   axis_->publish();
 }
@@ -276,6 +277,7 @@ void Axis::Member::end(Error cause, bool aborted) {
   axis.revoke_motion();
   if (activity_->may_run) {
     // The stop of one that may move goes out whatever is known of its start.
+    axis.tracker_.forget_base();
     axis.leave_running(*activity_);
     axis.note_motion_to_stop();
     if (unknown) {

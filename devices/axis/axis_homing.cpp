@@ -82,9 +82,11 @@ Task<> Axis::run_home(ActivityPtr activity) {
 std::int64_t Axis::counter_at_home() const {
   const auto measured = tracker_.counter();
   const auto turns = measured - sample_->position_pulses;
-  for (const auto nominal : {std::int64_t{0}, scale_.to_pulses(settings_.homing->offset)})
-    if (!moved_from(turns + nominal)) return turns + nominal;
-  return measured;
+  const auto home = turns, compensated = turns + scale_.to_pulses(settings_.homing->offset);
+  const bool at_home = !moved_from(home), at_compensated = !moved_from(compensated);
+  if (home != compensated && at_home && at_compensated) return measured;  // either may be meant
+  if (at_home) return home;
+  return at_compensated ? compensated : measured;
 }
 
 /// The drive searches for the rising edge of the switch; on an active switch there is none. A bounded move

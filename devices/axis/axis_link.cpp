@@ -254,7 +254,7 @@ void Axis::go_offline(const Error& cause) {
                      terminal_motion_ || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
   if (moved) stop_owed_ = true;
-  if (auto activity = std::exchange(activity_, nullptr)) {
+  if (auto activity = take_activity()) {
     auto unknown = error(Reason::offline, "the drive stopped answering while the command was being executed",
                          "check power and wiring; then reset the axis");
     unknown.outcome = Outcome::unknown;

@@ -45,9 +45,15 @@ MotionGuard Axis::guard(const Activity& activity) const {
                                  activity.hold_until.value_or(TimePoint::max())})};
 }
 
+/// It may be kept by whoever began it; nothing of it comes back to the axis.
+ActivityPtr Axis::take_activity() {
+  if (activity_) activity_->late.reset();
+  return std::exchange(activity_, nullptr);
+}
+
 void Axis::finish(Activity& activity, const std::function<void(CommandRecord&)>& how) {
   if (activity_.get() != &activity) return;
-  const auto keep = std::exchange(activity_, nullptr);
+  const auto keep = take_activity();
   how(*keep->command);
   const auto& command = keep->command->value();
   if (command.state == CommandState::done)
@@ -89,7 +95,7 @@ void Axis::enter_error_stop(const Error& cause) {
     spdlog::error("{}", to_string(cause));
     fault_ = cause;
   }
-  if (auto activity = std::exchange(activity_, nullptr)) {
+  if (auto activity = take_activity()) {
     leave_running(*activity);
     activity->command->error(cause);
     drop_buffer(cause);
@@ -123,7 +129,7 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
 
 Task<> Axis::run_move(ActivityPtr activity) {
   if (!co_await positioned(activity)) co_return;
-  tracker_.reached(*activity->plan.target);
+  tracker_.reached(*activity->plan.target, drive_->position_window());
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
@@ -150,17 +156,17 @@ Task<Result<void>> Axis::look(Duration oldest) {
   if (sample_ && sample_->asked_at >= env_.clock->now() - oldest) co_return Result<void>{};
   const Chain chain(*this);
   for (int attempt = 1;; ++attempt) {
-    auto sample = co_await drive_->read_state(TransactionClass::motion);
-    if (sample) {
-      // What a restart leaves behind must not be taken for a release, or for a shaft that was turned.
-      if (looks_restarted(*sample))
-        if (auto proof = co_await prove_continuity(TransactionClass::motion); !proof) co_return proof;
+    const auto sample = co_await drive_->read_state(TransactionClass::motion);
+    auto seen = sample ? Result<void>{} : fail(sample.error());
+    // What a restart leaves behind must not be taken for a release, or for a shaft that was turned.
+    if (sample && looks_restarted(*sample)) seen = co_await prove_continuity(TransactionClass::motion);
+    if (seen) {
       on_sample(*sample);
-      co_return Result<void>{};
+      co_return seen;
     }
-    if (sample.error().reason != Reason::no_reply || attempt == attempts) {
-      sample.error().outcome = Outcome::not_executed;
-      co_return fail(sample.error());
+    if (seen.error().reason != Reason::no_reply || attempt == attempts) {
+      seen.error().outcome = Outcome::not_executed;  // only read
+      co_return seen;
     }
   }
 }
@@ -169,7 +175,7 @@ Task<Result<void>> Axis::look(Duration oldest) {
 bool Axis::looks_restarted(const DriveSample& sample) const {
   if (!sample_) return false;
   const auto step = std::int64_t{sample.position_pulses} - sample_->position_pulses;
-  return sample.enabled != sample_->enabled || (!sample.moving && std::abs(step) > target_tolerance());
+  return sample.enabled != sample_->enabled || (!sample.moving && std::abs(step) > drive_->position_window());
 }
 
 /// How old a reading may be from which a start is judged. Without terminals that could move or release the
@@ -188,7 +194,11 @@ Result<void> Axis::aim(Activity& activity) {
   auto& plan = activity.plan;
   tracker_.settle_base();
   const auto velocity = plan.granted.velocity;
-  const auto target = tracker_.again(*plan.target);
+  const auto& command = activity.command->value();
+  auto target = tracker_.again(*plan.target);
+  // The shorter way round is that from where the axis rests.
+  if (command.kind == CommandKind::move_absolute && settings_.scale.modulo)
+    target = target_of({.position = command.asked.position.value_or(target.position)}, tracker_);
   // What backs off from a switch before homing is bounded by itself.
   if (activity.state == AxisState::homing) {
     plan = planner_.aimed(std::move(plan), target, tracker_);
@@ -196,6 +206,10 @@ Result<void> Axis::aim(Activity& activity) {
   }
   auto aimed = planner_.move(plan, target, tracker_);
   if (!aimed) return fail(aimed.error());
+  const bool turns_back = activity.state == AxisState::continuous_motion && velocity &&
+                          !tracker_.rests_at(target) && aimed->positive != (*velocity > 0);
+  if (turns_back)
+    return fail(error(Reason::soft_limit, "beyond the software limit already", "move the other way"));
   plan = *std::move(aimed);
   plan.granted.velocity = velocity;  // with its sign
   activity.command->grant(plan.granted);
@@ -204,7 +218,7 @@ Result<void> Axis::aim(Activity& activity) {
 
 /// The drive would go as far as was asked (M19). Errors: moving.
 Result<void> Axis::check_way(const Plan& plan) const {
-  if (tracker_.deviation(*plan.target) <= target_tolerance() + 1) return {};
+  if (tracker_.deviation(*plan.target) <= drive_->position_window() + 1) return {};
   return fail(
       error(Reason::moving,
             fmt::format("the shaft was moved before the start: from {:.6g} {} the way would be another "
@@ -236,8 +250,8 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     there = result && tracker_.rests_at(target);
     if (result && !there) {
       activity->plan.predicted = planner_.duration(activity->plan, target.counter - base);
-      tracker_.forget_base();
       result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
+      if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
     }
   }
   const auto since = env_.clock->now();
@@ -430,7 +444,10 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
     }
     if (sample_ && sample_->asked_at >= since) {
       const auto& sample = *sample_;
-      if (sample.moving || moved_from(base)) activity->started = true;
+      if (!activity->started && (sample.moving || moved_from(base))) {
+        activity->started = true;
+        resting_since.reset();  // what rested before it began says nothing of its settling
+      }
       // Its motion was acknowledged, and may have begun and ended between two samples.
       if (unseen && sample.asked_at >= since + plan.predicted + unseen_margin && !held_back(plan))
         activity->started = true;

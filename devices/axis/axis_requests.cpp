@@ -20,16 +20,29 @@ Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& opti
     return std::visit([&](const auto& request) { return accept(request, always); }, action);
   }
   auto repeat = env_.book->find_repeat(settings_.name, action, options);
-  if (repeat && *repeat != nullptr) renew_hold(*repeat);
+  if (repeat && *repeat != nullptr) renew_hold(*repeat, options);
   if (!repeat || *repeat != nullptr) return repeat;
   if (options.buffer_mode == BufferMode::buffered) return accept_buffered(action, options);
   return std::visit([&](const auto& request) { return accept(request, options); }, action);
 }
 
+/// The hold counts from when its call arrived: whoever let go since then is not kept moving.
+TimePoint Axis::held_until(const CommandOptions& options, Duration hold) const {
+  const auto now = env_.clock->now();
+  return (options.arrived == TimePoint{} ? now : std::min(now, options.arrived)) + hold;
+}
+
+/// A held motion is being executed, and its hold is not over.
+bool Axis::holds() const {
+  return activity_ && activity_->hold_until && env_.clock->now() < *activity_->hold_until &&
+         current(*activity_);
+}
+
 /// A repeated jog (or held velocity) extends the motion that it started, and never starts one that has ended.
-void Axis::renew_hold(const CommandPtr& command) {
-  if (!activity_ || activity_->command != command || !activity_->hold_until || !current(*activity_)) return;
-  activity_->hold_until = env_.clock->now() + command->value().asked.hold.value_or(Duration{0});
+void Axis::renew_hold(const CommandPtr& command, const CommandOptions& options) {
+  if (!holds() || activity_->command != command) return;
+  const auto until = held_until(options, command->value().asked.hold.value_or(Duration{0}));
+  activity_->hold_until = std::max(*activity_->hold_until, until);
 }
 
 template <class Request>
@@ -46,6 +59,7 @@ ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, Axi
   auto command = waited ? std::exchange(next_, nullptr) : env_.book->open(settings_.name, action, options);
   const auto replaced = activity_;
   const bool moving = (replaced && replaced->state != AxisState::standstill) || (sample_ && sample_->moving);
+  note_motion_to_stop();
   if (replaced)
     supersede(error(Reason::superseded,
                     fmt::format("replaced by {} {}", to_string(kind_of(action)), command->value().id)));
@@ -173,7 +187,7 @@ Result<Plan> Axis::plan_velocity(double velocity, const MotionValues& with, bool
 
 /// A repeated call with the same velocity extends the held motion that it started.
 bool Axis::renews(const Action& action, const CommandOptions& options) const {
-  if (!activity_ || !activity_->hold_until || !current(*activity_)) return false;
+  if (!holds()) return false;
   const auto& known = activity_->command->value();
   const auto velocity = std::visit(
       [](const auto& request) -> std::optional<double> {
@@ -190,8 +204,9 @@ CommandPtr Axis::renew(const Action& action, const CommandOptions& options, Dura
   // nothing: it counts once that is known.
   env_.book->attach(
       activity_->command, settings_.name, action, options,
-      [activity = std::weak_ptr(activity_), until = env_.clock->now() + hold](const Result<void>& known) {
-        if (const auto held = activity.lock(); held && known) held->hold_until = until;
+      [activity = std::weak_ptr(activity_), until = held_until(options, hold)](const Result<void>& known) {
+        if (const auto held = activity.lock(); held && known)
+          held->hold_until = std::max(held->hold_until.value_or(until), until);
       });
   return activity_->command;
 }
@@ -203,7 +218,7 @@ Result<CommandPtr> Axis::accept(const MoveVelocityRequest& request, const Comman
   if (!plan) return fail(plan.error());
   plan->granted.hold = request.hold;
   const auto activity = begin(request, options, AxisState::continuous_motion, *plan);
-  if (request.hold) activity->hold_until = env_.clock->now() + *request.hold;
+  if (request.hold) activity->hold_until = held_until(options, *request.hold);
   launch(run_velocity(activity), "velocity");
   return activity->command;
 }
@@ -215,7 +230,7 @@ Result<CommandPtr> Axis::accept(const JogRequest& request, const CommandOptions&
   if (!plan) return fail(plan.error());
   plan->granted.hold = request.hold;
   const auto activity = begin(request, options, AxisState::continuous_motion, *plan);
-  activity->hold_until = env_.clock->now() + request.hold;
+  activity->hold_until = held_until(options, request.hold);
   launch(run_velocity(activity), "jog");
   return activity->command;
 }

@@ -28,7 +28,7 @@ void Axis::revoke_motion() {
 void Axis::supersede(const Error& cause) {
   ++accept_epoch_;
   revoke_motion();
-  if (auto activity = std::exchange(activity_, nullptr)) {
+  if (auto activity = take_activity()) {
     leave_running(*activity);
     auto told = cause;
     const bool enabling = activity->noted && activity->command->value().kind == CommandKind::enable;

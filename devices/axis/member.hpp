@@ -49,10 +49,7 @@ class Axis::Member {
   [[nodiscard]] const std::string& start_note() const { return start_note_; }
   Task<Result<void>> verify();
   /// From now on its start may have been sent.
-  void about_to_start() {
-    activity_->may_run = true;
-    axis_->tracker_.forget_base();
-  }
+  void about_to_start() { activity_->may_run = true; }
   /// It is known that it was not.
   void not_started() { activity_->may_run = false; }
   Task<Result<TimePoint>> trigger();

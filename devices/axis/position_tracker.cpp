@@ -115,8 +115,9 @@ PositionTracker PositionTracker::after(const Target& target) const {
   return then;
 }
 
-void PositionTracker::reached(const Target& target) {
-  base_ = {.units = target.exact, .counter = target.counter};
+void PositionTracker::reached(const Target& target, std::int64_t window) {
+  if (std::abs(counter_ - target.counter) > window) return forget_base();
+  base_ = Base{.units = target.exact, .counter = target.counter};
 }
 
 }  // namespace axisd

@@ -67,8 +67,9 @@ class PositionTracker {
   [[nodiscard]] std::int64_t deviation(const Target& target) const;
   /// How it will be once that target is reached: what is planned behind a move starts from there.
   [[nodiscard]] PositionTracker after(const Target& target) const;
-  /// That target was reached and is the base of the next relative move.
-  void reached(const Target& target);
+  /// The drive came to rest after it was told to go to that target: the base of the next relative move, if
+  /// the shaft is within `window` pulses of it.
+  void reached(const Target& target, std::int64_t window = 0);
   /// The shaft moves, or nothing holds it where it stands.
   void forget_base() { base_.reset(); }
 

@@ -38,6 +38,35 @@ TEST(PositionTracker, APlanThatIsNotCarriedOutChangesNothing) {
   EXPECT_EQ(tracker.plan_relative(1).counter, 22);
 }
 
+/// Near enough to be done is not where the drive stands: a relative move counts from the latter.
+TEST(PositionTracker, ATargetThatWasMissedIsNoBase) {
+  PositionTracker tracker(half_pulses(false));
+  tracker.update(0);
+  const auto target = tracker.plan_absolute(50);
+  tracker.update(91);
+  tracker.reached(target, 0);
+  EXPECT_EQ(tracker.plan_relative(1).counter, 93);
+  tracker.reached(target, 10);
+  EXPECT_EQ(tracker.plan_relative(1).counter, 102);
+}
+
+TEST(PositionTracker, ABaseThatTheShaftLeftIsVoid) {
+  PositionTracker tracker(half_pulses(false));
+  tracker.update(0);
+  const auto target = tracker.plan_absolute(50);
+  tracker.update(100, 3);
+  tracker.reached(target, 3);
+  tracker.update(97, 3);
+  EXPECT_EQ(tracker.plan_relative(1).counter, 102) << "it only wavers";
+  EXPECT_EQ(tracker.deviation(tracker.plan_relative(1)), 3);
+  tracker.update(104, 3);
+  tracker.update(100, 3);
+  EXPECT_EQ(tracker.plan_relative(1).counter, 102);
+  tracker.update(400, 3);
+  EXPECT_EQ(tracker.plan_relative(1).counter, 402);
+  EXPECT_EQ(tracker.again(target).counter, 100) << "an absolute target stays what it was";
+}
+
 TEST(PositionTracker, UnwrapsTheCounter) {
   PositionTracker tracker(half_pulses(false));
   constexpr auto most = std::numeric_limits<std::int32_t>::max();
