@@ -23,7 +23,7 @@ class Killed(Scenario):
         command = machine.client.get_command(pb.Command(id=state.command_id))
         self.assertEqual(command.kind, pb.COMMAND_KIND_JOG)
         program.kill()
-        self.assert_command(machine.client.wait_ended(command), "DONE")
+        self.assert_command(machine.client.wait_ended(command), "ABORTED")
         machine.sim.wait_rest()
         state = machine.client.wait_state("feeder", lambda s: s.state == pb.STATE_STANDSTILL, "halted by itself")
         self.assertLess(state.position, 390, "it ran to the soft limit")
