@@ -125,8 +125,8 @@ class PreparedMove {
   /// it. All of them or none. Errors: superseded where one was stopped, or told something else, since; as of
   /// start_move(); invalid_argument. With an outcome other than `unknown` none has moved nor will; with
   /// `unknown` each may have started, and was told to stop: the caller confirms it. Once only; all stay alive
-  /// meanwhile.
-  virtual Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others) = 0;
+  /// meanwhile. Nothing of it is sent after `not_after`: expired.
+  virtual Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, TimePoint not_after) = 0;
 };
 
 /// A positioning move of which all but the trigger stands in the drive, for a trigger of its own (M6, M22).
@@ -138,8 +138,10 @@ class LoadedMove {
   /// superseded where something else was told meanwhile; as of start_move(), never `unknown`.
   virtual Task<Result<void>> verify() = 0;
   /// Sends the trigger, once: when the start frame had gone out, or was acknowledged where the bus does not
-  /// say. verify() is repeated where it has grown too old for that (M6). Errors: as of start_move().
-  virtual Task<Result<TimePoint>> trigger() = 0;
+  /// say. verify() is repeated where it has grown too old for that (M6). It is not sent after `not_after`:
+  /// what the caller knows of the shaft has grown too old then, and it may ask again. Errors: as of
+  /// start_move(); expired.
+  virtual Task<Result<TimePoint>> trigger(TimePoint not_after) = 0;
   /// What the drive still has to be told once the motion has begun; guarded, and of no consequence to it.
   virtual Task<> follow_up() { co_return; }
 };

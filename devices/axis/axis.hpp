@@ -302,11 +302,14 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   bool may_start(Activity& activity);
+
+  // axis_aim.cpp: where a motion starts from, and where it goes (M19)
   Task<Result<void>> look(Duration oldest);
   [[nodiscard]] bool looks_restarted(const DriveSample& sample) const;
-  [[nodiscard]] Duration oldest_before_start() const;
+  [[nodiscard]] bool may_move_by_itself() const;
   Result<void> aim(Activity& activity);
   [[nodiscard]] Result<void> check_way(const Plan& plan) const;
+  Task<std::optional<Result<void>>> start_unmoved(ActivityPtr activity);
 
   // axis_lateness.cpp: nothing starts late (M31)
   void bound_start(const ActivityPtr& activity, bool waited, bool halting);

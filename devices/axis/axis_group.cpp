@@ -207,7 +207,28 @@ Task<Result<void>> Axis::Member::verify() {
   co_return verified;
 }
 
-Task<Result<TimePoint>> Axis::Member::trigger() { co_return co_await loaded_->trigger(); }
+/// Where something else could have turned the shaft meanwhile: looks once more, right before the trigger.
+Task<Result<TimePoint>> Axis::Member::look_again() {
+  if (!axis_->may_move_by_itself()) co_return TimePoint::max();
+  if (auto seen = co_await look(); !seen) co_return axisd::fail(seen.error());
+  if (there_)
+    co_return axisd::fail(
+        axis_->error(Reason::moving, "the shaft was moved before the start", "repeat the move"));
+  // The SYNC comes up to a period later.
+  const auto guard = axis_->settings_.reboot_guard;
+  co_return axis_->sample_->asked_at + (prepared_ ? guard / 2 : guard);
+}
+
+Task<Result<TimePoint>> Axis::Member::trigger() {
+  for (int attempt = 1;; ++attempt) {
+    const auto not_after = co_await look_again();
+    if (!not_after) co_return not_after;
+    auto triggered = co_await loaded_->trigger(*not_after);
+    const bool grown_old = !triggered && triggered.error().reason == Reason::expired &&
+                           axis_->env_.clock->now() < tied().not_after;
+    if (!grown_old || attempt == attempts) co_return triggered;
+  }
+}
 
 void Axis::Member::started(TimePoint at) {
   started_at_ = at;

@@ -149,84 +149,6 @@ bool Axis::may_start(Activity& activity) {
   return false;
 }
 
-/// Reads the drive's state, unless the last reading is not older than `oldest`. Errors: as of
-/// Drive::read_state().
-Task<Result<void>> Axis::look(Duration oldest) {
-  constexpr int attempts = 3;
-  if (sample_ && sample_->asked_at >= env_.clock->now() - oldest) co_return Result<void>{};
-  const Chain chain(*this);
-  for (int attempt = 1;; ++attempt) {
-    const auto sample = co_await drive_->read_state(TransactionClass::motion);
-    auto seen = sample ? Result<void>{} : fail(sample.error());
-    // What a restart leaves behind must not be taken for a release, or for a shaft that was turned.
-    if (sample && looks_restarted(*sample)) seen = co_await prove_continuity(TransactionClass::motion);
-    if (seen) {
-      on_sample(*sample);
-      co_return seen;
-    }
-    if (seen.error().reason != Reason::no_reply || attempt == attempts) {
-      seen.error().outcome = Outcome::not_executed;  // only read
-      co_return seen;
-    }
-  }
-}
-
-/// It may be the first reading of another power cycle.
-bool Axis::looks_restarted(const DriveSample& sample) const {
-  if (!sample_) return false;
-  const auto step = std::int64_t{sample.position_pulses} - sample_->position_pulses;
-  return sample.enabled != sample_->enabled || (!sample.moving && std::abs(step) > drive_->position_window());
-}
-
-/// How old a reading may be from which a start is judged. Without terminals that could move or release the
-/// drive by themselves, only what the canary would show happens between two.
-Duration Axis::oldest_before_start() const {
-  const bool by_terminal = std::ranges::any_of(settings_.inputs, [this](const TerminalSettings& input) {
-    return starts_motion(input) || input.function == "motor_free";
-  });
-  return by_terminal || drive_->moves_by_itself() ? Duration{0} : settings_.reboot_guard;
-}
-
-/// Plans the activity's motion anew, from where the shaft is: the counter may mean something else since it
-/// was accepted (homing, SetPosition, zeroing), and the shaft may have been moved (M19). Errors: as of
-/// Planner::move().
-Result<void> Axis::aim(Activity& activity) {
-  auto& plan = activity.plan;
-  tracker_.settle_base();
-  const auto velocity = plan.granted.velocity;
-  const auto& command = activity.command->value();
-  auto target = tracker_.again(*plan.target);
-  // The shorter way round is that from where the axis rests.
-  if (command.kind == CommandKind::move_absolute && settings_.scale.modulo)
-    target = target_of({.position = command.asked.position.value_or(target.position)}, tracker_);
-  // What backs off from a switch before homing is bounded by itself.
-  if (activity.state == AxisState::homing) {
-    plan = planner_.aimed(std::move(plan), target, tracker_);
-    return {};
-  }
-  auto aimed = planner_.move(plan, target, tracker_);
-  if (!aimed) return fail(aimed.error());
-  const bool turns_back = activity.state == AxisState::continuous_motion && velocity &&
-                          !tracker_.rests_at(target) && aimed->positive != (*velocity > 0);
-  if (turns_back)
-    return fail(error(Reason::soft_limit, "beyond the software limit already", "move the other way"));
-  plan = *std::move(aimed);
-  plan.granted.velocity = velocity;  // with its sign
-  activity.command->grant(plan.granted);
-  return {};
-}
-
-/// The drive would go as far as was asked (M19). Errors: moving.
-Result<void> Axis::check_way(const Plan& plan) const {
-  if (tracker_.deviation(*plan.target) <= drive_->position_window() + 1) return {};
-  return fail(
-      error(Reason::moving,
-            fmt::format("the shaft was moved before the start: from {:.6g} {} the way would be another "
-                        "than the one that was asked for",
-                        tracker_.position(), settings_.scale.unit),
-            "see what moves it; then repeat the move"));
-}
-
 /// One positioning motion to the plan's target. False: the activity has ended.
 Task<bool> Axis::positioned(ActivityPtr activity) {
   if (!co_await reach_standstill(activity)) co_return false;
@@ -242,7 +164,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   bool there = false;
   {
     const Chain chain(*this);
-    if (result) result = co_await look(oldest_before_start());
+    if (result) result = co_await look(settings_.reboot_guard);
     if (!current(*activity) || !may_start(*activity)) co_return false;
     if (result) result = check_way(activity->plan);
     base = tracker_.counter();
@@ -250,7 +172,14 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     there = result && tracker_.rests_at(target);
     if (result && !there) {
       activity->plan.predicted = planner_.duration(activity->plan, target.counter - base);
-      result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
+      if (may_move_by_itself()) {
+        auto triggered = co_await start_unmoved(activity);
+        if (!triggered) co_return false;
+        result = *std::move(triggered);
+        base = tracker_.counter();
+      } else {
+        result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
+      }
       if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
     }
   }

@@ -52,6 +52,9 @@ class Axis::Member {
   void about_to_start() { activity_->may_run = true; }
   /// It is known that it was not.
   void not_started() { activity_->may_run = false; }
+  /// Starts that by SYNC are bound until then: shortly after a reading, where something else could have
+  /// turned the shaft; max() elsewhere. Errors: of look().
+  Task<Result<TimePoint>> look_again();
   Task<Result<TimePoint>> trigger();
   /// The start was executed.
   void started(TimePoint at);

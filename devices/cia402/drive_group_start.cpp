@@ -29,10 +29,10 @@ class Cia402Drive::Prepared final : public PreparedMove {
   Prepared(Cia402Drive& drive, MotionGuard guard, std::uint64_t epoch)
       : drive_(&drive), block_(drive.expected_.front()), guard_(std::move(guard)), epoch_(epoch) {}
 
-  Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others) override {
+  Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, TimePoint not_after) override {
     auto members = members_of(others);
     if (!members) co_return fail(members.error());
-    Members all{.moves = std::move(*members), .parts = {}, .refusal = {}};
+    Members all{.moves = std::move(*members), .parts = {}, .refusal = {}, .not_after = not_after};
     all.parts.resize(all.moves.size());
     co_await at_once(all, [&all](std::size_t i) { return all.moves[i]->check(all, i); });
     if (all.refusal) co_return fail(std::move(*all.refusal));
@@ -50,6 +50,7 @@ class Cia402Drive::Prepared final : public PreparedMove {
     std::vector<Prepared*> moves;
     std::vector<canopen::SyncStart> parts;
     std::optional<Error> refusal;
+    TimePoint not_after;
   };
 
   [[nodiscard]] Result<std::vector<Prepared*>> members_of(const std::vector<PreparedMove*>& others) {
@@ -79,7 +80,8 @@ class Cia402Drive::Prepared final : public PreparedMove {
     options.guard = guard_;
     const auto canary = co_await drive.check_prepared(block_, true, options);
     auto guard = guard_;
-    if (canary) guard.not_after = std::min(guard.not_after, *canary + drive.setup_.reboot_guard);
+    if (canary)
+      guard.not_after = std::min({guard.not_after, all.not_after, *canary + drive.setup_.reboot_guard});
     const bool superseded = may_send(own(), drive.clock_->now()) != Verdict::send;
     if (superseded || !canary) {
       if (!all.refusal)

@@ -14,8 +14,12 @@ constexpr int attempts = 3;
 
 class Cia402Drive::Loaded final : public LoadedMove {
  public:
-  Loaded(Cia402Drive& drive, MotionGuard guard, std::uint64_t epoch)
-      : drive_(&drive), block_(drive.expected_.front()), guard_(std::move(guard)), epoch_(epoch) {}
+  Loaded(Cia402Drive& drive, MotionGuard guard, std::uint64_t epoch, TimePoint read_at)
+      : drive_(&drive),
+        block_(drive.expected_.front()),
+        guard_(std::move(guard)),
+        epoch_(epoch),
+        read_at_(read_at) {}
 
   Task<Result<void>> verify() override {
     for (int attempt = 1;; ++attempt) {
@@ -35,18 +39,19 @@ class Cia402Drive::Loaded final : public LoadedMove {
     }
   }
 
-  Task<Result<TimePoint>> trigger() override {
+  Task<Result<TimePoint>> trigger(TimePoint not_after) override {
+    const auto latest = std::min(guard_.not_after, not_after);
     for (int attempt = 1;; ++attempt) {
       if (drive_->clock_->now() > read_at_ + drive_->setup_.reboot_guard / 2)
         if (const auto verified = co_await verify(); !verified) co_return fail(verified.error());
       auto fresh = motion();
-      fresh.guard.not_after = std::min(guard_.not_after, read_at_ + drive_->setup_.reboot_guard);
+      fresh.guard.not_after = std::min(latest, read_at_ + drive_->setup_.reboot_guard);
       bool triggered = false;
       const auto pulled = co_await drive_->pull_trigger(
           OperationMode::profile_position, {object::control_word, control::start_word}, fresh, triggered);
       if (pulled) co_return drive_->clock_->now();
       const bool grown_old =
-          !triggered && pulled.error().reason == Reason::expired && drive_->clock_->now() < guard_.not_after;
+          !triggered && pulled.error().reason == Reason::expired && drive_->clock_->now() < latest;
       if (!grown_old || attempt == attempts) co_return fail(pulled.error());
     }
   }
@@ -64,7 +69,7 @@ class Cia402Drive::Loaded final : public LoadedMove {
   MotionBlock block_;
   MotionGuard guard_;
   std::uint64_t epoch_;
-  TimePoint read_at_{};
+  TimePoint read_at_;  ///< its canary
 };
 
 Task<Result<std::unique_ptr<LoadedMove>>> Cia402Drive::load_move(MoveProfile profile, MotionGuard guard) {
@@ -76,7 +81,7 @@ Task<Result<std::unique_ptr<LoadedMove>>> Cia402Drive::load_move(MoveProfile pro
     give_up_leaving();
     const auto epoch = start_gate_->epoch();
     ready = co_await prepare_start(block, OperationMode::profile_position, std::nullopt, options);
-    if (ready) co_return std::make_unique<Loaded>(*this, std::move(guard), epoch);
+    if (ready) co_return std::make_unique<Loaded>(*this, std::move(guard), epoch, *ready);
     if (ready.error().reason != Reason::no_reply) break;
   }
   auto error = ready.error();

@@ -197,12 +197,20 @@ Task<GroupRun::MaybeFailure> GroupRun::look_after_the_started() {
 
 Task<GroupRun::MaybeFailure> GroupRun::start_by_sync(std::vector<std::size_t> together) {
   if (auto lost = unready()) co_return lost;
+  auto not_after = TimePoint::max();
+  for (const auto i : together) {
+    const auto until = co_await members_[i]->look_again();
+    if (given_up_) co_return std::nullopt;
+    if (!until) co_return attributed(i, until.error());
+    not_after = std::min(not_after, *until);
+  }
+  if (auto lost = unready()) co_return lost;
   std::vector<PreparedMove*> others;
   for (const auto i : together) {
     members_[i]->about_to_start();
     if (i != together.front()) others.push_back(members_[i]->prepared());
   }
-  const auto at = co_await members_[together.front()]->prepared()->start_with(std::move(others));
+  const auto at = co_await members_[together.front()]->prepared()->start_with(std::move(others), not_after);
   if (!at && at.error().outcome != Outcome::unknown)
     for (const auto i : together) members_[i]->not_started();
   if (given_up_) co_return std::nullopt;

@@ -16,8 +16,8 @@ constexpr std::uint16_t absolute_move = 5;  // 7.6.1: bit 0 position mode, bit 2
 
 class YakoRtuDrive::Loaded final : public LoadedMove {
  public:
-  Loaded(YakoRtuDrive& drive, MotionBlock block, MotionGuard guard)
-      : drive_(&drive), block_(block), guard_(std::move(guard)) {}
+  Loaded(YakoRtuDrive& drive, MotionBlock block, MotionGuard guard, TimePoint read_at)
+      : drive_(&drive), block_(block), guard_(std::move(guard)), read_at_(read_at) {}
 
   Task<Result<void>> verify() override {
     for (int attempt = 1;; ++attempt) {
@@ -36,13 +36,14 @@ class YakoRtuDrive::Loaded final : public LoadedMove {
     }
   }
 
-  Task<Result<TimePoint>> trigger() override {
+  Task<Result<TimePoint>> trigger(TimePoint not_after) override {
+    const auto latest = std::min(guard_.not_after, not_after);
     for (int attempt = 1;; ++attempt) {
       // Half of the guard is left for what the line still has to do before this one.
       if (drive_->clock_->now() > read_at_ + drive_->setup_.reboot_guard / 2)
         if (const auto verified = co_await verify(); !verified) co_return fail(verified.error());
       auto fresh = motion();
-      fresh.guard.not_after = std::min(guard_.not_after, read_at_ + drive_->setup_.reboot_guard);
+      fresh.guard.not_after = std::min(latest, read_at_ + drive_->setup_.reboot_guard);
       const auto written = co_await drive_->node_.write(reg::start, absolute_move, fresh);
       if (written && written->certain) co_return written->request_end;
       if (written) {
@@ -53,8 +54,7 @@ class YakoRtuDrive::Loaded final : public LoadedMove {
         co_return fail(std::move(error));
       }
       // Nothing was sent: what it rests on had grown too old.
-      const bool grown_old =
-          written.error().reason == Reason::expired && drive_->clock_->now() < guard_.not_after;
+      const bool grown_old = written.error().reason == Reason::expired && drive_->clock_->now() < latest;
       if (!grown_old || attempt == attempts) co_return drive_->failed(written.error());
     }
   }
@@ -67,7 +67,7 @@ class YakoRtuDrive::Loaded final : public LoadedMove {
   YakoRtuDrive* drive_;
   MotionBlock block_;
   MotionGuard guard_;
-  TimePoint read_at_{};
+  TimePoint read_at_;  ///< its canary
 };
 
 Task<Result<std::unique_ptr<LoadedMove>>> YakoRtuDrive::load_move(MoveProfile profile, MotionGuard guard) {
@@ -75,10 +75,12 @@ Task<Result<std::unique_ptr<LoadedMove>>> YakoRtuDrive::load_move(MoveProfile pr
   const TransactionOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
   const auto block = distinct(encode(profile));
   Result<void> loaded;
+  TimePoint read_at{};
   for (int attempt = 0; attempt < attempts; ++attempt) {
     const auto canary = co_await read_canary(motion);
     auto fresh = motion;  // as of start_once()
-    if (canary) fresh.guard.not_after = std::min(guard.not_after, canary->sent_at + setup_.reboot_guard);
+    if (canary) read_at = canary->sent_at;
+    if (canary) fresh.guard.not_after = std::min(guard.not_after, read_at + setup_.reboot_guard);
     loaded = canary ? co_await write_canary(block, fresh) : fail(canary.error());
     if (loaded) break;
     const bool grown_old = loaded.error().reason == Reason::expired && clock_->now() < guard.not_after;
@@ -89,7 +91,7 @@ Task<Result<std::unique_ptr<LoadedMove>>> YakoRtuDrive::load_move(MoveProfile pr
     if (error.outcome == Outcome::unknown) error.outcome = Outcome::not_executed;  // only parameters
     co_return fail(std::move(error));
   }
-  co_return std::make_unique<Loaded>(*this, block, std::move(guard));
+  co_return std::make_unique<Loaded>(*this, block, std::move(guard), read_at);
 }
 
 }  // namespace axisd::yako_rtu

@@ -45,12 +45,17 @@ void Client::act() {
   submit(station, sensible(station));
 }
 
-/// Some axes together, on any bus.
+/// Some axes together, on any bus or on one that could start them by one SYNC; mostly such that can move now.
 void Client::move_group() {
   GroupMoveRequest request{.arrive_together = dice_.chance(0.5)};
   const double share = 2.5 / static_cast<double>(plant_->stations.size());
+  const bool by_sync = std::ranges::any_of(plant_->stations, &Station::on_can) && dice_.chance(0.5);
+  const bool sensibly = dice_.chance(0.8);
   for (const auto& station : plant_->stations) {
-    if (!station.axis->snapshot()->enabled || !dice_.chance(share)) continue;
+    const auto state = station.axis->snapshot();
+    if (!state->enabled || (by_sync && !station.on_can()) || !dice_.chance(share)) continue;
+    const bool ready = state->state == AxisState::standstill && state->trust != PositionTrust::unknown;
+    if (sensibly && !ready) continue;
     GroupTarget target{.axis = station.name, .with = {.velocity = static_cast<double>(10 + dice_.pick(90))}};
     if (dice_.chance(0.5))
       target.position = static_cast<double>(dice_.pick(60));
