@@ -48,8 +48,8 @@ void Client::act() {
 /// Some axes together, on any bus or on one that could start them by one SYNC; mostly such that can move now.
 void Client::move_group() {
   GroupMoveRequest request{.arrive_together = dice_.chance(0.5)};
-  const double share = 2.5 / static_cast<double>(plant_->stations.size());
   const bool by_sync = std::ranges::any_of(plant_->stations, &Station::on_can) && dice_.chance(0.5);
+  const double share = by_sync ? 0.9 : 2.5 / static_cast<double>(plant_->stations.size());
   const bool sensibly = dice_.chance(0.8);
   for (const auto& station : plant_->stations) {
     const auto state = station.axis->snapshot();

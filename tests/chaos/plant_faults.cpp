@@ -50,6 +50,8 @@ simulation::Fault draw(const std::array<Likely, N>& faults, Dice& dice) {
 }
 
 constexpr std::uint32_t nmt_command = 0x000, sync_id = 0x080, sdo_request = 0x600, heartbeat = 0x700;
+/// TPDO4: a flood there takes the bus, and claims no status word and no position that the node does not have.
+constexpr std::uint16_t flooded = 0x480;
 /// A SYNC goes out a hundred times a second, and no transaction waits for it.
 constexpr double sync_share = 0.002;
 
@@ -126,7 +128,9 @@ bool Plant::strike(Station& station, const can::Frame& frame, const Telegram& te
       frame.id - sdo_request == station.node ? draw(on_can_requests, dice_) : draw(on_can_commands, dice_);
   fault.node = station.node;
   // What sends by itself has identifiers of its own.
-  if (fault.kind != FaultKind::flood && fault.kind != FaultKind::emcy)
+  if (fault.kind == FaultKind::flood)
+    fault.cob = static_cast<std::uint16_t>(flooded + station.node);
+  else if (fault.kind != FaultKind::emcy)
     fault.cob = static_cast<std::uint16_t>(frame.id);
   nodes.add_fault(fault);
   if (fault.kind == FaultKind::abort && on_refused) on_refused(station, telegram);
