@@ -46,6 +46,18 @@ struct LeaseChange {
   std::string before;  ///< until now; empty: nobody
 };
 
+/// Somebody began or ceased to hold an axis in Stopping. A hold that is renewed is no event.
+struct StopHoldChange {
+  enum class What : std::uint8_t {
+    held,
+    released,
+    not_durable,  ///< the disk failed: the hold stands, and ends with this run of the daemon
+  };
+  What what = What::held;
+  HoldKey hold;
+  std::string by;  ///< who released it, or holds it; empty: nobody
+};
+
 /// The newest frames of a bus were written to a file.
 struct FlightRecordWritten {
   std::string bus, name, reason;
@@ -59,7 +71,7 @@ struct ConfigurationReloaded {
 };
 
 using EventContent = std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift,
-                                  FlightRecordWritten, LeaseChange, ConfigurationReloaded>;
+                                  FlightRecordWritten, LeaseChange, ConfigurationReloaded, StopHoldChange>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon

@@ -14,6 +14,7 @@
 #include "devices/axis/command.hpp"
 #include "devices/axis/obstacles.hpp"
 #include "devices/axis/snapshot.hpp"
+#include "devices/axis/stop_holds.hpp"
 #include "devices/budget.hpp"
 #include "devices/bus_access.hpp"
 #include "devices/bus_kind.hpp"
@@ -59,6 +60,12 @@ struct MachineInfo {
   std::string inhibited_by;
 };
 
+/// What became of the release of a held stop.
+struct StopReleased {
+  std::optional<Command> stop{};  ///< the newest one; nothing: there was none in this run of the daemon
+  std::vector<StopHold> holds{};  ///< who still holds the axis
+};
+
 /// Thread: any. Callbacks arrive on the core thread and must only hand over.
 class Machine {
  public:
@@ -71,7 +78,8 @@ class Machine {
   [[nodiscard]] virtual MachineInfo info() const = 0;
 
   /// Validates and starts a command; calls back exactly once: with an error if it was not accepted, else when
-  /// it reached `until` or ended. Ending the call early never changes the command. Stops take their own lane.
+  /// it reached `until` or ended, and, of a stop with hold, when the hold is durable or it is known that it
+  /// is not. Ending the call early never changes the command. Stops take their own lane.
   virtual void submit(std::string axis, Action action, CommandOptions options, WaitUntil until,
                       CommandCallback callback) = 0;
 
@@ -80,8 +88,10 @@ class Machine {
   virtual void explain(std::string axis, std::optional<Action> action, CommandOptions options,
                        std::function<void(Result<std::vector<Obstacle>>)> callback) = 0;
 
-  /// Ends Stopping with hold (MC_Stop with Execute going false).
-  virtual void release_stop(std::string axis, CommandCallback callback) = 0;
+  /// Ends holds of an axis (MC_Stop with Execute going false). Errors: unknown_axis, invalid_argument (there
+  /// is none that is meant), stopping (held anew meanwhile), storage, and, of everybody's, those of leases.
+  virtual void release_stop(std::string axis, HoldRelease release,
+                            std::function<void(Result<StopReleased>)> callback) = 0;
   /// Stops all axes and latches the inhibit (M14). Calls back with the stop command of each axis.
   virtual void stop_all(std::string client, WaitUntil until,
                         std::function<void(std::vector<Result<Command>>)> callback) = 0;

@@ -12,6 +12,7 @@
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
 #include "devices/axis/snapshot.hpp"
+#include "devices/axis/stop_holds.hpp"
 
 namespace axisd {
 
@@ -35,9 +36,13 @@ struct InhibitRecord {
   bool operator==(const InhibitRecord&) const = default;
 };
 
+/// Who holds an axis in Stopping, and since when (M14).
+using HoldRecords = std::map<HoldKey, WallTime>;
+
 struct AxisRecord {
   std::optional<OffsetRecord> offset;
   std::uint64_t eeprom_writes = 0;  ///< since the axis was first configured on this computer
+  HoldRecords holds{};
   bool operator==(const AxisRecord&) const = default;
 };
 
@@ -53,7 +58,7 @@ struct StoredState {
 /// Saves what must survive. Calls return at once; nothing waits for the disk, a stop least of all. `done`
 /// (may be empty) is called exactly once, later, on the core thread: when the change is durable, or with
 /// Error `storage`. After an error the saved offset of that axis is void (neither old nor new is certain), an
-/// inhibit stays latched, and counts are kept for the next save. Thread: core.
+/// inhibit stays latched, holds stand, and counts are kept for the next save. Thread: core.
 class Persistence {
  public:
   using Callback = std::function<void(Result<void>)>;
@@ -68,6 +73,10 @@ class Persistence {
   /// The position is no longer known: after a restart there is nothing to restore.
   virtual void forget_offset(std::string axis, Callback done) = 0;
   virtual void save_inhibit(InhibitRecord inhibit, Callback done) = 0;
+  /// Somebody holds the axis; also one that the configuration no longer has.
+  virtual void save_hold(std::string axis, HoldKey hold, WallTime since, Callback done) = 0;
+  /// These have ended.
+  virtual void forget_holds(std::string axis, HoldRecords holds, Callback done) = 0;
   /// `writes` more registers were saved to the drive's EEPROM.
   virtual void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) = 0;
 };

@@ -8,10 +8,12 @@
 
 #include "api/server/command_reply.hpp"
 #include "api/server/convert.hpp"
+#include "api/server/hold_validate.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/reply_stream.hpp"
 #include "api/server/status.hpp"
+#include "api/server/value_reply.hpp"
 #include "api/server/watch_hub.hpp"
 
 namespace axisd::server {
@@ -44,28 +46,35 @@ AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request&
                 command);
 }
 
-template <class Request>
+template <class Request, class Response>
 AxisServiceImpl::Reactor* AxisServiceImpl::stop(Context* context, const Request& request,
-                                                v1::Command* command) {
+                                                Response* response) {
   const auto client = client_of(*context);
   const auto& what = Request::descriptor()->name();
   if (auto axis = find_axis(services_.machine, request.axis()); !axis)
     return refuse(context, client, what, axis.error());
   auto action = to_action(request);
   if (!action) return refuse(context, client, what, action.error());
+  std::function<void()> also;
+  if constexpr (requires { response->mutable_holds(); })
+    if (request.hold())
+      also = [&machine = services_.machine, axis = request.axis(), response] {
+        if (const auto now = machine.snapshot(axis)) to_proto(now->holds, *response->mutable_holds());
+      };
   return submit(context, request.axis(), *std::move(action), stop_options(request.options(), client), {},
-                command);
+                response->mutable_command(), std::move(also));
 }
 
 AxisServiceImpl::Reactor* AxisServiceImpl::submit(Context* context, const std::string& axis, Action action,
                                                   Submission submission, Admission::Ticket ticket,
-                                                  v1::Command* command) {
+                                                  v1::Command* command, std::function<void()> also) {
   const auto what = to_string(kind_of(action));
   return PendingCall::start(
       services_, context, std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
         auto client = submission.options.client;
-        services_.machine.submit(axis, std::move(action), std::move(submission.options), submission.until,
-                                 reply_with_command(call, command, std::move(client), axis, what));
+        services_.machine.submit(
+            axis, std::move(action), std::move(submission.options), submission.until,
+            reply_with_command(call, command, std::move(client), axis, what, std::move(also)));
       });
 }
 
@@ -116,7 +125,7 @@ AxisServiceImpl::Reactor* AxisServiceImpl::Enable(Context* context, const v1::En
 }
 AxisServiceImpl::Reactor* AxisServiceImpl::Disable(Context* context, const v1::DisableRequest* request,
                                                    v1::DisableResponse* response) {
-  return stop(context, *request, response->mutable_command());
+  return stop(context, *request, response);
 }
 AxisServiceImpl::Reactor* AxisServiceImpl::Home(Context* context, const v1::HomeRequest* request,
                                                 v1::HomeResponse* response) {
@@ -143,15 +152,15 @@ AxisServiceImpl::Reactor* AxisServiceImpl::Jog(Context* context, const v1::JogRe
 }
 AxisServiceImpl::Reactor* AxisServiceImpl::Halt(Context* context, const v1::HaltRequest* request,
                                                 v1::HaltResponse* response) {
-  return stop(context, *request, response->mutable_command());
+  return stop(context, *request, response);
 }
 AxisServiceImpl::Reactor* AxisServiceImpl::Stop(Context* context, const v1::StopRequest* request,
                                                 v1::StopResponse* response) {
-  return stop(context, *request, response->mutable_command());
+  return stop(context, *request, response);
 }
 AxisServiceImpl::Reactor* AxisServiceImpl::QuickStop(Context* context, const v1::QuickStopRequest* request,
                                                      v1::QuickStopResponse* response) {
-  return stop(context, *request, response->mutable_command());
+  return stop(context, *request, response);
 }
 AxisServiceImpl::Reactor* AxisServiceImpl::ReleaseStop(Context* context,
                                                        const v1::ReleaseStopRequest* request,
@@ -159,10 +168,18 @@ AxisServiceImpl::Reactor* AxisServiceImpl::ReleaseStop(Context* context,
   const auto client = client_of(*context);
   if (auto axis = find_axis(services_.machine, request->axis()); !axis)
     return refuse(context, client, "release_stop", axis.error());
-  auto* command = response->mutable_command();
+  auto release = release_of(*request, client);
+  if (!release) return refuse(context, client, "release_stop", release.error());
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    services_.machine.release_stop(
-        request->axis(), reply_with_command(call, command, client, request->axis(), "release_stop"));
+    services_.machine.release_stop(request->axis(), *std::move(release),
+                                   reply_with_value<StopReleased>(
+                                       call,
+                                       [response](const StopReleased& released) {
+                                         if (released.stop)
+                                           to_proto(*released.stop, *response->mutable_command());
+                                         to_proto(released.holds, *response->mutable_holds());
+                                       },
+                                       fmt::format("{}: {} release_stop", client, request->axis())));
   });
 }
 AxisServiceImpl::Reactor* AxisServiceImpl::Reset(Context* context, const v1::ResetRequest* request,

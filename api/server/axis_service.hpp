@@ -47,10 +47,11 @@ class AxisServiceImpl final
   template <class Request>
   Reactor* move(Context* context, const Request& request, v1::Command* command);
   /// Submits a stop: on its own lane, never limited, never refused for its options.
-  template <class Request>
-  Reactor* stop(Context* context, const Request& request, v1::Command* command);
+  template <class Request, class Response>
+  Reactor* stop(Context* context, const Request& request, Response* response);
+  /// `also`: as of reply_with_command().
   Reactor* submit(Context* context, const std::string& axis, Action action, Submission submission,
-                  Admission::Ticket ticket, v1::Command* command);
+                  Admission::Ticket ticket, v1::Command* command, std::function<void()> also = {});
 
   const Services services_;
 };

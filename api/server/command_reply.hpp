@@ -1,6 +1,7 @@
 // Commands as answers.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -11,9 +12,10 @@
 namespace axisd::server {
 
 /// The callback that ends `call` with the command in `to` (part of its response), or with the error's status.
-/// Logs `what` for people. `what` must be a literal.
+/// Logs `what` for people. `what` must be a literal. `also` (may be empty) fills the rest of the response.
 [[nodiscard]] Machine::CommandCallback reply_with_command(std::shared_ptr<PendingCall> call, v1::Command* to,
                                                           std::string client, std::string subject,
-                                                          std::string_view what);
+                                                          std::string_view what,
+                                                          std::function<void()> also = {});
 
 }  // namespace axisd::server

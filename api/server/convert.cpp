@@ -107,6 +107,16 @@ void to_proto(const Command& from, v1::Command& to) {
   if (from.ended_at) to_proto(*from.ended_at, *to.mutable_ended_at());
 }
 
+void to_proto(const std::vector<StopHold>& from, google::protobuf::RepeatedPtrField<v1::StopHold>& to) {
+  for (const auto& hold : from) {
+    auto& entry = *to.Add();
+    entry.set_holder(hold.key.holder);
+    entry.set_request_id(hold.key.request_id);
+    to_proto(hold.since, *entry.mutable_since());
+    entry.set_durable(hold.durable);
+  }
+}
+
 void update_times(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   if (to.has_measured_at()) to_proto(from.sampled.measured_at(), *to.mutable_measured_at());
   if (to.has_age()) to_proto(std::max(now - from.sampled.before(), Duration::zero()), *to.mutable_age());
@@ -121,7 +131,8 @@ void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to) {
   if (from.fault) to_proto(*from.fault, *to.mutable_fault());
   to.set_enabled(from.enabled);
   to.set_enabled_by_daemon(from.enabled_by_us);
-  to.set_stop_held(from.stop_held);
+  to.set_stop_held(!from.holds.empty());
+  to_proto(from.holds, *to.mutable_holds());
   to.set_inhibited(from.inhibited);
   to.set_position(from.position);
   if (from.commanded_position) to.set_commanded_position(*from.commanded_position);

@@ -26,6 +26,8 @@ void to_proto(const Error& from, v1::ErrorDetail& to);
 void to_proto(const ConfigurationChange& from, v1::ConfigChange& to);
 void to_proto(const MotionValues& from, v1::MotionValues& to);
 void to_proto(const Command& from, v1::Command& to);
+/// Those who hold an axis, added to `to`.
+void to_proto(const std::vector<StopHold>& from, google::protobuf::RepeatedPtrField<v1::StopHold>& to);
 /// `now` is Machine::now() of this very message: AxisState.age is counted up to it.
 void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to);
 /// The times alone, where the rest is as it was: those that `to` has.

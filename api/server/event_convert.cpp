@@ -57,6 +57,16 @@ void fill(const ConfigurationReloaded& from, v1::Event& event) {
   for (const auto& change : from.changes) to_proto(change, *to.add_changes());
 }
 
+void fill(const StopHoldChange& from, v1::Event& event) {
+  auto& to = *event.mutable_stop_hold_change();
+  to.set_kind(static_cast<v1::StopHoldChangeKind>(std::to_underlying(from.what) + 1));  // 0 is "unspecified"
+  to.set_holder(from.hold.holder);
+  to.set_request_id(from.hold.request_id);
+  to.set_by(from.by);
+}
+static_assert(std::to_underlying(StopHoldChange::What::not_durable) + 1 ==
+              v1::STOP_HOLD_CHANGE_KIND_NOT_DURABLE);
+
 }  // namespace
 
 v1::EventKind kind_of(const Event& event) {
@@ -70,6 +80,7 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const ConfigurationReloaded&) const {
       return v1::EVENT_KIND_CONFIGURATION_RELOADED;
     }
+    v1::EventKind operator()(const StopHoldChange&) const { return v1::EVENT_KIND_STOP_HOLD_CHANGE; }
   };
   return std::visit(Kind{}, event.content);
 }

@@ -94,4 +94,12 @@ void to_proto(const GroupStopResult& from, v1::GroupStopResult& to) {
     to_proto(from.command.error(), *to.mutable_error());
 }
 
+void to_proto(const GroupReleaseResult& from, v1::GroupReleaseStopResult& to) {
+  to.set_name(from.axis);
+  if (from.holds)
+    to_proto(*from.holds, *to.mutable_holds());
+  else
+    to_proto(from.holds.error(), *to.mutable_error());
+}
+
 }  // namespace axisd::server

@@ -11,5 +11,6 @@ namespace axisd::server {
 void to_proto(const GroupSettings& from, v1::Group& to);
 void to_proto(const GroupMove& from, v1::GroupMove& to);
 void to_proto(const GroupStopResult& from, v1::GroupStopResult& to);
+void to_proto(const GroupReleaseResult& from, v1::GroupReleaseStopResult& to);
 
 }  // namespace axisd::server

@@ -10,6 +10,7 @@
 
 #include "api/server/convert.hpp"
 #include "api/server/group_convert.hpp"
+#include "api/server/hold_validate.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
@@ -17,6 +18,15 @@
 #include "api/server/value_reply.hpp"
 
 namespace axisd::server {
+namespace {
+
+Error nothing_named() {
+  return {.reason = Reason::invalid_argument,
+          .message = "neither a group nor an axis is named",
+          .remedy = "name one, or use StopAll"};
+}
+
+}  // namespace
 
 GroupServiceImpl::Reactor* GroupServiceImpl::ListGroups(Context* context, const v1::ListGroupsRequest*,
                                                         v1::ListGroupsResponse* response) {
@@ -63,24 +73,30 @@ GroupServiceImpl::Reactor* GroupServiceImpl::GetGroupMove(Context* context,
 
 template <class Request, class Response>
 GroupServiceImpl::Reactor* GroupServiceImpl::stop(Context* context, const Request& request, StopKind kind,
-                                                  bool hold, Response* response) {
+                                                  Response* response) {
   const auto client = client_of(*context);
-  GroupStopRequest wanted{.group = request.group(),
-                          .axes = {request.axes().begin(), request.axes().end()},
-                          .kind = kind,
-                          .hold = hold};
+  GroupStopRequest wanted{
+      .group = request.group(), .axes = {request.axes().begin(), request.axes().end()}, .kind = kind};
+  if constexpr (requires { request.hold(); }) {
+    wanted.hold = request.hold();
+    wanted.request_id = hold_id(request.request_id());
+  }
+  const bool hold = wanted.hold;
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
     services_.machine.group_access().stop(
         std::move(wanted), client, stop_all_wait(request.wait_until()),
-        [call, response, client, kind](std::vector<GroupStopResult> results) {
+        [call, response, client, kind, hold,
+         &machine = services_.machine](std::vector<GroupStopResult> results) {
           const auto shared = std::make_shared<const std::vector<GroupStopResult>>(std::move(results));
           call->complete(
-              [response, shared]() -> grpc::Status {
-                for (const auto& result : *shared) to_proto(result, *response->add_results());
-                if (shared->empty())
-                  return to_status({.reason = Reason::invalid_argument,
-                                    .message = "neither a group nor an axis is named",
-                                    .remedy = "name one, or use StopAll"});
+              [response, shared, hold, &machine]() -> grpc::Status {
+                for (const auto& result : *shared) {
+                  auto& entry = *response->add_results();
+                  to_proto(result, entry);
+                  const auto now = hold ? machine.snapshot(result.axis) : nullptr;
+                  if (now) to_proto(now->holds, *entry.mutable_holds());
+                }
+                if (shared->empty()) return to_status(nothing_named());
                 const bool nothing = std::ranges::all_of(*shared, [](const GroupStopResult& result) {
                   return !result.command && result.command.error().reason == Reason::unknown_axis;
                 });
@@ -96,12 +112,41 @@ GroupServiceImpl::Reactor* GroupServiceImpl::stop(Context* context, const Reques
 
 GroupServiceImpl::Reactor* GroupServiceImpl::GroupHalt(Context* context, const v1::GroupHaltRequest* request,
                                                        v1::GroupHaltResponse* response) {
-  return stop(context, *request, StopKind::halt, false, response);
+  return stop(context, *request, StopKind::halt, response);
 }
 
 GroupServiceImpl::Reactor* GroupServiceImpl::GroupStop(Context* context, const v1::GroupStopRequest* request,
                                                        v1::GroupStopResponse* response) {
-  return stop(context, *request, StopKind::stop, request->hold(), response);
+  return stop(context, *request, StopKind::stop, response);
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::GroupReleaseStop(Context* context,
+                                                              const v1::GroupReleaseStopRequest* request,
+                                                              v1::GroupReleaseStopResponse* response) {
+  const auto client = client_of(*context);
+  auto release = release_of(*request, client);
+  if (!release) return answer(context, to_status(release.error()));
+  GroupReleaseRequest wanted{.group = request->group(),
+                             .axes = {request->axes().begin(), request->axes().end()},
+                             .release = *std::move(release)};
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    services_.machine.group_access().release_stop(
+        std::move(wanted), [call, response, client](std::vector<GroupReleaseResult> results) {
+          const auto shared = std::make_shared<const std::vector<GroupReleaseResult>>(std::move(results));
+          call->complete(
+              [response, shared]() -> grpc::Status {
+                for (const auto& result : *shared) to_proto(result, *response->add_results());
+                if (shared->empty()) return to_status(nothing_named());
+                const bool nothing = std::ranges::all_of(*shared, [](const GroupReleaseResult& result) {
+                  return !result.holds && result.holds.error().reason == Reason::unknown_axis;
+                });
+                return nothing ? to_status(shared->front().holds.error()) : grpc::Status::OK;
+              },
+              [client, shared] {
+                spdlog::info("{}: group release_stop of {} axes", client, shared->size());
+              });
+        });
+  });
 }
 
 }  // namespace axisd::server

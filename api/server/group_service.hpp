@@ -23,10 +23,12 @@ class GroupServiceImpl final : public v1::GroupService::CallbackService {
                      v1::GroupHaltResponse* response) override;
   Reactor* GroupStop(Context* context, const v1::GroupStopRequest* request,
                      v1::GroupStopResponse* response) override;
+  Reactor* GroupReleaseStop(Context* context, const v1::GroupReleaseStopRequest* request,
+                            v1::GroupReleaseStopResponse* response) override;
 
  private:
   template <class Request, class Response>
-  Reactor* stop(Context* context, const Request& request, StopKind kind, bool hold, Response* response);
+  Reactor* stop(Context* context, const Request& request, StopKind kind, Response* response);
 
   const Services services_;
 };

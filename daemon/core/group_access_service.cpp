@@ -22,6 +22,9 @@ struct GroupAccessService::Gathering {
   std::vector<GroupStopResult> results;
   std::size_t missing = 0;
   std::function<void(std::vector<GroupStopResult>)> callback;
+  void one_more() {
+    if (--missing == 0) callback(std::move(results));
+  }
 };
 
 void GroupAccessService::move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
@@ -51,26 +54,25 @@ void GroupAccessService::get(std::string id, std::function<void(Result<GroupMove
   });
 }
 
-std::vector<std::string> GroupAccessService::resolve(const MachineTable& table,
-                                                     const GroupStopRequest& request,
-                                                     std::vector<GroupStopResult>& unknown) {
-  auto names = request.axes;
-  if (!request.group.empty()) {
-    const auto group = std::ranges::find(table.groups, request.group, &GroupSettings::name);
-    if (group != table.groups.end())
-      names.insert(names.begin(), group->axes.begin(), group->axes.end());
+std::vector<std::string> GroupAccessService::resolve(const MachineTable& table, const std::string& group,
+                                                     const std::vector<std::string>& axes,
+                                                     const Unknown& unknown) {
+  auto names = axes;
+  if (!group.empty()) {
+    const auto found = std::ranges::find(table.groups, group, &GroupSettings::name);
+    if (found != table.groups.end())
+      names.insert(names.begin(), found->axes.begin(), found->axes.end());
     else
-      unknown.push_back({.axis = request.group,
-                         .command = fail(no_such_group(request.group, names_of(table.groups), table.axes))});
+      unknown(group, no_such_group(group, names_of(table.groups), table.axes));
   }
-  std::vector<std::string> axes;
+  std::vector<std::string> known;
   for (const auto& name : names) {
     if (table.find(name) == nullptr)
-      unknown.push_back({.axis = name, .command = fail(no_such_axis(name, table.axes))});
-    else if (std::ranges::find(axes, name) == axes.end())
-      axes.push_back(name);
+      unknown(name, no_such_axis(name, table.axes));
+    else if (std::ranges::find(known, name) == known.end())
+      known.push_back(name);
   }
-  return axes;
+  return known;
 }
 
 void GroupAccessService::stop(GroupStopRequest request, std::string client, WaitUntil until,
@@ -78,19 +80,27 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
   auto gathering = std::make_shared<Gathering>();
   gathering->callback = std::move(callback);
   const auto table = machine_->table();
-  const auto axes = resolve(*table, request, gathering->results);
+  const auto axes =
+      resolve(*table, request.group, request.axes, [&](const std::string& name, const Error& error) {
+        gathering->results.push_back({.axis = name, .command = fail(error)});
+      });
   if (axes.empty())
     return post(loop_->executor(), [gathering] { gathering->callback(std::move(gathering->results)); });
   auto serve = [this, gathering, axes, request, client = std::move(client), until,
                 arrived = loop_->clock().now()] {
     const auto known = gathering->results.size();
+    // One more for each whose hold the disk has to know first.
+    gathering->missing = axes.size() * (request.hold ? 2 : 1);
     std::vector<Result<CommandPtr>> commands;
+    const StopRequest stop{.kind = request.kind, .hold = request.hold};
+    const CommandOptions options{.client = client, .request_id = request.request_id, .arrived = arrived};
     for (const auto& axis : axes) {
-      commands.push_back(machine_->submit(axis, StopRequest{.kind = request.kind, .hold = request.hold},
-                                          {.client = client, .arrived = arrived}));
       gathering->results.push_back({.axis = axis, .command = fail(Reason::internal, "no answer")});
+      commands.push_back(
+          request.hold ? machine_->submit_held(axis, stop, options, [gathering] { gathering->one_more(); })
+                       : machine_->submit(axis, stop, options));
+      if (request.hold && !commands.back()) --gathering->missing;  // nothing is held
     }
-    gathering->missing = commands.size();
     for (std::size_t i = 0; i < commands.size(); ++i) gather(gathering, known + i, commands[i], until);
   };
   std::vector<std::shared_ptr<AxisGate>> gates;
@@ -99,11 +109,44 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
   loop_->lane().request(std::move(gates), std::move(serve));
 }
 
+void GroupAccessService::release_stop(GroupReleaseRequest request,
+                                      std::function<void(std::vector<GroupReleaseResult>)> callback) {
+  struct Gathering {
+    std::vector<GroupReleaseResult> results;
+    std::size_t missing = 0;
+    std::function<void(std::vector<GroupReleaseResult>)> callback;
+  };
+  auto gathering = std::make_shared<Gathering>();
+  gathering->callback = std::move(callback);
+  request.release.arrived = loop_->clock().now();
+  post(loop_->executor(), [this, gathering, request = std::move(request)] {
+    auto& results = gathering->results;
+    const auto axes = resolve(*machine_->table(), request.group, request.axes,
+                              [&](const std::string& name, const Error& error) {
+                                results.push_back({.axis = name, .holds = fail(error)});
+                              });
+    if (axes.empty()) return gathering->callback(std::move(results));
+    gathering->missing = axes.size();
+    for (const auto& axis : axes) {
+      const auto index = results.size();
+      results.push_back({.axis = axis, .holds = fail(Reason::internal, "no answer")});
+      machine_->release_stop(axis, request.release, [gathering, index](Result<StopReleased> released) {
+        auto& holds = gathering->results[index].holds;
+        if (released)
+          holds = std::move(released->holds);
+        else
+          holds = fail(released.error());
+        if (--gathering->missing == 0) gathering->callback(std::move(gathering->results));
+      });
+    }
+  });
+}
+
 void GroupAccessService::gather(const std::shared_ptr<Gathering>& gathering, std::size_t index,
                                 const Result<CommandPtr>& command, WaitUntil until) {
   const auto take = [gathering, index](Result<Command> result) {
     gathering->results[index].command = std::move(result);
-    if (--gathering->missing == 0) gathering->callback(std::move(gathering->results));
+    gathering->one_more();
   };
   if (!command) return take(fail(command.error()));
   if (reached((*command)->value().state, until)) return take((*command)->value());

@@ -24,15 +24,19 @@ class GroupAccessService final : public GroupAccess {
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
   void stop(GroupStopRequest request, std::string client, WaitUntil until,
             std::function<void(std::vector<GroupStopResult>)> callback) override;
+  void release_stop(GroupReleaseRequest request,
+                    std::function<void(std::vector<GroupReleaseResult>)> callback) override;
 
   /// From now on only stops are accepted.
   void close() { closing_ = true; }
 
  private:
   struct Gathering;
-  /// The names of axes that are known, each once, and results for those that are not.
-  static std::vector<std::string> resolve(const MachineTable& table, const GroupStopRequest& request,
-                                          std::vector<GroupStopResult>& unknown);
+  /// A name that there is not, and why.
+  using Unknown = std::function<void(const std::string& name, const Error& error)>;
+  /// The names of axes that are known, each once.
+  static std::vector<std::string> resolve(const MachineTable& table, const std::string& group,
+                                          const std::vector<std::string>& axes, const Unknown& unknown);
   void gather(const std::shared_ptr<Gathering>& gathering, std::size_t index,
               const Result<CommandPtr>& command, WaitUntil until);
 

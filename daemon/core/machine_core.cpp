@@ -56,6 +56,12 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
           parts_.persistence == nullptr ? 0 : parts_.persistence->loaded().start_count,
           [this](std::string_view axis) { return find(axis); },
           [this](const std::string& axis, EventContent content) { on_event(axis, std::move(content)); }),
+      holds_(
+          *parts_.clock, parts_.persistence,
+          [this](const std::string& axis, EventContent content) { on_event(axis, std::move(content)); },
+          [this](std::string_view axis) {
+            if (auto* found = find(axis)) found->refresh();
+          }),
       groups_({.executor = parts_.executor,
                .clock = parts_.clock,
                .book = &book_,
@@ -194,9 +200,43 @@ Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& ac
   auto* found = find(axis);
   if (found == nullptr) return fail(no_such_axis(axis, table()->axes));
   const auto* stop = std::get_if<StopRequest>(&action);
-  if (const auto leaving = leaving_.find(axis); leaving != leaving_.end() && stop != nullptr)
-    return hold_stop(leaving->second, axis, *stop, options);
-  return found->submit(action, options);
+  if (stop != nullptr && stop->hold) return submit_held(axis, *stop, options, {});
+  return execute(*found, action, options);
+}
+
+Result<CommandPtr> MachineCore::execute(Axis& axis, const Action& action, const CommandOptions& options) {
+  const auto* stop = std::get_if<StopRequest>(&action);
+  if (const auto leaving = leaving_.find(axis.settings().name); leaving != leaving_.end() && stop != nullptr)
+    return hold_stop(leaving->second, axis.settings().name, *stop, options);
+  return axis.submit(action, options);
+}
+
+/// The hold first, so that the axis never shows, nor accepts, anything between the stop and it.
+Result<CommandPtr> MachineCore::submit_held(const std::string& axis, const StopRequest& request,
+                                            const CommandOptions& options, std::function<void()> settled) {
+  auto* found = find(axis);
+  if (found == nullptr) return fail(no_such_axis(axis, table()->axes));
+  holds_.add(axis, {.holder = options.client, .request_id = options.request_id}, options.arrived,
+             std::move(settled));
+  return execute(*found, request, options);
+}
+
+void MachineCore::release_stop(const std::string& axis, const HoldRelease& release,
+                               std::function<void(Result<StopReleased>)> done) {
+  const auto* found = find(axis);
+  if (found == nullptr) return done(fail(no_such_axis(axis, table()->axes)));
+  const bool everybody = release.whose == HoldRelease::Whose::everybody;
+  if (everybody) {
+    const auto may = found->check_lease({.client = release.client, .lease_token = release.lease_token});
+    if (!may) return done(fail(may.error()));
+  }
+  holds_.release(axis, release, [this, axis, done = std::move(done)](const Result<void>& released) {
+    if (!released) return done(fail(released.error()));
+    StopReleased answer{.holds = holds_.of(axis)->all()};
+    if (const auto* now = find(axis); now != nullptr && now->last_stop())
+      answer.stop = now->last_stop()->value();
+    done(std::move(answer));
+  });
 }
 
 std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client, TimePoint arrived) {

@@ -18,6 +18,7 @@
 #include "daemon/core/link_cycler.hpp"
 #include "daemon/core/machine_table.hpp"
 #include "daemon/core/reload.hpp"
+#include "daemon/core/stop_hold_keeper.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
 #include "devices/generic/device.hpp"
@@ -79,6 +80,13 @@ class MachineCore {
   [[nodiscard]] GroupKeeper& groups() { return groups_; }
 
   Result<CommandPtr> submit(const std::string& axis, const Action& action, const CommandOptions& options);
+  /// The same of a stop that is held. `settled`: as of StopHoldKeeper::add(), unless it is refused.
+  Result<CommandPtr> submit_held(const std::string& axis, const StopRequest& request,
+                                 const CommandOptions& options, std::function<void()> settled);
+  /// Ends holds of an axis, once that is durable. Errors: unknown_axis, those of StopHoldKeeper::release(),
+  /// and, of everybody's, of the lease that it needs where there is one.
+  void release_stop(const std::string& axis, const HoldRelease& release,
+                    std::function<void(Result<StopReleased>)> done);
   /// Latches the inhibit first, then stops every axis, moving ones first (M14).
   /// `arrived`: as of CommandOptions.
   std::vector<Result<CommandPtr>> stop_all(const std::string& client, TimePoint arrived = {});
@@ -142,6 +150,7 @@ class MachineCore {
   CommandPtr hold_stop(std::vector<HeldStop>& stops, const std::string& axis, const StopRequest& request,
                        const CommandOptions& options);
 
+  Result<CommandPtr> execute(Axis& axis, const Action& action, const CommandOptions& options);
   void expect_stops();
   Task<> watch(canopen::CanopenBus& network);
   Task<> watch_port(Bus& bus);
@@ -157,6 +166,7 @@ class MachineCore {
   std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before these, which tell them
   FlightRecorder flight_recorder_;
   LeaseKeeper leases_;
+  StopHoldKeeper holds_;
   bool inhibited_ = false;
   int latches_ = 0;  ///< StopAlls so far
   boost::atomic_shared_ptr<const std::string> inhibited_by_;

@@ -80,12 +80,35 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
     const bool is_stop =
         std::holds_alternative<StopRequest>(action) || std::holds_alternative<DisableRequest>(action);
     if (closing_ && !is_stop) return callback(closing());
+    if (const auto* held = std::get_if<StopRequest>(&action); held != nullptr && held->hold)
+      return submit_held(axis, *held, options, until, std::move(callback));
     answer(machine_->submit(axis, action, options), until, std::move(callback));
   };
   if (found != nullptr && (stop != nullptr || disable))
     loop_->lane().request({found->gate}, std::move(serve));
   else
     post(loop_->executor(), std::move(serve));
+}
+
+/// The stop waits for nothing; its answer does for the disk.
+void MachineService::submit_held(const std::string& axis, const StopRequest& request,
+                                 const CommandOptions& options, WaitUntil until, CommandCallback callback) {
+  struct Gathering {
+    Result<Command> command = fail(Reason::internal, "no answer");
+    int missing = 2;
+    CommandCallback callback;
+    void one_more() {
+      if (--missing == 0) callback(std::move(command));
+    }
+  };
+  auto gathering = std::make_shared<Gathering>();
+  const auto command = machine_->submit_held(axis, request, options, [gathering] { gathering->one_more(); });
+  if (!command) return callback(fail(command.error()));
+  gathering->callback = std::move(callback);
+  answer(command, until, [gathering](Result<Command> result) {
+    gathering->command = std::move(result);
+    gathering->one_more();
+  });
 }
 
 void MachineService::explain(std::string axis, std::optional<Action> action, CommandOptions options,
@@ -98,11 +121,13 @@ void MachineService::explain(std::string axis, std::optional<Action> action, Com
   });
 }
 
-void MachineService::release_stop(std::string axis, CommandCallback callback) {
-  post(loop_->executor(), [this, axis = std::move(axis), callback = std::move(callback)]() mutable {
-    auto* found = machine_->find(axis);
-    if (found == nullptr) return callback(fail(no_such_axis(axis, machine_->table()->axes)));
-    answer(found->release_stop(), WaitUntil::accepted, std::move(callback));
+void MachineService::release_stop(std::string axis, HoldRelease release,
+                                  std::function<void(Result<StopReleased>)> callback) {
+  release.arrived = now();
+  post(loop_->executor(), [this, axis = std::move(axis), release = std::move(release),
+                           callback = std::move(callback)]() mutable {
+    if (closing_) return callback(closing());
+    machine_->release_stop(axis, release, std::move(callback));
   });
 }
 

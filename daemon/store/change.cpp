@@ -8,6 +8,12 @@ struct Apply {
   void operator()(const SetOffset& change) const { state.axes[change.axis].offset = change.offset; }
   void operator()(const ForgetOffset& change) const { state.axes[change.axis].offset.reset(); }
   void operator()(const SetInhibit& change) const { state.inhibit = change.inhibit; }
+  void operator()(const SetHold& change) const {
+    state.axes[change.axis].holds.insert_or_assign(change.hold, change.since);
+  }
+  void operator()(const ForgetHolds& change) const {
+    for (const auto& [hold, since] : change.holds) state.axes[change.axis].holds.erase(hold);
+  }
   void operator()(const CountEepromWrites& change) const {
     state.axes[change.axis].eeprom_writes += change.writes;
   }
@@ -19,6 +25,10 @@ struct ApplyAfterFailure {
   void operator()(const ForgetOffset& change) const { Apply{state}(change); }
   void operator()(const SetInhibit& change) const {
     if (change.inhibit.active) Apply{state}(change);
+  }
+  void operator()(const SetHold& change) const { Apply{state}(change); }
+  void operator()(const ForgetHolds& change) const {
+    state.axes[change.axis].holds.insert(change.holds.begin(), change.holds.end());
   }
   void operator()(const CountEepromWrites& change) const { Apply{state}(change); }
 };

@@ -19,17 +19,27 @@ struct ForgetOffset {
 struct SetInhibit {
   InhibitRecord inhibit;
 };
+struct SetHold {
+  std::string axis;
+  HoldKey hold;
+  WallTime since{};
+};
+struct ForgetHolds {
+  std::string axis;
+  HoldRecords holds;  ///< as they were: what could not be forgotten stands
+};
 struct CountEepromWrites {
   std::string axis;
   std::uint64_t writes = 0;
 };
-using Change = std::variant<SetOffset, ForgetOffset, SetInhibit, CountEepromWrites>;
+using Change = std::variant<SetOffset, ForgetOffset, SetInhibit, SetHold, ForgetHolds, CountEepromWrites>;
 
 /// The change as asked.
 void apply(StoredState& state, const Change& change);
 
 /// What is left of a change that could not be saved: the disk may hold either version, so the next save must
-/// not grant more than both. Offsets are void, an inhibit is latched and never released, counts stay counted.
+/// not grant more than both. Offsets are void, an inhibit is latched and never released, holds stand, counts
+/// stay counted.
 void apply_after_failure(StoredState& state, const Change& change);
 
 /// An older state in place of a damaged one: no offset is trusted, and motion is inhibited, because the lost

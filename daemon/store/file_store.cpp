@@ -62,6 +62,14 @@ void FileStore::save_inhibit(InhibitRecord inhibit, Callback done) {
   enqueue(SetInhibit{.inhibit = std::move(inhibit)}, std::move(done));
 }
 
+void FileStore::save_hold(std::string axis, HoldKey hold, WallTime since, Callback done) {
+  enqueue(SetHold{.axis = std::move(axis), .hold = std::move(hold), .since = since}, std::move(done));
+}
+
+void FileStore::forget_holds(std::string axis, HoldRecords holds, Callback done) {
+  enqueue(ForgetHolds{.axis = std::move(axis), .holds = std::move(holds)}, std::move(done));
+}
+
 void FileStore::count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) {
   enqueue(CountEepromWrites{.axis = std::move(axis), .writes = writes}, std::move(done));
 }

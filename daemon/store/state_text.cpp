@@ -66,6 +66,21 @@ bool read_offset(Reader& reader, OffsetRecord& offset) {
   return reader.literal("\n");
 }
 
+std::int64_t ns_of(WallTime time) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
+}
+
+/// After its "hold".
+bool read_hold(Reader& reader, HoldRecords& holds) {
+  HoldKey key;
+  std::int64_t since = 0;
+  if (!reader.literal(" since_ns=") || !reader.number(since) || !reader.literal(" request=") ||
+      !reader.word(key.request_id) || !reader.literal(" by=") || !reader.word(key.holder) ||
+      !reader.literal("\n"))
+    return false;
+  return holds.emplace(std::move(key), WallTime(std::chrono::nanoseconds(since))).second;
+}
+
 bool read_axis(Reader& reader, std::map<std::string, AxisRecord>& axes) {
   std::string name;
   AxisRecord axis;
@@ -73,6 +88,8 @@ bool read_axis(Reader& reader, std::map<std::string, AxisRecord>& axes) {
       !reader.literal("\n"))
     return false;
   if (reader.literal("offset") && !read_offset(reader, axis.offset.emplace())) return false;
+  while (reader.literal("hold"))
+    if (!read_hold(reader, axis.holds)) return false;
   return axes.emplace(std::move(name), axis).second;
 }
 
@@ -90,6 +107,12 @@ std::optional<Generation> read_generation(std::string_view body) {
   return generation;
 }
 
+std::string offset_line(const OffsetRecord& offset) {
+  return fmt::format("offset pulses={} trust={} last={} per_rev={} invert={:d} canary={:04x}\n",
+                     offset.offset_pulses, trust_word(offset.trust), offset.last_position_pulses,
+                     offset.pulses_per_revolution, offset.invert, fmt::join(offset.canary, "."));
+}
+
 std::string checksum_line(std::string_view body) { return fmt::format("{}{:08x}\n", trailer, crc32(body)); }
 
 /// The part that the checksum covers, if the checksum is right.
@@ -104,18 +127,16 @@ std::optional<std::string_view> intact_body(std::string_view text) {
 
 std::string encode(const Generation& generation) {
   const auto& [number, state] = generation;
-  const auto since =
-      std::chrono::duration_cast<std::chrono::nanoseconds>(state.inhibit.since.time_since_epoch());
   std::string text(version_line);
   text += fmt::format("generation {}\nstart_count {}\ninhibit active={:d} since_ns={} by={}\n", number,
-                      state.start_count, state.inhibit.active, since.count(), escape(state.inhibit.by));
+                      state.start_count, state.inhibit.active, ns_of(state.inhibit.since),
+                      escape(state.inhibit.by));
   for (const auto& [name, axis] : state.axes) {
     text += fmt::format("axis {} eeprom_writes={}\n", escape(name), axis.eeprom_writes);
-    if (!axis.offset) continue;
-    const auto& offset = *axis.offset;
-    text += fmt::format("offset pulses={} trust={} last={} per_rev={} invert={:d} canary={:04x}\n",
-                        offset.offset_pulses, trust_word(offset.trust), offset.last_position_pulses,
-                        offset.pulses_per_revolution, offset.invert, fmt::join(offset.canary, "."));
+    if (axis.offset) text += offset_line(*axis.offset);
+    for (const auto& [hold, since] : axis.holds)
+      text += fmt::format("hold since_ns={} request={} by={}\n", ns_of(since), escape(hold.request_id),
+                          escape(hold.holder));
   }
   return text + checksum_line(text);
 }

@@ -57,7 +57,6 @@ struct Buffered {
 /// Stops in progress; one sequence serves all that arrive meanwhile.
 struct Stopping {
   bool running = false;
-  bool hold = false;               ///< stay in Stopping until ReleaseStop
   StopKind kind = StopKind::none;  ///< strongest requested
   int requests = 0;                ///< each needs a frame of its own
   bool from_motion = false;        ///< the first of them found the axis in motion

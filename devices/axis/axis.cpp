@@ -161,7 +161,7 @@ void Axis::on_alarm(const DriveSample& sample) {
   lose_trust();
   enter_error_stop(alarm_error(sample.alarm_code, "the drive reports"));
   // Also for an alarm that clears itself: nothing may go on by itself when it does (M5).
-  begin_stop(StopKind::stop, false, nullptr);
+  begin_stop(StopKind::stop, nullptr);
 }
 
 void Axis::on_released(const DriveSample& sample, bool enabled_before) {
@@ -180,7 +180,7 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
                     "check terminals with the function motor_free and other masters on the bus"));
   }
   // As abort_at_rest(): the terminal may let go of the drive again.
-  if (moved) begin_stop(StopKind::halt, false, nullptr);
+  if (moved) begin_stop(StopKind::halt, nullptr);
 }
 
 void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before) {
@@ -203,7 +203,7 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
     return;
   }
   spdlog::warn("{}: moving without a command; stopping it", settings_.name);
-  begin_stop(StopKind::stop, false, nullptr);
+  begin_stop(StopKind::stop, nullptr);
 }
 
 void Axis::lose_trust() {
@@ -234,7 +234,7 @@ void Axis::remember_position() {
 
 AxisState Axis::state() const {
   if (fault_) return AxisState::error_stop;
-  if (stopping_.hold || (stopping_.running && stopping_.kind > StopKind::halt)) return AxisState::stopping;
+  if (!unheld() || (stopping_.running && stopping_.kind > StopKind::halt)) return AxisState::stopping;
   if (activity_ && activity_->state != AxisState::standstill) return activity_->state;
   // MC_Halt shows DiscreteMotion until the axis rests (PLCopen part 1, 3.6).
   if (stopping_.running && stopping_.from_motion) return AxisState::discrete_motion;

@@ -80,7 +80,10 @@ class Axis {
 
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
-  Result<CommandPtr> release_stop();
+  /// Nobody holds it in Stopping.
+  [[nodiscard]] bool unheld() const { return env_.holds == nullptr || env_.holds->empty(); }
+  /// The newest stop; nullptr: there was none.
+  [[nodiscard]] const CommandPtr& last_stop() const { return stopping_.last; }
   /// Everything that stands in the way of a request now: submit() would refuse it with the first that blocks
   /// (a repeat of an accepted request is never refused, though). Nothing: of motion in general. Only looks.
   [[nodiscard]] std::vector<Obstacle> explain(const std::optional<Action>& action,
@@ -275,6 +278,7 @@ class Axis {
   void look_at_options(const CommandOptions& options, Obstacles& found) const;
   [[nodiscard]] Error reloading() const;
   [[nodiscard]] Error ending() const;
+  void look_at_holds(const CommandOptions& options, Obstacles& found) const;
   void look_at_link(Obstacles& found) const;
   void look_at_fault(Obstacles& found) const;
   void look_at_maintenance(Obstacles& found) const;
@@ -368,7 +372,7 @@ class Axis {
   void supersede(const Error& cause);
   /// Before the activity ends: the stop that follows shows what it ends.
   void note_motion_to_stop();
-  void begin_stop(StopKind kind, bool hold, CommandPtr command);
+  void begin_stop(StopKind kind, CommandPtr command);
   Task<> run_stop();
   void note_stop_sent(TimePoint end, bool answered);
   Task<Result<void>> stop_and_confirm();

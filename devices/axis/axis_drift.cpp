@@ -34,7 +34,7 @@ Task<Result<void>> Axis::check_for_drift() {
     enter_error_stop(error(Reason::misconfigured,
                            "the drive no longer holds its configuration: " + drift->text,
                            "disable the axis: the configuration is then applied again; then reset it"));
-    begin_stop(StopKind::stop, false, nullptr);
+    begin_stop(StopKind::stop, nullptr);
   }
   co_return Result<void>{};
 }

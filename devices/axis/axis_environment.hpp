@@ -8,6 +8,7 @@
 #include "buses/clock.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/command_book.hpp"
+#include "devices/axis/stop_holds.hpp"
 #include "devices/event.hpp"
 #include "devices/lease/lease_table.hpp"
 #include "devices/persistence.hpp"
@@ -21,8 +22,9 @@ struct AxisEnvironment {
   CommandBook* book = nullptr;
   Persistence* persistence = nullptr;
   const LeaseTable* leases = nullptr;
-  const bool* inhibited = nullptr;  ///< StopAll is latched
-  std::function<void()> published;  ///< after each new snapshot
+  const bool* inhibited = nullptr;   ///< StopAll is latched
+  const StopHolds* holds = nullptr;  ///< of this axis; they outlive it
+  std::function<void()> published;   ///< after each new snapshot
   std::function<void(const std::string& axis, EventContent)> event{};
 };
 

@@ -305,7 +305,7 @@ void Axis::Member::end(Error cause, bool aborted) {
       ++axis.unknown_starts_.unresolved;
       if (!axis.fault_) axis.fault_ = cause;
     }
-    axis.begin_stop(StopKind::stop, false, nullptr);
+    axis.begin_stop(StopKind::stop, nullptr);
     tell_part(*activity_, cause);
     cause.outcome = Outcome::unknown;  // also where nobody has heard yet whether it had started
   }

@@ -57,8 +57,7 @@ void Axis::lease_lost(const Error& cause) {
   note_motion_to_stop();
   supersede(error(cause.reason, cause.message, cause.remedy));
   release_as_owed();
-  if (moves && !activity_)
-    begin_stop(policy == LeaseLoss::halt ? StopKind::halt : StopKind::stop, false, nullptr);
+  if (moves && !activity_) begin_stop(policy == LeaseLoss::halt ? StopKind::halt : StopKind::stop, nullptr);
   publish();
 }
 

@@ -75,7 +75,7 @@ void Axis::fail_with_stop(Activity& activity, Error cause) {
     note_motion_to_stop();
     finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
   }
-  begin_stop(StopKind::stop, false, nullptr);
+  begin_stop(StopKind::stop, nullptr);
   publish();
 }
 
@@ -85,7 +85,7 @@ void Axis::abort_at_rest(Activity& activity, Error cause) {
   if (activity_.get() != &activity) return;
   revoke_motion();
   leave_running(activity);
-  begin_stop(StopKind::halt, false, nullptr);
+  begin_stop(StopKind::halt, nullptr);
   finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
 
@@ -365,7 +365,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       note_motion_to_stop();
       revoke_motion();
       leave_running(*activity);
-      begin_stop(StopKind::halt, false, nullptr);
+      begin_stop(StopKind::halt, nullptr);
       auto cause =
           error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");
       finish(*activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });

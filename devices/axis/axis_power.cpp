@@ -20,7 +20,7 @@ constexpr auto sample_patience = std::chrono::seconds(5);
 void Axis::on_turned_by_power(const Error& cause) {
   enter_error_stop(cause);
   left_running_ = true;
-  begin_stop(StopKind::stop, false, nullptr);
+  begin_stop(StopKind::stop, nullptr);
   publish();
 }
 

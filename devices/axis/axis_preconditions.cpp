@@ -51,6 +51,14 @@ void Axis::look_at_options(const CommandOptions& options, Obstacles& found) cons
   found.block_on(check_lease({.client = options.client, .lease_token = options.lease_token}));
 }
 
+/// Everybody's stop counts: each who holds has to let go (M14).
+void Axis::look_at_holds(const CommandOptions& options, Obstacles& found) const {
+  if (unheld()) return;
+  const auto& holds = env_.holds->all();
+  found.block(error(Reason::stopping, "a stop is held by " + text_of(holds),
+                    how_to_release(holds, settings_.name, options.client)));
+}
+
 void Axis::look_at_link(Obstacles& found) const {
   if (reloading_) return found.block(reloading());
   if (link_ == LinkState::configuring) {
@@ -125,9 +133,8 @@ void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) co
     found.block(
         error(Reason::superseded, "a stop that arrived later was served first", "send a new request"));
   // A stop that the core has not seen yet comes before everything that is accepted now.
-  if (stopping_.hold)
-    found.block(error(Reason::stopping, "a stop is held", "release it: " + shell("release-stop")));
-  else if (gate_->stop_pending() || (stopping_.running && stopping_.kind > StopKind::halt))
+  look_at_holds(options, found);
+  if (unheld() && (gate_->stop_pending() || (stopping_.running && stopping_.kind > StopKind::halt)))
     found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   look_at_fault(found);
   look_at_maintenance(found);

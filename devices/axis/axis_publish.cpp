@@ -99,7 +99,7 @@ void Axis::publish() {
   next->link_note = drive_->link_note();
   next->start_note = drive_->no_common_start();
   next->fault = fault_;
-  next->stop_held = stopping_.hold;
+  if (env_.holds != nullptr) next->holds = env_.holds->all();
   next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
   next->enabled_by_us = enabled_by_us_;
   next->trust = tracker_.trust();

@@ -24,9 +24,7 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
   } else if ((sample_ && sample_->moving && !stop_owed_) || terminal_motion_) {
     add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + shell("stop"));
   }
-  if (stopping_.hold)
-    add(Reason::stopping, "a stop is held", "release it: " + shell("release-stop"));
-  else if (stopping_.running || gate_->stop_pending())
+  if (stopping_.running || gate_->stop_pending())
     add(Reason::stopping, "the axis is stopping", "wait for standstill");
   if (stop_owed_ && !stopping_.running)
     add(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",

@@ -64,7 +64,7 @@ ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, Axi
     supersede(error(Reason::superseded,
                     fmt::format("replaced by {} {}", to_string(kind_of(action)), command->value().id)));
   // M9: what a start in motion does is not in the manuals, so the motion is ended first.
-  if (moving && !stopping_.running) begin_stop(StopKind::halt, false, nullptr);
+  if (moving && !stopping_.running) begin_stop(StopKind::halt, nullptr);
   command->grant(plan.granted);
   activity_ = std::make_shared<Activity>(Activity{.command = std::move(command),
                                                   .state = state,
@@ -88,7 +88,7 @@ Result<CommandPtr> Axis::accept(const EnableRequest& request, const CommandOptio
 Result<CommandPtr> Axis::accept(const DisableRequest& request, const CommandOptions& options) {
   if (auto permitted = permit(request, options); !permitted) return fail(permitted.error());
   supersede(error(Reason::superseded, "the axis is being disabled"));
-  begin_stop(StopKind::stop, false, nullptr);
+  begin_stop(StopKind::stop, nullptr);
   const auto activity = begin(request, options, AxisState::standstill, {});
   launch(run_disable(activity), "disable");
   return activity->command;
@@ -249,7 +249,7 @@ void Axis::execute_stop(const StopRequest& request, const CommandOptions& option
   // The drive keeps the deceleration that was set before the motion: the answer says which (M12).
   if (request.kind != StopKind::quick_stop) command->grant({.deceleration_time = deceleration_bound()});
   if (options.arrived != TimePoint{}) observed_.stop_requested(options.arrived, request.all);
-  begin_stop(request.kind, request.hold, std::move(command));
+  begin_stop(request.kind, std::move(command));
   publish();
 }
 
@@ -267,14 +267,6 @@ Result<CommandPtr> Axis::accept(const SetPositionRequest& request, const Command
   return activity->command;
 }
 
-Result<CommandPtr> Axis::release_stop() {
-  if (!stopping_.hold)
-    return fail(error(Reason::invalid_argument, "no stop is held", "nothing needs to be released"));
-  stopping_.hold = false;
-  publish();
-  return stopping_.last;
-}
-
 Result<CommandPtr> Axis::cancel(const CommandPtr& command, TimePoint arrived) {
   if (cancel_buffered(command)) {
     publish();
@@ -282,7 +274,7 @@ Result<CommandPtr> Axis::cancel(const CommandPtr& command, TimePoint arrived) {
     stop_arrived_ = std::max(stop_arrived_, arrived);
     note_motion_to_stop();
     supersede(error(Reason::cancelled, "cancelled by a client"));
-    begin_stop(StopKind::halt, false, nullptr);
+    begin_stop(StopKind::halt, nullptr);
     publish();
   }
   return command;

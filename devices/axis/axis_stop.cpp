@@ -42,9 +42,8 @@ void Axis::note_motion_to_stop() {
   if (activity_ && activity_->state != AxisState::standstill) stopping_.from_motion = true;
 }
 
-void Axis::begin_stop(StopKind kind, bool hold, CommandPtr command) {
+void Axis::begin_stop(StopKind kind, CommandPtr command) {
   stopping_.kind = std::max(stopping_.kind, kind);
-  stopping_.hold = stopping_.hold || hold;
   ++stopping_.requests;
   if (command) {
     command->activate();

@@ -10,6 +10,7 @@
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
 #include "devices/axis/command.hpp"
+#include "devices/axis/stop_holds.hpp"
 #include "devices/drive.hpp"
 
 namespace axisd {
@@ -110,7 +111,6 @@ struct AxisSnapshot {
   std::string drift{};                ///< what the drive no longer holds as configured; empty: nothing
   bool enabled = false;               ///< the drive's power stage
   bool enabled_by_us = false;         ///< false with enabled: found energised
-  bool stop_held = false;             ///< Stopping until ReleaseStop
   bool inhibited = false;             ///< StopAll holds the machine
 
   double position = 0;
@@ -135,9 +135,10 @@ struct AxisSnapshot {
       0;  ///< registers saved in the drive, since the axis is known on this computer
 
   SampleTimes sampled{};
-  std::string command_id{};    ///< current command, if any
-  std::string lease_holder{};  ///< who leases the axis; empty: nobody
-  std::uint64_t revision = 0;  ///< rises with every publication
+  std::string command_id{};       ///< current command, if any
+  std::string lease_holder{};     ///< who leases the axis; empty: nobody
+  std::vector<StopHold> holds{};  ///< who keeps it in Stopping until ReleaseStop; none: nobody
+  std::uint64_t revision = 0;     ///< rises with every publication
 };
 /// boost's pointer: libstdc++ 12's atomic shared_ptr is a data race to ThreadSanitizer.
 using AxisSnapshotPtr = boost::shared_ptr<const AxisSnapshot>;

@@ -10,6 +10,7 @@
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
 #include "devices/axis/command.hpp"
+#include "devices/axis/stop_holds.hpp"
 
 namespace axisd {
 
@@ -69,6 +70,20 @@ struct GroupStopRequest {
   std::vector<std::string> axes;
   StopKind kind = StopKind::stop;  ///< halt or stop
   bool hold = false;
+  std::string request_id{};  ///< by which it is held; may be empty
+};
+
+/// What is to be released: groups by name, axes, or both.
+struct GroupReleaseRequest {
+  std::string group;
+  std::vector<std::string> axes;
+  HoldRelease release;  ///< the same of each
+};
+
+/// What became of one axis (or of a name that there is not) of a release.
+struct GroupReleaseResult {
+  std::string axis;
+  Result<std::vector<StopHold>> holds;  ///< who still holds it; errors: as of Machine::release_stop()
 };
 
 /// What became of one axis (or of a name that there is not) of a stop.
@@ -93,6 +108,9 @@ class GroupAccess {
   /// Stops what is known, and says what is not.
   virtual void stop(GroupStopRequest request, std::string client, WaitUntil until,
                     std::function<void(std::vector<GroupStopResult>)> callback) = 0;
+  /// Of what is known; says what is not.
+  virtual void release_stop(GroupReleaseRequest request,
+                            std::function<void(std::vector<GroupReleaseResult>)> callback) = 0;
 };
 
 }  // namespace axisd

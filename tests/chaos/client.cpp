@@ -37,10 +37,9 @@ void Client::act() {
     return plant_->machine->release_inhibit(name_, [this](const Result<void>& released) {
       if (released) judge_->inhibited(false);
     });
-  if (station.axis->snapshot()->stop_held && what < 80) {
-    (void)station.axis->release_stop();
-    return;
-  }
+  if (!station.axis->snapshot()->holds.empty() && what < 80)
+    return plant_->machine->release_stop(
+        station.name, {.client = name_, .whose = HoldRelease::Whose::everybody}, [](const auto&) {});
   if (what < 68 && plant_->machine->inhibited_by() == nullptr && dice_.chance(0.2)) return move_group();
   submit(station, sensible(station));
 }

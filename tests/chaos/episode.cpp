@@ -55,7 +55,8 @@ void settle(Plant& plant, Judge& judge) {
     if (state->link != LinkState::online)
       judge.violation(station.name, fmt::format("stays {}: {}", to_string(state->link),
                                                 state->link_error ? to_string(*state->link_error) : ""));
-    (void)station.axis->release_stop();
+    plant.machine->release_stop(station.name, {.client = "the end", .whose = HoldRelease::Whose::everybody},
+                                [](const auto&) {});
     judge.stop_asked(station.name);
   }
   judge.inhibited(true);

@@ -130,6 +130,7 @@ Answer<v1::Command> Client::quick_stop(bool hold, v1::WaitUntil wait) {
 Answer<v1::Command> Client::release_stop() {
   v1::ReleaseStopRequest release;
   release.set_axis(axis_);
+  release.set_mine(true);
   return command(&v1::AxisService::Stub::ReleaseStop, release);
 }
 Answer<v1::Command> Client::reset() {

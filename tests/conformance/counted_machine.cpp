@@ -195,6 +195,11 @@ class CountedGroups final : public GroupAccess {
       inner_->stop(request, client, until, ledger_->answer(ticket, callback));
     });
   }
+  void release_stop(GroupReleaseRequest request,
+                    std::function<void(std::vector<GroupReleaseResult>)> callback) override {
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->release_stop(request, ledger_->answer(ticket, callback)); });
+  }
 
  private:
   GroupAccess* inner_;
@@ -230,9 +235,11 @@ class CountedMachine final : public Machine {
       inner_->explain(axis, action, options, ledger_->answer(ticket, callback));
     });
   }
-  void release_stop(std::string axis, CommandCallback callback) override {
-    ledger_->enter(
-        [=, this](const auto& ticket) { inner_->release_stop(axis, ledger_->answer(ticket, callback)); });
+  void release_stop(std::string axis, HoldRelease release,
+                    std::function<void(Result<StopReleased>)> callback) override {
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->release_stop(axis, release, ledger_->answer(ticket, callback));
+    });
   }
   void stop_all(std::string client, WaitUntil until,
                 std::function<void(std::vector<Result<Command>>)> callback) override {

@@ -252,9 +252,16 @@ TEST(M14, HoldUntilReleaseStop) {
   EXPECT_EQ(rig.try_submit(EnableRequest{}).error().reason, Reason::stopping);
   rig.complete(StopRequest{});
   EXPECT_EQ(rig.state()->state, AxisState::stopping) << "another stop does not end the hold";
-  EXPECT_TRUE(rig.axis().release_stop());
+  std::vector<Result<StopReleased>> released;
+  const auto release = [&] {
+    rig.machine->release_stop("feeder", {}, [&](auto result) { released.push_back(std::move(result)); });
+  };
+  release();
   EXPECT_EQ(rig.state()->state, AxisState::standstill);
-  EXPECT_FALSE(rig.axis().release_stop());
+  release();
+  ASSERT_EQ(released.size(), 2U);
+  EXPECT_TRUE(released.at(0));
+  EXPECT_EQ(released.at(1).error().reason, Reason::invalid_argument);
   EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 0}).state, CommandState::done);
 }
 

@@ -39,6 +39,15 @@ class FakePersistence final : public Persistence {
     if (!failing && !frozen) saved.inhibit = std::move(inhibit);
     answer(std::move(done));
   }
+  void save_hold(std::string axis, HoldKey hold, WallTime since, Callback done) override {
+    if (!failing && !frozen) saved.axes[axis].holds.insert_or_assign(std::move(hold), since);
+    answer(std::move(done));
+  }
+  void forget_holds(std::string axis, HoldRecords holds, Callback done) override {
+    if (!failing && !frozen)
+      for (const auto& [hold, since] : holds) saved.axes[axis].holds.erase(hold);
+    answer(std::move(done));
+  }
   void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) override {
     if (!failing && !frozen) saved.axes[axis].eeprom_writes += writes;
     answer(std::move(done));

@@ -337,8 +337,10 @@ void FakeGroups::get(std::string id, std::function<void(Result<GroupMove>)> call
 
 void FakeGroups::stop(GroupStopRequest request, std::string client, WaitUntil until,
                       std::function<void(std::vector<GroupStopResult>)> callback) {
-  note(fmt::format("stop {} {} kind {} hold {} by {} until {}", request.group, fmt::join(request.axes, "+"),
-                   static_cast<int>(request.kind), request.hold, client, static_cast<int>(until)));
+  note(fmt::format("stop {} {} kind {} hold {}{} by {} until {}", request.group, fmt::join(request.axes, "+"),
+                   static_cast<int>(request.kind), request.hold,
+                   request.request_id.empty() ? "" : " as " + request.request_id, client,
+                   static_cast<int>(until)));
   std::vector<GroupStopResult> results;
   results.reserve(request.axes.size());
   for (const auto& axis : request.axes)
@@ -347,6 +349,26 @@ void FakeGroups::stop(GroupStopRequest request, std::string client, WaitUntil un
                                       ? Result<Command>(fail(Reason::unknown_axis, "there is no axis"))
                                       : Result<Command>(Command{.id = "c-2", .axis = axis})});
   post_([callback, results] { callback(results); });
+}
+
+void FakeGroups::release_stop(GroupReleaseRequest request,
+                              std::function<void(std::vector<GroupReleaseResult>)> callback) {
+  note(
+      fmt::format("release {} {} {}", request.group, fmt::join(request.axes, "+"), text_of(request.release)));
+  std::vector<GroupReleaseResult> results;
+  for (const auto& axis : request.axes) {
+    if (axis == "nobody")
+      results.push_back({.axis = axis, .holds = fail(Reason::unknown_axis, "there is no axis")});
+    else
+      results.push_back(
+          {.axis = axis, .holds = std::vector<StopHold>{{.key = {.holder = "hmi", .request_id = "r-1"}}}});
+  }
+  post_([callback, results] { callback(results); });
+}
+
+std::string text_of(const HoldRelease& release) {
+  return fmt::format("by {} as {} whose {} token {}", release.client, release.request_id,
+                     static_cast<int>(release.whose), release.lease_token);
 }
 
 void FakeEvents::add(std::string axis, EventContent content) {

@@ -144,6 +144,9 @@ class FakeLeases final : public FakeAccess, public LeaseAccess {
   Lease lease_{.token = 7};
 };
 
+/// Whose holds are to end, for a log.
+std::string text_of(const HoldRelease& release);
+
 /// Has the group "gantry" of the axes feeder and table; every move is done at once, as "g-1".
 class FakeGroups final : public FakeAccess, public GroupAccess {
  public:
@@ -155,6 +158,8 @@ class FakeGroups final : public FakeAccess, public GroupAccess {
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
   void stop(GroupStopRequest request, std::string client, WaitUntil until,
             std::function<void(std::vector<GroupStopResult>)> callback) override;
+  void release_stop(GroupReleaseRequest request,
+                    std::function<void(std::vector<GroupReleaseResult>)> callback) override;
 
  private:
   std::vector<GroupSettings> groups_{

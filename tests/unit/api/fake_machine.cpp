@@ -164,9 +164,15 @@ void FakeMachine::explain(std::string axis, std::optional<Action> action, Comman
   post([callback = std::move(callback), found] { callback(found); });
 }
 
-void FakeMachine::release_stop(std::string axis, CommandCallback callback) {
-  note("release_stop " + axis);
-  answer(callback, result_of(std::move(axis), CommandKind::stop));
+void FakeMachine::release_stop(std::string axis, HoldRelease release,
+                               std::function<void(Result<StopReleased>)> callback) {
+  note("release_stop " + axis + " " + text_of(release));
+  auto stop = result_of(std::move(axis), CommandKind::stop);
+  Result<StopReleased> released =
+      stop ? Result<StopReleased>(
+                 StopReleased{.stop = *stop, .holds = {{.key = {.holder = "hmi", .request_id = "r-1"}}}})
+           : Result<StopReleased>(fail(stop.error()));
+  post([callback = std::move(callback), released = std::move(released)] { callback(released); });
 }
 
 void FakeMachine::stop_all(std::string client, WaitUntil until,

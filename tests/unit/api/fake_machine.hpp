@@ -60,7 +60,8 @@ class FakeMachine final : public Machine {
               CommandCallback callback) override;
   void explain(std::string axis, std::optional<Action> action, CommandOptions options,
                std::function<void(Result<std::vector<Obstacle>>)> callback) override;
-  void release_stop(std::string axis, CommandCallback callback) override;
+  void release_stop(std::string axis, HoldRelease release,
+                    std::function<void(Result<StopReleased>)> callback) override;
   void stop_all(std::string client, WaitUntil until,
                 std::function<void(std::vector<Result<Command>>)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;

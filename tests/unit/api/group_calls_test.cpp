@@ -105,11 +105,12 @@ TEST_F(GroupCalls, StopsTellOfEachNameAndNeverFailForOne) {
   request.add_axes("feeder");
   request.add_axes("nobody");
   request.set_hold(true);
+  request.set_request_id("r-1");
   request.set_wait_until(v1::WAIT_UNTIL_DONE);
   v1::GroupStopResponse response;
   ASSERT_TRUE(groups_->GroupStop(&context, request, &response).ok());
   EXPECT_THAT(machine_.groups().log(),
-              ElementsAre("stop gantry feeder+nobody kind 2 hold true by local:unix until 2"));
+              ElementsAre("stop gantry feeder+nobody kind 2 hold true as r-1 by local:unix until 2"));
   ASSERT_EQ(response.results_size(), 2);
   EXPECT_EQ(response.results(0).command().axis(), "feeder");
   EXPECT_EQ(response.results(1).error().reason(), v1::REASON_UNKNOWN_AXIS);
@@ -121,6 +122,42 @@ TEST_F(GroupCalls, StopsTellOfEachNameAndNeverFailForOne) {
   EXPECT_EQ(detail_of(groups_->GroupHalt(&halting, halt, &halted)).reason(), v1::REASON_UNKNOWN_AXIS);
   Call empty;
   EXPECT_EQ(detail_of(groups_->GroupHalt(&empty, {}, &halted)).reason(), v1::REASON_INVALID_ARGUMENT);
+}
+
+TEST_F(GroupCalls, AStopIsNeverRefusedForItsRequestId) {
+  Call context;
+  v1::GroupStopRequest request;
+  request.add_axes("feeder");
+  request.set_hold(true);
+  request.set_request_id("two words");
+  v1::GroupStopResponse response;
+  ASSERT_TRUE(groups_->GroupStop(&context, request, &response).ok());
+  EXPECT_THAT(machine_.groups().log(), ElementsAre("stop  feeder kind 2 hold true by local:unix until 0"));
+}
+
+TEST_F(GroupCalls, ReleasesTellOfEachName) {
+  Call context;
+  v1::GroupReleaseStopRequest request;
+  request.add_axes("feeder");
+  request.add_axes("nobody");
+  request.set_request_id("r-1");
+  v1::GroupReleaseStopResponse response;
+  ASSERT_TRUE(groups_->GroupReleaseStop(&context, request, &response).ok());
+  EXPECT_THAT(machine_.groups().log(),
+              ElementsAre("release  feeder+nobody by local:unix as r-1 whose 0 token 0"));
+  ASSERT_EQ(response.results_size(), 2);
+  ASSERT_EQ(response.results(0).holds_size(), 1);
+  EXPECT_EQ(response.results(0).holds(0).holder(), "hmi");
+  EXPECT_EQ(response.results(1).error().reason(), v1::REASON_UNKNOWN_AXIS);
+
+  Call nothing;
+  v1::GroupReleaseStopRequest nobody;
+  nobody.add_axes("nobody");
+  EXPECT_EQ(detail_of(groups_->GroupReleaseStop(&nothing, nobody, &response)).reason(),
+            v1::REASON_UNKNOWN_AXIS);
+  Call empty;
+  EXPECT_EQ(detail_of(groups_->GroupReleaseStop(&empty, {}, &response)).reason(),
+            v1::REASON_INVALID_ARGUMENT);
 }
 
 }  // namespace

@@ -60,8 +60,8 @@ TEST(Convert, EveryEnumValueHasItsNamesakeInTheContract) {
 
 TEST(Convert, SnapshotKeepsEveryValue) {
   AxisSnapshot snapshot{.name = "feeder", .bus = "line-a", .node = 3, .model = "ykd2405pr", .unit = "mm"};
-  snapshot.simulated = snapshot.enabled = snapshot.enabled_by_us = snapshot.stop_held = snapshot.inhibited =
-      true;
+  snapshot.simulated = snapshot.enabled = snapshot.enabled_by_us = snapshot.inhibited = true;
+  snapshot.holds = {{.key = {.holder = "hmi", .request_id = "r-1"}, .since = WallTime(5s), .durable = true}};
   snapshot.state = AxisState::error_stop;
   snapshot.link = LinkState::online;
   snapshot.link_error = Error{.reason = Reason::offline};
@@ -102,6 +102,11 @@ TEST(Convert, SnapshotKeepsEveryValue) {
   EXPECT_EQ(state.measured_at().nanos(), 500'000'000);
   EXPECT_EQ(state.fault().reason(), v1::REASON_ALARM);
   EXPECT_TRUE(state.has_target());
+  ASSERT_EQ(state.holds_size(), 1);
+  EXPECT_EQ(state.holds(0).holder(), "hmi");
+  EXPECT_EQ(state.holds(0).request_id(), "r-1");
+  EXPECT_EQ(state.holds(0).since().seconds(), 5);
+  EXPECT_TRUE(state.holds(0).durable());
   EXPECT_EQ(state.commanded_position(), 1.75);
   EXPECT_EQ(state.following_error(), 0.25);
   EXPECT_EQ(state.motion_cause(), v1::MOTION_CAUSE_TERMINAL);

@@ -44,8 +44,43 @@ TEST_F(ReloadedMachine, AStopMeanwhileIsExecutedByTheAxisThatComes) {
   ASSERT_TRUE(world_.run_until([&] { return (*stop)->has_ended(); }, 10s));
   EXPECT_EQ((*stop)->value().state, CommandState::done);
   EXPECT_GE(writes(2, 0x0028), 1);
-  EXPECT_TRUE(state("a2")->stop_held);
-  EXPECT_TRUE(machine_->find("a2")->release_stop());
+  EXPECT_EQ(state("a2")->holds.size(), 1U);
+  EXPECT_EQ(state("a2")->state, AxisState::stopping);
+}
+
+TEST_F(ReloadedMachine, AHoldOutlivesTheExchangeOfItsAxis) {
+  complete("a2", StopRequest{.hold = true});
+  line_->forget_wire();
+  reload(slower(1));
+  EXPECT_THAT(refusals_, IsEmpty());
+  ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(state("a2")->state, AxisState::stopping);
+  ASSERT_EQ(state("a2")->holds.size(), 1U);
+  EXPECT_EQ(machine_->submit("a2", MoveVelocityRequest{.velocity = 10}, options()).error().reason,
+            Reason::stopping);
+  EXPECT_EQ(line_->network().node(2)->starts(), 0);
+}
+
+TEST_F(ReloadedMachine, AnAxisThatWasRemovedAndComesBackIsHeldStill) {
+  complete("a2", DisableRequest{});
+  const auto with = configuration_;
+  auto without = configuration_;
+  without.axes.pop_back();
+  ask(without);
+  // While it is leaving: nobody has it any more, and still it counts.
+  ASSERT_TRUE(machine_->submit("a2", StopRequest{.hold = true}, {.client = "hmi", .request_id = "r"}));
+  ASSERT_TRUE(world_.run_until([this] { return answered_; }, 10s));
+  EXPECT_EQ(machine_->find("a2"), nullptr);
+  EXPECT_EQ(store_.saved.axes.at("a2").holds.size(), 1U);
+  reload(with);
+  ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(state("a2")->state, AxisState::stopping);
+  EXPECT_EQ(machine_->submit("a2", EnableRequest{}, options()).error().reason, Reason::stopping);
+  bool released = false;
+  machine_->release_stop("a2", {.client = "hmi", .request_id = "r"},
+                         [&](const auto& result) { released = result.has_value(); });
+  ASSERT_TRUE(world_.run_until([&] { return released; }, 1s));
+  EXPECT_EQ(complete("a2", EnableRequest{}).state, CommandState::done);
 }
 
 TEST_F(ReloadedMachine, StopAllMeanwhileStopsEveryAxis) {

@@ -52,12 +52,11 @@ TEST_F(ReloadedMachine, IsRefusedAsAWholeWithEveryReason) {
   wanted.axes.at(1).axis.limits.velocity = 50;
   wanted.machine = "other";
   wanted.lines.front().baud = 57600;
-  complete("a2", StopRequest{.hold = true});
   LeaseRequest lease{.client = "hmi", .axes = {"a2"}};
   ASSERT_TRUE(machine_->leases().acquire(lease));
   reload(wanted);
   EXPECT_THAT(reasons(), ElementsAre(Reason::not_supported, Reason::not_supported, Reason::moving,
-                                     Reason::stopping, Reason::lease_required));
+                                     Reason::lease_required));
   EXPECT_THAT(refusals_.at(0).message, HasSubstr("machine changed"));
   EXPECT_THAT(refusals_.at(1).message, HasSubstr("buses.line-a changed (modbus_rtu.baud)"));
   EXPECT_THAT(refusals_.at(2).message, HasSubstr("a1: executes move_velocity"));

@@ -54,6 +54,31 @@ TEST(Change, AFailedInhibitLatchesAndAFailedReleaseDoesNotRelease) {
   EXPECT_EQ(state.inhibit, latched);
 }
 
+const HoldKey hmi{.holder = "hmi", .request_id = "r1"}, panel{.holder = "panel", .request_id = {}};
+const WallTime noon{std::chrono::hours(12)}, later{std::chrono::hours(13)};
+
+TEST(Change, HoldsBeginAndEnd) {
+  StoredState state;
+  apply(state, SetHold{.axis = "x", .hold = hmi, .since = noon});
+  apply(state, SetHold{.axis = "x", .hold = panel, .since = later});
+  EXPECT_EQ(state.axes.at("x").holds, (HoldRecords{{hmi, noon}, {panel, later}}));
+  apply(state, ForgetHolds{.axis = "x", .holds = {{hmi, noon}}});
+  EXPECT_EQ(state.axes.at("x").holds, (HoldRecords{{panel, later}}));
+}
+
+TEST(Change, AFailedHoldStandsAndAFailedReleaseDoesNotRelease) {
+  StoredState state;
+  apply_after_failure(state, SetHold{.axis = "x", .hold = hmi, .since = noon});
+  EXPECT_EQ(state.axes.at("x").holds, (HoldRecords{{hmi, noon}}));
+  apply_after_failure(state, ForgetHolds{.axis = "x", .holds = {{hmi, noon}}});
+  EXPECT_EQ(state.axes.at("x").holds, (HoldRecords{{hmi, noon}}));
+  // As the core's picture is, which was changed when it was asked for.
+  apply(state, ForgetHolds{.axis = "x", .holds = {{hmi, noon}}});
+  apply(state, SetHold{.axis = "x", .hold = hmi, .since = later});
+  apply_after_failure(state, ForgetHolds{.axis = "x", .holds = {{hmi, noon}}});
+  EXPECT_EQ(state.axes.at("x").holds, (HoldRecords{{hmi, later}})) << "one that came since stands as it is";
+}
+
 TEST(Change, AFailedCountIsKept) {
   StoredState state;
   apply_after_failure(state, CountEepromWrites{.axis = "x", .writes = 2});
@@ -71,10 +96,12 @@ TEST(Change, AnOlderStateIsNotTrustedAndInhibitsMotion) {
   EXPECT_TRUE(state.inhibit.active);
   EXPECT_EQ(state.inhibit.since, WallTime(std::chrono::seconds(9)));
   EXPECT_EQ(state.start_count, 3U);
+  apply(state, SetHold{.axis = "x", .hold = hmi, .since = noon});
 
   state.inhibit = latched;
   distrust(state, WallTime(std::chrono::seconds(9)));
   EXPECT_EQ(state.inhibit, latched) << "who latched it must not get lost";
+  EXPECT_EQ(state.axes.at("x").holds.size(), 1U) << "holds stand";
 }
 
 }  // namespace

@@ -70,8 +70,39 @@ TEST_F(FileStoreTest, SavesAreThereAfterARestart) {
   const auto store = open();
   EXPECT_FALSE(store->damage());
   EXPECT_EQ(store->loaded().axes.at("x").offset, offset(2));
-  EXPECT_EQ(store->loaded().axes.at("y"), (AxisRecord{.offset = {}, .eeprom_writes = 4}));
+  EXPECT_EQ(store->loaded().axes.at("y"), (AxisRecord{.offset = {}, .eeprom_writes = 4, .holds = {}}));
   EXPECT_EQ(store->loaded().inhibit, inhibit);
+}
+
+TEST_F(FileStoreTest, HoldsOutliveARestartUntilTheyAreForgotten) {
+  const HoldKey hmi{.holder = "hmi", .request_id = "r1"}, panel{.holder = "panel", .request_id = {}};
+  const WallTime noon{std::chrono::hours(12)};
+  {
+    auto store = open();
+    store->save_hold("x", hmi, noon, record());
+    store->save_hold("x", panel, noon, record());
+    wait_for(2);
+    EXPECT_EQ(decode(temporary_.read("state.v1"))->state.axes.at("x").holds.size(), 2U);
+  }
+  {
+    auto store = open();
+    EXPECT_EQ(store->loaded().axes.at("x").holds, (HoldRecords{{hmi, noon}, {panel, noon}}));
+    store->forget_holds("x", {{hmi, noon}}, record());
+    wait_for(3);
+    break_disk();
+    store->forget_holds("x", {{panel, noon}}, record());
+    store->save_hold("y", hmi, noon, record());
+    wait_for(5);
+    EXPECT_EQ(results_[3].error().reason, Reason::storage);
+    EXPECT_EQ(store->current().axes.at("x").holds, (HoldRecords{{panel, noon}})) << "not released";
+    repair_disk();
+    store->count_eeprom_writes("x", 1, record());
+    wait_for(6);
+    EXPECT_TRUE(results_[5]);
+  }
+  const auto store = open();
+  EXPECT_EQ(store->loaded().axes.at("x").holds, (HoldRecords{{panel, noon}}));
+  EXPECT_EQ(store->loaded().axes.at("y").holds, (HoldRecords{{hmi, noon}})) << "as soon as the disk worked";
 }
 
 TEST_F(FileStoreTest, AReportedSaveIsOnTheDiskAlready) {
@@ -115,7 +146,7 @@ TEST_F(FileStoreTest, DamageCostsTrustAndInhibitsMotion) {
     } else {
       EXPECT_FALSE(store->damage()) << "reported once; its consequences are saved";
     }
-    EXPECT_EQ(store->loaded().axes.at("x"), (AxisRecord{.offset = {}, .eeprom_writes = 2}));
+    EXPECT_EQ(store->loaded().axes.at("x"), (AxisRecord{.offset = {}, .eeprom_writes = 2, .holds = {}}));
     EXPECT_TRUE(store->loaded().inhibit.active);
   }
 }

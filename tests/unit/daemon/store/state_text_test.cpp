@@ -16,14 +16,18 @@ Generation example() {
   generation.state.inhibit = {.active = true,
                               .by = "tls:CN=hmi 1, panel\n\"left\" 100%",
                               .since = WallTime(std::chrono::nanoseconds(1'700'000'000'123'456'789))};
-  generation.state.axes["feeder"] = {.offset = OffsetRecord{.offset_pulses = -123456789012345,
-                                                            .trust = PositionTrust::homed,
-                                                            .canary = {5, 100, 100, 300, 0, 0xFFFF},
-                                                            .last_position_pulses = 42,
-                                                            .pulses_per_revolution = 10000,
-                                                            .invert = true},
-                                     .eeprom_writes = 3};
-  generation.state.axes["turn-table_2"] = {.offset = {}, .eeprom_writes = 0};
+  generation.state.axes["feeder"] = {
+      .offset = OffsetRecord{.offset_pulses = -123456789012345,
+                             .trust = PositionTrust::homed,
+                             .canary = {5, 100, 100, 300, 0, 0xFFFF},
+                             .last_position_pulses = 42,
+                             .pulses_per_revolution = 10000,
+                             .invert = true},
+      .eeprom_writes = 3,
+      .holds = {{{.holder = "tls:hmi 1", .request_id = "r-7"},
+                 WallTime(std::chrono::nanoseconds(1'700'000'001'000'000'002))},
+                {{.holder = "panel", .request_id = {}}, WallTime{}}}};
+  generation.state.axes["turn-table_2"] = {.offset = {}, .eeprom_writes = 0, .holds = {}};
   return generation;
 }
 
@@ -43,9 +47,20 @@ TEST(StateText, FormatIsFixed) {
       "axis feeder eeprom_writes=3\n"
       "offset pulses=-123456789012345 trust=homed last=42 per_rev=10000 invert=1 "
       "canary=0005.0064.0064.012c.0000.ffff\n"
+      "hold since_ns=0 request= by=panel\n"
+      "hold since_ns=1700000001000000002 request=r-7 by=tls:hmi%201\n"
       "axis turn-table_2 eeprom_writes=0\n"
       "crc32 " +
           encode(example()).substr(encode(example()).size() - 9));
+}
+
+TEST(StateText, ReadsWhatWasWrittenBeforeThereWereHolds) {
+  const std::string body =
+      "axisd-state 1\ngeneration 3\nstart_count 2\ninhibit active=0 since_ns=0 by=\naxis feeder "
+      "eeprom_writes=3\n";
+  const auto read = decode(body + fmt::format("crc32 {:08x}\n", crc32(body)));
+  ASSERT_TRUE(read);
+  EXPECT_TRUE(read->state.axes.at("feeder").holds.empty());
 }
 
 TEST(StateText, ChecksumIsIeee802) { EXPECT_EQ(crc32("123456789"), 0xCBF43926U); }
@@ -130,6 +145,11 @@ TEST(StateText, AcceptsOnlyTheCanonicalForm) {
            {"%0a", "%zz"},
            {"ffff", "fffff"},
            {"0005", "5"},
+           {"request=r-7", "request=r 7"},
+           {"request= by=panel", "request=r-7 by=tls:hmi%201"},
+           {"by=panel", "by=zzz"},
+           {"hold since_ns=0", "hold since_ns="},
+           {"hold since_ns=0", "holds since_ns=0"},
            {"turn-table_2", "feeder"},
            {"turn-table_2", "aaa"},
            {"turn-table_2 eeprom_writes=0\n", "turn-table_2 eeprom_writes=0\nmore\n"},
