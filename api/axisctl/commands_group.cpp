@@ -1,4 +1,4 @@
-// group list|move|show|halt|stop: axes that start and stop together.
+// group list|move|show|halt|stop|release-stop: axes that start and stop together.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -8,6 +8,7 @@
 
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/hold_view.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/motion_arguments.hpp"
 #include "api/axisctl/quantity.hpp"
@@ -145,7 +146,8 @@ void stop(Invocation& invocation, const Arguments& arguments,
   for (const auto& axis : arguments.axes) request.add_axes(axis);
   if constexpr (requires { request.set_hold(true); }) request.set_hold(arguments.keep);
   request.set_wait_until(arguments.wait ? v1::WAIT_UNTIL_DONE : v1::WAIT_UNTIL_ACCEPTED);
-  if constexpr (requires { request.set_request_id(""); }) request.set_request_id(random_uuid());
+  // Without a name of its own a hold is released without one, and repetitions are one hold.
+  if constexpr (requires { request.set_request_id(""); }) request.set_request_id(arguments.request_id);
   const auto& client = invocation.client();
   const auto response =
       repeat_stop(client, method, request, arguments.group, client.timeout(), arguments.wait);
@@ -162,21 +164,60 @@ void stop(Invocation& invocation, const Arguments& arguments,
   }
 }
 
+void add_names(CLI::App& command, Arguments& arguments) {
+  command.add_option("GROUP", arguments.group, "Name of a group");
+  command.add_option("--axis", arguments.axes, "An axis beside it, or in its place; may be repeated")
+      ->type_name("AXIS");
+}
+
+void check_names(const Arguments& arguments) {
+  if (arguments.group.empty() && arguments.axes.empty())
+    throw Failure(ExitCode::usage, "name a group, or axes with --axis");
+}
+
 template <class Request, class Response>
 void add_stop(CLI::App& group, Invocation& invocation, const char* name, const char* help,
               grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
   const auto arguments = std::make_shared<Arguments>();
   auto* command = group.add_subcommand(name, help);
-  command->add_option("GROUP", arguments->group, "Name of a group");
-  command->add_option("--axis", arguments->axes, "An axis beside it, or in its place; may be repeated")
-      ->type_name("AXIS");
-  if constexpr (requires(Request request) { request.set_hold(true); })
-    command->add_flag("--hold", arguments->keep, "Stay in Stopping until release-stop");
+  add_names(*command, *arguments);
+  if constexpr (requires(Request request) { request.set_hold(true); }) {
+    command->add_flag("--hold", arguments->keep, "Stay in Stopping, each, until group release-stop");
+    add_hold_id(*command, arguments->request_id);
+  }
   add_wait(*command, *arguments);
   command->callback([&invocation, arguments, method] {
-    if (arguments->group.empty() && arguments->axes.empty())
-      throw Failure(ExitCode::usage, "name a group, or axes with --axis");
+    check_names(*arguments);
     stop(invocation, *arguments, method);
+  });
+}
+
+void release(Invocation& invocation, const Arguments& arguments, const ReleaseArguments& which) {
+  v1::GroupReleaseStopRequest request;
+  request.set_group(arguments.group);
+  for (const auto& axis : arguments.axes) request.add_axes(axis);
+  which.fill(request);
+  const auto response = invocation.client().call(&Stub::GroupReleaseStop, request, arguments.group);
+  if (invocation.json) print_line(json(response));
+  for (const auto& result : response.results()) {
+    if (result.has_error()) invocation.status = ExitCode::ended_otherwise;
+    if (invocation.json) continue;
+    print_line(result.has_error()
+                   ? coloured(fmt::format("{}: {}", result.name(), describe(result.error(), result.name())),
+                              Colour::red, use_colour())
+                   : released_line(result.name(), result.holds()));
+  }
+}
+
+void add_release(CLI::App& group, Invocation& invocation) {
+  const auto arguments = std::make_shared<Arguments>();
+  const auto which = std::make_shared<ReleaseArguments>();
+  auto* command = group.add_subcommand("release-stop", "End a held stop of each axis of a group");
+  add_names(*command, *arguments);
+  which->add_to(*command);
+  command->callback([&invocation, arguments, which] {
+    check_names(*arguments);
+    release(invocation, *arguments, *which);
   });
 }
 
@@ -203,8 +244,8 @@ void add_move(CLI::App& group, Invocation& invocation) {
 }  // namespace
 
 void add_group_commands(CLI::App& app, Invocation& invocation) {
-  auto* group =
-      app.add_subcommand("group", "Axes that start and stop together: list, move, show, halt, stop");
+  auto* group = app.add_subcommand(
+      "group", "Axes that start and stop together: list, move, show, halt, stop, release-stop");
   group->require_subcommand(1);
   group->footer(examples);
   group->add_subcommand("list", "The groups of the configuration")->callback([&invocation] {
@@ -222,6 +263,7 @@ void add_group_commands(CLI::App& app, Invocation& invocation) {
   add_stop(*group, invocation, "halt", "Decelerate each axis of a group", &Stub::GroupHalt);
   add_stop(*group, invocation, "stop", "Stop each axis of a group; nothing takes over before standstill",
            &Stub::GroupStop);
+  add_release(*group, invocation);
 }
 
 }  // namespace axisd::axisctl

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/hold_view.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/motion_arguments.hpp"
 #include "api/axisctl/progress.hpp"
@@ -25,6 +26,7 @@ using Stub = v1::AxisService::Stub;
 
 struct StopArguments : MotionArguments {
   bool all = false, keep = false;
+  ReleaseArguments release;
 };
 
 /// Either axes or --all.
@@ -40,10 +42,6 @@ struct Answer {
   std::optional<Failure> refusal;
 };
 
-/// Releasing a stop is none: it may be somebody else's stop by the time it is repeated.
-template <class Request>
-constexpr bool is_stop = requires(Request request) { request.mutable_options(); };
-
 /// Each axis in turn, whatever becomes of the others: no stop may be missing because of another one's
 /// trouble. Those that did not reach the daemon are repeated, all together.
 template <class Request, class Response>
@@ -56,16 +54,15 @@ std::vector<Answer> ask_each(const Client& client, const std::vector<Request>& r
       auto& answer = answers[i];
       if (answer.command || (answer.refusal && answer.refusal->code() != ExitCode::unreachable)) continue;
       try {
-        answer.command = client
-                             .call_within(is_stop<Request> ? repetition.left() : client.timeout(), method,
-                                          requests[i], requests[i].axis(), Lane::stop)
-                             .command();
+        answer.command =
+            client.call_within(repetition.left(), method, requests[i], requests[i].axis(), Lane::stop)
+                .command();
       } catch (const Failure& failure) {
         answer.refusal = failure;
         if (failure.code() == ExitCode::unreachable) lost = failure;
       }
     }
-    if (!lost || !is_stop<Request>) return answers;
+    if (!lost) return answers;
     if (repetition.again(client, *lost)) continue;
     for (std::size_t i = 0; i < requests.size(); ++i)
       if (auto& answer = answers[i]; !answer.command && answer.refusal->code() == ExitCode::unreachable)
@@ -82,9 +79,12 @@ void stop_each(Invocation& invocation, const StopArguments& arguments,
   for (const auto& axis : arguments.axes) {
     auto& request = requests.emplace_back();
     request.set_axis(axis);
-    if constexpr (requires { request.set_hold(true); }) request.set_hold(arguments.keep);
-    if constexpr (requires { request.mutable_options(); })
-      *request.mutable_options() = command_options(arguments);
+    *request.mutable_options() = command_options(arguments);
+    if constexpr (requires { request.set_hold(true); }) {
+      request.set_hold(arguments.keep);
+      // Without a name of its own it is released without one, and its repetitions are one hold.
+      if (arguments.keep) request.mutable_options()->set_request_id(arguments.request_id);
+    }
   }
   std::vector<v1::Command> commands;
   ExitCode worst = ExitCode::ok;
@@ -97,6 +97,10 @@ void stop_each(Invocation& invocation, const StopArguments& arguments,
     }
   }
   invocation.status = report(invocation, commands, arguments.wait, {.unit = {}, .start = {}});
+  if (arguments.keep && !invocation.json)
+    for (const auto& command : commands)
+      print_line(fmt::format("{}: held until 'axisctl release-stop {}{}'", command.axis(), command.axis(),
+                             arguments.request_id.empty() ? "" : " --request-id " + arguments.request_id));
   if (worst != ExitCode::ok) invocation.status = worst;
 }
 
@@ -126,9 +130,12 @@ CLI::App* add(CLI::App& app, Invocation& invocation, const std::shared_ptr<StopA
               grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
   auto* command = app.add_subcommand(name, help);
   add_several_axes(*command, *arguments);
-  if constexpr (requires(Request request) { request.mutable_options(); }) add_wait(*command, *arguments);
-  if constexpr (requires(Request request) { request.set_hold(true); })
-    command->add_flag("--hold", arguments->keep, "Stay in Stopping until release-stop");
+  add_wait(*command, *arguments);
+  if constexpr (requires(Request request) { request.set_hold(true); }) {
+    command->add_flag("--hold", arguments->keep,
+                      "Stay in Stopping until release-stop, also over a restart of the daemon");
+    add_hold_id(*command, arguments->request_id);
+  }
   command->get_option("AXIS")->required();  // of those with --all it is not: they check it
   command->callback([&invocation, arguments, method] { stop_each(invocation, *arguments, method); });
   return command;
@@ -138,6 +145,36 @@ void release_all(Invocation& invocation) {
   const auto response = invocation.client().call(&v1::SystemService::Stub::ReleaseStopAll,
                                                  v1::ReleaseStopAllRequest(), std::string_view());
   print_line(invocation.json ? json(response) : "released; every axis needs a new command to move");
+}
+
+/// Each axis once, whatever becomes of the others. Never repeated: it may be somebody else's stop by then.
+void release_each(Invocation& invocation, const StopArguments& arguments) {
+  for (const auto& axis : arguments.axes) {
+    v1::ReleaseStopRequest request;
+    request.set_axis(axis);
+    arguments.release.fill(request);
+    try {
+      const auto response = invocation.client().call(&Stub::ReleaseStop, request, axis, Lane::stop);
+      print_line(invocation.json ? json(response) : released_line(axis, response.holds()));
+    } catch (const Failure& failure) {
+      fmt::print(stderr, "axisctl: {}\n", failure.what());
+      invocation.status = failure.code();
+    }
+  }
+}
+
+void add_release(CLI::App& app, Invocation& invocation) {
+  const auto arguments = std::make_shared<StopArguments>();
+  auto* command = app.add_subcommand(
+      "release-stop", "End a held stop: by default that of 'axisctl stop --hold' without --request-id");
+  add_several_axes(*command, *arguments);
+  arguments->release.add_to(*command);
+  command->add_flag("--all", arguments->all, "Release what stop --all holds");
+  command->callback([&invocation, arguments] {
+    check_axes(*arguments);
+    if (arguments->all) return release_all(invocation);
+    release_each(invocation, *arguments);
+  });
 }
 
 }  // namespace
@@ -162,15 +199,7 @@ void add_stop_commands(CLI::App& app, Invocation& invocation) {
   add(app, invocation, fresh(), "quick-stop",
       "Stop at once, without deceleration; open loop: costs position trust", &Stub::QuickStop);
 
-  const auto releasing = fresh();
-  auto* release = add(app, invocation, releasing, "release-stop", "End a held stop", &Stub::ReleaseStop);
-  release->get_option("AXIS")->required(false);
-  release->add_flag("--all", releasing->all, "Release what stop --all holds");
-  release->callback([&invocation, releasing] {
-    check_axes(*releasing);
-    if (releasing->all) return release_all(invocation);
-    stop_each(invocation, *releasing, &Stub::ReleaseStop);
-  });
+  add_release(app, invocation);
 }
 
 }  // namespace axisd::axisctl

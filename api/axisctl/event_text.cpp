@@ -64,6 +64,21 @@ std::string text_of(const v1::ConfigurationReloaded& reloaded) {
   return text;
 }
 
+std::string text_of(const v1::StopHoldChange& change) {
+  const auto whose = change.holder() +
+                     (change.request_id().empty() ? "" : fmt::format(" (request {})", change.request_id()));
+  switch (change.kind()) {
+    case v1::STOP_HOLD_CHANGE_KIND_HELD:
+      return "stop held by " + whose;
+    case v1::STOP_HOLD_CHANGE_KIND_RELEASED:
+      return fmt::format("hold of {} released by {}", whose, change.by());
+    case v1::STOP_HOLD_CHANGE_KIND_NOT_DURABLE:
+      return fmt::format("hold of {} would not outlive a restart: the disk failed", whose);
+    default:
+      return "a change of a held stop that this axisctl does not know";
+  }
+}
+
 std::string content(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
@@ -80,6 +95,8 @@ std::string content(const v1::Event& event) {
       return text_of(event.lease_change());
     case v1::Event::kConfigurationReloaded:
       return text_of(event.configuration_reloaded());
+    case v1::Event::kStopHoldChange:
+      return text_of(event.stop_hold_change());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -111,7 +128,7 @@ v1::EventKind parse_event_kind(std::string_view text) {
   }
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
-                            "configuration (of a drive), configuration-reloaded, flight, lease",
+                            "configuration (of a drive), configuration-reloaded, flight, lease, stop (holds)",
                             text));
 }
 

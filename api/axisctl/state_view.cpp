@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <set>
+
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/hold_view.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -89,6 +92,13 @@ std::string power(const v1::AxisState& state) {
   return state.enabled_by_daemon() ? "on" : "on, found so: nobody enabled it through this daemon";
 }
 
+/// Their names alone, each once.
+std::string holders(const v1::AxisState& state) {
+  std::set<std::string> names;
+  for (const auto& hold : state.holds()) names.insert(hold.holder());
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 }  // namespace
 
 std::string remarks(const v1::AxisState& state) {
@@ -97,7 +107,7 @@ std::string remarks(const v1::AxisState& state) {
   if (state.link() != v1::LINK_STATE_ONLINE && state.has_age())
     append(text, fmt::format("last measured {} ago", duration_text(seconds(state.age()))));
   if (state.inhibited()) append(text, "all stopped");
-  if (state.stop_held()) append(text, "stop held");
+  if (state.stop_held()) append(text, "stop held by " + holders(state));
   if (!state.lease_holder().empty()) append(text, "leased by " + state.lease_holder());
   if (state.alarm_code() != 0)
     append(text, fmt::format("alarm {} {}", state.alarm_code(), state.alarm_name()));
@@ -139,7 +149,7 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   details.add("axis", state.axis() + (state.simulated() ? " (simulated)" : ""));
   details.add("state", coloured(state_of(state), state_colour(state), colour) +
                            (state.in_position() ? ", in position" : "") +
-                           (state.stop_held() ? ", stop held" : "") +
+                           (state.stop_held() ? ", stop held by all of: " + text_of(state.holds()) : "") +
                            (state.inhibited() ? ", all axes stopped: release-stop --all" : ""));
   if (state.has_fault())
     details.add("fault", coloured(describe(state.fault(), state.axis()), Colour::red, colour));

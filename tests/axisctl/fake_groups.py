@@ -52,6 +52,18 @@ class FakeGroups(rpc.GroupServiceServicer):
         self.note("GroupHalt", request, context)
         return group_pb.GroupHaltResponse(results=self.group_results(request, types_pb2.COMMAND_KIND_HALT))
 
+    async def GroupReleaseStop(self, request, context):
+        self.note("GroupReleaseStop", request, context)
+        results = []
+        for name in (*GROUPS.get(request.group, ()), *request.axes):
+            error = self.release(self.axes[name], request)
+            results.append(group_pb.GroupReleaseStopResult(name=name, error=error, holds=self.axes[name].state.holds))
+        return group_pb.GroupReleaseStopResponse(results=results)
+
     async def GroupStop(self, request, context):
         self.note("GroupStop", request, context)
+        if request.hold:
+            for name in (*GROUPS.get(request.group, ()), *request.axes):
+                if name in self.axes:
+                    self.hold(self.axes[name], request.request_id)
         return group_pb.GroupStopResponse(results=self.group_results(request, types_pb2.COMMAND_KIND_STOP))

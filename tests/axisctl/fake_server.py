@@ -233,12 +233,35 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         axis.end(types_pb2.COMMAND_STATE_ABORTED, error_pb2.ErrorDetail(
             reason=error_pb2.REASON_SUPERSEDED, message=f"a {method} took its place"))
         command = self.command(axis, kind, request)
-        held = bool(getattr(request, "hold", False))
-        axis.state.stop_held = held
+        if getattr(request, "hold", False):
+            self.hold(axis, request.options.request_id)
+        axis.state.stop_held = bool(axis.state.holds)
         if axis.state.enabled:
-            axis.state.state = types_pb2.STATE_STOPPING if held else types_pb2.STATE_STANDSTILL
+            axis.state.state = types_pb2.STATE_STOPPING if axis.state.holds else types_pb2.STATE_STANDSTILL
         self.change(command, types_pb2.COMMAND_STATE_DONE)
         return response(command=command)
+
+    @staticmethod
+    def hold(axis, request_id, holder="local:localhost"):
+        if not any((hold.holder, hold.request_id) == (holder, request_id) for hold in axis.state.holds):
+            hold = axis.state.holds.add(holder=holder, request_id=request_id, durable=True)
+            hold.since.FromSeconds(1_700_000_000)
+
+    @staticmethod
+    def release(axis, request):
+        """The error, if there is none of these."""
+        def meant(hold):
+            mine = hold.holder == "local:localhost"
+            return request.everybody or mine and (request.mine or hold.request_id == request.request_id)
+        kept = [hold for hold in axis.state.holds if not meant(hold)]
+        if len(kept) == len(axis.state.holds):
+            return error_pb2.ErrorDetail(reason=error_pb2.REASON_INVALID_ARGUMENT, message=f"{axis.name}: no such hold")
+        del axis.state.holds[:]
+        axis.state.holds.extend(kept)
+        axis.state.stop_held = bool(kept)
+        if not kept:
+            axis.state.state = types_pb2.STATE_STANDSTILL
+        return None
 
     async def Halt(self, request, context):
         return await self.halting("Halt", types_pb2.COMMAND_KIND_HALT, request, context, axes_pb.HaltResponse)
@@ -253,10 +276,11 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
     async def ReleaseStop(self, request, context):
         self.note("ReleaseStop", request, context)
         axis = await self.ready(request, context, powered=False)
-        axis.state.stop_held = False
-        axis.state.state = types_pb2.STATE_STANDSTILL
+        if (error := self.release(axis, request)) is not None:
+            await refuse(context, grpc.StatusCode.INVALID_ARGUMENT, error)
         return axes_pb.ReleaseStopResponse(command=types_pb2.Command(
-            id="c-0", axis=axis.name, kind=types_pb2.COMMAND_KIND_STOP, state=types_pb2.COMMAND_STATE_DONE))
+            id="c-0", axis=axis.name, kind=types_pb2.COMMAND_KIND_STOP, state=types_pb2.COMMAND_STATE_DONE),
+            holds=axis.state.holds)
 
     # CommandService
 

@@ -5,6 +5,7 @@ import socket
 import subprocess
 import tempfile
 import unittest
+import unittest.mock
 
 import fake_server
 from support import AXISCTL, LIMIT, AxisctlTest, environment
@@ -212,11 +213,34 @@ class Stopping(AxisctlTest):
         self.assertEqual([name for name, _, _ in self.server.machine.calls], ["Halt", "Stop", "QuickStop"])
 
     def test_hold_and_release(self):
-        self.ok("stop", "feeder", "--hold")
+        self.assertIn("held until 'axisctl release-stop feeder'", self.ok("stop", "feeder", "--hold"))
         self.assertTrue(self.server.calls("Stop")[0].hold)
-        self.assertIn("stop held", self.ok("state", "feeder"))
-        self.ok("release-stop", "feeder")
+        self.assertEqual(self.server.calls("Stop")[0].options.request_id, "")
+        self.assertIn("stop held by all of: local:localhost since 2023-11-14T22:13:20Z", self.ok("state", "feeder"))
+        self.assertIn("stop held by local:localhost", self.ok("list"))
+        self.assertIn("feeder: released; a new command can move it", self.ok("release-stop", "feeder"))
         self.assertNotIn("stop held", self.ok("state", "feeder"))
+        self.assertIn("no such hold", self.fails(4, "release-stop", "feeder"))
+
+    def test_whose_holds_are_released(self):
+        self.assertIn("release-stop feeder --request-id door'",
+                      self.ok("stop", "feeder", "--hold", "--request-id", "door"))
+        self.ok("stop", "feeder", "--hold")
+        self.server.machine.hold(self.server.machine.axes["feeder"], "r7", holder="panel")
+        self.assertIn("still held by local:localhost (request door) since 2023-11-14T22:13:20Z, panel (request r7)",
+                      self.ok("release-stop", "feeder"))
+        self.assertIn("still held by panel", self.ok("release-stop", "feeder", "--request-id", "door"))
+        self.assertEqual(self.json("release-stop", "feeder", "--everybody", "--lease", "7"),
+                         [{"command": unittest.mock.ANY, "holds": []}])
+        self.assertEqual(self.server.calls("ReleaseStop")[-1].lease_token, 7)
+        self.fails(2, "release-stop", "feeder", "--everybody", "--mine")
+        self.ok("group", "stop", "transfer", "--hold")
+        self.assertIn("turntable: released; a new command can move it", self.ok("group", "release-stop", "transfer"))
+        again = self.run_axisctl("group", "release-stop", "transfer")
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("turntable: no such hold", again.stdout)
+        self.ok("group", "stop", "transfer", "--hold", "--request-id", "door")
+        self.ok("group", "release-stop", "transfer", "--mine")
 
     def test_one_refused_stop_does_not_keep_the_others(self):
         done = self.run_axisctl("stop", "ghost", "feeder")

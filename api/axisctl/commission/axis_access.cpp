@@ -119,6 +119,7 @@ v1::Command AxisAccess::stop(bool hold) {
   request.set_hold(hold);
   *request.mutable_options() = options();
   request.mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE);
+  if (hold) request.mutable_options()->set_request_id(hold_id_);
   holds_ = holds_ || hold;
   return client().call_within(longest_stop, &Axis::Stop, request, axis_, Lane::stop).command();
 }
@@ -126,6 +127,7 @@ v1::Command AxisAccess::stop(bool hold) {
 void AxisAccess::release_stop() {
   v1::ReleaseStopRequest request;
   request.set_axis(axis_);
+  request.set_request_id(hold_id_);
   client().call(&Axis::ReleaseStop, request, axis_, Lane::stop);
   holds_ = false;
 }

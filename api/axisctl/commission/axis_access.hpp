@@ -70,7 +70,8 @@ class AxisAccess {
   Invocation& invocation_;
   std::string axis_;
   std::unique_ptr<LeaseKeeper> lease_;
-  bool holds_ = false;  ///< a stop with hold was asked for, and not released since
+  const std::string hold_id_ = random_uuid();  ///< of its stops with hold
+  bool holds_ = false;                         ///< a stop with hold was asked for, and not released since
   std::atomic<bool> ours_ = false;
   std::atomic<bool> stopped_ = false;
   std::mutex starting_;  ///< held while a start is on its way to the daemon
