@@ -67,6 +67,7 @@ class LostAnswers(ClientTest):
             await self.feeder.move_relative(5)
         self.assertEqual(self.request_ids("MoveRelative"), [raised.exception.request_id])
         self.assertFalse(raised.exception.nothing_sent)
+        self.fake.hold(self.fake.axes["feeder"], "")
         for call in (self.feeder.release_stop(), self.feeder.disable(),
                      self.machine.group("transfer").move({"feeder": 1})):
             with self.assertRaises(axisd.UnreachableError):
@@ -78,6 +79,69 @@ class LostAnswers(ClientTest):
         with self.assertRaises(axisd.RefusedError):
             await self.machine.axis("nobody").stop()
         self.assertEqual(len(self.calls("Stop")), 1)
+
+
+class Held(ClientTest):
+    async def holds(self, axis="feeder"):
+        return (await self.machine.axis(axis).state()).holds
+
+    async def test_a_program_releases_what_it_holds_and_nothing_else(self):
+        self.fake.hold(self.fake.axes["feeder"], "another program's")
+        self.fake.hold(self.fake.axes["feeder"], "")
+        await self.feeder.stop(hold=True)
+        await self.feeder.quick_stop(hold=True)
+        self.assertEqual(len(await self.holds()), 4)
+        left = await self.feeder.release_stop()
+        self.assertEqual([hold.request_id for hold in left], ["another program's", ""])
+        self.assertEqual(left, await self.holds())
+        self.assertEqual(left[0].since.year, 2023)
+        await self.feeder.release_stop()  # holds none itself: the one without a name
+        self.assertEqual([hold.request_id for hold in await self.holds()], ["another program's"])
+
+    async def test_a_hold_by_name_is_released_by_name(self):
+        await self.feeder.stop(hold=True, request_id="guard-door")
+        self.assertEqual([request.options.request_id for request in self.calls("Stop")], ["guard-door"])
+        async with axisd.connect(self.machine.server) as other:
+            self.assertEqual(await other.axis("feeder").release_stop("guard-door"), ())
+
+    async def test_a_hold_that_somebody_else_released_is_no_error(self):
+        await self.feeder.stop(hold=True)
+        async with axisd.connect(self.machine.server) as other:
+            self.assertEqual(await other.axis("feeder").release_stop(everybody=True), ())
+        self.assertEqual(await self.feeder.release_stop(), ())
+        with self.assertRaises(axisd.RefusedError):
+            await self.feeder.release_stop()
+
+    async def test_a_stop_without_an_answer_is_released_too(self):
+        self.fake.losing["Stop"] = ALWAYS
+        self.machine.timeout = 0.3
+        with self.assertRaises(axisd.UnreachableError):
+            await self.feeder.stop(hold=True)
+        self.assertEqual(len(await self.holds()), 1)
+        self.assertEqual(await self.feeder.release_stop(), ())
+
+    async def test_a_program_does_not_fill_its_share(self):
+        for _ in range(30):
+            await self.feeder.stop(hold=True)
+        self.assertEqual(len(await self.holds()), 8)
+        self.assertEqual(await self.feeder.release_stop(), ())
+
+    async def test_groups(self):
+        self.fake.hold(self.fake.axes["turntable"], "r", holder="panel")
+        group = self.machine.group("transfer")
+        await group.stop(hold=True)
+        await group.stop(hold=True)
+        left = await group.release_stop()
+        self.assertEqual((left["feeder"], [hold.holder for hold in left["turntable"]]), ((), ["panel"]))
+        await group.stop(hold=True)
+        self.assertEqual(await self.feeder.release_stop(), (), "of its axes one by one, too")
+        self.assertEqual(len(await self.holds("turntable")), 2)
+        await group.release_stop()
+        self.assertEqual(len(await self.holds("turntable")), 1)
+        with self.assertRaises(axisd.RefusedError):
+            await group.release_stop()
+        self.assertEqual((await group.stop(hold=True))["feeder"].kind, "stop")
+        self.assertEqual(await group.release_stop(everybody=True), {"feeder": (), "turntable": ()})
 
 
 class NoDaemon(unittest.IsolatedAsyncioTestCase):
@@ -194,6 +258,9 @@ class CommandLine(AxisctlTest):
             self.ok(word, "feeder", "turntable")
             self.assertEqual(len(self.ids(method)), 4)
             self.assertEqual(len(set(self.ids(method))), 2)
+        self.server.machine.losing.update(Stop=2)
+        self.ok("stop", "feeder", "--hold")
+        self.assertEqual(len(self.server.machine.axes["feeder"].state.holds), 1, "repetitions are one hold")
         self.server.machine.losing.update(GroupStop=2, StopAll=2)
         self.ok("group", "stop", "transfer", "--hold")
         self.assertEqual(len({request.request_id for request in self.server.calls("GroupStop")}), 1)

@@ -55,14 +55,14 @@ class Explain(Scenario):
         self.assertEqual(self.way_out(machine)[0], ["enable feeder", "home feeder"])
         self.assertEqual(self.obstacles(machine, **MOVE), [])
 
-        client.to_done("Stop", "feeder", hold=True)
+        client.to_done("Stop", "feeder", hold=True, request_id="door")
         client.call(client.system.StopAll, system_pb.StopAllRequest(wait_until="WAIT_UNTIL_DONE"))
         client.call(client.lease.AcquireLease,
                     lease_pb.AcquireLeaseRequest(axes=["feeder"], label="panel 2", ttl={"seconds": 60}))
         self.assertEqual(self.obstacles(machine, **MOVE),
                          [("INHIBITED", True), ("LEASE_REQUIRED", True), ("STOPPING", True)])
         lines, token = self.way_out(machine)
-        self.assertEqual(lines, ["release-stop --all", "lease acquire feeder --take", "release-stop feeder"])
+        self.assertEqual(lines, ["release-stop --all", "lease acquire feeder --take", "release-stop feeder --request-id door"])
         starts = len(machine.wire.writes(START))
         done = machine.axisctl("move", "feeder", "10mm", "--wait", "--lease", token)
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -83,12 +83,12 @@ class Stop(Scenario):
     def test_held_stop(self):
         machine = self.ready_feeder()
         self.move_under_way(machine)
-        self.assert_command(machine.client.motion("Stop", "feeder", wait=DONE, hold=True), "DONE")
+        self.assert_command(machine.client.motion("Stop", "feeder", wait=DONE, hold=True, request_id="door"), "DONE")
         state = machine.client.state("feeder")
         self.assert_state(state, "STOPPING")
         self.assertTrue(state.stop_held)
         self.refused("FAILED_PRECONDITION", "STOPPING", machine.client.motion, "MoveAbsolute", "feeder", position=1.0)
-        machine.client.call(machine.client.axis.ReleaseStop, axis_pb.ReleaseStopRequest(axis="feeder"))
+        machine.client.call(machine.client.axis.ReleaseStop, axis_pb.ReleaseStopRequest(axis="feeder", request_id="door"))
         self.assert_state(machine.client.state("feeder"), "STANDSTILL")
         machine.client.to_done("MoveAbsolute", "feeder", position=1.0)
 

@@ -12,10 +12,11 @@ from .configuration import ConfigChange, ConfigCheck, ConfigFinding, Configurati
 from .drive import Drive
 from .drives import (Alarm, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
-                     StateChange, TerminalCapability, TerminalEdge, VelocitySegment)
+                     StateChange, StopHoldChange, TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import (ArgumentError, AxisdError, LeaseLostError, MotionError, RefusedError, StopError,
                      UnreachableError)
 from .group import Group, GroupMember, GroupMove
+from .holds import StopHold
 from .lease import Lease, LeaseInfo
 from .machine import Machine, connect
 from .reasons import Outcome, Reason
@@ -33,6 +34,6 @@ __all__ = [
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle", "Outcome",
     "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Reload", "ScanProgress", "Segments",
-    "SerialProgress", "State", "StateChange", "StopBudget", "StopError", "StopResult", "Terminal", "TerminalCapability",
+    "SerialProgress", "State", "StateChange", "StopBudget", "StopError", "StopHold", "StopHoldChange", "StopResult", "Terminal", "TerminalCapability",
     "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",
 ]

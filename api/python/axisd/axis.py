@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from .calls import Seconds, command_options, did_you_mean, done, duration
 from .drive import Drive
-from .errors import ArgumentError, AxisdError, MotionError
+from .errors import ArgumentError, AxisdError, MotionError, RefusedError
+from .holds import StopHold
+from .reasons import Reason
 from .types import AxisState, Command, Link, Obstacle
-from .v1 import axis_service_pb2, system_service_pb2
+from .v1 import axis_service_pb2, system_service_pb2, types_pb2
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -120,20 +122,57 @@ class Axis:
         request = axis_service_pb2.HaltRequest(axis=self.name, options=command_options(None, wait))
         return await self._stop(self._machine._stops.Halt, request, wait)
 
-    async def stop(self, *, hold: bool = False, wait: bool = True) -> Command:
-        """Decelerates; nothing takes over before standstill (with `hold`: before release_stop)."""
-        request = axis_service_pb2.StopRequest(axis=self.name, hold=hold, options=command_options(None, wait))
+    async def stop(self, *, hold: bool = False, wait: bool = True, request_id: str | None = None) -> Command:
+        """Decelerates; nothing takes over before standstill (with `hold`: before release_stop(), and before everybody else
+        who holds has released, also over a restart of the daemon). `request_id`: the name of the hold, for another program
+        to release it by."""
+        request = axis_service_pb2.StopRequest(axis=self.name, hold=hold, options=self._stop_options(hold, wait, request_id))
         return await self._stop(self._machine._stops.Stop, request, wait)
 
-    async def quick_stop(self, *, hold: bool = False, wait: bool = True) -> Command:
-        """Stops at once, without deceleration. Open loop: the position is no longer trusted."""
-        request = axis_service_pb2.QuickStopRequest(axis=self.name, hold=hold, options=command_options(None, wait))
+    async def quick_stop(self, *, hold: bool = False, wait: bool = True, request_id: str | None = None) -> Command:
+        """Stops at once, without deceleration. Open loop: the position is no longer trusted. Otherwise as stop()."""
+        request = axis_service_pb2.QuickStopRequest(axis=self.name, hold=hold,
+                                                    options=self._stop_options(hold, wait, request_id))
         return await self._stop(self._machine._stops.QuickStop, request, wait)
 
-    async def release_stop(self) -> None:
-        """Ends a stop with `hold`."""
-        request = axis_service_pb2.ReleaseStopRequest(axis=self.name)
-        await self._machine._call(self._machine._axes.ReleaseStop, request, self.name)
+    def _stop_options(self, hold: bool, wait: bool, request_id: str | None) -> types_pb2.CommandOptions:
+        if hold:
+            # Before it is sent: a stop without an answer may hold, too.
+            request_id = self._machine._holds.fresh(self.name, request_id)
+            self._machine._holds.add(self.name, request_id)
+        return command_options(request_id, wait)
+
+    async def release_stop(self, request_id: str | None = None, *, mine: bool = False,
+                           everybody: bool = False) -> tuple[StopHold, ...]:
+        """Ends the stops that this connection holds; who holds the axis still. Without any: that of the stops without a
+        name (`axisctl stop --hold`). `request_id`: the one of this name, of any program with this client's identity; `mine`:
+        all of that identity; `everybody`: all there are, for whoever may command the axis (an event tells of it)."""
+        names = self._machine._holds.of(self.name)
+        if request_id is None and not mine and not everybody and names:
+            left: tuple[StopHold, ...] = ()
+            for name in names:
+                left = await self._release(name)
+            return left
+        request = axis_service_pb2.ReleaseStopRequest(axis=self.name, request_id=request_id or "", mine=mine,
+                                                      everybody=everybody, lease_token=self._lease_token)
+        response = await self._machine._call(self._machine._axes.ReleaseStop, request, self.name)
+        for name in names:
+            if mine or everybody or name == request_id:
+                self._machine._holds.drop(self.name, name)
+        return tuple(StopHold.of(hold) for hold in response.holds)
+
+    async def _release(self, name: str) -> tuple[StopHold, ...]:
+        """One that this connection holds, unless somebody else released it already, or it never arrived."""
+        request = axis_service_pb2.ReleaseStopRequest(axis=self.name, request_id=name)
+        try:
+            response = await self._machine._call(self._machine._axes.ReleaseStop, request, self.name)
+        except RefusedError as refusal:
+            if refusal.reason is not Reason.INVALID_ARGUMENT:
+                raise
+            self._machine._holds.drop(self.name, name)
+            return (await self.state()).holds
+        self._machine._holds.drop(self.name, name)
+        return tuple(StopHold.of(hold) for hold in response.holds)
 
     async def explain(self, command: Explainable | None = None, value: float | None = None, *,
                       velocity: float | None = None, hold: Seconds | None = None,

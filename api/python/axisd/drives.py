@@ -247,8 +247,18 @@ class ConfigurationReloaded:
     changes: tuple[ConfigChange, ...]
 
 
+@dataclasses.dataclass(frozen=True)
+class StopHoldChange:
+    """Somebody began or ceased to hold an axis in Stopping. `kind`: "held", "released" or "not_durable"; `by`: who
+    released it, or holds it."""
+    kind: str
+    holder: str
+    request_id: str
+    by: str
+
+
 Content = (TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
-           | ConfigurationReloaded)
+           | ConfigurationReloaded | StopHoldChange)
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -274,6 +284,10 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
     if kind == "configuration_reloaded":
         return ConfigurationReloaded(content.client, content.previous_revision, content.revision,
                                      tuple(ConfigChange.of(change) for change in content.changes))
+    if kind == "stop_hold_change":
+        name = event_service_pb2.StopHoldChangeKind.Name(content.kind)
+        return StopHoldChange(name.removeprefix("STOP_HOLD_CHANGE_KIND_").lower(), content.holder, content.request_id,
+                              content.by)
     return None
 
 

@@ -5,12 +5,15 @@ import asyncio
 import dataclasses
 import datetime
 import uuid
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+import grpc
+
 from .calls import Seconds, did_you_mean, duration
 from .errors import ArgumentError, AxisdError, MotionError, RefusedError, StopError
+from .holds import StopHold
 from .reasons import Outcome, Reason
 from .types import Command, CommandState, ErrorDetail, StopResult, _member, _optional_error
 from .v1 import group_service_pb2, types_pb2
@@ -158,14 +161,50 @@ class Group:
         return await self._stop(self._machine._group_stops.GroupHalt, request, wait)
 
     async def stop(self, hold: bool = False, wait: bool = True) -> dict[str, Command]:
-        """Stops each axis; nothing takes over before standstill, with `hold` before Axis.release_stop(). Raises StopError
+        """Stops each axis; nothing takes over before standstill, with `hold` before release_stop(). Raises StopError
         unless every one has confirmed its standstill (without `wait`: has accepted the stop); all that are known are
         stopped in any case. Repeated, up to the machine's `timeout`, while the daemon cannot be reached."""
+        holds, subject = self._machine._holds, self._hold_subject
+        name = holds.fresh(subject, None)
+        if hold:
+            # Before it is sent: a stop without an answer may hold, too.
+            holds.add(subject, name)
         request = group_service_pb2.GroupStopRequest(group=self.name, axes=sorted(self._targets), hold=hold,
-                                                     request_id=str(uuid.uuid4()),
+                                                     request_id=name,
                                                      wait_until=types_pb2.WAIT_UNTIL_DONE if wait
                                                      else types_pb2.WAIT_UNTIL_ACCEPTED)
         return await self._stop(self._machine._group_stops.GroupStop, request, wait)
+
+    @property
+    def _hold_subject(self) -> str:
+        """No axis is called so."""
+        return f"group {self.name or id(self)}"
+
+    async def release_stop(self, *, mine: bool = False, everybody: bool = False) -> dict[str, tuple[StopHold, ...]]:
+        """Ends what stop() of this group holds; who holds each axis still. `mine` and `everybody` as of
+        Axis.release_stop(). Raises RefusedError for the first axis where that was not possible, once all were tried."""
+        names = self._machine._holds.of(self._hold_subject)
+        left: dict[str, tuple[StopHold, ...]] = {}
+        for name in [""] if mine or everybody or not names else names:
+            request = group_service_pb2.GroupReleaseStopRequest(
+                group=self.name, axes=sorted(self._targets), request_id=name, mine=mine, everybody=everybody,
+                lease_token=self._lease_token)
+            response = await self._machine._call(self._machine._groups.GroupReleaseStop, request, self._subject)
+            for result in response.results:
+                error = _optional_error(result, "error")
+                left[result.name] = tuple(StopHold.of(hold) for hold in result.holds)
+                # Somebody else released it already, or it never arrived.
+                if error is not None and not (name and error.reason is Reason.INVALID_ARGUMENT):
+                    raise RefusedError(str(error), grpc.StatusCode.FAILED_PRECONDITION, error)
+            self._forget(name, left)
+        if mine or everybody:
+            for name in names:
+                self._forget(name, left)
+        return left
+
+    def _forget(self, name: str, axes: Iterable[str]) -> None:
+        for subject in (self._hold_subject, *axes):
+            self._machine._holds.drop(subject, name)
 
     async def _stop(self, method: Any, request: Any, wait: bool) -> dict[str, Command]:
         response = await self._machine._stop_call(method, request, self._subject, wait)
@@ -173,6 +212,8 @@ class Group:
         commands: dict[str, Command] = {}
         failed: list[StopResult] = []
         for result in results:
+            if result.command is not None and getattr(request, "hold", False):
+                self._machine._holds.add(result.axis, request.request_id)  # Axis.release_stop() ends it, too
             if result.command is not None and (result.confirmed or not wait and not result.command.state.ended):
                 commands[result.axis] = result.command
             else:

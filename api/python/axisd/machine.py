@@ -20,6 +20,7 @@ from .configuration import ConfigCheck, Configuration, Reload
 from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, RefusedError, UnreachableError, translate
 from .group import Group
+from .holds import Holds
 from .lease import Lease, LeaseInfo
 from .reasons import Reason
 from .traffic import BusStatistics, FlightRecord, TracedFrame
@@ -79,6 +80,7 @@ class Machine:
         if tls_ca is not None:
             self._credentials = grpc.ssl_channel_credentials(read(tls_ca), read(tls_key), read(tls_certificate))
         self._channels: list[grpc.aio.Channel] = []
+        self._holds = Holds()
 
     async def __aenter__(self) -> Machine:
         self._channels = [self._channel(), self._channel()]

@@ -10,6 +10,7 @@ from typing import Any
 from google.protobuf.duration_pb2 import Duration
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from .holds import StopHold
 from .reasons import Outcome, Reason
 from .v1 import axis_service_pb2, bus_service_pb2, error_pb2, group_service_pb2, system_service_pb2, types_pb2
 
@@ -204,6 +205,7 @@ class AxisState:
     starts_by_sync: bool
     commanded_position: float | None
     following_error: float | None
+    holds: tuple[StopHold, ...]
     raw: types_pb2.AxisState = dataclasses.field(repr=False, compare=False)
 
     @classmethod
@@ -225,7 +227,8 @@ class AxisState:
             drift=raw.drift, eeprom_writes=raw.eeprom_writes, link_note=raw.link_note,
             lease_holder=raw.lease_holder, start_note=raw.start_note,
             starts_by_sync=raw.starts_by_sync, commanded_position=_optional(raw, "commanded_position"),
-            following_error=_optional(raw, "following_error"), raw=raw)
+            following_error=_optional(raw, "following_error"),
+            holds=tuple(StopHold.of(hold) for hold in raw.holds), raw=raw)
 
 
 @dataclasses.dataclass(frozen=True)
