@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
@@ -58,6 +59,16 @@ struct StopHoldChange {
   std::string by;  ///< who released it, or holds it; empty: nobody
 };
 
+/// A command was accepted, or has ended: `command` as it stood then. Its renewals and repeats are no events.
+struct CommandChange {
+  std::shared_ptr<const Command> command;
+};
+
+/// An axis went into ErrorStop, or another cause took the place of the first.
+struct AxisFault {
+  Error cause;
+};
+
 /// The newest frames of a bus were written to a file.
 struct FlightRecordWritten {
   std::string bus, name, reason;
@@ -70,8 +81,9 @@ struct ConfigurationReloaded {
   std::vector<ConfigurationChange> changes;
 };
 
-using EventContent = std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift,
-                                  FlightRecordWritten, LeaseChange, ConfigurationReloaded, StopHoldChange>;
+using EventContent =
+    std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten, LeaseChange,
+                 ConfigurationReloaded, StopHoldChange, CommandChange, AxisFault>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon

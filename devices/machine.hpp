@@ -97,6 +97,10 @@ class Machine {
                         std::function<void(std::vector<Result<Command>>)> callback) = 0;
   virtual void release_inhibit(std::string client, std::function<void(Result<void>)> callback) = 0;
 
+  /// The newest commands of this run of the daemon, newest first, at most `most`; of one axis unless that is
+  /// empty. Of a client that gives very many the older ones are forgotten before those of others.
+  virtual void list_commands(std::string axis, std::size_t most,
+                             std::function<void(std::vector<Command>)> callback) = 0;
   /// A known command; calls back at once. Errors: unknown_command.
   virtual void get_command(std::string id, CommandCallback callback) = 0;
   /// Calls back at each change of the command until it has ended (the last call) or the returned token is

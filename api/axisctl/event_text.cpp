@@ -79,6 +79,13 @@ std::string text_of(const v1::StopHoldChange& change) {
   }
 }
 
+std::string text_of(const v1::CommandChange& change) {
+  const auto& command = change.command();
+  return fmt::format("{} by {}", command_line(command, ""), command.client());
+}
+
+std::string text_of(const v1::AxisFault& fault) { return "fault: " + describe(fault.cause()); }
+
 std::string content(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
@@ -97,6 +104,10 @@ std::string content(const v1::Event& event) {
       return text_of(event.configuration_reloaded());
     case v1::Event::kStopHoldChange:
       return text_of(event.stop_hold_change());
+    case v1::Event::kCommandChange:
+      return text_of(event.command_change());
+    case v1::Event::kAxisFault:
+      return text_of(event.axis_fault());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -128,7 +139,8 @@ v1::EventKind parse_event_kind(std::string_view text) {
   }
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
-                            "configuration (of a drive), configuration-reloaded, flight, lease, stop (holds)",
+                            "configuration (of a drive), configuration-reloaded, flight, lease, stop "
+                            "(holds), command, axis-fault",
                             text));
 }
 

@@ -74,7 +74,8 @@ AxisServiceImpl::Reactor* AxisServiceImpl::submit(Context* context, const std::s
         auto client = submission.options.client;
         services_.machine.submit(
             axis, std::move(action), std::move(submission.options), submission.until,
-            reply_with_command(call, command, std::move(client), axis, what, std::move(also)));
+            reply_with_command(call, command, std::move(client), axis, what, std::move(also),
+                               services_.machine.wall(services_.machine.now())));
       });
 }
 

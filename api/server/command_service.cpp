@@ -1,9 +1,11 @@
 #include "api/server/command_service.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "api/server/command_reply.hpp"
 #include "api/server/command_stream.hpp"
@@ -14,6 +16,39 @@
 #include "api/server/validate.hpp"
 
 namespace axisd::server {
+
+namespace {
+
+constexpr std::size_t usual_commands = 20, most_commands = 500;
+
+}  // namespace
+
+grpc::ServerUnaryReactor* CommandServiceImpl::ListCommands(Context* context,
+                                                           const v1::ListCommandsRequest* request,
+                                                           v1::ListCommandsResponse* response) {
+  if (!request->axis().empty())
+    if (const auto axis = find_axis(services_.machine, request->axis()); !axis)
+      return answer(context, to_status(axis.error()));
+  if (request->limit() > most_commands)
+    return answer(context, to_status({.reason = Reason::out_of_range,
+                                      .message = fmt::format("limit is {}", request->limit()),
+                                      .remedy = "ask for fewer; WatchEvents tells of each command",
+                                      .permitted = Range{.minimum = 0, .maximum = most_commands}}));
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.machine.list_commands(
+            request->axis(), request->limit() == 0 ? usual_commands : request->limit(),
+            [call, response](std::vector<Command> commands) {
+              call->complete([response, commands = std::move(commands)]() -> grpc::Status {
+                for (const auto& command : commands) to_proto(command, *response->add_commands());
+                return grpc::Status::OK;
+              });
+            });
+      });
+}
+
 grpc::ServerUnaryReactor* CommandServiceImpl::GetCommand(Context* context,
                                                          const v1::GetCommandRequest* request,
                                                          v1::GetCommandResponse* response) {

@@ -11,6 +11,8 @@ class CommandServiceImpl final : public v1::CommandService::CallbackService {
   explicit CommandServiceImpl(const Services& services) : services_(services) {}
 
   using Context = grpc::CallbackServerContext;
+  grpc::ServerUnaryReactor* ListCommands(Context* context, const v1::ListCommandsRequest* request,
+                                         v1::ListCommandsResponse* response) override;
   grpc::ServerUnaryReactor* GetCommand(Context* context, const v1::GetCommandRequest* request,
                                        v1::GetCommandResponse* response) override;
   grpc::ServerWriteReactor<v1::WatchCommandResponse>* WatchCommand(

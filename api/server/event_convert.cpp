@@ -64,6 +64,14 @@ void fill(const StopHoldChange& from, v1::Event& event) {
   to.set_request_id(from.hold.request_id);
   to.set_by(from.by);
 }
+
+void fill(const CommandChange& from, v1::Event& event) {
+  to_proto(*from.command, *event.mutable_command_change()->mutable_command());
+}
+
+void fill(const AxisFault& from, v1::Event& event) {
+  to_proto(from.cause, *event.mutable_axis_fault()->mutable_cause());
+}
 static_assert(std::to_underlying(StopHoldChange::What::not_durable) + 1 ==
               v1::STOP_HOLD_CHANGE_KIND_NOT_DURABLE);
 
@@ -81,6 +89,8 @@ v1::EventKind kind_of(const Event& event) {
       return v1::EVENT_KIND_CONFIGURATION_RELOADED;
     }
     v1::EventKind operator()(const StopHoldChange&) const { return v1::EVENT_KIND_STOP_HOLD_CHANGE; }
+    v1::EventKind operator()(const CommandChange&) const { return v1::EVENT_KIND_COMMAND_CHANGE; }
+    v1::EventKind operator()(const AxisFault&) const { return v1::EVENT_KIND_AXIS_FAULT; }
   };
   return std::visit(Kind{}, event.content);
 }

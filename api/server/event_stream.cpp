@@ -7,7 +7,8 @@
 
 namespace axisd::server {
 
-// Some 20 KiB a message: far below what a client accepts, and enough to catch up quickly.
+// Some 20 KiB a message, 100 of commands alone: far below what a client accepts, and enough to catch up
+// quickly.
 constexpr std::size_t most_events = 256;
 
 EventStream::EventStream(const Services& services, grpc::CallbackServerContext* context,

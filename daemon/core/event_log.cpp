@@ -1,16 +1,42 @@
 #include "daemon/core/event_log.hpp"
 
-#include <algorithm>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 namespace axisd::core {
+
+namespace {
+
+/// Whose share an event counts against.
+std::string owner_of(const std::string& axis, const EventContent& content) {
+  if (const auto* change = std::get_if<CommandChange>(&content)) return change->command->client;
+  if (const auto* change = std::get_if<StopHoldChange>(&content)) return change->hold.holder;
+  return axis;
+}
+
+template <std::size_t... Kind>
+std::vector<FairLane> lanes(std::index_sequence<Kind...> /*kinds*/) {
+  const auto capacity_of = []<class Content>(std::type_identity<Content>) {
+    const bool frequent = std::is_same_v<Content, TerminalEdge> || std::is_same_v<Content, StateChange> ||
+                          std::is_same_v<Content, CommandChange>;
+    return frequent ? EventLog::capacity : EventLog::capacity_of_rare;
+  };
+  return {FairLane(capacity_of(std::type_identity<std::variant_alternative_t<Kind, EventContent>>()))...};
+}
+
+}  // namespace
+
+EventLog::EventLog() : lanes_(lanes(std::make_index_sequence<std::variant_size_v<EventContent>>())) {}
 
 void EventLog::record(WallTime at, std::string axis, EventContent content) {
   {
     const std::lock_guard lock(mutex_);
-    events_.push_back(
-        {.sequence = ++newest_, .at = at, .axis = std::move(axis), .content = std::move(content)});
-    if (events_.size() > capacity) events_.pop_front();
+    const auto sequence = ++newest_;
+    events_.erase(lanes_[content.index()].add(owner_of(axis, content), sequence));
+    events_.emplace_hint(
+        events_.end(), sequence,
+        Event{.sequence = sequence, .at = at, .axis = std::move(axis), .content = std::move(content)});
   }
   if (notify_) notify_();
 }
@@ -18,13 +44,12 @@ void EventLog::record(WallTime at, std::string axis, EventContent content) {
 EventSource::Batch EventLog::events_after(std::uint64_t cursor, std::size_t most) const {
   const std::lock_guard lock(mutex_);
   Batch batch{.events = {}, .lost = 0, .newest = newest_};
-  if (events_.empty() || cursor >= newest_) return batch;
-  const auto oldest = events_.front().sequence;
-  if (cursor + 1 < oldest) batch.lost = oldest - cursor - 1;
-  const auto first = std::max(cursor + 1, oldest) - oldest;
-  const auto count = std::min<std::uint64_t>(most, events_.size() - first);
-  const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first);
-  batch.events.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
+  for (auto next = events_.upper_bound(cursor); next != events_.end() && batch.events.size() < most; ++next) {
+    // The newest is always kept: what is lost lies before an event.
+    batch.lost += next->first - cursor - 1;
+    cursor = next->first;
+    batch.events.push_back(next->second);
+  }
   return batch;
 }
 

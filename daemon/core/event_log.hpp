@@ -1,26 +1,34 @@
 #pragma once
 
-#include <deque>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
+#include <vector>
 
+#include "daemon/core/fair_lane.hpp"
 #include "devices/event.hpp"
 
 namespace axisd::core {
 
-/// The newest events in memory. Thread: record() and on_event() core, the rest any.
+/// The newest events in memory: so many of each kind, and of one kind fairly between axes, or between clients
+/// where it is they who cause them. Thread: record() and on_event() core, the rest any.
 class EventLog final : public EventSource {
  public:
-  static constexpr std::size_t capacity = 10'000;
+  /// Of terminal edges, changes of state and commands.
+  static constexpr std::size_t capacity = 4'000;
+  /// Of each other kind.
+  static constexpr std::size_t capacity_of_rare = 1'000;
 
+  EventLog();
   void record(WallTime at, std::string axis, EventContent content);
   [[nodiscard]] Batch events_after(std::uint64_t cursor, std::size_t most) const override;
   void on_event(std::function<void()> notify) override { notify_ = std::move(notify); }
 
  private:
   mutable std::mutex mutex_;  ///< held for copies of a bounded batch only
-  std::deque<Event> events_;
+  std::map<std::uint64_t, Event> events_;
+  std::vector<FairLane> lanes_;  ///< by kind
   std::uint64_t newest_ = 0;
   std::function<void()> notify_;
 };

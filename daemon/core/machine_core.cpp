@@ -47,6 +47,9 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
     : parts_(std::move(parts)),
       recorder_memory_(static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024),
       book_(*parts_.clock, parts_.instance_id, parts_.journal),
+      commands_([this](const std::string& axis, EventContent content) {
+        events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
+      }),
       flight_recorder_(*parts_.clock, parts_.flight_records,
                        [this](const std::string& axis, const FlightRecordWritten& record) {
                          events_.record(parts_.clock->wall(parts_.clock->now()), axis, record);
@@ -70,6 +73,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                .axes = [this] { return table()->axes; },
                .launch = [this](Task<> task, const char* name) { launch(std::move(task), name); }},
               configuration.groups) {
+  book_.on_open([this](const CommandPtr& command) { commands_.add(command); });
   if (parts_.persistence != nullptr) {
     const auto& inhibit = parts_.persistence->loaded().inhibit;
     set_inhibit(inhibit.active, inhibit.by);

@@ -11,6 +11,7 @@
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "config/configuration.hpp"
 #include "daemon/core/bus_recorder.hpp"
+#include "daemon/core/command_log.hpp"
 #include "daemon/core/event_log.hpp"
 #include "daemon/core/flight_recorder.hpp"
 #include "daemon/core/group_keeper.hpp"
@@ -76,6 +77,7 @@ class MachineCore {
   [[nodiscard]] const std::vector<std::unique_ptr<Device>>& devices() const { return devices_; }
   [[nodiscard]] CommandBook& book() { return book_; }
   [[nodiscard]] EventLog& events() { return events_; }
+  [[nodiscard]] const CommandLog& commands() const { return commands_; }
   [[nodiscard]] LeaseKeeper& leases() { return leases_; }
   [[nodiscard]] GroupKeeper& groups() { return groups_; }
 
@@ -163,6 +165,7 @@ class MachineCore {
   const std::size_t recorder_memory_;  ///< bytes, of each bus
   CommandBook book_;
   EventLog events_;
+  CommandLog commands_;
   std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before these, which tell them
   FlightRecorder flight_recorder_;
   LeaseKeeper leases_;

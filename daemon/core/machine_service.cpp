@@ -162,6 +162,13 @@ void MachineService::release_inhibit(std::string client, std::function<void(Resu
   });
 }
 
+void MachineService::list_commands(std::string axis, std::size_t most,
+                                   std::function<void(std::vector<Command>)> callback) {
+  post(loop_->executor(), [this, axis = std::move(axis), most, callback = std::move(callback)] {
+    callback(machine_->commands().newest(axis, most));
+  });
+}
+
 void MachineService::get_command(std::string id, CommandCallback callback) {
   post(loop_->executor(), [this, id = std::move(id), callback = std::move(callback)] {
     const auto command = machine_->book().find(id);

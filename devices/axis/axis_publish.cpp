@@ -62,6 +62,9 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
         LinkChange{.to = now.link, .detail = now.link_error ? now.link_error->message : std::string()});
   if (before.state != now.state)
     env_.event(settings_.name, StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});
+  const bool other_fault = now.fault && (!before.fault || before.fault->reason != now.fault->reason ||
+                                         before.fault->message != now.fault->message);
+  if (other_fault) env_.event(settings_.name, AxisFault{.cause = *now.fault});
   if (before.drift != now.drift) env_.event(settings_.name, ConfigurationDrift{.text = now.drift});
 }
 

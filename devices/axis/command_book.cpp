@@ -236,6 +236,7 @@ CommandPtr CommandBook::open(const std::string& axis, const Action& action, cons
   follow(entry);
   if (journal_ != nullptr && !options.request_id.empty())
     journal_->accepted(entry->command->value(), entry->digest);
+  if (opened_) opened_(entry->command);
   return entry->command;
 }
 

@@ -64,6 +64,9 @@ class CommandBook {
   Result<CommandPtr> find_repeat(const std::string& axis, const Action& action,
                                  const CommandOptions& options);
 
+  /// Told of each command that is entered from now on.
+  void on_open(std::function<void(const CommandPtr&)> opened) { opened_ = std::move(opened); }
+
   /// Enters an accepted command.
   CommandPtr open(const std::string& axis, const Action& action, const CommandOptions& options);
 
@@ -115,6 +118,7 @@ class CommandBook {
   std::map<std::string, EntryPtr> by_request_;  ///< client + request_id
   std::map<std::string, std::vector<Unsettled>> unsettled_;
   std::map<std::string, Error> unknown_outcomes_;
+  std::function<void(const CommandPtr&)> opened_;
   TimePoint doubtful_until_{};
   std::string damage_;
   std::shared_ptr<int> alive_ = std::make_shared<int>(0);

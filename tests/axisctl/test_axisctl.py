@@ -369,7 +369,7 @@ class Completion(AxisctlTest):
 
     def test_subcommands_options_axes(self):
         self.assertEqual(self.complete("sto"), ["stop"])
-        self.assertEqual(sorted(self.complete("command", "")), ["cancel", "get", "watch"])
+        self.assertEqual(sorted(self.complete("command", "")), ["cancel", "get", "list", "watch"])
         self.assertIn("--relative", self.complete("move", "feeder", "--re"))
         self.assertIn("--json", self.complete("list", "--j"))
         self.assertEqual(self.complete("move", "fe"), ["feeder"])

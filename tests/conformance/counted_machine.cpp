@@ -252,6 +252,12 @@ class CountedMachine final : public Machine {
       inner_->release_inhibit(client, ledger_->answer(ticket, callback));
     });
   }
+  void list_commands(std::string axis, std::size_t most,
+                     std::function<void(std::vector<Command>)> callback) override {
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->list_commands(axis, most, ledger_->answer(ticket, callback));
+    });
+  }
   void get_command(std::string id, CommandCallback callback) override {
     ledger_->enter(
         [=, this](const auto& ticket) { inner_->get_command(id, ledger_->answer(ticket, callback)); });

@@ -10,7 +10,7 @@ from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
 from .configuration import ConfigChange, ConfigCheck, ConfigFinding, Configuration, Reload
 from .drive import Drive
-from .drives import (Alarm, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
+from .drives import (Alarm, AxisFault, CommandChange, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
                      StateChange, StopHoldChange, TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import (ArgumentError, AxisdError, LeaseLostError, MotionError, RefusedError, StopError,
@@ -26,8 +26,8 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
                     Network, NetworkLink, Obstacle, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
-    "Alarm", "ArgumentError", "Axis", "AxisBudget", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
-    "ClassStatistics", "Command", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
+    "Alarm", "ArgumentError", "Axis", "AxisBudget", "AxisFault", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
+    "ClassStatistics", "Command", "CommandChange", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
     "ConfigurationDrift", "ConfigurationReloaded", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "Jog", "Latency", "Lease",

@@ -8,7 +8,7 @@ from typing import Any
 from google.protobuf.duration_pb2 import Duration
 
 from .configuration import ConfigChange
-from .types import (ErrorDetail, Link, MotionCause, State, _member, _optional, _optional_error, _optional_time, seconds)
+from .types import (Command, ErrorDetail, Link, MotionCause, State, _member, _optional, _optional_error, _optional_time, seconds)
 from .v1 import bus_service_pb2, drive_service_pb2, event_service_pb2, types_pb2
 
 
@@ -257,8 +257,20 @@ class StopHoldChange:
     by: str
 
 
+@dataclasses.dataclass(frozen=True)
+class CommandChange:
+    """A command was accepted, or has ended: as it stood then."""
+    command: Command
+
+
+@dataclasses.dataclass(frozen=True)
+class AxisFault:
+    """An axis went into ErrorStop, or another cause took the place of the first."""
+    cause: ErrorDetail
+
+
 Content = (TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
-           | ConfigurationReloaded | StopHoldChange)
+           | ConfigurationReloaded | StopHoldChange | CommandChange | AxisFault)
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -284,6 +296,10 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
     if kind == "configuration_reloaded":
         return ConfigurationReloaded(content.client, content.previous_revision, content.revision,
                                      tuple(ConfigChange.of(change) for change in content.changes))
+    if kind == "command_change":
+        return CommandChange(Command.of(content.command))
+    if kind == "axis_fault":
+        return AxisFault(ErrorDetail.of(content.cause))
     if kind == "stop_hold_change":
         name = event_service_pb2.StopHoldChangeKind.Name(content.kind)
         return StopHoldChange(name.removeprefix("STOP_HOLD_CHANGE_KIND_").lower(), content.holder, content.request_id,

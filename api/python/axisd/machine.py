@@ -211,6 +211,11 @@ class Machine:
         request = command_service_pb2.CancelCommandRequest(id=command_id)
         return Command.of((await self._stop_call(self._cancels.CancelCommand, request, command_id)).command)
 
+    async def commands(self, axis: str = "", limit: int = 20) -> list[Command]:
+        """The newest commands of all clients since the daemon was started, newest first; of one axis unless that is empty."""
+        request = command_service_pb2.ListCommandsRequest(axis=axis, limit=limit)
+        return [Command.of(raw) for raw in (await self._call(self._commands.ListCommands, request, axis)).commands]
+
     async def stop_all(self, *, wait: bool = True) -> list[StopResult]:
         """Stops every axis and refuses all motion until release_stop_all(). An operational stop, without safety
         rating. Never raises for a single axis: look at each result."""

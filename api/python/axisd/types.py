@@ -260,6 +260,7 @@ class Command:
     granted: MotionValues
     cause: ErrorDetail | None
     request_id: str
+    client: str
     accepted_at: datetime.datetime | None
     started_at: datetime.datetime | None
     ended_at: datetime.datetime | None
@@ -272,7 +273,7 @@ class Command:
             raw.id, raw.axis, kind.name.removeprefix("COMMAND_KIND_").lower() if kind else str(raw.kind),
             _member(CommandState, types_pb2.CommandState.DESCRIPTOR, "COMMAND_STATE_", raw.state),
             MotionValues.of(raw.asked), MotionValues.of(raw.granted), _optional_error(raw, "cause"), raw.request_id,
-            _optional_time(raw, "accepted_at"), _optional_time(raw, "started_at"), _optional_time(raw, "ended_at"),
+            raw.client, _optional_time(raw, "accepted_at"), _optional_time(raw, "started_at"), _optional_time(raw, "ended_at"),
             raw)
 
 

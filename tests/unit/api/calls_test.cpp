@@ -99,60 +99,6 @@ TEST_F(Calls, EveryMotionReachesTheMachineAndReturnsItsCommand) {
   EXPECT_EQ(released.holds(0).request_id(), "r-1");
 }
 
-TEST_F(Calls, AReleaseSaysWhoseHoldsAreToEnd) {
-  serve();
-  const auto release = [&](auto edit) {
-    Call context;
-    v1::ReleaseStopRequest request;
-    request.set_axis("feeder");
-    edit(request);
-    v1::ReleaseStopResponse response;
-    return axes_->ReleaseStop(&context, request, &response);
-  };
-  EXPECT_TRUE(release([](auto& r) { r.set_request_id("r-1"); }).ok());
-  EXPECT_TRUE(release([](auto& r) { r.set_mine(true); }).ok());
-  EXPECT_TRUE(release([](auto& r) {
-                r.set_everybody(true);
-                r.set_lease_token(9);
-              }).ok());
-  EXPECT_THAT(machine_.log(), ElementsAre("release_stop feeder by local:unix as r-1 whose 0 token 0",
-                                          "release_stop feeder by local:unix as  whose 1 token 0",
-                                          "release_stop feeder by local:unix as  whose 2 token 9"));
-  for (const auto& status : {release([](auto& r) {
-                               r.set_request_id("r-1");
-                               r.set_everybody(true);
-                             }),
-                             release([](auto& r) {
-                               r.set_mine(true);
-                               r.set_everybody(true);
-                             }),
-                             release([](auto& r) { r.set_request_id("two words"); })})
-    EXPECT_EQ(detail_of(status).reason(), v1::REASON_INVALID_ARGUMENT);
-  EXPECT_EQ(machine_.log().size(), 3U);
-}
-
-TEST_F(Calls, AHeldStopSaysWhoHolds) {
-  AxisSnapshot held{.name = "feeder"};
-  held.holds = {{.key = {.holder = "panel", .request_id = "p-1"}}};
-  machine_.publish(std::move(held));
-  serve();
-  const auto stop = [&](bool hold) {
-    Call context;
-    v1::StopRequest request;
-    request.set_axis("feeder");
-    request.set_hold(hold);
-    request.mutable_options()->set_request_id("r-1");
-    v1::StopResponse response;
-    EXPECT_TRUE(axes_->Stop(&context, request, &response).ok());
-    return response;
-  };
-  const auto answer = stop(true);
-  ASSERT_EQ(answer.holds_size(), 1);
-  EXPECT_EQ(answer.holds(0).holder(), "panel");
-  EXPECT_EQ(stop(false).holds_size(), 0);
-  EXPECT_EQ(machine_.submitted().at(0).options.request_id, "r-1");
-}
-
 TEST_F(Calls, AMisspeltAxisIsAnsweredWithTheNearestName) {
   serve();
   const auto status = call<v1::HomeRequest>(&Stub::Home, [](auto& r) { r.set_axis("feedr"); });

@@ -188,6 +188,14 @@ void FakeMachine::release_inhibit(std::string client, std::function<void(Result<
   post([callback = std::move(callback)] { callback({}); });
 }
 
+void FakeMachine::list_commands(std::string axis, std::size_t most,
+                                std::function<void(std::vector<Command>)> callback) {
+  note(fmt::format("list_commands {} {}", axis, most));
+  post([callback = std::move(callback)] {
+    callback({{.id = "c-2", .axis = "feeder", .client = "hmi"}, {.id = "c-1", .axis = "feeder"}});
+  });
+}
+
 void FakeMachine::get_command(std::string id, CommandCallback callback) {
   note("get_command " + id);
   answer(callback, result_of("feeder", CommandKind::home));

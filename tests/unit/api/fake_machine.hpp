@@ -65,6 +65,8 @@ class FakeMachine final : public Machine {
   void stop_all(std::string client, WaitUntil until,
                 std::function<void(std::vector<Result<Command>>)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
+  void list_commands(std::string axis, std::size_t most,
+                     std::function<void(std::vector<Command>)> callback) override;
   void get_command(std::string id, CommandCallback callback) override;
   std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
   void cancel_command(std::string id, CommandCallback callback) override;
