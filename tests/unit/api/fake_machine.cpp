@@ -110,6 +110,7 @@ std::size_t FakeMachine::watchers() const {
 std::vector<std::string> FakeMachine::axis_names() const {
   const std::lock_guard lock(mutex_);
   std::vector<std::string> names;
+  names.reserve(snapshots_.size());
   for (const auto& [name, snapshot] : snapshots_) names.push_back(name);
   return names;
 }

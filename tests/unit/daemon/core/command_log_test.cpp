@@ -76,6 +76,7 @@ TEST_F(Commands, EachIsTwoEventsHoweverOftenItIsRepeatedOrRenewed) {
   world_.run_for(3s);
   const auto changes = events<CommandChange>();
   std::vector<std::string> seen;
+  seen.reserve(changes.size());
   for (const auto& change : changes)
     seen.push_back(std::string(to_string(change.command->kind)) + " " +
                    std::string(to_string(change.command->state)));
