@@ -20,6 +20,7 @@
 #include "devices/cia402/model.hpp"
 #include "devices/cia402/object_setting.hpp"
 #include "devices/cia402/objects.hpp"
+#include "devices/cia402/standstill.hpp"
 #include "devices/cia402/state_pdos.hpp"
 #include "devices/cia402/status_word.hpp"
 #include "devices/descriptor.hpp"
@@ -47,6 +48,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> configure() override;
   [[nodiscard]] bool moves_by_itself() const override { return false; }
   [[nodiscard]] bool closed_loop() const override;
+  [[nodiscard]] std::int64_t position_window() const override;
 
   // drive_state.cpp
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
@@ -164,7 +166,9 @@ class Cia402Drive final : public Drive {
   Task<std::optional<Reading>> next_pdos();
   Task<Result<Reading>> poll_objects(SdoOptions options);
   Task<Result<DriveSample>> look(bool by_pdo, SdoOptions options);
-  DriveSample judge(const Reading& reading);
+  DriveSample judge(const Reading& reading, bool of_one_moment);
+  void judge_motion(DriveSample& sample, const Reading& reading);
+  void note_direction(const DriveSample& sample);
   Task<> leave_homing(SdoOptions options);
   void give_up_leaving();
   [[nodiscard]] DriveMode mode_of(const DriveSample& sample, const Reading& reading);
@@ -216,6 +220,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> step_to_enabled(State state, SdoOptions options);
   Task<Result<void>> confirm_nothing_pending(SdoOptions options);
   Task<Result<void>> watch_standstill(std::int64_t position, SdoOptions options);
+  Task<Result<std::optional<std::int64_t>>> read_turning(SdoOptions options);
   Task<Result<void>> reset_fault(SdoOptions options);
   Task<bool> released(SdoOptions options);
 
@@ -334,6 +339,8 @@ class Cia402Drive final : public Drive {
   std::optional<bool> homed_;  ///< how our last homing of this power cycle ended; nothing: as the drive says
   std::optional<Live> live_;
   std::optional<std::int32_t> last_position_;
+  Standstill standstill_;
+  std::optional<std::int32_t> direction_from_;  ///< where the direction was told last
   bool last_moving_ = false;
   bool negative_ = false;
   std::uint16_t pending_alarm_ = 0;  ///< told by EMCY, and not reported yet: it may be gone already (M5)
@@ -343,9 +350,10 @@ class Cia402Drive final : public Drive {
   std::vector<ContinuityMark> expected_marks_;  ///< of an earlier run of the daemon: one of them
   std::vector<MotionBlock> power_up_blocks_;    ///< what a power-up may leave; the newest last
 
-  std::optional<bool> saving_;        ///< the EEPROM switch, if it is known
-  std::optional<bool> found_closed_;  ///< loop mode as it was before this power cycle's first write
-  std::set<std::uint32_t> unsaved_;   ///< saved objects that did not hold what was written
+  std::optional<bool> saving_;                ///< the EEPROM switch, if it is known
+  std::optional<std::int64_t> found_window_;  ///< VendorObjects::position_window, as it was read last
+  std::optional<bool> found_closed_;          ///< loop mode as it was before this power cycle's first write
+  std::set<std::uint32_t> unsaved_;           ///< saved objects that did not hold what was written
   std::uint64_t eeprom_writes_ = 0;
   std::optional<TimePoint> stop_sent_at_;
 };

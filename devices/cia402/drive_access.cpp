@@ -51,6 +51,8 @@ void Cia402Drive::forget_power_cycle() {
   leave_homing_ = last_moving_ = false;
   live_.reset();
   last_position_.reset();
+  standstill_.forget();
+  direction_from_.reset();
   pdos_.forget();
 }
 
@@ -68,8 +70,10 @@ Task<Result<std::int64_t>> Cia402Drive::read_object(Object object, SdoOptions op
                             "check the configured model against the drive's firmware"));
   if (answer->size_indicated) sizes_[object.key()] = static_cast<std::uint8_t>(bytes);
   const auto raw = canopen::number_of(std::span(answer->bytes).first(bytes));
-  co_return type.is_signed ? canopen::sign_extended(raw, static_cast<unsigned>(8 * bytes))
-                           : static_cast<std::int64_t>(raw);
+  const auto value = type.is_signed ? canopen::sign_extended(raw, static_cast<unsigned>(8 * bytes))
+                                    : static_cast<std::int64_t>(raw);
+  if (object == model_->objects.position_window) found_window_ = value;
+  co_return value;
 }
 
 Task<Result<void>> Cia402Drive::write_object(Object object, std::int64_t value, std::uint8_t bytes,

@@ -143,6 +143,20 @@ bool Cia402Drive::closed_loop() const {
   return model_->descriptor->capabilities.closed_loop && !open && found;
 }
 
+/// Where the drive does not say, or has its own window switched off (6067h: FFFFFFFFh), as drives of this
+/// kind have it by default.
+std::int64_t Cia402Drive::position_window() const {
+  const auto mode = setup_.model_settings.find("loop_mode");
+  const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
+  if (!model_->descriptor->capabilities.closed_loop || open || !found_closed_.value_or(true)) return 0;
+  constexpr std::int64_t usual = 10, usual_per_revolution = 1000;
+  const auto revolution = std::max<std::int64_t>(setup_.pulses_per_revolution, 1);
+  const auto found = found_window_.value_or(0);
+  if (found <= 0 || found > revolution) return std::max(usual, revolution / usual_per_revolution);
+  const auto counts = model_->meaning.counts_per_revolution;
+  return counts == 0 ? found : std::max(found, (found * revolution + counts - 1) / counts);
+}
+
 Task<Result<void>> Cia402Drive::configure() {
   if (setup_error_) co_return failed(*setup_error_);
   // Before anything else: an EMCY with the identifier 80h would be a SYNC to the others (M24).
@@ -166,6 +180,8 @@ Task<Result<void>> Cia402Drive::configure() {
     if (!mode) co_return fail(mode.error());
     found_closed_ = *mode == 0;
   }
+  if (const auto window = model_->objects.position_window)
+    if (const auto found = co_await read_object(*window, patiently()); !found) co_return fail(found.error());
   if (const auto done = co_await bring_to(required_); !done) co_return done;
   if (const auto halting =
           co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());

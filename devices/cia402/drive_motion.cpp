@@ -156,7 +156,8 @@ Task<> Cia402Drive::acknowledge_set_point(SdoOptions options) {
 /// In homing mode already, at rest. Compared and not just written: some drives save these.
 Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions options) {
   homing_start_ = {.offset = profile.offset_pulses,
-                   .braking = braking_pulses(profile, setup_.pulses_per_revolution)};
+                   .braking = braking_pulses(profile, setup_.pulses_per_revolution),
+                   .window = position_window()};
   const auto word = co_await read_object(object::status_word, options);
   if (!word) co_return fail(word.error());
   const auto bits = static_cast<std::uint16_t>(*word);

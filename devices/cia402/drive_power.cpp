@@ -23,7 +23,9 @@ constexpr auto transition_limit = milliseconds(1000);
 constexpr auto lost_transition_limit = milliseconds(100);
 constexpr auto mode_limit = milliseconds(500);
 constexpr auto watch_time = milliseconds(30), watch_pause = milliseconds(5);
-constexpr std::int64_t jitter = 2;  // pulses; an encoder at rest
+/// Readings in a row of a velocity beyond its noise, in one direction: a motion, however slow. Fewer are the
+/// controller taking hold of the shaft.
+constexpr int turning_readings = 3;
 
 /// The control word that keeps a state and asks for nothing.
 std::uint16_t quiet_word(State state) {
@@ -132,25 +134,38 @@ Task<Result<void>> Cia402Drive::stopped_unless(Result<void> watched) {
   co_return watched;
 }
 
+/// r/min that the shaft turns with beyond noise, signed. Nothing: the drive says that it moves.
+Task<Result<std::optional<std::int64_t>>> Cia402Drive::read_turning(SdoOptions options) {
+  const auto& objects = model_->objects;
+  const auto source = objects.moving ? objects.moving : objects.velocity;
+  if (!source) co_return 0;
+  const auto shown = co_await read_object(*source, std::move(options));
+  if (!shown) co_return fail(shown.error());
+  if (objects.moving) co_return *shown == 0 ? std::optional<std::int64_t>(0) : std::nullopt;
+  const auto rpm = decode_velocity(*model_, setup_.pulses_per_revolution, *shown);
+  co_return std::abs(rpm) > velocity_noise_rpm ? rpm : 0;
+}
+
 /// Power is on, or a halt is released, and nothing was started: the shaft stays where it is, or is stopped.
+/// Where it is, is what the drive itself takes for in position (M30).
 Task<Result<void>> Cia402Drive::watch_standstill(std::int64_t position, SdoOptions options) {
   const auto until = clock_->now() + watch_time;
+  const auto window = position_window();
+  int turning = 0;  // readings in a row, signed as they are
   for (;;) {
-    std::int64_t moving = 0;
-    if (model_->objects.moving) {
-      const auto shown = co_await read_object(*model_->objects.moving, options);
-      if (!shown) co_return fail(shown.error());
-      moving = *shown;
-    }
+    const auto rpm = co_await read_turning(options);
+    if (!rpm) co_return fail(rpm.error());
+    const int sign = rpm->value_or(0) == 0 ? 0 : (rpm->value_or(0) < 0 ? -1 : 1);
+    turning = sign == 0 || turning * sign < 0 ? sign : turning + sign;
     const auto now = co_await read_object(object::position, options);
     if (!now) co_return fail(now.error());
-    if (moving != 0 || std::abs(*now - position) > jitter) {
+    if (!*rpm || std::abs(turning) >= turning_readings || std::abs(*now - position) > window) {
       (void)co_await stop(StopKind::quick_stop);  // the caller stops it again, and watches it
       co_return fail(error_at(Reason::terminal, object::position,
                               "the shaft turned although nothing was started; stopped",
                               "check terminals that start motion and other masters; then reset the axis"));
     }
-    if (clock_->now() >= until) co_return Result<void>{};
+    if (clock_->now() >= until && turning == 0) co_return Result<void>{};
     co_await sleep_until(executor_, *clock_, clock_->now() + watch_pause);
   }
 }

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "devices/cia402/drive.hpp"
@@ -124,14 +125,14 @@ Task<Result<Reading>> Cia402Drive::poll_objects(SdoOptions options) {
 /// By PDO, where they come and are wanted, else by SDO.
 Task<Result<DriveSample>> Cia402Drive::look(bool by_pdo, SdoOptions options) {
   if (by_pdo)
-    if (const auto reading = co_await next_pdos()) co_return judge(*reading);
+    if (const auto reading = co_await next_pdos()) co_return judge(*reading, true);
   if (rebooted_) co_return fail(lost_memory());
   const auto polled = co_await poll_objects(options);
   if (!polled) co_return fail(polled.error());
   if (rebooted_) co_return fail(lost_memory());
   if (missed_pdos_ >= missed_in_a_row && link_note_.empty())
     link_note_ = "state by SDO polling: its TPDOs do not come";
-  co_return judge(*polled);
+  co_return judge(*polled, false);
 }
 
 Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class) {
@@ -153,17 +154,43 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
   co_return sample;
 }
 
-DriveSample Cia402Drive::judge(const Reading& reading) {
-  auto sample = decode_state(*model_, setup_.pulses_per_revolution, reading.values, active_low_);
+/// What is measured wavers: a little of it is no motion, and has no direction.
+void Cia402Drive::judge_motion(DriveSample& sample, const Reading& reading) {
+  if (const auto window = position_window(); window > 0) {
+    sample.moving =
+        standstill_.moves({.at = sample.asked_at,
+                           .position = sample.position_pulses,
+                           .velocity_rpm = sample.velocity_rpm,
+                           .told = told_motion(*model_, reading.values)},
+                          {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution});
+    if (!sample.moving) sample.velocity_rpm = 0;
+  }
+  note_direction(sample);
+  sample.negative_direction = negative_;
+}
+
+void Cia402Drive::note_direction(const DriveSample& sample) {
+  if (!direction_from_) direction_from_ = sample.position_pulses;
+  const auto way = std::int64_t{sample.position_pulses} - *direction_from_;
+  if (std::abs(way) > position_window() / 2) {
+    negative_ = way < 0;
+    direction_from_ = sample.position_pulses;
+  } else if (sample.velocity_rpm != 0) {
+    negative_ = sample.negative_direction;
+  }
+}
+
+/// `of_one_moment`: all of the reading's positions are.
+DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
+  auto sample =
+      decode_state(*model_, setup_.pulses_per_revolution, reading.values, active_low_, position_window() > 0);
   sample.asked_at = reading.asked_at;
   sample.measured_at = reading.measured_at;
-  if (last_position_ && sample.position_pulses != *last_position_)
-    negative_ = sample.position_pulses < *last_position_;
-  else if (sample.velocity_rpm != 0)
-    negative_ = sample.negative_direction;
+  judge_motion(sample, reading);
+  const bool compared = position_window() > 0 && (of_one_moment || !sample.moving);
+  if (!compared) sample.commanded_pulses.reset();
   last_position_ = sample.position_pulses;
   last_moving_ = sample.moving;
-  sample.negative_direction = negative_;
   note_knowledge(reading);
   if (halt_ && sample.asked_at >= halt_->since && !sample.moving) halt_->rested = true;
   if (live_ && sample.asked_at >= live_->since) {

@@ -1,6 +1,7 @@
 // The control word as it is known to stand in the drive, and stops, which are made of it.
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <utility>
 
 #include "devices/cia402/drive.hpp"
@@ -217,7 +218,9 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
   if (!source) co_return last_moving_;
   const auto shown = co_await read_object(*source, std::move(options));
   if (!shown) co_return last_moving_;
-  co_return bit != 0 ? (*shown & bit) != 0 : *shown != 0;
+  if (bit != 0) co_return (*shown & bit) != 0;
+  if (objects.moving || position_window() == 0) co_return *shown != 0;
+  co_return std::abs(decode_velocity(*model_, setup_.pulses_per_revolution, *shown)) > velocity_noise_rpm;
 }
 
 /// An edge of bit 8 on a motor that turns under halt. Between its two words nothing can be behind it:

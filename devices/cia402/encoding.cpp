@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
+#include "devices/cia402/standstill.hpp"
 #include "devices/cia402/status_word.hpp"
 
 namespace axisd::cia402 {
@@ -23,7 +25,9 @@ constexpr auto standard_types = std::to_array<StandardType>({
     {object::halt_option, {2, true}},
     {object::mode, {1, true}},
     {object::mode_display, {1, true}},
+    {{0x6062, 0}, {4, true}},
     {object::position, {4, true}},
+    {{0x6067, 0}, {4, false}},
     {{0x606C, 0}, {4, true}},
     {object::target_position, {4, true}},
     {object::home_offset, {4, true}},
@@ -79,6 +83,7 @@ bool has(const Model& model, canopen::Object object) {
 std::vector<canopen::Object> state_objects(const Model& model) {
   std::vector<canopen::Object> objects{object::status_word, object::position};
   const auto& vendor = model.objects;
+  if (vendor.commanded_position) objects.push_back(*vendor.commanded_position);
   if (vendor.velocity) objects.push_back(*vendor.velocity);
   if (has(model, object::error_code)) objects.push_back(object::error_code);
   if (vendor.inputs) objects.push_back(*vendor.inputs);
@@ -90,7 +95,11 @@ std::vector<canopen::Object> state_objects(const Model& model) {
 std::vector<canopen::PdoMapping> state_layout(const Model& model) {
   constexpr std::size_t most_entries = 4, most_bytes = 8;
   std::vector<canopen::PdoMapping> layout;
-  for (const auto object : state_objects(model)) {
+  auto objects = state_objects(model);
+  // Both positions are to be of one moment: one PDO carries them.
+  if (model.objects.commanded_position)
+    std::rotate(objects.begin(), objects.begin() + 1, objects.begin() + 3);
+  for (const auto object : objects) {
     const auto bytes = type_of(model, object).bytes;
     if (layout.empty() || layout.back().size() == most_entries ||
         canopen::pdo_size(layout.back()) + bytes > most_bytes)
@@ -121,22 +130,49 @@ std::uint16_t alarm_of(const Model& model, std::uint16_t error_code) {
   return prefix == meaning.alarm_prefix ? own : error_code;
 }
 
+int decode_velocity(const Model& model, std::int64_t pulses_per_revolution, std::int64_t value) {
+  if (model.meaning.velocity_in_rpm) return static_cast<std::int32_t>(value);
+  return clamped(static_cast<double>(value) * 60 /
+                 static_cast<double>(std::max<std::int64_t>(1, pulses_per_revolution)));
+}
+
+std::optional<bool> told_motion(const Model& model, const Values& values) {
+  const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
+  if (model.status.moving != 0 || model.objects.moving)
+    return (word & model.status.moving) != 0 || value_of(values, model.objects.moving) != 0;
+  if (!is_energised(state_of(word))) return false;
+  bool rests = false;
+  switch (static_cast<OperationMode>(value_of(values, object::mode_display))) {
+    case OperationMode::profile_velocity:
+      rests = (word & status::mode_specific) != 0;
+      break;
+    case OperationMode::profile_position:  // bit 10 under halt: the velocity is 0
+    case OperationMode::homing:
+      rests = (word & status::target_reached) != 0;
+      break;
+    case OperationMode::none:
+      break;
+  }
+  return rests ? std::optional(false) : std::nullopt;
+}
+
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
-                         ActiveLow active_low) {
+                         ActiveLow active_low, bool measured) {
   const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
   const auto is = [word](std::uint16_t bits) { return (word & bits) != 0; };
   const auto& bits = model.status;
   const auto state = state_of(word);
   DriveSample sample;
   sample.position_pulses = static_cast<std::int32_t>(value_of(values, object::position));
+  if (const auto& commanded = model.objects.commanded_position;
+      commanded && values.contains(commanded->key()))
+    sample.commanded_pulses = static_cast<std::int32_t>(value_of(values, commanded));
   const auto velocity = value_of(values, model.objects.velocity);
-  sample.velocity_rpm = model.meaning.velocity_in_rpm
-                            ? static_cast<std::int32_t>(velocity)
-                            : clamped(static_cast<double>(velocity) * 60 /
-                                      static_cast<double>(std::max<std::int64_t>(1, pulses_per_revolution)));
+  sample.velocity_rpm = decode_velocity(model, pulses_per_revolution, velocity);
   sample.negative_direction = velocity < 0;
   // The manual shows motion in three places (6.2.2 bit 14, 2001h, 2002h): any one is enough to be careful.
-  sample.moving = is(bits.moving) || velocity != 0 || value_of(values, model.objects.moving) != 0;
+  const bool turns = measured ? std::abs(sample.velocity_rpm) > velocity_noise_rpm : velocity != 0;
+  sample.moving = is(bits.moving) || turns || value_of(values, model.objects.moving) != 0;
   const auto mode = static_cast<OperationMode>(value_of(values, object::mode_display));
   // In homing the appendix (MC_HOME) reads the maker's bit as "homing failed": there the state tells.
   const bool by_state = bits.enabled == 0 || mode == OperationMode::homing;

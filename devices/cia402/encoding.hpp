@@ -50,9 +50,15 @@ inline constexpr std::uint8_t stop_transfers = 4;
 /// What the driver asks of the network for such a drive; `watched`: objects that are looked at for drift.
 CanTransactionSet transactions_of(const Model& model, std::uint8_t watched);
 
-/// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's.
+/// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's. `measured`:
+/// velocities are, so that a small one is no motion.
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
-                         ActiveLow active_low = {});
+                         ActiveLow active_low = {}, bool measured = false);
+/// Whether it moves, by the drive's own word: the maker's bits and objects, else those of CiA 402, which
+/// depend on the mode of operation and tell rest alone. Nothing: it does not say.
+std::optional<bool> told_motion(const Model& model, const Values& values);
+/// r/min of an object that holds a velocity.
+int decode_velocity(const Model& model, std::int64_t pulses_per_revolution, std::int64_t value);
 /// The bit that says "homed", alone: CiA 402's bit 12 means that in homing mode only. Nothing: neither bit
 /// tells now.
 std::optional<bool> home_bit(const Model& model, const Values& values);

@@ -6,12 +6,10 @@ namespace axisd::cia402 {
 
 namespace {
 
-constexpr std::int64_t jitter = 2;  // pulses; an encoder at rest
-
 /// Motor and bit need not come to rest in the same cycle of the drive.
 constexpr Duration bit_lag = std::chrono::milliseconds(50);
 
-bool near(std::int64_t position, std::int64_t other, std::int64_t tolerance = jitter) {
+bool within(std::int64_t position, std::int64_t other, std::int64_t tolerance) {
   return std::abs(position - other) <= tolerance;
 }
 
@@ -26,8 +24,12 @@ void HomingWatch::begin(TimePoint at, Start start) {
 /// Which of the three it is after an offset is not said (6.2.6; CiA 402 has had both signs).
 bool HomingWatch::at_home(std::int32_t position, std::int64_t tolerance) const {
   const std::int64_t offset = start_.offset;
-  return near(position, 0, tolerance) || near(position, offset, tolerance) ||
-         near(position, -offset, tolerance);
+  return within(position, 0, tolerance) || within(position, offset, tolerance) ||
+         within(position, -offset, tolerance);
+}
+
+bool HomingWatch::near(std::int32_t position, std::int32_t other) const {
+  return within(position, other, start_.window);
 }
 
 bool HomingWatch::goes_on(const DriveSample& sample, Signs signs) {
@@ -45,8 +47,8 @@ bool HomingWatch::goes_on(const DriveSample& sample, Signs signs) {
   }
   const auto rest = rests_ ? sample.asked_at - resting_since_ : Duration{};
   was_low_ = was_low_ || (signs.low && (!start_.tied_to_rest || rest >= bit_lag));
-  const bool placed = at_home(sample.position_pulses, jitter);
-  const bool close = at_home(sample.position_pulses, jitter + start_.braking);
+  const bool placed = at_home(sample.position_pulses, start_.window);
+  const bool close = at_home(sample.position_pulses, start_.window + start_.braking);
   const bool ended = rests_ && rest >= longest_rest;
   // Elsewhere the bit may have fallen only because the motor turned, and rest is only a pause.
   const bool believable = sample.homed && !held_up_ && (was_low_ || (moved_ && close));

@@ -32,6 +32,7 @@ class HomingWatch {
     std::optional<std::int32_t> from{};  ///< where the motor stood
     std::int32_t offset = 0;             ///< 607Ch
     std::int32_t braking = 0;            ///< pulses that it may turn on beyond the switch
+    std::int64_t window = 0;             ///< Drive::position_window()
     /// Before the start the bit was high, and CiA 402's own: while the motor turns it says nothing, so that a
     /// stop which nobody saw (a pulse at a terminal) would make it rise.
     bool tied_to_rest = false;
@@ -47,6 +48,7 @@ class HomingWatch {
 
  private:
   [[nodiscard]] bool at_home(std::int32_t position, std::int64_t tolerance) const;
+  [[nodiscard]] bool near(std::int32_t position, std::int32_t other) const;
 
   std::optional<TimePoint> began_;
   Start start_;

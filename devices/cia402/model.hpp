@@ -39,17 +39,20 @@ struct MemoryCommand {
 
 /// Objects that CiA 402 does not have, or not always. Absent: the drive has no such object.
 struct VendorObjects {
-  std::optional<canopen::Object> moving{};         ///< not 0: the motor turns
-  std::optional<canopen::Object> velocity{};       ///< present velocity (606Ch, or the maker's)
-  std::optional<canopen::Object> inputs{};         ///< levels, bit per terminal in the descriptor's order
-  std::optional<canopen::Object> outputs{};        ///< likewise
-  std::optional<canopen::Object> start_speed{};    ///< of each ramp, r/min
-  std::optional<canopen::Object> microstep{};      ///< index into CanIdentification::microstep_codes
-  std::optional<canopen::Object> loop_mode{};      ///< 0 closed loop, 1 open loop
-  std::optional<canopen::Object> eeprom_switch{};  ///< 0: writes are saved, 1: they are not
-  std::optional<MemoryCommand> save{};             ///< everything, to the EEPROM
-  std::optional<MemoryCommand> restore{};          ///< the factory settings
-  std::optional<canopen::Object> alarm_clear{};    ///< 1 clears the alarm
+  std::optional<canopen::Object> moving{};    ///< not 0: the motor turns
+  std::optional<canopen::Object> velocity{};  ///< present velocity (606Ch, or the maker's)
+  /// Where the drive wants the shaft now (6062h); in pulses, as 6064h. One that a PDO can carry.
+  std::optional<canopen::Object> commanded_position{};
+  std::optional<canopen::Object> position_window{};  ///< in which it takes a target for reached (6067h)
+  std::optional<canopen::Object> inputs{};           ///< levels, bit per terminal in the descriptor's order
+  std::optional<canopen::Object> outputs{};          ///< likewise
+  std::optional<canopen::Object> start_speed{};      ///< of each ramp, r/min
+  std::optional<canopen::Object> microstep{};        ///< index into CanIdentification::microstep_codes
+  std::optional<canopen::Object> loop_mode{};        ///< 0 closed loop, 1 open loop
+  std::optional<canopen::Object> eeprom_switch{};    ///< 0: writes are saved, 1: they are not
+  std::optional<MemoryCommand> save{};               ///< everything, to the EEPROM
+  std::optional<MemoryCommand> restore{};            ///< the factory settings
+  std::optional<canopen::Object> alarm_clear{};      ///< 1 clears the alarm
   /// 1 zeroes the position. Absent: homing method 35 does, where the drive has it.
   std::optional<canopen::Object> position_clear{};
   std::optional<canopen::Object> hardware_version{}, software_version{};  ///< numbers
@@ -65,6 +68,8 @@ struct Meaning {
   bool ramps_are_times = true;
   /// Velocities are r/min; else in pulses per second.
   bool velocity_in_rpm = true;
+  /// Of the encoder, where it is not said whether position_window is in counts or in pulses; 0: in pulses.
+  std::int64_t counts_per_revolution = 0;
   /// 603Fh and EMCY: `code & alarm_mask` is the alarm's code where `code & ~alarm_mask` is `alarm_prefix`;
   /// everything else is reported as it is.
   std::uint16_t alarm_mask = 0xFFFF, alarm_prefix = 0;

@@ -16,8 +16,9 @@ namespace {
 using canopen::Eds;
 using canopen::Object;
 
-constexpr Object identity_vendor{0x1018, 1}, identity_product{0x1018, 2}, velocity_value{0x606C, 0},
-    inputs_value{0x60FD, 0}, drive_modes{0x6502, 0}, store_all{0x1010, 1}, restore_all{0x1011, 1};
+constexpr Object identity_vendor{0x1018, 1}, identity_product{0x1018, 2}, commanded_position{0x6062, 0},
+    position_window{0x6067, 0}, velocity_value{0x606C, 0}, inputs_value{0x60FD, 0}, drive_modes{0x6502, 0},
+    store_all{0x1010, 1}, restore_all{0x1011, 1};
 
 struct Needed {
   Object object;
@@ -152,6 +153,10 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   model_.homing_codes = homing_codes_;
   model_.objects.velocity = velocity_value;
   if (has_inputs) model_.objects.inputs = inputs_value;
+  if (eds.find(position_window) != nullptr) model_.objects.position_window = position_window;
+  const auto* commanded = eds.find(commanded_position);
+  if (conventions.closed_loop && commanded != nullptr && commanded->mappable)
+    model_.objects.commanded_position = commanded_position;
   // CiA 301 7.5.2.13, 7.5.2.14: "save" and "load".
   constexpr std::int64_t save = 0x65766173, load = 0x64616F6C;
   if (eds.find(store_all) != nullptr) model_.objects.save = cia402::MemoryCommand{store_all, save};

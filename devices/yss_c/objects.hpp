@@ -25,7 +25,8 @@ inline constexpr std::size_t input_count = 7, output_count = 3;
 
 // 2042h..206Ah: currents, control loops, filters.
 inline constexpr Object closed_loop_current{0x2042, 0}, deviation_threshold{0x2046, 0},
-    in_position_threshold{0x2047, 0}, last_gain{0x2066, 0}, first_filter{0x2067, 0}, last_filter{0x206A, 0};
+    in_position_threshold{0x2047, 0}, positioning_accuracy{0x204F, 0}, last_gain{0x2066, 0},
+    first_filter{0x2067, 0}, last_filter{0x206A, 0};
 
 // CiA 402, with the vendor's ranges and units.
 inline constexpr Object error_code{0x603F, 0}, control_word{0x6040, 0}, status_word{0x6041, 0},

@@ -134,11 +134,11 @@ TEST(HomingWatch, EndsWithTheRiseOfTheBit) {
 TEST(HomingWatch, ABitOfTheLastTimeIsNoEnd) {
   for (const std::int32_t end : {0, offset, -offset, 60}) {
     HomingWatch watch;
-    watch.begin(start, {.from = away, .offset = offset});
+    watch.begin(start, {.from = away, .offset = offset, .window = 1});
     EXPECT_TRUE(goes_on(watch, at(10ms, false, true, away)));
     EXPECT_TRUE(goes_on(watch, at(20ms, true, true, 50)));
     EXPECT_TRUE(goes_on(watch, at(30ms, false, true, end)));
-    EXPECT_TRUE(goes_on(watch, at(400ms, false, true, end + 1))) << "within the jitter of an encoder";
+    EXPECT_TRUE(goes_on(watch, at(400ms, false, true, end + 1))) << "within the window of the drive";
     EXPECT_FALSE(goes_on(watch, at(530ms, false, true, end))) << "it rests for good";
     EXPECT_EQ(watch.reached(), end != 60) << end << ": home is only where a homing leaves the counter";
   }

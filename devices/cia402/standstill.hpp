@@ -1,0 +1,41 @@
+// Tells rest from motion where a drive measures: position and velocity waver at rest, too (M30).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "buses/clock.hpp"
+
+namespace axisd::cia402 {
+
+/// A velocity up to this may be noise, r/min: it proves neither rest nor motion.
+inline constexpr int velocity_noise_rpm = 1;
+
+/// Pure. A velocity beyond its noise is a motion. Below, the drive's own word counts; where it has none, the
+/// position does: at rest it stays within half of the in-position window. How long it must do so after a
+/// motion follows from the slowest one, 1 r/min.
+class Standstill {
+ public:
+  struct Look {
+    TimePoint at{};
+    std::int32_t position = 0;
+    int velocity_rpm = 0;
+    std::optional<bool> told{};  ///< by the drive: it moves, or rests; nothing: it does not say
+  };
+  /// What positions mean, pulses; `window`: Drive::position_window(), > 0.
+  struct Gauge {
+    std::int64_t window = 1, pulses_per_revolution = 1;
+  };
+
+  /// Takes a look. True: it moves.
+  bool moves(const Look& look, const Gauge& gauge);
+  void forget() { *this = {}; }
+
+ private:
+  bool note(const Look& look, bool moves);
+
+  std::optional<Look> since_;  ///< it was there, and as it is
+  bool moves_ = false;
+};
+
+}  // namespace axisd::cia402

@@ -1,0 +1,78 @@
+// Rest and motion by readings that waver.
+#include "devices/cia402/standstill.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace axisd::cia402 {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Standstill::Gauge gauge{.window = 10, .pulses_per_revolution = 1000};
+constexpr TimePoint start{1h};
+constexpr std::array noise{0, 1, -1, 1, 0, -1, -1, 0, 1};
+
+Standstill::Look look(Duration after, std::int32_t position, int velocity_rpm,
+                      std::optional<bool> told = std::nullopt) {
+  return {.at = start + after, .position = position, .velocity_rpm = velocity_rpm, .told = told};
+}
+
+TEST(Standstill, NoiseIsNoMotion) {
+  Standstill standstill;
+  for (std::size_t i = 0; i < 90; ++i) {
+    const auto wavers = noise.at(i % noise.size());
+    EXPECT_FALSE(standstill.moves(look(20ms * static_cast<int>(i), 500 + 2 * wavers, wavers), gauge)) << i;
+  }
+}
+
+TEST(Standstill, AVelocityBeyondItsNoiseIsAMotionWhateverTheDriveSays) {
+  for (const int rpm : {2, -2, 500}) {
+    Standstill standstill;
+    EXPECT_TRUE(standstill.moves(look(0ms, 0, rpm, false), gauge));
+  }
+}
+
+TEST(Standstill, BelowItTheDrivesOwnWordCountsAtOnce) {
+  Standstill standstill;
+  EXPECT_TRUE(standstill.moves(look(0ms, 0, 0, true), gauge)) << "its motor turns, slowly";
+  EXPECT_FALSE(standstill.moves(look(1ms, 0, 1, false), gauge));
+  EXPECT_TRUE(standstill.moves(look(2ms, 0, 300), gauge));
+  EXPECT_FALSE(standstill.moves(look(3ms, 5000, -1, false), gauge)) << "its counter was set, too";
+}
+
+TEST(Standstill, TheSlowestMotionIsSeenByItsWayBeforeAStartIsGivenUp) {
+  Standstill standstill;
+  std::optional<Duration> seen;
+  int told = 0;
+  for (int i = 0; i < 150; ++i) {  // 1 r/min: a pulse in 60 ms
+    const auto wavers = noise.at(static_cast<std::size_t>(i) % noise.size());
+    const bool moves = standstill.moves(look(20ms * i, i / 3, 1 + wavers / 2), gauge);
+    if (moves && !seen) seen = 20ms * i;
+    told += moves ? 1 : 0;
+  }
+  ASSERT_TRUE(seen);
+  EXPECT_LT(*seen, 500ms);
+  EXPECT_EQ(told, 150 - *seen / 20ms) << "and goes on";
+}
+
+TEST(Standstill, WhereTheDriveDoesNotSayItRestsWhenThePositionHasStayedForLongEnough) {
+  Standstill standstill;
+  EXPECT_TRUE(standstill.moves(look(0ms, 0, 200), gauge));
+  EXPECT_TRUE(standstill.moves(look(20ms, 60, 30), gauge));
+  Duration rested{};
+  for (int i = 2; rested == Duration{} && i < 100; ++i) {
+    const auto wavers = noise.at(static_cast<std::size_t>(i) % noise.size());
+    if (!standstill.moves(look(20ms * i, 61 + wavers, wavers), gauge)) rested = 20ms * i;
+  }
+  EXPECT_GE(rested, 500ms);
+  EXPECT_LE(rested, 700ms);
+  const Standstill::Gauge fine{.window = 10, .pulses_per_revolution = 10'000};
+  Standstill other;
+  EXPECT_TRUE(other.moves(look(0ms, 0, 200), fine));
+  EXPECT_FALSE(other.moves(look(60ms, 1, 1), fine));
+}
+
+}  // namespace
+}  // namespace axisd::cia402
