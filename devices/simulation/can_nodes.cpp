@@ -145,6 +145,7 @@ void CanNodes::strike(SimulatedCanNode& node, const Fault& fault) {
 void CanNodes::reboot(SimulatedCanNode& node, Duration off_time) {
   node.advance(now_);
   node.set_power(false);
+  std::erase_if(late_, [&node](const auto& late) { return late.second.first == &node; });
   if (off_time > Duration{})
     trouble(node).returns = now_ + off_time;
   else
@@ -240,11 +241,16 @@ void CanNodes::from_node(SimulatedCanNode& node, const can::Frame& frame) {
       one.late_replies.erase(one.late_replies.begin());
       return;
     }
+    const auto of_node = [&node](const auto& late) { return late.second.first == &node; };
+    if (std::ranges::any_of(late_, of_node)) return send_later(node, now_, frame);
   }
   emit(node, frame);
 }
 
+/// Frames with one identifier keep their order on the wire: what is late holds up what comes after it.
 void CanNodes::send_later(const SimulatedCanNode& node, TimePoint when, const can::Frame& frame) {
+  for (const auto& [late, entry] : late_)
+    if (entry.first == &node) when = std::max(when, late);
   late_.emplace(when, std::pair{&node, frame});
 }
 

@@ -128,6 +128,19 @@ TEST_F(CanNodesTest, AnswersLateAndAborts) {
   EXPECT_EQ(0U, nodes.nodes().pending_faults());
 }
 
+/// One identifier, one queue: the client relies on it.
+TEST_F(CanNodesTest, ALateAnswerIsNotOvertaken) {
+  put(1);
+  command("fault delay_reply delay_ms=20");
+  EXPECT_THAT(ask(0x601, read_device_type), IsEmpty());
+  EXPECT_THAT(ask(0x601, {0x40, 0x01, 0x10, 0}), IsEmpty());
+  EXPECT_THAT(wait(20ms), ElementsAre("581#4300100092010400", "581#4F01100000000000"));
+  command("fault delay_reply delay_ms=20");
+  ask(0x601, read_device_type);
+  command("fault reboot node=1");
+  EXPECT_THAT(wait(400ms), ElementsAre("701#00")) << "what was not sent yet is gone with the supply";
+}
+
 TEST_F(CanNodesTest, GoesSilentAndComesBack) {
   put(1);
   command("fault silence node=1 delay_ms=100");
