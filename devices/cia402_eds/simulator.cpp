@@ -43,7 +43,8 @@ StandardDrive::StandardDrive(SimulatedNodeSettings settings)
       settings_(std::move(settings)),
       server_({.pdos = pdo_settings, .sdo = {.segmented_uploads = behaviour_.segmented_uploads}}, dictionary_,
               hooks(), [this](bool communication_only) { nmt_reset(communication_only); }),
-      inputs_(cia402_eds::inputs, {home_switch, positive_limit, negative_limit}, settings_) {
+      inputs_(cia402_eds::inputs, {home_switch, positive_limit, negative_limit}, settings_),
+      encoder_(settings_.encoder, settings_.address) {
   add_rows(dictionary_);
   for (const auto& [key, value] : settings_.eeprom) dictionary_.preset(key, value);
   if (!settings_.powered) return;
@@ -107,7 +108,7 @@ TimePoint StandardDrive::next_event() const {
 
 TimePoint StandardDrive::motion_event() const {
   if (boot_end_) return *boot_end_;
-  if (!motor_.moving()) return phase_due_;
+  if (!motor_.moving()) return std::min(phase_due_, settling_event());
   auto next = std::min(motor_.ends(), motor_.lags(dictionary_.get(0x6065) + 1));
   const auto change = inputs_.next_switch(motor_.shaft(), motor_.direction());
   return change ? std::min(next, motor_.reaches(*change)) : next;
@@ -117,6 +118,7 @@ void StandardDrive::step(TimePoint now) {
   constexpr int following_error = 0x8611;
   now_ = now;
   const bool ended = motor_.advance(now, energised());
+  follow(now);
   if (boot_end_ && now >= *boot_end_) boot_end_.reset();
   if (alive()) {
     for (const auto& edge :
@@ -131,6 +133,32 @@ void StandardDrive::step(TimePoint now) {
     if (const auto present = appearance(); std::exchange(appearance_, present) != present) server_.touch(now);
   }
   server_.advance(now);
+}
+
+/// Bit 10 comes with time alone.
+TimePoint StandardDrive::settling_event() const {
+  constexpr Duration cycle = std::chrono::milliseconds(1);
+  if (!reached_ || in_position()) return TimePoint::max();
+  if (in_window_since_)
+    return std::max(now_ + cycle, *in_window_since_ + std::chrono::milliseconds(dictionary_.get(0x6068)));
+  return encoder_.wavers(motor_) ? now_ + cycle : TimePoint::max();
+}
+
+/// What the load and the encoder do meanwhile.
+void StandardDrive::follow(TimePoint now) {
+  motor_.follow_within(encoder_.settings().following);
+  if (!energised()) encoder_.relax();
+  const bool held = motor_.blocked() || motor_.moving() || energised();
+  if (const auto pulses = encoder_.slipped(now, !held); pulses != 0) motor_.push(pulses, powered_);
+  if (!reached_ || std::llabs(encoder_.deviation(motor_, now)) > dictionary_.get(0x6067))
+    in_window_since_.reset();
+  else if (!in_window_since_)
+    in_window_since_ = now;
+}
+
+bool StandardDrive::in_position() const {
+  return in_window_since_ && now_ - *in_window_since_ >= std::chrono::milliseconds(dictionary_.get(0x6068)) &&
+         std::llabs(encoder_.deviation(motor_, now_)) <= dictionary_.get(0x6067);
 }
 
 /// All that can change by itself and shows in mappable objects, but the position.
@@ -165,6 +193,13 @@ void StandardDrive::block_shaft(bool blocked) {
 bool StandardDrive::push_shaft(std::int64_t pulses) {
   if (motor_.blocked() || energised()) return false;
   motor_.push(pulses, powered_);
+  server_.touch(now_);
+  step(now_);
+  return true;
+}
+
+bool StandardDrive::lean_on_shaft(int counts) {
+  if (!energised() || !encoder_.lean(counts)) return false;
   server_.touch(now_);
   step(now_);
   return true;

@@ -38,6 +38,8 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] std::span<const int> alarms() const override;
   void block_shaft(bool blocked) override;
   bool push_shaft(std::int64_t pulses) override;
+  bool lean_on_shaft(int counts) override;
+  [[nodiscard]] simulation::Encoder* encoder() override { return &encoder_; }
   [[nodiscard]] std::int64_t shaft_pulses() const override { return motor_.shaft(); }
   [[nodiscard]] bool shaft_moving() const override { return motor_.moving() && !motor_.blocked(); }
   [[nodiscard]] int starts() const override { return starts_; }
@@ -69,15 +71,20 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   // simulator.cpp: power, time, inputs
   void step(TimePoint now);
   [[nodiscard]] TimePoint motion_event() const;
+  [[nodiscard]] TimePoint settling_event() const;
   [[nodiscard]] bool alive() const { return powered_ && !boot_end_; }
   [[nodiscard]] bool energised() const { return state_ == State::operation || state_ == State::quick_stop; }
   [[nodiscard]] std::uint64_t appearance() const;
+  void follow(TimePoint now);
+  /// The encoder is within 6067h of the end of a motion, for 6068h already.
+  [[nodiscard]] bool in_position() const;
   void restart(bool counter_lost);
   void nmt_reset(bool communication_only);
 
   // simulator_objects.cpp
   simulation::CanopenHooks hooks();
   [[nodiscard]] std::optional<std::int64_t> read(const simulation::ObjectRow& row) const;
+  [[nodiscard]] std::int64_t velocity() const;
   std::uint32_t write(const simulation::ObjectRow& row, std::int64_t value, bool& store);
   void written(const simulation::ObjectRow& row);
 
@@ -135,6 +142,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   simulation::CanopenServer server_;
   simulation::InputBank inputs_;
   simulation::Motor motor_;
+  simulation::Encoder encoder_;
   TimePoint now_{};
   bool powered_ = false;
   std::optional<TimePoint> boot_end_;
@@ -147,6 +155,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   int fault_ = 0;  ///< error code; 0: none
   int starts_ = 0;
   bool reached_ = false, acknowledged_ = false, limited_ = false;
+  std::optional<TimePoint> in_window_since_;  ///< after a motion that ended at its target
   bool attained_ = false, homing_error_ = false, homing_interrupted_ = false;
 
   Activity activity_ = Activity::none;

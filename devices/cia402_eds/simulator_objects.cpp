@@ -22,7 +22,7 @@ simulation::CanopenHooks StandardDrive::hooks() {
                           bool& store) { return write(row, value, store); },
           .written = [this](const ObjectRow& row) { written(row); },
           .saves = [](const ObjectRow&) { return false; },  // on command only: 1010h
-          .changing = [this] { return motor_.moving(); }};
+          .changing = [this] { return motor_.moving() || encoder_.wavers(motor_); }};
 }
 
 std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
@@ -33,15 +33,26 @@ std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
       return status();
     case 0x6061:
       return mode_;
+    case 0x6062:
+      return motor_.counter();
     case 0x6064:
-      return motor_.encoder();
+      return encoder_.position(motor_, now_);
     case 0x606C:
-      return shaft_moving() ? std::lround(motor_.direction() * motor_.speed()) : 0;
+      return velocity();
+    case 0x60F4:
+      return encoder_.deviation(motor_, now_);
     case 0x60FD:
       return inputs_.bits();
     default:
       return std::nullopt;
   }
+}
+
+/// 606Ch: measured, by a motor that takes 1000 increments per revolution.
+std::int64_t StandardDrive::velocity() const {
+  constexpr double per_rpm = 1000.0 / 60;
+  const auto noise = encoder_.velocity_noise(now_) * per_rpm;
+  return std::lround(motor_.shaft_speed() + noise);
 }
 
 std::uint32_t StandardDrive::write(const ObjectRow& row, std::int64_t value, bool& store) {

@@ -76,7 +76,7 @@ void StandardDrive::transition(std::uint16_t word) {
 /// The controller takes over where the shaft stands.
 void StandardDrive::enter_operation() {
   if (!energised()) {
-    const auto here = motor_.encoder();
+    const auto here = motor_.encoder();  // what the loop holds, not one reading
     motor_.power_up();
     motor_.set_counter(here);
   }
@@ -174,7 +174,7 @@ std::uint16_t StandardDrive::state_bits() const {
 bool StandardDrive::target_reached() const {
   if (state_ != State::operation) return false;
   if (halted()) return !motor_.moving();
-  if (mode_ == position_mode) return reached_;
+  if (mode_ == position_mode) return in_position();
   if (mode_ == homing_mode) return activity_ != Activity::homing;
   if (mode_ != velocity_mode) return false;
   return activity_ == Activity::velocity ? motor_.cruising() : dictionary_.get(0x60FF) == 0;

@@ -54,9 +54,23 @@ bool set_encoder_option(EncoderSettings& settings, std::string_view name, std::s
 
 std::int64_t Encoder::noise(TimePoint now) const {
   if (settings_.noise <= 0) return 0;
-  const auto period = static_cast<std::uint64_t>(now.time_since_epoch() / noise_period);
   const auto width = static_cast<std::uint64_t>(settings_.noise) * 2 + 1;
-  return static_cast<std::int64_t>(scramble(seed_ ^ scramble(period)) % width) - settings_.noise;
+  return static_cast<std::int64_t>(random(0, now) % width) - settings_.noise;
+}
+
+std::uint64_t Encoder::random(std::uint64_t stream, TimePoint now) const {
+  const auto period = static_cast<std::uint64_t>(now.time_since_epoch() / noise_period);
+  return scramble((seed_ + (stream << 32U)) ^ scramble(period));
+}
+
+int Encoder::velocity_noise(TimePoint now) const {
+  constexpr std::uint64_t stream = 1, width = 3;
+  return settings_.noise > 0 ? static_cast<int>(random(stream, now) % width) - 1 : 0;
+}
+
+bool Encoder::wavers(const Motor& motor) const {
+  constexpr double visible = 0.25;  // pulses
+  return settings_.noise > 0 || settings_.slip != 0 || std::abs(motor.behind()) > visible;
 }
 
 std::int64_t Encoder::deviation(const Motor& motor, TimePoint now) const {
@@ -80,7 +94,8 @@ bool Encoder::lean(int counts) {
 }
 
 std::int64_t Encoder::slipped(TimePoint now, bool released) {
-  const auto passed = std::chrono::duration<double>(now - std::exchange(slipped_until_, now)).count();
+  const auto since = std::exchange(slipped_until_, now).value_or(now);
+  const auto passed = std::chrono::duration<double>(now - since).count();
   if (!released || settings_.slip == 0) {
     slip_rest_ = 0;
     return 0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "buses/clock.hpp"
@@ -46,6 +47,10 @@ class Encoder {
   [[nodiscard]] std::int32_t position(const Motor& motor, TimePoint now) const;
   /// Pulses that the reading is behind the commanded position now, signed.
   [[nodiscard]] std::int64_t deviation(const Motor& motor, TimePoint now) const;
+  /// r/min by which a measured velocity is off, at rest as well: at most 1, and 0 without noise.
+  [[nodiscard]] int velocity_noise(TimePoint now) const;
+  /// What it shows changes with time, though no pulses come.
+  [[nodiscard]] bool wavers(const Motor& motor) const;
 
   /// A hand presses on the energised shaft and bends it by so many counts, until lean(0). False: it is held.
   bool lean(int counts);
@@ -57,13 +62,14 @@ class Encoder {
 
  private:
   [[nodiscard]] std::int64_t noise(TimePoint now) const;
+  [[nodiscard]] std::uint64_t random(std::uint64_t stream, TimePoint now) const;
 
   EncoderSettings settings_;
   std::uint64_t seed_;
   double pulses_per_count_ = 1;
   int leaning_ = 0;
-  TimePoint slipped_until_{};
-  double slip_rest_ = 0;  ///< of a pulse
+  std::optional<TimePoint> slipped_until_;  ///< nothing: never asked
+  double slip_rest_ = 0;                    ///< of a pulse
 };
 
 }  // namespace axisd::simulation

@@ -93,6 +93,11 @@ void Motor::stop(bool slips) {
 
 double Motor::speed() const { return moving_ ? profile_.speed_at(elapsed()) : 0; }
 
+double Motor::shaft_speed() const {
+  if (blocked_) return 0;
+  return following_ > 0 ? behind_ / following_ : direction_ * speed();
+}
+
 bool Motor::cruising() const {
   return moving_ && !braking_ && std::abs(speed() - rates_.cruise) <= rates_.cruise * 1e-9;
 }

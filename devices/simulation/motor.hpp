@@ -34,6 +34,7 @@ class Motor {
   /// An energised closed loop needs time: its shaft is behind the pulses by speed x `time`, and comes to rest
   /// exponentially. 0: at once. It concerns what an encoder shows (behind()); switches see shaft().
   void follow_within(Duration time) { following_ = std::chrono::duration<double>(time).count(); }
+  [[nodiscard]] bool following() const { return following_ > 0; }
   /// The load turns the shaft. `seen`: the counters follow (an encoder); else the origin moves along.
   void push(std::int64_t pulses, bool seen);
 
@@ -41,6 +42,8 @@ class Motor {
   [[nodiscard]] bool braking() const { return moving_ && braking_; }
   [[nodiscard]] int direction() const { return direction_; }  ///< of the last motion, 1 or -1
   [[nodiscard]] double speed() const;                         ///< pulses/s, not signed
+  /// Of the shaft, which follows the pulses; pulses/s, signed.
+  [[nodiscard]] double shaft_speed() const;
   /// At the speed that the motion is for.
   [[nodiscard]] bool cruising() const;
   [[nodiscard]] bool blocked() const { return blocked_; }

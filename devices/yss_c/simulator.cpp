@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <utility>
 
@@ -72,7 +73,8 @@ SimulatedDrive::SimulatedDrive(SimulatedNodeSettings settings)
       settings_(with_defaults(std::move(settings))),
       server_(server_settings(behaviour_), dictionary_, hooks(),
               [this](bool communication_only) { nmt_reset(communication_only); }),
-      inputs_(input_terminals, {input_home, input_positive_limit, input_negative_limit}, settings_) {
+      inputs_(input_terminals, {input_home, input_positive_limit, input_negative_limit}, settings_),
+      encoder_(settings_.encoder, settings_.address) {
   add_rows(dictionary_, behaviour_, pdos_of(behaviour_));
   for (const auto& [key, value] : settings_.eeprom) dictionary_.preset(key, value);
   if (!settings_.powered) return;
@@ -184,6 +186,7 @@ TimePoint SimulatedDrive::motion_event() const {
 void SimulatedDrive::step(TimePoint now) {
   now_ = now;
   const bool ended = motor_.advance(now, in_control());
+  follow(now);
   if (boot_end_ && now >= *boot_end_) {
     boot_end_.reset();
     server_.advance(now);  // the boot-up message comes before an alarm's
@@ -207,6 +210,16 @@ void SimulatedDrive::step(TimePoint now) {
       server_.touch(now);
   }
   server_.advance(now);
+}
+
+/// What the load and the encoder do meanwhile.
+void SimulatedDrive::follow(TimePoint now) {
+  encoder_.set_resolution(pulses_of_counts(1));
+  motor_.follow_within(closed_loop() ? encoder_.settings().following : Duration{});
+  if (!in_control()) encoder_.relax();
+  const bool held = motor_.blocked() || motor_.moving() || (ready() && energised());
+  if (const auto pulses = encoder_.slipped(now, !held); pulses != 0)
+    motor_.push(pulses, ready() && closed_loop() && !behaviour_.released_position_frozen);
 }
 
 /// All that can change by itself and shows in mappable objects, but the position.
@@ -242,9 +255,28 @@ bool SimulatedDrive::push_shaft(std::int64_t pulses) {
   return true;
 }
 
+bool SimulatedDrive::lean_on_shaft(int counts) {
+  if (!in_control() || !encoder_.lean(counts)) return false;
+  server_.touch(now_);
+  step(now_);
+  return true;
+}
+
+double SimulatedDrive::pulses_of_counts(double counts) const {
+  return counts * pulses_per_revolution() / 4000;
+}
+
 /// In pulses. 2046h gives no unit: taken as counts of the encoder, so that its default is one revolution.
 std::int64_t SimulatedDrive::deviation_limit() const {
   return dictionary_.get(0x2046) * pulses_per_revolution() / 4000 + 1;
+}
+
+/// 204Fh gives no unit: taken as counts of the encoder, as 2046h.
+bool SimulatedDrive::in_position() const {
+  if (!reached_ || !closed_loop()) return reached_;
+  const auto window =
+      static_cast<std::int64_t>(std::ceil(pulses_of_counts(static_cast<double>(dictionary_.get(0x204F)))));
+  return std::llabs(encoder_.deviation(motor_, now_)) <= window;
 }
 
 int SimulatedDrive::pulses_per_revolution() const {
@@ -276,7 +308,7 @@ std::uint16_t SimulatedDrive::shown(std::uint16_t active, std::uint8_t inversion
 
 /// Functions 2030h:0D..0F that are active.
 std::uint16_t SimulatedDrive::outputs() const {
-  const std::array<bool, 5> functions{false, alarm_ != 0, motor_.moving(), homed_, reached_};
+  const std::array<bool, 5> functions{false, alarm_ != 0, motor_.moving(), homed_, in_position()};
   unsigned bits = 0;
   for (unsigned i = 0; i < 3; ++i)
     if (functions.at(static_cast<std::size_t>(dictionary_.get(0x2030, static_cast<std::uint8_t>(0x0D + i)))))

@@ -40,6 +40,8 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] std::span<const int> alarms() const override;
   void block_shaft(bool blocked) override;
   bool push_shaft(std::int64_t pulses) override;
+  bool lean_on_shaft(int counts) override;
+  [[nodiscard]] simulation::Encoder* encoder() override { return &encoder_; }
   [[nodiscard]] std::int64_t shaft_pulses() const override { return motor_.shaft(); }
   [[nodiscard]] bool shaft_moving() const override { return motor_.moving() && !motor_.blocked(); }
   [[nodiscard]] int starts() const override { return starts_; }
@@ -72,7 +74,13 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] bool ready() const { return powered_ && !boot_end_; }
   [[nodiscard]] bool closed_loop() const { return dictionary_.get(0x2007) == 0; }
   [[nodiscard]] bool in_control() const { return closed_loop() && ready() && energised() && alarm_ == 0; }
+  [[nodiscard]] bool shows_encoder() const { return closed_loop() && !behaviour_.position_is_commanded; }
+  void follow(TimePoint now);
+  /// Pulses of the motor for so many counts of the encoder.
+  [[nodiscard]] double pulses_of_counts(double counts) const;
   [[nodiscard]] std::int64_t deviation_limit() const;
+  /// A motion ended at its target, and the encoder is within 204Fh of it.
+  [[nodiscard]] bool in_position() const;
   [[nodiscard]] int pulses_per_revolution() const;
   [[nodiscard]] simulation::InputSettings input_settings() const;
   [[nodiscard]] std::uint16_t outputs() const;
@@ -92,6 +100,7 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] bool saves(const simulation::ObjectRow& row) const;
   std::uint32_t command(std::uint16_t index, std::int64_t value);
   [[nodiscard]] std::int32_t position() const;
+  [[nodiscard]] std::int64_t velocity_rpm() const;
 
   // simulator_state.cpp: CiA 402 and alarms
   void control(std::uint16_t word);
@@ -156,6 +165,7 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   simulation::CanopenServer server_;
   simulation::InputBank inputs_;
   simulation::Motor motor_;
+  simulation::Encoder encoder_;
   TimePoint now_{};
   std::optional<std::uint32_t> bitrate_;  ///< since the last power-up; nothing: never joined a network
   bool powered_ = false;

@@ -16,11 +16,19 @@ simulation::CanopenHooks SimulatedDrive::hooks() {
                           bool& store) { return write(row, value, store); },
           .written = [this](const ObjectRow& row) { written(row); },
           .saves = [this](const ObjectRow& row) { return saves(row); },
-          .changing = [this] { return motor_.moving(); }};
+          .changing = [this] { return motor_.moving() || (closed_loop() && encoder_.wavers(motor_)); }};
 }
 
 std::int32_t SimulatedDrive::position() const {
-  return closed_loop() && !behaviour_.position_is_commanded ? motor_.encoder() : motor_.counter();
+  return shows_encoder() ? encoder_.position(motor_, now_) : motor_.counter();
+}
+
+/// 2002h: measured, where there is something to measure with.
+std::int64_t SimulatedDrive::velocity_rpm() const {
+  const bool measured = shows_encoder() && motor_.following();
+  const auto speed = measured ? motor_.shaft_speed() : motor_.direction() * motor_.speed();
+  const auto noise = shows_encoder() ? encoder_.velocity_noise(now_) : 0;
+  return std::lround(speed * 60 / pulses_per_revolution()) + noise;
 }
 
 std::optional<std::int64_t> SimulatedDrive::read(const ObjectRow& row) const {
@@ -30,7 +38,7 @@ std::optional<std::int64_t> SimulatedDrive::read(const ObjectRow& row) const {
     case 0x2001:
       return motor_.moving() ? 1 : 0;
     case 0x2002:
-      return std::lround(motor_.direction() * motor_.speed() * 60 / pulses_per_revolution());
+      return velocity_rpm();
     case 0x2003:
       return shown(inputs_.bits(), 0x01, 7);
     case 0x2004:

@@ -176,7 +176,7 @@ std::uint16_t SimulatedDrive::state_bits() const {
 
 bool SimulatedDrive::target_reached() const {
   if (halted()) return !motor_.moving();
-  if (mode_ == 1) return reached_ && !behaviour_.reached_only_bit15;
+  if (mode_ == 1) return in_position() && !behaviour_.reached_only_bit15;
   if (mode_ == 6) return !motor_.moving();
   if (mode_ != 3 || state_ != State::operation) return false;
   return activity_ == Activity::velocity ? motor_.cruising() && !stopping_
@@ -202,7 +202,7 @@ std::uint16_t SimulatedDrive::status() const {
   set(12, bit12);
   set(13, homing && b.bit13_is_homing_error ? homing_error_ : energised());
   set(14, motor_.moving());
-  set(15, mode_ == 1 && reached_ && !b.reached_only_bit10);
+  set(15, mode_ == 1 && in_position() && !b.reached_only_bit10);
   return static_cast<std::uint16_t>(bits);
 }
 

@@ -1,4 +1,4 @@
-// A whole machine with one simulated YSS-C on a CAN network in virtual time.
+// A whole machine with one simulated CAN drive (YSS-C, or any by CiA 402) on a network in virtual time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,14 +13,29 @@
 
 #include "buses/can/network.hpp"
 #include "daemon/core/machine_core.hpp"
+#include "devices/descriptor.hpp"
 #include "devices/simulation/can_nodes.hpp"
 #include "devices/simulation/simulator.hpp"
+#include "tests/support/fake_journal.hpp"
+#include "tests/support/fake_persistence.hpp"
 #include "tests/support/rig.hpp"
+#include "tests/support/source_tree.hpp"
 #include "tests/support/virtual_world.hpp"
 
 namespace axisd::test {
 
+/// A closed-loop drive as it is (M30): every reading is measured.
+inline constexpr simulation::EncoderSettings measured_by_default{
+    .noise = 1, .following = std::chrono::milliseconds(3), .quantised = true, .compliance = 10};
+
 struct CanRigOptions {
+  std::string model = "yss-c";  ///< or cia402
+  bool invert = false;
+  simulation::EncoderSettings encoder = measured_by_default;
+  bool polled = false;  ///< it takes no TPDO: its state is asked for by SDO
+  std::function<void(simulation::SimulatedNodeSettings&)> adjust_drive{};
+  bool persistence = false;  ///< keep state between restarts in CanRig::store
+  bool journal = false;      ///< and commands in CanRig::journal
   simulation::Switches switches{};
   Duration sync_period{};
   bool limits = true;
@@ -32,48 +47,32 @@ struct CanRigOptions {
 };
 
 /// The axis "feeder", node 5: 1000 pulses/rev, 10 mm/rev (100 pulses per mm), 0..400 mm, 100 mm/s; home
-/// switch at -50 mm, limit switches at -60 mm and 460 mm from where it powered up.
+/// switch at -50 mm, limit switches at -60 mm and 460 mm from where it powered up, in axis direction.
 class CanRig {
  public:
   static constexpr std::uint8_t node_id = 5;
 
   explicit CanRig(CanRigOptions options = {})
-      : network(world.clock(), 1'000'000), options_(std::move(options)), drives_(world.clock(), network) {
-    const auto pulses = [](double mm) { return static_cast<std::int64_t>(mm * 100); };
-    simulation::SimulatedNodeSettings settings{.address = node_id, .switches = options_.switches};
-    if (options_.switches_near)
-      settings.mechanics = {.home_switch_from = pulses(-52),
-                            .home_switch_to = pulses(-50),
-                            .positive_limit_from = pulses(460),
-                            .negative_limit_from = pulses(-60)};
-    auto made = simulation::make_can_node("yss-c", std::move(settings));
+      : store(world.executor()),
+        journal(world.executor()),
+        network(world.clock(), 1'000'000),
+        options_(std::move(options)),
+        drives_(world.clock(), network) {
+    auto made = simulation::make_can_node(options_.model, drive_settings());
     if (!made) throw std::invalid_argument(to_string(made.error()));
     drive = &drives_.nodes().add(std::move(*made));
     drives_.nodes().set_observer(
         [this](TimePoint at, bool, const can::Frame& frame) { frames.emplace_back(at, frame); });
     run(std::chrono::seconds(1));
+    if (options_.polled)
+      nodes().add_fault(
+          {.kind = simulation::FaultKind::abort, .count = -1, .object = 0x1A00, .code = 0x06010002});
     if (options_.before_start) options_.before_start(*drive);
     drives_.nodes().advance();
     configuration.machine = "test";
     configuration.networks.push_back(
         {.name = "can0", .interface = "sim", .sync_period = options_.sync_period});
-    AxisSettings axis{.name = "feeder", .bus = "can0", .node = node_id, .model = "yss-c"};
-    axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
-    if (options_.limits) {
-      axis.limits.position_minimum = 0;
-      axis.limits.position_maximum = 400;
-    }
-    axis.limits.velocity = 100;
-    axis.homing = HomingSettings{.method = HomingMethod::home_negative,
-                                 .velocity = 20,
-                                 .search_velocity = 2,
-                                 .backoff = 5,
-                                 .timeout = std::chrono::seconds(30)};
-    axis.inputs = {{.terminal = "X0", .function = "home"},
-                   {.terminal = "X1", .function = "positive_limit"},
-                   {.terminal = "X2", .function = "negative_limit"}};
-    if (options_.adjust) options_.adjust(axis);
-    configuration.axes.push_back({.axis = std::move(axis)});
+    configuration.axes.push_back({.axis = axis_settings()});
     start_daemon();
   }
   ~CanRig() {
@@ -82,9 +81,13 @@ class CanRig {
 
   void start_daemon() {
     frames.clear();
+    store.restart();
+    journal.restart(world.clock().wall(world.now()));
     core::MachineParts parts{.executor = world.executor(),
                              .clock = &world.clock(),
-                             .instance_id = "t",
+                             .persistence = options_.persistence ? &store : nullptr,
+                             .journal = options_.journal ? &journal : nullptr,
+                             .instance_id = "t" + std::to_string(++starts_),
                              .make_port = [this](const canopen::NetworkSettings& settings) {
                                return std::make_unique<can::NetworkPort>(
                                    world.clock(),
@@ -167,6 +170,8 @@ class CanRig {
   }
 
   VirtualWorld world;
+  FakePersistence store;
+  FakeJournal journal;
   can::Network network;
   config::Configuration configuration;
   simulation::SimulatedCanNode* drive = nullptr;
@@ -174,7 +179,53 @@ class CanRig {
   std::vector<std::pair<TimePoint, can::Frame>> frames;  ///< that passed the wire, since start_daemon()
 
  private:
+  [[nodiscard]] simulation::SimulatedNodeSettings drive_settings() const {
+    simulation::SimulatedNodeSettings settings{
+        .address = node_id, .encoder = options_.encoder, .switches = options_.switches};
+    const auto pulses = [](double mm) { return static_cast<std::int64_t>(mm * 100); };
+    const bool invert = options_.invert;
+    if (options_.switches_near)
+      settings.mechanics = {.home_switch_from = pulses(invert ? 50 : -52),
+                            .home_switch_to = pulses(invert ? 52 : -50),
+                            .positive_limit_from = pulses(invert ? 60 : 460),
+                            .negative_limit_from = pulses(invert ? -460 : -60)};
+    if (options_.adjust_drive) options_.adjust_drive(settings);
+    return settings;
+  }
+  [[nodiscard]] AxisSettings axis_settings() const {
+    const bool standard = options_.model == "cia402";
+    AxisSettings axis{.name = "feeder", .bus = "can0", .node = node_id, .model = options_.model};
+    axis.scale = {
+        .pulses_per_revolution = 1000, .travel_numerator = 10, .invert = options_.invert, .unit = "mm"};
+    if (options_.limits) {
+      axis.limits.position_minimum = 0;
+      axis.limits.position_maximum = 400;
+    }
+    axis.limits.velocity = 100;
+    axis.homing = HomingSettings{.method = HomingMethod::home_negative,
+                                 .velocity = 20,
+                                 .search_velocity = 2,
+                                 .backoff = 5,
+                                 .timeout = std::chrono::seconds(30)};
+    // Where a terminal has one meaning, it is that of the drive's direction.
+    const bool turned = standard && options_.invert;
+    axis.inputs = {
+        {.terminal = standard ? "HOME" : "X0", .function = "home"},
+        {.terminal = standard ? "POS" : "X1", .function = turned ? "negative_limit" : "positive_limit"},
+        {.terminal = standard ? "NEG" : "X2", .function = turned ? "positive_limit" : "negative_limit"}};
+    if (standard) {
+      axis.model_settings = {{"eds", in_source_tree("config/examples/standard-drive.eds")}};
+      const auto* model = find_drive_model("cia402");
+      auto made = model->specialise(*model, axis.model_settings);
+      if (!made) throw std::invalid_argument(to_string(made.error()));
+      axis.own_descriptor = *made;
+    }
+    if (options_.adjust) options_.adjust(axis);
+    return axis;
+  }
+
   CanRigOptions options_;
+  int starts_ = 0;
   simulation::NetworkNodes drives_;
 };
 

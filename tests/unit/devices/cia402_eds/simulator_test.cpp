@@ -44,6 +44,7 @@ TEST(StandardDrive, MovesWithRates) {
   EXPECT_FALSE(bench.bit(10));
   bench.run(60ms);
   EXPECT_EQ(bench.position(), 10'000);
+  bench.run(5ms);  // 6068h
   EXPECT_TRUE(bench.bit(10));
   bench.control(0x0F);
   EXPECT_FALSE(bench.bit(12));
