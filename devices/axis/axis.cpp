@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "devices/released_position.hpp"
+
 namespace axisd {
 
 Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescriptor& descriptor,
@@ -95,6 +97,14 @@ bool Axis::active_in(const DriveSample& sample, const TerminalSettings& input) c
   return terminal != descriptor_->inputs.end() && ((sample.inputs >> bit) & 1U) != 0;
 }
 
+bool Axis::counts_while_released() const {
+  return drive_->closed_loop() && counts_released(*descriptor_, settings_.model_settings);
+}
+
+bool Axis::terminal_may_void_position() const {
+  return has_input("homing_start") || (has_input("motor_free") && !counts_while_released());
+}
+
 bool Axis::starts_motion(const TerminalSettings& input) const {
   const auto* function = find_function(descriptor_->input_functions, input.function);
   return function != nullptr && function->starts_motion;
@@ -165,8 +175,9 @@ void Axis::on_alarm(const DriveSample& sample) {
 }
 
 void Axis::on_released(const DriveSample& sample, bool enabled_before) {
-  if (!drive_->closed_loop() && sample.alarm_code == 0 && tracker_.trust() != PositionTrust::unknown)
-    lose_trust();  // an open-loop motor without current can be turned by hand
+  // What nothing holds can be turned by hand.
+  if (!counts_while_released() && sample.alarm_code == 0 && tracker_.trust() != PositionTrust::unknown)
+    lose_trust();
   if (!enabled_by_us_ && !enabled_before) return;
   const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
   enabled_by_us_ = false;

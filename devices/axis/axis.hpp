@@ -216,6 +216,12 @@ class Axis {
   [[nodiscard]] bool busy() const;
   [[nodiscard]] std::int64_t home_offset() const;
   [[nodiscard]] bool has_input(std::string_view function) const;
+  /// The position follows a shaft that is turned while the motor is released: in closed loop only, and where
+  /// that is known (M20).
+  [[nodiscard]] bool counts_while_released() const;
+  /// What a terminal does while nobody looks would not show: homing zeroes the counter, a release lets the
+  /// shaft be turned uncounted (M20).
+  [[nodiscard]] bool terminal_may_void_position() const;
   [[nodiscard]] bool input_active(std::string_view function) const;
   [[nodiscard]] bool active_in(const DriveSample& sample, const TerminalSettings& input) const;
   [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;

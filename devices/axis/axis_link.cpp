@@ -151,12 +151,11 @@ Task<Result<void>> Axis::prove_or_configure() {
   bool restorable = false;
   if (stored) {
     const auto& record = *stored;
-    // Nobody saw a homing that a terminal started meanwhile, which zeroes the counter.
-    restorable = !position_unsettled_ && !has_input("homing_start") &&
+    restorable = !position_unsettled_ && !terminal_may_void_position() &&
                  record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
                  record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
                  !moved_from(tracker_.counter() - sample_->position_pulses + record.last_position_pulses) &&
-                 (sample_->enabled || drive_->closed_loop());
+                 (sample_->enabled || counts_while_released());
     if (restorable) drive_->expect_marks({record.canary});
   }
   const auto void_record = [this] {  // what it says may come true again by chance, but never by right
@@ -243,8 +242,7 @@ void Axis::bus_lost(Error cause) {
 
 void Axis::go_offline(const Error& cause) {
   bus_loss_.reset();
-  // Homing that a terminal starts meanwhile would zero the counter, and nobody would have seen it.
-  if (has_input("homing_start")) lose_trust();
+  if (terminal_may_void_position()) lose_trust();
   spdlog::warn("{}: offline: {}", settings_.name, to_string(cause));
   link_ = LinkState::offline;
   link_error_ = cause;

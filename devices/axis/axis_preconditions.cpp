@@ -349,8 +349,8 @@ void Axis::look_at(const SetPositionRequest& request, const CommandOptions& opti
     found.block(error(Reason::not_supported,
                       "the drive's absolute segments count from home: another position would not move them",
                       "home the axis instead: " + shell("home")));
-  // A released open-loop motor can be turned by hand: its position would be lost again at once (M20).
-  if (sample_ && !sample_->enabled && !drive_->closed_loop())
+  // A released motor can be turned by hand: its position would be lost again at once (M20).
+  if (sample_ && !sample_->enabled && !counts_while_released())
     found.block(error(Reason::disabled, "the power stage is off, so the position would not hold",
                       "enable the axis first: " + shell("enable")));
   if (!number)

@@ -55,8 +55,7 @@ void Axis::retire(bool position_holds) {
   reloading_ = true;
   answered_ = link_ != LinkState::offline;
   link_error_ = reloading();
-  // Homing that a terminal starts meanwhile would zero the counter, and nobody would have seen it.
-  if (has_input("homing_start") || !position_holds) lose_trust();
+  if (terminal_may_void_position() || !position_holds) lose_trust();
   if (!position_holds && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
   remember_position();
   close();

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "devices/descriptor.hpp"
+#include "devices/released_position.hpp"
 #include "devices/yako_rtu/registers.hpp"
 
 namespace axisd::yako_rtu {
@@ -95,6 +96,7 @@ inline constexpr auto closed_loop_settings = std::to_array<SettingSpec>({
      .default_value = "closed",
      .description = "Closed or open loop (0x0012). In open loop a release or quick stop loses the position.",
      .object = reg::loop_mode},
+    released_position_setting,
     {.key = "encoder_resolution",
      .kind = "enum",
      .choices = encoder_lines,

@@ -4,6 +4,7 @@
 
 #include "devices/cia402/configuration.hpp"
 #include "devices/cia402/drive.hpp"
+#include "devices/released_position.hpp"
 #include "devices/yako_rtu/tables.hpp"
 #include "devices/yss_c/objects.hpp"
 #include "devices/yss_c/parameters.hpp"
@@ -70,6 +71,7 @@ constexpr SettingSpec settings[] = {
      .default_value = "closed",
      .description = "Closed or open loop (2007h). In open loop a release or quick stop loses the position.",
      .object = object::loop_mode.key()},
+    released_position_setting,
     {.key = "home_approach",
      .kind = "enum",
      .choices = yako_rtu::home_approaches,

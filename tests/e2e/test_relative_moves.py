@@ -9,7 +9,8 @@ WINDOW = 12  # pulses: the in-position window of these drives, and what their en
 
 def table(model):
     return Axis(model=model, unit="mm", scale="{ microstep: 4000 pulses/rev, travel: 5 mm/rev }",
-                limits="{ position: [0, 400], velocity: 50 mm/s, acceleration_time: 150 ms }")
+                limits="{ position: [0, 400], velocity: 50 mm/s, acceleration_time: 150 ms }",
+                drive="{ released_position: counted }")
 
 
 class TurnedByHand(Scenario):

@@ -11,8 +11,10 @@ namespace {
 using namespace std::chrono_literals;
 
 RigOptions closed_loop(std::string model = "ess42-r") {
-  return {.model = std::move(model),
-          .adjust = [](AxisSettings& axis) { axis.homing->method = HomingMethod::negative_limit; }};
+  return {.model = std::move(model), .adjust = [](AxisSettings& axis) {
+            axis.homing->method = HomingMethod::negative_limit;
+            axis.model_settings["released_position"] = std::string("counted");
+          }};
 }
 
 /// Somebody turns the shaft; mm in axis direction.

@@ -23,6 +23,7 @@ RigOptions measured(std::string_view model, int noise) {
     axis.homing->method = HomingMethod::negative_limit;
     axis.homing->position = -60;
     axis.homing->max_travel = 600;
+    if (axis.model != "ykd2405pr") axis.model_settings["released_position"] = std::string("counted");
   };
   options.adjust_drive = [noise](simulation::SimulatedNodeSettings& node) {
     for (auto* position : {&node.mechanics.home_switch_from, &node.mechanics.home_switch_to,
