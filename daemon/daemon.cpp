@@ -23,6 +23,7 @@
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
 #include "daemon/core/quiesce.hpp"
+#include "daemon/descriptors.hpp"
 #include "daemon/logging.hpp"
 #include "daemon/ports.hpp"
 #include "daemon/store/file_store.hpp"
@@ -169,6 +170,8 @@ class CoreThread {
 /// From the first thread to the last: all that were started have ended when it returns. Exit status.
 int serve(const Options& options, const config::Configuration& configuration, const std::string& yaml,
           Logging& logging) {
+  raise_descriptor_limit();
+  if (auto enough = check_descriptor_limit(configuration); !enough) return give_up(enough.error());
   core::CoreLoop loop;
   auto store = store::FileStore::open(configuration.state_directory, loop.executor());
   if (!store) return give_up(store.error());
@@ -294,7 +297,10 @@ int run_daemon(const Options& options, const config::Configuration& configuratio
   return status;
 }
 
-int run_quiesce(const Options& options) {
+namespace {
+
+/// As run_quiesce(). Throws where the system has no more of something.
+int quiesce(const Options& options) {
   auto loaded = config::load_file(*options.quiesce);
   if (!loaded.configuration) {
     for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
@@ -322,19 +328,37 @@ int run_quiesce(const Options& options) {
                            .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
                            .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
                            .link_helper = (*ports)->link_helper()};
+  std::exception_ptr failure;
   auto all = [](core::CoreLoop& core, core::QuiesceParts of, const config::Configuration& machine,
-                std::vector<core::QuiesceReport>& out) -> Task<> {
-    out = co_await core::quiesce(std::move(of), machine, quiesce_limit);
+                std::vector<core::QuiesceReport>& out, std::exception_ptr& thrown) -> Task<> {
+    try {
+      out = co_await core::quiesce(std::move(of), machine, quiesce_limit);
+    } catch (...) {
+      thrown = std::current_exception();
+    }
     core.stop();
   };
-  spawn(loop.executor(), all(loop, std::move(parts), configuration, reports), "quiesce");
+  spawn(loop.executor(), all(loop, std::move(parts), configuration, reports, failure), "quiesce");
   loop.run();
+  if (failure) std::rethrow_exception(failure);
   bool confirmed = true;
   for (const auto& report : reports) {
     std::cout << report.axis << ": " << report.detail << '\n';
     confirmed = confirmed && report.confirmed;
   }
   return confirmed ? exit_status::in_order : exit_status::failed;
+}
+
+}  // namespace
+
+int run_quiesce(const Options& options) {
+  raise_descriptor_limit();
+  try {
+    return quiesce(options);
+  } catch (const std::exception& error) {  // no memory, no descriptors, no more threads
+    std::cerr << "axisd: " << error.what() << ": nothing can be said of the axes\n";
+    return exit_status::failed;
+  }
 }
 
 }  // namespace axisd

@@ -17,7 +17,7 @@ inline constexpr int in_order = 0;
 /// trying again may help.
 inline constexpr int failed = 1;
 inline constexpr int configuration =
-    2;  ///< or command line, certificates included: trying again is pointless
+    2;  ///< or command line, certificates, limits of the process: trying again is pointless
 }  // namespace exit_status
 
 /// A config::TlsCheck: the files as the service's user sees them.
