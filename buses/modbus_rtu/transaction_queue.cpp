@@ -12,6 +12,10 @@ bool is_read(const Transaction& transaction) {
   return transaction.exchange.request.function == Function::read_holding_registers;
 }
 
+bool is_stop(const Transaction& transaction) {
+  return transaction.transaction_class == TransactionClass::stop;
+}
+
 bool sends_the_same(const Transaction& a, const Transaction& b) {
   return a.exchange.frame == b.exchange.frame && !a.exchange.guard.gate && !b.exchange.guard.gate &&
          a.exchange.serial == b.exchange.serial && a.exchange.reply_timeout == b.exchange.reply_timeout &&
@@ -50,7 +54,9 @@ void TransactionQueue::push(TransactionPtr transaction) {
 }
 
 void TransactionQueue::push_again(TransactionPtr transaction) {
-  if (is_read(*transaction) && merge(*transaction)) return;
+  // An axis whose node has fallen silent may have two stops waiting, one that is owed and one that was asked
+  // for since: twice as many frames as the published bound of a stop of all axes counts.
+  if ((is_read(*transaction) || is_stop(*transaction)) && merge(*transaction)) return;
   insert(std::move(transaction), false);
 }
 
@@ -68,6 +74,8 @@ bool TransactionQueue::merge(Transaction& transaction) {
   known->watch = nullptr;  // somebody waits for it
   std::ranges::move(transaction.on_end, std::back_inserter(known->on_end));
   known->transaction_class = std::min(known->transaction_class, transaction.transaction_class);
+  known->patient = known->patient && transaction.patient;
+  known->doubtful = known->doubtful && transaction.doubtful;
   // The later deadline: an answer that still serves one of them is worth sending for.
   known->exchange.deadline = std::max(known->exchange.deadline, transaction.exchange.deadline);
   insert(std::move(known), false);

@@ -34,8 +34,8 @@ struct Transaction {
   bool reserved = false;   ///< it was given out by the reservation: only a stop may take its place
   Watch* watch = nullptr;  ///< that may repeat it
   bool given_up = false;   ///< unless it goes out before it can be taken back
-  /// Called exactly once each, unless its watch ends between two readings. Several: identical reads that were
-  /// merged.
+  /// Called exactly once each, unless its watch ends between two readings. Several: identical reads or stops
+  /// that were merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
 };
 using TransactionPtr = std::unique_ptr<Transaction>;
@@ -54,7 +54,7 @@ class TransactionQueue {
   static constexpr Duration doubtful_patience = std::chrono::seconds(2);
   explicit TransactionQueue(int reservation = default_reservation) : reservation_(reservation) {}
 
-  /// A read equal to one that waits joins it (and lends it its urgency); everything else is queued.
+  /// A read or stop equal to one that waits joins it (and lends its urgency); everything else is queued.
   void push(TransactionPtr transaction);
   /// The same for one that was carried out and asks for something else now: in its old place, ahead of what
   /// was queued since.

@@ -66,10 +66,12 @@ def turntable(node=5, bus="can0", simulated="", **keys):
 
 class Machine:
     """Not started by itself: start_lines() and start_daemon(), or start(). `networks`: the buses that are CAN
-    networks, with their YAML keys; `link_helper`: the socket of axisd-link."""
+    networks, with their YAML keys; `link_helper`: the socket of axisd-link; `turnaround`: how late drives on lines may
+    answer."""
 
-    def __init__(self, axes, baud=115200, serial_format="8N1", server=None, networks=None, link_helper=None):
-        self.axes = axes
+    def __init__(self, axes, baud=115200, serial_format="8N1", server=None, networks=None, link_helper=None,
+                 turnaround="1 s"):
+        self.axes, self.turnaround = axes, turnaround
         self.networks = networks or {}
         self.baud, self.serial_format = baud, serial_format
         # In memory where possible, so that a busy disk does not hold up simulators, which log.
@@ -103,7 +105,7 @@ class Machine:
             text += f"  {bus}:\n    canopen: {{ {', '.join(f'{key}: {value}' for key, value in keys.items())} }}\n"
         for bus in self.lines_used():
             text += (f"  {bus}:\n    modbus_rtu: {{ port: {self.path(bus)}, baud: {self.baud}, "
-                     f"format: {self.serial_format}, turnaround_max: 1 s }}\n")
+                     f"format: {self.serial_format}, turnaround_max: {self.turnaround} }}\n")
         text += "axes:\n"
         for name, axis in self.axes.items():
             text += f"  {name}:\n{axis.yaml()}"

@@ -77,6 +77,35 @@ TEST(TransactionQueue, WritesAndGuardedReadsNeverMerge) {
   EXPECT_EQ(queue.size(), 4U);
 }
 
+/// Of one axis: what is owed to its silent node, and what is asked for meanwhile.
+TEST(TransactionQueue, EqualStopsMergeAndBothAreTold) {
+  TransactionQueue queue;
+  int told = 0;
+  const auto stop_of = [&](std::uint8_t node, std::uint16_t value) {
+    auto stop = read_of(0x28, Class::stop, TimePoint::max(), node);
+    stop->exchange.request = {
+        .node = node, .function = Function::write_single_register, .address = 0x28, .values = {value}};
+    stop->exchange.frame = *encode(stop->exchange.request);
+    stop->on_end.emplace_back([&](const auto&, const auto&) { ++told; });
+    return stop;
+  };
+  auto owed = stop_of(1, 0);
+  owed->patient = owed->doubtful = true;
+  queue.push(std::move(owed));
+  queue.push(read_of(7, Class::moving_state));
+  queue.push(stop_of(1, 0));
+  queue.push(stop_of(2, 0));
+  queue.push(stop_of(1, 1));  // a quick stop
+  ASSERT_EQ(queue.size(), 4U);
+  EXPECT_EQ(queue.top_class(), Class::stop);
+  const auto merged = queue.pop();
+  EXPECT_EQ(merged->exchange.request.node, 1);
+  EXPECT_EQ(merged->exchange.request.values.front(), 0);
+  EXPECT_FALSE(merged->patient || merged->doubtful) << "as urgent as the more urgent one";
+  for (const auto& tell : merged->on_end) tell(*merged, {});
+  EXPECT_EQ(told, 2);
+}
+
 TEST(TransactionQueue, EveryEighthComesFromBelowButNeverBeforeAStop) {
   TransactionQueue queue(8);
   queue.push(read_of(100, Class::scan));
