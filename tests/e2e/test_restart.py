@@ -248,6 +248,26 @@ class Damage(CrashScenario):
         self.assertEqual(machine.sim.shaft().starts - self.before.starts, 1)
 
 
+class TornJournal(CrashScenario):
+    def test_a_last_line_that_was_never_durable_keeps_nobody_from_moving(self):
+        """What a crash of the computer may leave of a line behind the last one that was synced."""
+        machine = self.ready()
+        self.assert_command(machine.client.wait_ended(self.move(machine)), "DONE")
+        file = pathlib.Path(machine.state_directory) / "journal.v1"
+        for number, torn in enumerate((b"1", b"1c291ca3 9 acce", b"\0" * 300, "cut", "all but its end")):
+            machine.daemon.kill()
+            text = file.read_bytes()
+            last = text.splitlines()[-1]
+            left = {"cut": last[:len(last) // 2], "all but its end": last[:-1]}.get(torn, torn)
+            file.write_bytes(text + left)
+            machine.start_daemon()
+            machine.client.wait_online("feeder")
+            self.assertIn(f"ends in {len(left)} bytes of a line that a crash cut short", machine.daemon.log())
+            self.assertEqual(self.retry(machine).state, pb.COMMAND_STATE_DONE)
+            machine.client.to_done("Enable", "feeder")
+            machine.client.to_done("MoveRelative", "feeder", distance=1.0, request_id=f"after-{number}")
+
+
 class RepeatedByAxisctl(CrashScenario):
     def test_moves_once(self):
         machine = self.ready()
