@@ -123,6 +123,7 @@ class Example {
     fill(request, v1::WAIT_UNTIL_DONE);
     grpc::ClientContext context;
     check(stops_->Halt(&context, request, &response));
+    expect_done(response.command());  // else it may still be moving
   }
 
   std::string axis_;

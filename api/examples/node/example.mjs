@@ -60,7 +60,9 @@ if (!axis) {
   process.exit(2);
 }
 process.once('SIGINT', () => {
-  call(stops, 'Halt', { axis, options: options('WAIT_UNTIL_DONE') }).catch(({ message }) => console.error(message));
+  call(stops, 'Halt', { axis, options: options('WAIT_UNTIL_DONE') })
+    .then(({ command }) => expectDone(command))  // else it may still be moving
+    .catch(({ message }) => console.error(`${axis}: not halted: ${message}`));
 });
 try {
   expectDone((await call(axes, 'Enable', { axis, options: options('WAIT_UNTIL_DONE') })).command);
