@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -120,9 +121,12 @@ void AxisChecks::complete_scale() {
   if (!usable("unit") || !usable("scale.microstep") || !usable("scale.gear") || !usable("scale.travel"))
     return;
   if (!given("scale.travel")) {
-    if (scale.unit != "deg" && scale.unit != "rev") {
+    constexpr auto without_travel = std::to_array<std::string_view>({"deg", "rev"});
+    if (std::ranges::find(without_travel, scale.unit) == without_travel.end()) {
+      const auto meant = nearest(scale.unit, without_travel);
+      const auto unit = meant.empty() ? "" : fmt::format("did you mean unit: {}? else ", meant);
       add("scale.travel", fmt::format("missing key 'travel' in {}scale", path_),
-          fmt::format("for example travel: 5 {}/rev", scale.unit));
+          fmt::format("{}for example travel: 5 {}/rev", unit, scale.unit));
       return;
     }
     scale.travel_numerator = scale.unit == "deg" ? 360 : 1;
