@@ -10,7 +10,8 @@ import sys
 def running(*command, **options):
     """A process that must live until the end of the context."""
     name = pathlib.Path(sys.argv[0]).name
-    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options) as process:
+    options = {"stdin": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options
+    with subprocess.Popen(command, **options) as process:
         try:
             yield process
             if process.poll() is not None:

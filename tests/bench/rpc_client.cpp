@@ -8,6 +8,8 @@
 //   prints
 //                                           when each was called, arrived and was answered, and for which
 //                                           axis
+//   bench_rpc_client TARGET stop-all -      StopAll for each line that comes on the standard input; prints
+//                                           when each was called, arrived and was answered
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
@@ -24,6 +26,7 @@
 #include <vector>
 
 #include "axisd/v1/axis_service.grpc.pb.h"
+#include "axisd/v1/system_service.grpc.pb.h"
 
 namespace {
 
@@ -136,8 +139,21 @@ void stop(Stub& stub, int count) {
   }
 }
 
+void stop_all(v1::SystemService::Stub& stub) {
+  for (int c = std::getchar(); c != EOF; c = std::getchar()) {
+    if (c != '\n') continue;
+    grpc::ClientContext context;
+    v1::StopAllResponse response;
+    const auto begin = now();
+    must(stub.StopAll(&context, {}, &response), "StopAll");
+    std::printf("%lld %lld %lld\n", begin, monotonic(response.results(0).command().accepted_at()), now());
+    std::fflush(stdout);
+  }
+}
+
 int usage() {
-  std::fputs("usage: bench_rpc_client TARGET fetch FILE|get S|watch N S|stall N S|stop N\n", stderr);
+  std::fputs("usage: bench_rpc_client TARGET fetch FILE|get S|watch N S|stall N S|stop N|stop-all -\n",
+             stderr);
   return 2;
 }
 
@@ -145,8 +161,8 @@ int usage() {
 
 int main(int argc, char** argv) {
   if (argc < 4) return usage();
-  const auto stub =
-      v1::AxisService::NewStub(grpc::CreateChannel(argv[1], grpc::InsecureChannelCredentials()));
+  const auto channel = grpc::CreateChannel(argv[1], grpc::InsecureChannelCredentials());
+  const auto stub = v1::AxisService::NewStub(channel);
   const std::string_view command = argv[2];
   if (command == "fetch")
     fetch(*stub, argv[3]);
@@ -158,6 +174,8 @@ int main(int argc, char** argv) {
     watch(*stub, std::atoi(argv[3]), seconds(argv[4]), 1);
   else if (command == "stop")
     stop(*stub, std::atoi(argv[3]));
+  else if (command == "stop-all")
+    stop_all(*v1::SystemService::NewStub(channel));
   else
     return usage();
   return 0;

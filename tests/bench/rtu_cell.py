@@ -26,6 +26,7 @@ class Line:
         self.build, self.directory, self.baud, self.nodes = build, pathlib.Path(directory), baud, nodes
         self.silent, self.untimed = silent, untimed
         self.port, self.log = self.directory / name, self.directory / f"{name}.log"
+        self.hands = self.directory / f"{name}.ctl"  # control socket of axisd-sim
         # A slave keeps 3.5 characters of silence before it answers: no drive is faster.
         self.turnaround = 0 if untimed else silence(baud)
 
@@ -35,7 +36,7 @@ class Line:
         drives = [word for node in range(1, self.nodes + 1) for word in (
             "--drive", f"node={node},model=ykd2405pr" + (",powered=off" if node in self.silent else ""))]
         return [f"{self.build}/daemon/axisd-sim", "--link", self.port, "--baud", str(self.baud), "--turnaround-us",
-                str(round(self.turnaround * 1e6)), "--log", self.log, *drives]
+                str(round(self.turnaround * 1e6)), "--log", self.log, "--control", self.hands, *drives]
 
     @contextlib.contextmanager
     def open(self):

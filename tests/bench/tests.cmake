@@ -37,11 +37,13 @@ if(AXISD_GRPC)
     "${CMAKE_CURRENT_LIST_DIR}/can_bench.py ${CMAKE_BINARY_DIR} --rounds 1 --seconds 1 --nodes 2)\n"
     "add_test(bench.rtu /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rtu_bench.py ${CMAKE_BINARY_DIR} --turns 1 "
     "--rounds 1 --seconds 1 --nodes 4 --baud 115200 --stops 5)\n"
+    "add_test(bench.stop_all /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/stop_all_bench.py ${CMAKE_BINARY_DIR} --nodes 4 "
+    "--silent 1 3 --baud 115200 --stops 2 --report-only)\n"
     "add_test(bench.rpc /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rpc_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
     "--seconds 1)\n"
     "add_test(bench.machine /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/machine_bench.py ${CMAKE_BINARY_DIR} "
     "--rounds 1 --seconds 1 --axes 1)\n"
-    "set_tests_properties(bench.rtu bench.rpc bench.machine PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
+    "set_tests_properties(bench.rtu bench.stop_all bench.rpc bench.machine PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
     "set_tests_properties(bench.bring-up bench.core bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"
     "set_tests_properties(bench.sync_in_guest PROPERTIES RESOURCE_LOCK guest COST 100)\n")
   file(GENERATE OUTPUT ${include_file} CONTENT "${text}")

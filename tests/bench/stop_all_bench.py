@@ -1,0 +1,161 @@
+"""StopAll on an RS-485 line of 16 drives that is asked as fast as it allows, some of which do not answer: from its arrival
+at the daemon to the last byte of the last stop frame of a drive that answers, and of the last of all, beside the bound
+that axisd publishes (M15). Ends with 1 if more than the computer can be blamed for is beyond that bound.
+
+    stop_all_bench.py BUILD [--nodes N] [--silent N ...] [--baud BAUD ...] [--stops N] [--report-only]
+"""
+import argparse
+import contextlib
+import dataclasses
+import os
+import pathlib
+import random
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+from figures import running, table
+from rtu_cell import SERVER, Cell, Line
+from rtu_stops import HOST_ALLOWANCE, STOP, bare_waits, late_wakes, requests_of
+
+STOP_BYTES = 8
+POLL = "1 ms"  # a refresh period that no line of 16 can keep: it is never idle
+#: Whether axisd knows by then that they do not answer. Who does gets its frame as if they were not there, if it does.
+FRESH, KNOWN = "since just now", "for seconds"
+
+
+@dataclasses.dataclass
+class Stop:
+    answering: float  # from its arrival to the last byte of the last frame to a drive that answers, s
+    last: float  # the same of all drives, s
+    stalls: float  # how long bare threads were held back meanwhile, s, one after the other
+
+    def less_stalls(self):
+        """`last` without what the computer took beyond what the published bound leaves to it."""
+        return self.last - max(0.0, self.stalls - HOST_ALLOWANCE)
+
+
+class Hands:
+    """The control socket of axisd-sim."""
+
+    def __init__(self, path):
+        self.socket = socket.socket(socket.AF_UNIX)
+        self.socket.connect(str(path))
+        self.replies = self.socket.makefile()
+
+    def do(self, command):
+        self.socket.sendall(command.encode() + b"\n")
+        reply = self.replies.readline()
+        if not reply.startswith("ok"):
+            sys.exit(f"stop_all_bench.py: {command}: {reply}")
+
+
+def held_back(waits, begin, end):
+    """Sum of the times from `begin` to `end` in which a bare thread waited to be let on."""
+    total, until = 0.0, begin
+    for due, awake in sorted(waits):
+        total += max(0.0, min(awake, end) - max(due, until))
+        until = max(until, min(awake, end))
+    return total
+
+
+def judge(line, given, waits, silent, arrived):
+    """The Stop that arrived at this time: the first stop frame to each drive from then on."""
+    ends = {}
+    for at, frame in given:
+        if at >= arrived and frame[2:12] == STOP:
+            ends.setdefault(int(frame[:2], 16), at + line.wire(STOP_BYTES) - arrived)
+    missing = set(range(1, line.nodes + 1)) - set(ends)
+    if missing:
+        sys.exit(f"stop_all_bench.py: no stop frame went to the drives {sorted(missing)}")
+    last = max(ends.values())
+    return Stop(answering=max(end for node, end in ends.items() if node not in silent), last=last,
+                stalls=held_back(waits, arrived, arrived + last))
+
+
+def wait_online(cell, count):
+    end = time.monotonic() + 120
+    while time.monotonic() < end:
+        axes = cell.ask("list").get("axes", [])
+        if sum(axis.get("link") == "LINK_STATE_ONLINE" for axis in axes) == count:
+            return
+        time.sleep(0.1)
+    sys.exit(f"stop_all_bench.py: not {count} axes online")
+
+
+def published(cell):
+    """From the arrival of a stop of all axes to its last byte, in s."""
+    axes = cell.ask("budget")["budgets"][0]["axes"]
+    return max(float(axis["stop_all"]["last_frame"].rstrip("s")) for axis in axes)
+
+
+def measure(build, baud, given, silent_counts):
+    """(how many silent, since when) -> its Stops; and the bound."""
+    chance, calls = random.Random(baud), []
+    with tempfile.TemporaryDirectory() as directory, Line(build, directory, baud, given.nodes).open() as line:
+        cell = Cell(build, [line], POLL)
+        log, waits_log = pathlib.Path(directory) / "wire.log", pathlib.Path(directory) / "waits.log"
+        with cell.online("--wire-log", log), bare_waits(build, waits_log), contextlib.ExitStack() as stack:
+            bound, hands = published(cell), Hands(line.hands)
+            client = stack.enter_context(running(f"{build}/tests/bench_rpc_client", SERVER, "stop-all", "-",
+                                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
+            for number in range(given.stops):
+                for count in silent_counts:
+                    silent = sorted(chance.sample(range(1, given.nodes + 1), count))
+                    known = count > 0 and number % 2 == 1
+                    wait_online(cell, given.nodes)
+                    for node in silent:
+                        hands.do(f"fault drop_request count=-1 node={node}")
+                    if known:
+                        wait_online(cell, given.nodes - count)
+                    time.sleep(chance.uniform(0, 0.03))
+                    client.stdin.write("\n")
+                    client.stdin.flush()
+                    _, arrived, _ = client.stdout.readline().split()
+                    calls.append((count, KNOWN if known else FRESH if count else "", silent, int(arrived) / 1e9))
+                    time.sleep(bound + 0.3)
+                    hands.do("fault clear")
+                    cell.ask("release-stop", "--all")
+        sent, waits = requests_of(log), late_wakes(waits_log)
+    found = {}
+    for count, since, silent, arrived in calls:
+        found.setdefault((count, since), []).append(judge(line, sent, waits, silent, arrived))
+    return found, bound
+
+
+def milliseconds(values):
+    """Median and maximum."""
+    return f"{statistics.median(values) * 1e3:.1f} / {max(values) * 1e3:.1f}"
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("build")
+    parser.add_argument("--nodes", type=int, default=16, help="2 to 127")
+    parser.add_argument("--silent", type=int, nargs="*", default=[0, 1, 4, 15])
+    parser.add_argument("--baud", type=int, nargs="*", default=[115200, 9600])
+    parser.add_argument("--stops", type=int, default=60, help="of each kind; every other one of drives known to be silent")
+    parser.add_argument("--report-only", action="store_true", help="ends with 0 whatever was seen")
+    given = parser.parse_args()
+    build, within = os.path.abspath(given.build), True
+    rows = [["bit/s", "silent", "", "stops", "last answering", "last of all", "less stalls", "published", "met"]]
+    for baud in given.baud:
+        found, bound = measure(build, baud, given, given.silent)
+        for (count, since), stops in sorted(found.items()):
+            met = max(stop.less_stalls() for stop in stops) <= bound
+            within = within and met
+            rows.append([str(baud), f"{count} of {given.nodes}", since, str(len(stops)),
+                         milliseconds([stop.answering for stop in stops]), milliseconds([stop.last for stop in stops]),
+                         f"{max(stop.less_stalls() for stop in stops) * 1e3:.1f}", f"{bound * 1e3:.1f}",
+                         "yes" if met else "NO"])
+    print("\nStopAll: from its arrival to the last byte of a stop frame, ms, median / longest; less stalls: the longest without "
+          "what bare threads were held back beyond host_allowance")
+    table(rows)
+    return 0 if within or given.report_only else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
