@@ -13,6 +13,7 @@
 #include "api/server/pending_call.hpp"
 #include "api/server/reply_stream.hpp"
 #include "api/server/status.hpp"
+#include "api/server/stop_requests.hpp"
 #include "api/server/value_reply.hpp"
 #include "api/server/watch_hub.hpp"
 
@@ -49,33 +50,21 @@ AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request&
 template <class Request, class Response>
 AxisServiceImpl::Reactor* AxisServiceImpl::stop(Context* context, const Request& request,
                                                 Response* response) {
-  const auto client = client_of(*context);
-  const auto& what = Request::descriptor()->name();
-  if (auto axis = find_axis(services_.machine, request.axis()); !axis)
-    return refuse(context, client, what, axis.error());
-  auto action = to_action(request);
-  if (!action) return refuse(context, client, what, action.error());
-  std::function<void()> also;
-  if constexpr (requires { response->mutable_holds(); })
-    if (request.hold())
-      also = [&machine = services_.machine, axis = request.axis(), response] {
-        if (const auto now = machine.snapshot(axis)) to_proto(now->holds, *response->mutable_holds());
-      };
-  return submit(context, request.axis(), *std::move(action), stop_options(request.options(), client), {},
-                response->mutable_command(), std::move(also));
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    handle(services_.machine, request, client_of(*context), call, response);
+  });
 }
 
 AxisServiceImpl::Reactor* AxisServiceImpl::submit(Context* context, const std::string& axis, Action action,
                                                   Submission submission, Admission::Ticket ticket,
-                                                  v1::Command* command, std::function<void()> also) {
+                                                  v1::Command* command) {
   const auto what = to_string(kind_of(action));
   return PendingCall::start(
       services_, context, std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
         auto client = submission.options.client;
-        services_.machine.submit(
-            axis, std::move(action), std::move(submission.options), submission.until,
-            reply_with_command(call, command, std::move(client), axis, what, std::move(also),
-                               services_.machine.wall(services_.machine.now())));
+        services_.machine.submit(axis, std::move(action), std::move(submission.options), submission.until,
+                                 reply_with_command(call, command, std::move(client), axis, what, {},
+                                                    services_.machine.wall(services_.machine.now())));
       });
 }
 

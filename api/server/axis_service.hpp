@@ -49,9 +49,8 @@ class AxisServiceImpl final
   /// Submits a stop: on its own lane, never limited, never refused for its options.
   template <class Request, class Response>
   Reactor* stop(Context* context, const Request& request, Response* response);
-  /// `also`: as of reply_with_command().
   Reactor* submit(Context* context, const std::string& axis, Action action, Submission submission,
-                  Admission::Ticket ticket, v1::Command* command, std::function<void()> also = {});
+                  Admission::Ticket ticket, v1::Command* command);
 
   const Services services_;
 };

@@ -8,6 +8,7 @@
 #include "api/server/bus_watch_convert.hpp"
 #include "api/server/paced_stream.hpp"
 #include "api/server/peer.hpp"
+#include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"

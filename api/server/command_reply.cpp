@@ -31,8 +31,8 @@ void log(std::string_view client, std::string_view subject, std::string_view wha
 
 }  // namespace
 
-Machine::CommandCallback reply_with_command(std::shared_ptr<PendingCall> call, v1::Command* to,
-                                            std::string client, std::string subject, std::string_view what,
+Machine::CommandCallback reply_with_command(ReplyPtr call, v1::Command* to, std::string client,
+                                            std::string subject, std::string_view what,
                                             std::function<void()> also, std::optional<WallTime> called) {
   return [call = std::move(call), to, client = std::move(client), subject = std::move(subject), what,
           also = std::move(also), called](Result<Command> result) {

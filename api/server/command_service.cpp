@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "api/server/command_reply.hpp"
 #include "api/server/command_stream.hpp"
 #include "api/server/convert.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
+#include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
 
 namespace axisd::server {
@@ -84,12 +84,8 @@ grpc::ServerWriteReactor<v1::WatchCommandResponse>* CommandServiceImpl::WatchCom
 grpc::ServerUnaryReactor* CommandServiceImpl::CancelCommand(Context* context,
                                                             const v1::CancelCommandRequest* request,
                                                             v1::CancelCommandResponse* response) {
-  if (const auto valid = check_command_id(request->id()); !valid)
-    return answer(context, to_status(valid.error()));
-  auto* command = response->mutable_command();
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    services_.machine.cancel_command(
-        request->id(), reply_with_command(call, command, client_of(*context), request->id(), "cancel"));
+    handle(services_.machine, *request, client_of(*context), call, response);
   });
 }
 

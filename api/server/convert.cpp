@@ -107,6 +107,15 @@ void to_proto(const Command& from, v1::Command& to) {
   if (from.ended_at) to_proto(*from.ended_at, *to.mutable_ended_at());
 }
 
+void to_proto(const Lease& from, const Machine& machine, v1::Lease& to) {
+  to.set_client(from.client);
+  to.set_label(from.label);
+  for (const auto& axis : from.axes) to.add_axes(axis);
+  to_proto(from.ttl, *to.mutable_ttl());
+  to_proto(std::max(from.expires - machine.now(), Duration::zero()), *to.mutable_remaining());
+  to_proto(machine.wall(from.acquired), *to.mutable_acquired_at());
+}
+
 void to_proto(const std::vector<StopHold>& from, google::protobuf::RepeatedPtrField<v1::StopHold>& to) {
   for (const auto& hold : from) {
     auto& entry = *to.Add();

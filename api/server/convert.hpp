@@ -5,6 +5,7 @@
 
 #include "axisd/v1/bus_service.pb.h"
 #include "axisd/v1/error.pb.h"
+#include "axisd/v1/lease_service.pb.h"
 #include "axisd/v1/types.pb.h"
 #include "devices/machine.hpp"
 
@@ -28,6 +29,8 @@ void to_proto(const MotionValues& from, v1::MotionValues& to);
 void to_proto(const Command& from, v1::Command& to);
 /// Those who hold an axis, added to `to`.
 void to_proto(const std::vector<StopHold>& from, google::protobuf::RepeatedPtrField<v1::StopHold>& to);
+/// What is left of it is counted from Machine::now().
+void to_proto(const Lease& from, const Machine& machine, v1::Lease& to);
 /// `now` is Machine::now() of this very message: AxisState.age is counted up to it.
 void to_proto(const AxisSnapshot& from, TimePoint now, v1::AxisState& to);
 /// The times alone, where the rest is as it was: those that `to` has.

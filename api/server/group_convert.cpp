@@ -60,6 +60,12 @@ Result<GroupMoveRequest> to_request(const v1::MoveGroupRequest& from) {
   return request;
 }
 
+Error nothing_named() {
+  return {.reason = Reason::invalid_argument,
+          .message = "neither a group nor an axis is named",
+          .remedy = "name one, or use StopAll"};
+}
+
 void to_proto(const GroupSettings& from, v1::Group& to) {
   to.set_name(from.name);
   for (const auto& axis : from.axes) to.add_axes(axis);

@@ -14,20 +14,11 @@
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
+#include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
 
 namespace axisd::server {
-namespace {
-
-Error nothing_named() {
-  return {.reason = Reason::invalid_argument,
-          .message = "neither a group nor an axis is named",
-          .remedy = "name one, or use StopAll"};
-}
-
-}  // namespace
-
 GroupServiceImpl::Reactor* GroupServiceImpl::ListGroups(Context* context, const v1::ListGroupsRequest*,
                                                         v1::ListGroupsResponse* response) {
   for (const auto& group : services_.machine.group_access().groups())
@@ -71,53 +62,18 @@ GroupServiceImpl::Reactor* GroupServiceImpl::GetGroupMove(Context* context,
       });
 }
 
-template <class Request, class Response>
-GroupServiceImpl::Reactor* GroupServiceImpl::stop(Context* context, const Request& request, StopKind kind,
-                                                  Response* response) {
-  const auto client = client_of(*context);
-  GroupStopRequest wanted{
-      .group = request.group(), .axes = {request.axes().begin(), request.axes().end()}, .kind = kind};
-  if constexpr (requires { request.hold(); }) {
-    wanted.hold = request.hold();
-    wanted.request_id = hold_id(request.request_id());
-  }
-  const bool hold = wanted.hold;
-  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    services_.machine.group_access().stop(
-        std::move(wanted), client, stop_all_wait(request.wait_until()),
-        [call, response, client, kind, hold,
-         &machine = services_.machine](std::vector<GroupStopResult> results) {
-          const auto shared = std::make_shared<const std::vector<GroupStopResult>>(std::move(results));
-          call->complete(
-              [response, shared, hold, &machine]() -> grpc::Status {
-                for (const auto& result : *shared) {
-                  auto& entry = *response->add_results();
-                  to_proto(result, entry);
-                  const auto now = hold ? machine.snapshot(result.axis) : nullptr;
-                  if (now) to_proto(now->holds, *entry.mutable_holds());
-                }
-                if (shared->empty()) return to_status(nothing_named());
-                const bool nothing = std::ranges::all_of(*shared, [](const GroupStopResult& result) {
-                  return !result.command && result.command.error().reason == Reason::unknown_axis;
-                });
-                return nothing ? to_status(shared->front().command.error()) : grpc::Status::OK;
-              },
-              [client, kind, shared] {
-                spdlog::info("{}: group {} of {} axes", client, kind == StopKind::halt ? "halt" : "stop",
-                             shared->size());
-              });
-        });
-  });
-}
-
 GroupServiceImpl::Reactor* GroupServiceImpl::GroupHalt(Context* context, const v1::GroupHaltRequest* request,
                                                        v1::GroupHaltResponse* response) {
-  return stop(context, *request, StopKind::halt, response);
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    handle(services_.machine, *request, client_of(*context), call, response);
+  });
 }
 
 GroupServiceImpl::Reactor* GroupServiceImpl::GroupStop(Context* context, const v1::GroupStopRequest* request,
                                                        v1::GroupStopResponse* response) {
-  return stop(context, *request, StopKind::stop, response);
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    handle(services_.machine, *request, client_of(*context), call, response);
+  });
 }
 
 GroupServiceImpl::Reactor* GroupServiceImpl::GroupReleaseStop(Context* context,

@@ -27,9 +27,6 @@ class GroupServiceImpl final : public v1::GroupService::CallbackService {
                             v1::GroupReleaseStopResponse* response) override;
 
  private:
-  template <class Request, class Response>
-  Reactor* stop(Context* context, const Request& request, StopKind kind, Response* response);
-
   const Services services_;
 };
 

@@ -10,6 +10,7 @@
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
+#include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
 
@@ -17,15 +18,6 @@ namespace axisd::server {
 namespace {
 
 constexpr std::size_t longest_label = 64;
-
-void to_proto(const Lease& from, const Machine& machine, v1::Lease& to) {
-  to.set_client(from.client);
-  to.set_label(from.label);
-  for (const auto& axis : from.axes) to.add_axes(axis);
-  server::to_proto(from.ttl, *to.mutable_ttl());
-  server::to_proto(std::max(from.expires - machine.now(), Duration::zero()), *to.mutable_remaining());
-  server::to_proto(machine.wall(from.acquired), *to.mutable_acquired_at());
-}
 
 /// Labels appear in the log and in errors for others: they must not be able to forge lines there.
 bool usable_label(std::string_view label) {
@@ -109,11 +101,7 @@ LeaseServiceImpl::Reactor* LeaseServiceImpl::RenewLease(Context* context,
                                                         const v1::RenewLeaseRequest* request,
                                                         v1::RenewLeaseResponse* response) {
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    services_.machine.lease_access().renew(
-        {.client = client_of(*context), .lease_token = request->lease_token()},
-        reply_with_value<Lease>(call, [response, &machine = services_.machine](const Lease& lease) {
-          to_proto(lease, machine, *response->mutable_lease());
-        }));
+    handle(services_.machine, *request, client_of(*context), call, response);
   });
 }
 

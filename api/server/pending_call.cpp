@@ -20,7 +20,7 @@ grpc::ServerUnaryReactor* PendingCall::start(const Services& services, grpc::Cal
   return call.get();
 }
 
-void PendingCall::complete(Fill fill, ReplyThread::Job always) {
+void PendingCall::complete(Fill fill, Job always) {
   reply_->post([call = shared_from_this(), fill = std::move(fill), always = std::move(always)]() mutable {
     if (always) always();
     if (!call->finished_) call->finish(fill());

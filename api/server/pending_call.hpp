@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 
+#include "api/server/reply.hpp"
 #include "api/server/services.hpp"
 
 namespace axisd::server {
@@ -16,11 +17,10 @@ namespace axisd::server {
 ///
 ///   gRPC thread  --start()--> Machine        core thread  --complete()--> reply thread  --Finish--> gRPC
 class PendingCall final : public grpc::ServerUnaryReactor,
+                          public Reply,
                           public OpenCall,
                           public std::enable_shared_from_this<PendingCall> {
  public:
-  /// Fills the response and gives the status. Runs on the reply thread, and only while the response exists.
-  using Fill = std::move_only_function<grpc::Status()>;
   /// Asks the machine; must arrange for complete() to be called.
   using Ask = std::function<void(std::shared_ptr<PendingCall> call)>;
 
@@ -30,9 +30,8 @@ class PendingCall final : public grpc::ServerUnaryReactor,
   static grpc::ServerUnaryReactor* start(const Services& services, grpc::CallbackServerContext* context,
                                          Admission::Ticket ticket, const Ask& ask);
 
-  /// Answers the client, unless the call has ended; `always` runs before, on the same thread, in any case.
-  /// Cheap. Thread: any; meant for the core.
-  void complete(Fill fill, ReplyThread::Job always = {});
+  /// On the reply thread.
+  void complete(Fill fill, Job always = {}) override;
 
   void close(const grpc::Status& status) override;
   void OnCancel() override;

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "api/server/pending_call.hpp"
+#include "api/server/reply.hpp"
 #include "api/server/status.hpp"
 
 namespace axisd::server {
@@ -18,8 +18,8 @@ namespace axisd::server {
 /// exists, or with the error's status. `what` ("local:unix: feeder save_parameters") is logged with the
 /// outcome, also if the client has left; empty: nothing is logged.
 template <class Value, class Fill>
-[[nodiscard]] std::function<void(Result<Value>)> reply_with_value(std::shared_ptr<PendingCall> call,
-                                                                  Fill fill, std::string what = {}) {
+[[nodiscard]] std::function<void(Result<Value>)> reply_with_value(ReplyPtr call, Fill fill,
+                                                                  std::string what = {}) {
   return [call = std::move(call), fill = std::move(fill), what = std::move(what)](Result<Value> result) {
     // On the core thread: nothing but handing over.
     const auto shared = std::make_shared<const Result<Value>>(std::move(result));

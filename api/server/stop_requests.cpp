@@ -1,0 +1,167 @@
+#include "api/server/stop_requests.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "api/server/command_reply.hpp"
+#include "api/server/convert.hpp"
+#include "api/server/group_convert.hpp"
+#include "api/server/hold_validate.hpp"
+#include "api/server/status.hpp"
+#include "api/server/validate.hpp"
+#include "api/server/value_reply.hpp"
+
+namespace axisd::server {
+namespace {
+
+/// No machine has as many axes and groups; looking for names that there are not must cost no stop its time.
+constexpr int most_names = 1024;
+
+void refuse(const ReplyPtr& reply, const std::string& client, std::string_view what, const Error& error) {
+  reply->complete([error] { return to_status(error); },
+                  [client, what = std::string(what), error] {
+                    spdlog::info("{}: {} refused: {}", client, what, to_string(error));
+                  });
+}
+
+template <class Request, class Response>
+void stop_axis(Machine& machine, const Request& request, const std::string& client, const ReplyPtr& reply,
+               Response* response) {
+  const auto& name = Request::descriptor()->name();
+  if (auto axis = find_axis(machine, request.axis()); !axis) return refuse(reply, client, name, axis.error());
+  auto action = to_action(request);
+  if (!action) return refuse(reply, client, name, action.error());
+  std::function<void()> also;
+  if constexpr (requires { response->mutable_holds(); })
+    if (request.hold())
+      also = [&machine, axis = request.axis(), response] {
+        if (const auto now = machine.snapshot(axis)) to_proto(now->holds, *response->mutable_holds());
+      };
+  auto submission = stop_options(request.options(), client);
+  const auto what = to_string(kind_of(*action));
+  machine.submit(request.axis(), *std::move(action), std::move(submission.options), submission.until,
+                 reply_with_command(reply, response->mutable_command(), client, request.axis(), what,
+                                    std::move(also), machine.wall(machine.now())));
+}
+
+template <class Request, class Response>
+void stop_group(Machine& machine, const Request& request, StopKind kind, const std::string& client,
+                const ReplyPtr& reply, Response* response) {
+  if (request.axes_size() > most_names)
+    return refuse(reply, client, Request::descriptor()->name(),
+                  {.reason = Reason::invalid_argument,
+                   .message = fmt::format("axes has {} names, more than {}", request.axes_size(), most_names),
+                   .remedy = "name each axis once, or use StopAll"});
+  GroupStopRequest wanted{
+      .group = request.group(), .axes = {request.axes().begin(), request.axes().end()}, .kind = kind};
+  if constexpr (requires { request.hold(); }) {
+    wanted.hold = request.hold();
+    wanted.request_id = hold_id(request.request_id());
+  }
+  const bool hold = wanted.hold;
+  machine.group_access().stop(
+      std::move(wanted), client, stop_all_wait(request.wait_until()),
+      [reply, response, client, kind, hold, &machine](std::vector<GroupStopResult> results) {
+        const auto shared = std::make_shared<const std::vector<GroupStopResult>>(std::move(results));
+        reply->complete(
+            [response, shared, hold, &machine]() -> grpc::Status {
+              for (const auto& result : *shared) {
+                auto& entry = *response->add_results();
+                to_proto(result, entry);
+                const auto now = hold ? machine.snapshot(result.axis) : nullptr;
+                if (now) to_proto(now->holds, *entry.mutable_holds());
+              }
+              if (shared->empty()) return to_status(nothing_named());
+              const bool nothing = std::ranges::all_of(*shared, [](const GroupStopResult& result) {
+                return !result.command && result.command.error().reason == Reason::unknown_axis;
+              });
+              return nothing ? to_status(shared->front().command.error()) : grpc::Status::OK;
+            },
+            [client, kind, shared] {
+              spdlog::info("{}: group {} of {} axes", client, kind == StopKind::halt ? "halt" : "stop",
+                           shared->size());
+            });
+      });
+}
+
+using Results = std::vector<Result<Command>>;
+
+void to_proto(const Results& results, const std::vector<std::string>& axes, v1::StopAllResponse& to) {
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    auto& entry = *to.add_results();
+    if (i < axes.size()) entry.set_axis(axes[i]);  // the machine answers in its axes' order
+    if (results[i]) {
+      entry.set_axis(results[i]->axis);
+      server::to_proto(*results[i], *entry.mutable_command());
+    } else {
+      server::to_proto(results[i].error(), *entry.mutable_error());
+    }
+  }
+}
+
+}  // namespace
+
+void handle(Machine& machine, const v1::HaltRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::HaltResponse* response) {
+  stop_axis(machine, request, client, reply, response);
+}
+void handle(Machine& machine, const v1::StopRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::StopResponse* response) {
+  stop_axis(machine, request, client, reply, response);
+}
+void handle(Machine& machine, const v1::QuickStopRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::QuickStopResponse* response) {
+  stop_axis(machine, request, client, reply, response);
+}
+void handle(Machine& machine, const v1::DisableRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::DisableResponse* response) {
+  stop_axis(machine, request, client, reply, response);
+}
+void handle(Machine& machine, const v1::GroupHaltRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::GroupHaltResponse* response) {
+  stop_group(machine, request, StopKind::halt, client, reply, response);
+}
+void handle(Machine& machine, const v1::GroupStopRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::GroupStopResponse* response) {
+  stop_group(machine, request, StopKind::stop, client, reply, response);
+}
+
+void handle(Machine& machine, const v1::StopAllRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::StopAllResponse* response) {
+  auto axes = machine.axis_names();
+  machine.stop_all(client, stop_all_wait(request.wait_until()),
+                   [reply, response, client, axes = std::move(axes)](Results results) {
+                     const auto shared = std::make_shared<const Results>(std::move(results));
+                     reply->complete(
+                         [response, axes, shared] {
+                           to_proto(*shared, axes, *response);
+                           return grpc::Status::OK;
+                         },
+                         [client, shared] {
+                           spdlog::info("{}: stop_all of {} axes, inhibit latched", client, shared->size());
+                         });
+                   });
+}
+
+void handle(Machine& machine, const v1::RenewLeaseRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::RenewLeaseResponse* response) {
+  machine.lease_access().renew({.client = client, .lease_token = request.lease_token()},
+                               reply_with_value<Lease>(reply, [response, &machine](const Lease& lease) {
+                                 to_proto(lease, machine, *response->mutable_lease());
+                               }));
+}
+
+void handle(Machine& machine, const v1::CancelCommandRequest& request, const std::string& client,
+            const ReplyPtr& reply, v1::CancelCommandResponse* response) {
+  if (const auto valid = check_command_id(request.id()); !valid)
+    return refuse(reply, client, "cancel", valid.error());
+  machine.cancel_command(
+      request.id(), reply_with_command(reply, response->mutable_command(), client, request.id(), "cancel"));
+}
+
+}  // namespace axisd::server
