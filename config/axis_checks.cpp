@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
 
+#include "buses/regular_file.hpp"
 #include "config/checks.hpp"
 #include "config/quantity.hpp"
 #include "config/text.hpp"
@@ -59,11 +58,13 @@ std::string AxisChecks::velocity_text(double value) const {
   return fmt::format("{} {}/s", format_number(value), axis_.scale.unit);
 }
 
+/// Files that are named in a configuration are smaller.
+constexpr std::size_t largest_file = 4U << 20U;
+
 /// Of the content of a file; 0 for none that can be read.
 std::size_t content_of(const SettingValue& path) {
-  std::ifstream file(std::get<std::string>(path), std::ios::binary);
-  if (!file) return 0;
-  return std::hash<std::string>()(std::string(std::istreambuf_iterator<char>(file), {}));
+  const auto text = read_regular_file(std::get<std::string>(path), largest_file);
+  return text ? std::hash<std::string>()(*text) : 0;
 }
 
 void AxisChecks::specialise() {

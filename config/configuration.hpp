@@ -100,7 +100,8 @@ using TlsCheck = std::function<std::vector<std::pair<std::string_view, Error>>(c
 /// `check_tls`: empty: the files that it names are not looked at.
 LoadResult load_file(const std::string& path, const std::string& original = {},
                      const TlsCheck& check_tls = {});
-LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls = {});
+LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls = {},
+                     Duration longest = Duration::max());
 
 /// JSON Schema (draft 2020-12) of the file, generated from the definitions that the loader uses.
 std::string json_schema();

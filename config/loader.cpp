@@ -7,6 +7,7 @@
 #include <expected>
 #include <system_error>
 
+#include "buses/clock.hpp"
 #include "config/checks.hpp"
 #include "config/configuration.hpp"
 #include "config/document.hpp"
@@ -42,7 +43,8 @@ std::expected<std::string, std::error_code> read_file(const std::string& path) {
 
 }  // namespace
 
-LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls) try {
+LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls,
+                     Duration longest) try {
   Diagnostics diagnostics(file_name);
   const auto document = parse_document(text);
   if (!document) {
@@ -52,7 +54,15 @@ LoadResult load_text(std::string_view text, const std::string& file_name, const 
   Configuration configuration;
   Places places;
   Reader(configuration, diagnostics, places).read(**document);
-  for (auto& entry : configuration.axes) complete_axis(entry, diagnostics, places);
+  // Each may name a file of its own that takes its time.
+  const auto begun = monotonic_now();
+  for (auto& entry : configuration.axes) {
+    complete_axis(entry, diagnostics, places);
+    if (monotonic_now() - begun <= longest) continue;
+    diagnostics.add(Mark{}, fmt::format("checking {} axes takes too long", configuration.axes.size()),
+                    "use smaller files in drive: { eds: ... }, or fewer axes");
+    break;
+  }
   check_devices(configuration, diagnostics, places);
   check_machine(configuration, diagnostics, places);
   if (check_tls) check_tls_files(configuration, check_tls, diagnostics, places);

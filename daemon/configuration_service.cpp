@@ -6,10 +6,11 @@
 #include <chrono>
 #include <fstream>
 #include <future>
-#include <iterator>
 #include <utility>
 
+#include "buses/regular_file.hpp"
 #include "config/budget.hpp"
+#include "config/document.hpp"
 #include "config/fields.hpp"
 #include "daemon/store/line_text.hpp"
 #include "daemon/store/thread.hpp"
@@ -17,6 +18,11 @@
 namespace axisd {
 
 namespace {
+
+/// Checks and the like that may wait for others.
+constexpr std::size_t most_looks = 8;
+/// Spent on one of them; the others wait meanwhile.
+constexpr auto longest_look = std::chrono::seconds(2);
 
 std::string revision_of(std::string_view yaml) {
   return fmt::format("{:08x}-{}", store::crc32(yaml), yaml.size());
@@ -56,6 +62,12 @@ Error under_way() {
           .remedy = "wait for its end"};
 }
 
+Error too_many_look() {
+  return {.reason = Reason::busy,
+          .message = "other configurations are being checked",
+          .remedy = "wait for the end of these checks, then ask again"};
+}
+
 Error closing() {
   return {.reason = Reason::cancelled,
           .message = "the daemon is shutting down",
@@ -65,7 +77,9 @@ Error closing() {
 }  // namespace
 
 ConfigurationService::ConfigurationService(Parts parts)
-    : parts_(std::move(parts)), served_(served_from(parts_.path, parts_.yaml, parts_.since)) {
+    : parts_(std::move(parts)),
+      served_(served_from(parts_.path, parts_.yaml, parts_.since)),
+      looks_(most_looks) {
   thread_ = store::start_thread([this] { run(); });
 }
 
@@ -78,6 +92,7 @@ void ConfigurationService::close() {
   }
   wake_.notify_one();
   if (thread_.joinable()) thread_.join();
+  looks_.close();
 }
 
 std::shared_ptr<const ServedConfiguration> ConfigurationService::served() const {
@@ -85,22 +100,23 @@ std::shared_ptr<const ServedConfiguration> ConfigurationService::served() const 
   return served_;
 }
 
-std::string ConfigurationService::file_revision() const {
-  constexpr std::size_t longest = 1 << 20;  // more than the loader takes
-  std::ifstream file(parts_.path, std::ios::binary);
-  std::string text(longest, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!file.eof()) return {};
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  return revision_of(text);
+void ConfigurationService::file_revision(std::function<void(Result<std::string>)> callback) {
+  const bool taken = looks_.post([this, callback] {
+    const auto text = read_regular_file(parts_.path, config::largest_text);
+    callback(text ? revision_of(*text) : std::string());
+  });
+  if (!taken) callback(fail(too_many_look()));
 }
 
-ConfigurationCheck ConfigurationService::check(std::string_view yaml) const {
-  auto loaded = config::load_text(yaml, parts_.path, parts_.check_tls);
-  return {
-      .findings = findings_of(std::move(loaded.diagnostics)),
-      .warnings = loaded.configuration ? config::warnings(*loaded.configuration) : std::vector<std::string>(),
-      .revision = revision_of(yaml)};
+void ConfigurationService::check(std::string yaml, std::function<void(Result<ConfigurationCheck>)> callback) {
+  const bool taken = looks_.post([this, callback, yaml = std::move(yaml)] {
+    auto loaded = config::load_text(yaml, parts_.path, parts_.check_tls, longest_look);
+    callback(ConfigurationCheck{.findings = findings_of(std::move(loaded.diagnostics)),
+                                .warnings = loaded.configuration ? config::warnings(*loaded.configuration)
+                                                                 : std::vector<std::string>(),
+                                .revision = revision_of(yaml)});
+  });
+  if (!taken) callback(fail(too_many_look()));
 }
 
 void ConfigurationService::reload(std::string client, bool dry_run,

@@ -8,13 +8,15 @@
 #include <thread>
 
 #include "config/configuration.hpp"
+#include "daemon/bounded_worker.hpp"
 #include "daemon/core/reload.hpp"
 #include "devices/configuration_access.hpp"
 
 namespace axisd {
 
 /// The file that the daemon serves, and the loader that judges others like it. Reloads are made one at a time
-/// on a thread of its own, because they read files and wait for the machine. Thread: any.
+/// on a thread of its own, because they read files and wait for the machine; what only looks at files has
+/// another one, so that no reload waits for it. Thread: any.
 class ConfigurationService final : public ConfigurationAccess {
  public:
   struct Parts {
@@ -36,8 +38,8 @@ class ConfigurationService final : public ConfigurationAccess {
   ~ConfigurationService() override;
 
   [[nodiscard]] std::shared_ptr<const ServedConfiguration> served() const override;
-  [[nodiscard]] std::string file_revision() const override;
-  [[nodiscard]] ConfigurationCheck check(std::string_view yaml) const override;
+  void file_revision(std::function<void(Result<std::string>)> callback) override;
+  void check(std::string yaml, std::function<void(Result<ConfigurationCheck>)> callback) override;
   void reload(std::string client, bool dry_run,
               std::function<void(Result<ConfigurationReload>)> callback) override;
   /// Copies what is served to `last_good`: it proved to be of use.
@@ -63,6 +65,7 @@ class ConfigurationService final : public ConfigurationAccess {
   bool busy_ = false;                                  // guarded by mutex_
   bool closing_ = false;                               // guarded by mutex_
   std::thread thread_;
+  BoundedWorker looks_;
 };
 
 }  // namespace axisd

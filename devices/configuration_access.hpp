@@ -49,11 +49,12 @@ class ConfigurationAccess {
  public:
   virtual ~ConfigurationAccess() = default;
   [[nodiscard]] virtual std::shared_ptr<const ServedConfiguration> served() const = 0;
-  /// Of what the file holds now; empty if it cannot be read. Reads it.
-  [[nodiscard]] virtual std::string file_revision() const = 0;
+  /// The revision of what the file holds now, empty if it cannot be read. Calls back once, from a thread of
+  /// its own or, with busy (too many ask), at once; not at all if the daemon ends before.
+  virtual void file_revision(std::function<void(Result<std::string>)> callback) = 0;
   /// Checks a text as a start of the daemon would, with relative paths in it counting from the served file.
-  /// Takes milliseconds. Opens no port.
-  [[nodiscard]] virtual ConfigurationCheck check(std::string_view yaml) const = 0;
+  /// Takes milliseconds, some seconds at most. Opens no port. Calls back as file_revision().
+  virtual void check(std::string yaml, std::function<void(Result<ConfigurationCheck>)> callback) = 0;
   /// Reads the file again, and makes it what is served, all of it or nothing; `dry_run`: only tells what
   /// would become of it. Calls back once, from a thread of its own, at once or when axes that change have
   /// been exchanged. Errors: busy (another reload is under way), cancelled (the daemon ends).

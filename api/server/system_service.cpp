@@ -11,31 +11,17 @@
 #include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
+#include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
 
 namespace axisd::server {
 namespace {
 
-using Results = std::vector<Result<Command>>;
-
 Error no_configuration() {
   return {.reason = Reason::not_supported,
           .message = "this server was not started from a configuration file",
           .remedy = "ask the daemon itself"};
-}
-
-void to_proto(const Results& results, const std::vector<std::string>& axes, v1::StopAllResponse& to) {
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    auto& entry = *to.add_results();
-    if (i < axes.size()) entry.set_axis(axes[i]);  // the machine answers in its axes' order
-    if (results[i]) {
-      entry.set_axis(results[i]->axis);
-      server::to_proto(*results[i], *entry.mutable_command());
-    } else {
-      server::to_proto(results[i].error(), *entry.mutable_error());
-    }
-  }
 }
 
 void to_proto(const ConfigurationFinding& from, v1::ConfigFinding& to) {
@@ -70,22 +56,8 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1:
 
 grpc::ServerUnaryReactor* SystemServiceImpl::StopAll(Context* context, const v1::StopAllRequest* request,
                                                      v1::StopAllResponse* response) {
-  const auto client = client_of(*context);
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    auto axes = services_.machine.axis_names();
-    services_.machine.stop_all(client, stop_all_wait(request->wait_until()),
-                               [call, response, client, axes = std::move(axes)](Results results) {
-                                 const auto shared = std::make_shared<const Results>(std::move(results));
-                                 call->complete(
-                                     [response, axes, shared] {
-                                       to_proto(*shared, axes, *response);
-                                       return grpc::Status::OK;
-                                     },
-                                     [client, shared] {
-                                       spdlog::info("{}: stop_all of {} axes, inhibit latched", client,
-                                                    shared->size());
-                                     });
-                               });
+    handle(services_.machine, *request, client_of(*context), call, response);
   });
 }
 
@@ -133,7 +105,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::Explain(Context* context, const v1:
 
 grpc::ServerUnaryReactor* SystemServiceImpl::GetConfig(Context* context, const v1::GetConfigRequest*,
                                                        v1::GetConfigResponse* response) {
-  const auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
   const auto served = services_.configuration->served();
@@ -141,21 +113,29 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetConfig(Context* context, const v
   response->set_path(served->path);
   response->set_revision(served->revision);
   server::to_proto(served->served_since, *response->mutable_served_since());
-  response->set_file_revision(services_.configuration->file_revision());
-  return answer(context, grpc::Status::OK);
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.configuration->file_revision(reply_with_value<std::string>(
+            call, [response](const std::string& revision) { response->set_file_revision(revision); }));
+      });
 }
 
 grpc::ServerUnaryReactor* SystemServiceImpl::CheckConfig(Context* context,
                                                          const v1::CheckConfigRequest* request,
                                                          v1::CheckConfigResponse* response) {
-  const auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
-  const auto checked = services_.configuration->check(request->yaml());
-  for (const auto& found : checked.findings) to_proto(found, *response->add_findings());
-  for (const auto& warning : checked.warnings) response->add_warnings(warning);
-  response->set_revision(checked.revision);
-  return answer(context, grpc::Status::OK);
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        services_.configuration->check(
+            request->yaml(),
+            reply_with_value<ConfigurationCheck>(call, [response](const ConfigurationCheck& checked) {
+              for (const auto& found : checked.findings) to_proto(found, *response->add_findings());
+              for (const auto& warning : checked.warnings) response->add_warnings(warning);
+              response->set_revision(checked.revision);
+            }));
+      });
 }
 
 grpc::ServerUnaryReactor* SystemServiceImpl::ReloadConfig(Context* context,

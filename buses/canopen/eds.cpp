@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <boost/property_tree/ini_parser.hpp>
 #include <boost/property_tree/ptree.hpp>
-#include <fstream>
 #include <set>
 #include <sstream>
 #include <tuple>
 #include <utility>
 
 #include "buses/canopen/eds_values.hpp"
+#include "buses/regular_file.hpp"
 
 namespace axisd::canopen {
 
@@ -260,14 +260,9 @@ class Reader {
 std::expected<Eds, std::vector<EdsProblem>> parse_eds(std::string_view text) { return Reader().read(text); }
 
 Result<Eds> load_eds(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text(eds_size_limit + 1, '\0');
-  // A directory opens and fails when it is read.
-  if (!file || (file.read(text.data(), static_cast<std::streamsize>(text.size())), file.bad()))
-    return fail(Reason::invalid_argument, fmt::format("{}: cannot be read", path),
-                "check the path and its permissions");
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  auto eds = parse_eds(text);
+  const auto text = read_regular_file(path, eds_size_limit);
+  if (!text) return fail(text.error());
+  auto eds = parse_eds(*text);
   if (eds) return std::move(*eds);
   std::string message;
   for (const auto& [line, what] : eds.error())

@@ -13,13 +13,13 @@ class FakeConfiguration final : public ConfigurationAccess {
   [[nodiscard]] std::shared_ptr<const ServedConfiguration> served() const override {
     return std::make_shared<const ServedConfiguration>(served_);
   }
-  [[nodiscard]] std::string file_revision() const override { return "r2"; }
-  [[nodiscard]] ConfigurationCheck check(std::string_view yaml) const override {
-    ConfigurationCheck result{.revision = "of " + std::string(yaml)};
+  void file_revision(std::function<void(Result<std::string>)> callback) override { callback("r2"); }
+  void check(std::string yaml, std::function<void(Result<ConfigurationCheck>)> callback) override {
+    ConfigurationCheck result{.revision = "of " + yaml};
     if (yaml == "bad")
       result.findings = {{.line = 3, .column = 7, .message = "unknown key 'bad'", .suggestion = "remove it"},
                          {.message = "too large"}};
-    return result;
+    callback(std::move(result));
   }
   void reload(std::string client, bool dry_run,
               std::function<void(Result<ConfigurationReload>)> callback) override {
