@@ -33,7 +33,8 @@ struct ServerLimits {
 
 struct ServerSettings {
   std::string listen =
-      "localhost:7443";  ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
+      "localhost:7443";     ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
+  std::string stop_listen;  ///< of the stop lane, as listen; empty: next to it
   std::optional<TlsSettings> tls;
   ServerLimits limits;
 };

@@ -26,12 +26,12 @@ bool is_loopback(std::string_view host) {
   return host == "localhost" || host == "[::1]" || dotted;
 }
 
-void check_server(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
-  const std::string_view listen = configuration.server.listen;
-  if (!places.usable("server.listen") || listen.starts_with("unix:")) return;
+void check_address(std::string_view key, std::string_view listen, const Configuration& configuration,
+                   Diagnostics& diagnostics, const Places& places) {
+  if (!places.usable(key) || listen.empty() || listen.starts_with("unix:")) return;
   const auto colon = listen.rfind(':');
   const auto host = listen.substr(0, colon), port = listen.substr(colon + 1);
-  const auto mark = places.mark("server.listen");
+  const auto mark = places.mark(key);
   if (const auto number = parse_decimal(port); !number || number->value > 65535) {
     diagnostics.add(mark, fmt::format("port {} is out of range", quoted(port)),
                     "write a port between 0 and 65535");
@@ -42,6 +42,19 @@ void check_server(const Configuration& configuration, Diagnostics& diagnostics, 
         fmt::format("without tls, {} would let anybody on the network move this machine", quoted(listen)),
         "add server.tls, or listen on localhost or unix:/PATH");
   }
+}
+
+void check_server(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+  const auto& server = configuration.server;
+  check_address("server.listen", server.listen, configuration, diagnostics, places);
+  check_address("server.stop_listen", server.stop_listen, configuration, diagnostics, places);
+  if (!server.stop_listen.empty() && server.stop_listen == server.listen)
+    diagnostics.add(places.mark("server.stop_listen"),
+                    fmt::format("{} is server.listen, too", quoted(server.listen)),
+                    "give the stop lane an address of its own, or leave the key out");
+  if (server.stop_listen.empty() && server.listen.ends_with(":65535") && places.usable("server.listen"))
+    diagnostics.add(places.mark("server.listen"), "there is no port after 65535 for the stop lane",
+                    "choose another port, or say server.stop_listen");
 }
 
 /// A bus as the file describes it, of whatever kind.

@@ -90,6 +90,15 @@ constexpr KeySpec server_keys[] = {
      .pattern = "unix:/.+|(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9._-]+):[0-9]{1,5}",
      .pattern_hint = "write HOST:PORT, [IPV6]:PORT or unix:/PATH",
      .apply = [](Target& t, const Value& v) { t.configuration->server.listen = v.text; }},
+    {.key = "stop_listen",
+     .kind = Kind::text,
+     .description =
+         "Where stops are taken as well, whatever happens at `listen`. Without it the port after that of "
+         "`listen`, or its path with .stop behind it, where clients look for it.",
+     .example = "127.0.0.1:7500",
+     .pattern = "unix:/.+|(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9._-]+):[0-9]{1,5}",
+     .pattern_hint = "write HOST:PORT, [IPV6]:PORT or unix:/PATH",
+     .apply = [](Target& t, const Value& v) { t.configuration->server.stop_listen = v.text; }},
     {.key = "tls",
      .kind = Kind::section,
      .description = "Mutual TLS; required where the daemon can be reached from other machines.",

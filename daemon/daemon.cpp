@@ -15,6 +15,7 @@
 #include <random>
 #include <thread>
 
+#include "api/server/lane/stop_lane.hpp"
 #include "api/server/server.hpp"
 #include "api/tls/pem_files.hpp"
 #include "config/budget.hpp"
@@ -116,17 +117,26 @@ bool stop_axes(core::CoreLoop& loop, core::MachineCore& machine) {
   return wait_until([&] { return ask_core(loop, [&] { return machine.at_rest(); }); }, stop_patience);
 }
 
+std::optional<server::TlsFiles> tls_files(const config::ServerSettings& settings) {
+  if (!settings.tls) return std::nullopt;
+  return server::TlsFiles{.certificate = settings.tls->certificate,
+                          .key = settings.tls->key,
+                          .client_ca = settings.tls->client_ca};
+}
+
+server::StopLaneOptions stop_lane_options(const config::ServerSettings& settings) {
+  return {
+      .listen = settings.stop_listen.empty() ? server::stop_lane_of(settings.listen) : settings.stop_listen,
+      .tls = tls_files(settings)};
+}
+
 server::ServerOptions server_options(const config::ServerSettings& settings) {
   const auto& limits = settings.limits;
-  server::ServerOptions options{.listen = {settings.listen},
-                                .limits = {.calls = limits.calls, .streams = limits.streams},
-                                .connections = limits.connections,
-                                .stalled_reader_limit = limits.stalled_reader};
-  if (settings.tls)
-    options.tls = server::TlsFiles{.certificate = settings.tls->certificate,
-                                   .key = settings.tls->key,
-                                   .client_ca = settings.tls->client_ca};
-  return options;
+  return {.listen = {settings.listen},
+          .tls = tls_files(settings),
+          .limits = {.calls = limits.calls, .streams = limits.streams},
+          .connections = limits.connections,
+          .stalled_reader_limit = limits.stalled_reader};
 }
 
 void log_budget(const BusBudgetReport& budget) {
@@ -229,11 +239,14 @@ int serve(const Options& options, const config::Configuration& configuration, co
   auto serving = server_options(configuration.server);
   serving.configuration = &served;
   server::Server server(service, std::move(serving));
+  server::StopLane stop_lane(service, stop_lane_options(configuration.server));
   machine.start();
   const CoreThread core_thread(loop);
 
   int status = exit_status::failed;
-  if (const auto port = server.start(); !port) {
+  if (const auto stops = stop_lane.start(); !stops) {
+    status = give_up(stops.error());
+  } else if (const auto port = server.start(); !port) {
     status = give_up(port.error());
   } else {
     wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },
@@ -253,6 +266,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
   }
 
   server.shutdown();
+  stop_lane.stop();
   ask_core(loop, [&] {
     published_to = nullptr;
     machine.close();

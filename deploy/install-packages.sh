@@ -7,11 +7,11 @@ set -euo pipefail
 
 build=(
   ca-certificates ccache clang-19 cmake git libbenchmark-dev libboost1.81-dev libcli11-dev libfmt-dev libgmock-dev
-  libgrpc++-dev libgrpc-dev libgtest-dev libmodbus-dev libprotobuf-dev libspdlog-dev libssl-dev libsystemd-dev
+  libgrpc++-dev libgrpc-dev libgtest-dev libmodbus-dev libnghttp2-dev libprotobuf-dev libspdlog-dev libssl-dev libsystemd-dev
   libyaml-cpp-dev lld-19 llvm-19 ninja-build pkg-config protobuf-compiler protobuf-compiler-grpc
   python3 python3-protobuf
 )
-run=(libfmt9 libgrpc++1.51 libmodbus5 libprotobuf32 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
+run=(libabsl20220623 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
 test=(
   can-utils clang-format-19 clang-tidy-19 groff-base iproute2 libclang-rt-19-dev mypy openssl procps python3-can
   python3-grpcio python3-jsonschema python3-pymodbus python3-serial python3-serial-asyncio

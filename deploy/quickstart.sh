@@ -57,7 +57,7 @@ axisd=$bin/daemon/axisd axisctl=$bin/api/axisctl/axisctl
 
 taken() { (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null || (exec 3<>"/dev/tcp/::1/$1") 2>/dev/null; }
 port=7443
-while taken "$port"; do port=$((20000 + RANDOM % 10000)); done
+while taken "$port" || taken $((port + 1)); do port=$((20000 + RANDOM % 10000)); done
 export AXISD_SERVER=localhost:$port
 
 say "axisd with simulated drives on RS-485 and CAN, on $AXISD_SERVER"

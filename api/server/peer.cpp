@@ -10,21 +10,21 @@ namespace {
 
 constexpr std::size_t longest_identity = 128;
 
-// Identities appear in the log and in Command.client: a certificate must not be able to forge lines there.
-std::string printable(const grpc::string_ref& text) {
-  std::string result(text.data(), std::min(text.size(), longest_identity));
+}  // namespace
+
+std::string printable_identity(std::string_view name) {
+  std::string result(name.substr(0, longest_identity));
   std::ranges::replace_if(result, [](char c) { return c < ' ' || c > '~'; }, '?');
   return result;
 }
-
-}  // namespace
 
 std::string client_of(const grpc::CallbackServerContext& context) {
   const auto auth = context.auth_context();
   if (auth && auth->IsPeerAuthenticated()) {
     for (const auto* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME}) {
       const auto values = auth->FindPropertyValues(property);
-      if (!values.empty() && !values.front().empty()) return printable(values.front());
+      if (!values.empty() && !values.front().empty())
+        return printable_identity({values.front().data(), values.front().size()});
     }
     return "unnamed:" + peer_host(context.peer());
   }

@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "buses/clock.hpp"
 
@@ -14,6 +15,10 @@ namespace axisd::server {
 /// without TLS, "local:" and the host part of its address. Never the port: request ids must stay valid over a
 /// reconnection.
 [[nodiscard]] std::string client_of(const grpc::CallbackServerContext& context);
+
+/// An identity as it may appear in the log and in Command.client: of a bounded length, without anything by
+/// which a certificate could forge a line there.
+[[nodiscard]] std::string printable_identity(std::string_view name);
 
 /// How long the caller waits for the answer, from this call on, by the clock of its deadline; nothing: for
 /// ever. Not above a day.

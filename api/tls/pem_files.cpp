@@ -2,37 +2,21 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <openssl/bio.h>
-#include <openssl/err.h>
-#include <openssl/pem.h>
 #include <openssl/x509.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <memory>
 #include <system_error>
 
+#include "api/tls/pem.hpp"
 #include "buses/file_descriptor.hpp"
 
 namespace axisd::tls {
 namespace {
 
-template <class T, void (*release)(T*)>
-struct Release {
-  void operator()(T* value) const { release(value); }
-};
-using Certificate = std::unique_ptr<X509, Release<X509, X509_free>>;
-using Key = std::unique_ptr<EVP_PKEY, Release<EVP_PKEY, EVP_PKEY_free>>;
-using Memory = std::unique_ptr<BIO, Release<BIO, BIO_free_all>>;
-
 constexpr std::size_t largest_file = 1U << 20U;
-
-std::unexpected<Error> wrong(const std::string& path, std::string_view what, std::string remedy) {
-  ERR_clear_error();
-  return fail(Reason::invalid_argument, fmt::format("{}: {}", path, what), std::move(remedy));
-}
 
 std::unexpected<Error> unreadable(const std::string& path, std::string_view why) {
   return wrong(path, fmt::format("cannot read: {}", why),
@@ -58,47 +42,12 @@ Result<std::string> read_file(const std::string& path) {
   return text;
 }
 
-Memory reader(const std::string& text) {
-  return Memory(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
-}
-
-// An encrypted key must fail, not ask on a terminal that a service does not have.
-int no_password(char*, int, int, void*) { return -1; }
-
-/// All certificates of a file, at least one.
-Result<std::vector<Certificate>> certificates(const std::string& path, const std::string& text) {
-  const auto memory = reader(text);
-  std::vector<Certificate> all;
-  for (;;) {
-    Certificate next(PEM_read_bio_X509(memory.get(), nullptr, no_password, nullptr));
-    if (next) {
-      all.push_back(std::move(next));
-      continue;
-    }
-    const bool at_end = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
-    ERR_clear_error();
-    if (at_end && !all.empty()) return all;
-    if (at_end) return wrong(path, "no certificate in PEM format", "give a file with BEGIN CERTIFICATE");
-    return wrong(path, fmt::format("certificate {} is not readable", all.size() + 1),
-                 "repair or replace the file");
-  }
-}
-
 bool has_expired(const Certificate& certificate) {
   return X509_cmp_current_time(X509_get0_notAfter(certificate.get())) < 0;
 }
 
 std::unexpected<Error> expired(const std::string& path) {
   return wrong(path, "the certificate has expired", "renew it");
-}
-
-Result<Key> private_key(const std::string& path, const std::string& text) {
-  const auto memory = reader(text);
-  Key key(PEM_read_bio_PrivateKey(memory.get(), nullptr, no_password, nullptr));
-  if (!key)
-    return wrong(path, "no usable private key in PEM format",
-                 "give an unencrypted key with BEGIN PRIVATE KEY");
-  return key;
 }
 
 /// Reads the files one after the other, and keeps what was found at each.

@@ -16,7 +16,7 @@ import time
 from figures import cpu_seconds, lateness, percentile, running, spread, table
 from rtu_cell import SERVER, Cell, Client, Line
 
-BARE = "127.0.0.1:7445"
+BARE = "127.0.0.1:7446"  # 7445 is the stop lane of SERVER
 PERIOD = 0.010  # s, of WatchAxes
 
 

@@ -38,6 +38,8 @@ THIRD_PARTY = {
     "grpcpp": ["api/server", "api/cell", "api/axisctl", "api/examples", "daemon/*"],
     "google": ["api/budget", "api/server", "api/cell", "api/axisctl", "daemon/*"],
     "openssl": ["api/tls"],
+    "nghttp2": ["api/server/lane"],
+    "absl": ["api/server/lane"],
     "CLI": ["api/axisctl", "daemon/sim", "daemon/*"],
     "systemd": ["daemon"],
 }

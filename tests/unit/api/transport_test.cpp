@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "buses/file_descriptor.hpp"
+#include "tests/unit/api/certificates.hpp"
 #include "tests/unit/api/serving.hpp"
 
 namespace axisd::testing {
@@ -19,11 +20,6 @@ using namespace std::chrono_literals;
 using server::Server;
 using server::ServerOptions;
 using ::testing::HasSubstr;
-
-std::string contents(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// The status of one Stop, and the identity that the server saw.
 std::pair<grpc::Status, std::string> stop(const std::shared_ptr<grpc::Channel>& channel) {
@@ -147,63 +143,35 @@ TEST_F(Transport, ConnectionsAreBounded) {
   EXPECT_TRUE(eventually([&] { return stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok(); }));
 }
 
-/// Certificates made by the openssl command.
 class Tls : public Transport {
  protected:
-  static void run(const std::string& command) {
-    ASSERT_EQ(std::system((command + " 2>/dev/null").c_str()), 0) << command;
-  }
-  void make_ca(const std::string& name) {
-    run("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=" +
-        name + " -keyout " + (directory_ / (name + ".key")) + " -out " + (directory_ / (name + ".crt")));
-  }
-  void make_pair(const std::string& name, const std::string& ca) {
-    const auto base = directory_ / name;
-    std::ofstream(base + ".ext") << "subjectAltName=DNS:localhost,IP:127.0.0.1\n";
-    run("openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=" + name +
-        " -keyout " + base + ".key -out " + base + ".csr");
-    run("openssl x509 -req -days 2 -in " + base + ".csr -CA " + (directory_ / (ca + ".crt")) + " -CAkey " +
-        (directory_ / (ca + ".key")) + " -CAcreateserial -extfile " + base + ".ext -out " + base + ".crt");
-  }
-  ServerOptions options() {
-    return {.listen = {"127.0.0.1:0"},
-            .tls = server::TlsFiles{.certificate = directory_ / "server.crt",
-                                    .key = directory_ / "server.key",
-                                    .client_ca = directory_ / "ca.crt"}};
-  }
-  std::shared_ptr<grpc::ChannelCredentials> client(const std::string& name) {
-    grpc::SslCredentialsOptions ssl;
-    ssl.pem_root_certs = contents(directory_ / "ca.crt");
-    if (!name.empty()) {
-      ssl.pem_private_key = contents(directory_ / (name + ".key"));
-      ssl.pem_cert_chain = contents(directory_ / (name + ".crt"));
-    }
-    return grpc::SslCredentials(ssl);
-  }
+  ServerOptions options() { return {.listen = {"127.0.0.1:0"}, .tls = certificates_.server_files()}; }
+
+  Certificates certificates_{directory_};
 };
 
 TEST_F(Tls, OnlyVerifiedClientsAreServedByTheirName) {
-  make_ca("ca");
-  make_ca("stranger-ca");
-  make_pair("server", "ca");
-  make_pair("hmi-1", "ca");
-  make_pair("intruder", "stranger-ca");
+  certificates_.make_ca("ca");
+  certificates_.make_ca("stranger-ca");
+  certificates_.make_pair("server", "ca");
+  certificates_.make_pair("hmi-1", "ca");
+  certificates_.make_pair("intruder", "stranger-ca");
   const auto port = start(options());
   ASSERT_TRUE(port) << to_string(port.error());
   const auto target = "127.0.0.1:" + std::to_string(*port);
-  const auto [status, name] = stop(connect(target, client("hmi-1")));
+  const auto [status, name] = stop(connect(target, certificates_.client("hmi-1")));
   EXPECT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(name, "hmi-1");
-  EXPECT_FALSE(stop(connect(target, client("intruder"))).first.ok());
-  EXPECT_FALSE(stop(connect(target, client(""))).first.ok());
+  EXPECT_FALSE(stop(connect(target, certificates_.client("intruder"))).first.ok());
+  EXPECT_FALSE(stop(connect(target, certificates_.client(""))).first.ok());
   EXPECT_FALSE(stop(connect(target)).first.ok());
   EXPECT_EQ(machine_.submitted().size(), 1U);
 }
 
 TEST_F(Tls, UnusableFilesAreNamedAtTheStart) {
-  make_ca("ca");
-  make_pair("server", "ca");
-  make_pair("other", "ca");
+  certificates_.make_ca("ca");
+  certificates_.make_pair("server", "ca");
+  certificates_.make_pair("other", "ca");
   const auto refused_file = [&](auto change, const std::string& file) {
     auto wrong = options();
     change(*wrong.tls);

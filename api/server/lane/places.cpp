@@ -1,0 +1,99 @@
+#include "api/server/lane/places.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <tuple>
+#include <utility>
+
+namespace axisd::server::lane {
+
+namespace {
+
+std::string most_of(const std::map<std::string, int>& counts) {
+  const auto most = std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; });
+  return most == counts.end() ? std::string() : most->first;
+}
+
+int total(const std::map<std::string, int>& counts) {
+  int sum = 0;
+  for (const auto& [key, number] : counts) sum += number;
+  return sum;
+}
+
+}  // namespace
+
+template <class Of>
+std::map<std::string, int> Places::count(bool known, Of of) const {
+  std::map<std::string, int> counts;
+  for (const auto& [id, place] : all_)
+    if (place.known == known) ++counts[std::invoke(of, place)];
+  return counts;
+}
+
+std::optional<Places::Id> Places::oldest_stranger(const std::string* address, Id but) const {
+  const Entry* oldest = nullptr;
+  for (const auto& entry : all_) {
+    if (entry.first == but || entry.second.known) continue;
+    if (address != nullptr && entry.second.address != *address) continue;
+    if (oldest == nullptr || entry.second.since < oldest->second.since) oldest = &entry;
+  }
+  return oldest == nullptr ? std::nullopt : std::optional(oldest->first);
+}
+
+std::optional<Places::Id> Places::idlest(const std::string& identity, Id but) const {
+  const Entry* idlest = nullptr;
+  const auto order = [](const Place& place) {
+    return std::tuple(place.waiting > 0, place.asked, place.used);
+  };
+  for (const auto& entry : all_) {
+    if (entry.first == but || !entry.second.known || entry.second.identity != identity) continue;
+    if (idlest == nullptr || order(entry.second) < order(idlest->second)) idlest = &entry;
+  }
+  return idlest == nullptr ? std::nullopt : std::optional(idlest->first);
+}
+
+std::optional<Places::Id> Places::enter(Id id, std::string address, TimePoint now) {
+  all_[id] = {.address = address, .identity = {}, .since = now, .used = now};
+  const auto strangers = count(false, &Place::address);
+  if (strangers.at(address) > limits_.strangers_per_address) return oldest_stranger(&address, id);
+  if (total(strangers) > limits_.strangers) {
+    const auto most = most_of(strangers);
+    return oldest_stranger(&most, id);
+  }
+  if (std::cmp_less_equal(all_.size(), limits_.connections)) return std::nullopt;
+  return idlest(most_of(count(true, &Place::identity)), id);
+}
+
+std::optional<Places::Id> Places::identify(Id id, std::string identity, bool local, TimePoint now) {
+  auto& place = all_.at(id);
+  place.identity = identity;
+  place.known = true;
+  place.used = now;
+  if (count(true, &Place::identity).at(identity) <= (local ? limits_.local : limits_.per_identity))
+    return std::nullopt;
+  return idlest(identity, id);
+}
+
+void Places::used(Id id, TimePoint now, int waiting) {
+  auto& place = all_.at(id);
+  place.used = now;
+  place.waiting = waiting;
+}
+
+std::optional<Places::Id> Places::overdue(TimePoint now) const {
+  const auto oldest = oldest_stranger(nullptr, Id{});
+  if (!oldest || all_.at(*oldest).since + limits_.introduction > now) return std::nullopt;
+  return oldest;
+}
+
+std::optional<Places::Id> Places::least_needed() const {
+  if (const auto stranger = oldest_stranger(nullptr, Id{})) return stranger;
+  return idlest(most_of(count(true, &Place::identity)), Id{});
+}
+
+TimePoint Places::next_due() const {
+  const auto oldest = oldest_stranger(nullptr, Id{});
+  return oldest ? all_.at(*oldest).since + limits_.introduction : TimePoint::max();
+}
+
+}  // namespace axisd::server::lane

@@ -1,0 +1,138 @@
+#include "api/server/lane/stop_calls.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <ranges>
+#include <utility>
+
+#include "api/server/command_reply.hpp"
+#include "api/server/status.hpp"
+#include "api/server/stop_requests.hpp"
+#include "api/server/validate.hpp"
+
+namespace axisd::server::lane {
+namespace {
+
+struct Context {
+  Machine& machine;
+  Admission& admission;
+  const Http2::Call& call;
+  const std::string& client;
+  StopCalls::Done done;
+};
+
+Answer answer_of(const grpc::Status& status, const google::protobuf::Message& response) {
+  if (status.ok()) return {.code = 0, .error = {}, .details = {}, .message = response.SerializeAsString()};
+  return {.code = status.error_code(),
+          .error = status.error_message(),
+          .details = status.error_details(),
+          .message = {}};
+}
+
+/// A call that waits for the machine. Its response lives as long as anybody may fill it.
+template <class Response>
+class LaneReply final : public Reply {
+ public:
+  LaneReply(StopCalls::Done done, Admission::Ticket ticket)
+      : done_(std::move(done)), ticket_(std::move(ticket)) {}
+
+  void complete(Fill fill, Job always) override {
+    done_([response = response_, fill = std::move(fill), always = std::move(always)]() mutable {
+      if (always) always();
+      const auto status = fill();
+      return answer_of(status, *response);
+    });
+  }
+  [[nodiscard]] Response* response() const { return response_.get(); }
+
+ private:
+  StopCalls::Done done_;
+  Admission::Ticket ticket_;
+  std::shared_ptr<Response> response_ = std::make_shared<Response>();
+};
+
+void refuse(const StopCalls::Done& done, const Error& error) {
+  done([error] { return answer_of(to_status(error), v1::StopResponse::default_instance()); });
+}
+
+template <class Request>
+std::optional<Request> parsed(const Context& context) {
+  Request request;
+  if (request.ParseFromString(context.call.message)) return request;
+  refuse(context.done, {.reason = Reason::invalid_argument,
+                        .message = "the request is no " + Request::descriptor()->name(),
+                        .remedy = "use the published proto files"});
+  return std::nullopt;
+}
+
+template <class Request, class Response>
+void take(Context context) {
+  const auto request = parsed<Request>(context);
+  if (!request) return;
+  const auto reply = std::make_shared<LaneReply<Response>>(std::move(context.done), Admission::Ticket());
+  handle(context.machine, *request, context.client, reply, reply->response());
+}
+
+/// A jog and what renews it come by one way, in the order in which they were sent; so does the halt after it.
+void jog(Context context) {
+  const auto request = parsed<v1::JogRequest>(context);
+  if (!request) return;
+  if (auto axis = find_axis(context.machine, request->axis()); !axis)
+    return refuse(context.done, axis.error());
+  auto action = to_action(*request);
+  if (!action) return refuse(context.done, action.error());
+  auto submission = motion_options(request->options(), context.client, context.machine);
+  if (!submission) return refuse(context.done, submission.error());
+  if (context.call.patience)
+    submission->options.call_deadline = context.machine.now() + *context.call.patience;
+  auto ticket = context.admission.admit(context.client, Admission::Kind::call);
+  if (!ticket) return refuse(context.done, ticket.error());
+  const auto reply =
+      std::make_shared<LaneReply<v1::JogResponse>>(std::move(context.done), *std::move(ticket));
+  context.machine.submit(
+      request->axis(), *std::move(action), std::move(submission->options), submission->until,
+      reply_with_command(reply, reply->response()->mutable_command(), context.client, request->axis(),
+                         to_string(CommandKind::jog), {}, context.machine.wall(context.machine.now())));
+}
+
+struct Entry {
+  std::string_view path;
+  void (*handler)(Context context);
+};
+
+constexpr Entry table[] = {
+    {"/axisd.v1.StopService/Halt", &take<v1::HaltRequest, v1::HaltResponse>},
+    {"/axisd.v1.StopService/Stop", &take<v1::StopRequest, v1::StopResponse>},
+    {"/axisd.v1.StopService/QuickStop", &take<v1::QuickStopRequest, v1::QuickStopResponse>},
+    {"/axisd.v1.StopService/Disable", &take<v1::DisableRequest, v1::DisableResponse>},
+    {"/axisd.v1.StopService/Jog", &jog},
+    {"/axisd.v1.StopService/GroupHalt", &take<v1::GroupHaltRequest, v1::GroupHaltResponse>},
+    {"/axisd.v1.StopService/GroupStop", &take<v1::GroupStopRequest, v1::GroupStopResponse>},
+    {"/axisd.v1.StopService/StopAll", &take<v1::StopAllRequest, v1::StopAllResponse>},
+    {"/axisd.v1.StopService/RenewLease", &take<v1::RenewLeaseRequest, v1::RenewLeaseResponse>},
+    {"/axisd.v1.StopService/CancelCommand", &take<v1::CancelCommandRequest, v1::CancelCommandResponse>},
+};
+
+}  // namespace
+
+void StopCalls::start(const Http2::Call& call, const std::string& client, Done done) {
+  const auto* found = std::ranges::find(table, call.path, &Entry::path);
+  if (found == std::end(table))
+    return refuse(done, {.reason = Reason::not_supported,
+                         .message = "this port takes stops, and what renews a jog or a lease",
+                         .remedy = "ask for everything else at the main port"});
+  found->handler({.machine = machine_,
+                  .admission = admission_,
+                  .call = call,
+                  .client = client,
+                  .done = std::move(done)});
+}
+
+std::vector<std::string_view> StopCalls::paths() {
+  std::vector<std::string_view> paths;
+  paths.reserve(std::size(table));
+  for (const auto& entry : table) paths.push_back(entry.path);
+  return paths;
+}
+
+}  // namespace axisd::server::lane

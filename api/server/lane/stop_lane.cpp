@@ -1,0 +1,302 @@
+#include "api/server/lane/stop_lane.hpp"
+
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <map>
+#include <mutex>
+#include <utility>
+
+#include "api/server/lane/connection.hpp"
+#include "api/server/lane/stop_calls.hpp"
+#include "api/server/listen.hpp"
+#include "api/server/peer.hpp"
+#include "api/server/status.hpp"
+
+namespace axisd::server {
+
+using lane::Answer;
+using lane::Connection;
+using lane::Places;
+using lane::StopCalls;
+
+namespace {
+
+constexpr auto longest_sleep = std::chrono::seconds(1);
+/// Accepted at once, before those who are there are served again.
+constexpr int most_accepted = 8;
+
+/// As gRPC writes it, for peer_host().
+std::string text_of(const sockaddr_storage& address, socklen_t size) {
+  char host[NI_MAXHOST]{};
+  if (address.ss_family == AF_UNIX) return "unix:";
+  if (getnameinfo(reinterpret_cast<const sockaddr*>(&address), size, host, sizeof host, nullptr, 0,
+                  NI_NUMERICHOST) != 0)
+    return "ipv4:unknown:0";
+  return address.ss_family == AF_INET6 ? fmt::format("ipv6:[{}]:0", host) : fmt::format("ipv4:{}:0", host);
+}
+
+}  // namespace
+
+std::string stop_lane_of(const std::string& listen) {
+  if (listen.starts_with("unix:")) return listen + ".stop";
+  const auto colon = listen.rfind(':');
+  const int port = std::atoi(listen.c_str() + colon + 1);
+  return fmt::format("{}:{}", listen.substr(0, colon), port == 0 ? 0 : port + 1);
+}
+
+class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
+ public:
+  Loop(Machine& machine, Places::Limits limits) : calls_(machine), places_(limits) {
+    if (wake_.get() < 0) throw std::bad_alloc();
+  }
+
+  void open(std::vector<ListeningSocket> sockets, std::shared_ptr<const tls::Acceptor> acceptor) {
+    sockets_ = std::move(sockets);
+    acceptor_ = std::move(acceptor);
+  }
+
+  void run();
+  void stop() {
+    stopping_ = true;
+    eventfd_write(wake_.get(), 1);
+  }
+  [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
+
+ private:
+  using Id = Places::Id;
+  struct Peer {
+    std::string host, client;  ///< client: once it is identified
+    std::unique_ptr<Connection> connection;
+  };
+  struct Done {
+    Id id;
+    std::int32_t stream;
+    StopCalls::Make make;
+  };
+
+  void accept_from(const ListeningSocket& socket);
+  void enter(FileDescriptor socket, const std::string& host, bool encrypted);
+  void serve(Id id);
+  void begin(Id id, const lane::Http2::Call& call);
+  void identify(Id id, Peer& peer);
+  void close(std::optional<Id> id);
+  void post(Done done);
+  void answer_what_is_done();
+  void say_goodbye();
+
+  StopCalls calls_;
+  Places places_;
+  std::vector<ListeningSocket> sockets_;
+  std::shared_ptr<const tls::Acceptor> acceptor_;
+  std::map<Id, Peer> peers_;
+  Id last_ = 0;
+  std::uint64_t turned_away_ = 0;
+  FileDescriptor wake_{eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
+  std::atomic<bool> stopping_{false};
+  std::atomic<TimePoint> progress_{monotonic_now()};
+  std::mutex mutex_;
+  std::vector<Done> done_;  ///< under mutex_
+};
+
+void StopLane::Loop::run() {
+  std::vector<pollfd> polled;
+  std::vector<Id> known, strangers;
+  while (!stopping_) {
+    progress_.store(monotonic_now(), std::memory_order_relaxed);
+    polled.clear();
+    known.clear();
+    strangers.clear();
+    polled.push_back({.fd = wake_.get(), .events = POLLIN, .revents = 0});
+    for (const auto& socket : sockets_)
+      polled.push_back({.fd = socket.fd.get(), .events = POLLIN, .revents = 0});
+    const auto first = polled.size();
+    std::vector<Id> ids;
+    ids.reserve(peers_.size());
+    for (const auto& [id, peer] : peers_) {
+      const short events = peer.connection->wants_to_write() ? POLLIN | POLLOUT : POLLIN;
+      polled.push_back({.fd = peer.connection->fd(), .events = events, .revents = 0});
+      ids.push_back(id);
+    }
+    const auto until = std::min<Duration>(longest_sleep, places_.next_due() - monotonic_now());
+    const auto patience = std::chrono::ceil<std::chrono::milliseconds>(std::max(until, Duration{}));
+    if (poll(polled.data(), polled.size(), static_cast<int>(patience.count())) < 0 && errno != EINTR) {
+      spdlog::critical("stop lane: poll: {}", std::generic_category().message(errno));
+      return;
+    }
+    if (polled[0].revents != 0) {
+      eventfd_t count = 0;
+      eventfd_read(wake_.get(), &count);
+    }
+    answer_what_is_done();
+    // Whoever is known goes before strangers, whose handshakes cost a thousand times as much as a stop.
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      if (polled[first + i].revents != 0)
+        (peers_.at(ids[i]).client.empty() ? strangers : known).push_back(ids[i]);
+    for (const auto id : known) serve(id);
+    for (const auto id : strangers) serve(id);
+    for (std::size_t i = 0; i < sockets_.size(); ++i)
+      if (polled[i + 1].revents != 0) accept_from(sockets_[i]);
+    close(places_.overdue(monotonic_now()));
+  }
+  say_goodbye();
+}
+
+void StopLane::Loop::accept_from(const ListeningSocket& socket) {
+  for (int i = 0; i < most_accepted; ++i) {
+    sockaddr_storage address{};
+    socklen_t size = sizeof address;
+    FileDescriptor connection(
+        accept4(socket.fd.get(), reinterpret_cast<sockaddr*>(&address), &size, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (connection.get() < 0) {
+      // Out of descriptors: somebody makes room, so that whoever wants to stop comes in.
+      if (errno == EMFILE || errno == ENFILE) close(places_.least_needed());
+      return;
+    }
+    if (socket.unix_path.empty()) {
+      const int on = 1, patience_ms = 10'000;
+      setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+      setsockopt(connection.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+      setsockopt(connection.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, &patience_ms, sizeof patience_ms);
+    }
+    enter(std::move(connection), peer_host(text_of(address, size)), socket.unix_path.empty());
+  }
+}
+
+void StopLane::Loop::enter(FileDescriptor socket, const std::string& host, bool encrypted) {
+  const auto id = ++last_;
+  const auto now = monotonic_now();
+  auto acceptor = encrypted ? acceptor_ : nullptr;
+  const bool anonymous = acceptor == nullptr;
+  auto& peer = peers_[id];
+  peer.host = host;
+  peer.connection = std::make_unique<Connection>(
+      std::move(socket), std::move(acceptor), [this, id](const lane::Http2::Call& call) { begin(id, call); },
+      now);
+  close(places_.enter(id, host, now));
+  if (anonymous) identify(id, peer);
+}
+
+/// Precondition: the connection is identified.
+void StopLane::Loop::identify(Id id, Peer& peer) {
+  const auto name = peer.connection->name();
+  if (!name)
+    peer.client = "local:" + peer.host;
+  else
+    peer.client = name->empty() ? "unnamed:" + peer.host : printable_identity(*name);
+  close(places_.identify(id, peer.client, !name, monotonic_now()));
+}
+
+void StopLane::Loop::serve(Id id) {
+  const auto found = peers_.find(id);
+  if (found == peers_.end()) return;  // it made room
+  auto& peer = found->second;
+  const auto now = monotonic_now();
+  if (!peer.connection->read(now)) return close(id);
+  if (peer.client.empty() && peer.connection->identified()) identify(id, peer);
+  places_.used(id, now, peer.connection->waiting());
+}
+
+void StopLane::Loop::begin(Id id, const lane::Http2::Call& call) {
+  auto& peer = peers_.at(id);
+  // Bytes of the first request may come with the last ones of the handshake.
+  if (peer.client.empty()) identify(id, peer);
+  places_.asked(id);
+  calls_.start(call, peer.client, [loop = weak_from_this(), id, stream = call.stream](StopCalls::Make make) {
+    if (const auto alive = loop.lock()) alive->post({.id = id, .stream = stream, .make = std::move(make)});
+  });
+}
+
+void StopLane::Loop::post(Done done) {
+  {
+    const std::lock_guard lock(mutex_);
+    done_.push_back(std::move(done));
+  }
+  eventfd_write(wake_.get(), 1);
+}
+
+void StopLane::Loop::answer_what_is_done() {
+  std::vector<Done> done;
+  {
+    const std::lock_guard lock(mutex_);
+    done.swap(done_);
+  }
+  for (auto& each : done) {
+    auto answer = each.make();  // also logs, whether or not the client is still there
+    const auto found = peers_.find(each.id);
+    if (found == peers_.end()) continue;
+    auto& connection = *found->second.connection;
+    connection.answer(each.stream, std::move(answer));
+    if (!connection.write()) {
+      close(each.id);
+      continue;
+    }
+    places_.used(each.id, monotonic_now(), connection.waiting());
+  }
+}
+
+void StopLane::Loop::close(std::optional<Id> id) {
+  if (!id) return;
+  const auto found = peers_.find(*id);
+  if (found == peers_.end()) return;
+  if (found->second.client.empty())
+    if (const auto count = ++turned_away_; std::has_single_bit(count))
+      spdlog::info("stop lane: {} connections ended before anybody was identified on them, the last from {}",
+                   count, found->second.host);
+  places_.leave(*id);
+  peers_.erase(found);
+}
+
+void StopLane::Loop::say_goodbye() {
+  answer_what_is_done();
+  for (auto& [id, peer] : peers_) {
+    peer.connection->go_away();
+    (void)peer.connection->write();
+  }
+  peers_.clear();
+  sockets_.clear();
+}
+
+StopLane::StopLane(Machine& machine, StopLaneOptions options)
+    : machine_(machine), options_(std::move(options)) {}
+
+StopLane::~StopLane() { stop(); }
+
+Result<int> StopLane::start() {
+  std::shared_ptr<const tls::Acceptor> acceptor;
+  if (options_.tls) {
+    const auto contents = tls::read(*options_.tls);
+    if (!contents) return fail(contents.error());
+    auto made = tls::Acceptor::make(*contents);
+    if (!made) return fail(std::move(made).error());
+    acceptor = *std::move(made);
+  }
+  auto sockets = listen_on(options_.listen, options_.tls.has_value());
+  if (!sockets) return fail(std::move(sockets).error());
+  const int port = sockets->front().port;
+  loop_ = std::make_shared<Loop>(machine_, options_.limits);
+  loop_->open(*std::move(sockets), std::move(acceptor));
+  thread_ = std::thread([loop = loop_] { loop->run(); });
+  pthread_setname_np(thread_.native_handle(), "axisd-stops");
+  spdlog::info("stops are taken on {} as well", port == 0 ? options_.listen : fmt::format("port {}", port));
+  return port;
+}
+
+void StopLane::stop() {
+  if (!thread_.joinable()) return;
+  loop_->stop();
+  thread_.join();
+}
+
+TimePoint StopLane::last_progress() const { return loop_ ? loop_->last_progress() : monotonic_now(); }
+
+}  // namespace axisd::server

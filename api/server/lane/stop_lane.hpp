@@ -1,0 +1,52 @@
+// The stop lane: a port of its own by which stops reach the machine whatever happens at the main one.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "api/server/lane/places.hpp"
+#include "api/server/tls.hpp"
+#include "devices/machine.hpp"
+
+namespace axisd::server {
+
+struct StopLaneOptions {
+  std::string listen;  ///< "HOST:PORT", "[IPV6]:PORT" or "unix:PATH"
+  std::optional<TlsFiles> tls{};
+  lane::Places::Limits limits{};
+};
+
+/// Where the stop lane of a server is, unless it is told: the next port, or the path with ".stop" behind it;
+/// of port 0, any. Clients go by the same rule. Precondition: an address that listen_on() takes.
+[[nodiscard]] std::string stop_lane_of(const std::string& listen);
+
+/// A gRPC server for the calls of lane::StopCalls alone, on one thread, which is none of gRPC's and shares
+/// neither memory nor connections with it. start() and stop() on one thread.
+class StopLane {
+ public:
+  /// `machine` outlives stop().
+  StopLane(Machine& machine, StopLaneOptions options);
+  ~StopLane();
+  StopLane(const StopLane&) = delete;
+
+  /// Begins to serve; returns the TCP port (0: a unix socket). Once. Errors: as of listen_on(), and
+  /// invalid_argument (TLS files).
+  [[nodiscard]] Result<int> start();
+  /// Answers what waits as UNAVAILABLE, then ends. Idempotent.
+  void stop();
+
+  /// When its thread last came round, at most every second. Thread: any.
+  [[nodiscard]] TimePoint last_progress() const;
+
+ private:
+  class Loop;
+  Machine& machine_;
+  const StopLaneOptions options_;
+  std::shared_ptr<Loop> loop_;
+  std::thread thread_;
+};
+
+}  // namespace axisd::server

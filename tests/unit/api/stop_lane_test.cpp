@@ -1,0 +1,220 @@
+// The stop lane through real connections.
+#include "api/server/lane/stop_lane.hpp"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <thread>
+
+#include "api/server/lane/stop_calls.hpp"
+#include "axisd/v1/stop_service.grpc.pb.h"
+#include "buses/file_descriptor.hpp"
+#include "tests/support/source_tree.hpp"
+#include "tests/unit/api/certificates.hpp"
+#include "tests/unit/api/serving.hpp"
+
+namespace axisd::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class Lane : public ::testing::Test {
+ protected:
+  void serve(server::StopLaneOptions options = {}) {
+    if (options.listen.empty()) options.listen = "127.0.0.1:0";
+    lane_ = std::make_unique<server::StopLane>(machine_, std::move(options));
+    const auto port = lane_->start();
+    ASSERT_TRUE(port) << to_string(port.error());
+    port_ = *port;
+    target_ = "127.0.0.1:" + std::to_string(port_);
+  }
+  std::unique_ptr<v1::StopService::Stub> client(
+      const std::shared_ptr<grpc::ChannelCredentials>& credentials = grpc::InsecureChannelCredentials()) {
+    return v1::StopService::NewStub(connect(target_, credentials));
+  }
+  static std::pair<grpc::Status, v1::StopResponse> stop(v1::StopService::Stub& client,
+                                                        const std::string& axis = "feeder") {
+    Call context;
+    v1::StopRequest request;
+    request.set_axis(axis);
+    v1::StopResponse response;
+    return {client.Stop(&context, request, &response), response};
+  }
+  /// A connection that says nothing.
+  FileDescriptor silent() const {
+    FileDescriptor fd(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address{.sin_family = AF_INET, .sin_port = htons(static_cast<std::uint16_t>(port_))};
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(fd.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    return fd;
+  }
+
+  TemporaryDirectory directory_;
+  FakeMachine machine_;
+  std::unique_ptr<server::StopLane> lane_;
+  int port_ = 0;
+  std::string target_;
+};
+
+TEST_F(Lane, EveryCallReachesTheMachine) {
+  serve();
+  auto stub = client();
+  const auto call = [&]<class Request, class Response>(grpc::Status (v1::StopService::Stub::*method)(
+                                                           grpc::ClientContext*, const Request&, Response*),
+                                                       Request request) {
+    Call context;
+    if constexpr (requires { request.set_axis("feeder"); }) request.set_axis("feeder");
+    Response response;
+    const auto status = (stub.get()->*method)(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << Request::descriptor()->name() << ": " << status.error_message();
+    return response;
+  };
+  using Stub = v1::StopService::Stub;
+  EXPECT_EQ(call(&Stub::Halt, v1::HaltRequest()).command().kind(), v1::COMMAND_KIND_HALT);
+  const auto stopped = call(&Stub::Stop, v1::StopRequest()).command();
+  EXPECT_EQ(stopped.kind(), v1::COMMAND_KIND_STOP);
+  EXPECT_EQ(stopped.client(), "local:localhost");
+  call(&Stub::QuickStop, v1::QuickStopRequest());
+  call(&Stub::Disable, v1::DisableRequest());
+  v1::JogRequest jog;
+  jog.set_velocity(4);
+  jog.mutable_options()->set_request_id("r-1");
+  EXPECT_EQ(call(&Stub::Jog, jog).command().kind(), v1::COMMAND_KIND_JOG);
+  v1::GroupStopRequest group;
+  group.add_axes("feeder");
+  call(&Stub::GroupStop, group);
+  v1::GroupHaltRequest halt;
+  halt.add_axes("feeder");
+  call(&Stub::GroupHalt, halt);
+  call(&Stub::StopAll, v1::StopAllRequest());
+  call(&Stub::RenewLease, v1::RenewLeaseRequest());
+  v1::CancelCommandRequest cancel;
+  cancel.set_id("c-1");
+  call(&Stub::CancelCommand, cancel);
+  EXPECT_EQ(machine_.submitted().size(), 5U);
+  // All that the contract has, and nothing else.
+  std::ifstream contract(test::in_source_tree("proto/axisd/v1/stop_service.proto"));
+  const std::string text{std::istreambuf_iterator<char>(contract), {}};
+  const std::regex rpc("rpc (\\w+)\\(");
+  std::vector<std::string> published;
+  for (auto each = std::sregex_iterator(text.begin(), text.end(), rpc); each != std::sregex_iterator();
+       ++each)
+    published.push_back("/axisd.v1.StopService/" + (*each)[1].str());
+  const auto taken = server::lane::StopCalls::paths();
+  EXPECT_THAT(published, ::testing::UnorderedElementsAreArray(taken.begin(), taken.end()));
+}
+
+TEST_F(Lane, ErrorsCarryTheirDetail) {
+  serve();
+  auto stub = client();
+  const auto [unknown, none] = stop(*stub, "no-such-axis");
+  EXPECT_EQ(unknown.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(detail_of(unknown).reason(), v1::REASON_UNKNOWN_AXIS);
+  machine_.refuse_with(
+      Error{.reason = Reason::offline, .message = "100 % gone: gr\xC3\xBC\xC3\x9F", .remedy = "look"});
+  const auto [offline, nothing] = stop(*stub);
+  EXPECT_EQ(offline.error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_THAT(offline.error_message(), HasSubstr("100 % gone: gr\xC3\xBC\xC3\x9F"));
+  EXPECT_EQ(detail_of(offline).remedy(), "look");
+}
+
+TEST_F(Lane, WhatIsNoStopIsRefused) {
+  serve();
+  auto axes = v1::AxisService::NewStub(connect(target_));
+  Call context;
+  v1::StopRequest request;
+  request.set_axis("feeder");
+  v1::StopResponse response;
+  EXPECT_EQ(axes->Stop(&context, request, &response).error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  EXPECT_TRUE(machine_.submitted().empty());
+}
+
+TEST_F(Lane, ALateAnswerFindsNobodyAndHarmsNothing) {
+  serve();
+  machine_.hold();
+  auto stub = client();
+  {
+    Call context(100ms);
+    v1::StopRequest request;
+    request.set_axis("feeder");
+    v1::StopResponse response;
+    EXPECT_EQ(stub->Stop(&context, request, &response).error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  }
+  stub.reset();
+  EXPECT_TRUE(eventually([&] { return machine_.held() == 1; }));
+  machine_.let_go();
+  auto next = client();
+  EXPECT_TRUE(stop(*next).first.ok());
+  machine_.hold();
+  std::thread caller([&] { EXPECT_FALSE(stop(*next).first.ok()); });
+  EXPECT_TRUE(eventually([&] { return machine_.held() == 1; }));
+  lane_->stop();
+  caller.join();
+  machine_.let_go();
+}
+
+TEST_F(Lane, SilentConnectionsKeepNobodyOut) {
+  serve();
+  std::vector<FileDescriptor> crowd;
+  crowd.reserve(400);
+  for (int i = 0; i < 400; ++i) crowd.push_back(silent());
+  auto stub = client();
+  EXPECT_TRUE(stop(*stub).first.ok());
+}
+
+TEST_F(Lane, ManyCallsOfManyClients) {
+  serve();
+  std::vector<std::thread> callers;
+  std::atomic<int> good{0};
+  callers.reserve(8);
+  for (int i = 0; i < 8; ++i)
+    callers.emplace_back([&] {
+      auto stub = client();
+      for (int n = 0; n < 25; ++n) good += stop(*stub).first.ok() ? 1 : 0;
+    });
+  for (auto& caller : callers) caller.join();
+  EXPECT_EQ(good, 200);
+}
+
+TEST_F(Lane, OnlyVerifiedClientsAreServedByTheirName) {
+  Certificates certificates(directory_);
+  certificates.make_ca("ca");
+  certificates.make_ca("stranger-ca");
+  certificates.make_pair("server", "ca");
+  certificates.make_pair("hmi-1", "ca");
+  certificates.make_pair("intruder", "stranger-ca");
+  serve({.listen = "127.0.0.1:0", .tls = certificates.server_files()});
+  auto hmi = client(certificates.client("hmi-1"));
+  const auto [status, response] = stop(*hmi);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.command().client(), "hmi-1");
+  for (const auto& wrong :
+       {certificates.client("intruder"), certificates.client(""), grpc::InsecureChannelCredentials()}) {
+    auto stub = client(wrong);
+    EXPECT_FALSE(stop(*stub).first.ok());
+  }
+  std::vector<FileDescriptor> crowd;
+  crowd.reserve(200);
+  for (int i = 0; i < 200; ++i) crowd.push_back(silent());
+  auto late = client(certificates.client("hmi-1"));
+  EXPECT_TRUE(stop(*late).first.ok());
+  EXPECT_EQ(machine_.submitted().size(), 2U);
+}
+
+TEST(StopLaneAddress, IsNextToThatOfTheServer) {
+  EXPECT_EQ(server::stop_lane_of("localhost:7443"), "localhost:7444");
+  EXPECT_EQ(server::stop_lane_of("[::1]:7443"), "[::1]:7444");
+  EXPECT_EQ(server::stop_lane_of("127.0.0.1:0"), "127.0.0.1:0");
+  EXPECT_EQ(server::stop_lane_of("unix:/run/axisd/axisd.sock"), "unix:/run/axisd/axisd.sock.stop");
+}
+
+}  // namespace
+}  // namespace axisd::testing
