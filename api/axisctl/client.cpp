@@ -67,6 +67,9 @@ Client::Client(Connection connection) : connection_(std::move(connection)) {
   const auto trusted = credentials(connection_);
   channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
   stop_channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
+  const auto lane =
+      connection_.stop_server.empty() ? stop_lane_of(connection_.server) : connection_.stop_server;
+  if (!lane.empty()) lane_channel_ = grpc::CreateCustomChannel(lane, trusted, arguments());
 }
 
 void Client::wait_for_connection(Lane lane, std::chrono::milliseconds limit) const {

@@ -54,7 +54,8 @@ v1::Command renew(Invocation& invocation, const JogArguments& arguments, const I
     const auto id = request.options().request_id();
     *request.mutable_options() = command_options(arguments);
     request.mutable_options()->set_request_id(id);
-    command = invocation.client().call_within(hold, &Stub::Jog, request, arguments.axis()).command();
+    command =
+        invocation.client().call_within(hold, &Stub::Jog, request, arguments.axis(), Lane::stop).command();
   }
   return command;
 }
@@ -68,7 +69,7 @@ void jog(Invocation& invocation, const JogArguments& arguments) {
   const auto request = jog_request(arguments, before.unit(), hold);
   // The wait itself sees the request; nothing else has to happen on a thread of its own.
   const Interrupt interrupt([] {});
-  v1::Command command = send(invocation, &Stub::Jog, request);
+  v1::Command command = send(invocation, &Stub::Jog, request, Lane::stop);
   if (!invocation.json) print_line(command_line(command, before.unit()));
   try {
     command = renew(invocation, arguments, interrupt, request, command, hold);

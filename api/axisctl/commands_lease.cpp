@@ -56,7 +56,7 @@ v1::AcquireLeaseResponse acquire(Invocation& invocation, const Arguments& argume
 v1::RenewLeaseResponse renew(Invocation& invocation, std::uint64_t token, std::chrono::nanoseconds limit) {
   v1::RenewLeaseRequest request;
   request.set_lease_token(token);
-  return invocation.client().call_within(limit, &Stub::RenewLease, request, std::string_view());
+  return invocation.client().call_within(limit, &Stub::RenewLease, request, std::string_view(), Lane::stop);
 }
 
 v1::ReleaseLeaseResponse release(Invocation& invocation, std::uint64_t token) {

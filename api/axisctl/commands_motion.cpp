@@ -64,11 +64,12 @@ void set_position(Invocation& invocation, const MotionArguments& arguments) {
 
 template <class Request, class Response>
 v1::Command send_simple(Invocation& invocation, const MotionArguments& arguments, const std::string& axis,
-                        grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+                        grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                        Lane lane = Lane::ordinary) {
   Request request;
   request.set_axis(axis);
   *request.mutable_options() = command_options(arguments);
-  return send(invocation, method, request);
+  return send(invocation, method, request, lane);
 }
 
 void check_request_id(const MotionArguments& arguments) {
@@ -105,7 +106,7 @@ void disable(Invocation& invocation, const MotionArguments& arguments,
   auto worst = ExitCode::ok;
   for (const auto& axis : arguments.axes) {
     try {
-      commands.push_back(send_simple(invocation, arguments, axis, method));
+      commands.push_back(send_simple(invocation, arguments, axis, method, Lane::stop));
     } catch (const Failure& failure) {
       fmt::print(stderr, "axisctl: {}\n", failure.what());
       worst = failure.code();

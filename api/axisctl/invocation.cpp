@@ -29,13 +29,19 @@ Exit status:
   4    the daemon refused
   130  interrupted while waiting
 
-Environment: AXISD_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_LEASE, NO_COLOR.)";
+Environment: AXISD_SERVER, AXISD_STOP_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_LEASE, NO_COLOR.)";
 
 void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_option("--server", invocation.connection.server, "The daemon: HOST:PORT or unix:PATH")
       ->envname("AXISD_SERVER")
       ->type_name("ADDRESS")
       ->capture_default_str();
+  app.add_option(
+         "--stop-server", invocation.connection.stop_server,
+         "Where it takes stops whatever else it does; without it the port after that of --server, or its "
+         "path with .stop behind it")
+      ->envname("AXISD_STOP_SERVER")
+      ->type_name("ADDRESS");
   app.add_option("--tls-ca", invocation.connection.tls_ca,
                  "Use TLS; the daemon's certificate is checked with this one")
       ->envname("AXISD_TLS_CA")

@@ -76,7 +76,7 @@ class Axis:
     async def disable(self, *, wait: bool = True, request_id: str | None = None) -> Command:
         """Stops, waits for standstill, switches the power stage off."""
         request = axis_service_pb2.DisableRequest(axis=self.name, options=command_options(request_id, wait))
-        return await self._command(self._machine._axes.Disable, request, wait)
+        return await self._command(self._machine._stops.Disable, request, wait)
 
     async def home(self, *, wait: bool = True, buffered: bool = False, request_id: str | None = None) -> Command:
         """Searches the home position as configured."""
@@ -266,7 +266,7 @@ class Jog:
     async def _call(self) -> Command:
         # The same id each time: a repeat extends the hold, and never starts a jog anew that has ended.
         request = axis_service_pb2.JogRequest(**self._arguments, options=command_options(self._request_id, wait=False))
-        return await self._axis._command(self._axis._machine._axes.Jog, request, wait=False)
+        return await self._axis._command(self._axis._machine._stops.Jog, request, wait=False)
 
     async def _renew(self) -> None:
         # Three renewals per hold: two may be late or lost before the axis halts.

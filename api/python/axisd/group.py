@@ -158,7 +158,7 @@ class Group:
         request = group_service_pb2.GroupHaltRequest(group=self.name, axes=sorted(self._targets),
                                                      wait_until=types_pb2.WAIT_UNTIL_DONE if wait
                                                      else types_pb2.WAIT_UNTIL_ACCEPTED)
-        return await self._stop(self._machine._group_stops.GroupHalt, request, wait)
+        return await self._stop(self._machine._stops.GroupHalt, request, wait)
 
     async def stop(self, hold: bool = False, wait: bool = True) -> dict[str, Command]:
         """Stops each axis; nothing takes over before standstill, with `hold` before release_stop(). Raises StopError
@@ -173,7 +173,7 @@ class Group:
                                                      request_id=name,
                                                      wait_until=types_pb2.WAIT_UNTIL_DONE if wait
                                                      else types_pb2.WAIT_UNTIL_ACCEPTED)
-        return await self._stop(self._machine._group_stops.GroupStop, request, wait)
+        return await self._stop(self._machine._stops.GroupStop, request, wait)
 
     @property
     def _hold_subject(self) -> str:

@@ -103,5 +103,5 @@ class Lease:
 
     def _brief(self, limit: float) -> Any:
         async def renew(request: Any, timeout: float | None = None) -> Any:
-            return await self._machine._leases.RenewLease(request, timeout=min(timeout or limit, limit))
+            return await self._machine._stops.RenewLease(request, timeout=min(timeout or limit, limit))
         return renew

@@ -23,6 +23,7 @@ from .group import Group
 from .holds import Holds
 from .lease import Lease, LeaseInfo
 from .reasons import Reason
+from .stop_lane import StopCalls, StopLane, stop_lane_of
 from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, StopResult, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
@@ -55,26 +56,30 @@ _LONGEST_PAUSE = 0.5
 
 def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = None,
             tls_certificate: str | pathlib.Path | None = None, tls_key: str | pathlib.Path | None = None,
-            timeout: float = 10.0) -> Machine:
+            timeout: float = 10.0, stop_server: str | None = None) -> Machine:
     """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
     localhost:7443. Connects with the first call. `timeout` limits how long the daemon may take to answer, not how long
-    a motion may take. Stops are repeated until then while the daemon cannot be reached."""
+    a motion may take. Stops are repeated until then while the daemon cannot be reached. `stop_server`: its stop lane;
+    without it that of $AXISD_STOP_SERVER, else next to `server`."""
     if server is None:
         server = os.environ.get("AXISD_SERVER", "localhost:7443")
-    return Machine(server, tls_ca, tls_certificate, tls_key, timeout)
+    if stop_server is None:
+        stop_server = os.environ.get("AXISD_STOP_SERVER")
+    return Machine(server, tls_ca, tls_certificate, tls_key, timeout, stop_server)
 
 
 class Machine:
     """One daemon. Made by connect()."""
 
     def __init__(self, server: str, tls_ca: str | pathlib.Path | None, tls_certificate: str | pathlib.Path | None,
-                 tls_key: str | pathlib.Path | None, timeout: float) -> None:
+                 tls_key: str | pathlib.Path | None, timeout: float, stop_server: str | None = None) -> None:
         def read(path: str | pathlib.Path | None) -> bytes | None:
             return pathlib.Path(path).read_bytes() if path is not None else None
 
         if tls_ca is None and (tls_certificate is not None or tls_key is not None):
             raise ValueError("tls_certificate and tls_key need tls_ca")
         self.server = server
+        self.stop_server = stop_server
         self.timeout = timeout
         self._credentials = None
         if tls_ca is not None:
@@ -83,20 +88,19 @@ class Machine:
         self._holds = Holds()
 
     async def __aenter__(self) -> Machine:
-        self._channels = [self._channel(), self._channel()]
-        ordinary, stops = self._channels
+        ordinary, stops = self._channel(self.server), self._channel(self.server)
+        address = self.stop_server or stop_lane_of(self.server)
+        lane = self._channel(address) if address is not None else None
+        self._channels = [channel for channel in (ordinary, stops, lane) if channel is not None]
         self._axes = axis_service_pb2_grpc.AxisServiceStub(ordinary)
-        self._stops = axis_service_pb2_grpc.AxisServiceStub(stops)
         self._commands = command_service_pb2_grpc.CommandServiceStub(ordinary)
-        self._cancels = command_service_pb2_grpc.CommandServiceStub(stops)
         self._buses = bus_service_pb2_grpc.BusServiceStub(ordinary)
         self._drives = drive_service_pb2_grpc.DriveServiceStub(ordinary)
         self._events = event_service_pb2_grpc.EventServiceStub(ordinary)
         self._leases = lease_service_pb2_grpc.LeaseServiceStub(ordinary)
         self._groups = group_service_pb2_grpc.GroupServiceStub(ordinary)
-        self._group_stops = group_service_pb2_grpc.GroupServiceStub(stops)
         self._system = system_service_pb2_grpc.SystemServiceStub(ordinary)
-        self._system_stops = system_service_pb2_grpc.SystemServiceStub(stops)
+        self._stops = StopCalls(StopLane(lane), stops)
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
@@ -104,10 +108,10 @@ class Machine:
         for channel in self._channels:
             await channel.close()
 
-    def _channel(self) -> grpc.aio.Channel:
+    def _channel(self, address: str) -> grpc.aio.Channel:
         if self._credentials is None:
-            return grpc.aio.insecure_channel(self.server, options=_OPTIONS)
-        return grpc.aio.secure_channel(self.server, self._credentials, options=_OPTIONS)
+            return grpc.aio.insecure_channel(address, options=_OPTIONS)
+        return grpc.aio.secure_channel(address, self._credentials, options=_OPTIONS)
 
     async def _call(self, method: Any, request: Any, subject: str, wait: bool = False,
                     limit: float | None = None) -> Any:
@@ -209,7 +213,7 @@ class Machine:
     async def cancel(self, command_id: str) -> Command:
         """Halts the axis if it executes this command."""
         request = command_service_pb2.CancelCommandRequest(id=command_id)
-        return Command.of((await self._stop_call(self._cancels.CancelCommand, request, command_id)).command)
+        return Command.of((await self._stop_call(self._stops.CancelCommand, request, command_id)).command)
 
     async def commands(self, axis: str = "", limit: int = 20) -> list[Command]:
         """The newest commands of all clients since the daemon was started, newest first; of one axis unless that is empty."""
@@ -221,7 +225,7 @@ class Machine:
         rating. Never raises for a single axis: look at each result."""
         request = system_service_pb2.StopAllRequest(
             wait_until=types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED)
-        response = await self._stop_call(self._system_stops.StopAll, request, "stop all", wait)
+        response = await self._stop_call(self._stops.StopAll, request, "stop all", wait)
         return [StopResult.of(result) for result in response.results]
 
     async def release_stop_all(self) -> None:
