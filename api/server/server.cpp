@@ -40,8 +40,9 @@ void limit_transport(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 1000);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 5000);
-  // Only reflection uses gRPC's synchronous threads, one per open call: a handful is enough.
-  builder.SetResourceQuota(grpc::ResourceQuota("axisd").SetMaxThreads(8));
+  // Only reflection uses gRPC's synchronous threads, one per open call: a handful is enough. Near this much
+  // memory gRPC reads less and takes no new connections; stops have another way.
+  builder.SetResourceQuota(grpc::ResourceQuota("axisd").SetMaxThreads(8).Resize(256U << 20U));
   builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::MIN_POLLERS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
