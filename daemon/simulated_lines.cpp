@@ -11,11 +11,17 @@
 
 namespace axisd {
 
+namespace {
+/// What is measured wavers and lags as on a real drive, so that who tries axisd without hardware sees it.
+constexpr simulation::EncoderSettings usual_encoder{
+    .noise = 1, .following = std::chrono::milliseconds(3), .quantised = true};
+}  // namespace
+
 simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry) {
   const Scale scale(entry.axis.scale);
   const auto& simulate = entry.simulation;
   const auto pulses = [&](double units) { return scale.to_pulses(units - simulate.start_position); };
-  simulation::SimulatedNodeSettings node{.address = entry.axis.node};
+  simulation::SimulatedNodeSettings node{.address = entry.axis.node, .encoder = usual_encoder};
   auto& mechanics = node.mechanics;
   if (simulate.home_switch) {
     const auto edges =

@@ -233,6 +233,7 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
     // Without a known position a jog is bounded by its travel alone: from where the shaft is (M16).
     if (activity->plan.target->distance) tracker_.forget_base();
     if (!co_await positioned(activity)) co_return;
+    tracker_.reached(*activity->plan.target, drive_->position_window());
     remember_position();
     const bool jog = activity->command->value().kind == CommandKind::jog;
     const auto& limits = settings_.limits;

@@ -144,7 +144,9 @@ Result<std::optional<PositionTracker::Target>> Axis::end_of_velocity(bool positi
   if (tracker_.trust() != PositionTrust::unknown) {
     target = tracker_.plan_absolute(positive ? *limits.position_maximum : *limits.position_minimum);
     const auto way = target.position - tracker_.position();
-    if (positive ? way <= 0 : way >= 0)
+    // A measured position wavers: within its window it is at the limit (M30).
+    const bool there = std::abs(target.counter - tracker_.counter()) <= drive_->position_window();
+    if (there || (positive ? way <= 0 : way >= 0))
       return fail(Error{.reason = Reason::soft_limit,
                         .message = fmt::format("{}: at the software limit already", settings_.name),
                         .remedy = "move the other way",

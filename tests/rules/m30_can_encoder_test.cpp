@@ -252,6 +252,25 @@ TEST(M30, OnCanASlowTurnOfAnEnabledShaftIsFound) {
   }
 }
 
+/// M16: whichever of its readings is the last.
+TEST(M30, OnCanAtTheSoftwareLimitNothingIsLeftToGo) {
+  for (const std::string model : {"yss-c", "cia402"})
+    for (const bool moved_there : {false, true}) {
+      CanRig rig(measured(model, 2));
+      rig.ready();
+      if (moved_there)
+        rig.done(MoveAbsoluteRequest{.position = 400});
+      else
+        EXPECT_EQ(rig.complete(MoveVelocityRequest{.velocity = 80}).state, CommandState::aborted);
+      for (int i = 0; i < 20; ++i) {
+        rig.run(17ms);
+        const auto again = rig.machine->submit("feeder", MoveVelocityRequest{.velocity = 10}, {});
+        ASSERT_FALSE(again) << i;
+        EXPECT_EQ(again.error().reason, Reason::soft_limit);
+      }
+    }
+}
+
 TEST(M30, OnCanRandomRelativeMovesDoNotDrift) {
   for (const std::string model : {"yss-c", "cia402"})
     for (const bool invert : {false, true}) {
