@@ -57,10 +57,10 @@ class EdsFile : public ::testing::Test {
     ASSERT_NE(at, std::string::npos) << from;
     write(text.replace(at, from.size(), to));
   }
-  /// The example with an object (in its list as `number`=0x...) turned into one of the maker's.
-  void write_without(std::string_view number, std::string_view object) const {
+  /// The example with an object turned into one of the maker's.
+  void write_without(std::string_view object) const {
     auto text = read_text(source_path("config/examples/standard-drive.eds"));
-    for (const auto& entry : {fmt::format("{}=0x{}", number, object), fmt::format("[{}]", object)}) {
+    for (const auto& entry : {fmt::format("=0x{}", object), fmt::format("[{}]", object)}) {
       const auto at = text.find(entry);
       ASSERT_NE(at, std::string::npos) << entry;
       text.replace(at + entry.find(object), object.size(), "609B");
@@ -163,7 +163,7 @@ TEST_F(EdsFile, ADriveWithoutHomingModeHasNoHoming) {
 }
 
 TEST_F(EdsFile, ADriveWithoutDigitalInputsHasNoTerminals) {
-  write_without("48", "60FD");
+  write_without("60FD");
   EXPECT_EQ(found({.inputs = ""}), "");
   EXPECT_THAT(
       found({.inputs = "NEG: negative_limit"}),
@@ -171,7 +171,7 @@ TEST_F(EdsFile, ADriveWithoutDigitalInputsHasNoTerminals) {
 }
 
 TEST_F(EdsFile, ADriveWithoutHomingAccelerationTakesNoTimeForIt) {
-  write_without("47", "609A");
+  write_without("609A");
   const std::string homing =
       "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 mm/s";
   EXPECT_EQ(found({.more = homing + " }\n"}), "");
