@@ -2,6 +2,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <random>
+
 #include "tests/conformance/scenario.hpp"
 
 namespace axisd::conformance {
@@ -193,6 +197,38 @@ double index_by_thirds(const Setup& setup, int count) {
   }
   bench.finish(count);
   return bench.shaft().mm;
+}
+
+RandomMoves move_at_random(const Setup& setup, int count) {
+  Bench bench(
+      setup,
+      {.limits = false, .home_switch = false, .limit_switches = false, .mechanics = false, .homing = ""});
+  bench.ready();
+  std::mt19937 random(static_cast<std::uint32_t>(count));
+  // As many of a fraction of a pulse as of a few pulses, tenths of mm, and mm.
+  const auto distance = [&random] {
+    const auto size = std::pow(10.0, std::uniform_real_distribution(-3.0, 0.8)(random));
+    return std::bernoulli_distribution(0.5)(random) ? size : -size;
+  };
+  RandomMoves result;
+  double asked = 0, least = 0, most = 0;
+  for (int i = 0; i < count; ++i) {
+    const auto mm = distance();
+    const auto moved = bench.client.move_by(mm);
+    if (!moved.ok() || moved->state() != v1::COMMAND_STATE_DONE) {
+      if (++result.refused == 1)
+        result.first_refusal = moved.ok() ? describe(moved.response) : moved.status.error_message();
+      asked = bench.shaft().mm - most;
+      continue;
+    }
+    asked += mm;
+    // By how much the first reading of an encoder was off stays: that is no drift.
+    const auto beside = bench.shaft().mm - asked;
+    least = i == 0 ? beside : std::min(least, beside);
+    most = i == 0 ? beside : std::max(most, beside);
+  }
+  result.drift_pulses = (most - least) * pulses_per_mm;
+  return result;
 }
 
 std::span<const Scenario> motion_scenarios() { return scenarios; }

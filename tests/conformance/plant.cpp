@@ -93,7 +93,7 @@ std::string any_homing_method(const Manual& manual, const Variant& variant) {
 std::string Variant::name() const {
   std::string text = invert ? "inverted" : "plain";
   for (const auto& [name, on] : switches) text += fmt::format(" {}={}", name, on ? "on" : "off");
-  return text;
+  return text + fmt::format(" noise={}", noise);
 }
 
 std::map<std::string, std::string> terminals_of(const Manual& manual, const Variant& variant,
@@ -148,6 +148,8 @@ Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& rec
   auto drive = fmt::format("node={},model={}{}", recipe.node, manual.model(), mechanics_of(variant, recipe));
   for (const auto& [name, on] : variant.switches)
     drive += fmt::format(",switch.{}={}", name, on ? "on" : "off");
+  if (manual.says_yes("closed_loop"))
+    drive += fmt::format(",encoder.noise={},encoder.following_ms=8,encoder.quantised=on", variant.noise);
   if (!recipe.drive.empty()) drive += "," + recipe.drive;
   return {.yaml = std::move(yaml), .drives = {std::move(drive)}};
 }

@@ -16,6 +16,9 @@ namespace axisd::conformance {
 struct Variant {
   bool invert = false;
   std::map<std::string, bool> switches{};
+  /// Counts that a reading of the encoder is off at most (M30). In each variant the shaft also lags behind in
+  /// motion and settles after it, and whole counts are shown. Without effect on a model that has no encoder.
+  int noise = 1;
   [[nodiscard]] std::string name() const;
 };
 

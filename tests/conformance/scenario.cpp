@@ -57,9 +57,9 @@ void make_possible(std::map<std::string, bool>& flipped, std::span<const simulat
 
 }  // namespace
 
-std::vector<Variant> variants_of(const std::string& model, const Subject& subject, bool sampled) {
+std::vector<Variant> variants_of(const std::string& model, const Subject& subject, bool sampled, int noise) {
   constexpr std::size_t pairs = 12, part = 5;
-  std::vector<Variant> all{{.invert = false}, {.invert = true}};
+  std::vector<Variant> all{{.invert = false, .noise = noise}, {.invert = true, .noise = noise}};
   if (!subject.varied) return all;
   const auto switches = simulation::find_simulator(model)->switches;
   const auto flipped = [](const simulation::SwitchSpec& one) {
@@ -69,12 +69,14 @@ std::vector<Variant> variants_of(const std::string& model, const Subject& subjec
   const auto salt = static_cast<std::size_t>(same - subjects().begin()) + model.size();
   for (std::size_t i = 0; i < switches.size(); ++i)
     if (!sampled || (i + salt) % part == 0)
-      all.push_back({.invert = (i / part + salt) % 2 != 0, .switches = {flipped(switches[i])}});
+      all.push_back(
+          {.invert = (i / part + salt) % 2 != 0, .switches = {flipped(switches[i])}, .noise = noise});
   std::mt19937 random(static_cast<std::uint32_t>(salt));
   for (std::size_t i = 0; i < (sampled ? pairs / part : pairs); ++i) {
     const auto& first = switches[random() % switches.size()];
     const auto& second = switches[random() % switches.size()];
-    all.push_back({.invert = random() % 2 == 0, .switches = {flipped(first), flipped(second)}});
+    all.push_back(
+        {.invert = random() % 2 == 0, .switches = {flipped(first), flipped(second)}, .noise = noise});
   }
   for (auto& variant : all) make_possible(variant.switches, switches);
   return all;

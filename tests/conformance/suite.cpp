@@ -14,6 +14,11 @@
 
 namespace axisd::conformance {
 
+int& suite_noise() {
+  static int counts = Variant{}.noise;
+  return counts;
+}
+
 namespace {
 
 #if __has_feature(address_sanitizer)
@@ -29,10 +34,12 @@ struct Case {
   std::string model;
   const Subject* subject;
   int shard, of;
+  int noise;  ///< of the encoder, counts
 };
 
 void PrintTo(const Case& one, std::ostream* out) {
-  *out << one.model << ' ' << one.subject->name << ' ' << one.shard + 1 << " of " << one.of;
+  *out << one.model << ' ' << one.subject->name << ' ' << one.shard + 1 << " of " << one.of << ", noise "
+       << one.noise;
 }
 
 std::vector<Case> cases() {
@@ -40,13 +47,26 @@ std::vector<Case> cases() {
   for (const auto& model : models())
     for (const auto& subject : subjects()) {
       const int of = subject.varied ? shards : 1;
-      for (int shard = 0; shard < of; ++shard) all.push_back({model, &subject, shard, of});
+      for (int shard = 0; shard < of; ++shard) all.push_back({model, &subject, shard, of, suite_noise()});
     }
+  return all;
+}
+
+/// What the suite leaves out of 0, 1 and 2 counts, of the models that have an encoder.
+std::vector<Case> other_noises() {
+  std::vector<Case> all;
+  for (const auto& model : models()) {
+    if (!Manual(model).says_yes("closed_loop")) continue;
+    for (const auto& subject : subjects())
+      for (const int noise : {0, 1, 2})
+        if (noise != suite_noise()) all.push_back({model, &subject, 0, 1, noise});
+  }
   return all;
 }
 
 std::string name_of(const ::testing::TestParamInfo<Case>& info) {
   auto name = fmt::format("{}_{}", info.param.model, info.param.subject->name);
+  if (info.param.noise != suite_noise()) name += fmt::format("_noise_{}", info.param.noise);
   if (info.param.of > 1) name += fmt::format("_{}", info.param.shard + 1);
   std::ranges::replace_if(name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
   return name;
@@ -61,9 +81,9 @@ class Suite : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Suite, Behaves) {
   spdlog::set_level(spdlog::level::off);
-  const auto& [model, subject, shard, of] = GetParam();
+  const auto& [model, subject, shard, of, noise] = GetParam();
   const Manual manual(model);
-  const auto variants = variants_of(model, *subject, sampled);
+  const auto variants = variants_of(model, *subject, sampled || noise != suite_noise(), noise);
   int failed = 0;
   for (std::size_t i = static_cast<std::size_t>(shard); i < variants.size();
        i += static_cast<std::size_t>(of))
@@ -76,6 +96,7 @@ TEST_P(Suite, Behaves) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Conformance, Suite, ::testing::ValuesIn(cases()), name_of);
+INSTANTIATE_TEST_SUITE_P(OtherNoise, Suite, ::testing::ValuesIn(other_noises()), name_of);
 
 TEST(Conformance, EveryModelHasASimulatorAndItsManual) {
   ASSERT_FALSE(models().empty());
@@ -94,6 +115,20 @@ TEST(Conformance, ThirdsAddUpOnAxesWithoutEnd) {
     for (const bool invert : {false, true})
       EXPECT_NEAR(index_by_thirds({.manual = manual, .variant = {.invert = invert}}, count), count / 3.0,
                   0.05);
+  }
+}
+
+/// The counter of pulses is what a drive without an encoder shows: it is among them.
+TEST(Conformance, RandomMovesDoNotDrift) {
+  spdlog::set_level(spdlog::level::off);
+  for (const auto& model : models()) {
+    SCOPED_TRACE(model);
+    const Manual manual(model);
+    for (const bool invert : {false, true}) {
+      const auto moved = move_at_random({.manual = manual, .variant = {.invert = invert, .noise = 2}}, 250);
+      EXPECT_EQ(moved.refused, 0) << moved.first_refusal;
+      EXPECT_LE(moved.drift_pulses, 1.001);
+    }
   }
 }
 
