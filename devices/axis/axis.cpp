@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "devices/released_position.hpp"
 
@@ -83,6 +84,10 @@ bool Axis::has_input(std::string_view function) const {
 
 std::int64_t Axis::home_offset() const {
   return scale_.to_pulses(settings_.homing ? settings_.homing->position : 0);
+}
+
+bool Axis::is_from_home(std::int64_t offset) const {
+  return std::abs(offset - home_offset()) <= drive_->position_window();
 }
 
 bool Axis::input_active(std::string_view function) const {

@@ -121,7 +121,7 @@ class Axis {
   /// The drive's segment table holds targets that count from its own zero.
   void set_absolute_segments(bool absolute) { absolute_segments_ = absolute; }
   /// The position is the drive's counter and the configured position at home, nothing else.
-  [[nodiscard]] bool position_is_from_home() const { return tracker_.offset() == home_offset(); }
+  [[nodiscard]] bool position_is_from_home() const { return is_from_home(tracker_.offset()); }
   /// The drive's memory is no longer what configure() made it: applied again. `position_lost`: the counter or
   /// its meaning, too.
   void reconfigure(const std::string& why, bool position_lost);
@@ -216,6 +216,8 @@ class Axis {
   [[nodiscard]] bool busy() const;
   [[nodiscard]] std::int64_t home_offset() const;
   [[nodiscard]] bool has_input(std::string_view function) const;
+  /// This offset of the position is that of home, as far as a reading tells (M30).
+  [[nodiscard]] bool is_from_home(std::int64_t offset) const;
   /// The position follows a shaft that is turned while the motor is released: in closed loop only, and where
   /// that is known (M20).
   [[nodiscard]] bool counts_while_released() const;

@@ -2,12 +2,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "devices/axis/axis.hpp"
 #include "devices/axis/chain.hpp"
 
 namespace axisd {
+
+namespace {
+
+/// Longest that a shaft takes to follow the drive to where it has stopped.
+constexpr Duration home_settling = std::chrono::milliseconds(500);
+
+}  // namespace
 
 std::string_view Axis::homing_switch() const {
   switch (settings_.homing->method) {
@@ -136,6 +145,7 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
   const auto near = std::max<std::int64_t>(drive_->position_window(), 1);
   bool mode_seen = false;
   bool bit_was_low = !homed_before;
+  std::optional<TimePoint> rests_since;
   for (;;) {
     co_await sampled_.wait_until(std::max(latest, env_.clock->now() + milliseconds(1)));
     if (!current(*activity)) co_return false;
@@ -151,6 +161,10 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
         const auto counter = std::int64_t{sample.position_pulses};
         const bool at_home = std::abs(counter) <= near || std::abs(counter - offset) <= near;
         const bool held_up = input_active("stop") || input_active("quick_stop");
+        // The shaft follows late: what is measured first is still on the way there (M30).
+        if (!rests_since) rests_since = now;
+        if (sample.homed && !at_home && drive_->position_window() > 0 && now < *rests_since + home_settling)
+          continue;
         if (rose || (sample.homed && at_home && !held_up)) co_return true;
         fail_with_stop(*activity, error(Reason::not_reached, "homing ended without reaching home",
                                         "check the switch, limit and stop terminals"));

@@ -345,7 +345,7 @@ void Axis::look_at(const SetPositionRequest& request, const CommandOptions& opti
   if (activity_ || stopping_.running || (sample_ && sample_->moving))
     found.block(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
   const bool number = scale_.checked_pulses(request.position).has_value();
-  if (number && absolute_segments_ && tracker_.offset_for(request.position) != home_offset())
+  if (number && absolute_segments_ && !is_from_home(tracker_.offset_for(request.position)))
     found.block(error(Reason::not_supported,
                       "the drive's absolute segments count from home: another position would not move them",
                       "home the axis instead: " + shell("home")));

@@ -137,6 +137,52 @@ TEST(M30, HomeEndsDoneAndAgain) {
   });
 }
 
+/// Home is told of while the shaft still follows: what is measured then is not the origin.
+TEST(M30, HomeIsTheDrivesOriginHoweverLateTheShaftSettles) {
+  for (const bool stays : {false, true})
+    for (const auto model : closed_loops) {
+      auto options = measured(model, 1);
+      options.switches["homed_stays_during_homing"] = stays;
+      options.adjust = [adjust = options.adjust](AxisSettings& axis) {
+        adjust(axis);
+        axis.homing->search_velocity = 20;
+      };
+      options.adjust_drive = [adjust = options.adjust_drive](simulation::SimulatedNodeSettings& node) {
+        adjust(node);
+        node.encoder.following = 40ms;
+      };
+      both_directions(options, [](const RigOptions& one) {
+        Rig rig(one);
+        rig.enable();
+        for (int i = 0; i < 2; ++i) {
+          expect_done(rig.complete(HomeRequest{}));
+          const auto home = load_of(rig, one);
+          expect_done(rig.complete(MoveAbsoluteRequest{.position = 20}));
+          EXPECT_NEAR(load_of(rig, one) - home, 80, 0.0011);
+        }
+      });
+    }
+}
+
+TEST(M30, AtTheSoftwareLimitIsWithinWhatAReadingWavers) {
+  on_each([](const RigOptions& options) {
+    Rig rig(options);
+    rig.ready();
+    expect_done(rig.complete(MoveAbsoluteRequest{.position = 380}));
+    for (const double way : {1.0, -1.0}) {
+      const auto run = rig.submit(MoveVelocityRequest{.velocity = 80 * way});
+      ASSERT_TRUE(rig.run_until([&] { return run->has_ended(); }, 30s));
+      EXPECT_EQ(run->value().cause->reason, Reason::soft_limit) << describe(run->value());
+      for (int i = 0; i < 20; ++i) {
+        const auto again = rig.try_submit(MoveVelocityRequest{.velocity = 10 * way});
+        ASSERT_FALSE(again) << i;
+        EXPECT_EQ(again.error().reason, Reason::soft_limit);
+        rig.run(7ms);
+      }
+    }
+  });
+}
+
 TEST(M30, ARestartOfTheDaemonFindsItWhereItWas) {
   on_each([](RigOptions options) {
     options.persistence = options.journal = true;
