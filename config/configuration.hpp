@@ -25,9 +25,10 @@ struct TlsSettings {
 
 /// `limits:` of the server.
 struct ServerLimits {
-  int calls = 256;        ///< waiting, per client; stops are not counted
-  int streams = 64;       ///< open, per client
-  int connections = 256;  ///< of all clients
+  int calls = 256;            ///< waiting, per client; stops are not counted
+  int streams = 64;           ///< open, per client
+  int connections = 256;      ///< of all clients
+  int request_ids = 1 << 20;  ///< remembered, of all clients; see devices/axis/id_limits.hpp
   Duration stalled_reader = std::chrono::seconds(2);
 };
 

@@ -227,6 +227,7 @@ Section section_of(const ServerSettings& server) {
   fields.add("limits.calls", server.limits.calls);
   fields.add("limits.streams", server.limits.streams);
   fields.add("limits.connections", server.limits.connections);
+  fields.add("limits.request_ids", server.limits.request_ids);
   fields.add("limits.stalled_reader", server.limits.stalled_reader);
   if (!server.tls) return fields.take();
   fields.add("tls.certificate", server.tls->certificate);

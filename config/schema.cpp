@@ -69,6 +69,19 @@ constexpr KeySpec limit_keys[] = {
          [](Target& t, const Value& v) {
            t.configuration->server.limits.connections = static_cast<int>(v.integer);
          }},
+    {.key = "request_ids",
+     .kind = Kind::integer,
+     .description =
+         "Request ids that are remembered of all clients together, at 20 bytes each; a client may have "
+         "twice as many as are free. Each is remembered for 11 minutes at least. Stops need none.",
+     .example = "100000",
+     .default_value = "1048576",
+     .minimum = 1'000,
+     .maximum = 10'000'000,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.configuration->server.limits.request_ids = static_cast<int>(v.integer);
+         }},
     {.key = "stalled_reader",
      .kind = Kind::duration,
      .description = "A stream whose reader has not read for so long is cancelled.",

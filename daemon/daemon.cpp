@@ -145,11 +145,13 @@ void log_budget(const BusBudgetReport& budget) {
 }
 
 /// Precondition: the directory is locked.
-Result<std::unique_ptr<store::JournalFile>> open_journal(const std::string& state_directory,
+Result<std::unique_ptr<store::JournalFile>> open_journal(const config::Configuration& configuration,
                                                          core::CoreLoop& loop) {
-  auto disk = store::open_journal_disk(state_directory);
+  auto disk = store::open_journal_disk(configuration.state_directory);
   if (!disk) return fail(disk.error());
-  return store::JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), loop.executor());
+  const IdLimits limits{.total = static_cast<std::size_t>(configuration.server.limits.request_ids)};
+  return store::JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), loop.executor(),
+                                  {.bounds = {.most = limits.total + limits.reserve()}});
 }
 
 /// What cannot be served as it is asked for would fail at the next start, too.
@@ -186,7 +188,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
   auto store = store::FileStore::open(configuration.state_directory, loop.executor());
   if (!store) return give_up(store.error());
   if ((*store)->damage()) spdlog::error("{}", to_string(*(*store)->damage()));
-  auto journal = open_journal(configuration.state_directory, loop);
+  auto journal = open_journal(configuration, loop);
   if (!journal) return give_up(journal.error());
   core::FrameObserver wire_log;
   if (!options.wire_log.empty()) {

@@ -46,7 +46,8 @@ void log_link(const canopen::CanopenBus& network, std::string& told) {
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
     : parts_(std::move(parts)),
       recorder_memory_(static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024),
-      book_(*parts_.clock, parts_.instance_id, parts_.journal),
+      book_(*parts_.clock, parts_.instance_id, parts_.journal,
+            {.total = static_cast<std::size_t>(configuration.server.limits.request_ids)}),
       commands_([this](const std::string& axis, EventContent content) {
         events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
       }),

@@ -22,7 +22,8 @@ std::unexpected<Error> closing() {
 
 std::unexpected<Error> unknown_command(const std::string& id) {
   return fail(Reason::unknown_command, fmt::format("there is no command '{}' (any more)", id),
-              "commands are remembered for 30 minutes; those without a request_id not over a restart");
+              "commands that have ended are remembered for 30 minutes at most, and not beyond the newest few "
+              "thousand; those without a request_id not over a restart");
 }
 
 }  // namespace

@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -16,6 +19,10 @@ namespace {
 constexpr auto newest = "journal.v1";
 constexpr auto unfinished = "journal.v1.new";
 constexpr auto damaged = "journal.v1.damaged";
+
+constexpr std::string_view ids_prefix = "journal-ids-", ids_suffix = ".v1";
+
+std::string ids_name(std::uint32_t file) { return fmt::format("{}{}{}", ids_prefix, file, ids_suffix); }
 
 class FileDisk final : public JournalDisk {
  public:
@@ -29,15 +36,8 @@ class FileDisk final : public JournalDisk {
       return failed("open", newest, errno);
     }
     std::string text;
-    std::array<char, 65536> chunk{};
-    for (;;) {
-      const auto got = ::read(file.get(), chunk.data(), chunk.size());
-      if (got == 0) return text;
-      if (got > 0)
-        text.append(chunk.data(), static_cast<std::size_t>(got));
-      else if (errno != EINTR)
-        return failed("read", newest, errno);
-    }
+    if (auto got = read_all(file.get(), newest, text, SIZE_MAX); !got) return fail(got.error());
+    return text;
   }
 
   Result<void> append(std::string_view text) override {
@@ -72,6 +72,43 @@ class FileDisk final : public JournalDisk {
     return {};
   }
 
+  Result<void> append_ids(std::uint32_t number, std::uint64_t offset, std::string_view bytes) override {
+    const auto name = ids_name(number);
+    const int at = directory_.get();
+    const FileDescriptor file(openat(at, name.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0640));
+    if (file.get() < 0) return failed("create", name, errno);
+    const auto begin = static_cast<off_t>(offset);
+    if (ftruncate(file.get(), begin) != 0 || lseek(file.get(), begin, SEEK_SET) != begin)
+      return failed("write", name, errno);
+    if (auto written = write_all(file.get(), name.c_str(), bytes); !written) return written;
+    if (fdatasync(file.get()) != 0) return failed("write", name, errno);
+    // Of a new one the name has to be durable, too.
+    if (offset == 0 && fsync(at) != 0) return failed("write", ".", errno);
+    return {};
+  }
+
+  Result<std::string> read_ids(std::uint32_t number, std::uint64_t most) override {
+    const auto name = ids_name(number);
+    const FileDescriptor file(openat(directory_.get(), name.c_str(), O_RDONLY | O_CLOEXEC));
+    std::string bytes;
+    if (file.get() < 0 && errno == ENOENT) return bytes;
+    if (file.get() < 0) return failed("open", name, errno);
+    if (auto got = read_all(file.get(), name.c_str(), bytes, most); !got) return fail(got.error());
+    return bytes;
+  }
+
+  void keep_ids(const std::vector<std::uint32_t>& files) override {
+    std::set<std::string> names;
+    for (const auto file : files) names.insert(ids_name(file));
+    std::error_code error;
+    for (std::filesystem::directory_iterator entry(path_, error), end; !error && entry != end;
+         entry.increment(error)) {
+      const auto name = entry->path().filename().string();
+      if (name.starts_with(ids_prefix) && name.ends_with(ids_suffix) && !names.contains(name))
+        unlinkat(directory_.get(), name.c_str(), 0);
+    }
+  }
+
  private:
   [[nodiscard]] std::unexpected<Error> failed(std::string_view what, std::string_view name, int error) const {
     return fail({.reason = Reason::storage,
@@ -79,6 +116,19 @@ class FileDisk final : public JournalDisk {
                                         std::generic_category().message(error)),
                  .remedy = "free space on the disk, and check it and the directory's permissions",
                  .where = {.native_code = static_cast<std::uint32_t>(error)}});
+  }
+  [[nodiscard]] Result<void> read_all(int file, const char* name, std::string& text,
+                                      std::uint64_t most) const {
+    std::array<char, 65536> chunk{};
+    while (text.size() < most) {
+      const auto got = ::read(file, chunk.data(), std::min<std::uint64_t>(chunk.size(), most - text.size()));
+      if (got == 0) break;
+      if (got > 0)
+        text.append(chunk.data(), static_cast<std::size_t>(got));
+      else if (errno != EINTR)
+        return failed("read", name, errno);
+    }
+    return {};
   }
   [[nodiscard]] Result<void> write_all(int file, const char* name, std::string_view text) const {
     while (!text.empty()) {

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "buses/error.hpp"
 #include "buses/file_descriptor.hpp"
@@ -26,9 +28,19 @@ class JournalDisk {
   [[nodiscard]] virtual Result<void> replace(std::string_view text) = 0;
   /// Keeps a second name for the present file, which a person may want to look at.
   [[nodiscard]] virtual Result<void> keep_damaged() = 0;
+
+  // Files beside it, by number.
+  /// Durably writes behind the first `offset` bytes; what was there is gone. Errors: storage: what is there
+  /// is not known.
+  [[nodiscard]] virtual Result<void> append_ids(std::uint32_t file, std::uint64_t offset,
+                                                std::string_view bytes) = 0;
+  /// At most `most` bytes from its beginning; none: it is not there. Errors: storage.
+  [[nodiscard]] virtual Result<std::string> read_ids(std::uint32_t file, std::uint64_t most) = 0;
+  /// Removes all others, as far as that goes.
+  virtual void keep_ids(const std::vector<std::uint32_t>& files) = 0;
 };
 
-/// `journal.v1` in a directory, which the caller has locked. Errors: storage.
+/// `journal.v1` and `journal-ids-N.v1` in a directory, which the caller has locked. Errors: storage.
 Result<std::unique_ptr<JournalDisk>> open_journal_disk(const std::filesystem::path& directory);
 
 }  // namespace axisd::store

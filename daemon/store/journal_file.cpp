@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <utility>
 
 #include "daemon/store/thread.hpp"
@@ -15,47 +16,73 @@ namespace {
 constexpr auto retry = std::chrono::seconds(1);
 /// The file is written anew when it has grown to twice what it was, and to this at least.
 constexpr std::size_t smallest_rewrite = std::size_t{1} << 20U;
+/// Commands that have ended and are kept with all that is known of them.
+constexpr std::size_t kept_in_full = 1'000;
+/// What time it is is written so often at most: what is heard of meanwhile counts as heard of before.
+constexpr Duration time_told = std::chrono::seconds(1);
 
 }  // namespace
 
 Result<std::unique_ptr<JournalFile>> JournalFile::open(std::unique_ptr<JournalDisk> disk, WallTime now,
-                                                       Executor core) {
-  std::unique_ptr<JournalFile> journal(new JournalFile(std::move(disk), std::move(core)));
+                                                       Executor core, JournalOptions options) {
+  std::unique_ptr<JournalFile> journal(new JournalFile(std::move(disk), std::move(core), std::move(options)));
   const auto text = journal->disk_->read();
   if (!text) return fail(text.error());
-  if (*text) {
-    auto load = load_journal(**text, monotonic_now());
-    if (load.newer_format)
-      return fail(Reason::storage, "the command journal was written by a newer axisd",
-                  "run that version, or move journal.v1 away 10 minutes after the last command");
-    if (load.torn > 0)
-      spdlog::warn(
-          "the command journal ends in {} bytes of a line that a crash cut short before it was durable: left "
-          "out, as nothing was sent for it",
-          load.torn);
-    journal->model_ = std::move(load.model);
-    if (!load.damage.empty()) {
-      journal->model_.apply(DoubtLine{.until = now + longest_validity, .damage = load.damage},
-                            monotonic_now());
-      if (auto kept = journal->disk_->keep_damaged(); !kept) return fail(kept.error());
-    }
-    // A clock that was set back meanwhile does not make the doubt longer than it was.
-    auto content = journal->model_.content();
-    if (content.doubtful_until)
-      content.doubtful_until = std::min(*content.doubtful_until, WallTime(now + longest_validity));
-    if (content.doubtful_until && *content.doubtful_until <= now) {
-      content.doubtful_until.reset();
-      journal->model_.doubt_is_over();
-    }
-    journal->loaded_ = std::move(content);
-  }
-  if (auto written = journal->rewrite(); !written) return fail(written.error());
+  if (*text)
+    if (auto loaded = journal->load(**text, now); !loaded) return fail(loaded.error());
+  journal->look_at_clock();
+  if (auto written = journal->settle(); !written) return fail(written.error());
   journal->thread_ = start_thread([self = journal.get()] { self->run(); });
   return journal;
 }
 
-JournalFile::JournalFile(std::unique_ptr<JournalDisk> disk, Executor core)
-    : core_(std::move(core)), disk_(std::move(disk)) {}
+Result<void> JournalFile::load(const std::string& text, WallTime now) {
+  auto load = load_journal(text);
+  if (load.newer_format)
+    return fail(Reason::storage, "the command journal was written by a newer axisd",
+                "run that version, or move journal.v1 away 10 minutes after the last command");
+  if (load.torn > 0)
+    spdlog::warn(
+        "the command journal ends in {} bytes of a line that a crash cut short before it was durable: left "
+        "out, as nothing was sent for it",
+        load.torn);
+  model_ = std::move(load.model);
+  look_at_clock();
+  model_.forget_before(model_.now() - remembered);
+  auto ids = load_ids(*disk_, still_needed(model_.id_files(), model_.now(), options_.bounds));
+  if (!ids) return fail(ids.error());
+  model_.set_id_files(std::move(ids->files));
+  if (load.damage.empty()) load.damage = std::move(ids->damage);
+  if (!load.damage.empty()) {
+    model_.apply(DoubtLine{.until = now + longest_validity, .damage = load.damage});
+    if (auto kept = disk_->keep_damaged(); !kept) return kept;
+  }
+  // A clock that was set back meanwhile does not make the doubt longer than it was.
+  auto content = model_.content();
+  if (content.doubtful_until)
+    content.doubtful_until = std::min(*content.doubtful_until, WallTime(now + longest_validity));
+  if (content.doubtful_until && *content.doubtful_until <= now) {
+    content.doubtful_until.reset();
+    model_.doubt_is_over();
+  }
+  content.ids = std::move(ids->runs);
+  loaded_ = std::move(content);
+  return {};
+}
+
+JournalFile::JournalFile(std::unique_ptr<JournalDisk> disk, Executor core, JournalOptions options)
+    : core_(std::move(core)), options_(std::move(options)), disk_(std::move(disk)) {}
+
+std::string boot_id() {
+  std::ifstream file("/proc/sys/kernel/random/boot_id");
+  std::string id;
+  file >> id;
+  return id;
+}
+
+void JournalFile::look_at_clock() {
+  model_.apply(model_.time_after(options_.boot, monotonic_now().time_since_epoch()));
+}
 
 JournalFile::~JournalFile() {
   if (!thread_.joinable()) return;
@@ -85,6 +112,10 @@ void JournalFile::ended(const Command& command) {
   enqueue({.line = EndedLine{.command = command}, .durable = true});
 }
 
+void JournalFile::heard(const Command& command, RequestKey request) {
+  enqueue({.line = HeardLine{.command = command, .request = std::move(request)}});
+}
+
 void JournalFile::enqueue(Pending pending) {
   {
     // Held by the writer only for a swap: the core does not wait for the disk.
@@ -112,8 +143,8 @@ void JournalFile::run() {
 }
 
 void JournalFile::commit(std::vector<Pending> batch) {
-  const auto now = monotonic_now();
-  for (const auto& pending : batch) model_.apply(pending.line, now);
+  look_at_clock();
+  for (const auto& pending : batch) model_.apply(pending.line);
   const bool was_broken = broken_;
   // What a failed write left at the end of the file is not known, nor what a failed sync left out.
   const auto written = was_broken ? rewrite() : write(batch);
@@ -123,15 +154,37 @@ void JournalFile::commit(std::vector<Pending> batch) {
   if (!written) return tell(written.error());
   if (was_broken) tell(std::nullopt);
   if (size_ < std::max(smallest_rewrite, 2 * size_when_rewritten_)) return;
-  model_.forget_before(monotonic_now() - remembered);
-  if (const auto shortened = rewrite(); !shortened) {
+  if (const auto shortened = settle(); !shortened) {
     broken_ = true;
     tell(shortened.error());
   }
 }
 
+/// What has ended goes to the files of ids, apart from the newest; the journal is written anew without it.
+Result<void> JournalFile::settle() {
+  model_.forget_before(model_.now() - remembered);
+  model_.set_id_files(still_needed(model_.id_files(), model_.now(), options_.bounds));
+  auto settled = model_.settled(kept_in_full);
+  if (!settled.runs.empty()) {
+    const auto added = append_ids(*disk_, model_.id_files(), settled.runs);
+    if (!added) return fail(added.error());
+    model_.apply(*added);
+  }
+  model_.drop(settled.commands);
+  if (auto written = rewrite(); !written) return written;
+  std::vector<std::uint32_t> files;
+  files.reserve(model_.id_files().size());
+  for (const auto& file : model_.id_files()) files.push_back(file.file);
+  disk_->keep_ids(files);
+  return {};
+}
+
 Result<void> JournalFile::write(const std::vector<Pending>& batch) {
   std::string text;
+  if (model_.now() - told_time_ >= time_told || told_time_ == Duration::min()) {
+    told_time_ = model_.now();
+    text += encode_line(++last_number_, model_.time_after(options_.boot, monotonic_now().time_since_epoch()));
+  }
   for (const auto& pending : batch) text += encode_line(++last_number_, pending.line);
   if (auto appended = disk_->append(text); !appended) return appended;
   size_ += text.size();

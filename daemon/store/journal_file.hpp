@@ -10,11 +10,21 @@
 #include <vector>
 
 #include "buses/task.hpp"
+#include "daemon/store/id_files.hpp"
 #include "daemon/store/journal_disk.hpp"
 #include "daemon/store/journal_model.hpp"
 #include "devices/axis/command_journal.hpp"
 
 namespace axisd::store {
+
+/// The kernel's name of this start of the computer; empty: there is none.
+std::string boot_id();
+
+struct JournalOptions {
+  IdBounds bounds{};
+  /// Within one start of the computer monotonic_now() tells how long anything takes.
+  std::string boot = boot_id();
+};
 
 /// The command journal in a file, written by a thread of its own: what is told while the disk is busy goes
 /// into the next write together. Thread: core (created and destroyed there, too).
@@ -23,7 +33,7 @@ class JournalFile final : public CommandJournal {
   /// Loads the journal and durably begins a new one with what is still needed. Blocks on the disk. Errors:
   /// storage, with what to do.
   static Result<std::unique_ptr<JournalFile>> open(std::unique_ptr<JournalDisk> disk, WallTime now,
-                                                   Executor core);
+                                                   Executor core, JournalOptions options = {});
   JournalFile(const JournalFile&) = delete;
   /// Writes what is still pending. Callbacks are posted, which no longer run if the core has ended.
   ~JournalFile() override;
@@ -34,6 +44,7 @@ class JournalFile final : public CommandJournal {
   void attached(const std::string& command, RequestKey request, Callback done) override;
   void sending(const Command& command, SendingNote note, Callback done) override;
   void ended(const Command& command) override;
+  void heard(const Command& command, RequestKey request) override;
 
  private:
   struct Pending {
@@ -41,7 +52,10 @@ class JournalFile final : public CommandJournal {
     bool durable = false;
     Callback done{};
   };
-  JournalFile(std::unique_ptr<JournalDisk> disk, Executor core);
+  JournalFile(std::unique_ptr<JournalDisk> disk, Executor core, JournalOptions options);
+  [[nodiscard]] Result<void> load(const std::string& text, WallTime now);
+  void look_at_clock();
+  [[nodiscard]] Result<void> settle();
   void enqueue(Pending pending);
   void run();
   void commit(std::vector<Pending> batch);
@@ -50,6 +64,7 @@ class JournalFile final : public CommandJournal {
   void tell(const std::optional<Error>& trouble);
 
   Executor core_;
+  const JournalOptions options_;
   JournalContent loaded_;
   /// Of the core, which alone reads and writes it; outlives this with the handlers that were posted.
   std::shared_ptr<std::optional<Error>> trouble_ = std::make_shared<std::optional<Error>>();
@@ -57,6 +72,7 @@ class JournalFile final : public CommandJournal {
   // Of the writing thread, once it runs.
   std::unique_ptr<JournalDisk> disk_;
   JournalModel model_;
+  Duration told_time_ = Duration::min();  ///< the last one that was written
   std::uint64_t last_number_ = 0;
   std::size_t size_ = 0, size_when_rewritten_ = 0;  ///< of the file, bytes
   bool broken_ = false;  ///< the last write failed: what the file ends with is not known

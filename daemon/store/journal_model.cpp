@@ -3,52 +3,54 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 namespace axisd::store {
 
-JournalModel::Entry& JournalModel::entry_of(const Command& command, TimePoint now) {
-  if (const auto found = by_id_.find(command.id); found != by_id_.end()) return *found->second;
+JournalModel::Entry& JournalModel::entry_of(const Command& command) {
+  if (const auto found = by_id_.find(command.id); found != by_id_.end()) {
+    found->second->touched = time_;
+    return *found->second;
+  }
   entries_.push_back({.command = {.command = {.id = command.id, .axis = command.axis, .kind = command.kind}},
-                      .touched = now});
+                      .touched = time_});
   by_id_.emplace(command.id, std::prev(entries_.end()));
   return entries_.back();
 }
 
-void JournalModel::apply(const JournalLine& line, TimePoint now) {
-  std::visit([&](const auto& l) { apply_line(l, now); }, line);
+void JournalModel::apply(const JournalLine& line) {
+  std::visit([&](const auto& l) { apply_line(l); }, line);
 }
 
-void JournalModel::apply_line(const AcceptedLine& line, TimePoint now) {
-  auto& entry = entry_of(line.command, now);
+void JournalModel::apply_line(const AcceptedLine& line) {
+  auto& entry = entry_of(line.command);
   entry.command.command = line.command;
   entry.command.digest = line.digest;
-  entry.touched = now;
 }
 
-void JournalModel::apply_line(const AttachedLine& line, TimePoint now) {
+void JournalModel::apply_line(const AttachedLine& line) {
   const auto found = by_id_.find(line.command);
   if (found == by_id_.end()) return;  // the line before it was damaged, which is known
   found->second->command.attached.push_back(line.request);
-  found->second->touched = now;
+  found->second->touched = time_;
 }
 
-void JournalModel::apply_line(const SendingLine& line, TimePoint now) {
-  auto& entry = entry_of(line.command, now);
+void JournalModel::apply_line(const SendingLine& line) {
+  auto& entry = entry_of(line.command);
   entry.command.command.granted = line.command.granted;
   entry.command.sent = true;
   entry.command.note = line.note;
-  entry.touched = now;
 }
 
-void JournalModel::apply_line(const EndedLine& line, TimePoint now) {
-  auto& entry = entry_of(line.command, now);
+void JournalModel::apply_line(const EndedLine& line) {
+  auto& entry = entry_of(line.command);
   auto& command = entry.command.command;
   command.granted = line.command.granted;
   command.state = line.command.state;
   command.cause = line.command.cause;
   command.started_at = line.command.started_at;
   command.ended_at = line.command.ended_at;
-  entry.touched = now;
   // As while the daemon runs: what moves nothing leaves no ErrorStop.
   const bool moves = command.kind != CommandKind::enable && command.kind != CommandKind::disable &&
                      command.kind != CommandKind::reset && command.kind != CommandKind::set_position;
@@ -58,8 +60,41 @@ void JournalModel::apply_line(const EndedLine& line, TimePoint now) {
     unknown_outcomes_.erase(command.axis);
 }
 
-void JournalModel::apply_line(const DoubtLine& line, TimePoint) {
+void JournalModel::apply_line(const DoubtLine& line) {
   if (!doubt_ || doubt_->until < line.until) doubt_ = line;
+}
+
+void JournalModel::apply_line(const TimeLine& line) {
+  time_ = line.at;
+  latest_ = std::max(latest_, time_);
+  if (!line.boot.empty()) mark_ = line;
+}
+
+void JournalModel::apply_line(const HeardLine& line) {
+  const bool known = by_id_.contains(line.command.id);
+  auto& journalled = entry_of(line.command).command;
+  if (!known) {
+    journalled.command = line.command;
+    journalled.command.client = line.request.client;
+    journalled.command.request_id = line.request.request_id;
+    journalled.digest = line.request.digest;
+  } else if (journalled.command.request_id != line.request.request_id &&
+             std::ranges::find(journalled.attached, line.request) == journalled.attached.end()) {
+    journalled.attached.push_back(line.request);
+  }
+}
+
+void JournalModel::apply_line(const IdsLine& line) {
+  if (const auto same = std::ranges::find(id_files_, line.file, &IdsLine::file); same != id_files_.end())
+    *same = line;
+  else
+    id_files_.push_back(line);
+}
+
+TimeLine JournalModel::time_after(const std::string& boot, Duration uptime) const {
+  auto at = latest_;
+  if (mark_ && mark_->boot == boot) at = std::max(at, mark_->at + uptime - mark_->uptime);
+  return {.at = at, .boot = boot, .uptime = uptime};
 }
 
 bool JournalModel::awaits_reset(const Command& command) const {
@@ -67,7 +102,7 @@ bool JournalModel::awaits_reset(const Command& command) const {
   return found != unknown_outcomes_.end() && found->second == command.id;
 }
 
-void JournalModel::forget_before(TimePoint then) {
+void JournalModel::forget_before(Duration then) {
   for (auto entry = entries_.begin(); entry != entries_.end();) {
     const auto& command = entry->command.command;
     if (ended(command.state) && entry->touched < then && !awaits_reset(command)) {
@@ -79,11 +114,56 @@ void JournalModel::forget_before(TimePoint then) {
   }
 }
 
+JournalModel::Settled JournalModel::settled(std::size_t kept) const {
+  std::vector<const Entry*> over;
+  over.reserve(entries_.size());
+  // Axes with a start of which nobody knows yet what became: what was sent after it tells.
+  std::set<std::string_view> open;
+  for (const auto& entry : entries_) {
+    const auto& command = entry.command.command;
+    const bool sent = entry.command.sent;
+    if (!ended(command.state) && sent)
+      open.insert(command.axis);
+    else if (ended(command.state) && !awaits_reset(command) && !(sent && open.contains(command.axis)))
+      over.push_back(&entry);
+  }
+  over.resize(over.size() - std::min(kept, over.size()));
+  Settled settled;
+  settled.commands.reserve(over.size());
+  std::map<std::string_view, std::vector<EndedId>> by_client;
+  for (const auto* entry : over) {
+    const auto& [command, digest, sent, note, attached, heard_of] = entry->command;
+    settled.commands.push_back(command.id);
+    const auto add = [&](std::string_view client, std::string_view request_id, std::string_view content) {
+      if (!request_id.empty())
+        by_client[client].push_back({.request_id = request_id,
+                                     .digest = content,
+                                     .command = &command,
+                                     .heard_of = TimePoint(entry->touched)});
+    };
+    add(command.client, command.request_id, digest);
+    for (const auto& request : attached) add(request.client, request.request_id, request.digest);
+  }
+  for (auto& [client, ids] : by_client)
+    for (auto& run : runs_of(std::move(ids)))
+      settled.runs.push_back({.client = std::string(client), .run = std::move(run)});
+  return settled;
+}
+
+void JournalModel::drop(const std::vector<std::string>& commands) {
+  for (const auto& id : commands)
+    if (auto found = by_id_.extract(id)) entries_.erase(found.mapped());
+}
+
 std::vector<JournalLine> JournalModel::lines() const {
   std::vector<JournalLine> lines;
+  lines.reserve(3 * entries_.size() + id_files_.size() + 2);
   if (doubt_) lines.emplace_back(*doubt_);
+  for (const auto& file : id_files_) lines.emplace_back(file);
+  Duration time{};
   for (const auto& [journalled, touched] : entries_) {
     const auto& command = journalled.command;
+    if (std::exchange(time, touched) != touched) lines.emplace_back(TimeLine{.at = touched});
     if (!journalled.digest.empty())
       lines.emplace_back(AcceptedLine{.command = command, .digest = journalled.digest});
     for (const auto& request : journalled.attached)
@@ -92,14 +172,20 @@ std::vector<JournalLine> JournalModel::lines() const {
     if (ended(command.state))
       lines.emplace_back(EndedLine{.command = command, .awaits_reset = awaits_reset(command)});
   }
+  auto now = mark_.value_or(TimeLine{});
+  if (mark_ && latest_ > now.at) now.uptime += latest_ - std::exchange(now.at, latest_);
+  if (mark_ || latest_ != time) lines.emplace_back(now.boot.empty() ? TimeLine{.at = latest_} : now);
   return lines;
 }
 
 JournalContent JournalModel::content() const {
   JournalContent content;
+  content.now = TimePoint(latest_);
+  content.commands.reserve(entries_.size());
   for (const auto& entry : entries_) {
     const auto& command = entry.command.command;
     content.commands.push_back(entry.command);
+    content.commands.back().heard_of = TimePoint(entry.touched);
     if (awaits_reset(command))
       content.unknown_outcomes.emplace(command.axis, std::pair(command.id, command.cause.value_or(Error{})));
   }
@@ -110,9 +196,9 @@ JournalContent JournalModel::content() const {
   return content;
 }
 
-JournalLoad load_journal(std::string_view text, TimePoint now) {
+JournalLoad load_journal(std::string_view text) {
   JournalLoad load;
-  if (!text.starts_with(journal_header)) {
+  if (!text.starts_with(journal_header) && !text.starts_with(journal_header_1)) {
     load.newer_format = text.starts_with(journal_header_any) && text.find('\n') != std::string_view::npos;
     if (!load.newer_format) load.damage = "the first line is not that of a journal";
     if (load.newer_format) return load;
@@ -139,7 +225,7 @@ JournalLoad load_journal(std::string_view text, TimePoint now) {
     if (last != 0 && line->number != last + 1)
       damaged(fmt::format("number {} follows {}", line->number, last));
     last = line->number;
-    load.model.apply(line->line, now);
+    load.model.apply(line->line);
   }
   return load;
 }

@@ -99,6 +99,12 @@ class Reader : public LineReader {
     value = from_ns(ns);
     return true;
   }
+  bool duration(Duration& value) {
+    std::int64_t ns = 0;
+    if (!number(ns)) return false;
+    value = Duration(ns);
+    return true;
+  }
   bool head(Command& c) {
     return literal("id=") && word(c.id) && literal(" axis=") && word(c.axis) && literal(" kind=") &&
            kind(c.kind);
@@ -114,6 +120,15 @@ class Reader : public LineReader {
 
 std::string head(const Command& c) {
   return fmt::format("id={} axis={} kind={}", escape(c.id), escape(c.axis), to_string(c.kind));
+}
+
+/// With a space before it; empty: there is none.
+std::string cause_text(const Command& c) {
+  if (!c.cause) return {};
+  return fmt::format(" reason={} outcome={} message={} remedy={} bus={} node={}", to_string(c.cause->reason),
+                     outcomes.at(static_cast<std::size_t>(c.cause->outcome)), escape(c.cause->message),
+                     escape(c.cause->remedy), escape(c.cause->where.bus),
+                     c.cause->where.node ? int{*c.cause->where.node} : 0);
 }
 
 struct Encode {
@@ -138,18 +153,27 @@ struct Encode {
   }
   std::string operator()(const EndedLine& line) const {
     const auto& c = line.command;
-    auto text = fmt::format("ended {} state={} awaits_reset={:d} granted={} started={} at={}", head(c),
-                            to_string(c.state), line.awaits_reset, text_of(c.granted), text_of(c.started_at),
-                            text_of(c.ended_at));
-    if (c.cause)
-      text += fmt::format(" reason={} outcome={} message={} remedy={} bus={} node={}",
-                          to_string(c.cause->reason), outcomes.at(static_cast<std::size_t>(c.cause->outcome)),
-                          escape(c.cause->message), escape(c.cause->remedy), escape(c.cause->where.bus),
-                          c.cause->where.node ? int{*c.cause->where.node} : 0);
-    return text;
+    const auto text = fmt::format("ended {} state={} awaits_reset={:d} granted={} started={} at={}", head(c),
+                                  to_string(c.state), line.awaits_reset, text_of(c.granted),
+                                  text_of(c.started_at), text_of(c.ended_at));
+    return text + cause_text(c);
   }
   std::string operator()(const DoubtLine& line) const {
     return fmt::format("doubt until={} damage={}", in_ns(line.until), escape(line.damage));
+  }
+  std::string operator()(const TimeLine& line) const {
+    return fmt::format("time at={} boot={} uptime={}", line.at.count(), escape(line.boot),
+                       line.uptime.count());
+  }
+  std::string operator()(const HeardLine& line) const {
+    const auto& c = line.command;
+    return fmt::format("heard {} state={} client={} request={} digest={} accepted={} at={}{}", head(c),
+                       to_string(c.state), escape(line.request.client), escape(line.request.request_id),
+                       escape(line.request.digest), in_ns(c.accepted_at), text_of(c.ended_at), cause_text(c));
+  }
+  std::string operator()(const IdsLine& line) const {
+    return fmt::format("ids file={} bytes={} count={} begin={} newest={}", line.file, line.bytes, line.count,
+                       line.begin.count(), line.newest.count());
   }
 };
 
@@ -212,6 +236,31 @@ bool read_doubt(Reader& reader, DoubtLine& line) {
          reader.word(line.damage);
 }
 
+bool read_time(Reader& reader, TimeLine& line) {
+  return reader.literal("at=") && reader.duration(line.at) && reader.literal(" boot=") &&
+         reader.word(line.boot) && reader.literal(" uptime=") && reader.duration(line.uptime);
+}
+
+bool read_heard(Reader& reader, HeardLine& line) {
+  auto& c = line.command;
+  auto& request = line.request;
+  if (!reader.head(c) || !reader.literal(" state=") ||
+      !reader.one_of(states, c.state, [](CommandState state) { return to_string(state); }) ||
+      !reader.literal(" client=") || !reader.word(request.client) || !reader.literal(" request=") ||
+      !reader.word(request.request_id) || !reader.literal(" digest=") || !reader.word(request.digest) ||
+      !reader.literal(" accepted=") || !reader.time(c.accepted_at) || !reader.literal(" at="))
+    return false;
+  if (!reader.literal("-") && !reader.time(c.ended_at.emplace())) return false;
+  return reader.at_end() || read_cause(reader, c.cause.emplace());
+}
+
+bool read_ids(Reader& reader, IdsLine& line) {
+  return reader.literal("file=") && reader.number(line.file) && reader.literal(" bytes=") &&
+         reader.number(line.bytes) && reader.literal(" count=") && reader.number(line.count) &&
+         reader.literal(" begin=") && reader.duration(line.begin) && reader.literal(" newest=") &&
+         reader.duration(line.newest);
+}
+
 template <class Line>
 std::optional<JournalLine> parsed(Reader& reader, bool (*read)(Reader&, Line&)) {
   Line line;
@@ -225,6 +274,9 @@ std::optional<JournalLine> parse(Reader& reader) {
   if (reader.literal("sending ")) return parsed(reader, read_sending);
   if (reader.literal("ended ")) return parsed(reader, read_ended);
   if (reader.literal("doubt ")) return parsed(reader, read_doubt);
+  if (reader.literal("time ")) return parsed(reader, read_time);
+  if (reader.literal("heard ")) return parsed(reader, read_heard);
+  if (reader.literal("ids ")) return parsed(reader, read_ids);
   return std::nullopt;
 }
 

@@ -35,9 +35,31 @@ struct DoubtLine {
   WallTime until{};
   std::string damage;
 };
-using JournalLine = std::variant<AcceptedLine, AttachedLine, SendingLine, EndedLine, DoubtLine>;
+/// What follows was last heard of then. The journal's time begins with it, and goes on over restarts.
+struct TimeLine {
+  Duration at{};
+  std::string boot{};  ///< with it: so long after this start of the computer it was `at`
+  Duration uptime{};
+};
+/// A command that has ended was asked for again.
+struct HeardLine {
+  Command command;  ///< id, axis, kind, when it was accepted, and how it ended
+  RequestKey request;
+};
+/// Commands that have ended and are kept by their ids only: see id_files.hpp.
+struct IdsLine {
+  std::uint32_t file = 0;
+  std::uint64_t bytes = 0;     ///< of the file; what is behind them does not count
+  std::uint64_t count = 0;     ///< ids
+  Duration begin{}, newest{};  ///< the first and the last time one of them was last heard of
+  bool operator==(const IdsLine&) const = default;
+};
+using JournalLine =
+    std::variant<AcceptedLine, AttachedLine, SendingLine, EndedLine, DoubtLine, TimeLine, HeardLine, IdsLine>;
 
-inline constexpr std::string_view journal_header = "axisd-journal 1\n";
+inline constexpr std::string_view journal_header = "axisd-journal 2\n";
+/// Of before there were times and ids: this build reads it, too.
+inline constexpr std::string_view journal_header_1 = "axisd-journal 1\n";
 inline constexpr std::string_view journal_header_any = "axisd-journal ";
 
 /// With its end of line. Lines are numbered without a gap, so that a lost one shows.

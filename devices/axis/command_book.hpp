@@ -4,45 +4,19 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "buses/clock.hpp"
-#include "devices/axis/command.hpp"
+#include "devices/axis/command_digest.hpp"
 #include "devices/axis/command_journal.hpp"
+#include "devices/axis/command_record.hpp"
+#include "devices/axis/id_limits.hpp"
+#include "devices/axis/known_ids.hpp"
 
 namespace axisd {
-
-/// One accepted command while it lives. Ends exactly once; later transitions are ignored. Thread: core.
-class CommandRecord {
- public:
-  using Observer = std::function<void(const Command&)>;
-  CommandRecord(Command command, Clock& clock) : command_(std::move(command)), clock_(&clock) {}
-
-  [[nodiscard]] const Command& value() const { return command_; }
-  [[nodiscard]] bool has_ended() const { return ended(command_.state); }
-  /// Not set: it has not, or in an earlier run of the daemon.
-  [[nodiscard]] TimePoint ended_when() const { return ended_when_; }
-  void grant(const MotionValues& granted) { command_.granted = granted; }
-  void activate();
-  void done() { end(CommandState::done, std::nullopt); }
-  void abort(Error cause) { end(CommandState::aborted, std::move(cause)); }
-  void error(Error cause) { end(CommandState::error, std::move(cause)); }
-  void unknown(Error cause) { end(CommandState::unknown, std::move(cause)); }
-
-  /// Called at each change until the command has ended, while `alive` exists.
-  void observe(std::weak_ptr<void> alive, Observer observer);
-
- private:
-  void end(CommandState state, std::optional<Error> cause);
-  void tell();
-
-  Command command_;
-  Clock* clock_;
-  TimePoint ended_when_{};
-  std::vector<std::pair<std::weak_ptr<void>, Observer>> observers_;
-};
-using CommandPtr = std::shared_ptr<CommandRecord>;
 
 /// A command of an earlier run of the daemon of which only reading the drive back tells what became of it.
 struct Unsettled {
@@ -52,15 +26,17 @@ struct Unsettled {
 };
 
 /// All commands of the machine: gives ids, remembers ended ones for a while, and makes requests repeatable,
-/// over restarts of the daemon too. Thread: core.
+/// over restarts of the daemon too. How much it remembers is bounded, in all and of each client (M32).
+/// Thread: core.
 class CommandBook {
  public:
   /// `instance_id` makes ids unique across restarts. Without a journal nothing is known of earlier runs.
-  CommandBook(Clock& clock, std::string instance_id, CommandJournal* journal = nullptr);
+  CommandBook(Clock& clock, std::string instance_id, CommandJournal* journal = nullptr, IdLimits limits = {});
 
   /// What an earlier request with this id did: its command (same content), nothing (new id), or an error
   /// (request_id_conflict; storage: the journal was damaged, and the id may have been in it; busy: no further
-  /// id can be remembered). Requests without an id are never deduplicated.
+  /// id of this client can be remembered at present). Of a command that ended long ago, with many since, the
+  /// repeat gets what is still known: see KnownIds. Requests without an id are never deduplicated.
   Result<CommandPtr> find_repeat(const std::string& axis, const Action& action,
                                  const CommandOptions& options);
 
@@ -88,34 +64,57 @@ class CommandBook {
   /// Ends what is left of take_unsettled(): of axes that the configuration no longer has.
   void give_up_unsettled();
 
-  /// nullptr: unknown.
+  /// nullptr: unknown, or its details are not remembered.
   [[nodiscard]] CommandPtr find(const std::string& id) const;
+  /// Request ids that are remembered, of all clients.
+  [[nodiscard]] std::size_t ids() const { return ids_; }
 
  private:
   struct Entry {
     CommandPtr command;
-    std::string digest;
-    std::string request_key;
+    RequestKey request;
     TimePoint heard_of{};  ///< last
     TimePoint queued{};
     bool sending = false;  ///< told to the journal
   };
   using EntryPtr = std::shared_ptr<Entry>;
+  /// What is remembered of one client's requests.
+  struct ClientIds {
+    std::unordered_map<std::string, EntryPtr> by_request;
+    std::deque<EntryPtr> detailed;  ///< all of these, about in the order in which they were entered
+    KnownIds known;                 ///< what has ended, without details
+    [[nodiscard]] std::size_t size() const { return detailed.size() + known.size(); }
+  };
   void restore(JournalContent content);
-  EntryPtr enter(CommandPtr command, std::string digest, std::string request_key);
+  EntryPtr enter(CommandPtr command, RequestKey request, TimePoint heard_of);
   void follow(const EntryPtr& entry);
   void on_change(Entry& entry);
-  void forget_old();
-  [[nodiscard]] static bool forgettable(const Entry& entry, TimePoint now);
+  [[nodiscard]] static TimePoint last_heard_of(const Entry& entry);
+  void heard(Entry& entry);
+  Result<CommandPtr> known_repeat(KnownIds::Found found, const std::string& axis, const Action& action,
+                                  const CommandOptions& options);
+  // command_quota.cpp
+  [[nodiscard]] std::size_t ids_of(const std::string& client) const;
+  [[nodiscard]] bool has_room(const std::string& client) const;
+  Result<void> make_room(const std::string& client);
+  [[nodiscard]] Error no_room(const std::string& client) const;
+  [[nodiscard]] std::optional<TimePoint> next_free(const ClientIds& ids) const;
+  std::size_t forget_some(ClientIds& ids, TimePoint then);
   void forget(const EntryPtr& entry);
+  void forget_old();
+  void forget_unnamed(TimePoint now);
+  void shorten();
 
   Clock* clock_;
   std::string instance_id_;
   CommandJournal* journal_;
+  IdLimits limits_;
   std::uint64_t last_ = 0;
-  std::deque<EntryPtr> named_, unnamed_;  ///< with a request_id and without, by Entry::queued
-  std::map<std::string, EntryPtr> by_id_;
-  std::map<std::string, EntryPtr> by_request_;  ///< client + request_id
+  std::map<std::string, ClientIds> clients_;
+  std::size_t detailed_ = 0, ids_ = 0;  ///< of all clients; ids_: remembered, with and without details
+  std::string looked_at_;               ///< the client whose ids were looked through last
+  std::deque<EntryPtr> unnamed_;        ///< without a request_id, by Entry::queued
+  std::unordered_map<std::string, EntryPtr> by_id_;
   std::map<std::string, std::vector<Unsettled>> unsettled_;
   std::map<std::string, Error> unknown_outcomes_;
   std::function<void(const CommandPtr&)> opened_;
@@ -123,8 +122,5 @@ class CommandBook {
   std::string damage_;
   std::shared_ptr<int> alive_ = std::make_shared<int>(0);
 };
-
-/// The content of a request as text: equal exactly for equal requests.
-std::string digest(const std::string& axis, const Action& action);
 
 }  // namespace axisd

@@ -11,14 +11,10 @@
 
 #include "buses/error.hpp"
 #include "devices/axis/command.hpp"
+#include "devices/axis/known_ids.hpp"
 #include "devices/drive.hpp"
 
 namespace axisd {
-
-/// What has ended is remembered for so long after it was last heard of: longer than any request is valid, so
-/// that a late repeat never starts a second motion.
-inline constexpr Duration remembered = std::chrono::minutes(30);
-static_assert(remembered > longest_validity);
 
 /// By what a drive that is read back tells whether it executed a start. In counts of its own counter.
 struct SendingNote {
@@ -44,11 +40,20 @@ struct JournalledCommand {
   bool sent = false;                   ///< its start may have been sent
   SendingNote note{};                  ///< with `sent`
   std::vector<RequestKey> attached{};  ///< further requests that were taken into it
+  TimePoint heard_of{};                ///< last, by the journal's time
+};
+
+/// Ids of one client's commands that have ended, of which no more is kept.
+struct ClientRun {
+  std::string client;
+  IdRun run;  ///< by the journal's time
 };
 
 /// Everything that is known of earlier runs.
 struct JournalContent {
   std::vector<JournalledCommand> commands{};  ///< in order of acceptance
+  std::vector<ClientRun> ids{};               ///< those that were heard of first come first
+  TimePoint now{};  ///< by the journal's time, which goes on over restarts: never too late
   /// Axes whose last outcome was unknown, and has not been reset since: the command's id and cause.
   std::map<std::string, std::pair<std::string, Error>> unknown_outcomes{};
   /// The journal was damaged: an id that is not in it may have been used all the same, until then.
@@ -77,6 +82,8 @@ class CommandJournal {
   /// `storage`: it must not be.
   virtual void sending(const Command& command, SendingNote note, Callback done) = 0;
   virtual void ended(const Command& command) = 0;
+  /// A command that has ended was asked for again.
+  virtual void heard(const Command& command, RequestKey request) = 0;
 };
 
 }  // namespace axisd

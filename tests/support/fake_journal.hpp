@@ -12,7 +12,9 @@ namespace axisd::test {
 
 class FakeJournal final : public CommandJournal {
  public:
-  explicit FakeJournal(Executor executor) : executor_(std::move(executor)) {}
+  /// With a clock ages go on over restarts; without one nothing gets any older.
+  explicit FakeJournal(Executor executor, Clock* clock = nullptr)
+      : executor_(std::move(executor)), clock_(clock) {}
 
   std::string text{store::journal_header};  ///< what the file holds
   bool failing = false;                     ///< as a full disk: writes fail
@@ -23,9 +25,10 @@ class FakeJournal final : public CommandJournal {
   /// What the next daemon finds when it starts.
   void restart(WallTime now) {
     held_.clear();
-    auto load = store::load_journal(text, {});
+    auto load = store::load_journal(text);
     if (!load.damage.empty())
-      load.model.apply(store::DoubtLine{.until = now + longest_validity, .damage = load.damage}, {});
+      load.model.apply(store::DoubtLine{.until = now + longest_validity, .damage = load.damage});
+    if (clock_ != nullptr) load.model.apply(load.model.time_after("boot", clock_->now().time_since_epoch()));
     loaded_ = load.model.content();
     text = store::journal_header;
     number_ = 0;
@@ -52,6 +55,9 @@ class FakeJournal final : public CommandJournal {
     write(store::SendingLine{.command = command, .note = std::move(note)}, std::move(done));
   }
   void ended(const Command& command) override { write(store::EndedLine{.command = command}, {}); }
+  void heard(const Command& command, RequestKey request) override {
+    write(store::HeardLine{.command = command, .request = std::move(request)}, {});
+  }
 
  private:
   static Error full() {
@@ -67,6 +73,13 @@ class FakeJournal final : public CommandJournal {
       return;
     }
     if (failing) told_ = true;
+    if (!failing && clock_ != nullptr) {
+      const auto now = clock_->now().time_since_epoch();
+      if (now - told_time_ >= std::chrono::seconds(1) || now < told_time_) {
+        told_time_ = now;
+        text += store::encode_line(++number_, store::TimeLine{.at = now, .boot = "boot", .uptime = now});
+      }
+    }
     if (!failing) text += store::encode_line(++number_, line);
     if (!done) return;
     post(executor_, [done = std::move(done), result = failing ? Result<void>(fail(full())) : Result<void>()] {
@@ -75,9 +88,11 @@ class FakeJournal final : public CommandJournal {
   }
 
   Executor executor_;
+  Clock* clock_;
   JournalContent loaded_;
   std::uint64_t number_ = 0;
   bool told_ = false;
+  Duration told_time_{};
   std::vector<std::pair<store::JournalLine, Callback>> held_;
 };
 

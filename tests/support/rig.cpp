@@ -55,7 +55,7 @@ simulation::SimulatedNodeSettings drive_of(const RigOptions& options) {
 }  // namespace
 
 Rig::Rig(RigOptions options)
-    : store(world.executor()), journal(world.executor()), options_(std::move(options)) {
+    : store(world.executor()), journal(world.executor(), &world.clock()), options_(std::move(options)) {
   configuration.machine = "test";
   configuration.lines.push_back({.name = "line-a", .port = "sim"});
   configuration.axes.push_back({.axis = feeder(options_)});

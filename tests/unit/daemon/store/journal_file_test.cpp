@@ -8,6 +8,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <csignal>
+#include <set>
 
 #include "tests/support/temporary_directory.hpp"
 
@@ -35,6 +36,13 @@ class FaultyDisk final : public JournalDisk {
     return faults_->replace ? full() : disk_->replace(text);
   }
   Result<void> keep_damaged() override { return disk_->keep_damaged(); }
+  Result<void> append_ids(std::uint32_t file, std::uint64_t offset, std::string_view bytes) override {
+    return faults_->replace ? full() : disk_->append_ids(file, offset, bytes);
+  }
+  Result<std::string> read_ids(std::uint32_t file, std::uint64_t most) override {
+    return disk_->read_ids(file, most);
+  }
+  void keep_ids(const std::vector<std::uint32_t>& files) override { disk_->keep_ids(files); }
 
  private:
   static Result<void> full() { return fail(Reason::storage, "cannot write journal.v1: full", "free space"); }
@@ -193,7 +201,7 @@ TEST_F(JournalFileTest, ALineThatACrashCutShortLocksNothing) {
     ASSERT_EQ(content.commands.size(), 1);
     EXPECT_TRUE(content.commands[0].sent);
   }
-  EXPECT_EQ(load_journal(text(), {}).torn, 0);
+  EXPECT_EQ(load_journal(text()).torn, 0);
 }
 
 TEST_F(JournalFileTest, ItDoesNotGrowWithoutEndAndKeepsWhatIsStillNeeded) {
@@ -210,18 +218,87 @@ TEST_F(JournalFileTest, ItDoesNotGrowWithoutEndAndKeepsWhatIsStillNeeded) {
     wait_for(static_cast<std::size_t>(i) + 1);
   }
   EXPECT_LT(text().size(), std::size_t{2} << 20U);
-  const auto load = load_journal(text(), {});
+  const auto load = load_journal(text());
   EXPECT_EQ(load.damage, "");
   EXPECT_EQ(load.model.content().commands.front().command.id, "open");
 }
 
+/// Of many commands the ids are kept, in little space, whenever the daemon is restarted.
+TEST_F(JournalFileTest, OfManyCommandsTheIdsAreKept) {
+  constexpr int count = 12'000;
+  std::size_t told = 0;
+  {
+    const auto journal = open();
+    for (int i = 1; i <= count; ++i) {
+      const auto id = "i-" + std::to_string(i);
+      journal->accepted(command(id), std::string(100, 'd'));
+      journal->ended(done(id));
+      if (i % 500 != 0) continue;
+      journal->sending(command("open"), {}, record());
+      wait_for(++told);
+    }
+  }
+  for (int start = 0; start < 3; ++start) {
+    auto content = open()->take_loaded();
+    EXPECT_FALSE(content.doubtful_until) << content.damage;
+    std::set<std::string> known;
+    for (const auto& each : content.commands) known.insert(each.command.id);
+    EXPECT_LT(known.size(), 6'000);
+    EXPECT_TRUE(known.contains("open"));
+    KnownIds ids;
+    for (auto& [client, run] : content.ids) {
+      EXPECT_EQ(client, "c");
+      EXPECT_LE(run.newest, content.now);
+      ids.add(std::move(run));
+    }
+    for (int i = 1; i <= count; ++i) {
+      const auto id = "i-" + std::to_string(i);
+      if (known.contains(id)) continue;
+      const auto found = ids.find("ri-" + std::to_string(i), std::string(100, 'd'));
+      ASSERT_TRUE(found) << i;
+      EXPECT_TRUE(found->same_content);
+      EXPECT_EQ(found->command.id, id);
+    }
+    EXPECT_EQ(known.size() - 1 + ids.size(), count);
+    EXPECT_LT(text().size(), std::size_t{1} << 20U) << "those are elsewhere";
+  }
+  // One of the files is damaged: nobody knows what was in it.
+  auto bytes = temporary_.read("journal-ids-1.v1");
+  bytes[100] = static_cast<char>(bytes[100] ^ 1);
+  temporary_.write("journal-ids-1.v1", bytes);
+  EXPECT_TRUE(open()->take_loaded().doubtful_until);
+  EXPECT_TRUE(open()->take_loaded().doubtful_until) << "as long as a request is valid";
+}
+
+/// The ids cannot be written, then the journal: nothing is lost, and nothing is taken for durable.
+TEST_F(JournalFileTest, AFullDiskLosesNoIds) {
+  {
+    const auto journal = open();
+    faults_->replace = true;
+    for (int i = 1; i <= 6'000; ++i) {
+      const auto id = "i-" + std::to_string(i);
+      journal->accepted(command(id), std::string(100, 'd'));
+      journal->ended(done(id));
+    }
+    journal->sending(command("open"), {}, record());
+    wait_for_trouble(*journal, true);
+    faults_->replace = false;
+    wait_for_trouble(*journal, false);
+  }
+  const auto content = open()->take_loaded();
+  EXPECT_FALSE(content.doubtful_until) << content.damage;
+  std::size_t ids = content.commands.size();
+  for (const auto& each : content.ids) ids += each.run.records.size();
+  EXPECT_EQ(ids, 6'001);
+}
+
 TEST_F(JournalFileTest, ANewerFormatIsNotTakenForDamage) {
-  temporary_.write("journal.v1", "axisd-journal 2\nwhatever\n");
+  temporary_.write("journal.v1", "axisd-journal 3\nwhatever\n");
   auto disk = open_journal_disk(temporary_.path());
   const auto journal = JournalFile::open(std::move(*disk), WallTime(), core_.get_executor());
   ASSERT_FALSE(journal);
   EXPECT_THAT(journal.error().message, HasSubstr("newer"));
-  EXPECT_EQ(text(), "axisd-journal 2\nwhatever\n");
+  EXPECT_EQ(text(), "axisd-journal 3\nwhatever\n");
 }
 
 /// What was told to be durable is there when the process is killed at any moment.
