@@ -149,12 +149,13 @@ std::int64_t Cia402Drive::position_window() const {
   const auto mode = setup_.model_settings.find("loop_mode");
   const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
   if (!model_->descriptor->capabilities.closed_loop || open || !found_closed_.value_or(true)) return 0;
-  constexpr std::int64_t usual = 10, usual_per_revolution = 1000;
+  // Two readings at rest are as far apart as noise of two counts permits.
+  constexpr std::int64_t usual = 10, usual_per_revolution = 1000, least = 4;
   const auto revolution = std::max<std::int64_t>(setup_.pulses_per_revolution, 1);
   const auto found = found_window_.value_or(0);
   if (found <= 0 || found > revolution) return std::max(usual, revolution / usual_per_revolution);
   const auto counts = model_->meaning.counts_per_revolution;
-  return counts == 0 ? found : std::max(found, (found * revolution + counts - 1) / counts);
+  return std::max({least, found, counts == 0 ? found : (found * revolution + counts - 1) / counts});
 }
 
 Task<Result<void>> Cia402Drive::configure() {
@@ -181,7 +182,9 @@ Task<Result<void>> Cia402Drive::configure() {
     found_closed_ = *mode == 0;
   }
   if (const auto window = model_->objects.position_window)
-    if (const auto found = co_await read_object(*window, patiently()); !found) co_return fail(found.error());
+    if (const auto found = co_await read_object(*window, patiently());
+        !found && found.error().reason != Reason::refused)  // some list it, and do not have it
+      co_return fail(found.error());
   if (const auto done = co_await bring_to(required_); !done) co_return done;
   if (const auto halting =
           co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());

@@ -194,9 +194,15 @@ Task<Result<void>> Cia402Drive::write_homing_method(HomingMethod method, SdoOpti
 
 Task<Result<void>> Cia402Drive::clear_position(MotionGuard guard) {
   const SdoOptions options{.transaction_class = TransactionClass::motion, .guard = std::move(guard)};
-  if (model_->objects.position_clear)
-    co_return co_await write_object(*model_->objects.position_clear, 1, 0, options);
-  if (!model_->homing_codes.empty()) co_return co_await home_here(options);
+  const bool by_homing = !model_->objects.position_clear && !model_->homing_codes.empty();
+  if (model_->objects.position_clear || by_homing) {
+    const auto cleared = by_homing ? co_await home_here(options)
+                                   : co_await write_object(*model_->objects.position_clear, 1, 0, options);
+    // The counter has jumped, and not the shaft.
+    standstill_.forget();
+    direction_from_.reset();
+    co_return cleared;
+  }
   co_return fail(error_at(Reason::not_supported, object::position,
                           "the drive cannot zero its position counter", "home the axis"));
 }

@@ -23,6 +23,8 @@ constexpr auto transition_limit = milliseconds(1000);
 constexpr auto lost_transition_limit = milliseconds(100);
 constexpr auto mode_limit = milliseconds(500);
 constexpr auto watch_time = milliseconds(30), watch_pause = milliseconds(5);
+/// Beyond the time to watch: a shaft whose velocity has not fallen back to noise by then does not rest.
+constexpr auto longest_unrest = milliseconds(100);
 /// Readings in a row of a velocity beyond its noise, in one direction: a motion, however slow. Fewer are the
 /// controller taking hold of the shaft.
 constexpr int turning_readings = 3;
@@ -150,7 +152,8 @@ Task<Result<std::optional<std::int64_t>>> Cia402Drive::read_turning(SdoOptions o
 /// Where it is, is what the drive itself takes for in position (M30).
 Task<Result<void>> Cia402Drive::watch_standstill(std::int64_t position, SdoOptions options) {
   const auto until = clock_->now() + watch_time;
-  const auto window = position_window();
+  // Some drives take a whole revolution for in position.
+  const auto window = std::min(position_window(), std::max<std::int64_t>(10, setup_.pulses_per_revolution / 100));
   int turning = 0;  // readings in a row, signed as they are
   for (;;) {
     const auto rpm = co_await read_turning(options);
@@ -159,7 +162,9 @@ Task<Result<void>> Cia402Drive::watch_standstill(std::int64_t position, SdoOptio
     turning = sign == 0 || turning * sign < 0 ? sign : turning + sign;
     const auto now = co_await read_object(object::position, options);
     if (!now) co_return fail(now.error());
-    if (!*rpm || std::abs(turning) >= turning_readings || std::abs(*now - position) > window) {
+    const auto way = way_between(static_cast<std::int32_t>(position), static_cast<std::int32_t>(*now));
+    const bool unrest = clock_->now() >= until + longest_unrest;
+    if (!*rpm || std::abs(turning) >= turning_readings || std::abs(way) > window || unrest) {
       (void)co_await stop(StopKind::quick_stop);  // the caller stops it again, and watches it
       co_return fail(error_at(Reason::terminal, object::position,
                               "the shaft turned although nothing was started; stopped",

@@ -220,7 +220,9 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
   if (!shown) co_return last_moving_;
   if (bit != 0) co_return (*shown & bit) != 0;
   if (objects.moving || position_window() == 0) co_return *shown != 0;
-  co_return std::abs(decode_velocity(*model_, setup_.pulses_per_revolution, *shown)) > velocity_noise_rpm;
+  // A motion as slow as noise is known by its way only.
+  const auto rpm = decode_velocity(*model_, setup_.pulses_per_revolution, *shown);
+  co_return last_moving_ || std::abs(rpm) > velocity_noise_rpm;
 }
 
 /// An edge of bit 8 on a motor that turns under halt. Between its two words nothing can be behind it:

@@ -23,7 +23,7 @@ bool Standstill::moves(const Look& look, const Gauge& gauge) {
   if (look.told) return note(look, *look.told);
   if (!since_) return note(look, false);
   const auto band = std::max<std::int64_t>(gauge.window / 2, 1);
-  if (std::abs(std::int64_t{look.position} - since_->position) > band) return note(look, true);
+  if (std::abs(way_between(since_->position, look.position)) > band) return note(look, true);
   if (moves_ && look.at - since_->at >= time_of(band, gauge.pulses_per_revolution)) return note(look, false);
   return moves_;
 }

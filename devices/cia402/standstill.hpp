@@ -11,6 +11,11 @@ namespace axisd::cia402 {
 /// A velocity up to this may be noise, r/min: it proves neither rest nor motion.
 inline constexpr int velocity_noise_rpm = 1;
 
+/// Pulses from one reading of the counter to another: it wraps.
+constexpr std::int64_t way_between(std::int32_t from, std::int32_t to) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) - static_cast<std::uint32_t>(from));
+}
+
 /// Pure. A velocity beyond its noise is a motion. Below, the drive's own word counts; where it has none, the
 /// position does: at rest it stays within half of the in-position window. How long it must do so after a
 /// motion follows from the slowest one, 1 r/min.
