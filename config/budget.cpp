@@ -9,6 +9,7 @@
 #include "buses/budget_can.hpp"
 #include "buses/budget_rtu.hpp"
 #include "config/checks.hpp"
+#include "config/position_warnings.hpp"
 #include "config/quantity.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/generic/value.hpp"
@@ -163,7 +164,9 @@ std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports) {
 }
 
 std::vector<std::string> warnings(const Configuration& configuration) {
-  return warnings(budgets(configuration));
+  auto lines = warnings(budgets(configuration));
+  std::ranges::move(position_warnings(configuration), std::back_inserter(lines));
+  return lines;
 }
 
 void check_budgets(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {

@@ -163,7 +163,7 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
   }
   auto& configuration = *loaded.configuration;
   auto budgets = config::budgets(configuration);
-  result.warnings = config::warnings(budgets);
+  result.warnings = config::warnings(configuration);
   result.changes = config::differences(parts_.configuration, configuration);
   core::Reload reload{.client = request.client,
                       .configuration = configuration,
