@@ -128,9 +128,16 @@ std::string every_parameter(const Setup& setup) {
       EXPECT_GE(value.value(), parameter->minimum()) << parameter->name();
       EXPECT_LE(value.value(), parameter->maximum()) << parameter->name();
     }
-    EXPECT_EQ(value.value() & manual->mask(),
-              std::stoll(bench.outside(fmt::format("peek @1 {}", value.address()))))
-        << parameter->name();
+    // A measured value is another one a few milliseconds later.
+    constexpr std::string_view measures[] = {"Present position", "Present speed", " actual",
+                                             "Following error"};
+    const bool measured =
+        setup.manual.says_yes("closed_loop") &&
+        std::ranges::any_of(measures, [&](auto name) { return manual->title.contains(name); });
+    if (!measured)
+      EXPECT_EQ(value.value() & manual->mask(),
+                std::stoll(bench.outside(fmt::format("peek @1 {}", value.address()))))
+          << parameter->name();
     const bool free = parameter->configured_by().empty() && !is_for_motion(setup.manual, value.address()) &&
                       parameter->access() != v1::PARAMETER_ACCESS_READ_ONLY;
     if (free && parameter->has_default_value())
