@@ -90,8 +90,9 @@ void reload_at_a_signal(ConfigurationService& served) {
   });
 }
 
-/// Tells systemd that core and workers make progress, until a signal asks for the end: which one.
-int supervise(core::CoreLoop& loop, const core::MachineCore& machine, ConfigurationService& served) {
+/// Tells systemd that core, stop lane and workers make progress, until a signal asks for the end: which one.
+int supervise(core::CoreLoop& loop, const core::MachineCore& machine, const server::StopLane& stop_lane,
+              ConfigurationService& served) {
   const auto signals = ending_signals();
   std::uint64_t interval_us = 0;
   const bool watched = sd_watchdog_enabled(0, &interval_us) > 0;
@@ -102,10 +103,10 @@ int supervise(core::CoreLoop& loop, const core::MachineCore& machine, Configurat
     if (number == SIGHUP) reload_at_a_signal(served);
     if (number == SIGTERM || number == SIGINT) return number;
     const auto oldest = monotonic_now() - stalled_after;
-    bool alive = loop.last_progress() > oldest;
+    bool alive = loop.last_progress() > oldest && stop_lane.last_progress() > oldest;
     for (const auto& bus : machine.buses()) alive = alive && bus->last_progress() > oldest;
     if (!alive)
-      spdlog::critical("core or a bus worker makes no progress");
+      spdlog::critical("core, stop lane or a bus worker makes no progress");
     else if (watched)  // nobody may read what nobody asked for, and a full socket blocks
       sd_notify(0, "WATCHDOG=1");
   }
@@ -248,11 +249,12 @@ int serve(const Options& options, const config::Configuration& configuration, co
   const CoreThread core_thread(loop);
 
   int status = exit_status::failed;
-  if (const auto stops = stop_lane.start(); !stops) {
+  if (const auto stops = stop_lane.listen(); !stops) {
     status = give_up(stops.error());
   } else if (const auto port = server.start(); !port) {
     status = give_up(port.error());
   } else {
+    stop_lane.serve();
     wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },
                std::chrono::seconds(1));
     served.keep_copy();
@@ -260,7 +262,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
                  *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
                  configuration.axes.size());
     sd_notify(0, "READY=1");
-    const int number = supervise(loop, machine, served);
+    const int number = supervise(loop, machine, stop_lane, served);
     spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");
     sd_notify(0, "STOPPING=1");
     service.close();

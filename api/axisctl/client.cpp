@@ -72,6 +72,14 @@ Client::Client(Connection connection) : connection_(std::move(connection)) {
   if (!lane.empty()) lane_channel_ = grpc::CreateCustomChannel(lane, trusted, arguments());
 }
 
+bool Client::lane_is_reachable() const {
+  if (!lane_channel_) return false;
+  constexpr std::chrono::milliseconds patience(300);
+  const bool there = is_reachable(*lane_channel_, lane_is_deaf_ ? std::chrono::milliseconds(0) : patience);
+  lane_is_deaf_ = !there;
+  return there;
+}
+
 void Client::wait_for_connection(Lane lane, std::chrono::milliseconds limit) const {
   const auto until = std::chrono::system_clock::now() + limit;
   if (channel(lane)->GetState(true) == GRPC_CHANNEL_READY)

@@ -4,6 +4,7 @@
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -48,7 +49,7 @@ class Client {
                        grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                        const Request& request, std::string_view subject, Lane lane = Lane::ordinary) const {
     if constexpr (!std::is_null_pointer_v<std::remove_const_t<decltype(on_stop_lane<Request>)>>) {
-      if (lane == Lane::stop && lane_channel_ && is_reachable(*lane_channel_)) {
+      if (lane == Lane::stop && lane_is_reachable()) {
         // Half of the time is left for the main address.
         Response response;
         const auto status =
@@ -75,6 +76,8 @@ class Client {
   [[nodiscard]] std::chrono::nanoseconds timeout() const { return connection_.timeout; }
 
  private:
+  /// Waits for it as long as it was not waited for in vain.
+  [[nodiscard]] bool lane_is_reachable() const;
   template <class Stub, class Method, class Request, class Response>
   static grpc::Status attempt(std::chrono::nanoseconds limit, Stub&& stub, Method method,
                               const Request& request, Response& response) {
@@ -88,6 +91,7 @@ class Client {
   Connection connection_;
   std::shared_ptr<grpc::Channel> channel_, stop_channel_;
   std::shared_ptr<grpc::Channel> lane_channel_;  ///< nullptr: no address is known
+  mutable std::atomic<bool> lane_is_deaf_{false};
 };
 
 /// A random UUID (version 4): the request_id of one invocation.

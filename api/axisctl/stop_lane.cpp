@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <chrono>
+
+#include "api/axisctl/error.hpp"
 
 namespace axisd::axisctl {
 
@@ -19,8 +20,8 @@ std::string stop_lane_of(const std::string& server) {
   return fmt::format("{}:{}", server.substr(0, colon), port + 1);
 }
 
-bool is_reachable(grpc::Channel& lane) {
-  const auto until = std::chrono::system_clock::now() + std::chrono::milliseconds(300);
+bool is_reachable(grpc::Channel& lane, std::chrono::milliseconds patience) {
+  const auto until = std::chrono::system_clock::now() + patience;
   for (;;) {
     const auto state = lane.GetState(true);
     if (state == GRPC_CHANNEL_READY) return true;
@@ -31,14 +32,9 @@ bool is_reachable(grpc::Channel& lane) {
 
 bool is_for_the_main_address(const grpc::Status& status, bool repeatable) {
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED) return true;
-  if (!status.error_details().empty()) return false;  // the daemon's answer
-  switch (status.error_code()) {
-    case grpc::StatusCode::UNAVAILABLE:
-    case grpc::StatusCode::DEADLINE_EXCEEDED:
-      return repeatable;
-    default:
-      return false;
-  }
+  if (!repeatable) return false;
+  const auto detail = detail_of(status);
+  return !detail || detail->reason() == v1::REASON_UNKNOWN_AXIS;  // of another machine's lane, perhaps
 }
 
 }  // namespace axisd::axisctl

@@ -3,6 +3,7 @@
 
 #include <grpcpp/channel.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -38,8 +39,8 @@ inline constexpr auto on_stop_lane<v1::CancelCommandRequest> = &v1::StopService:
 /// is no address with a port.
 [[nodiscard]] std::string stop_lane_of(const std::string& server);
 
-/// Connects, for 0.3 s at most; false at once where nobody listens.
-[[nodiscard]] bool is_reachable(grpc::Channel& lane);
+/// Connects, for so long at most; false at once where nobody listens.
+[[nodiscard]] bool is_reachable(grpc::Channel& lane, std::chrono::milliseconds patience);
 
 /// May be asked for twice when the first one may have been lost. Disable may not: it lets go of the load.
 template <class Request>
@@ -47,7 +48,8 @@ inline constexpr bool may_be_repeated = true;
 template <>
 inline constexpr bool may_be_repeated<v1::DisableRequest> = false;
 
-/// The call was not taken there, or was lost and may be repeated: the main address is asked for the same.
+/// The call was not taken there, or may have been lost and may be repeated: the main address is asked for the
+/// same. Whoever has that port may be something else altogether: only an answer of axisd's counts.
 [[nodiscard]] bool is_for_the_main_address(const grpc::Status& status, bool repeatable);
 
 }  // namespace axisd::axisctl

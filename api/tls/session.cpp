@@ -1,5 +1,6 @@
 #include "api/tls/session.hpp"
 
+#include <arpa/inet.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
@@ -38,6 +39,14 @@ std::string common_name(const X509* certificate) {
   return at < 0 ? std::string() : text_of(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
 }
 
+std::string address_of(const ASN1_OCTET_STRING* from) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const bool v4 = ASN1_STRING_length(from) == 4;
+  if (!v4 && ASN1_STRING_length(from) != 16) return {};
+  const auto* bytes = ASN1_STRING_get0_data(from);
+  return inet_ntop(v4 ? AF_INET : AF_INET6, bytes, text.data(), text.size()) != nullptr ? text.data() : "";
+}
+
 std::string first_alternative(const X509* certificate) {
   using Names = std::unique_ptr<GENERAL_NAMES, Release<GENERAL_NAMES, GENERAL_NAMES_free>>;
   const Names names(
@@ -47,6 +56,7 @@ std::string first_alternative(const X509* certificate) {
     // One member of the union has the strings of all three kinds.
     if (name->type == GEN_DNS || name->type == GEN_URI || name->type == GEN_EMAIL)
       if (auto text = text_of(name->d.ia5); !text.empty()) return text;
+    if (name->type == GEN_IPADD) return address_of(name->d.iPAddress);
   }
   return {};
 }

@@ -1,10 +1,12 @@
 #include "daemon/store/journal_file.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <random>
 #include <utility>
 
 #include "daemon/store/thread.hpp"
@@ -76,8 +78,10 @@ JournalFile::JournalFile(std::unique_ptr<JournalDisk> disk, Executor core, Journ
 std::string boot_id() {
   std::ifstream file("/proc/sys/kernel/random/boot_id");
   std::string id;
-  file >> id;
-  return id;
+  if (file >> id) return id;
+  // Where the system hides it, time goes on within this run of the daemon alone.
+  std::random_device random;
+  return fmt::format("run-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
 }
 
 void JournalFile::look_at_clock() {
@@ -181,7 +185,7 @@ Result<void> JournalFile::settle() {
 
 Result<void> JournalFile::write(const std::vector<Pending>& batch) {
   std::string text;
-  if (model_.now() - told_time_ >= time_told || told_time_ == Duration::min()) {
+  if (told_time_ == Duration::min() || model_.now() - told_time_ >= time_told) {
     told_time_ = model_.now();
     text += encode_line(++last_number_, model_.time_after(options_.boot, monotonic_now().time_since_epoch()));
   }

@@ -104,6 +104,7 @@ class CommandBook {
   void forget_old();
   void forget_unnamed(TimePoint now);
   void shorten();
+  bool shorten(ClientIds& ids);
 
   Clock* clock_;
   std::string instance_id_;

@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <utility>
+#include <vector>
 
 #include "devices/axis/command_book.hpp"
 
@@ -15,6 +17,10 @@ namespace {
 constexpr std::size_t most_detailed = 4'096;
 /// So many of these lose their details together.
 constexpr int shortened_at_once = 512;
+/// Whose are looked at for it.
+constexpr std::ptrdiff_t shortened_clients = 4;
+/// Ids of one client that may be remembered in all details; of commands that have not ended, all are.
+constexpr std::size_t most_live = 16'384;
 /// Ended commands without an id of their client's beyond this are forgotten earlier than others.
 constexpr std::size_t history = 10'000;
 /// So many are looked at whenever a command is entered: the core has other things to do.
@@ -36,6 +42,12 @@ bool CommandBook::has_room(const std::string& client) const {
 /// that have more than it lose theirs.
 Result<void> CommandBook::make_room(const std::string& client) {
   const auto then = clock_->now() - remembered_at_least;
+  if (const auto own = clients_.find(client);
+      own != clients_.end() && own->second.detailed.size() >= most_live)
+    return fail(Reason::busy,
+                fmt::format("{} has {} request ids of commands that have not ended", client,
+                            own->second.detailed.size()),
+                "renew a jog with the request_id that it was begun with, or end it and begin another");
   if (const auto own = clients_.find(client); own != clients_.end())
     while (!has_room(client) && forget_some(own->second, then) > 0) {
     }
@@ -88,7 +100,8 @@ std::optional<TimePoint> CommandBook::next_free(const ClientIds& ids) const {
 }
 
 /// Some of what has ended, and was last heard of before `then`; how many. What is still needed goes to the
-/// end of its queue, so that it holds up nothing.
+/// end of its queue, so that it holds up nothing: a queue is in the order in which they were last heard of,
+/// as far as they have ended.
 std::size_t CommandBook::forget_some(ClientIds& ids, TimePoint then) {
   auto forgotten = ids.known.forget_one(then);
   ids_ -= forgotten;
@@ -96,12 +109,17 @@ std::size_t CommandBook::forget_some(ClientIds& ids, TimePoint then) {
   for (std::size_t looked = 0; forgotten == 0 && looked < most; ++looked) {
     auto entry = std::move(ids.detailed.front());
     ids.detailed.pop_front();
-    if (entry->command->has_ended() && last_heard_of(*entry) < then) {
+    const bool ended = entry->command->has_ended();
+    if (ended && last_heard_of(*entry) < then) {
       --detailed_;
       --ids_;
       ++forgotten;
       forget(entry);
+    } else if (ended && entry->queued >= last_heard_of(*entry)) {
+      ids.detailed.push_front(std::move(entry));  // those behind it are younger still
+      break;
     } else {
+      entry->queued = clock_->now();
       ids.detailed.push_back(std::move(entry));
     }
   }
@@ -151,12 +169,20 @@ void CommandBook::forget_unnamed(TimePoint now) {
   }
 }
 
-/// Remembers ended commands of whoever has most of them by their ids only.
+/// Remembers ended commands of those who have most of them by their ids only.
 void CommandBook::shorten() {
   if (detailed_ <= most_detailed) return;
-  auto& ids = std::ranges::max_element(clients_, {}, [](const auto& client) {
-                return client.second.detailed.size();
-              })->second;
+  std::vector<ClientIds*> all;
+  all.reserve(clients_.size());
+  for (auto& [name, ids] : clients_) all.push_back(&ids);
+  const auto most = all.begin() + std::min<std::ptrdiff_t>(shortened_clients, std::ssize(all));
+  std::ranges::partial_sort(all, most, std::greater(), [](const auto* ids) { return ids->detailed.size(); });
+  for (auto each = all.begin(); each != most; ++each)
+    if (shorten(**each)) return;
+}
+
+/// False: of what was looked at, nothing has ended.
+bool CommandBook::shorten(ClientIds& ids) {
   const auto most = std::min<std::size_t>(shortened_at_once, (ids.detailed.size() + 1) / 2);
   std::vector<EntryPtr> ended;
   ended.reserve(most);
@@ -178,6 +204,7 @@ void CommandBook::shorten() {
   for (auto& run : runs_of(std::move(short_of))) ids.known.add(std::move(run));
   for (const auto& entry : ended) forget(entry);
   detailed_ -= ended.size();
+  return !ended.empty();
 }
 
 }  // namespace axisd

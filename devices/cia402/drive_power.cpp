@@ -153,7 +153,8 @@ Task<Result<std::optional<std::int64_t>>> Cia402Drive::read_turning(SdoOptions o
 Task<Result<void>> Cia402Drive::watch_standstill(std::int64_t position, SdoOptions options) {
   const auto until = clock_->now() + watch_time;
   // Some drives take a whole revolution for in position.
-  const auto window = std::min(position_window(), std::max<std::int64_t>(10, setup_.pulses_per_revolution / 100));
+  const auto window =
+      std::min(position_window(), std::max<std::int64_t>(10, setup_.pulses_per_revolution / 100));
   int turning = 0;  // readings in a row, signed as they are
   for (;;) {
     const auto rpm = co_await read_turning(options);

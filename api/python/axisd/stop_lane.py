@@ -10,18 +10,20 @@ import grpc
 import grpc.aio
 
 from .errors import detail_of
+from .reasons import Reason
 from .v1 import (axis_service_pb2_grpc, command_service_pb2_grpc, group_service_pb2_grpc, lease_service_pb2_grpc,
                  stop_service_pb2_grpc, system_service_pb2_grpc)
 
 #: How long a connection to the lane may take before the main address is asked (s).
 _PATIENCE = 0.3
-_LOST = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
 
 
 def _is_for_the_main_address(error: grpc.aio.AioRpcError, repeatable: bool) -> bool:
+    """Whoever has that port may be something else altogether: only an answer of axisd's counts."""
     if error.code() is grpc.StatusCode.UNIMPLEMENTED:
         return True
-    return repeatable and error.code() in _LOST and detail_of(error) is None
+    detail = detail_of(error)
+    return repeatable and (detail is None or detail.reason is Reason.UNKNOWN_AXIS)
 
 
 def stop_lane_of(server: str) -> str | None:
@@ -40,6 +42,7 @@ class StopLane:
     def __init__(self, channel: grpc.aio.Channel | None) -> None:
         self._channel = channel
         self._lane = stop_service_pb2_grpc.StopServiceStub(channel) if channel is not None else None
+        self._deaf = False  # it was waited for in vain
 
     def call(self, name: str, main: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:
         """The method `name` of StopService; `main`: the same of the main address."""
@@ -50,7 +53,8 @@ class StopLane:
         repeatable = name != "Disable"
 
         async def either(request: Any, timeout: float | None = None) -> Any:
-            if await self._is_reachable():
+            self._deaf = not await self._is_reachable()
+            if not self._deaf:
                 try:  # half of the time is left for the main address
                     return await lane(request, timeout=timeout / 2 if timeout and repeatable else timeout)
                 except grpc.aio.AioRpcError as error:
@@ -63,7 +67,7 @@ class StopLane:
     async def _is_reachable(self) -> bool:
         assert self._channel is not None
         loop = asyncio.get_running_loop()
-        until = loop.time() + _PATIENCE
+        until = loop.time() + (0 if self._deaf else _PATIENCE)
         while True:
             state = self._channel.get_state(try_to_connect=True)
             if state is grpc.ChannelConnectivity.READY:

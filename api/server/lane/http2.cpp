@@ -37,7 +37,7 @@ std::string percent_encoded(std::string_view text) {
   return encoded;
 }
 
-/// "250m": a number of at most 8 digits and its unit. nullopt: anything else.
+/// "250m": a number of at most 8 digits and its unit, hours and minutes up to a day. nullopt: anything else.
 std::optional<Duration> timeout_of(std::string_view text) {
   if (text.size() < 2 || text.size() > 9) return std::nullopt;
   std::int64_t number = 0;
@@ -47,9 +47,9 @@ std::optional<Duration> timeout_of(std::string_view text) {
     return std::nullopt;
   switch (text.back()) {
     case 'H':
-      return std::chrono::hours(number);
+      return std::chrono::hours(std::min<std::int64_t>(number, 24));
     case 'M':
-      return std::chrono::minutes(number);
+      return std::chrono::minutes(std::min<std::int64_t>(number, 24L * 60));
     case 'S':
       return std::chrono::seconds(number);
     case 'm':
@@ -178,7 +178,10 @@ struct Http2::Callbacks {
 
   static int close(nghttp2_session*, std::int32_t id, std::uint32_t, void* user) {
     auto& http = self(user);
-    if (const auto* stream = find(http, id); stream != nullptr && stream->handed_out) --http.waiting_;
+    const auto* stream = find(http, id);
+    if (stream == nullptr) return 0;
+    if (stream->handed_out) --http.waiting_;
+    http.unsent_ -= stream->out.size() - stream->sent;
     http.streams_.erase(id);
     return 0;
   }
@@ -190,6 +193,7 @@ struct Http2::Callbacks {
     const auto count = std::min(room, stream->out.size() - stream->sent);
     std::memcpy(to, stream->out.data() + stream->sent, count);
     stream->sent += count;
+    self(user).unsent_ -= count;
     if (stream->sent < stream->out.size()) return static_cast<ssize_t>(count);
     *flags |= NGHTTP2_DATA_FLAG_EOF | NGHTTP2_DATA_FLAG_NO_END_STREAM;
     const auto trailer = field("grpc-status", "0");
@@ -277,7 +281,10 @@ void Http2::submit_answer(std::int32_t id, Stream& stream) {
   const auto& said = stream.answer;
   std::vector<nghttp2_nv> fields{field(":status", "200"), field("content-type", "application/grpc")};
   if (said.code == 0) {
-    stream.out = framed(said.message);
+    stream.out = framed(std::exchange(stream.answer.message, {}));
+    unsent_ += stream.out.size();
+    if (unsent_ > most_unsent)
+      return (void)nghttp2_session_terminate_session(session_.get(), NGHTTP2_ENHANCE_YOUR_CALM);
     const nghttp2_data_provider provider{.source = {.ptr = nullptr}, .read_callback = &Callbacks::read};
     (void)nghttp2_submit_response(session_.get(), id, fields.data(), fields.size(), &provider);
     return;

@@ -38,12 +38,14 @@ class Http2 {
   /// Called inside receive(), where answer() may be called as well.
   using OnCall = std::function<void(Call call)>;
 
-  static constexpr std::size_t largest_message = 16 * 1024;
+  /// A stop that names as many axes as there may be fits.
+  static constexpr std::size_t largest_message = 80 * 1024;
   static constexpr std::size_t largest_headers = 8 * 1024;  ///< of one request, as HTTP/2 counts them
   static constexpr int most_streams = 100;
+  static constexpr std::size_t most_unsent = 1024 * 1024;  ///< of answers that the peer does not take
   /// Effort that may be spent at once, and in a second: a frame is one unit, and so are 128 bytes, once more
   /// of headers after decompression. A call takes about eight.
-  static constexpr double effort_at_once = 1000, effort_per_second = 500;
+  static constexpr double effort_at_once = 8000, effort_per_second = 4000;
 
   Http2(OnCall on_call, TimePoint now);
   ~Http2();
@@ -71,6 +73,7 @@ class Http2 {
   OnCall on_call_;
   std::map<std::int32_t, Stream> streams_;
   int waiting_ = 0;
+  std::size_t unsent_ = 0;
   double effort_ = effort_at_once;
   TimePoint refilled_;
   struct Free {

@@ -57,8 +57,9 @@ std::optional<Places::Id> Places::enter(Id id, std::string address, TimePoint no
   const auto strangers = count(false, &Place::address);
   if (strangers.at(address) > limits_.strangers_per_address) return oldest_stranger(&address, id);
   if (total(strangers) > limits_.strangers) {
+    // Where each address has one, the oldest goes, whatever its address is.
     const auto most = most_of(strangers);
-    return oldest_stranger(&most, id);
+    return oldest_stranger(strangers.at(most) > 1 ? &most : nullptr, id);
   }
   if (std::cmp_less_equal(all_.size(), limits_.connections)) return std::nullopt;
   return idlest(most_of(count(true, &Place::identity)), id);

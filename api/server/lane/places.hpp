@@ -39,6 +39,7 @@ class Places {
   /// It carried something. `waiting`: calls on it that wait for their answers; such a one goes last.
   void used(Id id, TimePoint now, int waiting);
   void leave(Id id) { all_.erase(id); }
+  void clear() { all_.clear(); }
   /// A stranger whose time is over.
   [[nodiscard]] std::optional<Id> overdue(TimePoint now) const;
   /// When overdue() has to be asked next; TimePoint::max(): there is no stranger.

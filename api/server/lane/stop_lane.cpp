@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
+#include <exception>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -31,7 +32,9 @@ using lane::StopCalls;
 
 namespace {
 
-constexpr auto longest_sleep = std::chrono::seconds(1);
+constexpr Duration longest_sleep = std::chrono::seconds(1);
+/// Until it is tried again to let somebody in, when the system has no descriptors.
+constexpr Duration when_full = std::chrono::milliseconds(100);
 /// Accepted at once, before those who are there are served again.
 constexpr int most_accepted = 8;
 
@@ -84,6 +87,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
     StopCalls::Make make;
   };
 
+  bool serve_once();
   void accept_from(const ListeningSocket& socket);
   void enter(FileDescriptor socket, const std::string& host, bool encrypted);
   void serve(Id id);
@@ -101,6 +105,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   std::map<Id, Peer> peers_;
   Id last_ = 0;
   std::uint64_t turned_away_ = 0;
+  TimePoint full_until_{};  ///< nobody is let in: the system has no descriptors
   FileDescriptor wake_{eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
   std::atomic<bool> stopping_{false};
   std::atomic<TimePoint> progress_{monotonic_now()};
@@ -109,46 +114,59 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
 };
 
 void StopLane::Loop::run() {
-  std::vector<pollfd> polled;
-  std::vector<Id> known, strangers;
   while (!stopping_) {
-    progress_.store(monotonic_now(), std::memory_order_relaxed);
-    polled.clear();
-    known.clear();
-    strangers.clear();
-    polled.push_back({.fd = wake_.get(), .events = POLLIN, .revents = 0});
-    for (const auto& socket : sockets_)
-      polled.push_back({.fd = socket.fd.get(), .events = POLLIN, .revents = 0});
-    const auto first = polled.size();
-    std::vector<Id> ids;
-    ids.reserve(peers_.size());
-    for (const auto& [id, peer] : peers_) {
-      const short events = peer.connection->wants_to_write() ? POLLIN | POLLOUT : POLLIN;
-      polled.push_back({.fd = peer.connection->fd(), .events = events, .revents = 0});
-      ids.push_back(id);
+    try {
+      if (!serve_once()) break;
+    } catch (const std::exception& error) {  // no memory: nobody keeps any here
+      spdlog::critical("stop lane: {}; all of its connections are closed", error.what());
+      peers_.clear();
+      places_.clear();
     }
-    const auto until = std::min<Duration>(longest_sleep, places_.next_due() - monotonic_now());
-    const auto patience = std::chrono::ceil<std::chrono::milliseconds>(std::max(until, Duration{}));
-    if (poll(polled.data(), polled.size(), static_cast<int>(patience.count())) < 0 && errno != EINTR) {
-      spdlog::critical("stop lane: poll: {}", std::generic_category().message(errno));
-      return;
-    }
-    if (polled[0].revents != 0) {
-      eventfd_t count = 0;
-      eventfd_read(wake_.get(), &count);
-    }
-    answer_what_is_done();
-    // Whoever is known goes before strangers, whose handshakes cost a thousand times as much as a stop.
-    for (std::size_t i = 0; i < ids.size(); ++i)
-      if (polled[first + i].revents != 0)
-        (peers_.at(ids[i]).client.empty() ? strangers : known).push_back(ids[i]);
-    for (const auto id : known) serve(id);
-    for (const auto id : strangers) serve(id);
-    for (std::size_t i = 0; i < sockets_.size(); ++i)
-      if (polled[i + 1].revents != 0) accept_from(sockets_[i]);
-    close(places_.overdue(monotonic_now()));
   }
   say_goodbye();
+}
+
+/// False: nothing can be waited for any more. Clients then find nobody here, and go to the main address.
+bool StopLane::Loop::serve_once() {
+  std::vector<pollfd> polled;
+  std::vector<Id> known, strangers;
+  progress_.store(monotonic_now(), std::memory_order_relaxed);
+  const bool full = monotonic_now() < full_until_;
+  polled.push_back({.fd = wake_.get(), .events = POLLIN, .revents = 0});
+  for (const auto& socket : sockets_)
+    polled.push_back({.fd = full ? -1 : socket.fd.get(), .events = POLLIN, .revents = 0});
+  const auto first = polled.size();
+  std::vector<Id> ids;
+  ids.reserve(peers_.size());
+  for (const auto& [id, peer] : peers_) {
+    const short events = peer.connection->wants_to_write() ? POLLIN | POLLOUT : POLLIN;
+    polled.push_back({.fd = peer.connection->fd(), .events = events, .revents = 0});
+    ids.push_back(id);
+  }
+  const auto until =
+      std::min<Duration>(full ? when_full : longest_sleep, places_.next_due() - monotonic_now());
+  const auto patience = std::chrono::ceil<std::chrono::milliseconds>(std::max(until, Duration{}));
+  if (poll(polled.data(), polled.size(), static_cast<int>(patience.count())) < 0 && errno != EINTR) {
+    spdlog::critical("stop lane: poll: {}", std::generic_category().message(errno));
+    return false;
+  }
+  if (polled[0].revents != 0) {
+    eventfd_t count = 0;
+    eventfd_read(wake_.get(), &count);
+  }
+  answer_what_is_done();
+  // Whoever is known goes before strangers, whose handshakes cost a thousand times as much as a stop.
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (polled[first + i].revents == 0) continue;
+    const auto peer = peers_.find(ids[i]);  // it may have ended with its answer
+    if (peer != peers_.end()) (peer->second.client.empty() ? strangers : known).push_back(ids[i]);
+  }
+  for (const auto id : known) serve(id);
+  for (const auto id : strangers) serve(id);
+  for (std::size_t i = 0; i < sockets_.size(); ++i)
+    if (polled[i + 1].revents != 0) accept_from(sockets_[i]);
+  close(places_.overdue(monotonic_now()));
+  return true;
 }
 
 void StopLane::Loop::accept_from(const ListeningSocket& socket) {
@@ -159,8 +177,10 @@ void StopLane::Loop::accept_from(const ListeningSocket& socket) {
         accept4(socket.fd.get(), reinterpret_cast<sockaddr*>(&address), &size, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (connection.get() < 0) {
       // Out of descriptors: somebody makes room, so that whoever wants to stop comes in.
-      if (errno == EMFILE || errno == ENFILE) close(places_.least_needed());
-      return;
+      const bool none_left = errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS;
+      const auto leaves = none_left ? places_.least_needed() : std::nullopt;
+      if (none_left && !leaves) full_until_ = monotonic_now() + when_full;
+      return close(leaves);
     }
     if (socket.unix_path.empty()) {
       const int on = 1, patience_ms = 10'000;
@@ -271,7 +291,7 @@ StopLane::StopLane(Machine& machine, StopLaneOptions options)
 
 StopLane::~StopLane() { stop(); }
 
-Result<int> StopLane::start() {
+Result<int> StopLane::listen() {
   std::shared_ptr<const tls::Acceptor> acceptor;
   if (options_.tls) {
     const auto contents = tls::read(*options_.tls);
@@ -285,10 +305,13 @@ Result<int> StopLane::start() {
   const int port = sockets->front().port;
   loop_ = std::make_shared<Loop>(machine_, options_.limits);
   loop_->open(*std::move(sockets), std::move(acceptor));
-  thread_ = std::thread([loop = loop_] { loop->run(); });
-  pthread_setname_np(thread_.native_handle(), "axisd-stops");
   spdlog::info("stops are taken on {} as well", port == 0 ? options_.listen : fmt::format("port {}", port));
   return port;
+}
+
+void StopLane::serve() {
+  thread_ = std::thread([loop = loop_] { loop->run(); });
+  pthread_setname_np(thread_.native_handle(), "axisd-stops");
 }
 
 void StopLane::stop() {

@@ -24,7 +24,7 @@ struct StopLaneOptions {
 [[nodiscard]] std::string stop_lane_of(const std::string& listen);
 
 /// A gRPC server for the calls of lane::StopCalls alone, on one thread, which is none of gRPC's and shares
-/// neither memory nor connections with it. start() and stop() on one thread.
+/// neither memory nor connections with it. listen(), serve() and stop() on one thread.
 class StopLane {
  public:
   /// `machine` outlives stop().
@@ -32,9 +32,11 @@ class StopLane {
   ~StopLane();
   StopLane(const StopLane&) = delete;
 
-  /// Begins to serve; returns the TCP port (0: a unix socket). Once. Errors: as of listen_on(), and
-  /// invalid_argument (TLS files).
-  [[nodiscard]] Result<int> start();
+  /// Takes its address; whoever connects waits until serve(). Returns the TCP port (0: a unix socket). Once.
+  /// Errors: as of listen_on(), and invalid_argument (TLS files).
+  [[nodiscard]] Result<int> listen();
+  /// Precondition: listen().
+  void serve();
   /// Answers what waits as UNAVAILABLE, then ends. Idempotent.
   void stop();
 

@@ -31,8 +31,9 @@ class Lane : public ::testing::Test {
   void serve(server::StopLaneOptions options = {}) {
     if (options.listen.empty()) options.listen = "127.0.0.1:0";
     lane_ = std::make_unique<server::StopLane>(machine_, std::move(options));
-    const auto port = lane_->start();
+    const auto port = lane_->listen();
     ASSERT_TRUE(port) << to_string(port.error());
+    lane_->serve();
     port_ = *port;
     target_ = "127.0.0.1:" + std::to_string(port_);
   }
@@ -168,6 +169,27 @@ TEST_F(Lane, SilentConnectionsKeepNobodyOut) {
   for (int i = 0; i < 400; ++i) crowd.push_back(silent());
   auto stub = client();
   EXPECT_TRUE(stop(*stub).first.ok());
+}
+
+TEST_F(Lane, ClientsThatAreKilledWhileTheyWaitHarmNobody) {
+  serve();
+  for (int i = 0; i < 20; ++i) {
+    machine_.hold();
+    std::thread caller([&] {
+      auto stub = client();
+      Call context(50ms);
+      v1::StopRequest request;
+      request.set_axis("feeder");
+      v1::StopResponse response;
+      (void)stub->Stop(&context, request, &response);
+    });
+    EXPECT_TRUE(eventually([&] { return machine_.held() == 1; }));
+    if (i % 2 == 0) caller.join();
+    machine_.let_go();  // now and then the answer meets the end of the connection
+    if (i % 2 != 0) caller.join();
+  }
+  auto next = client();
+  EXPECT_TRUE(stop(*next).first.ok());
 }
 
 TEST_F(Lane, ManyCallsOfManyClients) {
