@@ -18,7 +18,9 @@ void expect_homed(Bench& bench, const std::string& method, double home_centre) {
   expect_state(state, v1::STATE_STANDSTILL);
   EXPECT_EQ(state.trust(), v1::POSITION_TRUST_HOMED) << method;
   EXPECT_TRUE(state.homed()) << method;
-  EXPECT_NEAR(state.position(), 3, 0.06) << method;
+  // A measured shaft may still follow: as far as the drive takes for in position, 10 pulses, and noise (M10).
+  const double close = bench.setup.manual.says_yes("closed_loop") ? 0.13 : 0.06;
+  EXPECT_NEAR(state.position(), 3, close) << method;
   const double where = method == "positive_limit"   ? positive_limit_at
                        : method == "negative_limit" ? negative_limit_at
                                                     : home_centre;
@@ -26,7 +28,7 @@ void expect_homed(Bench& bench, const std::string& method, double home_centre) {
   const auto offset = bench.shaft().mm - state.position();
   const double target = method == "positive_limit" ? 1 : 20;
   expect_done(bench.client.move_to(target));
-  EXPECT_NEAR(bench.shaft().mm - target, offset, 0.06) << method;
+  EXPECT_NEAR(bench.shaft().mm - target, offset, close) << method;
 }
 
 std::string all_methods(const Setup& setup) {

@@ -240,6 +240,27 @@ TEST(CommandBookRestart, WhatWasAskedForAgainIsYounger) {
   EXPECT_EQ(again->value().state, CommandState::aborted);
 }
 
+TEST_F(CommandBookTest, AJogThatIsRenewedWithNewIdsDoesNotFillTheMemory) {
+  const Action jog = JogRequest{.velocity = 1};
+  const auto command = book_.open("x", jog, request("first"));
+  int taken = 0;
+  while (taken < 20'000 && book_.find_repeat("x", jog, request(fmt::format("renewal {}", taken)))) {
+    book_.attach(command, "x", jog, request(fmt::format("renewal {}", taken)), [](const auto&) {});
+    ++taken;
+  }
+  EXPECT_GT(taken, 10'000);
+  EXPECT_LT(taken, 20'000);
+  const auto refused = book_.find_repeat("x", jog, request("another"));
+  EXPECT_EQ(refused.error().reason, Reason::busy);
+  EXPECT_EQ(book_.find_repeat("x", jog, request("renewal 7")).value(), command) << "a repeat is none";
+  EXPECT_TRUE(book_.find_repeat("y", move, {.client = "panel", .request_id = "a"}));
+  command->done();
+  pass(std::chrono::minutes(31));
+  for (int i = 0; i < 3'000; ++i)
+    book_.open("y", move, {.client = "panel", .request_id = fmt::format("{}", i)})->done();
+  EXPECT_TRUE(book_.find_repeat("x", jog, request("another"))) << "it has ended";
+}
+
 TEST_F(CommandBookTest, CommandsWithoutAnIdDoNotPileUp) {
   const auto first = book_.open("x", StopRequest{}, {});
   first->done();
