@@ -87,6 +87,9 @@ void CommandBook::restore(JournalContent content) {
                      .outcome = Outcome::not_executed});
     }
   }
+  // As they were queued before: a repeat had moved them.
+  for (auto& [client, ids] : clients_)
+    std::ranges::sort(ids.detailed, {}, [](const EntryPtr& entry) { return last_heard_of(*entry); });
   for (auto& [axis, outcome] : content.unknown_outcomes) {
     auto& [id, cause] = outcome;
     cause.message =

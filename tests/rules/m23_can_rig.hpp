@@ -195,6 +195,8 @@ class CanRig {
   [[nodiscard]] AxisSettings axis_settings() const {
     const bool standard = options_.model == "cia402";
     AxisSettings axis{.name = "feeder", .bus = "can0", .node = node_id, .model = options_.model};
+    // Else each release loses the position (M20).
+    if (options_.model == "yss-c") axis.model_settings["released_position"] = std::string("counted");
     axis.scale = {
         .pulses_per_revolution = 1000, .travel_numerator = 10, .invert = options_.invert, .unit = "mm"};
     if (options_.limits) {

@@ -31,9 +31,7 @@ CanRigOptions measured(const std::string& model, int noise) {
     axis.homing->method = HomingMethod::negative_limit;
     axis.homing->position = -60;
     axis.homing->max_travel = 600;
-    if (!fine) return;
-    axis.scale.pulses_per_revolution = 10'000;
-    axis.model_settings["released_position"] = std::string("counted");
+    if (fine) axis.scale.pulses_per_revolution = 10'000;
   };
   options.adjust_drive = [fine](simulation::SimulatedNodeSettings& node) {
     if (!fine) return;

@@ -26,6 +26,7 @@ LOADER_ONLY = {
     "merge_key",
     "model_on_wrong_bus",
     "missing_travel",
+    "misspelt_unit",
     "modulo_with_limits",
     "plaintext",
     "pv_direction",
