@@ -8,6 +8,7 @@ import argparse
 import bisect
 import contextlib
 import dataclasses
+import itertools
 import os
 import pathlib
 import random
@@ -33,6 +34,7 @@ FRESH, KNOWN = "since just now", "for seconds"
 class Stop:
     answering: float  # from its arrival to the last byte of the last frame to a drive that answers, s
     last: float  # the same of all drives, s
+    late: bool  # a drive that answers seemed not to: bytes stayed in the terminal for longer than turnaround_max
     stalls: float  # how long meanwhile bare threads were held back, and bytes in the terminal, s, one after the other
 
     def less_stalls(self):
@@ -102,7 +104,9 @@ def judge(line, ours, theirs, waits, silent, arrived):
     last = max(ends.values())
     meanwhile = [entry for entry in ours if arrived <= entry[0] <= arrived + last]
     stalls = held_back(waits + held_in_terminal(meanwhile, theirs), arrived, arrived + last)
-    return Stop(answering=max(end for node, end in ends.items() if node not in silent), last=last, stalls=stalls)
+    late = any(asked and asked_again and int(frame[:2], 16) not in silent
+               for (_, asked, frame), (_, asked_again, _) in itertools.pairwise(meanwhile))
+    return Stop(answering=max(end for node, end in ends.items() if node not in silent), last=last, late=late, stalls=stalls)
 
 
 def wait_online(cell, count):
@@ -181,15 +185,20 @@ def main():
     rows = [["bit/s", "silent", "", "stops", "last answering", "last of all", "less stalls", "published", "met"]]
     for baud in given.baud:
         found, bound = measure(build, baud, given, given.silent)
-        for (count, since), stops in sorted(found.items()):
+        for (count, since), all_of_them in sorted(found.items()):
+            # The bound presumes that who answers does so within turnaround_max. Most have to be judged, though.
+            stops = [stop for stop in all_of_them if given.report_only or not stop.late]
+            if 2 * len(stops) < len(all_of_them):
+                sys.exit("stop_all_bench.py: this computer is too busy: most bytes come too late for the simulated drives")
             met = max(stop.less_stalls() for stop in stops) <= bound
             within = within and met
-            rows.append([str(baud), f"{count} of {given.nodes}", since, str(len(stops)),
+            rows.append([str(baud), f"{count} of {given.nodes}", since, f"{len(stops)} of {len(all_of_them)}",
                          milliseconds([stop.answering for stop in stops]), milliseconds([stop.last for stop in stops]),
                          f"{max(stop.less_stalls() for stop in stops) * 1e3:.1f}", f"{bound * 1e3:.1f}",
                          "yes" if met else "NO"])
     print("\nStopAll: from its arrival to the last byte of a stop frame, ms, median / longest; less stalls: the longest without "
-          "what bare threads and the bytes of the terminal were held back beyond host_allowance")
+          "what bare threads and the bytes of the terminal were held back beyond host_allowance; stops in which the terminal kept "
+          "bytes for longer than turnaround_max are not among them")
     table(rows)
     return 0 if within or given.report_only else 1
 
