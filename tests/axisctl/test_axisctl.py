@@ -184,7 +184,9 @@ class Jogging(AxisctlTest):
         self.assertGreaterEqual(len(calls), 3)
         self.assertEqual(len({call.options.request_id for call in calls}), 1)  # a repeat extends the hold
         self.assertEqual(calls[0].hold.nanos, 300_000_000)
-        self.assertNotEqual(self.server.peers("Halt")[0], self.server.peers("Jog")[0])
+        # One connection, on which no renewal overtakes the halt, and which nothing else uses.
+        self.assertEqual(set(self.server.peers("Halt")), set(self.server.peers("Jog")))
+        self.assertNotEqual(self.server.peers("Halt")[0], self.server.peers("GetAxis")[0])
 
     def test_ctrl_c_halts(self):
         status, shown = self.on_terminal("jog", "feeder", "-30", "--hold", "2s", interrupt_at=r"Jog")
