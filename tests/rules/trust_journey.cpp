@@ -25,6 +25,7 @@ class Journey {
   explicit Journey(const ModelRigOptions& options)
       : rig_(options),
         inverted_(options.invert),
+        free_stop_(options.drive_keys.find("overtravel_stop: free") != std::string::npos),
         home_at_(options.invert ? ModelRig::negative_limit_edge : ModelRig::home_edge) {}
 
   ModelRig& rig() { return rig_; }
@@ -47,6 +48,9 @@ class Journey {
 
   void enable() {
     rig_.complete(ResetRequest{});
+    // A free stop at a limit may release the motor and leave Operation Enabled: only a disable leads out of
+    // it.
+    if (free_stop_ && !rig_.state()->enabled) done(DisableRequest{}, "disable");
     done(EnableRequest{}, "enable");
   }
 
@@ -105,6 +109,7 @@ class Journey {
  private:
   ModelRig rig_;
   bool inverted_;
+  bool free_stop_;
   double home_at_;
   double origin_ = 0;  ///< the load is at this when the axis says 0
   std::optional<double> homed_;
