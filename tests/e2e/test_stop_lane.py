@@ -62,7 +62,7 @@ class StopLane(Scenario):
                     return await connected.axis("spinner").stop()
 
             self.turning(machine)
-            self.assertEqual(asyncio.run(stop()).state.value, "done")
+            self.assertEqual(asyncio.run(stop()).state.value, "Done")
             self.stands(machine)
 
     def test_a_jog_is_kept_going_and_ended_there(self):
