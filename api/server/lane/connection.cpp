@@ -11,7 +11,7 @@ namespace axisd::server::lane {
 namespace {
 
 /// Of what waits for a peer that does not read.
-constexpr std::size_t most_unsent = 256 * 1024;
+constexpr std::size_t most_unsent = std::size_t{256} * 1024;
 
 }  // namespace
 
@@ -22,7 +22,7 @@ Connection::Connection(FileDescriptor socket, std::shared_ptr<const tls::Accepto
 }
 
 bool Connection::read(TimePoint now) {
-  std::array<char, 16 * 1024> piece;
+  std::array<char, 16'384> piece;
   const auto count = recv(socket_.get(), piece.data(), piece.size(), MSG_DONTWAIT);
   if (count < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
   if (count == 0) return false;

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cstring>
+#include <cstddef>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -41,8 +41,8 @@ std::string percent_encoded(std::string_view text) {
 std::optional<Duration> timeout_of(std::string_view text) {
   if (text.size() < 2 || text.size() > 9) return std::nullopt;
   std::int64_t number = 0;
-  const auto* end = text.data() + text.size() - 1;
-  if (const auto read = std::from_chars(text.data(), end, number);
+  const auto* end = text.end() - 1;
+  if (const auto read = std::from_chars(text.begin(), end, number);
       read.ec != std::errc{} || read.ptr != end || number < 0)
     return std::nullopt;
   switch (text.back()) {
@@ -191,7 +191,7 @@ struct Http2::Callbacks {
     auto* stream = find(self(user), id);
     if (stream == nullptr) return NGHTTP2_ERR_TEMPORAL_CALLBACK_FAILURE;
     const auto count = std::min(room, stream->out.size() - stream->sent);
-    std::memcpy(to, stream->out.data() + stream->sent, count);
+    std::copy_n(stream->out.begin() + static_cast<std::ptrdiff_t>(stream->sent), count, to);
     stream->sent += count;
     self(user).unsent_ -= count;
     if (stream->sent < stream->out.size()) return static_cast<ssize_t>(count);

@@ -39,10 +39,12 @@ class Http2 {
   using OnCall = std::function<void(Call call)>;
 
   /// A stop that names as many axes as there may be fits.
-  static constexpr std::size_t largest_message = 80 * 1024;
-  static constexpr std::size_t largest_headers = 8 * 1024;  ///< of one request, as HTTP/2 counts them
+  static constexpr std::size_t largest_message = std::size_t{80} * 1024;
+  static constexpr std::size_t largest_headers =
+      std::size_t{8} * 1024;  ///< of one request, as HTTP/2 counts them
   static constexpr int most_streams = 100;
-  static constexpr std::size_t most_unsent = 1024 * 1024;  ///< of answers that the peer does not take
+  static constexpr std::size_t most_unsent =
+      std::size_t{1024} * 1024;  ///< of answers that the peer does not take
   /// Effort that may be spent at once, and in a second: a frame is one unit, and so are 128 bytes, once more
   /// of headers after decompression. A call takes about eight.
   static constexpr double effort_at_once = 8000, effort_per_second = 4000;
@@ -59,7 +61,7 @@ class Http2 {
   /// Tells the peer to open no more streams here.
   void go_away();
   /// What has to go to the peer next; about `most` bytes. Empty: nothing at present.
-  [[nodiscard]] std::string take_output(std::size_t most = 64 * 1024);
+  [[nodiscard]] std::string take_output(std::size_t most = std::size_t{64} * 1024);
   /// Calls that were handed out and have not been answered.
   [[nodiscard]] int waiting() const { return waiting_; }
 

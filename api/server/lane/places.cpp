@@ -52,7 +52,7 @@ std::optional<Places::Id> Places::idlest(const std::string& identity, Id but) co
   return idlest == nullptr ? std::nullopt : std::optional(idlest->first);
 }
 
-std::optional<Places::Id> Places::enter(Id id, std::string address, TimePoint now) {
+std::optional<Places::Id> Places::enter(Id id, const std::string& address, TimePoint now) {
   all_[id] = {.address = address, .identity = {}, .since = now, .used = now};
   const auto strangers = count(false, &Place::address);
   if (strangers.at(address) > limits_.strangers_per_address) return oldest_stranger(&address, id);
@@ -65,7 +65,7 @@ std::optional<Places::Id> Places::enter(Id id, std::string address, TimePoint no
   return idlest(most_of(count(true, &Place::identity)), id);
 }
 
-std::optional<Places::Id> Places::identify(Id id, std::string identity, bool local, TimePoint now) {
+std::optional<Places::Id> Places::identify(Id id, const std::string& identity, bool local, TimePoint now) {
   auto& place = all_.at(id);
   place.identity = identity;
   place.known = true;

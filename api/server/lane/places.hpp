@@ -31,9 +31,9 @@ class Places {
   explicit Places(Limits limits) : limits_(limits) {}
 
   /// A new connection, which nobody has identified yet. The connection to close for it, if any.
-  [[nodiscard]] std::optional<Id> enter(Id id, std::string address, TimePoint now);
+  [[nodiscard]] std::optional<Id> enter(Id id, const std::string& address, TimePoint now);
   /// It is this client's; `local`: of whoever is on this computer. The connection to close for it, if any.
-  [[nodiscard]] std::optional<Id> identify(Id id, std::string identity, bool local, TimePoint now);
+  [[nodiscard]] std::optional<Id> identify(Id id, const std::string& identity, bool local, TimePoint now);
   /// It carried a complete request.
   void asked(Id id) { all_.at(id).asked = true; }
   /// It carried something. `waiting`: calls on it that wait for their answers; such a one goes last.
