@@ -11,9 +11,9 @@
 
 namespace axisd::server {
 
-/// The client's identity: the common name (else the first alternative name) of its verified certificate;
-/// without TLS, "local:" and the host part of its address. Never the port: request ids must stay valid over a
-/// reconnection.
+/// The client's identity: the common name (else the first alternative name, else a hash) of its verified
+/// certificate; without TLS, "local:" and the host part of its address. Never the port: request ids must stay
+/// valid over a reconnection.
 [[nodiscard]] std::string client_of(const grpc::CallbackServerContext& context);
 
 /// An identity as it may appear in the log and in Command.client: of a bounded length, without anything by

@@ -185,7 +185,7 @@ Result<void> JournalFile::settle() {
 
 Result<void> JournalFile::write(const std::vector<Pending>& batch) {
   std::string text;
-  if (told_time_ == Duration::min() || model_.now() - told_time_ >= time_told) {
+  if (!told_time_ || model_.now() - *told_time_ >= time_told) {
     told_time_ = model_.now();
     text += encode_line(++last_number_, model_.time_after(options_.boot, monotonic_now().time_since_epoch()));
   }

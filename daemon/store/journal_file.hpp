@@ -72,7 +72,7 @@ class JournalFile final : public CommandJournal {
   // Of the writing thread, once it runs.
   std::unique_ptr<JournalDisk> disk_;
   JournalModel model_;
-  Duration told_time_ = Duration::min();  ///< the last one that was written
+  std::optional<Duration> told_time_;  ///< the last one that was written
   std::uint64_t last_number_ = 0;
   std::size_t size_ = 0, size_when_rewritten_ = 0;  ///< of the file, bytes
   bool broken_ = false;  ///< the last write failed: what the file ends with is not known
