@@ -15,12 +15,15 @@ target_include_directories(bench_untimed_line PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(bench_untimed_line PRIVATE axisd_simulation)
 
 if(AXISD_GRPC)
-  foreach(program rpc_client bare_server)
+  foreach(program rpc_client command_client bare_server)
     add_executable(bench_${program} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/${program}.cpp)
     target_link_libraries(bench_${program} PRIVATE axisd_proto)
   endforeach()
+  add_executable(bench_full_journal EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/full_journal.cpp)
+  target_include_directories(bench_full_journal PRIVATE ${CMAKE_SOURCE_DIR})
+  target_link_libraries(bench_full_journal PRIVATE axisd_core)
   add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop bench_bare_waits bench_modbus_loop bench_untimed_line bench_rpc_client
-                                           bench_bare_server axisd axisd-sim axisctl)
+                                           bench_command_client bench_full_journal bench_bare_server axisd axisd-sim axisctl)
   set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
   set(text "")
   foreach(command bring-up core)
@@ -43,9 +46,11 @@ if(AXISD_GRPC)
     "--seconds 1)\n"
     "add_test(bench.machine /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/machine_bench.py ${CMAKE_BINARY_DIR} "
     "--rounds 1 --seconds 1 --axes 1)\n"
+    "add_test(bench.admission /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/admission_bench.py ${CMAKE_BINARY_DIR} "
+    "--rounds 1 --seconds 1 --axes 2 --ids 20000)\n"
     "add_test(bench.siege /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/siege_bench.py ${CMAKE_BINARY_DIR} --seconds 2 "
     "--only nobody --only \"rapid reset\" --only \"silent connections\")\n"
-    "set_tests_properties(bench.rtu bench.stop_all bench.rpc bench.machine bench.siege PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
+    "set_tests_properties(bench.rtu bench.stop_all bench.rpc bench.machine bench.admission bench.siege PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
     "set_tests_properties(bench.bring-up bench.core bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"
     "set_tests_properties(bench.sync_in_guest PROPERTIES RESOURCE_LOCK guest COST 100)\n")
   file(GENERATE OUTPUT ${include_file} CONTENT "${text}")
