@@ -2,6 +2,7 @@
 #include "daemon/daemon.hpp"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 
@@ -228,6 +229,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
              if (published_to != nullptr) published_to->published();
            }},
       configuration);
+  malloc_trim(0);  // a full journal was read in many pieces: what they leave between each other goes back
   core::MachineService service(loop, machine, configuration.machine, instance_id);
   published_to = &service;
   ConfigurationService served({.path = options.config,
