@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -32,7 +31,7 @@ class Reader {
   bool get(T& value) {
     std::string_view bytes;
     if (!take(sizeof value, bytes)) return false;
-    std::memcpy(&value, bytes.data(), sizeof value);
+    bytes.copy(reinterpret_cast<char*>(&value), sizeof value);
     return true;
   }
   bool text(std::string& value) {
@@ -66,7 +65,7 @@ bool read_run(Reader& reader, ClientRun& read) {
   run.begin = TimePoint(Duration(begin));
   run.newest = TimePoint(Duration(newest));
   run.records.resize(count);
-  if (count > 0) std::memcpy(run.records.data(), records.data(), records.size());
+  records.copy(reinterpret_cast<char*>(run.records.data()), records.size());
   return true;
 }
 

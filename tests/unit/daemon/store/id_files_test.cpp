@@ -14,8 +14,10 @@ using std::chrono::minutes;
 ClientRun run_of(const std::string& client, int count, Duration at) {
   const Command command{.id = "i-7", .state = CommandState::done};
   std::vector<std::string> names;
+  names.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) names.push_back(fmt::format("{}", i));
   std::vector<EndedId> ids;
+  ids.reserve(names.size());
   for (const auto& name : names)
     ids.push_back({.request_id = name, .digest = "d", .command = &command, .heard_of = TimePoint(at)});
   return {.client = client, .run = runs_of(std::move(ids)).front()};
@@ -112,6 +114,7 @@ TEST_F(IdFilesTest, DamageIsToldAndTheRestIsRead) {
 
 TEST_F(IdFilesTest, AreKeptByAgeAndWithinTheirBound) {
   std::vector<IdsLine> files;
+  files.reserve(40);
   for (std::uint32_t i = 0; i < 40; ++i)
     files.push_back({.file = i, .bytes = 1, .count = 1'000, .begin = minutes(i), .newest = minutes(i)});
   const auto numbers = [](const std::vector<IdsLine>& kept) {

@@ -142,7 +142,7 @@ TEST_F(SharesTest, StopsNeedNoIds) {
 
 TEST_F(SharesTest, OwnIdsGiveWayAfterElevenMinutesAndOthersNever) {
   fill("greedy", 10'000);
-  ask("hmi", "kept");
+  EXPECT_TRUE(ask("hmi", "kept"));
   pass(minutes(5));
   EXPECT_EQ(fill("greedy"), 9'999) << "and one is of hmi";
   pass(minutes(5) + std::chrono::seconds(59));

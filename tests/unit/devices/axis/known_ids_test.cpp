@@ -17,12 +17,15 @@ Command done(const std::string& id) { return {.id = id, .state = CommandState::d
 /// Ids r<first>, ... of commands i-<first>, ..., one each millisecond.
 std::vector<IdRun> run_of(int first, int count, TimePoint from = start) {
   std::vector<Command> commands;
+  commands.reserve(static_cast<std::size_t>(count));
   std::vector<std::string> names;
+  names.reserve(static_cast<std::size_t>(count));
   for (int i = first; i < first + count; ++i) {
     commands.push_back(done(fmt::format("i-{}", i)));
     names.push_back(fmt::format("r{}", i));
   }
   std::vector<EndedId> ids;
+  ids.reserve(commands.size());
   for (std::size_t i = 0; i < commands.size(); ++i)
     ids.push_back({.request_id = names[i],
                    .digest = "same",
