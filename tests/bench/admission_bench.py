@@ -27,7 +27,7 @@ def ready_cell(build, axes, poll, per_line=NODES):
     with tempfile.TemporaryDirectory() as directory, contextlib.ExitStack() as stack:
         lines = [stack.enter_context(Line(build, directory, 115200, size, name=f"line-{index}", untimed=True).open())
                  for index, size in enumerate(sizes)]
-        with Cell(build, lines, poll).online() as pid:
+        with Cell(build, lines, poll, calls=1000).online() as pid:
             commands(build, "ready")
             yield pid
 

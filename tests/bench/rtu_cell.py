@@ -86,14 +86,14 @@ class Client:
 class Cell:
     """axisd with an axis for each drive of some lines."""
 
-    def __init__(self, build, lines, poll):
-        """`poll`: the refresh period of each axis."""
-        self.build, self.lines, self.poll = build, lines, poll
+    def __init__(self, build, lines, poll, calls=256):
+        """`poll`: the refresh period of each axis; `calls`: that one client may have waiting."""
+        self.build, self.lines, self.poll, self.calls = build, lines, poll, calls
 
     def configuration(self):
         text = f"""machine: bench
 state_directory: {self.lines[0].directory}/state
-server: {{ listen: {SERVER} }}
+server: {{ listen: {SERVER}, limits: {{ calls: {self.calls} }} }}
 buses:
 """
         for index, line in enumerate(self.lines):
