@@ -21,6 +21,8 @@ std::string printable_identity(std::string_view name) {
   return result;
 }
 
+std::string unnamed_identity(std::string_view pem) { return fmt::format("unnamed:{:016x}", hash_of(pem)); }
+
 std::string client_of(const grpc::CallbackServerContext& context) {
   const auto auth = context.auth_context();
   if (auth && auth->IsPeerAuthenticated()) {
@@ -29,11 +31,9 @@ std::string client_of(const grpc::CallbackServerContext& context) {
       if (!values.empty() && !values.front().empty())
         return printable_identity({values.front().data(), values.front().size()});
     }
-    // Not its address, of which a client may have many: what one may take of the daemon is counted by this
-    // (M32).
     const auto whole = auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-    return fmt::format("unnamed:{:016x}",
-                       whole.empty() ? 0 : hash_of({whole.front().data(), whole.front().size()}));
+    return unnamed_identity(whole.empty() ? ""
+                                          : std::string_view(whole.front().data(), whole.front().size()));
   }
   return "local:" + peer_host(context.peer());
 }

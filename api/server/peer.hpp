@@ -20,6 +20,10 @@ namespace axisd::server {
 /// which a certificate could forge a line there.
 [[nodiscard]] std::string printable_identity(std::string_view name);
 
+/// Of a verified certificate without any name; `pem`: that certificate. Not its address, of which a client
+/// may have many: what one may take of the daemon is counted by this (M32).
+[[nodiscard]] std::string unnamed_identity(std::string_view pem);
+
 /// How long the caller waits for the answer, from this call on, by the clock of its deadline; nothing: for
 /// ever. Not above a day.
 [[nodiscard]] std::optional<Duration> patience_of(const grpc::CallbackServerContext& context);

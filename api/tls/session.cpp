@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <openssl/err.h>
+#include <openssl/pem.h>
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
 
@@ -149,6 +150,15 @@ std::string Session::name() const {
   if (!peer) return {};
   auto name = common_name(peer.get());
   return name.empty() ? first_alternative(peer.get()) : name;
+}
+
+std::string Session::certificate() const {
+  const Certificate peer(SSL_get1_peer_certificate(session_.get()));
+  const Memory text(BIO_new(BIO_s_mem()));
+  if (!peer || !text || PEM_write_bio_X509(text.get(), peer.get()) != 1) return {};
+  std::string pem(BIO_ctrl_pending(text.get()), '\0');
+  BIO_read(text.get(), pem.data(), static_cast<int>(pem.size()));
+  return pem;
 }
 
 }  // namespace axisd::tls

@@ -29,6 +29,8 @@ class Connection {
   [[nodiscard]] std::optional<std::string> name() const {
     return tls_ ? std::optional(tls_->name()) : std::nullopt;
   }
+  /// tls::Session::certificate(). Precondition: as of name(), with TLS.
+  [[nodiscard]] std::string certificate() const { return tls_->certificate(); }
   [[nodiscard]] int waiting() const { return http_.waiting(); }
 
   /// The socket is readable. False: the connection is over.

@@ -212,7 +212,8 @@ void StopLane::Loop::identify(Id id, Peer& peer) {
   if (!name)
     peer.client = "local:" + peer.host;
   else
-    peer.client = name->empty() ? "unnamed:" + peer.host : printable_identity(*name);
+    peer.client =
+        name->empty() ? unnamed_identity(peer.connection->certificate()) : printable_identity(*name);
   close(places_.identify(id, peer.client, !name, monotonic_now()));
 }
 

@@ -21,10 +21,15 @@ class Certificates {
         name + " -keyout " + (directory_ / (name + ".key")) + " -out " + (directory_ / (name + ".crt")));
   }
   void make_pair(const std::string& name, const std::string& ca) {
+    make_pair(name, ca, "/CN=" + name, "subjectAltName=DNS:localhost,IP:127.0.0.1\n");
+  }
+  /// `extensions`: as of openssl.cnf; may be empty.
+  void make_pair(const std::string& name, const std::string& ca, const std::string& subject,
+                 const std::string& extensions) {
     const auto base = directory_ / name;
-    std::ofstream(base + ".ext") << "subjectAltName=DNS:localhost,IP:127.0.0.1\n";
-    run("openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=" + name +
-        " -keyout " + base + ".key -out " + base + ".csr");
+    std::ofstream(base + ".ext") << extensions;
+    run("openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj " + subject + " -keyout " +
+        base + ".key -out " + base + ".csr");
     run("openssl x509 -req -days 2 -in " + base + ".csr -CA " + (directory_ / (ca + ".crt")) + " -CAkey " +
         (directory_ / (ca + ".key")) + " -CAcreateserial -extfile " + base + ".ext -out " + base + ".crt");
   }

@@ -231,6 +231,37 @@ TEST_F(Lane, OnlyVerifiedClientsAreServedByTheirName) {
   EXPECT_EQ(machine_.submitted().size(), 2U);
 }
 
+/// Holds, leases and request ids are by identity.
+TEST_F(Lane, AClientIsTheSameAtBothAddresses) {
+  Certificates certificates(directory_);
+  certificates.make_ca("ca");
+  certificates.make_pair("server", "ca");
+  certificates.make_pair("named", "ca");
+  certificates.make_pair("dns", "ca", "/O=x", "subjectAltName=DNS:panel.local\n");
+  certificates.make_pair("uri", "ca", "/O=x", "subjectAltName=URI:spiffe://cell/hmi,DNS:other\n");
+  certificates.make_pair("ip", "ca", "/O=x", "subjectAltName=IP:10.1.2.3\n");
+  certificates.make_pair("nameless", "ca", "/O=x", "");
+  serve({.listen = "127.0.0.1:0", .tls = certificates.server_files()});
+  server::Server main(machine_, {.listen = {"127.0.0.1:0"}, .tls = certificates.server_files()});
+  const auto port = main.start();
+  ASSERT_TRUE(port) << to_string(port.error());
+  for (const auto* name : {"named", "dns", "uri", "ip", "nameless"}) {
+    auto here = client(certificates.client(name));
+    const auto [status, response] = stop(*here);
+    ASSERT_TRUE(status.ok()) << name << ": " << status.error_message();
+    auto there =
+        v1::AxisService::NewStub(connect("127.0.0.1:" + std::to_string(*port), certificates.client(name)));
+    Call context;
+    v1::StopRequest request;
+    request.set_axis("feeder");
+    v1::StopResponse same;
+    ASSERT_TRUE(there->Stop(&context, request, &same).ok()) << name;
+    EXPECT_EQ(response.command().client(), same.command().client()) << name;
+    EXPECT_FALSE(same.command().client().empty()) << name;
+  }
+  main.shutdown();
+}
+
 TEST(StopLaneAddress, IsNextToThatOfTheServer) {
   EXPECT_EQ(server::stop_lane_of("localhost:7443"), "localhost:7444");
   EXPECT_EQ(server::stop_lane_of("[::1]:7443"), "[::1]:7444");
