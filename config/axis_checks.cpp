@@ -60,6 +60,8 @@ std::string AxisChecks::velocity_text(double value) const {
 
 /// Files that are named in a configuration are smaller.
 constexpr std::size_t largest_file = 4U << 20U;
+/// One line about such a file, which quotes its path and its text.
+constexpr std::size_t longest_problem = 600;
 
 /// Of the content of a file; 0 for none that can be read.
 std::size_t content_of(const SettingValue& path) {
@@ -91,7 +93,7 @@ void AxisChecks::specialise() {
   std::string_view lines = made.error().message;
   while (!lines.empty()) {
     const auto end = std::min(lines.find('\n'), lines.size());
-    diagnostics_.add(mark, std::string(lines.substr(0, end)), made.error().remedy);
+    diagnostics_.add(mark, printable(lines.substr(0, end), longest_problem), made.error().remedy);
     lines.remove_prefix(std::min(end + 1, lines.size()));
   }
 }

@@ -8,8 +8,6 @@ namespace axisd::config {
 
 namespace {
 
-constexpr std::size_t longest_shown = 60;
-
 /// Length of the valid UTF-8 sequence at the front, 0 if there is none (also for overlong forms and
 /// surrogates).
 std::size_t utf8_length(std::string_view text) {
@@ -34,10 +32,10 @@ std::size_t utf8_length(std::string_view text) {
 
 }  // namespace
 
-std::string printable(std::string_view text) {
+std::string printable(std::string_view text, std::size_t longest) {
   std::string result;
   while (!text.empty()) {
-    if (result.size() >= longest_shown) return result + "...";
+    if (result.size() >= longest) return result + "...";
     const auto length = utf8_length(text);
     // C1 control characters (U+0080..U+009F) drive terminals as well as C0 does.
     const bool control = length == 1

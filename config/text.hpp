@@ -1,6 +1,7 @@
 // What error messages do with text that somebody else wrote.
 #pragma once
 
+#include <cstddef>
 #include <initializer_list>
 #include <span>
 #include <string>
@@ -11,8 +12,8 @@
 
 namespace axisd::config {
 
-/// Valid UTF-8 without control characters, shortened to about 60 characters.
-std::string printable(std::string_view text);
+/// Valid UTF-8 without control characters, shortened to about `longest` bytes.
+std::string printable(std::string_view text, std::size_t longest = 60);
 /// The same in single quotes.
 std::string quoted(std::string_view text);
 /// "a, b or c".

@@ -44,7 +44,7 @@ TEST(Loader, WhatIsWrongWithAFileStandsAtItsKey) {
   };
   const auto refused = load_text(text, name, check);
   EXPECT_FALSE(refused.configuration);
-  EXPECT_EQ(findings(refused), name + ":9:10: /etc/axisd/tls/server.key: is bad; mend it\n");
+  EXPECT_EQ(findings(refused), name + ":10:10: /etc/axisd/tls/server.key: is bad; mend it\n");
   // Of paths that are none, nothing more is said.
   auto relative = text;
   relative.replace(relative.find("/etc/axisd/tls/server.key"), 1, "");
