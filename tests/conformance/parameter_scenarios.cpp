@@ -129,8 +129,8 @@ std::string every_parameter(const Setup& setup) {
       EXPECT_LE(value.value(), parameter->maximum()) << parameter->name();
     }
     // A measured value is another one a few milliseconds later.
-    constexpr std::string_view measures[] = {"Present position", "Present speed", " actual",
-                                             "Following error"};
+    constexpr std::string_view measures[] = {"Present position", "Present speed", "Actual position",
+                                             " actual", "Following error"};
     const bool measured =
         setup.manual.says_yes("closed_loop") &&
         std::ranges::any_of(measures, [&](auto name) { return manual->title.contains(name); });

@@ -7,7 +7,7 @@ if(AXISD_GRPC)
     string(REGEX REPLACE "^test_" "${AXISD_TEST_PREFIX}e2e." name ${name})
     add_test(NAME ${name} COMMAND ${AXISD_PYTHON} -B ${scenario})
     set_tests_properties(${name} PROPERTIES LABELS e2e TIMEOUT 600
-      ENVIRONMENT "AXISD=$<TARGET_FILE:axisd>;AXISD_SIM=$<TARGET_FILE:axisd-sim>;AXISCTL=$<TARGET_FILE:axisctl>")
+      ENVIRONMENT "AXISD=$<TARGET_FILE:axisd>;AXISD_SIM=$<TARGET_FILE:axisd-sim>;AXISCTL=$<TARGET_FILE:axisctl>;AXISD_SANITIZE=${AXISD_SANITIZE}")
   endforeach()
 endif()
 

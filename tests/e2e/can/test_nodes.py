@@ -75,6 +75,7 @@ class Nodes(CanScenario):
         neighbour = self.mid_move(machine, "second")
         machine.sim.control("fault delay_reply node=5 delay_ms=2500 count=2")
         move = machine.client.motion("MoveAbsolute", "table", position=90.0, wait=DONE)
+        ended = time.monotonic_ns()
         self.assertLessEqual(machine.sim.shaft(5).starts, 1)
         if move.state != pb.COMMAND_STATE_DONE:
             self.assertTrue(move.cause.message and move.cause.remedy, move)
@@ -82,6 +83,7 @@ class Nodes(CanScenario):
         machine.sim.wait_rest(5)
         self.assertLessEqual(machine.sim.shaft(5).starts, 1)
         self.neighbour_unharmed(machine, neighbour)
+        wait_for(lambda: len(machine.frames.frames("rx", since=ended, cob_id=0x585)) >= 2, "its late answers have come")
         self.usable_again(machine, "table")
 
     def test_floods_the_bus(self):

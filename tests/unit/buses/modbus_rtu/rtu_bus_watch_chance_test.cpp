@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <random>
+#include <ranges>
+#include <utility>
+#include <vector>
 
 #include "watch_rig.hpp"
 
@@ -42,6 +46,7 @@ class Chaos {
   struct Call {
     Request request;
     std::string name;
+    TransactionClass transaction_class;
   };
 
   std::uint8_t a_node() { return static_cast<std::uint8_t>(1 + dice_() % static_cast<unsigned>(rig_.nodes)); }
@@ -97,7 +102,9 @@ class Chaos {
          options(2));
   }
   void call(Request request, TransactionOptions how) {
-    calls_.push_back({.request = request, .name = std::to_string(calls_.size())});
+    calls_.push_back({.request = request,
+                      .name = std::to_string(calls_.size()),
+                      .transaction_class = how.transaction_class});
     rig_.transact(calls_.back().name, std::move(request), std::move(how));
   }
 
@@ -152,18 +159,23 @@ class Chaos {
     }
   }
   void check_calls() {
-    std::ptrdiff_t writes = 0;
-    for (const auto& [request, name] : calls_) {
+    // Those that went out, by the node and the end that they have in common: one frame serves several only
+    // if a stop is among them, which joins what waits already.
+    std::map<std::pair<std::uint8_t, TimePoint>, std::vector<TransactionClass>> writes;
+    for (const auto& [request, name, transaction_class] : calls_) {
       ASSERT_EQ(rig_.results[name].size(), 1U) << name;
       const auto& result = rig_.results[name].front();
       const bool is_write = request.function != Function::read_holding_registers;
-      if (is_write && (result || result.error().outcome != Outcome::not_sent)) ++writes;
+      if (is_write && (result || result.error().outcome != Outcome::not_sent))
+        writes[{request.node, rig_.ended_at.at(name)}].push_back(transaction_class);
       if (result && !is_write)
         expect_of(request.node, static_cast<std::uint16_t>(request.address - WatchRig::watched),
                   request.count, result->registers);
     }
-    EXPECT_EQ(std::ranges::count_if(rig_.line->wire(), &WireEntry::is_write), writes)
+    EXPECT_EQ(std::ranges::count_if(rig_.line->wire(), &WireEntry::is_write), std::ssize(writes))
         << "each goes out once, or its caller knows that it did not";
+    for (const auto& classes : writes | std::views::values)
+      EXPECT_TRUE(classes.size() == 1 || std::ranges::count(classes, TransactionClass::stop) > 0);
   }
   /// Bits 8 to 11 of the first are what a test pokes.
   static void expect_of(std::uint8_t node, std::uint16_t first, std::uint16_t count,

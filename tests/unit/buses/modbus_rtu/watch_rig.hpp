@@ -54,6 +54,7 @@ struct WatchRig {
   std::map<std::uint8_t, int> watches;      ///< begun, by node
   std::map<std::uint8_t, std::vector<WatchEnd>> ends;
   std::map<std::string, std::vector<Result<Answer>>> results;
+  std::map<std::string, TimePoint> ended_at;  ///< of what has results
   int nodes;
 
   explicit WatchRig(int node_count = 4) : nodes(node_count) {
@@ -109,6 +110,7 @@ struct WatchRig {
   void transact(std::string name, Request request, TransactionOptions options = {}) {
     auto one = [](WatchRig& rig, std::string key, Request r, TransactionOptions o) -> Task<> {
       auto result = co_await rig.bus->transact(std::move(r), std::move(o));
+      rig.ended_at[key] = rig.world.now();
       rig.results[std::move(key)].push_back(std::move(result));
     };
     spawn(world.executor(), one(*this, std::move(name), std::move(request), std::move(options)), "test");
