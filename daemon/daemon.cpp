@@ -16,6 +16,7 @@
 #include <random>
 #include <thread>
 
+#include "api/server/door_check.hpp"
 #include "api/server/lane/stop_lane.hpp"
 #include "api/server/server.hpp"
 #include "api/tls/pem_files.hpp"
@@ -91,9 +92,10 @@ void reload_at_a_signal(ConfigurationService& served) {
   });
 }
 
-/// Tells systemd that core, stop lane and workers make progress, until a signal asks for the end: which one.
+/// Tells systemd that core, stop lane and workers make progress, and that clients are answered, until a
+/// signal asks for the end: which one.
 int supervise(core::CoreLoop& loop, const core::MachineCore& machine, const server::StopLane& stop_lane,
-              ConfigurationService& served) {
+              server::DoorCheck& doors, ConfigurationService& served) {
   const auto signals = ending_signals();
   std::uint64_t interval_us = 0;
   const bool watched = sd_watchdog_enabled(0, &interval_us) > 0;
@@ -106,8 +108,12 @@ int supervise(core::CoreLoop& loop, const core::MachineCore& machine, const serv
     const auto oldest = monotonic_now() - stalled_after;
     bool alive = loop.last_progress() > oldest && stop_lane.last_progress() > oldest;
     for (const auto& bus : machine.buses()) alive = alive && bus->last_progress() > oldest;
+    doors.ask();
+    const auto silent = doors.silent_since(oldest);
     if (!alive)
       spdlog::critical("core, stop lane or a bus worker makes no progress");
+    else if (!silent.empty())
+      spdlog::critical("no answer for clients: {}", fmt::join(silent, ", "));
     else if (watched)  // nobody may read what nobody asked for, and a full socket blocks
       sd_notify(0, "WATCHDOG=1");
   }
@@ -264,7 +270,9 @@ int serve(const Options& options, const config::Configuration& configuration, co
                  *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
                  configuration.axes.size());
     sd_notify(0, "READY=1");
-    const int number = supervise(loop, machine, stop_lane, served);
+    server::DoorCheck doors([&server] { return server.connect_inside(); },
+                            [&stop_lane] { return stop_lane.connect_inside(); });
+    const int number = supervise(loop, machine, stop_lane, doors, served);
     spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");
     sd_notify(0, "STOPPING=1");
     service.close();

@@ -171,4 +171,10 @@ Result<std::vector<ListeningSocket>> listen_on(const std::string& address, bool 
   return listen_tcp(address, remote_allowed);
 }
 
+std::pair<FileDescriptor, FileDescriptor> connected_pair() {
+  int ends[2];
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends) != 0) return {};
+  return {FileDescriptor(ends[0]), FileDescriptor(ends[1])};
+}
+
 }  // namespace axisd::server

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "buses/error.hpp"
@@ -26,5 +27,8 @@ struct ListeningSocket {
 /// accepted. Another daemon on the same address is an error, never shared silently. Blocks for name
 /// resolution. Errors: invalid_argument, busy (in use), offline (the system refuses the address).
 [[nodiscard]] Result<std::vector<ListeningSocket>> listen_on(const std::string& address, bool remote_allowed);
+
+/// Two ends of one connection within the daemon; both closed: out of descriptors. Non-blocking.
+[[nodiscard]] std::pair<FileDescriptor, FileDescriptor> connected_pair();
 
 }  // namespace axisd::server

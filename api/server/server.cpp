@@ -176,6 +176,16 @@ void Server::shutdown(Duration deadline) {
   parts_->reply->stop();
 }
 
+FileDescriptor Server::connect_inside() {
+  auto [ours, theirs] = connected_pair();
+  if (ours.get() < 0) return {};
+  AcceptLoop::Acceptor::NewConnectionParameters parameters;
+  parameters.listener_fd = -1;
+  parameters.fd = theirs.release();
+  parts_->unix_acceptor->HandleNewConnection(&parameters);
+  return std::move(ours);
+}
+
 std::uint64_t Server::batches_serialised() const { return parts_->hub->batches_serialised(); }
 
 }  // namespace axisd::server

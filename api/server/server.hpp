@@ -9,6 +9,7 @@
 #include "api/server/admission.hpp"
 #include "api/server/tls.hpp"
 #include "buses/clock.hpp"
+#include "buses/file_descriptor.hpp"
 #include "devices/configuration_access.hpp"
 #include "devices/machine.hpp"
 
@@ -45,6 +46,10 @@ class Server {
   /// Turns health to NOT_SERVING, ends all streams and waiting calls with UNAVAILABLE, then stops; takes
   /// `deadline` at most. Commands are not changed by it. Idempotent.
   void shutdown(Duration deadline = std::chrono::seconds(2));
+
+  /// A connection of the daemon to itself, as from a unix socket, beyond server.limits.connections. Nothing
+  /// open (get() < 0): out of descriptors. Precondition: start() returned a port. Thread: any.
+  [[nodiscard]] FileDescriptor connect_inside();
 
   /// Batches of axis states serialised since the start. Thread: any.
   [[nodiscard]] std::uint64_t batches_serialised() const;

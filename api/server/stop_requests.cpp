@@ -83,6 +83,7 @@ void stop_group(Machine& machine, const Request& request, StopKind kind, const s
               return nothing ? to_status(shared->front().command.error()) : grpc::Status::OK;
             },
             [client, kind, shared] {
+              if (shared->empty()) return;  // the daemon asks this of itself, each second
               spdlog::info("{}: group {} of {} axes", client, kind == StopKind::halt ? "halt" : "stop",
                            shared->size());
             });

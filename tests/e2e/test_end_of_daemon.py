@@ -1,11 +1,12 @@
 """SIGTERM and SIGKILL in mid-move, starts that fail, --quiesce, and the systemd protocol."""
 import pathlib
+import re
 import signal
 import socket
 import time
 import unittest
 
-from harness import AXISD, START, STOP, Scenario, feeder, pb, run, spinner, wait_for
+from harness import AXISD, START, STOP, Scenario, feeder, frozen, pb, run, spinner, wait_for
 
 
 class Terminated(Scenario):
@@ -177,6 +178,28 @@ class Systemd(Scenario):
         self.assertNotIn("stopping what moves", daemon.log())
         machine.notify.wait_for("STOPPING=1", daemon)
         self.assertNotIn("READY=1", machine.notify.received())
+
+    def test_is_told_when_clients_get_no_answer(self):
+        """Whatever it is that answers them: the watchdog hears nothing until it goes on."""
+        machine = self.machine({"feeder": feeder()})
+        machine.start_lines()
+        daemon = machine.start_daemon({"WATCHDOG_USEC": "1000000"}, wait=False)
+        machine.notify.wait_for("WATCHDOG=1", daemon)
+        pid = daemon.process.pid
+        for thread, told in (("nexting_thread", "no answer for clients: .*main server"),
+                             ("axisd-stops", "stop lane .* makes no progress|no answer for clients: .*stop lane"),
+                             ("axisd-core", "core.* makes no progress")):
+            at = len(daemon.log())
+            with frozen(pid, thread):
+                def silent():
+                    return re.search(f" critical .*({told})", daemon.log()[at:])
+                wait_for(silent, f"{thread} is missed")
+                machine.notify.forget()
+                lines = len(daemon.log().splitlines())
+                wait_for(lambda: len(daemon.log().splitlines()) > lines + 2, "it is looked at again, and again")
+                self.assertNotIn("WATCHDOG=1", machine.notify.received())
+            machine.notify.wait_for("WATCHDOG=1", daemon)
+        self.assertEqual(daemon.terminate(), 0, daemon.log())
 
     def test_no_ready_without_the_port(self):
         machine = self.machine({"feeder": feeder()}).start()

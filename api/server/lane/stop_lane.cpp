@@ -25,7 +25,6 @@
 
 namespace axisd::server {
 
-using lane::Answer;
 using lane::Connection;
 using lane::Places;
 using lane::StopCalls;
@@ -73,6 +72,13 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
     stopping_ = true;
     eventfd_write(wake_.get(), 1);
   }
+  void join(FileDescriptor socket) {
+    {
+      const std::lock_guard lock(mutex_);
+      joining_.push_back(std::move(socket));
+    }
+    eventfd_write(wake_.get(), 1);
+  }
   [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
 
  private:
@@ -89,6 +95,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
 
   bool serve_once();
   void accept_from(const ListeningSocket& socket);
+  void let_in_from_inside();
   void enter(FileDescriptor socket, const std::string& host, bool encrypted);
   void serve(Id id);
   void begin(Id id, const lane::Http2::Call& call);
@@ -110,7 +117,8 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   std::atomic<bool> stopping_{false};
   std::atomic<TimePoint> progress_{monotonic_now()};
   std::mutex mutex_;
-  std::vector<Done> done_;  ///< under mutex_
+  std::vector<Done> done_;               ///< under mutex_
+  std::vector<FileDescriptor> joining_;  ///< under mutex_; from inside the daemon
 };
 
 void StopLane::Loop::run() {
@@ -154,6 +162,7 @@ bool StopLane::Loop::serve_once() {
     eventfd_t count = 0;
     eventfd_read(wake_.get(), &count);
   }
+  let_in_from_inside();
   answer_what_is_done();
   // Whoever is known goes before strangers, whose handshakes cost a thousand times as much as a stop.
   for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -190,6 +199,15 @@ void StopLane::Loop::accept_from(const ListeningSocket& socket) {
     }
     enter(std::move(connection), peer_host(text_of(address, size)), socket.unix_path.empty());
   }
+}
+
+void StopLane::Loop::let_in_from_inside() {
+  std::vector<FileDescriptor> joining;
+  {
+    const std::lock_guard lock(mutex_);
+    joining.swap(joining_);
+  }
+  for (auto& socket : joining) enter(std::move(socket), "daemon", false);
 }
 
 void StopLane::Loop::enter(FileDescriptor socket, const std::string& host, bool encrypted) {
@@ -319,6 +337,12 @@ void StopLane::stop() {
   if (!thread_.joinable()) return;
   loop_->stop();
   thread_.join();
+}
+
+FileDescriptor StopLane::connect_inside() {
+  auto [ours, theirs] = connected_pair();
+  if (ours.get() >= 0) loop_->join(std::move(theirs));
+  return std::move(ours);
 }
 
 TimePoint StopLane::last_progress() const { return loop_ ? loop_->last_progress() : monotonic_now(); }

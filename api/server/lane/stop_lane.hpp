@@ -9,6 +9,7 @@
 
 #include "api/server/lane/places.hpp"
 #include "api/server/tls.hpp"
+#include "buses/file_descriptor.hpp"
 #include "devices/machine.hpp"
 
 namespace axisd::server {
@@ -39,6 +40,10 @@ class StopLane {
   void serve();
   /// Answers what waits as UNAVAILABLE, then ends. Idempotent.
   void stop();
+
+  /// A connection of the daemon to itself, whose place no other client takes. Nothing open (get() < 0): out
+  /// of descriptors. Precondition: listen(). Thread: any.
+  [[nodiscard]] FileDescriptor connect_inside();
 
   /// When its thread last came round, at most every second. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;

@@ -6,6 +6,7 @@ from .case import Scenario
 from .client import (ACCEPTED, DONE, ENDED, STARTED, CallFailed, Client, axis_pb, bus_pb, command_pb, error_pb,
                      group_pb, lease_pb, pb, system_pb)
 from .demo import Demo
+from .frozen import frozen
 from .machine import Axis, Machine, feeder, spinner, turntable
 from .programs import AXISCTL, AXISD, LIMIT, ROOT, Program, run, wait_for
 from .wire import BLOCK, ENABLE, HOMING, START, STOP, crc, frame_bytes

@@ -29,6 +29,10 @@ class NotifySocket:
         return list(self._received)
 
     def forget(self):
+        """All that was sent up to now, also what has not been read yet."""
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as mark:
+            mark.sendto(b"FORGOTTEN", self.path)
+        wait_for(lambda: "FORGOTTEN" in self._received, "the messages up to now")
         self._received = []
 
     def wait_for(self, message, while_running):
