@@ -1,14 +1,17 @@
 """Stops while clients misbehave: what an honest operator waits for, and what it costs the daemon. README.md says what
 is measured.
 
-    siege_bench.py BUILD [--seconds S]
+    siege_bench.py BUILD [--seconds S] [--after S] [--only ATTACK]
 """
 import argparse
 import contextlib
+import gzip
+import itertools
 import multiprocessing
 import pathlib
 import random
 import socket
+import ssl
 import struct
 import subprocess
 import sys
@@ -21,13 +24,16 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 from client import package  # noqa: E402
 
 package.load()
-from axisd.v1 import (axis_service_pb2, axis_service_pb2_grpc, group_service_pb2, group_service_pb2_grpc,  # noqa: E402
+from axisd.v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc,  # noqa: E402
+                      group_service_pb2, group_service_pb2_grpc, lease_service_pb2, lease_service_pb2_grpc,
                       stop_service_pb2_grpc, system_service_pb2, system_service_pb2_grpc, types_pb2)
+from certificates import Certificates  # noqa: E402
 
 from figures import percentile, table  # noqa: E402
 from machine_bench import resident_mib  # noqa: E402
 
 AXES = 8
+PROCESSES = multiprocessing.get_context("spawn")  # gRPC does not survive a fork
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
 
@@ -44,59 +50,85 @@ REQUEST = b"\x83\x86" + literal(b":path", b"/axisd.v1.SystemService/GetInfo") + 
     literal(b"content-type", b"application/grpc") + literal(b"te", b"trailers")
 
 
-def connect(port):
-    return socket.create_connection(("127.0.0.1", port), 2)
+class Door:
+    """One address of the daemon, and how clients come in there."""
+
+    def __init__(self, port, certificates=None):
+        self.port, self.certificates = port, certificates
+
+    def connect(self):
+        return socket.create_connection(("127.0.0.1", self.port), 2)
+
+    def enter(self):
+        """A connection on which HTTP/2 can be spoken."""
+        peer = self.connect()
+        if self.certificates is None:
+            return peer
+        context = ssl.create_default_context(cafile=self.certificates.path("crt"))
+        context.load_cert_chain(self.certificates.path("crt", "client"), self.certificates.path("key", "client"))
+        context.set_alpn_protocols(["h2"])
+        return context.wrap_socket(peer, server_hostname="localhost")
+
+    def channel(self):
+        options = [("grpc.use_local_subchannel_pool", 1)]
+        if self.certificates is None:
+            return grpc.insecure_channel(f"127.0.0.1:{self.port}", options)
+        read = self.certificates.read
+        credentials = grpc.ssl_channel_credentials(read("crt"), read("key", "client"), read("crt", "client"))
+        return grpc.secure_channel(f"localhost:{self.port}", credentials, options)
 
 
-def flood(port, until, opening, make):
+def flood(door, until, opening, make):
     """Sends what `make` gives as fast as it is taken; connects anew whenever it is cut off."""
     while time.monotonic() < until:
-        with contextlib.suppress(OSError), connect(port) as peer:
+        with contextlib.suppress(OSError), door.enter() as peer:
             peer.settimeout(0.2)
             peer.sendall(PREFACE + frame(4, 0, 0) + opening)
             stream = 1
             while time.monotonic() < until and stream < 2**31 - 2000:
                 peer.sendall(b"".join(make(stream + 2 * i) for i in range(200)))
                 stream += 400
-                with contextlib.suppress(BlockingIOError):
-                    while peer.recv(65536, socket.MSG_DONTWAIT):
+                peer.settimeout(0)
+                with contextlib.suppress(BlockingIOError, ssl.SSLWantReadError):
+                    while peer.recv(65536):
                         pass
+                peer.settimeout(0.2)
 
 
-def rapid_reset(port, until):
-    flood(port, until, b"", lambda stream: frame(1, 4, stream, REQUEST) + frame(3, 0, stream, b"\0\0\0\x08"))
+def rapid_reset(door, until):
+    flood(door, until, b"", lambda stream: frame(1, 4, stream, REQUEST) + frame(3, 0, stream, b"\0\0\0\x08"))
 
 
-def pings(port, until):
-    flood(port, until, b"", lambda stream: frame(6, 0, 0, b"12345678"))
+def pings(door, until):
+    flood(door, until, b"", lambda stream: frame(6, 0, 0, b"12345678"))
 
 
-def settings(port, until):
-    flood(port, until, b"", lambda stream: frame(4, 0, 0))
+def settings(door, until):
+    flood(door, until, b"", lambda stream: frame(4, 0, 0))
 
 
-def continuation(port, until):
-    flood(port, until, frame(1, 0, 1, b"\x83"), lambda stream: frame(9, 0, 1, b"\x83" * 100))
+def continuation(door, until):
+    flood(door, until, frame(1, 0, 1, b"\x83"), lambda stream: frame(9, 0, 1, b"\x83" * 100))
 
 
-def half_open(port, until):
-    flood(port, until, b"", lambda stream: frame(1, 4, stream, REQUEST))
+def half_open(door, until):
+    flood(door, until, b"", lambda stream: frame(1, 4, stream, REQUEST))
 
 
-def garbage(port, until):
+def garbage(door, until):
     chance = random.Random(7)
     while time.monotonic() < until:
-        with contextlib.suppress(OSError), connect(port) as peer:
+        with contextlib.suppress(OSError), door.connect() as peer:
             peer.sendall(chance.randbytes(4096))
 
 
-def silent(port, until):
-    """Up to 2000 connections at a time that say nothing."""
+def silent(door, until):
+    """Connections that say nothing, one after the other, as many as one process may have."""
     crowd = []
     while time.monotonic() < until:
         with contextlib.suppress(OSError):
-            crowd.append(connect(port))
-        if len(crowd) > 2000:
+            crowd.append(door.connect())
+        if len(crowd) > 5000:
             for peer in crowd:
                 peer.close()
             crowd = []
@@ -104,35 +136,96 @@ def silent(port, until):
         peer.close()
 
 
-def calls(port, until, stub, method, request):
-    with grpc.insecure_channel(f"127.0.0.1:{port}", [("grpc.use_local_subchannel_pool", 1)]) as channel:
+def slow_prefaces(door, until):
+    """500 connections that send a byte of the preface each second."""
+    crowd, sent = [], 0
+    while time.monotonic() < until:
+        while len(crowd) < 500 and time.monotonic() < until:
+            with contextlib.suppress(OSError):
+                crowd.append(door.connect())
+        for peer in list(crowd):
+            try:
+                peer.sendall(PREFACE[sent:sent + 1])
+            except OSError:
+                peer.close()
+                crowd.remove(peer)
+        sent = (sent + 1) % len(PREFACE)
+        time.sleep(1)
+    for peer in crowd:
+        peer.close()
+
+
+def calls(door, until, stub, method, requests):
+    with door.channel() as channel:
         ask = getattr(stub(channel), method)
         waiting = []
         while time.monotonic() < until:
-            waiting.append(ask.future(request, timeout=10))
+            waiting.append(ask.future(next(requests), timeout=10))
             if len(waiting) >= 32:
                 with contextlib.suppress(grpc.RpcError, grpc.FutureTimeoutError):
                     waiting.pop(0).result(timeout=max(0.1, until - time.monotonic()))
 
 
-def unknown_names(port, until):
+def compressed(door, until):
+    """Messages of 200 KB that unpack to 200 MB."""
+    bomb = gzip.compress(bytes(200_000_000))
+    headers = REQUEST + literal(b"grpc-encoding", b"gzip")
+    body = b"\x01" + struct.pack(">I", len(bomb)) + bomb
+    while time.monotonic() < until:
+        with contextlib.suppress(OSError), door.enter() as peer:
+            peer.settimeout(2)
+            peer.sendall(PREFACE + frame(4, 0, 0))
+            for stream in range(1, 200, 2):
+                peer.sendall(frame(1, 4, stream, headers))
+                for at in range(0, len(body), 16384):
+                    peer.sendall(frame(0, at + 16384 >= len(body), stream, body[at:at + 16384]))
+                    if at % 65536 == 0:
+                        peer.recv(65536)
+
+
+def leases(door, until):
+    """Who comes and takes a lease, and comes again."""
+    axes = itertools.cycle(f"axis-{n + 1}" for n in range(AXES))
+    requests = (lease_service_pb2.AcquireLeaseRequest(axes=[axis], ttl={"seconds": 1}) for axis in axes)
+    calls(door, until, lease_service_pb2_grpc.LeaseServiceStub, "AcquireLease", requests)
+
+
+def unknown_names(door, until):
     request = group_service_pb2.GroupStopRequest(axes=[f"x{n}" for n in range(30_000)])
-    calls(port, until, group_service_pb2_grpc.GroupServiceStub, "GroupStop", request)
+    calls(door, until, group_service_pb2_grpc.GroupServiceStub, "GroupStop", itertools.repeat(request))
 
 
-def configurations(port, until):
+def configurations(door, until):
     request = system_service_pb2.CheckConfigRequest(yaml="a: [" + "1, " * 60_000 + "1]")
-    calls(port, until, system_service_pb2_grpc.SystemServiceStub, "CheckConfig", request)
+    calls(door, until, system_service_pb2_grpc.SystemServiceStub, "CheckConfig", itertools.repeat(request))
 
 
-ATTACKS = {"nobody": [], "silent connections": [silent], "garbage": [garbage], "PING flood": [pings],
-           "SETTINGS flood": [settings], "CONTINUATION flood": [continuation], "half-open streams": [half_open],
-           "rapid reset": [rapid_reset], "30,000 unknown names": [unknown_names], "CheckConfig of 180 KB": [configurations]}
+class Attack:
+    """What two processes do at the main address, and, if they can there, at the stop lane; over TLS or without."""
+
+    def __init__(self, do, at_lane=True, tls=False):
+        self.do, self.at_lane, self.tls = do, at_lane, tls
 
 
-def configuration(directory, port):
+ATTACKS = {
+    "nobody": Attack(None, at_lane=False), "nobody, TLS": Attack(None, at_lane=False, tls=True),
+    "silent connections": Attack(silent), "silent connections, TLS": Attack(silent, tls=True),
+    "slow prefaces": Attack(slow_prefaces),
+    "garbage": Attack(garbage), "garbage, TLS": Attack(garbage, tls=True), "PING flood": Attack(pings),
+    "SETTINGS flood": Attack(settings), "CONTINUATION flood": Attack(continuation), "half-open streams": Attack(half_open),
+    "rapid reset": Attack(rapid_reset), "rapid reset, TLS": Attack(rapid_reset, tls=True),
+    "compressed messages": Attack(compressed), "leases": Attack(leases, at_lane=False),
+    "30,000 unknown names": Attack(unknown_names, at_lane=False),
+    "CheckConfig of 180 KB": Attack(configurations, at_lane=False)}
+
+
+def configuration(directory, port, certificates):
     path = pathlib.Path(directory) / "siege.yaml"
-    text = f"machine: siege\nstate_directory: {directory}/state\nserver: {{ listen: 'localhost:{port}' }}\nbuses:\n" \
+    tls = ""
+    if certificates is not None:
+        tls = f", tls: {{ certificate: {certificates.path('crt', 'server')}, key: {certificates.path('key', 'server')}, " \
+            f"client_ca: {certificates.path('crt')} }}"
+    text = f"machine: siege\nstate_directory: {directory}/state\nserver: {{ listen: 'localhost:{port}'{tls} }}\nbuses:\n" \
         "  line: { modbus_rtu: { port: sim, baud: 115200, turnaround_max: 200 ms } }\naxes:\n"
     for node in range(1, AXES + 1):
         text += f"  axis-{node}: {{ bus: line, node: {node}, model: ykd2405pr, unit: rev, reboot_guard: 950 ms, " \
@@ -152,30 +245,42 @@ def two_free_ports():
                 return port
 
 
-def honest(port, until):
-    """Stops one axis after the other, 20 times a second, each on a connection of its own now and then. ms of each call;
-    None: it was not answered within 10 s."""
+def honest(door, until, ask, per_second):
+    """Asks `per_second` times a second, each on a connection of its own now and then. ms of each call; None: it was not
+    answered within 10 s."""
     took = []
     channel = None
     while time.monotonic() < until:
         if channel is None or len(took) % 10 == 0:
             if channel is not None:
                 channel.close()
-            channel = grpc.insecure_channel(f"127.0.0.1:{port}", [("grpc.use_local_subchannel_pool", 1)])
-            stub = stop_service_pb2_grpc.StopServiceStub(channel)
+            channel = door.channel()
         begin = time.monotonic()
         try:
-            stub.Halt(axis_service_pb2.HaltRequest(axis=f"axis-{len(took) % AXES + 1}"), timeout=10)
+            ask(channel, len(took))
             took.append((time.monotonic() - begin) * 1e3)
         except grpc.RpcError:
             took.append(None)
-        time.sleep(0.05)
+        time.sleep(1 / per_second)
     channel.close()
     return took
 
 
-def start_axes(port):
-    with grpc.insecure_channel(f"127.0.0.1:{port}", [("grpc.use_local_subchannel_pool", 1)]) as channel:
+def halt(channel, number):
+    request = axis_service_pb2.HaltRequest(axis=f"axis-{number % AXES + 1}")
+    stop_service_pb2_grpc.StopServiceStub(channel).Halt(request, timeout=10)
+
+
+def get_info(channel, _number):
+    system_service_pb2_grpc.SystemServiceStub(channel).GetInfo(system_service_pb2.GetInfoRequest(), timeout=10)
+
+
+def reader(door, until, results):
+    results.put(honest(door, until, get_info, 5))
+
+
+def start_axes(door):
+    with door.channel() as channel:
         axes = axis_service_pb2_grpc.AxisServiceStub(channel)
         for node in range(1, AXES + 1):
             for attempt in range(100):
@@ -191,48 +296,89 @@ def start_axes(port):
                 sys.exit("siege_bench.py: the axes did not start")
 
 
-def besiege(build, name, attacks, lane, seconds):
+def transactions(door):
+    """On the line since the start; None: nobody answers."""
+    with door.channel() as channel, contextlib.suppress(grpc.RpcError):
+        buses = bus_service_pb2_grpc.BusServiceStub(channel).ListBuses(bus_service_pb2.ListBusesRequest(), timeout=10)
+        return time.monotonic(), buses.buses[0].transactions
+    return None
+
+
+def rate(first, last):
+    return (last[1] - first[1]) / (last[0] - first[0]) if first and last else float("nan")
+
+
+def times(took):
+    """Lost, 99 %, longest."""
+    answered = [each for each in took if each is not None] or [float("nan")]
+    return [str(took.count(None)), f"{percentile(answered, 0.99):.1f}", f"{max(answered):.1f}"]
+
+
+def siege(given, process, attack, main, stops, lane):
+    """From the start of the axes to the end of the daemon: one row's figures."""
+    start_axes(main)
+    before = resident_mib(process.pid)
+    begun = transactions(main)
+    until = time.monotonic() + given.seconds
+    besiegers = [PROCESSES.Process(target=attack.do, args=(stops if lane else main, until), daemon=True)
+                 for _ in range(2 if attack.do else 0)]
+    results = PROCESSES.Queue()
+    besiegers.append(PROCESSES.Process(target=reader, args=(main, until, results), daemon=True))
+    for each in besiegers:
+        each.start()
+    took = honest(stops, until, halt, 20)
+    under = resident_mib(process.pid)
+    read = results.get(timeout=60)
+    for each in besiegers:
+        each.join(15)
+        each.kill()
+    ended = transactions(main)
+    time.sleep(given.after)
+    after = resident_mib(process.pid)
+    begin = time.monotonic()
+    process.terminate()
+    process.wait(60)
+    ending = time.monotonic() - begin
+    return [*times(took), *times(read), f"{rate(begun, ended):.0f}", f"{before:.0f}", f"{under:.0f}", f"{after:.0f}",
+            f"{ending:.1f}"]
+
+
+def besiege(given, name, attack, lane):
     with tempfile.TemporaryDirectory() as directory:
+        certificates = None
+        if attack.tls:
+            certificates = Certificates(directory, "authority")
+            for each in ("server", "client"):
+                certificates.issue(each)
         port = two_free_ports()
-        with subprocess.Popen([f"{build}/daemon/axisd", "--config", str(configuration(directory, port))],
-                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-            start_axes(port)
-            before = resident_mib(process.pid)
-            until = time.monotonic() + seconds
-            besiegers = [multiprocessing.Process(target=attack, args=(port + lane, until), daemon=True)
-                         for attack in attacks for _ in range(2)]
-            for each in besiegers:
-                each.start()
-            took = honest(port + 1, until)
-            after = resident_mib(process.pid)
-            for each in besiegers:
-                each.join(15)
-                each.kill()
-            begin = time.monotonic()
-            process.terminate()
-            process.wait(60)
-            ended = time.monotonic() - begin
-        answered = [each for each in took if each is not None]
-        return [name, str(len(took)), str(len(took) - len(answered)), f"{percentile(answered, 0.5):.1f}",
-                f"{percentile(answered, 0.99):.1f}", f"{max(answered):.1f}", f"{before:.0f}", f"{after:.0f}",
-                f"{ended:.1f}"]
+        log = pathlib.Path(directory) / "log"
+        words = [f"{given.build}/daemon/axisd", "--config", str(configuration(directory, port, certificates))]
+        with log.open("wb") as err, subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=err) as process:
+            try:
+                row = siege(given, process, attack, Door(port, certificates), Door(port + 1, certificates), lane)
+            finally:
+                process.kill()
+        unanswered = log.read_text(encoding="utf-8", errors="replace").count("no answer for clients")
+        return [name, *row, str(unanswered)]
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("build")
-    parser.add_argument("--seconds", type=float, default=20)
+    parser.add_argument("--seconds", type=float, default=60)
+    parser.add_argument("--after", type=float, default=60, help="until memory is looked at once more")
     parser.add_argument("--only", choices=ATTACKS, action="append", help="may be given several times")
     given = parser.parse_args()
-    rows = [["attack", "stops", "lost", "median, ms", "99 %, ms", "longest, ms", "MiB before", "under siege",
-             "SIGTERM, s"]]
-    for name, attacks in ATTACKS.items():
+    rows = [["attack", "stops lost", "99 %, ms", "longest", "reads lost", "99 %", "longest", "polls/s", "MiB before",
+             "under siege", "after", "SIGTERM, s", "alarms"]]
+    for name, attack in ATTACKS.items():
         if given.only and name not in given.only:
             continue
-        for lane in (0, 1) if attacks and attacks[0] not in (unknown_names, configurations) else (0,):
-            at = f"{name}, at the stop lane" if lane else name
-            rows.append(besiege(given.build, at, attacks, lane, given.seconds))
-    print(f"\nHalt at the stop lane by an honest client while two others misbehave for {given.seconds:g} s; {AXES} axes turn")
+        for lane in (False, True) if attack.at_lane else (False,):
+            rows.append(besiege(given, f"{name}, at the stop lane" if lane else name, attack, lane))
+            print("  ".join(rows[-1]), flush=True)
+    print(f"\nHalt at the stop lane and GetInfo at the main address by honest clients while two others misbehave for "
+          f"{given.seconds:g} s; {AXES} axes turn")
     table(rows)
 
 
