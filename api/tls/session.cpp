@@ -81,7 +81,7 @@ Result<std::shared_ptr<const Acceptor>> Acceptor::make(const Files& contents) {
   const auto authorities = certificates("server.tls.client_ca", contents.client_ca);
   if (!authorities) return fail(authorities.error());
 
-  const std::shared_ptr<Acceptor> acceptor(new Acceptor);
+  std::shared_ptr<Acceptor> acceptor(new Acceptor);
   acceptor->context_.reset(SSL_CTX_new(TLS_server_method()));
   auto* context = acceptor->context_.get();
   if (context == nullptr) return refused("no memory");

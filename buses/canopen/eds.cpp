@@ -164,7 +164,7 @@ class Reader {
     if (auto entry = parse_entry(object, name, section, type)) add(std::move(*entry), section.line);
   }
 
-  void add(EdsObject entry, int line) {
+  void add(EdsObject&& entry, int line) {
     if (eds_.objects.size() >= eds_object_limit) {
       problem(line, fmt::format("more than {} objects", eds_object_limit));
       return;
