@@ -19,7 +19,8 @@
 namespace axisd::server {
 namespace {
 
-constexpr int backlog = 128;
+/// As many as the system allows: who finds it full is not told to wait, at a unix socket.
+constexpr int backlog = SOMAXCONN;
 
 std::unexpected<Error> system_error(const std::string& address, std::string_view what) {
   const auto code = errno;

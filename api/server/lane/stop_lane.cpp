@@ -35,7 +35,7 @@ constexpr Duration longest_sleep = std::chrono::seconds(1);
 /// Until it is tried again to let somebody in, when the system has no descriptors.
 constexpr Duration when_full = std::chrono::milliseconds(100);
 /// Accepted at once, before those who are there are served again.
-constexpr int most_accepted = 8;
+constexpr int most_accepted = 32;
 
 /// As gRPC writes it, for peer_host().
 std::string text_of(const sockaddr_storage& address, socklen_t size) {
