@@ -266,12 +266,13 @@ int serve(const Options& options, const config::Configuration& configuration, co
     wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },
                std::chrono::seconds(1));
     served.keep_copy();
+    server::DoorCheck doors([&server] { return server.connect_inside(); },
+                            [&stop_lane] { return stop_lane.connect_inside(); });
+    doors.ask();  // its connections are there before anybody else's
     spdlog::info("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration.machine,
                  *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
                  configuration.axes.size());
     sd_notify(0, "READY=1");
-    server::DoorCheck doors([&server] { return server.connect_inside(); },
-                            [&stop_lane] { return stop_lane.connect_inside(); });
     const int number = supervise(loop, machine, stop_lane, doors, served);
     spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");
     sd_notify(0, "STOPPING=1");

@@ -59,8 +59,8 @@ TEST_F(DoorCheck, TellsThatTheCoreDoesNotAnswer) {
   const auto begun = monotonic_now();
   check_->ask();
   EXPECT_TRUE(eventually([&] { return silent() == std::vector<std::string>{"stop lane"}; }));
-  check_->ask();
-  EXPECT_THAT(silent(), ElementsAre("stop lane")) << "one question is on its way at a time";
+  check_->ask();  // one question is on its way at a time
+  EXPECT_TRUE(eventually([&] { return silent() == std::vector<std::string>{"stop lane"}; }));
   EXPECT_THAT(check_->silent_since(begun), IsEmpty()) << "it was asked later";
   machine_.let_go();
   EXPECT_TRUE(eventually([&] { return silent().empty(); }));
