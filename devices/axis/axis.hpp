@@ -444,7 +444,8 @@ class Axis {
   ObservedTimes observed_;
   std::optional<Error> bus_loss_;  ///< not yet acted upon
   bool stop_owed_ = false;         ///< M4: to a silent node, until standstill is confirmed
-  bool left_running_ = false;      ///< a command has ended, and what it began may go on
+  std::uint64_t failed_stops_ = 0;
+  bool left_running_ = false;  ///< a command has ended, and what it began may go on
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed

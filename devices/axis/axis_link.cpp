@@ -77,9 +77,15 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
     const auto stopped = co_await (again ? drive_->repeat_stop() : drive_->stop(StopKind::stop));
     if (!stopped) co_return stopped;
   }
+  auto failed_stops = failed_stops_;
   auto identity = co_await drive_->identify(contact);
   if (!identity) co_return fail(identity.error());
   if (closing_) co_return fail(ending());
+  if (std::exchange(failed_stops, failed_stops_) != failed_stops_) {
+    // That one has failed while the drive was looked for, and was not sent by what is above.
+    if (const auto stopped = co_await drive_->stop(StopKind::stop); !stopped) co_return stopped;
+    if (closing_) co_return fail(ending());
+  }
   if (link_ != LinkState::configuring) {
     link_ = LinkState::configuring;
     link_error_.reset();
@@ -89,6 +95,9 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
+  if (failed_stops != failed_stops_)
+    co_return fail(error(Reason::no_reply, "a stop has failed while the drive was being read",
+                         "it is sent as soon as the drive answers"));
   if (const auto settled = co_await settle_found_motion(); !settled) co_return settled;
   if (closing_) co_return fail(ending());
   co_return co_await prove_or_configure();

@@ -88,6 +88,7 @@ Task<> Axis::run_stop() {
   } else {
     observed_.stop_failed();
     stop_owed_ = true;
+    ++failed_stops_;
     if (!fault_) fault_ = confirmed.error();
     spdlog::error("{}", to_string(confirmed.error()));
     for (const auto& command : commands) {

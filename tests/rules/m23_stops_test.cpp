@@ -169,6 +169,21 @@ TEST(M04, ANodeStoppedByNmtGetsItsStop) {
   EXPECT_FALSE(rig.drive->shaft_moving());
 }
 
+TEST(M04, AStopThatFailsWhileTheDriveIsBeingConnectedIsSentBeforeItIsOnline) {
+  for (auto phase = 0ms; phase < 1s; phase += 25ms) {
+    CanRig rig({.limits = false, .connect = false});
+    make_mute(rig);
+    rig.run(1s + phase);
+    const auto stop = rig.submit(StopRequest{.kind = StopKind::stop});
+    ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 5s));
+    EXPECT_NE(stop->value().state, CommandState::done);
+    rig.frames.clear();
+    rig.network.set_fault({});
+    rig.reconnect();
+    EXPECT_GT(halts(rig), 0) << phase.count() << " ms";
+  }
+}
+
 TEST(M23, ALostReplyAfterTheEndOfAHaltLeavesTheDriveWatched) {
   // Each reply of the chain in turn.
   for (int lost = 1; lost <= 40; lost += 3) {
