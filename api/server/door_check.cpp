@@ -4,8 +4,11 @@
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
+#include <mutex>
 #include <utility>
+#include <vector>
 
 #include "axisd/v1/stop_service.grpc.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
@@ -15,9 +18,13 @@ namespace {
 
 using ChannelPtr = std::shared_ptr<grpc::Channel>;
 using Answered = std::function<void(const grpc::Status&)>;
+/// Keeps all of a question, by its context.
+using QuestionPtr = std::shared_ptr<grpc::ClientContext>;
 
 /// Beyond this a question is given up and asked anew, so that one lost answer is not the last.
 constexpr auto patience = std::chrono::seconds(10);
+/// Until a question that is cancelled has ended.
+constexpr auto farewell = std::chrono::seconds(1);
 
 /// What lives until its answer is there.
 template <class Service, class Request, class Response>
@@ -31,20 +38,20 @@ struct Question {
   Response response;
 };
 
-void ask_main(const ChannelPtr& channel, Answered answered) {
+QuestionPtr ask_main(const ChannelPtr& channel, Answered answered) {
   const auto question =
       std::make_shared<Question<v1::SystemService, v1::GetInfoRequest, v1::GetInfoResponse>>(channel);
-  question->stub->async()->GetInfo(
-      &question->context, &question->request, &question->response,
-      [question, answered = std::move(answered)](const grpc::Status& status) { answered(status); });
+  question->stub->async()->GetInfo(&question->context, &question->request, &question->response,
+                                   std::move(answered));
+  return {question, &question->context};
 }
 
-void ask_lane(const ChannelPtr& channel, Answered answered) {
+QuestionPtr ask_lane(const ChannelPtr& channel, Answered answered) {
   const auto question =
       std::make_shared<Question<v1::StopService, v1::GroupStopRequest, v1::GroupStopResponse>>(channel);
-  question->stub->async()->GroupStop(
-      &question->context, &question->request, &question->response,
-      [question, answered = std::move(answered)](const grpc::Status& status) { answered(status); });
+  question->stub->async()->GroupStop(&question->context, &question->request, &question->response,
+                                     std::move(answered));
+  return {question, &question->context};
 }
 
 /// Nobody was there, or not in time.
@@ -56,26 +63,42 @@ bool is_silence(const grpc::Status& status) {
 
 }  // namespace
 
+// Questions and channels end on the thread that asks: with the last channel gRPC joins its threads, and it
+// does not survive that on one of them.
 class DoorCheck::Door : public std::enable_shared_from_this<Door> {
  public:
-  using Ask = void (*)(const ChannelPtr& channel, Answered answered);
+  using Ask = QuestionPtr (*)(const ChannelPtr& channel, Answered answered);
 
   Door(std::string name, Connect connect, Ask ask)
       : name_(std::move(name)), connect_(std::move(connect)), ask_(ask) {}
 
   void ask() {
-    if (state_ == State::asked) return;
+    const auto before = state();
+    if (before == State::asked) return;
     if (owes_since_.load() == TimePoint::max()) owes_since_ = monotonic_now();
-    if (state_ == State::unconnected) {
+    question_.reset();
+    if (before == State::unconnected) {
       auto socket = connect_();
       if (socket.get() < 0) return;  // out of descriptors: tried again with the next question
       channel_ = grpc::CreateInsecureChannelFromFd("axisd", socket.release());
     }
-    state_ = State::asked;
-    ask_(channel_, [self = shared_from_this()](const grpc::Status& status) {
+    become(State::asked);
+    question_ = ask_(channel_, [self = shared_from_this()](const grpc::Status& status) {
       if (!is_silence(status)) self->owes_since_ = TimePoint::max();
-      self->state_ = is_silence(status) ? State::unconnected : State::connected;
+      self->become(is_silence(status) ? State::unconnected : State::connected);
     });
+  }
+  /// Asks no more. A question that does not even end when it is cancelled is left to itself, with its
+  /// channel.
+  void end() {
+    if (question_) question_->TryCancel();
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, farewell, [this] { return state_ != State::asked; })) {
+      static auto& left = *new std::vector<std::pair<QuestionPtr, ChannelPtr>>;  // outlives the process's end
+      left.emplace_back(std::move(question_), std::move(channel_));
+    }
+    question_.reset();
+    channel_.reset();
   }
   [[nodiscard]] TimePoint owes_since() const { return owes_since_; }
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -83,11 +106,24 @@ class DoorCheck::Door : public std::enable_shared_from_this<Door> {
  private:
   enum class State : std::uint8_t { unconnected, connected, asked };
 
+  [[nodiscard]] State state() {
+    const std::lock_guard lock(mutex_);
+    return state_;
+  }
+  void become(State state) {
+    const std::lock_guard lock(mutex_);
+    state_ = state;
+    changed_.notify_all();
+  }
+
   const std::string name_;
   const Connect connect_;
   const Ask ask_;
   ChannelPtr channel_;
-  std::atomic<State> state_{State::unconnected};  ///< `asked` ends on a thread of gRPC's
+  QuestionPtr question_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  State state_ = State::unconnected;  ///< under mutex_; `asked` ends on a thread of gRPC's
   std::atomic<TimePoint> owes_since_{TimePoint::max()};
 };
 
@@ -95,7 +131,9 @@ DoorCheck::DoorCheck(Connect main_server, Connect stop_lane)
     : doors_{std::make_shared<Door>("stop lane", std::move(stop_lane), &ask_lane),
              std::make_shared<Door>("main server", std::move(main_server), &ask_main)} {}
 
-DoorCheck::~DoorCheck() = default;
+DoorCheck::~DoorCheck() {
+  for (const auto& door : doors_) door->end();
+}
 
 void DoorCheck::ask() {
   for (const auto& door : doors_) door->ask();

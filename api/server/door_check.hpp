@@ -20,6 +20,7 @@ class DoorCheck {
   using Connect = std::function<FileDescriptor()>;
 
   DoorCheck(Connect main_server, Connect stop_lane);
+  /// Waits a moment for questions that are on their way, which are cancelled.
   ~DoorCheck();
   DoorCheck(const DoorCheck&) = delete;
 
