@@ -442,10 +442,10 @@ class Axis {
   /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
   std::optional<TimePoint> release_owed_;
   ObservedTimes observed_;
-  std::optional<Error> bus_loss_;  ///< not yet acted upon
-  bool stop_owed_ = false;         ///< M4: to a silent node, until standstill is confirmed
-  std::uint64_t failed_stops_ = 0;
-  bool left_running_ = false;  ///< a command has ended, and what it began may go on
+  std::optional<Error> bus_loss_;   ///< not yet acted upon
+  bool stop_owed_ = false;          ///< M4: to a silent node, until standstill is confirmed
+  std::uint64_t failed_stops_ = 0;  ///< tells whether one has failed meanwhile
+  bool left_running_ = false;       ///< a command has ended, and what it began may go on
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed

@@ -32,9 +32,11 @@ Task<> Axis::connect() {
     while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
     if (closing_) co_return;
     // The bus sees to it that repeated silence does not cost the neighbours much.
+    const auto failed_stops = failed_stops_;
     const auto connected = co_await try_connect(TransactionClass::idle_state, std::exchange(again, true));
     if (closing_) co_return;
-    if (connected && !configured_) continue;  // it was told to begin again meanwhile
+    if (!connected && failed_stops != failed_stops_) continue;  // with that stop, at once
+    if (connected && !configured_) continue;                    // it was told to begin again meanwhile
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
@@ -72,20 +74,21 @@ Task<> Axis::wait_for_port() {
 }
 
 Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
+  // A stop that fails from here on is not the one that is sent here: this attempt is given up for it.
+  const auto failed_stops = failed_stops_;
+  const auto stop_failed = [&]() -> Result<void> {
+    if (failed_stops == failed_stops_) return {};
+    return fail(error(Reason::no_reply, "a stop failed while the drive was being connected",
+                      "it is sent before anything else"));
+  };
   if (stop_owed_) {
     // Whatever the drive is doing now, the first frame it gets is a stop (M4).
     const auto stopped = co_await (again ? drive_->repeat_stop() : drive_->stop(StopKind::stop));
     if (!stopped) co_return stopped;
   }
-  auto failed_stops = failed_stops_;
   auto identity = co_await drive_->identify(contact);
   if (!identity) co_return fail(identity.error());
   if (closing_) co_return fail(ending());
-  if (std::exchange(failed_stops, failed_stops_) != failed_stops_) {
-    // That one has failed while the drive was looked for, and was not sent by what is above.
-    if (const auto stopped = co_await drive_->stop(StopKind::stop); !stopped) co_return stopped;
-    if (closing_) co_return fail(ending());
-  }
   if (link_ != LinkState::configuring) {
     link_ = LinkState::configuring;
     link_error_.reset();
@@ -95,12 +98,11 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
-  if (failed_stops != failed_stops_)
-    co_return fail(error(Reason::no_reply, "a stop has failed while the drive was being read",
-                         "it is sent as soon as the drive answers"));
+  if (auto failed = stop_failed(); !failed) co_return failed;
   if (const auto settled = co_await settle_found_motion(); !settled) co_return settled;
   if (closing_) co_return fail(ending());
-  co_return co_await prove_or_configure();
+  if (const auto ready = co_await prove_or_configure(); !ready) co_return ready;
+  co_return stop_failed();
 }
 
 /// Within homing the motor rests between its phases, and goes on.

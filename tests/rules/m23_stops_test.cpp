@@ -184,6 +184,28 @@ TEST(M04, AStopThatFailsWhileTheDriveIsBeingConnectedIsSentBeforeItIsOnline) {
   }
 }
 
+TEST(M04, SoIsOneThatFailsWhileAllElseIsAnswered) {
+  int failed = 0;
+  for (auto phase = 0ms; phase < 120ms; phase += 3ms) {
+    CanRig rig({.limits = false, .connect = false});
+    rig.run(phase);
+    rig.network.set_fault([](const can::Frame& frame) {
+      const bool of_control_word = frame.data[1] == 0x40 && frame.data[2] == 0x60;
+      return can::Network::Fault{.drop = frame.id == 0x580U + CanRig::node_id && of_control_word};
+    });
+    const auto stop = rig.submit(StopRequest{.kind = StopKind::stop});
+    ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 5s));
+    rig.frames.clear();
+    rig.network.set_fault({});
+    if (stop->value().state == CommandState::done) continue;  // it came by PDO
+    ++failed;
+    rig.reconnect();
+    rig.run(100ms);
+    EXPECT_GT(halts(rig), 0) << phase.count() << " ms";
+  }
+  EXPECT_GT(failed, 0);
+}
+
 TEST(M23, ALostReplyAfterTheEndOfAHaltLeavesTheDriveWatched) {
   // Each reply of the chain in turn.
   for (int lost = 1; lost <= 40; lost += 3) {
