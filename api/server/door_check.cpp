@@ -38,20 +38,24 @@ struct Question {
   Response response;
 };
 
-QuestionPtr ask_main(const ChannelPtr& channel, Answered answered) {
-  const auto question =
-      std::make_shared<Question<v1::SystemService, v1::GetInfoRequest, v1::GetInfoResponse>>(channel);
-  question->stub->async()->GetInfo(&question->context, &question->request, &question->response,
-                                   std::move(answered));
+/// `call` calls the method.
+template <class Service, class Request, class Response>
+QuestionPtr ask(const ChannelPtr& channel, Answered answered, auto call) {
+  const auto question = std::make_shared<Question<Service, Request, Response>>(channel);
+  call(*question->stub->async(), &question->context, &question->request, &question->response,
+       std::move(answered));
   return {question, &question->context};
 }
 
+QuestionPtr ask_main(const ChannelPtr& channel, Answered answered) {
+  return ask<v1::SystemService, v1::GetInfoRequest, v1::GetInfoResponse>(
+      channel, std::move(answered), [](auto& service, auto... rest) { service.GetInfo(std::move(rest)...); });
+}
+
 QuestionPtr ask_lane(const ChannelPtr& channel, Answered answered) {
-  const auto question =
-      std::make_shared<Question<v1::StopService, v1::GroupStopRequest, v1::GroupStopResponse>>(channel);
-  question->stub->async()->GroupStop(&question->context, &question->request, &question->response,
-                                     std::move(answered));
-  return {question, &question->context};
+  return ask<v1::StopService, v1::GroupStopRequest, v1::GroupStopResponse>(
+      channel, std::move(answered),
+      [](auto& service, auto... rest) { service.GroupStop(std::move(rest)...); });
 }
 
 /// Nobody was there, or not in time.

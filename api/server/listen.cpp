@@ -19,7 +19,7 @@
 namespace axisd::server {
 namespace {
 
-/// As many as the system allows: who finds it full is not told to wait, at a unix socket.
+/// As many as the system allows: a unix socket whose backlog is full refuses at once.
 constexpr int backlog = SOMAXCONN;
 
 std::unexpected<Error> system_error(const std::string& address, std::string_view what) {

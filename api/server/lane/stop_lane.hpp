@@ -41,8 +41,8 @@ class StopLane {
   /// Answers what waits as UNAVAILABLE, then ends. Idempotent.
   void stop();
 
-  /// A connection of the daemon to itself, whose place no other client takes. Nothing open (get() < 0): out
-  /// of descriptors. Precondition: listen(). Thread: any.
+  /// A connection of the daemon to itself, which has the place of a client of its own. Nothing open
+  /// (get() < 0): out of descriptors. Precondition: listen(). Thread: any.
   [[nodiscard]] FileDescriptor connect_inside();
 
   /// When its thread last came round, at most every second. Thread: any.
