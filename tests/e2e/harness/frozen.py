@@ -23,12 +23,10 @@ def frozen(pid, name):
     threads = [int(task.name) for task in pathlib.Path(f"/proc/{pid}/task").iterdir()
                if (task / "comm").read_text().strip() == name]
     assert threads, f"{name}: no such thread"
-    for thread in threads:
-        _ptrace(PTRACE_SEIZE, thread)
-        _ptrace(PTRACE_INTERRUPT, thread)
-        os.waitpid(thread, WALL)
-    try:
-        yield
-    finally:
+    with contextlib.ExitStack() as thawing:
         for thread in threads:
-            _ptrace(PTRACE_DETACH, thread)
+            _ptrace(PTRACE_SEIZE, thread)
+            thawing.callback(_ptrace, PTRACE_DETACH, thread)
+            _ptrace(PTRACE_INTERRUPT, thread)
+            os.waitpid(thread, WALL)
+        yield

@@ -22,7 +22,7 @@ class NotifySocket:
             message = self._socket.recv(4096)
             if not message:
                 return
-            self._received += message.decode().splitlines()
+            self._received.extend(message.decode().splitlines())
 
     def received(self):
         """All messages so far."""
@@ -33,7 +33,7 @@ class NotifySocket:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as mark:
             mark.sendto(b"FORGOTTEN", self.path)
         wait_for(lambda: "FORGOTTEN" in self._received, "the messages up to now")
-        self._received = []
+        self._received.clear()
 
     def wait_for(self, message, while_running):
         """Until the message has come; an error once the program has ended without it."""
