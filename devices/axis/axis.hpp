@@ -152,6 +152,8 @@ class Axis {
   Task<Result<void>> try_connect(TransactionClass contact, bool again);
   Task<Result<void>> settle_found_motion();
   [[nodiscard]] bool found_in_motion() const;
+  [[nodiscard]] bool may_have_been_stopped_abruptly() const;
+  void note_unseen_ends();
   [[nodiscard]] bool found_by_terminal() const;
   Task<Result<void>> prove_or_configure();
   Task<> wait_for_port();
@@ -336,6 +338,7 @@ class Axis {
   [[nodiscard]] bool shows(const Plan& plan, std::int64_t base) const;
   [[nodiscard]] bool held_back(const Plan& plan) const;
   Task<bool> is_no_reboot(ActivityPtr activity);
+  Task<bool> still_there(ActivityPtr activity);
   Task<bool> proven_continuous(ActivityPtr activity);
   /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
   /// itself takes for in position.
@@ -445,7 +448,9 @@ class Axis {
   std::optional<Error> bus_loss_;   ///< not yet acted upon
   bool stop_owed_ = false;          ///< M4: to a silent node, until standstill is confirmed
   std::uint64_t failed_stops_ = 0;  ///< tells whether one has failed meanwhile
-  bool left_running_ = false;       ///< a command has ended, and what it began may go on
+  /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
+  std::optional<std::vector<std::int64_t>> unseen_ends_;
+  bool left_running_ = false;  ///< a command has ended, and what it began may go on
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed

@@ -56,6 +56,7 @@ Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since
     *arrived = sample_->measured_at;
   }
   if (!co_await is_no_reboot(activity)) co_return;
+  if (there && !co_await still_there(activity)) co_return;
   tracker_.reached(*activity->plan.target, drive_->position_window());
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });

@@ -190,7 +190,8 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     if (!co_await started(activity, std::move(result), base, since)) co_return false;
     if (!co_await follow(activity, base, since)) co_return false;
   }
-  co_return co_await is_no_reboot(activity);
+  if (!co_await is_no_reboot(activity)) co_return false;
+  co_return !there || co_await still_there(activity);
 }
 
 /// A drive that was restarted, on the way or before, shows the counter 0: only where that is the target, too,
@@ -198,6 +199,26 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
   if (std::abs(activity->plan.target->counter) > target_tolerance()) co_return true;
   co_return co_await proven_continuous(activity);
+}
+
+/// Nothing was sent, as the axis rested at its target when it was read: what a terminal did since is looked
+/// for before it is called Done. False: the activity has ended.
+Task<bool> Axis::still_there(ActivityPtr activity) {
+  if (!may_move_by_itself()) co_return true;
+  const auto since = env_.clock->now();
+  while (!sample_ || sample_->asked_at < since) {
+    wake();
+    co_await sampled_.wait_until(env_.clock->now() + milliseconds(50));
+    if (!current(*activity)) co_return false;  // offline, too
+  }
+  const auto away = std::abs(tracker_.counter() - activity->plan.target->counter);
+  if (!found_in_motion() && away <= target_tolerance()) co_return true;
+  auto cause = error(Reason::moving, "the shaft was moved while the axis rested at its target",
+                     "see what moves it; then repeat the move");
+  cause.outcome = Outcome::not_executed;
+  tell_part(*activity, cause);
+  finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+  co_return false;
 }
 
 /// The drive was not restarted since its parameters were last written: the canary is read until it answers.

@@ -31,6 +31,7 @@ struct GroupRigOptions {
   Duration sync_period = 10ms;
   simulation::Switches can_switches{}, serial_switches{};
   LeaseLoss on_lease_loss = LeaseLoss::halt;
+  std::function<void(AxisSettings&)> adjust{};
 };
 
 /// Axes x (node 1, ykd2405pr) and y (node 2, ess42-r) on an RS-485 line, z (node 5, yss-c) on a CAN network;
@@ -185,6 +186,7 @@ class GroupRig {
     axis.limits.velocity = 100;
     axis.on_lease_loss = options.on_lease_loss;
     axis.position_tolerance = 0.02;
+    if (options.adjust) options.adjust(axis);
     return axis;
   }
   void add_serial(const std::string& name, std::uint8_t node, const std::string& model,
