@@ -227,17 +227,22 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
 
 /// An edge of bit 8 on a motor that turns under halt. Between its two words nothing can be behind it:
 /// velocity mode with 60FFh = 0, as in make_ready(). By RPDO at once, and by SDO, where the drive answers
-/// each: one that looks at the word once per cycle sees no edge in the first pair.
+/// each: one that looks at the word once per cycle sees no edge in the first pair. Nothing of a drive that
+/// falls silent before that is ready: it may hear the first word of a pair alone. Errors: no_reply.
 Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions options) {
   const auto word = static_cast<std::uint16_t>(bits | control::halt);
-  (void)co_await write_object(object::target_velocity, 0, 0, options);
+  const auto silent = [](const auto& answer) { return !answer && answer.error().reason == Reason::no_reply; };
+  const auto zeroed = co_await write_object(object::target_velocity, 0, 0, options);
+  if (silent(zeroed)) co_return fail(zeroed.error());
   if (mode_ != OperationMode::profile_velocity) {
     constexpr auto velocity = std::to_underlying(OperationMode::profile_velocity);
     mode_.reset();
-    (void)co_await write_object(object::mode, velocity, 1, options);
+    const auto written = co_await write_object(object::mode, velocity, 1, options);
+    if (silent(written)) co_return fail(written.error());
     const auto fits = [](std::int64_t shown) { return shown == velocity; };
     const auto shown = co_await read_until(object::mode_display, fits, urgent_mode_limit, options);
     mode_at_ = clock_->now();
+    if (silent(shown)) co_return fail(shown.error());
     if (shown && fits(*shown)) {
       mode_ = OperationMode::profile_velocity;
       leave_homing_ = false;

@@ -99,6 +99,36 @@ TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
   }
 }
 
+/// What gives the halt a new edge lets go of it for a moment. Where nobody answers, what a halt suspended may
+/// be behind it.
+TEST(M13, AStopOfASilentDriveStartsNothingThatAHaltSuspended) {
+  for (auto silent = 640ms; silent < 760ms; silent += 6ms) {
+    SCOPED_TRACE(silent.count());
+    CanRig rig({.limits = false, .adjust = [](AxisSettings& axis) {
+                  axis.inputs.push_back({.terminal = "X3", .function = "jog_positive"});
+                }});
+    rig.ready();
+    (void)rig.submit(MoveRelativeRequest{.distance = 900});
+    rig.run(500ms);
+    rig.done(StopRequest{.kind = StopKind::stop});
+    rig.touch([](auto& node) { node.set_input("X3", true); });
+    rig.run(500ms);
+    ASSERT_TRUE(rig.drive->shaft_moving());
+    rig.nodes().set_connected(false);
+    rig.touch([](auto& node) { node.set_input("X3", false); });
+    rig.run(150ms);
+    ASSERT_FALSE(rig.drive->shaft_moving());
+    const auto starts = rig.drive->starts();
+    const auto there = rig.shaft();
+    (void)rig.submit(StopRequest{.kind = StopKind::stop});
+    rig.run(silent);
+    rig.nodes().set_connected(true);
+    rig.run(3s);
+    EXPECT_EQ(rig.drive->starts(), starts);
+    EXPECT_EQ(rig.shaft(), there);
+  }
+}
+
 TEST(M13, AStopNeedsNoAnswer) {
   for (const bool velocity : {true, false}) {
     CanRig rig({.limits = false});
