@@ -40,6 +40,7 @@ Task<> Axis::connect() {
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
+      unseen_ends_.reset();
       watch_continuity();
       spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
                    identity_ ? identity_->version : "");
@@ -98,11 +99,31 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
+  if (may_have_been_stopped_abruptly()) lose_trust();
   if (auto failed = stop_failed(); !failed) co_return failed;
   if (const auto settled = co_await settle_found_motion(); !settled) co_return settled;
   if (closing_) co_return fail(ending());
   if (const auto ready = co_await prove_or_configure(); !ready) co_return ready;
   co_return stop_failed();
+}
+
+/// Open loop: what moved while nobody saw it may have run onto a limit, where it stops without a ramp and
+/// loses steps (M20). Not so where it rests at its target, or has not left, or still runs as it did.
+bool Axis::may_have_been_stopped_abruptly() const {
+  const bool by_terminal =
+      has_input("positive_limit") || has_input("negative_limit") || has_input("quick_stop");
+  if (drive_->closed_loop() || !unseen_ends_ || !by_terminal) return false;
+  const bool runs_on =
+      sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_owed_;
+  return !runs_on && std::ranges::find(*unseen_ends_, tracker_.counter()) == unseen_ends_->end();
+}
+
+/// Where the drive may be found at rest, if nothing stops it on its way.
+void Axis::note_unseen_ends() {
+  auto& ends = unseen_ends_.emplace();
+  if (sample_ && !sample_->moving) ends.push_back(tracker_.counter());
+  if (activity_ && activity_->may_run && activity_->plan.target)
+    ends.push_back(activity_->plan.target->counter);
 }
 
 /// Within homing the motor rests between its phases, and goes on.
@@ -263,6 +284,7 @@ void Axis::go_offline(const Error& cause) {
                      terminal_motion_ || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
   if (moved) stop_owed_ = true;
+  note_unseen_ends();
   if (auto activity = take_activity()) {
     auto unknown = error(Reason::offline, "the drive stopped answering while the command was being executed",
                          "check power and wiring; then reset the axis");
