@@ -59,7 +59,10 @@ void Hands::actuate(Station& station) {
   const auto now = plant_->world.now();
   const auto held = dice_.chance(0.5) ? 12ms + dice_.up_to(60ms) : dice_.up_to(500ms);
   const auto longest = station.wired == Wired::homing ? Duration(longest_by_homing) : Duration(longest_else);
-  if (station.wired != Wired::free) station.actuated_until = now + held + longest;
+  if (station.wired == Wired::free)
+    station.released_until = now + 30ms + held;
+  else
+    station.actuated_until = now + held + longest;
   if (station.wired == Wired::segment) set(station, "X4", true);
   const auto later = [&](Duration after, auto what) {
     later_.push_back(plant_->world.clock().call_at(now + after, what));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -28,9 +29,14 @@ std::string as_units(const Track& track, std::int64_t distance) {
 std::string wrong_run(const Command& command, const Track& track, const Departure& departure,
                       std::int64_t way) {
   const auto asked = *command.asked.velocity * track.pulses_per_unit;
-  if (std::llabs(way) > track.slack && (way > 0) != (asked > 0))
-    return fmt::format("{} goes the other way, by {}", command.id, as_units(track, way));
-  if (std::llabs(way) <= std::llabs(pulses(track, track.jog_travel)) + track.slack) return {};
+  // From where it was when it was read.
+  const auto heading = departure.from + way;
+  const bool onwards = asked > 0 ? heading >= departure.lately.low - track.slack
+                                 : heading <= departure.lately.high + track.slack;
+  if (!onwards) return fmt::format("{} goes the other way, by {}", command.id, as_units(track, way));
+  const auto& [low, high] = departure.lately;
+  const auto shortest = std::max({low - heading, heading - high, std::int64_t{0}});
+  if (shortest <= std::llabs(pulses(track, track.jog_travel)) + track.slack) return {};
   if (!departure.trusted)
     return fmt::format("{} goes by {}, and nobody knows the position", command.id, as_units(track, way));
   if (!departure.origin) return {};

@@ -16,6 +16,9 @@ namespace {
 /// line that loses replies may need several attempts).
 constexpr auto reboot_unnoticed = 5s;
 
+/// The drive's state is read within this, on the slowest line: what begins meanwhile does not show in it.
+constexpr auto reading = 20ms;
+
 bool is_motion(CommandKind kind) {
   return kind == CommandKind::home || kind == CommandKind::move_absolute ||
          kind == CommandKind::move_relative || kind == CommandKind::move_velocity ||
@@ -201,10 +204,10 @@ void Judge::on_executed(Station& station, const Executed& executed) {
 
 void Judge::on_departure(Station& station, const Subject& subject, const Executed& executed) {
   ++tally_.departures;
-  // Only a terminal turns a shaft that rested when it was read.
-  const auto lately = station.terminal_may_start(plant_->world.now())
-                          ? executed.lately
-                          : Stretch{.low = executed.from, .high = executed.from};
+  // Only by a terminal a shaft that rested when it was read is turned, or let go of.
+  const auto now = plant_->world.now();
+  const bool turned = station.terminal_may_start(now) || now <= station.released_until + Witness::start_time;
+  const auto lately = turned ? executed.lately : Stretch{.low = executed.from, .high = executed.from};
   subject.triggered->departed = lately;
   const auto& command = subject.triggered->command->value();
   const auto wrong = wrong_departure(command, station.track,
@@ -220,6 +223,7 @@ void Judge::on_departure(Station& station, const Subject& subject, const Execute
 void Judge::on_own_start(Station& station) {
   note(station.name, "the drive starts by itself");
   ++tally_.by_terminal;
+  subjects_.at(station.name).own_start = plant_->world.now();
   if (!station.terminal_may_start(plant_->world.now()))
     violation(station.name, "the drive starts, and nobody touched it");
 }
@@ -251,8 +255,27 @@ void Judge::on_end(Station& station, Subject& subject, const Judged& judged, con
   if (command.state == CommandState::done) on_done(station, subject, judged, command);
 }
 
-void Judge::on_done(Station& station, Subject& subject, const Judged& judged, const Command& command) {
+void Judge::check_arrival(Station& station, const Subject& subject, const Judged& judged,
+                          const Command& command) {
+  const auto now = plant_->world.now();
+  if (now - subject.own_start <= reading || now - station.released_until <= reading) return;
+  if (command.asked.distance) {
+    ++tally_.distances;
+    const auto there = station.drive->shaft_pulses();
+    if (const auto wrong =
+            wrong_arrival(command, station.track, judged.departed.value_or(Stretch{there, there}), there);
+        !wrong.empty())
+      violation(station.name, wrong);
+    return;
+  }
   const auto slack = std::abs(static_cast<double>(station.track.slack) / station.track.pulses_per_unit);
+  if (command.asked.position && is_motion(command.kind) && subject.origin && trusted(station) &&
+      std::abs(position(station, subject) - *command.granted.position) > slack)
+    violation(station.name, fmt::format("{} is done at {:.3f}, and the load is at {:.3f}", command.id,
+                                        *command.granted.position, position(station, subject)));
+}
+
+void Judge::on_done(Station& station, Subject& subject, const Judged& judged, const Command& command) {
   const bool positioned = command.asked.position.has_value() || command.asked.distance.has_value();
   const bool moves = station.drive->shaft_moving() && !station.terminal_may_start(plant_->world.now());
   if (is_stop(command.kind)) {
@@ -265,18 +288,7 @@ void Judge::on_done(Station& station, Subject& subject, const Judged& judged, co
   }
   if (is_motion(command.kind) && (positioned || command.kind == CommandKind::home) && moves)
     violation(station.name, fmt::format("{} is done, and the load moves", command.id));
-  if (command.asked.distance) {
-    ++tally_.distances;
-    const auto now = station.drive->shaft_pulses();
-    if (const auto wrong =
-            wrong_arrival(command, station.track, judged.departed.value_or(Stretch{now, now}), now);
-        !wrong.empty())
-      violation(station.name, wrong);
-  } else if (positioned && is_motion(command.kind) && subject.origin && trusted(station) &&
-             std::abs(position(station, subject) - *command.granted.position) > slack) {
-    violation(station.name, fmt::format("{} is done at {:.3f}, and the load is at {:.3f}", command.id,
-                                        *command.granted.position, position(station, subject)));
-  }
+  check_arrival(station, subject, judged, command);
   if (command.kind == CommandKind::home && judged.homings != 1)
     violation(station.name, fmt::format("{} is done without homing", command.id));
   if (command.kind != CommandKind::home && command.kind != CommandKind::set_position) return;

@@ -26,8 +26,9 @@ namespace axisd::chaos {
 ///    stage is switched on by an Enable only
 ///  - a start takes the shaft, from where it really is, as far or to where it was asked to (journey.hpp),
 ///    whatever becomes of it later
-///  - Done is no lie: the load is where the command says, has moved as far as it says, and rests; not
-///    executed means that nothing started; everything else has a cause
+///  - Done is no lie: the load is where the command says, has moved as far as it says, and rests (but for what
+///    a terminal began, or let go of, while it was read); not executed means that nothing started; everything
+///    else has a cause
 ///  - a confirmed stop reached the drive after it was asked for, and the load rests
 ///  - a trusted position of a resting axis is where the load is
 class Judge {
@@ -81,6 +82,7 @@ class Judge {
     std::uint64_t stop_frames = 0;         ///< executed by the drive
     std::uint64_t stop_frames_at_ask = 0;  ///< when the newest stop was asked for
     std::optional<std::int64_t> origin;    ///< the shaft at position 0, pulses, while it is known
+    TimePoint own_start{};                 ///< a terminal started it last
   };
 
   void on_bind(Station& station, const Telegram& telegram);
@@ -93,6 +95,7 @@ class Judge {
   void on_departure(Station& station, const Subject& subject, const Executed& executed);
   void on_change(const JudgedPtr& judged, const Command& command);
   void on_end(Station& station, Subject& subject, const Judged& judged, const Command& command);
+  void check_arrival(Station& station, const Subject& subject, const Judged& judged, const Command& command);
   void on_done(Station& station, Subject& subject, const Judged& judged, const Command& command);
   [[nodiscard]] static double position(const Station& station, const Subject& subject);
   [[nodiscard]] static bool trusted(const Station& station);

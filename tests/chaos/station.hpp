@@ -31,6 +31,7 @@ struct Station {
   Axis* axis = nullptr;
   TimePoint silent_until{};    ///< an outage: nothing passes from or to it
   TimePoint actuated_until{};  ///< so long what a terminal started may go on, or begin
+  TimePoint released_until{};  ///< by a terminal: until then it could be turned by hand
 
   [[nodiscard]] bool on_can() const { return model == "yss-c" || model == "cia402"; }
   [[nodiscard]] bool closed_loop() const { return model != "ykd2405pr"; }

@@ -44,6 +44,8 @@ class Witness {
   /// No later than the last movement of the shaft so far.
   [[nodiscard]] TimePoint last_moved() const { return last_moved_; }
   [[nodiscard]] TimePoint last_power_loss() const { return last_power_loss_; }
+  /// A start is bound within this of the last reading (M6: reboot_guard).
+  static constexpr Duration start_time = std::chrono::milliseconds(100);
 
  protected:
   void time_passed(TimePoint now) {
@@ -73,8 +75,6 @@ class Witness {
   }
 
  private:
-  /// A start is bound within this of the last reading (M6: reboot_guard).
-  static constexpr Duration start_time = std::chrono::milliseconds(100);
   void note_shaft() {
     const auto shaft = shaft_pulses();
     if (shaft == last_shaft_) return;
