@@ -129,7 +129,9 @@ void Axis::on_sample(const DriveSample& sample) {
   const auto before = sample_;
   sample_ = sample;
   if (before) tell_edges(*before, sample);
+  const auto counter = tracker_.counter();
   if (!rezeroing_) tracker_.update(sample.position_pulses, drive_->position_window());
+  const auto turned_by = tracker_.counter() - counter;
   // What nothing holds may be turned by hand, and back again.
   if (sample.moving || !sample.enabled) tracker_.forget_base();
   if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
@@ -142,9 +144,7 @@ void Axis::on_sample(const DriveSample& sample) {
   if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
-  if (!drive_->closed_loop() && before && before->moving && !sample.moving &&
-      before->mode != DriveMode::homing && sample.mode != DriveMode::homing && limit_active(last_positive_))
-    lose_trust();  // the overtravel stop has no ramp (M20)
+  if (before && ended_abruptly(*before, turned_by)) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = left_running_ = false;
   if (link_ == LinkState::online)
@@ -160,6 +160,16 @@ void Axis::on_sample(const DriveSample& sample) {
   publish();
   sampled_revision_ = revision_;
   sampled_.notify_all();
+}
+
+/// Open loop: a limit and a quick stop end a motion without a ramp, and it may lose steps (M20). What a
+/// terminal started may have begun and ended between two readings.
+bool Axis::ended_abruptly(const DriveSample& before, std::int64_t turned_by) const {
+  const auto& now = *sample_;
+  if (drive_->closed_loop() || now.moving || !(before.moving || turned_by != 0)) return false;
+  if (before.mode == DriveMode::homing || now.mode == DriveMode::homing) return false;
+  const bool positive = before.moving ? last_positive_ : (turned_by > 0) != settings_.scale.invert;
+  return limit_active(positive) || input_active("quick_stop");
 }
 
 Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {

@@ -231,6 +231,7 @@ class Axis {
   [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;
   [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
+  [[nodiscard]] bool ended_abruptly(const DriveSample& before, std::int64_t turned_by) const;
   void lose_trust();
   void remember_position();
 

@@ -26,9 +26,9 @@ namespace axisd::chaos {
 ///    stage is switched on by an Enable only
 ///  - a start takes the shaft, from where it really is, as far or to where it was asked to (journey.hpp),
 ///    whatever becomes of it later
-///  - Done is no lie: the load is where the command says, has moved as far as it says, and rests (but for what
-///    a terminal began, or let go of, while it was read); not executed means that nothing started; everything
-///    else has a cause
+///  - Done is no lie: the load is where the command says, has moved as far as it says, and rests. What a
+///    terminal began, or let go of, while the drive was read excuses it. Not executed means that nothing
+///    started; everything else has a cause
 ///  - a confirmed stop reached the drive after it was asked for, and the load rests
 ///  - a trusted position of a resting axis is where the load is
 class Judge {

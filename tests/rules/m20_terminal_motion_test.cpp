@@ -1,0 +1,74 @@
+// M20: open loop. What a terminal started may end at a limit, or by a quick stop, without a ramp, and between
+// two readings.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+RigOptions jogged(Duration poll_idle) {
+  return {.switches = {{"enabled_at_power_up", false}, {"abrupt_stop_slips", true}},
+          .adjust = [poll_idle](AxisSettings& axis) {
+            axis.inputs.push_back({.terminal = "X3", .function = "quick_stop"});
+            axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+            axis.poll_idle = poll_idle;
+          }};
+}
+
+/// Too short to be seen in motion where the axis is read rarely.
+constexpr auto jogged_for = 100ms;
+
+/// Its jog is ended by `terminals`, which stay as they are.
+void end_jog(Rig& rig, std::initializer_list<const char*> terminals) {
+  rig.set_input("X4", true);
+  rig.run(jogged_for);
+  for (const auto* terminal : terminals) rig.set_input(terminal, true);
+  rig.run(5ms);
+  rig.set_input("X4", false);
+  rig.run(3s);
+}
+
+TEST(M20TerminalMotion, ThatEndsAtALimitLosesThePosition) {
+  for (const auto poll_idle : {20ms, 2000ms})
+    both_directions(jogged(poll_idle), [](const RigOptions& options) {
+      Rig rig(options);
+      rig.ready();
+      end_jog(rig, {"X1"});
+      ASSERT_FALSE(rig.drive->shaft_moving());
+      ASSERT_GT(std::abs(rig.load_mm()), 0.01);
+      EXPECT_GT(std::abs(rig.state()->position - rig.load_mm()), 0.05) << "it slipped";
+      EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    });
+}
+
+TEST(M20TerminalMotion, ThatAQuickStopEndsLosesThePosition) {
+  for (const auto poll_idle : {20ms, 2000ms})
+    both_directions(jogged(poll_idle), [](const RigOptions& options) {
+      Rig rig(options);
+      rig.ready();
+      end_jog(rig, {"X3"});
+      ASSERT_FALSE(rig.drive->shaft_moving());
+      EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    });
+}
+
+TEST(M20TerminalMotion, ThatEndsWithItsTerminalKeepsIt) {
+  for (const auto poll_idle : {20ms, 2000ms})
+    both_directions(jogged(poll_idle), [](const RigOptions& options) {
+      Rig rig(options);
+      rig.ready();
+      end_jog(rig, {});
+      ASSERT_GT(std::abs(rig.load_mm()), 0.01);
+      EXPECT_NEAR(rig.state()->position, rig.load_mm(), 0.011);
+      EXPECT_EQ(rig.state()->trust, PositionTrust::set);
+    });
+}
+
+}  // namespace
+}  // namespace axisd::test
