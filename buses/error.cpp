@@ -44,8 +44,9 @@ std::string_view to_string(Reason reason) {
                                                                  "storage",
                                                                  "cancelled",
                                                                  "internal",
-                                                                 "reloading"});
-  static_assert(names.size() == std::to_underlying(Reason::reloading) + 1U);
+                                                                 "reloading",
+                                                                 "eeprom_budget"});
+  static_assert(names.size() == std::to_underlying(Reason::eeprom_budget) + 1U);
   return names.at(std::to_underlying(reason));
 }
 

@@ -49,6 +49,7 @@ enum class Reason : std::uint8_t {
   cancelled,            ///< Ended by CancelCommand or by the daemon's shutdown.
   internal,             ///< A bug of axisd.
   reloading,            ///< The configuration of the axis is being reloaded. Repeat it in a moment.
+  eeprom_budget,        ///< It would wear the drive's EEPROM beyond `limits.eeprom_saves_per_day`.
 };
 
 std::string_view to_string(Reason reason);

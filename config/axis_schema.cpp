@@ -85,6 +85,20 @@ constexpr KeySpec limit_keys[] = {
      .default_value = "5 r/min",
      .apply = [](Target& t,
                  const Value& v) { t.axis->axis.limits.start_speed_rpm = static_cast<int>(v.integer); }},
+    {.key = "eeprom_saves_per_day",
+     .kind = Kind::integer,
+     .description =
+         "How often the drive may be made to save to its EEPROM within a day: by SaveParameters, "
+         "RestoreFactory and whatever persist saves as it is written. Its cells bear about 100,000 "
+         "saves; what goes beyond is refused.",
+     .example = "20",
+     .default_value = "100",
+     .minimum = 1,
+     .maximum = 10'000,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.axis->axis.limits.eeprom_saves_per_day = static_cast<std::uint64_t>(v.integer);
+         }},
 };
 
 constexpr KeySpec poll_keys[] = {

@@ -86,6 +86,7 @@ void add_scale_and_limits(Fields& fields, const AxisSettings& axis) {
   fields.add("acceleration_time", axis.limits.acceleration_time);
   fields.add("deceleration_time", axis.limits.deceleration_time);
   fields.add("start_speed", axis.limits.start_speed_rpm);
+  fields.add("eeprom_saves_per_day", axis.limits.eeprom_saves_per_day);
 }
 
 void add_segments(Fields& fields, const SegmentSettings& segments) {

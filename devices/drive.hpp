@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "buses/error.hpp"
@@ -43,6 +44,13 @@ struct DriveSample {
   std::uint32_t inputs = 0;  ///< bit per terminal, in the descriptor's order; 1 active
   std::uint32_t outputs = 0;
   bool operator==(const DriveSample&) const = default;
+};
+
+/// Requests that made a drive save to its EEPROM, and the registers that they saved. Rather too many than too
+/// few.
+struct EepromWrites {
+  std::uint64_t saves = 0;
+  std::uint64_t registers = 0;
 };
 
 struct DriveIdentity {
@@ -247,8 +255,14 @@ class Drive {
   virtual Task<Result<Drift>> check_drift(TransactionClass transaction_class) = 0;
   /// The drive takes its motion from elsewhere, as it is configured (pulse inputs): axisd watches it.
   [[nodiscard]] virtual bool moves_by_itself() const = 0;
-  /// Registers that configure() and others saved to EEPROM since the last call.
-  virtual std::uint64_t take_eeprom_writes() = 0;
+  /// What configure() and others saved to EEPROM since the last call.
+  [[nodiscard]] EepromWrites take_eeprom_writes() { return std::exchange(eeprom_writes_, {}); }
+  /// `permit` is asked before each request that makes the drive save to its EEPROM, for how many of them
+  /// follow. What it refuses is not sent, and its error is that of whatever needed it. Only what ends saving
+  /// is not asked for, as it spares the EEPROM.
+  void ask_before_saving(std::function<Result<void>(std::uint64_t saves)> permit) {
+    save_permit_ = std::move(permit);
+  }
   /// The key of the configuration that decides this parameter ("inputs.X0", "drive.current"), or empty.
   [[nodiscard]] virtual std::string configured_by(std::uint32_t address) const = 0;
 
@@ -274,6 +288,20 @@ class Drive {
   virtual Task<Result<void>> clear_alarm(MotionGuard guard) = 0;
   /// Sets the drive's position counter to zero; only at standstill. Verified by the caller's next sample.
   virtual Task<Result<void>> clear_position(MotionGuard guard) = 0;
+
+ protected:
+  [[nodiscard]] Result<void> permit_saves(std::uint64_t saves) const {
+    return save_permit_ ? save_permit_(saves) : Result<void>{};
+  }
+  /// One request that made the drive save was sent.
+  void count_save(std::uint64_t registers) {
+    ++eeprom_writes_.saves;
+    eeprom_writes_.registers += registers;
+  }
+
+ private:
+  EepromWrites eeprom_writes_;
+  std::function<Result<void>(std::uint64_t saves)> save_permit_;
 };
 
 }  // namespace axisd

@@ -39,10 +39,19 @@ struct InhibitRecord {
 /// Who holds an axis in Stopping, and since when (M14).
 using HoldRecords = std::map<HoldKey, WallTime>;
 
+/// Requests that made the axis's drive save to its EEPROM, as far as EepromBudget counts them.
+struct EepromRecord {
+  std::uint64_t saves = 0;  ///< since the axis was first configured on this computer
+  /// Of the last day: by the hour, UTC, since 1970. At most 25 of them.
+  std::map<std::int64_t, std::uint64_t> by_hour{};
+  bool operator==(const EepromRecord&) const = default;
+};
+
 struct AxisRecord {
   std::optional<OffsetRecord> offset;
-  std::uint64_t eeprom_writes = 0;  ///< since the axis was first configured on this computer
+  std::uint64_t eeprom_writes = 0;  ///< registers, since the axis was first configured on this computer
   HoldRecords holds{};
+  EepromRecord eeprom{};
   bool operator==(const AxisRecord&) const = default;
 };
 
@@ -77,8 +86,9 @@ class Persistence {
   virtual void save_hold(std::string axis, HoldKey hold, WallTime since, Callback done) = 0;
   /// These have ended.
   virtual void forget_holds(std::string axis, HoldRecords holds, Callback done) = 0;
-  /// `writes` more registers were saved to the drive's EEPROM.
-  virtual void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) = 0;
+  /// `writes` more registers were saved to the drive's EEPROM; `saves`: as they are counted with those.
+  virtual void count_eeprom_writes(std::string axis, std::uint64_t writes, EepromRecord saves,
+                                   Callback done) = 0;
 };
 
 }  // namespace axisd

@@ -86,6 +86,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::request_id_conflict:
       return grpc::StatusCode::ALREADY_EXISTS;
     case Reason::busy:
+    case Reason::eeprom_budget:
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case Reason::cancelled:
       return grpc::StatusCode::CANCELLED;

@@ -17,8 +17,10 @@ constexpr std::uint8_t most_entries = 64;
 /// One run of the procedure. Steps give false where it cannot go on; `outcome_.error` says why.
 class Configuration {
  public:
-  Configuration(RemoteNode node, PdoSettings wanted, SdoOptions options)
-      : node_(node), wanted_(std::move(wanted)), options_(std::move(options)) {
+  using Permit = std::function<Result<void>(std::uint64_t writes)>;
+
+  Configuration(RemoteNode node, PdoSettings wanted, SdoOptions options, Permit permit)
+      : node_(node), wanted_(std::move(wanted)), options_(std::move(options)), permit_(std::move(permit)) {
     outcome_.direction = wanted_.direction;
     outcome_.number = wanted_.number;
   }
@@ -31,6 +33,10 @@ class Configuration {
     if (!co_await read_state()) co_return outcome_;
     if (differences(outcome_.state, wanted_).empty()) {
       outcome_.kind = PdoOutcome::Kind::as_found;
+      co_return outcome_;
+    }
+    if (const auto permitted = permit_ ? permit_(most_writes()) : Result<void>{}; !permitted) {
+      outcome_.error = permitted.error();
       co_return outcome_;
     }
     before_ = outcome_.state;
@@ -55,6 +61,12 @@ class Configuration {
   }
   [[nodiscard]] Object mapping(std::uint8_t sub) const {
     return mapping_object(wanted_.direction, wanted_.number, sub);
+  }
+
+  /// Of write_all().
+  [[nodiscard]] std::uint64_t most_writes() const {
+    constexpr std::uint64_t off_and_on = 2, count_twice = 2, times = 3;
+    return off_and_on + count_twice + wanted_.mapping.size() + times;
   }
 
   [[nodiscard]] std::optional<Error> objection() const {
@@ -144,6 +156,7 @@ class Configuration {
   RemoteNode node_;
   PdoSettings wanted_;
   SdoOptions options_;
+  Permit permit_;
   PdoOutcome outcome_;
   PdoState before_;
 };
@@ -184,8 +197,9 @@ Task<Result<PdoState>> read_pdo(RemoteNode node, PdoDirection direction, std::ui
   co_return state;
 }
 
-Task<PdoOutcome> configure_pdo(RemoteNode node, PdoSettings wanted, SdoOptions options) {
-  Configuration configuration(node, std::move(wanted), std::move(options));
+Task<PdoOutcome> configure_pdo(RemoteNode node, PdoSettings wanted, SdoOptions options,
+                               std::function<Result<void>(std::uint64_t writes)> permit) {
+  Configuration configuration(node, std::move(wanted), std::move(options), std::move(permit));
   co_return co_await configuration.run();
 }
 

@@ -1,6 +1,8 @@
 // Brings the PDOs of a node into the wanted form, and says what was achieved.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,8 +37,11 @@ struct PdoOutcome {
 /// 0, entries, count, transmission type, inhibit and event time, switch it on; then read everything back. It
 /// is compared first and only differences are written. Entries that the node holds to be read-only (on the
 /// YSS-C COB-IDs and counts are printed RO, chapter 7) are left as they are. Downloads are not repeated
-/// unless `options.attempts` says so; all of them may be.
-Task<PdoOutcome> configure_pdo(RemoteNode node, PdoSettings wanted, SdoOptions options = {});
+/// unless `options.attempts` says so; all of them may be. `permit` (may be empty) is asked once, before the
+/// first download, for at most how many there will be: its error is that of the outcome, and nothing is
+/// written.
+Task<PdoOutcome> configure_pdo(RemoteNode node, PdoSettings wanted, SdoOptions options = {},
+                               std::function<Result<void>(std::uint64_t writes)> permit = {});
 
 /// All of them, in order; after a loss of the node the rest is not tried. One outcome for each.
 Task<std::vector<PdoOutcome>> configure_pdos(RemoteNode node, std::vector<PdoSettings> wanted,

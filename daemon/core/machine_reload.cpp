@@ -40,8 +40,9 @@ bool is_of(std::string_view key, std::string_view part) {
 
 /// Only keys that the daemon uses by itself: the drive gets nothing written for them.
 bool is_of_the_daemon_alone(const ConfigurationChange& change) {
-  static constexpr std::string_view own[] = {"limits.velocity", "poll",          "turnaround_max",
-                                             "jog_travel",      "on_lease_loss", "position_tolerance"};
+  static constexpr std::string_view own[] = {
+      "limits.velocity", "limits.eeprom_saves_per_day", "poll", "turnaround_max", "jog_travel",
+      "on_lease_loss",   "position_tolerance"};
   return change.kind == Kind::changed && !change.keys.empty() &&
          std::ranges::all_of(change.keys, [](std::string_view key) {
            return std::ranges::any_of(own, [&](auto part) { return is_of(key, part); });

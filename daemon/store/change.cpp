@@ -15,7 +15,9 @@ struct Apply {
     for (const auto& [hold, since] : change.holds) state.axes[change.axis].holds.erase(hold);
   }
   void operator()(const CountEepromWrites& change) const {
-    state.axes[change.axis].eeprom_writes += change.writes;
+    auto& axis = state.axes[change.axis];
+    axis.eeprom_writes += change.writes;
+    axis.eeprom = change.saves;
   }
 };
 
@@ -30,7 +32,11 @@ struct ApplyAfterFailure {
   void operator()(const ForgetHolds& change) const {
     state.axes[change.axis].holds.insert(change.holds.begin(), change.holds.end());
   }
-  void operator()(const CountEepromWrites& change) const { Apply{state}(change); }
+  void operator()(const CountEepromWrites& change) const {
+    auto& axis = state.axes[change.axis];
+    axis.eeprom_writes += change.writes;
+    if (axis.eeprom.saves <= change.saves.saves) axis.eeprom = change.saves;  // else more came since
+  }
 };
 
 }  // namespace

@@ -31,6 +31,7 @@ struct ForgetHolds {
 struct CountEepromWrites {
   std::string axis;
   std::uint64_t writes = 0;
+  EepromRecord saves{};
 };
 using Change = std::variant<SetOffset, ForgetOffset, SetInhibit, SetHold, ForgetHolds, CountEepromWrites>;
 

@@ -70,8 +70,10 @@ void FileStore::forget_holds(std::string axis, HoldRecords holds, Callback done)
   enqueue(ForgetHolds{.axis = std::move(axis), .holds = std::move(holds)}, std::move(done));
 }
 
-void FileStore::count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) {
-  enqueue(CountEepromWrites{.axis = std::move(axis), .writes = writes}, std::move(done));
+void FileStore::count_eeprom_writes(std::string axis, std::uint64_t writes, EepromRecord saves,
+                                    Callback done) {
+  enqueue(CountEepromWrites{.axis = std::move(axis), .writes = writes, .saves = std::move(saves)},
+          std::move(done));
 }
 
 void FileStore::enqueue(Change change, Callback done) {

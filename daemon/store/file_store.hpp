@@ -37,7 +37,8 @@ class FileStore final : public Persistence {
   void save_inhibit(InhibitRecord inhibit, Callback done) override;
   void save_hold(std::string axis, HoldKey hold, WallTime since, Callback done) override;
   void forget_holds(std::string axis, HoldRecords holds, Callback done) override;
-  void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) override;
+  void count_eeprom_writes(std::string axis, std::uint64_t writes, EepromRecord saves,
+                           Callback done) override;
 
  private:
   struct Pending {

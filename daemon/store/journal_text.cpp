@@ -58,7 +58,7 @@ class Reader : public LineReader {
   bool reason(Reason& value) {
     std::string text;
     if (!word(text)) return false;
-    for (int i = 0; i <= static_cast<int>(Reason::reloading); ++i) {
+    for (int i = 0; i <= static_cast<int>(Reason::eeprom_budget); ++i) {
       value = static_cast<Reason>(i);
       if (to_string(value) == text) return true;
     }

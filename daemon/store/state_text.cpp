@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -12,6 +13,9 @@ namespace {
 
 constexpr std::string_view header = "axisd-state ";
 constexpr std::string_view version_line = "axisd-state 1\n";
+/// With `eeprom` lines, which version 1 has not. A state without them is written as version 1, so that it
+/// stays readable for an axisd that knows no other.
+constexpr std::string_view version_line_with_saves = "axisd-state 2\n";
 constexpr std::string_view trailer = "crc32 ";
 constexpr std::size_t trailer_size = trailer.size() + 8 + 1;  // eight hexadecimal digits, end of line
 
@@ -81,12 +85,26 @@ bool read_hold(Reader& reader, HoldRecords& holds) {
   return holds.emplace(std::move(key), WallTime(std::chrono::nanoseconds(since))).second;
 }
 
+/// After its "eeprom".
+bool read_saves(Reader& reader, EepromRecord& saves) {
+  if (!reader.literal(" saves=") || !reader.number(saves.saves) || !reader.literal(" by_hour=")) return false;
+  while (!reader.literal("\n")) {
+    std::int64_t hour = 0;
+    std::uint64_t count = 0;
+    if ((!saves.by_hour.empty() && !reader.literal(",")) || !reader.number(hour) || !reader.literal(":") ||
+        !reader.number(count) || !saves.by_hour.emplace(hour, count).second)
+      return false;
+  }
+  return true;
+}
+
 bool read_axis(Reader& reader, std::map<std::string, AxisRecord>& axes) {
   std::string name;
   AxisRecord axis;
   if (!reader.word(name) || !reader.literal(" eeprom_writes=") || !reader.number(axis.eeprom_writes) ||
       !reader.literal("\n"))
     return false;
+  if (reader.literal("eeprom") && !read_saves(reader, axis.eeprom)) return false;
   if (reader.literal("offset") && !read_offset(reader, axis.offset.emplace())) return false;
   while (reader.literal("hold"))
     if (!read_hold(reader, axis.holds)) return false;
@@ -97,7 +115,8 @@ std::optional<Generation> read_generation(std::string_view body) {
   Reader reader(body);
   Generation generation;
   auto& state = generation.state;
-  if (!reader.literal(version_line) || !reader.literal("generation ") || !reader.number(generation.number) ||
+  const bool known = reader.literal(version_line) || reader.literal(version_line_with_saves);
+  if (!known || !reader.literal("generation ") || !reader.number(generation.number) ||
       !reader.literal("\nstart_count ") || !reader.number(state.start_count) || !reader.literal("\n") ||
       !read_inhibit(reader, state.inhibit))
     return std::nullopt;
@@ -111,6 +130,13 @@ std::string offset_line(const OffsetRecord& offset) {
   return fmt::format("offset pulses={} trust={} last={} per_rev={} invert={:d} canary={:04x}\n",
                      offset.offset_pulses, trust_word(offset.trust), offset.last_position_pulses,
                      offset.pulses_per_revolution, offset.invert, fmt::join(offset.canary, "."));
+}
+
+std::string saves_line(const EepromRecord& eeprom) {
+  auto line = fmt::format("eeprom saves={} by_hour=", eeprom.saves);
+  for (const auto& [hour, count] : eeprom.by_hour)
+    line += fmt::format("{}{}:{}", line.ends_with('=') ? "" : ",", hour, count);
+  return line + "\n";
 }
 
 std::string checksum_line(std::string_view body) { return fmt::format("{}{:08x}\n", trailer, crc32(body)); }
@@ -127,12 +153,15 @@ std::optional<std::string_view> intact_body(std::string_view text) {
 
 std::string encode(const Generation& generation) {
   const auto& [number, state] = generation;
-  std::string text(version_line);
+  const bool saves =
+      std::ranges::any_of(state.axes, [](const auto& axis) { return axis.second.eeprom != EepromRecord{}; });
+  std::string text(saves ? version_line_with_saves : version_line);
   text += fmt::format("generation {}\nstart_count {}\ninhibit active={:d} since_ns={} by={}\n", number,
                       state.start_count, state.inhibit.active, ns_of(state.inhibit.since),
                       escape(state.inhibit.by));
   for (const auto& [name, axis] : state.axes) {
     text += fmt::format("axis {} eeprom_writes={}\n", escape(name), axis.eeprom_writes);
+    if (axis.eeprom != EepromRecord{}) text += saves_line(axis.eeprom);
     if (axis.offset) text += offset_line(*axis.offset);
     for (const auto& [hold, since] : axis.holds)
       text += fmt::format("hold since_ns={} request={} by={}\n", ns_of(since), escape(hold.request_id),
@@ -153,7 +182,8 @@ Result<Generation> decode(std::string_view text) {
 
 bool newer_format(std::string_view text) {
   const auto body = intact_body(text);
-  return body && body->starts_with(header) && !body->starts_with(version_line);
+  return body && body->starts_with(header) && !body->starts_with(version_line) &&
+         !body->starts_with(version_line_with_saves);
 }
 
 }  // namespace axisd::store

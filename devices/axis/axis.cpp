@@ -22,17 +22,21 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       face_(std::move(face)),
       gate_(face_->gate),
       simulated_(simulated),
+      eeprom_budget_(settings_.limits.eeprom_saves_per_day, {}),
       absolute_segments_(settings_.segments && settings_.segments->absolute),
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
       stopped_(env_.executor, *env_.clock) {
   if (env_.persistence != nullptr) {
     const auto& axes = env_.persistence->current().axes;
-    if (const auto found = axes.find(settings_.name); found != axes.end())
+    if (const auto found = axes.find(settings_.name); found != axes.end()) {
       eeprom_writes_ = found->second.eeprom_writes;
+      eeprom_budget_ = {settings_.limits.eeprom_saves_per_day, found->second.eeprom};
+    }
   }
   if (const auto before = face_->snapshot.load()) revision_ = before->revision;
   drive_->on_attention([this] { wake(); });
+  drive_->ask_before_saving([this](std::uint64_t saves) { return permit_saves(saves); });
   publish();
 }
 

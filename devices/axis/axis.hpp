@@ -21,6 +21,7 @@
 #include "devices/axis/activity.hpp"
 #include "devices/axis/axis_environment.hpp"
 #include "devices/axis/axis_face.hpp"
+#include "devices/axis/eeprom_budget.hpp"
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
 #include "devices/axis/planner.hpp"
@@ -209,6 +210,7 @@ class Axis {
   void on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before);
   void publish();
   bool note_eeprom_writes();
+  [[nodiscard]] Result<void> permit_saves(std::uint64_t saves);
   void tell_edges(const DriveSample& before, const DriveSample& now);
   void tell_changes(const AxisSnapshot& before, const AxisSnapshot& now);
   [[nodiscard]] std::vector<TerminalState> inputs(std::uint32_t bits) const;
@@ -423,7 +425,8 @@ class Axis {
   std::string drift_;                                     ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
   std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()
-  std::uint64_t eeprom_writes_ = 0;
+  std::uint64_t eeprom_writes_ = 0;                       ///< registers
+  EepromBudget eeprom_budget_;
   UnknownOutcomes unknown_starts_;
   bool absolute_segments_ = false;
 

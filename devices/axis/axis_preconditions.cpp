@@ -66,8 +66,9 @@ void Axis::look_at_link(Obstacles& found) const {
     if (link_error_) {
       cause = *link_error_;
       cause.message = fmt::format("{}: not configured: {}", settings_.name, link_error_->message);
-      if (cause.reason != Reason::wrong_model && cause.reason != Reason::misconfigured)
-        cause.reason = Reason::configuring;
+      const bool lasting = cause.reason == Reason::wrong_model || cause.reason == Reason::misconfigured ||
+                           cause.reason == Reason::eeprom_budget;
+      if (!lasting) cause.reason = Reason::configuring;
       cause.outcome = Outcome::not_sent;
     }
     found.block(std::move(cause));

@@ -79,11 +79,25 @@ MotionCause Axis::motion_cause() const {
 /// False: nothing was written since the last look. Else the next sample is published, whatever it says.
 bool Axis::note_eeprom_writes() {
   const auto written = drive_->take_eeprom_writes();
-  if (written == 0) return false;
+  if (written.saves == 0) return false;
   sampled_revision_ = 0;  // to be published
-  eeprom_writes_ += written;
-  if (env_.persistence != nullptr) env_.persistence->count_eeprom_writes(settings_.name, written, {});
+  eeprom_writes_ += written.registers;
+  eeprom_budget_.count(written.saves, env_.clock->wall(env_.clock->now()));
+  if (env_.persistence != nullptr)
+    env_.persistence->count_eeprom_writes(settings_.name, written.registers, eeprom_budget_.record(), {});
   return true;
+}
+
+/// Of the drive, whatever it saves for.
+Result<void> Axis::permit_saves(std::uint64_t saves) {
+  note_eeprom_writes();
+  const auto now = env_.clock->wall(env_.clock->now());
+  // Kept, so that hours of a clock that was set back are not found in the future again at each start.
+  if (eeprom_budget_.settle(now) && env_.persistence != nullptr)
+    env_.persistence->count_eeprom_writes(settings_.name, 0, eeprom_budget_.record(), {});
+  auto permitted = eeprom_budget_.permit(saves, now);
+  if (!permitted) permitted.error().where = {.bus = settings_.bus, .node = settings_.node};
+  return permitted;
 }
 
 void Axis::publish() {

@@ -73,6 +73,7 @@ struct LimitSettings {
   Duration acceleration_time = milliseconds(100);  ///< from start speed to velocity; the drives take a time
   std::optional<Duration> deceleration_time;       ///< default: acceleration_time
   int start_speed_rpm = 5;                         ///< r/min, 0x0020 of the RS-485 models
+  std::uint64_t eeprom_saves_per_day = 100;        ///< > 0, of what EepromBudget counts
 };
 
 struct HomingSettings {

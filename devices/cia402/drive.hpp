@@ -88,7 +88,6 @@ class Cia402Drive final : public Drive {
   Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
 
   // drive_parameters.cpp
-  std::uint64_t take_eeprom_writes() override { return std::exchange(eeprom_writes_, 0); }
   [[nodiscard]] std::string configured_by(std::uint32_t address) const override;
   Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t> addresses) override;
   Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values) override;
@@ -144,6 +143,8 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> set_pdos();
   Task<Result<std::string>> set_state_pdos();
   Task<> set_start_pdo();
+  /// configure_pdo(), asked for and counted as far as the drive saves it.
+  Task<canopen::PdoOutcome> set_pdo(canopen::PdoSettings wanted);
   void listen(const std::vector<canopen::PdoOutcome>& outcomes);
   void unsubscribe();
   /// Nothing waits for a SYNC in this drive (M24).
@@ -266,6 +267,8 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> write_counted(std::uint32_t address, std::int64_t value, std::uint8_t bytes);
   /// A write to it goes to the EEPROM while the drive saves.
   [[nodiscard]] bool can_be_saved(std::uint32_t address) const;
+  /// And the drive saves now, as far as is known.
+  [[nodiscard]] bool is_saved(std::uint32_t address) const;
   /// It was written: counted if it went to the EEPROM.
   void count_write(std::uint32_t address);
   /// Sets the EEPROM switch (200Ch of the YSS-C), if it is not so already.
@@ -354,7 +357,6 @@ class Cia402Drive final : public Drive {
   std::optional<std::int64_t> found_window_;  ///< VendorObjects::position_window, as it was read last
   std::optional<bool> found_closed_;          ///< loop mode as it was before this power cycle's first write
   std::set<std::uint32_t> unsaved_;           ///< saved objects that did not hold what was written
-  std::uint64_t eeprom_writes_ = 0;
   std::optional<TimePoint> stop_sent_at_;
 };
 

@@ -53,11 +53,13 @@ bool Cia402Drive::saves_at_rest() const { return setup_.persist == PersistSettin
 
 Task<Result<void>> Cia402Drive::save_writes(bool saved) {
   if (!model_->objects.eeprom_switch || saving_ == saved) co_return Result<void>{};
+  if (saved)
+    if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   saving_.reset();
   const auto written = co_await write_object(*model_->objects.eeprom_switch, saved ? 0 : 1, 0, patiently());
   if (!written) co_return written;
   saving_ = saved;
-  ++eeprom_writes_;  // whether this object saves itself is not said: counted
+  count_save(1);  // whether this object saves itself is not said: counted
   co_return Result<void>{};
 }
 
@@ -120,6 +122,8 @@ Task<Result<void>> Cia402Drive::check_inactive(const ObjectSetting& setting) {
 }
 
 Task<Result<void>> Cia402Drive::write_counted(std::uint32_t address, std::int64_t value, std::uint8_t bytes) {
+  if (is_saved(address))
+    if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   const auto written = co_await write_object(Object::of(address), value, bytes, patiently());
   if (written || written.error().outcome == Outcome::unknown) count_write(address);
   co_return written;
@@ -130,8 +134,12 @@ bool Cia402Drive::can_be_saved(std::uint32_t address) const {
   return parameter != nullptr && parameter->access == Access::rw_saved;
 }
 
+bool Cia402Drive::is_saved(std::uint32_t address) const {
+  return can_be_saved(address) && saving_.value_or(true);
+}
+
 void Cia402Drive::count_write(std::uint32_t address) {
-  if (can_be_saved(address) && saving_.value_or(true)) ++eeprom_writes_;
+  if (is_saved(address)) count_save(1);
 }
 
 Error Cia402Drive::not_held(const ObjectSetting& setting, std::int64_t actual) const {

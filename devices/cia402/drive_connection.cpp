@@ -244,19 +244,28 @@ Task<Result<void>> Cia402Drive::set_pdos() {
   if (!why) co_return fail(why.error());
   link_note_ = why->empty() ? std::string() : "state by SDO polling: " + *why;
   // Stops go out by this one at once (M12). The drive may have it so by default (chapter 7, 1600h).
-  const auto command =
-      co_await canopen::configure_pdo(node_,
-                                      {.direction = PdoDirection::receive,
-                                       .number = command_number,
-                                       .cob_id = canopen::rpdo_id(command_number, node_.id()),
-                                       .transmission_type = canopen::event_driven_of_profile,
-                                       .mapping = control_alone()},
-                                      patiently());
+  const auto command = co_await set_pdo({.direction = PdoDirection::receive,
+                                         .number = command_number,
+                                         .cob_id = canopen::rpdo_id(command_number, node_.id()),
+                                         .transmission_type = canopen::event_driven_of_profile,
+                                         .mapping = control_alone()});
   const bool at_once = command.state.transmission_type.value_or(0) >= canopen::event_driven_of_manufacturer;
   if (command.carries(control_alone()) && at_once) command_pdo_ = command.state.cob_id();
-  for (const auto object : command.written) count_write(object.key());
   co_await set_start_pdo();
   co_return Result<void>{};
+}
+
+Task<canopen::PdoOutcome> Cia402Drive::set_pdo(canopen::PdoSettings wanted) {
+  constexpr std::uint8_t most_subs = 8;
+  bool saved = false;
+  for (std::uint8_t sub = 0; sub <= most_subs; ++sub)
+    saved = saved || is_saved(canopen::communication_object(wanted.direction, wanted.number, sub).key()) ||
+            is_saved(canopen::mapping_object(wanted.direction, wanted.number, sub).key());
+  std::function<Result<void>(std::uint64_t)> permit;
+  if (saved) permit = [this](std::uint64_t writes) { return permit_saves(writes); };
+  auto outcome = co_await canopen::configure_pdo(node_, std::move(wanted), patiently(), std::move(permit));
+  for (const auto object : outcome.written) count_write(object.key());
+  co_return outcome;
 }
 
 /// Group starts come by another one, with a SYNC (M24). Whether its type counts is proven later.
@@ -272,8 +281,7 @@ Task<> Cia402Drive::set_start_pdo() {
                                     .cob_id = canopen::rpdo_id(start_number, node_.id()),
                                     .transmission_type = with_each_sync,
                                     .mapping = control_alone()};
-  const auto outcome = co_await canopen::configure_pdo(node_, wanted, patiently());
-  for (const auto object : outcome.written) count_write(object.key());
+  const auto outcome = co_await set_pdo(wanted);
   no_common_start_ = objection(outcome, wanted);
   if (no_common_start_.empty() && !is_start_pdo(start_number, outcome.state))
     no_common_start_ =
@@ -309,8 +317,7 @@ Task<Result<std::string>> Cia402Drive::set_state_pdos() {
       wanted.inhibit_time = static_cast<std::uint16_t>(scaled(inhibit_period, bitrate) / inhibit_unit);
       wanted.event_timer = static_cast<std::uint16_t>(scaled(event_period, bitrate) / milliseconds(1));
     }
-    auto outcome = co_await canopen::configure_pdo(node_, wanted, patiently());
-    for (const auto object : outcome.written) count_write(object.key());
+    auto outcome = co_await set_pdo(wanted);
     const bool gone = outcome.error && outcome.error->outcome != Outcome::refused &&
                       outcome.error->reason != Reason::invalid_argument;
     if (gone) co_return failed(*outcome.error);

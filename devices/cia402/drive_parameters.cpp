@@ -78,10 +78,17 @@ Task<Result<std::vector<ParameterValue>>> Cia402Drive::read_parameters(std::vect
 }
 
 Task<Result<std::vector<ParameterValue>>> Cia402Drive::write_parameters(std::vector<ParameterValue> values) {
+  std::vector<ParameterValue> different;  // the others spare the EEPROM
   for (const auto& value : values) {
     const auto before = co_await read_object(Object::of(value.address), parameters());
     if (!before) co_return fail(before.error());
-    if (*before == value.value) continue;  // spares the EEPROM
+    if (*before != value.value) different.push_back(value);
+  }
+  const auto saves = static_cast<std::uint64_t>(
+      std::ranges::count_if(different, [&](const auto& value) { return is_saved(value.address); }));
+  if (saves > 0)  // all of them or none
+    if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
+  for (const auto& value : different) {
     const auto written = co_await write_counted(value.address, value.value, 0);
     if (!written) co_return fail(written.error());
   }
@@ -134,6 +141,7 @@ Task<Result<void>> Cia402Drive::save_parameters() {
   if (!model_->objects.save)
     co_return fail(not_supported("the drive cannot save its parameters",
                                  "the configuration is applied after each power-up"));
+  if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   // What is saved now stands there after the next power-up: nothing that moves or enables (M27).
   if (const auto quiet = co_await quieten(); !quiet) co_return quiet;
   const auto neutral = distinct(fresh_neutral_block());
@@ -141,8 +149,8 @@ Task<Result<void>> Cia402Drive::save_parameters() {
   const auto saved =
       co_await write_object(model_->objects.save->object, model_->objects.save->value, 0, eeprom());
   if (saved || saved.error().outcome == Outcome::unknown) {
-    eeprom_writes_ +=
-        static_cast<std::uint64_t>(std::ranges::count_if(model_->descriptor->parameters, is_writable));
+    count_save(
+        static_cast<std::uint64_t>(std::ranges::count_if(model_->descriptor->parameters, is_writable)));
     // Saved, this block would no longer tell a power-up (M7): whatever comes now, it is no proof any more.
     note_power_up_block(neutral);
     const auto fresh = distinct(fresh_neutral_block());
@@ -181,13 +189,14 @@ Task<Result<std::string>> Cia402Drive::factory_address(const std::vector<std::ui
 Task<Result<std::string>> Cia402Drive::restore_factory(std::vector<std::uint8_t> taken) {
   if (!model_->objects.restore)
     co_return fail(not_supported("the drive cannot restore its factory settings", "use its maker's tool"));
+  if (const auto permitted = permit_saves(1); !permitted) co_return fail(permitted.error());
   auto address = co_await factory_address(taken);
   if (!address) co_return address;
   const auto& command = *model_->objects.restore;
   const auto restored = co_await write_object(command.object, command.value, 0, eeprom());
   if (restored || restored.error().outcome == Outcome::unknown) {
-    eeprom_writes_ += static_cast<std::uint64_t>(
-        std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access));
+    count_save(static_cast<std::uint64_t>(
+        std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access)));
     const auto found_closed = found_closed_;  // of this power cycle, which goes on
     forget_power_cycle();                     // whatever stands there now, it is not ours
     found_closed_ = found_closed;
@@ -234,6 +243,8 @@ Result<std::vector<ParameterValue>> Cia402Drive::addressing_objects(const Serial
 Task<Result<std::string>> Cia402Drive::change_serial(SerialChange change) {
   auto values = addressing_objects(change);
   if (!values) co_return fail(values.error());
+  // All of it or nothing: half of it might leave the drive out of reach. Two turn the switch, there and back.
+  if (const auto permitted = permit_saves(values->size() + 2); !permitted) co_return fail(permitted.error());
   // Without `persist` the drive was told not to save: such a change would be gone when it counts.
   if (const auto saving = co_await save_writes(true); !saving) co_return fail(saving.error());
   const auto written = co_await write_parameters(std::move(*values));

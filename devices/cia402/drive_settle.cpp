@@ -59,8 +59,12 @@ Task<Result<void>> Cia402Drive::disarm(SdoOptions options) {
   if (!any) co_return Result<void>{};
   if (const auto left = co_await leave_operational(true); !left) co_return left;
   Result<void> written;
-  for (const auto object : armed)
-    if (written) written = co_await write_object(object, canopen::event_driven_of_profile, 1, options);
+  for (const auto object : armed) {
+    if (!written) break;
+    // Counted, but not asked for: what is armed may move at the next SYNC.
+    written = co_await write_object(object, canopen::event_driven_of_profile, 1, options);
+    if (written || written.error().outcome == Outcome::unknown) count_write(object.key());
+  }
   // Whatever came of it: its state comes by PDO.
   const auto started = co_await enter_operational();
   co_return written ? started : written;

@@ -65,7 +65,6 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
   // drive_parameters.cpp
-  std::uint64_t take_eeprom_writes() override { return std::exchange(eeprom_writes_, 0); }
   [[nodiscard]] std::string configured_by(std::uint32_t address) const override;
   Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t> addresses) override;
   Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values) override;
@@ -105,6 +104,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> neutralise_inputs(const std::vector<RegisterSetting>& required, Registers& present);
   Task<Result<void>> check_inactive(const RegisterSetting& setting) const;
   Task<Result<void>> write_run(std::uint16_t address, std::vector<std::uint16_t> values);
+  [[nodiscard]] std::uint64_t saved_registers(std::uint16_t first, std::size_t count) const;
   /// Sets the EEPROM switch (0x0016), if it is not so already.
   Task<Result<void>> save_writes(bool saved);
   [[nodiscard]] bool saves_at_rest() const;
@@ -155,7 +155,6 @@ class YakoRtuDrive final : public Drive {
   /// 0x011F and the counts of a revolution by 0x0110, as the factory sets them until they were read.
   std::int64_t accuracy_ = 10, counts_per_revolution_ = 4000;
   std::set<std::uint16_t> unsaved_;  ///< saved registers that did not hold what was written
-  std::uint64_t eeprom_writes_ = 0;
 };
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);

@@ -246,13 +246,15 @@ bool YakoRtuDrive::saves_at_rest() const { return setup_.persist == PersistSetti
 
 Task<Result<void>> YakoRtuDrive::save_writes(bool saved) {
   if (saving_ == saved) co_return Result<void>{};
+  if (saved)
+    if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   const std::uint16_t value = saved ? 0 : 1;
   const auto written =
       co_await node_.write_patiently(reg::eeprom_update, value, in(TransactionClass::parameters));
   saving_.reset();
   if (!written) co_return failed(written.error());
   saving_ = saved;
-  ++eeprom_writes_;  // whether this register saves itself is not said: counted
+  count_save(1);  // whether this register saves itself is not said: counted
   co_return Result<void>{};
 }
 
@@ -285,20 +287,29 @@ Task<Result<void>> YakoRtuDrive::write_differences(const std::vector<RegisterSet
   co_return Result<void>{};
 }
 
+/// How many of these registers the drive saves as they are written.
+std::uint64_t YakoRtuDrive::saved_registers(std::uint16_t first, std::size_t count) const {
+  std::uint64_t saved = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto* parameter = find_parameter(model_->descriptor->parameters, first + i);
+    if (parameter != nullptr && parameter->access == Access::rw_saved) ++saved;
+  }
+  return saved;
+}
+
 Task<Result<void>> YakoRtuDrive::write_run(std::uint16_t address, std::vector<std::uint16_t> values) {
+  const auto saved = saving_.value_or(true) ? saved_registers(address, values.size()) : 0;
   Result<Answer> written = fail(Reason::internal, "no attempt was made");
   for (int attempt = 0; attempt < write_attempts; ++attempt) {
+    if (saved > 0)
+      if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
     written = values.size() == 1
                   ? co_await node_.write(address, values.front(), in(TransactionClass::parameters))
                   : co_await node_.write_block(address, values, in(TransactionClass::parameters));
+    const bool executed = written || written.error().outcome == Outcome::unknown;
+    if (executed && saved > 0) count_save(saved);
     if (written || written.error().reason != Reason::no_reply) break;
   }
-  const bool executed = written || written.error().outcome == Outcome::unknown;
-  if (executed && saving_.value_or(true))
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const auto* parameter = find_parameter(model_->descriptor->parameters, address + i);
-      if (parameter != nullptr && parameter->access == Access::rw_saved) ++eeprom_writes_;
-    }
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }

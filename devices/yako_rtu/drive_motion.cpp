@@ -204,9 +204,12 @@ Task<Result<void>> YakoRtuDrive::prepare_homing(HomingBlock block, TransactionOp
   const auto present = co_await node_.read(reg::homing_mode, 6, options);
   if (!present) co_return failed(present.error());
   if (std::ranges::equal(present->registers, block)) co_return Result<void>{};
+  const bool saved = saving_.value_or(true);
+  if (saved)
+    if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   const auto written = co_await node_.write_block(reg::homing_mode, block, std::move(options));
   const bool executed = written || written.error().outcome == Outcome::unknown;
-  if (executed && saving_.value_or(true)) eeprom_writes_ += block.size();
+  if (executed && saved) count_save(block.size());
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }

@@ -74,8 +74,16 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::ve
   for (const auto& value : values) addresses.push_back(value.address);
   const auto before = co_await read_parameters(addresses);
   if (!before) co_return fail(before.error());
+  const auto differs = [&](std::size_t i) {
+    return ((*before)[i].value & 0xFFFF) != (values[i].value & 0xFFFF);
+  };
+  std::uint64_t saves = 0;  // all of them or none
+  for (std::size_t i = 0; i < values.size() && saving_.value_or(true); ++i)
+    if (differs(i)) saves += saved_registers(static_cast<std::uint16_t>(values[i].address), 1);
+  if (saves > 0)
+    if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (((*before)[i].value & 0xFFFF) == (values[i].value & 0xFFFF)) continue;  // spares the EEPROM
+    if (!differs(i)) continue;  // spares the EEPROM
     std::vector<std::uint16_t> word{static_cast<std::uint16_t>(values[i].value & 0xFFFF)};
     const auto written = co_await write_run(static_cast<std::uint16_t>(values[i].address), std::move(word));
     if (!written) co_return fail(written.error());
@@ -121,6 +129,7 @@ Task<Result<void>> YakoRtuDrive::write_segments(DriveSegments segments) {
 }
 
 Task<Result<void>> YakoRtuDrive::save_parameters() {
+  if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   // What is saved now stands there after the next power-up, when a terminal may start it: nothing that moves
   // (M27).
   MotionBlock neutral = fresh_neutral_block();
@@ -130,10 +139,10 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
   const auto saved = co_await node_.write(reg::parameter_setting, 2, eeprom());
   const bool executed = saved || saved.error().outcome == Outcome::unknown;
   if (executed) {
-    eeprom_writes_ += static_cast<std::uint64_t>(
+    count_save(static_cast<std::uint64_t>(
         std::ranges::count_if(model_->descriptor->parameters, [](const auto& parameter) {
           return parameter.access == Access::rw || parameter.access == Access::rw_saved;
-        }));
+        })));
     // Saved, this block would no longer tell a power-up (M7): whatever comes now, it is no proof any more.
     note_power_up_block(neutral);
     const auto fresh = distinct(fresh_neutral_block());
@@ -146,6 +155,7 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
 }
 
 Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t> taken) {
+  if (const auto permitted = permit_saves(1); !permitted) co_return fail(permitted.error());
   const auto before = co_await read_registers({reg::node, reg::custom_node}, parameters());
   if (!before) co_return fail(before.error());
   const auto node = before->at(reg::node);
@@ -159,8 +169,8 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
                  "set the drive's address switches first, or give the other drive another address"));
   const auto restored = co_await node_.write(reg::parameter_setting, 1, eeprom());
   if (restored || restored.error().outcome == Outcome::unknown) {
-    eeprom_writes_ += static_cast<std::uint64_t>(
-        std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access));
+    count_save(static_cast<std::uint64_t>(
+        std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access)));
     expected_.clear();  // whatever stands there now, it is not ours
     saving_.reset();
     unsaved_.clear();
@@ -220,6 +230,8 @@ std::string YakoRtuDrive::serial_advice(const SerialChange& change) const {
 Task<Result<std::string>> YakoRtuDrive::change_serial(SerialChange change) {
   auto values = serial_registers(change);
   if (!values) co_return fail(values.error());
+  // All of it or nothing: half of it might leave the drive out of reach. Two turn the switch, there and back.
+  if (const auto permitted = permit_saves(values->size() + 2); !permitted) co_return fail(permitted.error());
   // Without `persist` the drive was told not to save: such a change would be gone when it counts.
   if (const auto saving = co_await save_writes(true); !saving) co_return fail(saving.error());
   const auto written = co_await write_parameters(std::move(*values));

@@ -50,6 +50,25 @@ class Drives(Scenario):
             self.assertIn(text, done.stderr)
         self.assertEqual(machine.sim.peek(0x0118, node=3), 6)
 
+    def test_an_eeprom_is_saved_to_so_often_a_day_also_by_the_next_daemon(self):
+        limits = "{ velocity: 10 rev/s, eeprom_saves_per_day: 3 }"
+        machine = self.machine({"ykd": drive("ykd2405pr", 1, limits=limits)}).start()
+
+        def save():
+            return machine.axisctl("drive", "save", "ykd", "--confirm", "ykd")
+        saves = 0
+        while (done := save()).returncode == 0 and saves < 10:
+            saves += 1
+        self.assertIn(saves, (2, 3))  # the switch that ends saving may count, too
+        for _ in range(2):
+            self.assertEqual((done.returncode, done.stdout), (4, ""), done)
+            self.assertIn("3 times in the last 24 h, where limits.eeprom_saves_per_day permits 3", done.stderr)
+            self.assertIn("UTC", done.stderr)
+            machine.daemon.terminate()
+            machine.start_daemon()
+            machine.client.wait_online("ykd")
+            done = save()
+
     def test_another_address_counts_after_a_power_cycle(self):
         machine = self.machine({"ssd": drive("ssd2608pr", 40, simulated="dip=0")}).start()
         done = machine.axisctl("drive", "readdress", "ssd", "41", "--confirm", "ssd")

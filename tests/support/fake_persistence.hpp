@@ -48,8 +48,12 @@ class FakePersistence final : public Persistence {
       for (const auto& [hold, since] : holds) saved.axes[axis].holds.erase(hold);
     answer(std::move(done));
   }
-  void count_eeprom_writes(std::string axis, std::uint64_t writes, Callback done) override {
-    if (!failing && !frozen) saved.axes[axis].eeprom_writes += writes;
+  void count_eeprom_writes(std::string axis, std::uint64_t writes, EepromRecord saves,
+                           Callback done) override {
+    if (!failing && !frozen) {
+      saved.axes[axis].eeprom_writes += writes;
+      saved.axes[axis].eeprom = std::move(saves);
+    }
     answer(std::move(done));
   }
 

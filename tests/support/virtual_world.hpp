@@ -15,8 +15,11 @@ class VirtualClock final : public Clock {
   /// Thread: any, as of the real clock.
   [[nodiscard]] TimePoint now() const override { return now_.load(std::memory_order_relaxed); }
   [[nodiscard]] WallTime wall(TimePoint t) const override {
-    return WallTime(std::chrono::duration_cast<WallTime::duration>(t.time_since_epoch()));
+    return WallTime(
+        std::chrono::duration_cast<WallTime::duration>(t.time_since_epoch() + wall_ahead_.load()));
   }
+  /// Somebody sets the wall clock: as far ahead of now(), counted from its epoch.
+  void set_wall_ahead(Duration ahead) { wall_ahead_ = ahead; }
   [[nodiscard]] TimePoint next() const { return next_due(); }
   /// Time never goes back: what is asked for in the past is due now.
   void advance_to(TimePoint when) {
@@ -26,6 +29,7 @@ class VirtualClock final : public Clock {
 
  private:
   void schedule(TimePoint) override {}
+  std::atomic<Duration> wall_ahead_{Duration{}};
   std::atomic<TimePoint> now_{TimePoint(std::chrono::hours(1))};
 };
 

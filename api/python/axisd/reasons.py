@@ -46,6 +46,7 @@ class Reason(enum.StrEnum):
     CANCELLED = "cancelled"
     INTERNAL = "internal"
     RELOADING = "reloading"
+    EEPROM_BUDGET = "eeprom_budget"
 
 
 class Outcome(enum.StrEnum):

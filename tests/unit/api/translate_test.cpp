@@ -189,7 +189,7 @@ TEST(Convert, RefusesMalformedTimes) {
 }
 
 TEST(Status, EveryReasonHasACodeAndKeepsItsDetails) {
-  for (int i = 0; i <= int{std::to_underlying(Reason::reloading)}; ++i) {
+  for (int i = 0; i <= int{std::to_underlying(Reason::eeprom_budget)}; ++i) {
     const auto reason = static_cast<Reason>(i);
     const auto status =
         to_status({.reason = reason, .message = "what", .remedy = "do", .where = {.bus = "line-a"}});

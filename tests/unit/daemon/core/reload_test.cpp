@@ -117,6 +117,17 @@ TEST_F(ReloadedMachine, AnEnergisedAxisIsExchangedForKeysOfTheDaemonOnly) {
   EXPECT_THAT(reasons(), ElementsAre(Reason::busy)) << "it may come back, and move by its terminals";
 }
 
+/// Whoever has used up the day's saves raises the limit without switching the power stage off.
+TEST_F(ReloadedMachine, TheEepromsBudgetIsTheDaemonsAlone) {
+  EXPECT_EQ(complete("a2", EnableRequest{}).state, CommandState::done);
+  auto wanted = configuration_;
+  wanted.axes.at(1).axis.limits.eeprom_saves_per_day = 7;
+  reload(wanted);
+  EXPECT_THAT(refusals_, IsEmpty());
+  ASSERT_TRUE(online("a2"));
+  EXPECT_EQ(machine_->find("a2")->settings().limits.eeprom_saves_per_day, 7U);
+}
+
 TEST_F(ReloadedMachine, AxesComeAndGoInTheOrderOfTheFile) {
   auto wanted = configuration_;
   wanted.axes.insert(wanted.axes.begin(), {.axis = axis(3)});

@@ -85,6 +85,27 @@ TEST(Change, AFailedCountIsKept) {
   EXPECT_EQ(state.axes.at("x").eeprom_writes, 2U);
 }
 
+const EepromRecord one_save{.saves = 1, .by_hour = {{7, 1}}}, two_saves{.saves = 2, .by_hour = {{7, 2}}};
+
+TEST(Change, SavesOfTheDayAreAsTheyWereCountedLast) {
+  StoredState state;
+  apply(state, CountEepromWrites{.axis = "x", .writes = 2, .saves = one_save});
+  apply(state, CountEepromWrites{.axis = "x", .writes = 3, .saves = two_saves});
+  EXPECT_EQ(state.axes.at("x").eeprom, two_saves);
+  const EepromRecord settled{.saves = 2, .by_hour = {}};
+  apply(state, CountEepromWrites{.axis = "x", .writes = 0, .saves = settled});
+  EXPECT_EQ(state.axes.at("x").eeprom, settled);
+}
+
+TEST(Change, FailedSavesOfTheDayAreKeptAndDoNotReplaceNewerOnes) {
+  StoredState state;
+  apply_after_failure(state, CountEepromWrites{.axis = "x", .writes = 2, .saves = one_save});
+  EXPECT_EQ(state.axes.at("x").eeprom, one_save);
+  apply(state, CountEepromWrites{.axis = "x", .writes = 3, .saves = two_saves});
+  apply_after_failure(state, CountEepromWrites{.axis = "x", .writes = 2, .saves = one_save});
+  EXPECT_EQ(state.axes.at("x").eeprom, two_saves);
+}
+
 TEST(Change, AnOlderStateIsNotTrustedAndInhibitsMotion) {
   StoredState state;
   state.start_count = 3;

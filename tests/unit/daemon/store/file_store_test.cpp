@@ -54,6 +54,7 @@ class FileStoreTest : public testing::Test {
 
 TEST_F(FileStoreTest, SavesAreThereAfterARestart) {
   const InhibitRecord inhibit{.active = true, .by = "panel", .since = WallTime(std::chrono::seconds(7))};
+  const EepromRecord saves{.saves = 5, .by_hour = {{472'222, 3}}};
   {
     auto store = open();
     store->save_offset("x", offset(1), record());
@@ -61,7 +62,7 @@ TEST_F(FileStoreTest, SavesAreThereAfterARestart) {
     store->save_offset("y", offset(3), record());
     store->forget_offset("y", record());
     store->save_inhibit(inhibit, record());
-    store->count_eeprom_writes("y", 4, record());
+    store->count_eeprom_writes("y", 4, saves, record());
     EXPECT_TRUE(results_.empty()) << "a callback never comes from inside the call";
     wait_for(6);
     for (const auto& result : results_) EXPECT_TRUE(result);
@@ -70,7 +71,8 @@ TEST_F(FileStoreTest, SavesAreThereAfterARestart) {
   const auto store = open();
   EXPECT_FALSE(store->damage());
   EXPECT_EQ(store->loaded().axes.at("x").offset, offset(2));
-  EXPECT_EQ(store->loaded().axes.at("y"), (AxisRecord{.offset = {}, .eeprom_writes = 4, .holds = {}}));
+  EXPECT_EQ(store->loaded().axes.at("y"),
+            (AxisRecord{.offset = {}, .eeprom_writes = 4, .holds = {}, .eeprom = saves}));
   EXPECT_EQ(store->loaded().inhibit, inhibit);
 }
 
@@ -96,7 +98,7 @@ TEST_F(FileStoreTest, HoldsOutliveARestartUntilTheyAreForgotten) {
     EXPECT_EQ(results_[3].error().reason, Reason::storage);
     EXPECT_EQ(store->current().axes.at("x").holds, (HoldRecords{{panel, noon}})) << "not released";
     repair_disk();
-    store->count_eeprom_writes("x", 1, record());
+    store->count_eeprom_writes("x", 1, {}, record());
     wait_for(6);
     EXPECT_TRUE(results_[5]);
   }
@@ -132,7 +134,7 @@ TEST_F(FileStoreTest, DamageCostsTrustAndInhibitsMotion) {
   {
     auto store = open();
     store->save_offset("x", offset(1), {});
-    store->count_eeprom_writes("x", 2, record());
+    store->count_eeprom_writes("x", 2, {}, record());
     wait_for(1);
     store->save_offset("x", offset(2), record());  // so that the generation before has an offset, too
     wait_for(2);
@@ -160,14 +162,14 @@ TEST_F(FileStoreTest, AFailingDiskIsReportedAndGrantsNothing) {
     break_disk();
     store->save_offset("x", offset(2), record());
     store->save_inhibit(latched, record());
-    store->count_eeprom_writes("x", 1, record());
+    store->count_eeprom_writes("x", 1, {}, record());
     wait_for(4);
     for (std::size_t i = 1; i < 4; ++i) {
       ASSERT_FALSE(results_[i]);
       EXPECT_EQ(results_[i].error().reason, Reason::storage);
     }
     repair_disk();
-    store->count_eeprom_writes("x", 1, record());
+    store->count_eeprom_writes("x", 1, {}, record());
     wait_for(5);
     EXPECT_TRUE(results_[4]);
   }

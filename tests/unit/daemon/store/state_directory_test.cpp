@@ -81,7 +81,7 @@ TEST_F(StateDirectoryTest, BothDamagedIsAnErrorThatSaysWhatToDo) {
 TEST_F(StateDirectoryTest, ANewerFormatIsNotTakenForDamage) {
   save(1);
   save(2);
-  const std::string body = "axisd-state 2\nmore\n";
+  const std::string body = "axisd-state 3\nmore\n";
   char checksum[16];
   std::snprintf(checksum, sizeof checksum, "crc32 %08x\n", crc32(body));
   temporary_.write("state.v1", body + checksum);

@@ -54,6 +54,22 @@ TEST(StateText, FormatIsFixed) {
           encode(example()).substr(encode(example()).size() - 9));
 }
 
+Generation with_saves() {
+  auto generation = example();
+  generation.state.axes["feeder"].eeprom = {.saves = 12, .by_hour = {{-3, 1}, {472'222, 9}}};
+  generation.state.axes["idle"].eeprom = {.saves = 7};
+  return generation;
+}
+
+TEST(StateText, SavesOfTheDayAreVersion2AndOnlyThey) {
+  const auto text = encode(with_saves());
+  EXPECT_TRUE(text.starts_with("axisd-state 2\n"));
+  EXPECT_THAT(text, HasSubstr("axis feeder eeprom_writes=3\neeprom saves=12 by_hour=-3:1,472222:9\noffset "));
+  EXPECT_THAT(text, HasSubstr("axis idle eeprom_writes=0\neeprom saves=7 by_hour=\naxis "));
+  EXPECT_EQ(decode(text), with_saves());
+  EXPECT_FALSE(newer_format(text));
+}
+
 TEST(StateText, ReadsWhatWasWrittenBeforeThereWereHolds) {
   const std::string body =
       "axisd-state 1\ngeneration 3\nstart_count 2\ninhibit active=0 since_ns=0 by=\naxis feeder "
@@ -88,7 +104,7 @@ TEST(StateText, EveryByteSurvivesInAName) {
 }
 
 TEST(StateText, NoTruncationIsAccepted) {
-  const auto text = encode(example());
+  const auto text = encode(with_saves());
   for (std::size_t length = 0; length < text.size(); ++length) {
     const auto decoded = decode(text.substr(0, length));
     ASSERT_FALSE(decoded) << length;
@@ -98,7 +114,7 @@ TEST(StateText, NoTruncationIsAccepted) {
 }
 
 TEST(StateText, NoFlippedBitIsAccepted) {
-  const auto text = encode(example());
+  const auto text = encode(with_saves());
   for (std::size_t bit = 0; bit < text.size() * 8; ++bit) {
     auto flipped = text;
     flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << (bit % 8)));
@@ -153,7 +169,8 @@ TEST(StateText, AcceptsOnlyTheCanonicalForm) {
            {"turn-table_2", "feeder"},
            {"turn-table_2", "aaa"},
            {"turn-table_2 eeprom_writes=0\n", "turn-table_2 eeprom_writes=0\nmore\n"},
-           {"axisd-state 1", "axisd-state 2"},
+           {"axisd-state 1", "axisd-state 2"},  // which it is only with saves
+           {"axisd-state 1", "axisd-state 3"},
            {"\n", "\r\n"}}) {
     const auto changed = replaced(text, what, by);
     ASSERT_FALSE(decode(changed)) << by;
@@ -161,8 +178,29 @@ TEST(StateText, AcceptsOnlyTheCanonicalForm) {
   }
 }
 
+TEST(StateText, AcceptsOnlyTheCanonicalFormOfSaves) {
+  const auto text = encode(with_saves());
+  ASSERT_TRUE(decode(replaced(text, "saves=12", "saves=13")));
+  for (const auto& [what, by] : std::initializer_list<std::pair<const char*, const char*>>{
+           {"axisd-state 2", "axisd-state 1"},
+           {"saves=12", "saves="},
+           {"saves=12", "saves=-1"},
+           {"saves=12", "saves=012"},
+           {"by_hour=-3:1,472222:9", "by_hour=472222:9,-3:1"},
+           {"by_hour=-3:1,472222:9", "by_hour=-3:1,-3:9"},
+           {"by_hour=-3:1,", "by_hour=-3:1,,"},
+           {"by_hour=-3:1,472222:9", "by_hour=-3:1,472222"},
+           {"by_hour=-3:1,472222:9", "by_hour=-3:1,472222:9,"},
+           {"by_hour=-3:1", "by_hour=,-3:1"},
+           {"eeprom saves=7 by_hour=\n", "eeprom saves=0 by_hour=\n"},
+           {"eeprom saves=7 by_hour=\n", "eeprom saves=7\n"}}) {
+    EXPECT_FALSE(decode(replaced(text, what, by))) << by;
+  }
+}
+
 TEST(StateText, TellsANewerFormatFromDamage) {
-  EXPECT_TRUE(newer_format(with_checksum("axisd-state 2\nwhatever\n")));
+  EXPECT_TRUE(newer_format(with_checksum("axisd-state 3\nwhatever\n")));
+  EXPECT_FALSE(newer_format(with_checksum("axisd-state 2\nwhatever\n")));
   EXPECT_FALSE(newer_format(encode(example())));
   EXPECT_FALSE(newer_format(with_checksum("something else\n")));
 }

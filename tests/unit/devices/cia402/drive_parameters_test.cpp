@@ -44,7 +44,7 @@ TEST(Cia402Parameters, SavesTheConfigurationOnceWithPersist) {
   ASSERT_TRUE(identity);
   ASSERT_TRUE(bench.run(bench.drive().configure()));
   const auto written = bench.simulated().eeprom_writes() - before;
-  EXPECT_GE(bench.drive().take_eeprom_writes(), written) << "counted, rather too many than too few";
+  EXPECT_GE(bench.drive().take_eeprom_writes().registers, written) << "counted, rather too many than too few";
   EXPECT_GE(written, 4U);
   bench.cycle_power();
   EXPECT_EQ(bench.simulated().peek(object::microstep.key()), 10U) << "kept";
@@ -53,6 +53,42 @@ TEST(Cia402Parameters, SavesTheConfigurationOnceWithPersist) {
   (void)bench.run(bench.drive().configure());  // may say first that the drive was switched off
   ASSERT_TRUE(bench.run(bench.drive().configure()));
   EXPECT_LE(bench.simulated().eeprom_writes() - again, 2U) << "compared before it is written";
+}
+
+/// Whatever would be saved is asked for, and not sent where it is not permitted.
+TEST(Cia402Parameters, SavesNothingThatIsNotPermitted) {
+  auto setup = with_jog();
+  setup.persist = PersistSettings::all();
+  DriveBench bench({}, setup);
+  std::uint64_t permitted = 0, asked = 0;
+  bench.drive().ask_before_saving([&](std::uint64_t saves) -> Result<void> {
+    asked += saves;
+    if (saves > permitted) return fail(Reason::eeprom_budget, "used up", "wait");
+    return {};
+  });
+  const auto reason = [](const auto& result) { return result ? Reason::internal : result.error().reason; };
+  ASSERT_TRUE(bench.run(bench.drive().identify(TransactionClass::parameters)));
+  const auto before = bench.simulated().eeprom_writes();
+  const auto counted = [&] { return bench.drive().take_eeprom_writes().saves; };
+  for (int attempt = 0; attempt < 3; ++attempt)
+    EXPECT_EQ(reason(bench.run(bench.drive().configure())), Reason::eeprom_budget);
+  EXPECT_EQ(bench.simulated().eeprom_writes(), before);
+  EXPECT_EQ(counted(), 0U);
+  permitted = 20;  // at a time
+  const auto configured = bench.run(bench.drive().configure());
+  ASSERT_TRUE(configured) << to_string(configured.error());
+  const auto after = bench.simulated().eeprom_writes();
+  EXPECT_GT(after, before);
+  EXPECT_GT(counted(), 0U);
+  permitted = 0;
+  asked = 0;
+  EXPECT_EQ(reason(bench.run(bench.drive().save_parameters())), Reason::eeprom_budget);
+  EXPECT_EQ(reason(bench.run(bench.drive().restore_factory({}))), Reason::eeprom_budget);
+  EXPECT_EQ(reason(bench.run(bench.drive().change_serial({.node = 40}))), Reason::eeprom_budget);
+  EXPECT_EQ(asked, 1U + 1U + 3U) << "a new node-ID, and the switch twice";
+  EXPECT_TRUE(bench.run(bench.drive().configure())) << "nothing is to be saved";
+  EXPECT_EQ(bench.simulated().eeprom_writes(), after);
+  EXPECT_EQ(counted(), 0U);
 }
 
 /// M3: the function goes in only while its input is inactive.
@@ -179,7 +215,7 @@ TEST(Cia402Parameters, SavesNothingThatMovesAfterAPowerUp) {
   ASSERT_TRUE(bench.run(bench.drive().write_parameters({{lock_current, 30}})));
   const auto saved = bench.run(bench.drive().save_parameters());
   ASSERT_TRUE(saved) << to_string(saved.error());
-  EXPECT_GT(bench.drive().take_eeprom_writes(), 100U) << "all RW objects";
+  EXPECT_GT(bench.drive().take_eeprom_writes().registers, 100U) << "all RW objects";
   EXPECT_TRUE(bench.run(bench.drive().check_continuity(TransactionClass::parameters))) << "another canary";
   bench.cycle_power();
   EXPECT_EQ(bench.simulated().peek(lock_current), 30U);
