@@ -37,6 +37,7 @@ struct ServerSettings {
       "localhost:7443";     ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
   std::string stop_listen;  ///< of the stop lane, as listen; empty: next to it
   std::optional<TlsSettings> tls;
+  bool reflection = false;  ///< gRPC's, for tools that read the contract from the server
   ServerLimits limits;
 };
 

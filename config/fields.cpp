@@ -225,6 +225,7 @@ Section section_of(const ServerSettings& server) {
   Fields fields("server", {});
   fields.add("listen", server.listen);
   fields.add("stop_listen", server.stop_listen);
+  fields.add("reflection", server.reflection);
   fields.add("limits.calls", server.limits.calls);
   fields.add("limits.streams", server.limits.streams);
   fields.add("limits.connections", server.limits.connections);

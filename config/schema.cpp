@@ -117,6 +117,14 @@ constexpr KeySpec server_keys[] = {
      .description = "Mutual TLS; required where the daemon can be reached from other machines.",
      .children = tls_keys,
      .apply = [](Target& t, const Value&) { t.configuration->server.tls.emplace(); }},
+    {.key = "reflection",
+     .kind = Kind::boolean,
+     .description =
+         "Serves gRPC's reflection, by which tools such as grpcurl read the contract from the daemon. "
+         "For development: clients know it from the .proto files.",
+     .example = "true",
+     .default_value = "false",
+     .apply = [](Target& t, const Value& v) { t.configuration->server.reflection = v.boolean; }},
     {.key = "limits",
      .kind = Kind::section,
      .description = "What clients may take of the daemon; refusals name the key.",

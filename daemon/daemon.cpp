@@ -143,6 +143,7 @@ server::ServerOptions server_options(const config::ServerSettings& settings) {
   const auto& limits = settings.limits;
   return {.listen = {settings.listen},
           .tls = tls_files(settings),
+          .reflection = settings.reflection,
           .limits = {.calls = limits.calls, .streams = limits.streams},
           .connections = limits.connections,
           .stalled_reader_limit = limits.stalled_reader};

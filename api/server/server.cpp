@@ -3,11 +3,11 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/impl/server_builder_option.h>
 #include <grpcpp/resource_quota.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <mutex>
 #include <utility>
 
 #include "api/server/accept_loop.hpp"
@@ -48,13 +48,22 @@ void limit_transport(grpc::ServerBuilder& builder) {
   builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
 }
 
-void enable_plugins() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    grpc::EnableDefaultHealthCheckService(true);
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  });
-}
+/// gRPC would serve reflection in every server of a process, or in none.
+class ReflectionOption final : public grpc::ServerBuilderOption {
+ public:
+  explicit ReflectionOption(bool served) : served_(served) {}
+  void UpdateArguments(grpc::ChannelArguments* /*arguments*/) override {}
+  void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
+    using grpc::reflection::ProtoServerReflectionPlugin;
+    std::erase_if(*plugins, [](const auto& plugin) {
+      return dynamic_cast<const ProtoServerReflectionPlugin*>(plugin.get()) != nullptr;
+    });
+    if (served_) plugins->push_back(std::make_unique<ProtoServerReflectionPlugin>());
+  }
+
+ private:
+  bool served_;
+};
 
 }  // namespace
 
@@ -124,9 +133,10 @@ Result<int> Server::start() {
     std::ranges::move(*opened, std::back_inserter(sockets));
   }
 
-  enable_plugins();
+  grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
   limit_transport(builder);
+  builder.SetOption(std::make_unique<ReflectionOption>(options_.reflection));
   for (grpc::Service* service :
        std::initializer_list<grpc::Service*>{&parts_->axis, &parts_->command, &parts_->system, &parts_->bus,
                                              &parts_->drive, &parts_->event, &parts_->lease, &parts_->group})

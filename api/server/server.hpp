@@ -20,6 +20,8 @@ struct ServerOptions {
   std::vector<std::string> listen{"localhost:7443"};
   /// Mutual TLS on all TCP addresses. Without it only loopback addresses; unix sockets are always plaintext.
   std::optional<TlsFiles> tls{};
+  /// gRPC's reflection; without it its clients get UNIMPLEMENTED.
+  bool reflection = false;
   Admission::Limits limits{};
   int connections = 256;
   /// A stream whose reader has not read for so long is cancelled.

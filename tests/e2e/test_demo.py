@@ -5,8 +5,19 @@ import unittest
 from harness.case import Scenario
 from harness.demo import Demo
 
+REFLECTION = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
+LIST_SERVICES = b"\x3a\x01*"
+
 
 class DemoScenarios(Scenario):
+    def test_tools_can_read_the_contract_from_it(self):
+        demo = Demo()
+        self.addCleanup(demo.close)
+        reflect = demo.client.channel.stream_stream(REFLECTION)
+        (listing,) = list(reflect(iter([LIST_SERVICES]), timeout=60))
+        for service in (b"AxisService", b"CommandService", b"BusService", b"SystemService"):
+            self.assertIn(b"axisd.v1." + service, listing)
+
     def test_rotary_axes_home_again_wherever_they_have_turned(self):
         demo = Demo()
         self.addCleanup(demo.close)

@@ -299,50 +299,69 @@ TEST_F(Calls, CommandsAsResources) {
   EXPECT_EQ(detail_of(status).reason(), v1::REASON_UNKNOWN_COMMAND);
 }
 
+struct GenericReply {
+  grpc::Status status;
+  std::string text;
+};
+
 /// Calls by path, for services whose proto files are not part of the contract.
-std::string generic_call(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
-                         const std::string& request) {
+GenericReply generic_call(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
+                          const std::string& request) {
   grpc::GenericStub stub(channel);
   grpc::CompletionQueue queue;
   Call context;
   const auto call = stub.PrepareCall(&context, path, &queue);
-  void* tag = nullptr;
-  bool ok = false;
-  const auto step = [&] { return queue.Next(&tag, &ok) && ok; };
+  const auto step = [&] {
+    void* tag = nullptr;
+    bool ok = false;  // not of a call that was refused: its status says so
+    EXPECT_TRUE(queue.Next(&tag, &ok));
+  };
   const grpc::Slice slice(request);
   grpc::ByteBuffer out(&slice, 1), in;
   call->StartCall(nullptr);
-  EXPECT_TRUE(step());
+  step();
   call->Write(out, nullptr);
-  EXPECT_TRUE(step());
+  step();
   call->Read(&in, nullptr);
-  EXPECT_TRUE(step());
+  step();
   call->WritesDone(nullptr);
   step();
-  grpc::Status status;
-  call->Finish(&status, nullptr);
+  GenericReply reply;
+  call->Finish(&reply.status, nullptr);
   step();
-  EXPECT_TRUE(status.ok()) << status.error_message();
   std::vector<grpc::Slice> slices;
-  std::string text;
-  if (in.Dump(&slices).ok())
-    for (const auto& part : slices) text.append(reinterpret_cast<const char*>(part.begin()), part.size());
-  return text;
+  if (in.Valid() && in.Dump(&slices).ok())
+    for (const auto& part : slices)
+      reply.text.append(reinterpret_cast<const char*>(part.begin()), part.size());
+  return reply;
 }
 
+const std::string reflection_path = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo";
+const std::string list_services("\x3a\x00", 2);  // list_services: ""
+
 TEST_F(Calls, HealthAndReflectionAreServed) {
-  serve();
-  EXPECT_EQ(generic_call(channel_, "/grpc.health.v1.Health/Check", ""), "\x08\x01");  // SERVING
+  serve({.reflection = true});
+  EXPECT_EQ(generic_call(channel_, "/grpc.health.v1.Health/Check", "").text, "\x08\x01");  // SERVING
   EXPECT_EQ(generic_call(channel_, "/grpc.health.v1.Health/Check",
                          "\x0a\x14"
-                         "axisd.v1.AxisService"),
+                         "axisd.v1.AxisService")
+                .text,
             "\x08\x01");
-  const auto services =
-      generic_call(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
-                   std::string("\x3a\x00", 2));  // list_services: ""
+  const auto services = generic_call(channel_, reflection_path, list_services).text;
   for (const auto* name : {"AxisService", "CommandService", "SystemService", "BusService", "DriveService",
                            "EventService", "LeaseService", "GroupService"})
     EXPECT_THAT(services, HasSubstr(std::string("axisd.v1.") + name));
+}
+
+/// Also in a process that has served it already.
+TEST_F(Calls, ReflectionIsOffUnlessAskedFor) {
+  for (const bool served : {false, true, false}) {
+    serve({.reflection = served});
+    const auto reply = generic_call(channel_, reflection_path, list_services);
+    EXPECT_EQ(reply.status.error_code(), served ? grpc::StatusCode::OK : grpc::StatusCode::UNIMPLEMENTED);
+    EXPECT_EQ(reply.text.empty(), !served);
+    EXPECT_EQ(generic_call(channel_, "/grpc.health.v1.Health/Check", "").text, "\x08\x01") << served;
+  }
 }
 
 TEST_F(Calls, OversizedRequestsAreRefusedAndTheConnectionLives) {
