@@ -45,8 +45,9 @@ std::string_view to_string(Reason reason) {
                                                                  "cancelled",
                                                                  "internal",
                                                                  "reloading",
-                                                                 "eeprom_budget"});
-  static_assert(names.size() == std::to_underlying(Reason::eeprom_budget) + 1U);
+                                                                 "eeprom_budget",
+                                                                 "state_unaccepted"});
+  static_assert(names.size() == std::to_underlying(Reason::state_unaccepted) + 1U);
   return names.at(std::to_underlying(reason));
 }
 

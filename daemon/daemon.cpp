@@ -30,9 +30,8 @@
 #include "daemon/descriptors.hpp"
 #include "daemon/logging.hpp"
 #include "daemon/ports.hpp"
-#include "daemon/store/file_store.hpp"
 #include "daemon/store/flight_files.hpp"
-#include "daemon/store/journal_file.hpp"
+#include "daemon/store/kept_state.hpp"
 
 namespace axisd {
 
@@ -58,9 +57,9 @@ sigset_t ending_signals() {
 }
 
 /// Starts of the daemon are counted durably, so ids never repeat; the random part tells two state directories
-/// apart.
+/// apart, and two runs from copies of the same one.
 std::string make_instance_id(std::uint64_t start_count) {
-  return fmt::format("{:x}{:04x}", start_count, std::random_device{}() & 0xFFFFU);
+  return fmt::format("{:x}{:08x}", start_count, std::random_device{}());
 }
 
 /// Runs `function` on the core thread and waits for its result.
@@ -154,14 +153,11 @@ void log_budget(const BusBudgetReport& budget) {
   for (const auto& warning : config::warnings(budget)) spdlog::warn("{}", warning);
 }
 
-/// Precondition: the directory is locked.
-Result<std::unique_ptr<store::JournalFile>> open_journal(const config::Configuration& configuration,
-                                                         core::CoreLoop& loop) {
-  auto disk = store::open_journal_disk(configuration.state_directory);
-  if (!disk) return fail(disk.error());
+Result<std::unique_ptr<store::KeptState>> open_state(const config::Configuration& configuration,
+                                                     core::CoreLoop& loop) {
   const IdLimits limits{.total = static_cast<std::size_t>(configuration.server.limits.request_ids)};
-  return store::JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), loop.executor(),
-                                  {.bounds = {.most = limits.total + limits.reserve()}});
+  return store::KeptState::open(configuration.state_directory, std::chrono::system_clock::now(),
+                                loop.executor(), {.bounds = {.most = limits.total + limits.reserve()}});
 }
 
 /// What cannot be served as it is asked for would fail at the next start, too.
@@ -195,11 +191,8 @@ int serve(const Options& options, const config::Configuration& configuration, co
   raise_descriptor_limit();
   if (auto enough = check_descriptor_limit(configuration); !enough) return give_up(enough.error());
   core::CoreLoop loop;
-  auto store = store::FileStore::open(configuration.state_directory, loop.executor());
-  if (!store) return give_up(store.error());
-  if ((*store)->damage()) spdlog::error("{}", to_string(*(*store)->damage()));
-  auto journal = open_journal(configuration, loop);
-  if (!journal) return give_up(journal.error());
+  auto state = open_state(configuration, loop);
+  if (!state) return give_up(state.error());
   core::FrameObserver wire_log;
   if (!options.wire_log.empty()) {
     auto opened = logging.open_wire_log(options.wire_log);
@@ -215,13 +208,13 @@ int serve(const Options& options, const config::Configuration& configuration, co
   const auto budgets = config::budgets(configuration);
   for (const auto& budget : budgets) log_budget(budget);
   for (const auto& warning : config::position_warnings(configuration)) spdlog::warn("{}", warning);
-  const auto instance_id = make_instance_id((*store)->loaded().start_count);
+  const auto instance_id = make_instance_id((*state)->state().loaded().start_count);
   core::MachineService* published_to = nullptr;
   core::MachineCore machine(
       {.executor = loop.executor(),
        .clock = &loop.clock(),
-       .persistence = store->get(),
-       .journal = journal->get(),
+       .persistence = &(*state)->state(),
+       .journal = &(*state)->journal(),
        .instance_id = instance_id,
        .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
        .make_port = [&](const auto& network) { return (*ports)->make_port(network); },

@@ -12,6 +12,7 @@
 #include "buses/error.hpp"
 #include "devices/axis/snapshot.hpp"
 #include "devices/configuration_change.hpp"
+#include "devices/kept_state.hpp"
 
 namespace axisd {
 
@@ -81,9 +82,15 @@ struct ConfigurationReloaded {
   std::vector<ConfigurationChange> changes;
 };
 
+/// What the daemon remembers is not certain, so that motion waits; or somebody has accepted that.
+struct KeptStateChange {
+  std::vector<Conviction> convictions;  ///< that stand, or that were accepted
+  std::string accepted_by;              ///< empty: they stand
+};
+
 using EventContent =
     std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten, LeaseChange,
-                 ConfigurationReloaded, StopHoldChange, CommandChange, AxisFault>;
+                 ConfigurationReloaded, StopHoldChange, CommandChange, AxisFault, KeptStateChange>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon

@@ -58,6 +58,22 @@ struct MachineInfo {
   std::string instance_id;  ///< new with every start
   bool inhibited = false;   ///< StopAll is latched
   std::string inhibited_by;
+  /// Why motion waits until the state is accepted; empty: it does not.
+  std::string state_unaccepted;
+};
+
+/// What became of a StopAll.
+struct AllStopped {
+  std::vector<Result<Command>> stops{};  ///< of each axis
+  std::optional<Error>
+      not_durable{};  ///< the latch would not outlive a restart of the daemon; nothing: it does
+};
+
+/// What a machine remembers over restarts, and whether that is certain.
+struct KeptStateReport {
+  KeptStateSeen seen{};                   ///< at the start of the daemon
+  std::vector<Conviction> convictions{};  ///< motion waits until they are accepted; none: it does not
+  std::uint64_t start_count = 0;          ///< of the daemon
 };
 
 /// What became of the release of a held stop.
@@ -92,10 +108,16 @@ class Machine {
   /// is none that is meant), stopping (held anew meanwhile), storage, and, of everybody's, those of leases.
   virtual void release_stop(std::string axis, HoldRelease release,
                             std::function<void(Result<StopReleased>)> callback) = 0;
-  /// Stops all axes and latches the inhibit (M14). Calls back with the stop command of each axis.
-  virtual void stop_all(std::string client, WaitUntil until,
-                        std::function<void(std::vector<Result<Command>>)> callback) = 0;
+  /// Stops all axes and latches the inhibit (M14). Calls back with the stop command of each axis, once it is
+  /// known whether the latch is durable, or that takes longer than a second.
+  virtual void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) = 0;
   virtual void release_inhibit(std::string client, std::function<void(Result<void>)> callback) = 0;
+
+  virtual void kept_state(std::function<void(KeptStateReport)> callback) = 0;
+  /// A person has looked at the convictions: motion waits for them no longer, once that is durable. Calls
+  /// back with those that were accepted; none: there was nothing. Errors: storage (they stand).
+  virtual void accept_state(std::string client,
+                            std::function<void(Result<std::vector<Conviction>>)> callback) = 0;
 
   /// The newest commands of this run of the daemon, newest first, at most `most`; of one axis unless that is
   /// empty. Of a client that gives very many the older ones are forgotten before those of others.

@@ -8,11 +8,13 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
 #include "devices/axis/snapshot.hpp"
 #include "devices/axis/stop_holds.hpp"
+#include "devices/kept_state.hpp"
 
 namespace axisd {
 
@@ -61,6 +63,7 @@ struct StoredState {
       0;  ///< rises with every start of the daemon, also after a damaged file: fencing epoch
   InhibitRecord inhibit;
   std::map<std::string, AxisRecord> axes;  ///< by name; also axes that the configuration no longer has
+  std::vector<Conviction> convictions{};   ///< until somebody has accepted them
   bool operator==(const StoredState&) const = default;
 };
 
@@ -78,6 +81,9 @@ class Persistence {
   /// The same with all that was asked for since, durable or not; what could not be saved as below.
   [[nodiscard]] virtual const StoredState& current() const = 0;
 
+  /// What the start of the daemon found of the files.
+  [[nodiscard]] virtual KeptStateSeen seen() const = 0;
+
   virtual void save_offset(std::string axis, OffsetRecord offset, Callback done) = 0;
   /// The position is no longer known: after a restart there is nothing to restore.
   virtual void forget_offset(std::string axis, Callback done) = 0;
@@ -89,6 +95,8 @@ class Persistence {
   /// `writes` more registers were saved to the drive's EEPROM; `saves`: as they are counted with those.
   virtual void count_eeprom_writes(std::string axis, std::uint64_t writes, EepromRecord saves,
                                    Callback done) = 0;
+  /// A person has looked at the convictions: there are none any more. After an error they stand.
+  virtual void accept_state(Callback done) = 0;
 };
 
 }  // namespace axisd

@@ -18,7 +18,7 @@ template <class Proto, class Domain>
 Proto one_further(Domain value) {
   return static_cast<Proto>(std::to_underlying(value) + 1);
 }
-static_assert(std::to_underlying(Reason::eeprom_budget) + 1 == v1::Reason_MAX);
+static_assert(std::to_underlying(Reason::state_unaccepted) + 1 == v1::Reason_MAX);
 static_assert(std::to_underlying(Outcome::unknown) + 1 == v1::Outcome_MAX);
 static_assert(std::to_underlying(AxisState::error_stop) + 1 == v1::State_MAX);
 static_assert(std::to_underlying(LinkState::online) + 1 == v1::LinkState_MAX);
@@ -66,6 +66,16 @@ void to_proto(const ConfigurationChange& from, v1::ConfigChange& to) {
   for (const auto& key : from.keys) to.add_keys(key);
 }
 static_assert(std::to_underlying(ConfigurationChangeKind::changed) + 1 == v1::CONFIG_CHANGE_KIND_CHANGED);
+
+void to_proto(const Conviction& from, v1::StateConviction& to) {
+  to.set_file(std::string(name_of(from.file)));
+  to.set_fault(one_further<v1::StateFault>(from.fault));
+  to.set_found(from.found);
+  to.set_expected(from.expected);
+  to.set_text(to_string(from));
+  to_proto(from.since, *to.mutable_since());
+}
+static_assert(std::to_underlying(KeptFault::foreign) + 1 == v1::StateFault_MAX);
 
 void to_proto(const Error& from, v1::ErrorDetail& to) {
   to.set_reason(to_proto(from.reason));

@@ -25,6 +25,7 @@ void to_proto(Duration from, google::protobuf::Duration& to);
 void to_proto(WallTime from, google::protobuf::Timestamp& to);
 void to_proto(const Error& from, v1::ErrorDetail& to);
 void to_proto(const ConfigurationChange& from, v1::ConfigChange& to);
+void to_proto(const Conviction& from, v1::StateConviction& to);
 void to_proto(const MotionValues& from, v1::MotionValues& to);
 void to_proto(const Command& from, v1::Command& to);
 /// Those who hold an axis, added to `to`.

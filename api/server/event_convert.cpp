@@ -72,6 +72,12 @@ void fill(const CommandChange& from, v1::Event& event) {
 void fill(const AxisFault& from, v1::Event& event) {
   to_proto(from.cause, *event.mutable_axis_fault()->mutable_cause());
 }
+
+void fill(const KeptStateChange& from, v1::Event& event) {
+  auto& to = *event.mutable_kept_state_change();
+  for (const auto& conviction : from.convictions) to_proto(conviction, *to.add_convictions());
+  to.set_accepted_by(from.accepted_by);
+}
 static_assert(std::to_underlying(StopHoldChange::What::not_durable) + 1 ==
               v1::STOP_HOLD_CHANGE_KIND_NOT_DURABLE);
 
@@ -91,6 +97,7 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const StopHoldChange&) const { return v1::EVENT_KIND_STOP_HOLD_CHANGE; }
     v1::EventKind operator()(const CommandChange&) const { return v1::EVENT_KIND_COMMAND_CHANGE; }
     v1::EventKind operator()(const AxisFault&) const { return v1::EVENT_KIND_AXIS_FAULT; }
+    v1::EventKind operator()(const KeptStateChange&) const { return v1::EVENT_KIND_KEPT_STATE_CHANGE; }
   };
   return std::visit(Kind{}, event.content);
 }

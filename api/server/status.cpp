@@ -63,6 +63,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::stopping:
     case Reason::moving:
     case Reason::inhibited:
+    case Reason::state_unaccepted:
     case Reason::not_trusted:
     case Reason::limit_switch:
     case Reason::alarm:

@@ -136,15 +136,18 @@ void handle(Machine& machine, const v1::StopAllRequest& request, const std::stri
             const ReplyPtr& reply, v1::StopAllResponse* response) {
   auto axes = machine.axis_names();
   machine.stop_all(client, stop_all_wait(request.wait_until()),
-                   [reply, response, client, axes = std::move(axes)](Results results) {
-                     const auto shared = std::make_shared<const Results>(std::move(results));
+                   [reply, response, client, axes = std::move(axes)](AllStopped stopped) {
+                     const auto shared = std::make_shared<const AllStopped>(std::move(stopped));
                      reply->complete(
                          [response, axes, shared] {
-                           to_proto(*shared, axes, *response);
+                           to_proto(shared->stops, axes, *response);
+                           if (shared->not_durable)
+                             to_proto(*shared->not_durable, *response->mutable_not_durable());
                            return grpc::Status::OK;
                          },
                          [client, shared] {
-                           spdlog::info("{}: stop_all of {} axes, inhibit latched", client, shared->size());
+                           spdlog::info("{}: stop_all of {} axes, inhibit latched{}", client,
+                                        shared->stops.size(), shared->not_durable ? ", not durable" : "");
                          });
                    });
 }

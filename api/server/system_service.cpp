@@ -41,6 +41,19 @@ void to_proto(const ConfigurationReload& from, v1::ReloadConfigResponse& to) {
   to.set_revision(from.revision);
 }
 
+void to_proto(KeptFile file, const KeptFileSeen& from, v1::KeptFileState& to) {
+  to.set_name(std::string(name_of(file)));
+  to.set_generation(from.found);
+  to.set_expected(from.expected);
+}
+
+void to_proto(const KeptStateReport& from, v1::GetStateResponse& to) {
+  to_proto(KeptFile::state, from.seen.state, *to.add_files());
+  to_proto(KeptFile::journal, from.seen.journal, *to.add_files());
+  for (const auto& conviction : from.convictions) server::to_proto(conviction, *to.add_convictions());
+  to.set_start_count(from.start_count);
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1::GetInfoRequest*,
@@ -51,6 +64,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1:
   response->set_instance_id(info.instance_id);
   response->set_inhibited(info.inhibited);
   response->set_inhibited_by(info.inhibited_by);
+  response->set_state_unaccepted(info.state_unaccepted);
   return answer(context, grpc::Status::OK);
 }
 
@@ -77,6 +91,36 @@ grpc::ServerUnaryReactor* SystemServiceImpl::ReleaseStopAll(Context* context,
                                         error ? to_string(*error) : "done");
                          });
         });
+      });
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::GetState(Context* context, const v1::GetStateRequest*,
+                                                      v1::GetStateResponse* response) {
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(services_, context, *std::move(ticket),
+                            [&](const std::shared_ptr<PendingCall>& call) {
+                              services_.machine.kept_state([call, response](const KeptStateReport& report) {
+                                call->complete([report, response] {
+                                  to_proto(report, *response);
+                                  return grpc::Status::OK;
+                                });
+                              });
+                            });
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::AcceptState(Context* context, const v1::AcceptStateRequest*,
+                                                         v1::AcceptStateResponse* response) {
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        using All = std::vector<Conviction>;
+        services_.machine.accept_state(client, reply_with_value<All>(call, [response](const All& accepted) {
+                                         for (const auto& conviction : accepted)
+                                           server::to_proto(conviction, *response->add_accepted());
+                                       }));
       });
 }
 

@@ -17,6 +17,10 @@ class SystemServiceImpl final : public v1::SystemService::CallbackService {
                                     v1::StopAllResponse* response) override;
   grpc::ServerUnaryReactor* ReleaseStopAll(Context* context, const v1::ReleaseStopAllRequest* request,
                                            v1::ReleaseStopAllResponse* response) override;
+  grpc::ServerUnaryReactor* GetState(Context* context, const v1::GetStateRequest* request,
+                                     v1::GetStateResponse* response) override;
+  grpc::ServerUnaryReactor* AcceptState(Context* context, const v1::AcceptStateRequest* request,
+                                        v1::AcceptStateResponse* response) override;
   grpc::ServerUnaryReactor* Explain(Context* context, const v1::ExplainRequest* request,
                                     v1::ExplainResponse* response) override;
   grpc::ServerUnaryReactor* GetConfig(Context* context, const v1::GetConfigRequest* request,

@@ -68,6 +68,7 @@ std::unique_ptr<Axis> MachineCore::make_axis(const AxisSettings& settings, AxisF
                       .persistence = parts_.persistence,
                       .leases = &leases_.table(),
                       .inhibited = &inhibited_,
+                      .state_unaccepted = state_gate_.refusal(),
                       .holds = holds_.of(settings.name),
                       .published = parts_.published,
                       .event = [this](const std::string& axis,

@@ -66,6 +66,14 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
           [this](std::string_view axis) {
             if (auto* found = find(axis)) found->refresh();
           }),
+      state_gate_(
+          parts_.persistence,
+          [this](KeptStateChange change) {
+            events_.record(parts_.clock->wall(parts_.clock->now()), {}, std::move(change));
+          },
+          [this] {
+            for (const auto& axis : axes_) axis->refresh();
+          }),
       groups_({.executor = parts_.executor,
                .clock = parts_.clock,
                .book = &book_,
@@ -128,6 +136,7 @@ void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
 }
 
 void MachineCore::start() {
+  state_gate_.start();
   expect_stops();
   for (std::size_t i = 0; i < lines_.size(); ++i) lines_[i]->start(recorders_[i]->exchange_observer());
   for (const auto& network : networks_) network->start();
@@ -244,16 +253,39 @@ void MachineCore::release_stop(const std::string& axis, const HoldRelease& relea
   });
 }
 
-std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client, TimePoint arrived) {
+void MachineCore::save_latch(const std::string& client, std::function<void(std::optional<Error>)> latched) {
+  if (parts_.persistence == nullptr) return latched ? latched(std::nullopt) : void();
+  // Once, whoever comes first: the disk, or the time.
+  auto tell = [kept = std::make_shared<std::function<void(std::optional<Error>)>>(std::move(latched))](
+                  std::optional<Error> error) {
+    if (auto now = std::exchange(*kept, nullptr)) now(std::move(error));
+  };
+  latch_waits_.insert_or_assign(
+      latches_, parts_.clock->call_at(parts_.clock->now() + StopHoldKeeper::longest_wait, [tell] {
+        tell(Error{.reason = Reason::storage,
+                   .message = "the latch of StopAll is not on the disk yet",
+                   .remedy = "keep the machine from moving by other means before the daemon is restarted; "
+                             "check the disk"});
+      }));
+  parts_.persistence->save_inhibit(
+      {.active = true, .by = client, .since = parts_.clock->wall(parts_.clock->now())},
+      [this, alive = std::weak_ptr(alive_), latch = latches_, tell](const Result<void>& saved) {
+        if (!saved) spdlog::error("the inhibit would not survive a restart: {}", to_string(saved.error()));
+        if (alive.expired()) return;
+        latch_waits_.erase(latch);
+        if (saved) return tell(std::nullopt);
+        auto error = saved.error();
+        error.message = "the latch of StopAll would not outlive a restart of the daemon: " + error.message;
+        tell(std::move(error));
+      });
+}
+
+std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client, TimePoint arrived,
+                                                      std::function<void(std::optional<Error>)> latched) {
   ++latches_;
   set_inhibit(true, client);
   spdlog::warn("StopAll by {}: motion is inhibited until it is released", client);
-  if (parts_.persistence != nullptr)
-    parts_.persistence->save_inhibit(
-        {.active = true, .by = client, .since = parts_.clock->wall(parts_.clock->now())},
-        [](const Result<void>& saved) {
-          if (!saved) spdlog::error("the inhibit would not survive a restart: {}", to_string(saved.error()));
-        });
+  save_latch(client, std::move(latched));
   // The line serves stops in the order in which they are queued.
   const auto rank = [](const Axis& axis) {
     if (axis.snapshot()->link == LinkState::offline) return 2;

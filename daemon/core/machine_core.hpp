@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "daemon/core/link_cycler.hpp"
 #include "daemon/core/machine_table.hpp"
 #include "daemon/core/reload.hpp"
+#include "daemon/core/state_gate.hpp"
 #include "daemon/core/stop_hold_keeper.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/command_book.hpp"
@@ -90,12 +92,16 @@ class MachineCore {
   void release_stop(const std::string& axis, const HoldRelease& release,
                     std::function<void(Result<StopReleased>)> done);
   /// Latches the inhibit first, then stops every axis, moving ones first (M14).
-  /// `arrived`: as of CommandOptions.
-  std::vector<Result<CommandPtr>> stop_all(const std::string& client, TimePoint arrived = {});
+  /// `arrived`: as of CommandOptions. `latched` (may be empty) is called once: when the latch is durable, or
+  /// with why it is not, or not yet after StopHoldKeeper::longest_wait.
+  std::vector<Result<CommandPtr>> stop_all(const std::string& client, TimePoint arrived = {},
+                                           std::function<void(std::optional<Error>)> latched = {});
   /// Ends the inhibit once that is durable.
   void release_inhibit(const std::string& client, std::function<void(Result<void>)> done);
   /// Who latched the inhibit, or nullptr. Thread: any.
   [[nodiscard]] boost::shared_ptr<const std::string> inhibited_by() const { return inhibited_by_.load(); }
+  [[nodiscard]] StateGate& state_gate() { return state_gate_; }
+  [[nodiscard]] const StateGate& state_gate() const { return state_gate_; }
   /// Stops what moves, for the end of the daemon. Returns the names of these axes.
   std::vector<std::string> stop_moving_axes();
   [[nodiscard]] bool at_rest() const;
@@ -160,6 +166,7 @@ class MachineCore {
   void on_event(const std::string& axis, EventContent content);
   void note_fault(const Axis& axis, const EventContent& content);
   void set_inhibit(bool inhibited, const std::string& by);
+  void save_latch(const std::string& client, std::function<void(std::optional<Error>)> latched);
 
   MachineParts parts_;
   const std::size_t recorder_memory_;  ///< bytes, of each bus
@@ -170,8 +177,11 @@ class MachineCore {
   FlightRecorder flight_recorder_;
   LeaseKeeper leases_;
   StopHoldKeeper holds_;
+  StateGate state_gate_;
   bool inhibited_ = false;
-  int latches_ = 0;  ///< StopAlls so far
+  int latches_ = 0;                          ///< StopAlls so far
+  std::map<int, Clock::Timer> latch_waits_;  ///< of StopAlls whose latch is not known to be durable yet
+  std::shared_ptr<int> alive_ = std::make_shared<int>();  ///< the disk may answer when this is gone
   boost::atomic_shared_ptr<const std::string> inhibited_by_;
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> lines_;
   std::vector<std::unique_ptr<canopen::CanopenBus>> networks_;

@@ -54,6 +54,7 @@ MachineInfo MachineService::info() const {
     info.inhibited = true;
     info.inhibited_by = *by;
   }
+  if (const auto why = machine_->state_gate().unaccepted()) info.state_unaccepted = *why;
   return info;
 }
 
@@ -132,23 +133,33 @@ void MachineService::release_stop(std::string axis, HoldRelease release,
   });
 }
 
-void MachineService::stop_all(std::string client, WaitUntil until,
-                              std::function<void(std::vector<Result<Command>>)> callback) {
+/// The stops wait for nothing; their answer does for the disk.
+void MachineService::stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) {
   struct Gathering {
-    std::vector<Result<Command>> results;
-    std::size_t missing = 0;
+    AllStopped answer{};
+    std::size_t missing = 1;  ///< the latch, and each stop
+    std::function<void(AllStopped)> callback;
+    void one_more() {
+      if (--missing == 0) callback(std::move(answer));
+    }
   };
-  auto serve = [this, client = std::move(client), arrived = now(), until, callback = std::move(callback)] {
-    const auto commands = machine_->stop_all(client, arrived);
+  auto serve = [this, client = std::move(client), arrived = now(), until,
+                callback = std::move(callback)]() mutable {
     auto gathering = std::make_shared<Gathering>();
-    gathering->results.assign(commands.size(), fail(Reason::internal, "no answer"));
-    gathering->missing = commands.size();
-    if (commands.empty()) return callback({});
+    gathering->callback = std::move(callback);
+    ++gathering->missing;  // until all are counted
+    const auto commands = machine_->stop_all(client, arrived, [gathering](std::optional<Error> error) {
+      gathering->answer.not_durable = std::move(error);
+      gathering->one_more();
+    });
+    gathering->answer.stops.assign(commands.size(), fail(Reason::internal, "no answer"));
+    gathering->missing += commands.size();
     for (std::size_t i = 0; i < commands.size(); ++i)
-      answer(commands[i], until, [gathering, i, callback](Result<Command> result) {
-        gathering->results[i] = std::move(result);
-        if (--gathering->missing == 0) callback(std::move(gathering->results));
+      answer(commands[i], until, [gathering, i](Result<Command> result) {
+        gathering->answer.stops[i] = std::move(result);
+        gathering->one_more();
       });
+    gathering->one_more();
   };
   const auto table = machine_->table();
   std::vector<std::shared_ptr<AxisGate>> gates;
@@ -160,6 +171,18 @@ void MachineService::stop_all(std::string client, WaitUntil until,
 void MachineService::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {
   post(loop_->executor(), [this, client = std::move(client), callback = std::move(callback)]() mutable {
     machine_->release_inhibit(client, std::move(callback));
+  });
+}
+
+void MachineService::kept_state(std::function<void(KeptStateReport)> callback) {
+  post(loop_->executor(),
+       [this, callback = std::move(callback)] { callback(machine_->state_gate().report()); });
+}
+
+void MachineService::accept_state(std::string client,
+                                  std::function<void(Result<std::vector<Conviction>>)> callback) {
+  post(loop_->executor(), [this, client = std::move(client), callback = std::move(callback)] {
+    machine_->state_gate().accept(client, callback);
   });
 }
 

@@ -31,9 +31,11 @@ class MachineService final : public Machine {
                std::function<void(Result<std::vector<Obstacle>>)> callback) override;
   void release_stop(std::string axis, HoldRelease release,
                     std::function<void(Result<StopReleased>)> callback) override;
-  void stop_all(std::string client, WaitUntil until,
-                std::function<void(std::vector<Result<Command>>)> callback) override;
+  void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
+  void kept_state(std::function<void(KeptStateReport)> callback) override;
+  void accept_state(std::string client,
+                    std::function<void(Result<std::vector<Conviction>>)> callback) override;
   void list_commands(std::string axis, std::size_t most,
                      std::function<void(std::vector<Command>)> callback) override;
   void get_command(std::string id, CommandCallback callback) override;

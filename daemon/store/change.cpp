@@ -19,6 +19,7 @@ struct Apply {
     axis.eeprom_writes += change.writes;
     axis.eeprom = change.saves;
   }
+  void operator()(const AcceptState& /*change*/) const { state.convictions.clear(); }
 };
 
 struct ApplyAfterFailure {
@@ -37,6 +38,7 @@ struct ApplyAfterFailure {
     axis.eeprom_writes += change.writes;
     if (axis.eeprom.saves <= change.saves.saves) axis.eeprom = change.saves;  // else more came since
   }
+  void operator()(const AcceptState& /*change*/) const {}
 };
 
 }  // namespace
@@ -47,10 +49,13 @@ void apply_after_failure(StoredState& state, const Change& change) {
   std::visit(ApplyAfterFailure{state}, change);
 }
 
-void distrust(StoredState& state, WallTime now) {
+void distrust_offsets(StoredState& state) {
   for (auto& [name, axis] : state.axes) axis.offset.reset();
+}
+
+void latch_by_caution(StoredState& state, WallTime now) {
   if (!state.inhibit.active)
-    state.inhibit = {.active = true, .by = "axisd: the state file was damaged", .since = now};
+    state.inhibit = {.active = true, .by = "axisd: whether StopAll was latched is not known", .since = now};
 }
 
 }  // namespace axisd::store

@@ -33,18 +33,21 @@ struct CountEepromWrites {
   std::uint64_t writes = 0;
   EepromRecord saves{};
 };
-using Change = std::variant<SetOffset, ForgetOffset, SetInhibit, SetHold, ForgetHolds, CountEepromWrites>;
+struct AcceptState {};
+using Change =
+    std::variant<SetOffset, ForgetOffset, SetInhibit, SetHold, ForgetHolds, CountEepromWrites, AcceptState>;
 
 /// The change as asked.
 void apply(StoredState& state, const Change& change);
 
 /// What is left of a change that could not be saved: the disk may hold either version, so the next save must
 /// not grant more than both. Offsets are void, an inhibit is latched and never released, holds stand, counts
-/// stay counted.
+/// stay counted, convictions stand.
 void apply_after_failure(StoredState& state, const Change& change);
 
-/// An older state in place of a damaged one: no offset is trusted, and motion is inhibited, because the lost
-/// version may have been.
-void distrust(StoredState& state, WallTime now);
+/// An older state in place of the newest one: no offset is trusted.
+void distrust_offsets(StoredState& state);
+/// Nobody vouches for what is known of the latch: motion is inhibited, because it may have been.
+void latch_by_caution(StoredState& state, WallTime now);
 
 }  // namespace axisd::store

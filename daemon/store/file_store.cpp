@@ -1,35 +1,44 @@
 #include "daemon/store/file_store.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "daemon/store/thread.hpp"
 
 namespace axisd::store {
 
-Result<std::unique_ptr<FileStore>> FileStore::open(const std::filesystem::path& directory, Executor core) {
-  auto opened = StateDirectory::open(directory);
-  if (!opened) return std::unexpected(opened.error());
-  auto found = opened->load();
-  if (!found) return std::unexpected(found.error());
-  auto generation = std::move(found->generation).value_or(Generation{});
-  if (found->damage) {
-    distrust(generation.state, std::chrono::system_clock::now());
-    if (auto moved = opened->set_aside(); !moved) return std::unexpected(moved.error());
-  }
+namespace {
+
+/// The journal may have got so much further than the state file knows, in time.
+constexpr auto longest_unknown = std::chrono::seconds(10);
+
+}  // namespace
+
+Result<std::unique_ptr<FileStore>> FileStore::begin(StateDirectory directory, Generation found,
+                                                    KeptStateSeen seen, Executor core) {
   std::unique_ptr<FileStore> store(
-      new FileStore(std::move(*opened), std::move(generation), std::move(found->damage), std::move(core)));
-  if (auto counted = store->count_this_start(); !counted) return std::unexpected(counted.error());
-  store->thread_ = start_thread([self = store.get()] { self->run(); });
+      new FileStore(std::move(directory), std::move(found), seen, std::move(core)));
+  auto counted = store->durable_.state;
+  ++counted.start_count;
+  if (auto written = store->write(counted, store->durable_.state); !written) return fail(written.error());
+  store->loaded_ = *store->current_ = store->durable_.state;
   return store;
 }
 
-FileStore::FileStore(StateDirectory directory, Generation loaded, std::optional<Error> damage, Executor core)
-    : core_(std::move(core)),
-      damage_(std::move(damage)),
-      directory_(std::move(directory)),
-      durable_(std::move(loaded)) {}
+Result<void> FileStore::serve(StateWitness& witness) {
+  witness_ = &witness;
+  // The second time: then the generation before knows this start, too, and falling back on it cannot repeat a
+  // start count.
+  if (auto written = write(durable_.state, durable_.state); !written) return written;
+  thread_ = start_thread([this] { run(); });
+  return {};
+}
 
-FileStore::~FileStore() {
+FileStore::FileStore(StateDirectory directory, Generation found, KeptStateSeen seen, Executor core)
+    : core_(std::move(core)), seen_(seen), directory_(std::move(directory)), durable_(std::move(found)) {}
+
+void FileStore::close() {
   if (!thread_.joinable()) return;
   {
     const std::scoped_lock lock(mutex_);
@@ -37,17 +46,6 @@ FileStore::~FileStore() {
   }
   wake_.notify_one();
   thread_.join();
-}
-
-Result<void> FileStore::count_this_start() {
-  ++durable_.state.start_count;
-  // Twice: then the generation before knows this start, too, and falling back on it cannot repeat a start
-  // count.
-  for (int generation = 0; generation < 2; ++generation) {
-    if (auto written = write(durable_.state); !written) return written;
-  }
-  loaded_ = *current_ = durable_.state;
-  return {};
 }
 
 void FileStore::save_offset(std::string axis, OffsetRecord offset, Callback done) {
@@ -76,6 +74,8 @@ void FileStore::count_eeprom_writes(std::string axis, std::uint64_t writes, Eepr
           std::move(done));
 }
 
+void FileStore::accept_state(Callback done) { enqueue(AcceptState{}, std::move(done)); }
+
 void FileStore::enqueue(Change change, Callback done) {
   store::apply(*current_, change);
   {
@@ -89,12 +89,14 @@ void FileStore::enqueue(Change change, Callback done) {
 void FileStore::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    wake_.wait(lock, [this] { return closing_ || !pending_.empty(); });
+    wake_.wait_for(lock, longest_unknown, [this] { return closing_ || !pending_.empty(); });
     auto batch = std::exchange(pending_, {});
     const bool last = closing_ && batch.empty();
     lock.unlock();
+    // All that the journal was told is on the disk then, and so is to be known, too.
+    if (last) (void)tell_journal(durable_);
     // An empty last batch retries what an earlier failure left unsaved; there is no one left to tell.
-    if (!batch.empty() || disk_differs_) commit(std::move(batch));
+    if (!batch.empty() || journal_is_ahead(last) || (last && disk_differs_)) commit(std::move(batch));
     if (last) return;
     lock.lock();
   }
@@ -104,19 +106,45 @@ void FileStore::commit(std::vector<Pending> batch) {
   auto next = durable_.state;
   for (const auto& pending : batch) apply(next, pending.change);
   Result<void> result;
-  if (disk_differs_ || next != durable_.state) result = write(next);
-  if (!result) {
-    for (const auto& pending : batch) apply_after_failure(durable_.state, pending.change);
+  if (disk_differs_ || batch.empty() || next != durable_.state) {
+    auto cautious = durable_.state;
+    for (const auto& pending : batch) apply_after_failure(cautious, pending.change);
+    result = write(next, cautious);
+    if (!result) {
+      const bool in_one_file = durable_.state == next;
+      durable_.state = cautious;
+      // What was not granted must not stand in either of them.
+      if (in_one_file && cautious != next) (void)write(cautious, cautious);
+    }
   }
   for (auto& pending : batch) report(std::move(pending), result);
 }
 
-Result<void> FileStore::write(const StoredState& state) {
-  Generation next{.number = durable_.number + 1, .state = state};
-  auto saved = directory_.save(encode(next));
-  disk_differs_ = !saved;
-  if (saved) durable_ = std::move(next);
-  return saved;
+/// Into both files: what one of them lost the other has.
+Result<void> FileStore::write(const StoredState& state, const StoredState& after_failure) {
+  Generation next{.number = durable_.number + 1, .journal = durable_.journal, .state = state};
+  if (witness_ != nullptr) next.journal.line = witness_->durable_line();
+  const auto saved = directory_.save(encode(next));
+  if (saved)
+    durable_ = std::move(next);
+  else
+    durable_.state = after_failure;  // of a generation that may be on the disk the journal does not know
+  const auto told = tell_journal(durable_);
+  if (told && witness_ != nullptr) told_line_ = witness_->durable_line();
+  disk_differs_ = !saved || !told;
+  return saved ? told : saved;
+}
+
+Result<void> FileStore::tell_journal(const Generation& generation) {
+  if (witness_ == nullptr) return {};
+  return witness_->note(line_of(generation));
+}
+
+bool FileStore::journal_is_ahead(bool told_again) const {
+  // To be told of a save takes it two lines: the time, and that.
+  constexpr std::uint64_t telling = 2;
+  return witness_ != nullptr && (witness_->durable_line() > told_line_ + (told_again ? telling : 0) ||
+                                 told_line_ > durable_.journal.line + telling);
 }
 
 void FileStore::report(Pending pending, const Result<void>& result) {

@@ -1,16 +1,16 @@
 #pragma once
 
 #include <condition_variable>
-#include <filesystem>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <thread>
 #include <vector>
 
 #include "buses/task.hpp"
 #include "daemon/store/change.hpp"
 #include "daemon/store/state_directory.hpp"
+#include "daemon/store/state_pair.hpp"
+#include "daemon/store/state_witness.hpp"
 #include "devices/persistence.hpp"
 
 namespace axisd::store {
@@ -19,18 +19,23 @@ namespace axisd::store {
 /// disk was busy goes into the next write together. Thread: core (created and destroyed there, too).
 class FileStore final : public Persistence {
  public:
-  /// Locks the directory, loads it and durably counts this start, before anything runs. Blocks on the disk.
-  /// Errors: storage, with what to do.
-  static Result<std::unique_ptr<FileStore>> open(const std::filesystem::path& directory, Executor core);
+  /// Goes on with what was found in the directory, and durably counts this start, before anything runs.
+  /// Blocks on the disk. Errors: storage, with what to do.
+  static Result<std::unique_ptr<FileStore>> begin(StateDirectory directory, Generation found,
+                                                  KeptStateSeen seen, Executor core);
+  /// Saves once more, so that each file knows the other, and begins to serve. Until then nothing is saved.
+  /// `witness` outlives this. Errors: as begin().
+  Result<void> serve(StateWitness& witness);
   /// Writes what is still pending. Callbacks are posted, which no longer run if the core has ended.
-  ~FileStore() override;
+  void close();
+  ~FileStore() override { close(); }
 
   /// Includes this start in start_count.
   [[nodiscard]] const StoredState& loaded() const override { return loaded_; }
   [[nodiscard]] const StoredState& current() const override { return *current_; }
-  /// Set if the newest file was damaged and an older one is used, without its offsets and with motion
-  /// inhibited.
-  [[nodiscard]] const std::optional<Error>& damage() const { return damage_; }
+  [[nodiscard]] KeptStateSeen seen() const override { return seen_; }
+  /// What the journal is to say of the file as it was last saved. Before serve().
+  [[nodiscard]] StateLine line() const { return line_of(durable_); }
 
   void save_offset(std::string axis, OffsetRecord offset, Callback done) override;
   void forget_offset(std::string axis, Callback done) override;
@@ -39,29 +44,33 @@ class FileStore final : public Persistence {
   void forget_holds(std::string axis, HoldRecords holds, Callback done) override;
   void count_eeprom_writes(std::string axis, std::uint64_t writes, EepromRecord saves,
                            Callback done) override;
+  void accept_state(Callback done) override;
 
  private:
   struct Pending {
     Change change;
     Callback done;
   };
-  FileStore(StateDirectory directory, Generation loaded, std::optional<Error> damage, Executor core);
-  Result<void> count_this_start();
+  FileStore(StateDirectory directory, Generation found, KeptStateSeen seen, Executor core);
   void enqueue(Change change, Callback done);
   void run();
   void commit(std::vector<Pending> batch);
-  Result<void> write(const StoredState& state);
+  [[nodiscard]] Result<void> write(const StoredState& state, const StoredState& after_failure);
+  [[nodiscard]] Result<void> tell_journal(const Generation& generation);
+  [[nodiscard]] bool journal_is_ahead(bool told_again) const;
   void report(Pending pending, const Result<void>& result);
 
   Executor core_;
-  std::optional<Error> damage_;
+  KeptStateSeen seen_;
   StoredState loaded_;
   std::shared_ptr<StoredState> current_ = std::make_shared<StoredState>();  ///< of the core
 
   // Of the writing thread, once it runs.
   StateDirectory directory_;
   Generation durable_;         // what the next write starts from
-  bool disk_differs_ = false;  // a write failed: the disk holds something else than durable_
+  bool disk_differs_ = false;  // a write failed: the files hold something else than durable_
+  StateWitness* witness_ = nullptr;
+  std::uint64_t told_line_ = 0;  // the journal's newest line when it was last told of a save
 
   std::mutex mutex_;
   std::condition_variable wake_;

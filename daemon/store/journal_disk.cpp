@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstdio>
@@ -19,6 +18,8 @@ namespace {
 constexpr auto newest = "journal.v1";
 constexpr auto unfinished = "journal.v1.new";
 constexpr auto damaged = "journal.v1.damaged";
+/// Many times what any journal comes to (id_files.hpp); anything longer is not ours.
+constexpr std::size_t largest_journal = std::size_t{256} << 20U;
 
 constexpr std::string_view ids_prefix = "journal-ids-", ids_suffix = ".v1";
 
@@ -29,15 +30,10 @@ class FileDisk final : public JournalDisk {
   FileDisk(std::filesystem::path path, FileDescriptor directory)
       : path_(std::move(path)), directory_(std::move(directory)) {}
 
-  Result<std::optional<std::string>> read() override {
-    const FileDescriptor file(openat(directory_.get(), newest, O_RDONLY | O_CLOEXEC));
-    if (file.get() < 0) {
-      if (errno == ENOENT) return std::nullopt;
-      return failed("open", newest, errno);
-    }
-    std::string text;
-    if (auto got = read_all(file.get(), newest, text, SIZE_MAX); !got) return fail(got.error());
-    return text;
+  Result<FoundFile> read() override {
+    auto found = find_file(directory_.get(), newest, largest_journal);
+    if (found.kind == FoundFile::Kind::unreadable) return failed("read", newest, found.error);
+    return found;
   }
 
   Result<void> append(std::string_view text) override {
@@ -55,7 +51,7 @@ class FileDisk final : public JournalDisk {
 
   Result<void> replace(std::string_view text) override {
     const int at = directory_.get();
-    FileDescriptor file(openat(at, unfinished, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0640));
+    FileDescriptor file(create_anew(at, unfinished, O_APPEND));
     if (file.get() < 0) return failed("create", unfinished, errno);
     if (auto written = write_all(file.get(), unfinished, text); !written) return written;
     if (fsync(file.get()) != 0) return failed("write", unfinished, errno);
@@ -67,15 +63,19 @@ class FileDisk final : public JournalDisk {
 
   Result<void> keep_damaged() override {
     const int at = directory_.get();
-    if (unlinkat(at, damaged, 0) != 0 && errno != ENOENT) return failed("remove", damaged, errno);
-    if (linkat(at, newest, at, damaged, 0) != 0) return failed("keep", newest, errno);
+    if (unlinkat(at, damaged, 0) != 0) (void)unlinkat(at, damaged, AT_REMOVEDIR);
+    // At no moment there is no journal, unless a directory has its name: that has no second one.
+    if (linkat(at, newest, at, damaged, 0) == 0) return {};
+    if (const int error = move_aside(at, newest, damaged); error != 0) return failed("keep", newest, error);
     return {};
   }
 
   Result<void> append_ids(std::uint32_t number, std::uint64_t offset, std::string_view bytes) override {
     const auto name = ids_name(number);
     const int at = directory_.get();
-    const FileDescriptor file(openat(at, name.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0640));
+    const FileDescriptor file(offset == 0
+                                  ? create_anew(at, name.c_str(), 0)
+                                  : openat(at, name.c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
     if (file.get() < 0) return failed("create", name, errno);
     const auto begin = static_cast<off_t>(offset);
     if (ftruncate(file.get(), begin) != 0 || lseek(file.get(), begin, SEEK_SET) != begin)
@@ -89,12 +89,10 @@ class FileDisk final : public JournalDisk {
 
   Result<std::string> read_ids(std::uint32_t number, std::uint64_t most) override {
     const auto name = ids_name(number);
-    const FileDescriptor file(openat(directory_.get(), name.c_str(), O_RDONLY | O_CLOEXEC));
-    std::string bytes;
-    if (file.get() < 0 && errno == ENOENT) return bytes;
-    if (file.get() < 0) return failed("open", name, errno);
-    if (auto got = read_all(file.get(), name.c_str(), bytes, most); !got) return fail(got.error());
-    return bytes;
+    auto found = find_file(directory_.get(), name.c_str(), most);
+    if (found.kind == FoundFile::Kind::unreadable) return failed("read", name, found.error);
+    found.text.resize(std::min<std::uint64_t>(found.text.size(), most));
+    return std::move(found.text);
   }
 
   void keep_ids(const std::vector<std::uint32_t>& files) override {
@@ -116,19 +114,6 @@ class FileDisk final : public JournalDisk {
                                         std::generic_category().message(error)),
                  .remedy = "free space on the disk, and check it and the directory's permissions",
                  .where = {.native_code = static_cast<std::uint32_t>(error)}});
-  }
-  [[nodiscard]] Result<void> read_all(int file, const char* name, std::string& text,
-                                      std::uint64_t most) const {
-    std::array<char, 65536> chunk{};
-    while (text.size() < most) {
-      const auto got = ::read(file, chunk.data(), std::min<std::uint64_t>(chunk.size(), most - text.size()));
-      if (got == 0) break;
-      if (got > 0)
-        text.append(chunk.data(), static_cast<std::size_t>(got));
-      else if (errno != EINTR)
-        return failed("read", name, errno);
-    }
-    return {};
   }
   [[nodiscard]] Result<void> write_all(int file, const char* name, std::string_view text) const {
     while (!text.empty()) {

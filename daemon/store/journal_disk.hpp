@@ -3,13 +3,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "buses/error.hpp"
 #include "buses/file_descriptor.hpp"
+#include "daemon/store/found_file.hpp"
 
 namespace axisd::store {
 
@@ -17,8 +17,8 @@ namespace axisd::store {
 class JournalDisk {
  public:
   virtual ~JournalDisk() = default;
-  /// Nothing: there is none. Errors: storage.
-  [[nodiscard]] virtual Result<std::optional<std::string>> read() = 0;
+  /// As it is found. Errors: storage: it cannot be read.
+  [[nodiscard]] virtual Result<FoundFile> read() = 0;
   /// Appends; survives the end of the daemon, and that of the computer once sync() has returned. Errors:
   /// storage: what is at the end of the file is not known then.
   [[nodiscard]] virtual Result<void> append(std::string_view text) = 0;
@@ -26,7 +26,7 @@ class JournalDisk {
   /// Durably replaces the whole file: at no moment is there none. Errors: storage: it is the old one or the
   /// new one.
   [[nodiscard]] virtual Result<void> replace(std::string_view text) = 0;
-  /// Keeps a second name for the present file, which a person may want to look at.
+  /// Keeps the present file, whatever it is, by another name: a person may want to look at it.
   [[nodiscard]] virtual Result<void> keep_damaged() = 0;
 
   // Files beside it, by number.

@@ -27,19 +27,29 @@ constexpr Duration time_told = std::chrono::seconds(1);
 
 Result<std::unique_ptr<JournalFile>> JournalFile::open(std::unique_ptr<JournalDisk> disk, WallTime now,
                                                        Executor core, JournalOptions options) {
+  const auto found = disk->read();
+  if (!found) return fail(found.error());
+  return begin(std::move(disk), found->regular() ? std::optional(load_journal(found->text)) : std::nullopt,
+               now, std::move(core), std::move(options));
+}
+
+Result<std::unique_ptr<JournalFile>> JournalFile::begin(std::unique_ptr<JournalDisk> disk,
+                                                        std::optional<JournalLoad> found, WallTime now,
+                                                        Executor core, JournalOptions options) {
   std::unique_ptr<JournalFile> journal(new JournalFile(std::move(disk), std::move(core), std::move(options)));
-  const auto text = journal->disk_->read();
-  if (!text) return fail(text.error());
-  if (*text)
-    if (auto loaded = journal->load(**text, now); !loaded) return fail(loaded.error());
+  // Before anything is written: what is in the place of a journal that cannot be used is kept.
+  if (!journal->options_.doubt.empty())
+    if (auto kept = journal->disk_->keep_damaged(); !kept) return fail(kept.error());
+  if (auto loaded = journal->load(std::move(found).value_or(JournalLoad{}), now); !loaded)
+    return fail(loaded.error());
   journal->look_at_clock();
+  if (journal->options_.state) journal->model_.apply(*journal->options_.state);
   if (auto written = journal->settle(); !written) return fail(written.error());
   journal->thread_ = start_thread([self = journal.get()] { self->run(); });
   return journal;
 }
 
-Result<void> JournalFile::load(const std::string& text, WallTime now) {
-  auto load = load_journal(text);
+Result<void> JournalFile::load(JournalLoad load, WallTime now) {
   if (load.newer_format)
     return fail(Reason::storage, "the command journal was written by a newer axisd",
                 "run that version, or move journal.v1 away 10 minutes after the last command");
@@ -49,16 +59,18 @@ Result<void> JournalFile::load(const std::string& text, WallTime now) {
         "out, as nothing was sent for it",
         load.torn);
   model_ = std::move(load.model);
+  last_number_ = std::max(load.last_number, options_.last_number);
   look_at_clock();
   model_.forget_before(model_.now() - remembered);
   auto ids = load_ids(*disk_, still_needed(model_.id_files(), model_.now(), options_.bounds));
   if (!ids) return fail(ids.error());
   model_.set_id_files(std::move(ids->files));
   if (load.damage.empty()) load.damage = std::move(ids->damage);
-  if (!load.damage.empty()) {
-    model_.apply(DoubtLine{.until = now + longest_validity, .damage = load.damage});
+  if (!load.damage.empty() && options_.doubt.empty())
     if (auto kept = disk_->keep_damaged(); !kept) return kept;
-  }
+  if (load.damage.empty()) load.damage = options_.doubt;
+  if (!load.damage.empty())
+    model_.apply(DoubtLine{.until = now + longest_validity, .damage = std::move(load.damage)});
   // A clock that was set back meanwhile does not make the doubt longer than it was.
   auto content = model_.content();
   if (content.doubtful_until)
@@ -120,6 +132,13 @@ void JournalFile::heard(const Command& command, RequestKey request) {
   enqueue({.line = HeardLine{.command = command, .request = std::move(request)}});
 }
 
+Result<void> JournalFile::note(StateLine line) {
+  std::promise<Result<void>> told;
+  auto answer = told.get_future();
+  enqueue({.line = std::move(line), .durable = true, .told = &told});
+  return answer.get();
+}
+
 void JournalFile::enqueue(Pending pending) {
   {
     // Held by the writer only for a swap: the core does not wait for the disk.
@@ -153,8 +172,10 @@ void JournalFile::commit(std::vector<Pending> batch) {
   // What a failed write left at the end of the file is not known, nor what a failed sync left out.
   const auto written = was_broken ? rewrite() : write(batch);
   broken_ = !written;
-  for (auto& pending : batch)
+  for (auto& pending : batch) {
     if (pending.done) post(core_, [done = std::move(pending.done), written] { done(written); });
+    if (pending.told != nullptr) pending.told->set_value(written);
+  }
   if (!written) return tell(written.error());
   if (was_broken) tell(std::nullopt);
   if (size_ < std::max(smallest_rewrite, 2 * size_when_rewritten_)) return;
@@ -193,13 +214,16 @@ Result<void> JournalFile::write(const std::vector<Pending>& batch) {
   if (auto appended = disk_->append(text); !appended) return appended;
   size_ += text.size();
   if (std::ranges::none_of(batch, &Pending::durable)) return {};
-  return disk_->sync();
+  if (auto synced = disk_->sync(); !synced) return synced;
+  durable_line_ = last_number_;
+  return {};
 }
 
 Result<void> JournalFile::rewrite() {
   std::string text(journal_header);
   for (const auto& line : model_.lines()) text += encode_line(++last_number_, line);
   if (auto replaced = disk_->replace(text); !replaced) return replaced;
+  durable_line_ = last_number_;
   size_ = size_when_rewritten_ = text.size();
   return {};
 }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,6 +15,7 @@
 #include "daemon/store/id_files.hpp"
 #include "daemon/store/journal_disk.hpp"
 #include "daemon/store/journal_model.hpp"
+#include "daemon/store/state_witness.hpp"
 #include "devices/axis/command_journal.hpp"
 
 namespace axisd::store {
@@ -24,16 +27,25 @@ struct JournalOptions {
   IdBounds bounds{};
   /// Within one start of the computer monotonic_now() tells how long anything takes.
   std::string boot = boot_id();
+  /// What it is to say of the state file from its first line on; nothing: what it says already.
+  std::optional<StateLine> state{};
+  /// Why it does not know all that it should, beside what its lines tell; empty: it does.
+  std::string doubt{};
+  std::uint64_t last_number = 0;  ///< its lines have higher ones
 };
 
 /// The command journal in a file, written by a thread of its own: what is told while the disk is busy goes
 /// into the next write together. Thread: core (created and destroyed there, too).
-class JournalFile final : public CommandJournal {
+class JournalFile final : public CommandJournal, public StateWitness {
  public:
   /// Loads the journal and durably begins a new one with what is still needed. Blocks on the disk. Errors:
   /// storage, with what to do.
   static Result<std::unique_ptr<JournalFile>> open(std::unique_ptr<JournalDisk> disk, WallTime now,
                                                    Executor core, JournalOptions options = {});
+  /// The same with what was read before; nothing: there is none that can be used.
+  static Result<std::unique_ptr<JournalFile>> begin(std::unique_ptr<JournalDisk> disk,
+                                                    std::optional<JournalLoad> found, WallTime now,
+                                                    Executor core, JournalOptions options);
   JournalFile(const JournalFile&) = delete;
   /// Writes what is still pending. Callbacks are posted, which no longer run if the core has ended.
   ~JournalFile() override;
@@ -45,15 +57,18 @@ class JournalFile final : public CommandJournal {
   void sending(const Command& command, SendingNote note, Callback done) override;
   void ended(const Command& command) override;
   void heard(const Command& command, RequestKey request) override;
+  Result<void> note(StateLine line) override;
+  [[nodiscard]] std::uint64_t durable_line() const override { return durable_line_; }
 
  private:
   struct Pending {
     JournalLine line;
     bool durable = false;
     Callback done{};
+    std::promise<Result<void>>* told = nullptr;  ///< waits for it, on a thread of its own
   };
   JournalFile(std::unique_ptr<JournalDisk> disk, Executor core, JournalOptions options);
-  [[nodiscard]] Result<void> load(const std::string& text, WallTime now);
+  [[nodiscard]] Result<void> load(JournalLoad found, WallTime now);
   void look_at_clock();
   [[nodiscard]] Result<void> settle();
   void enqueue(Pending pending);
@@ -74,6 +89,7 @@ class JournalFile final : public CommandJournal {
   JournalModel model_;
   std::optional<Duration> told_time_;  ///< the last one that was written
   std::uint64_t last_number_ = 0;
+  std::atomic<std::uint64_t> durable_line_ = 0;
   std::size_t size_ = 0, size_when_rewritten_ = 0;  ///< of the file, bytes
   bool broken_ = false;  ///< the last write failed: what the file ends with is not known
 

@@ -157,7 +157,8 @@ void JournalModel::drop(const std::vector<std::string>& commands) {
 
 std::vector<JournalLine> JournalModel::lines() const {
   std::vector<JournalLine> lines;
-  lines.reserve(3 * entries_.size() + id_files_.size() + 2);
+  lines.reserve(3 * entries_.size() + id_files_.size() + 3);
+  if (state_) lines.emplace_back(*state_);
   if (doubt_) lines.emplace_back(*doubt_);
   for (const auto& file : id_files_) lines.emplace_back(file);
   Duration time{};
@@ -198,7 +199,8 @@ JournalContent JournalModel::content() const {
 
 JournalLoad load_journal(std::string_view text) {
   JournalLoad load;
-  if (!text.starts_with(journal_header) && !text.starts_with(journal_header_1)) {
+  if (!text.starts_with(journal_header) && !text.starts_with(journal_header_2) &&
+      !text.starts_with(journal_header_1)) {
     load.newer_format = text.starts_with(journal_header_any) && text.find('\n') != std::string_view::npos;
     if (!load.newer_format) load.damage = "the first line is not that of a journal";
     if (load.newer_format) return load;
@@ -225,6 +227,7 @@ JournalLoad load_journal(std::string_view text) {
     if (last != 0 && line->number != last + 1)
       damaged(fmt::format("number {} follows {}", line->number, last));
     last = line->number;
+    load.last_number = std::max(load.last_number, last);
     load.model.apply(line->line);
   }
   return load;

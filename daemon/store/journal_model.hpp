@@ -39,6 +39,9 @@ class JournalModel {
 
   void doubt_is_over() { doubt_.reset(); }
 
+  /// What it last heard of the state file.
+  [[nodiscard]] const std::optional<StateLine>& state() const { return state_; }
+
   /// The shortest journal that says the same.
   [[nodiscard]] std::vector<JournalLine> lines() const;
   /// Without what is in the files of ids.
@@ -59,6 +62,7 @@ class JournalModel {
   void apply_line(const TimeLine& line);
   void apply_line(const HeardLine& line);
   void apply_line(const IdsLine& line);
+  void apply_line(const StateLine& line) { state_ = line; }
   [[nodiscard]] bool awaits_reset(const Command& command) const;
 
   Duration time_{};               ///< of what is applied
@@ -68,6 +72,7 @@ class JournalModel {
   std::unordered_map<std::string, std::list<Entry>::iterator> by_id_;
   std::map<std::string, std::string> unknown_outcomes_;  ///< axis -> id
   std::optional<DoubtLine> doubt_;
+  std::optional<StateLine> state_;
   std::vector<IdsLine> id_files_;  ///< the oldest first
 };
 
@@ -78,7 +83,8 @@ struct JournalLoad {
   /// Bytes of a last line that was never written whole, and so never made durable: nothing was sent for it.
   /// Left out, and no damage.
   std::size_t torn = 0;
-  bool newer_format = false;  ///< intact as far as can be told, but not to be read by this build
+  std::uint64_t last_number = 0;  ///< the highest of a line; 0: there is none
+  bool newer_format = false;      ///< intact as far as can be told, but not to be read by this build
 };
 JournalLoad load_journal(std::string_view text);
 

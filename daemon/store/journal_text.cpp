@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <utility>
 
 #include "daemon/store/line_text.hpp"
 #include "devices/axis/names.hpp"
@@ -58,7 +59,7 @@ class Reader : public LineReader {
   bool reason(Reason& value) {
     std::string text;
     if (!word(text)) return false;
-    for (int i = 0; i <= static_cast<int>(Reason::eeprom_budget); ++i) {
+    for (int i = 0; i <= static_cast<int>(Reason::state_unaccepted); ++i) {
       value = static_cast<Reason>(i);
       if (to_string(value) == text) return true;
     }
@@ -175,6 +176,16 @@ struct Encode {
     return fmt::format("ids file={} bytes={} count={} begin={} newest={}", line.file, line.bytes, line.count,
                        line.begin.count(), line.newest.count());
   }
+  std::string operator()(const StateLine& line) const {
+    auto text = fmt::format("state pair={} generation={} start_count={} inhibit={:d} since={} by={}",
+                            escape(line.pair), line.generation, line.start_count, line.inhibit.active,
+                            in_ns(line.inhibit.since), escape(line.inhibit.by));
+    for (const auto& [axis, holds] : line.holds)
+      for (const auto& [key, since] : holds)
+        text += fmt::format(" hold={} since={} request={} by={}", escape(axis), in_ns(since),
+                            escape(key.request_id), escape(key.holder));
+    return text;
+  }
 };
 
 bool read_accepted(Reader& reader, AcceptedLine& line) {
@@ -261,6 +272,26 @@ bool read_ids(Reader& reader, IdsLine& line) {
          reader.duration(line.newest);
 }
 
+bool read_state(Reader& reader, StateLine& line) {
+  if (!reader.literal("pair=") || !reader.word(line.pair) || !reader.literal(" generation=") ||
+      !reader.number(line.generation) || !reader.literal(" start_count=") ||
+      !reader.number(line.start_count) || !reader.literal(" inhibit=") || !reader.flag(line.inhibit.active) ||
+      !reader.literal(" since=") || !reader.time(line.inhibit.since) || !reader.literal(" by=") ||
+      !reader.word(line.inhibit.by))
+    return false;
+  while (reader.literal(" hold=")) {
+    std::string axis;
+    HoldKey key;
+    WallTime since{};
+    if (!reader.word(axis) || !reader.literal(" since=") || !reader.time(since) ||
+        !reader.literal(" request=") || !reader.word(key.request_id) || !reader.literal(" by=") ||
+        !reader.word(key.holder))
+      return false;
+    line.holds[axis].emplace(std::move(key), since);
+  }
+  return true;
+}
+
 template <class Line>
 std::optional<JournalLine> parsed(Reader& reader, bool (*read)(Reader&, Line&)) {
   Line line;
@@ -277,6 +308,7 @@ std::optional<JournalLine> parse(Reader& reader) {
   if (reader.literal("time ")) return parsed(reader, read_time);
   if (reader.literal("heard ")) return parsed(reader, read_heard);
   if (reader.literal("ids ")) return parsed(reader, read_ids);
+  if (reader.literal("state ")) return parsed(reader, read_state);
   return std::nullopt;
 }
 

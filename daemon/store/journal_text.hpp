@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -9,6 +10,7 @@
 #include <variant>
 
 #include "devices/axis/command_journal.hpp"
+#include "devices/persistence.hpp"
 
 namespace axisd::store {
 
@@ -54,11 +56,22 @@ struct IdsLine {
   Duration begin{}, newest{};  ///< the first and the last time one of them was last heard of
   bool operator==(const IdsLine&) const = default;
 };
-using JournalLine =
-    std::variant<AcceptedLine, AttachedLine, SendingLine, EndedLine, DoubtLine, TimeLine, HeardLine, IdsLine>;
+/// The state file was saved: which generation of it there is, and what of it must not be lost, once more.
+struct StateLine {
+  std::string pair;              ///< as in the state file
+  std::uint64_t generation = 0;  ///< of the state file, at least
+  std::uint64_t start_count = 0;
+  InhibitRecord inhibit{};
+  std::map<std::string, HoldRecords> holds{};  ///< by axis
+  bool operator==(const StateLine&) const = default;
+};
+using JournalLine = std::variant<AcceptedLine, AttachedLine, SendingLine, EndedLine, DoubtLine, TimeLine,
+                                 HeardLine, IdsLine, StateLine>;
 
-inline constexpr std::string_view journal_header = "axisd-journal 2\n";
-/// Of before there were times and ids: this build reads it, too.
+inline constexpr std::string_view journal_header = "axisd-journal 3\n";
+/// Of before it vouched for the state file, and of before there were times and ids: this build reads them,
+/// too.
+inline constexpr std::string_view journal_header_2 = "axisd-journal 2\n";
 inline constexpr std::string_view journal_header_1 = "axisd-journal 1\n";
 inline constexpr std::string_view journal_header_any = "axisd-journal ";
 
@@ -67,7 +80,7 @@ std::string encode_line(std::uint64_t number, const JournalLine& line);
 
 struct NumberedLine {
   std::uint64_t number = 0;
-  JournalLine line;
+  JournalLine line{};
 };
 /// Without its end of line. Nothing: damaged.
 std::optional<NumberedLine> decode_line(std::string_view text);

@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <system_error>
@@ -18,6 +17,7 @@ namespace {
 constexpr auto newest = "state.v1";
 constexpr auto previous = "state.v1.previous";
 constexpr auto damaged = "state.v1.damaged";
+constexpr auto previous_damaged = "state.v1.previous.damaged";
 constexpr auto newest_unfinished = "state.v1.new";
 constexpr auto previous_unfinished = "state.v1.previous.new";
 constexpr std::size_t largest_file = 16U << 20U;  // thousands of axes; anything longer is not ours
@@ -51,57 +51,17 @@ Result<StateDirectory> StateDirectory::open(const std::filesystem::path& path) {
   return StateDirectory(path, std::move(directory));
 }
 
-Result<std::optional<std::string>> StateDirectory::read(const char* name) const {
-  const FileDescriptor file(openat(directory_.get(), name, O_RDONLY | O_CLOEXEC));
-  if (file.get() < 0) {
-    if (errno == ENOENT) return std::nullopt;
-    return failed("open", name, errno);
-  }
-  std::string text;
-  std::array<char, 4096> chunk{};
-  while (text.size() <= largest_file) {
-    const auto got = ::read(file.get(), chunk.data(), chunk.size());
-    if (got == 0) break;
-    if (got > 0)
-      text.append(chunk.data(), static_cast<std::size_t>(got));
-    else if (errno != EINTR)
-      return failed("read", name, errno);
-  }
-  return text;
-}
-
-Result<StateDirectory::Loaded> StateDirectory::load() const {
-  const auto text = read(newest);
-  if (!text) return std::unexpected(text.error());
-  const auto before = read(previous);
-  if (!before) return std::unexpected(before.error());
-  if (!*text && !*before) return Loaded{};
-
-  const auto file = (path_ / newest).string();
-  auto current = *text ? decode(**text) : fail(Reason::storage, "missing");
-  if (current) return Loaded{.generation = *std::move(current), .damage = {}};
-  for (const auto& candidate : {*text, *before}) {
-    if (candidate && newer_format(*candidate))
-      return fail(
-          Reason::storage, fmt::format("{} was written by a newer axisd", file),
-          "run that version, or move the state directory's files away (every axis then needs homing)");
-  }
-  auto fallback = *before ? decode(**before) : fail(Reason::storage, "missing");
-  if (!fallback)
-    return fail(Reason::storage,
-                fmt::format("{} is damaged ({}), and so is the generation before it ({})", file,
-                            current.error().message, fallback.error().message),
-                "check the disk; moving the state.v1 files away starts anew: every axis then needs homing, "
-                "and a latched StopAll is forgotten");
-  return Loaded{.generation = *std::move(fallback),
-                .damage = Error{.reason = Reason::storage,
-                                .message = fmt::format("{} is damaged ({}); using the generation before it",
-                                                       file, current.error().message),
-                                .remedy = "home the axes, release the stop, and check the disk"}};
+Result<StateDirectory::Found> StateDirectory::find() const {
+  Found found{.newest = find_file(directory_.get(), newest, largest_file),
+              .previous = find_file(directory_.get(), previous, largest_file)};
+  if (found.newest.kind == FoundFile::Kind::unreadable) return failed("read", newest, found.newest.error);
+  if (found.previous.kind == FoundFile::Kind::unreadable)
+    return failed("read", previous, found.previous.error);
+  return found;
 }
 
 Result<void> StateDirectory::write(const char* name, std::string_view text) const {
-  FileDescriptor file(openat(directory_.get(), name, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
+  FileDescriptor file(create_anew(directory_.get(), name, 0));
   if (file.get() < 0) return failed("create", name, errno);
   while (!text.empty()) {
     const auto put = ::write(file.get(), text.data(), text.size());
@@ -132,9 +92,12 @@ Result<void> StateDirectory::save(std::string_view text) {
   return {};
 }
 
-Result<void> StateDirectory::set_aside() {
-  const int at = directory_.get();
-  if (renameat(at, newest, at, damaged) != 0 && errno != ENOENT) return failed("move aside", newest, errno);
+Result<void> StateDirectory::set_aside(KeptFile file) {
+  const bool is_newest = file == KeptFile::state;
+  const auto* name = is_newest ? newest : previous;
+  if (const int error = move_aside(directory_.get(), name, is_newest ? damaged : previous_damaged);
+      error != 0)
+    return failed("move aside", name, error);
   return {};
 }
 

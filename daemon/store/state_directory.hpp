@@ -2,14 +2,13 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
-#include <string>
 #include <string_view>
 #include <utility>
 
 #include "buses/error.hpp"
 #include "buses/file_descriptor.hpp"
-#include "daemon/store/state_text.hpp"
+#include "daemon/store/found_file.hpp"
+#include "devices/kept_state.hpp"
 
 namespace axisd::store {
 
@@ -21,25 +20,26 @@ class StateDirectory {
   /// daemon).
   static Result<StateDirectory> open(const std::filesystem::path& path);
 
-  struct Loaded {
-    std::optional<Generation> generation;  ///< empty: nothing was ever saved here
-    std::optional<Error> damage;           ///< the newest was unusable, and `generation` is the one before
+  /// `state.v1` and `state.v1.previous` as they are.
+  struct Found {
+    FoundFile newest{}, previous{};
   };
-  /// Errors: storage (unreadable, of a newer format, or no usable generation left: says what to do).
-  [[nodiscard]] Result<Loaded> load() const;
+  /// Errors: storage (unreadable: says what to do).
+  [[nodiscard]] Result<Found> find() const;
 
   /// Returns when `text` is durable as the newest generation. After an error either version may be on the
   /// disk.
   Result<void> save(std::string_view text);
 
-  /// Moves a damaged newest file aside (`state.v1.damaged`), so that it does not become the previous
-  /// generation.
-  Result<void> set_aside();
+  /// Moves a file that cannot be used aside (`state.v1.damaged`, `state.v1.previous.damaged`), so that it
+  /// does not become the previous generation, and somebody can look at it. Not of the journal.
+  Result<void> set_aside(KeptFile file);
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
   StateDirectory(std::filesystem::path path, FileDescriptor directory)
       : path_(std::move(path)), directory_(std::move(directory)) {}
-  [[nodiscard]] Result<std::optional<std::string>> read(const char* name) const;
   [[nodiscard]] Result<void> write(const char* name, std::string_view text) const;
   [[nodiscard]] std::unexpected<Error> failed(std::string_view what, std::string_view name, int error) const;
 

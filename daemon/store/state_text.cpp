@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <utility>
 
@@ -12,10 +13,9 @@ namespace axisd::store {
 namespace {
 
 constexpr std::string_view header = "axisd-state ";
-constexpr std::string_view version_line = "axisd-state 1\n";
-/// With `eeprom` lines, which version 1 has not. A state without them is written as version 1, so that it
-/// stays readable for an axisd that knows no other.
-constexpr std::string_view version_line_with_saves = "axisd-state 2\n";
+constexpr std::string_view version_line = "axisd-state 2\n";
+/// Of before the journal vouched for it and saves to the EEPROM were counted: this build reads it, too.
+constexpr std::string_view version_line_1 = "axisd-state 1\n";
 constexpr std::string_view trailer = "crc32 ";
 constexpr std::size_t trailer_size = trailer.size() + 8 + 1;  // eight hexadecimal digits, end of line
 
@@ -34,9 +34,24 @@ std::string_view trust_word(PositionTrust trust) {
   return "unknown";
 }
 
+constexpr auto files = std::to_array<std::string_view>({"state", "previous", "journal"});
+constexpr auto faults = std::to_array<std::string_view>(
+    {"missing", "rolled_back", "damaged", "not_regular", "swapped", "foreign"});
+static_assert(files.size() == std::to_underlying(KeptFile::journal) + 1U);
+static_assert(faults.size() == std::to_underlying(KeptFault::foreign) + 1U);
+
 class Reader : public LineReader {
  public:
   using LineReader::LineReader;
+
+  /// An enumeration by its word.
+  template <class Value, std::size_t size>
+  bool one_of(const std::array<std::string_view, size>& words, Value& value) {
+    std::string text;
+    const auto found = word(text) ? std::ranges::find(words, text) : words.end();
+    value = static_cast<Value>(found - words.begin());
+    return found != words.end();
+  }
 
   bool trust(PositionTrust& value) {
     for (const auto candidate :
@@ -111,15 +126,36 @@ bool read_axis(Reader& reader, std::map<std::string, AxisRecord>& axes) {
   return axes.emplace(std::move(name), axis).second;
 }
 
+/// After its "convicted".
+bool read_conviction(Reader& reader, Conviction& conviction) {
+  std::int64_t since = 0;
+  const bool ok = reader.literal(" file=") && reader.one_of(files, conviction.file) &&
+                  reader.literal(" fault=") && reader.one_of(faults, conviction.fault) &&
+                  reader.literal(" found=") && reader.number(conviction.found) &&
+                  reader.literal(" expected=") && reader.number(conviction.expected) &&
+                  reader.literal(" since_ns=") && reader.number(since) && reader.literal(" detail=") &&
+                  reader.word(conviction.detail) && reader.literal("\n");
+  conviction.since = WallTime(std::chrono::nanoseconds(since));
+  return ok;
+}
+
+bool read_mark(Reader& reader, JournalMark& mark) {
+  return reader.literal("pair ") && reader.word(mark.pair) && reader.literal(" journal_line=") &&
+         reader.number(mark.line) && reader.literal("\n");
+}
+
 std::optional<Generation> read_generation(std::string_view body) {
   Reader reader(body);
   Generation generation;
   auto& state = generation.state;
-  const bool known = reader.literal(version_line) || reader.literal(version_line_with_saves);
-  if (!known || !reader.literal("generation ") || !reader.number(generation.number) ||
-      !reader.literal("\nstart_count ") || !reader.number(state.start_count) || !reader.literal("\n") ||
-      !read_inhibit(reader, state.inhibit))
+  const bool before = reader.literal(version_line_1);
+  if ((!before && !reader.literal(version_line)) || !reader.literal("generation ") ||
+      !reader.number(generation.number) || !reader.literal("\n") ||
+      (!before && !read_mark(reader, generation.journal)) || !reader.literal("start_count ") ||
+      !reader.number(state.start_count) || !reader.literal("\n") || !read_inhibit(reader, state.inhibit))
     return std::nullopt;
+  while (!before && reader.literal("convicted"))
+    if (!read_conviction(reader, state.convictions.emplace_back())) return std::nullopt;
   while (!reader.at_end()) {
     if (!reader.literal("axis ") || !read_axis(reader, state.axes)) return std::nullopt;
   }
@@ -152,13 +188,19 @@ std::optional<std::string_view> intact_body(std::string_view text) {
 }  // namespace
 
 std::string encode(const Generation& generation) {
-  const auto& [number, state] = generation;
-  const bool saves =
-      std::ranges::any_of(state.axes, [](const auto& axis) { return axis.second.eeprom != EepromRecord{}; });
-  std::string text(saves ? version_line_with_saves : version_line);
-  text += fmt::format("generation {}\nstart_count {}\ninhibit active={:d} since_ns={} by={}\n", number,
-                      state.start_count, state.inhibit.active, ns_of(state.inhibit.since),
-                      escape(state.inhibit.by));
+  const auto& [number, mark, state] = generation;
+  const bool before = mark == JournalMark{} && state.convictions.empty() &&
+                      std::ranges::all_of(state.axes, [](const auto& axis) { return axis.second.eeprom == EepromRecord{}; });
+  std::string text(before ? version_line_1 : version_line);
+  text += fmt::format("generation {}\n", number);
+  if (!before) text += fmt::format("pair {} journal_line={}\n", escape(mark.pair), mark.line);
+  text += fmt::format("start_count {}\ninhibit active={:d} since_ns={} by={}\n", state.start_count,
+                      state.inhibit.active, ns_of(state.inhibit.since), escape(state.inhibit.by));
+  for (const auto& conviction : state.convictions)
+    text += fmt::format("convicted file={} fault={} found={} expected={} since_ns={} detail={}\n",
+                        files.at(std::to_underlying(conviction.file)),
+                        faults.at(std::to_underlying(conviction.fault)), conviction.found,
+                        conviction.expected, ns_of(conviction.since), escape(conviction.detail));
   for (const auto& [name, axis] : state.axes) {
     text += fmt::format("axis {} eeprom_writes={}\n", escape(name), axis.eeprom_writes);
     if (axis.eeprom != EepromRecord{}) text += saves_line(axis.eeprom);
@@ -183,7 +225,7 @@ Result<Generation> decode(std::string_view text) {
 bool newer_format(std::string_view text) {
   const auto body = intact_body(text);
   return body && body->starts_with(header) && !body->starts_with(version_line) &&
-         !body->starts_with(version_line_with_saves);
+         !body->starts_with(version_line_1);
 }
 
 }  // namespace axisd::store

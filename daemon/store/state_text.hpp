@@ -11,13 +11,22 @@
 
 namespace axisd::store {
 
+/// Which journal a state file belongs to.
+struct JournalMark {
+  std::string pair{};      ///< both files have it; empty: the file is of before there was one
+  std::uint64_t line = 0;  ///< the journal had this one when the state was saved; 0: there was no journal yet
+  bool operator==(const JournalMark&) const = default;
+};
+
 /// One generation of the state file.
 struct Generation {
   std::uint64_t number = 0;  ///< rises with every write
+  JournalMark journal{};
   StoredState state;
   bool operator==(const Generation&) const = default;
 };
 
+/// In the format of before where there is no mark.
 std::string encode(const Generation& generation);
 
 /// Accepts exactly what encode() produces. Errors (all `storage`): damaged (length, checksum, content), or

@@ -135,7 +135,7 @@ void Axis::start_next() {
   const auto& cause = begun.error();
   const bool overtaken = cause.reason == Reason::expired || cause.reason == Reason::lease_lost ||
                          cause.reason == Reason::lease_required || cause.reason == Reason::stopping ||
-                         cause.reason == Reason::inhibited;
+                         cause.reason == Reason::inhibited || cause.reason == Reason::state_unaccepted;
   overtaken ? next.command->abort(cause) : next.command->error(cause);
   drop_buffer(cause);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "buses/bus.hpp"
@@ -22,7 +23,9 @@ struct AxisEnvironment {
   CommandBook* book = nullptr;
   Persistence* persistence = nullptr;
   const LeaseTable* leases = nullptr;
-  const bool* inhibited = nullptr;   ///< StopAll is latched
+  const bool* inhibited = nullptr;  ///< StopAll is latched
+  /// Motion is refused with it; nothing in it: the state is accepted.
+  const std::optional<Error>* state_unaccepted = nullptr;
   const StopHolds* holds = nullptr;  ///< of this axis; they outlive it
   std::function<void()> published;   ///< after each new snapshot
   std::function<void(const std::string& axis, EventContent)> event{};

@@ -153,6 +153,7 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
   if (env_.inhibited != nullptr && *env_.inhibited)
     found.block(
         error(Reason::inhibited, "StopAll holds the machine", "release it: axisctl release-stop --all"));
+  if (env_.state_unaccepted != nullptr && *env_.state_unaccepted) found.block(**env_.state_unaccepted);
   look_at_readiness(options, found);
   const auto executed = activity_ ? std::optional(activity_->command->value().kind) : std::nullopt;
   if (executed == CommandKind::enable)

@@ -9,6 +9,22 @@
 
 namespace axisd {
 
+namespace {
+
+bool is_motion(CommandKind kind) {
+  return kind != CommandKind::enable && kind != CommandKind::reset && kind != CommandKind::set_position;
+}
+
+/// The journal was lost: what has to be done first, and that the request may have been executed before.
+Error with_doubt(Error unaccepted, const Error& doubt) {
+  unaccepted.message += "; " + doubt.message;
+  unaccepted.remedy += "; then " + doubt.remedy;
+  unaccepted.outcome = doubt.outcome;
+  return unaccepted;
+}
+
+}  // namespace
+
 Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& options) {
   accept_epoch_ = gate_->epoch();
   // Stops and disables are never deduplicated: each one is executed.
@@ -21,6 +37,9 @@ Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& opti
   }
   auto repeat = env_.book->find_repeat(settings_.name, action, options);
   if (repeat && *repeat != nullptr) renew_hold(*repeat, options);
+  const bool doubtful = !repeat && repeat.error().outcome == Outcome::unknown;
+  if (doubtful && is_motion(kind_of(action)) && env_.state_unaccepted != nullptr && *env_.state_unaccepted)
+    return fail(with_doubt(**env_.state_unaccepted, repeat.error()));
   if (!repeat || *repeat != nullptr) return repeat;
   if (options.buffer_mode == BufferMode::buffered) return accept_buffered(action, options);
   return std::visit([&](const auto& request) { return accept(request, options); }, action);

@@ -9,9 +9,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
-#include <utility>
 
-#include "daemon/store/journal_file.hpp"
+#include "daemon/store/kept_state.hpp"
 
 int main(int argc, char** argv) {
   using namespace axisd;
@@ -21,11 +20,9 @@ int main(int argc, char** argv) {
   }
   boost::asio::io_context core;
   const auto working = boost::asio::make_work_guard(core);
-  auto disk = store::open_journal_disk(argv[1]);
-  if (!disk) return 1;
-  auto journal =
-      store::JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), core.get_executor());
-  if (!journal) return 1;
+  auto kept = store::KeptState::open(argv[1], std::chrono::system_clock::now(), core.get_executor());
+  if (!kept) return 1;
+  auto* journal = &(*kept)->journal();
   const auto count = std::strtoul(argv[2], nullptr, 10);
   bool failed = false;
   unsigned long pending = 0;
@@ -37,15 +34,15 @@ int main(int argc, char** argv) {
                     .kind = CommandKind::move_absolute,
                     .asked = {.position = 0.1 * static_cast<double>(i % 4000)},
                     .accepted_at = std::chrono::system_clock::now()};
-    (*journal)->accepted(command, command.axis + " absolute 0x1.999999999999ap-4 - - -");
+    journal->accepted(command, command.axis + " absolute 0x1.999999999999ap-4 - - -");
     ++pending;
-    (*journal)->sending(command, {.start_pulses = 0, .target_pulses = 1000}, [&](const Result<void>& result) {
+    journal->sending(command, {.start_pulses = 0, .target_pulses = 1000}, [&](const Result<void>& result) {
       --pending;
       failed = failed || !result;
     });
     command.state = CommandState::done;
     command.started_at = command.ended_at = command.accepted_at;
-    (*journal)->ended(command);
+    journal->ended(command);
     while (pending >= 500) core.run_one();
   }
   while (pending > 0) core.run_one();

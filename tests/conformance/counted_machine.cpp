@@ -241,11 +241,18 @@ class CountedMachine final : public Machine {
       inner_->release_stop(axis, release, ledger_->answer(ticket, callback));
     });
   }
-  void stop_all(std::string client, WaitUntil until,
-                std::function<void(std::vector<Result<Command>>)> callback) override {
+  void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override {
     ledger_->enter([=, this](const auto& ticket) {
       inner_->stop_all(client, until, ledger_->answer(ticket, callback));
     });
+  }
+  void kept_state(std::function<void(KeptStateReport)> callback) override {
+    ledger_->enter([=, this](const auto& ticket) { inner_->kept_state(ledger_->answer(ticket, callback)); });
+  }
+  void accept_state(std::string client,
+                    std::function<void(Result<std::vector<Conviction>>)> callback) override {
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->accept_state(client, ledger_->answer(ticket, callback)); });
   }
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override {
     ledger_->enter([=, this](const auto& ticket) {

@@ -17,7 +17,7 @@
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
-#include "daemon/store/file_store.hpp"
+#include "daemon/store/kept_state.hpp"
 #include "devices/simulation/pty_line.hpp"
 #include "devices/simulation/simulator.hpp"
 
@@ -63,13 +63,13 @@ class RealRig : public testing::Test {
     auto line = simulation::PtyLine::open({}, std::move(nodes));
     ASSERT_TRUE(line) << to_string(line.error());
     line_ = std::move(*line);
-    auto store = store::FileStore::open(directory_, loop_.executor());
+    auto store = store::KeptState::open(directory_, std::chrono::system_clock::now(), loop_.executor());
     ASSERT_TRUE(store) << to_string(store.error());
     store_ = std::move(*store);
     machine_ = std::make_unique<core::MachineCore>(
         core::MachineParts{.executor = loop_.executor(),
                            .clock = &loop_.clock(),
-                           .persistence = store_.get(),
+                           .persistence = &store_->state(),
                            .instance_id = "rig",
                            .make_line =
                                [this](const modbus_rtu::LineSettings& settings) {
@@ -115,7 +115,7 @@ class RealRig : public testing::Test {
   std::filesystem::path directory_;
   std::unique_ptr<simulation::PtyLine> line_;
   core::CoreLoop loop_;
-  std::unique_ptr<store::FileStore> store_;
+  std::unique_ptr<store::KeptState> store_;
   std::unique_ptr<core::MachineCore> machine_;
   std::unique_ptr<core::MachineService> service_;
   std::thread core_;
@@ -191,10 +191,10 @@ TEST_F(RealRig, StopAllInhibitsUntilReleased) {
   wait_online();
   ASSERT_EQ(submit("axis-1", EnableRequest{})->state, CommandState::done);
   ASSERT_TRUE(submit("axis-1", MoveVelocityRequest{.velocity = 50}, WaitUntil::started));
-  std::promise<std::vector<Result<Command>>> stopped;
-  service_->stop_all("rig", WaitUntil::done,
-                     [&](std::vector<Result<Command>> results) { stopped.set_value(std::move(results)); });
-  for (const auto& result : stopped.get_future().get()) {
+  std::promise<AllStopped> stopped;
+  service_->stop_all("rig", WaitUntil::done, [&](AllStopped all) { stopped.set_value(std::move(all)); });
+  const auto answer = stopped.get_future().get();
+  for (const auto& result : answer.stops) {
     ASSERT_TRUE(result) << to_string(result.error());
     EXPECT_EQ(result->state, CommandState::done);
   }

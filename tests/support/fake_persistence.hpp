@@ -17,6 +17,7 @@ class FakePersistence final : public Persistence {
   bool frozen = false;   ///< the process is dead: nothing is saved any more
   bool slow = false;     ///< nothing is answered until release()
   StoredState saved;     ///< what the file holds now
+  KeptStateSeen seen_files{};
   /// What the next daemon finds when it starts.
   void restart() { loaded_ = saved; }
   /// The disk answers.
@@ -27,6 +28,7 @@ class FakePersistence final : public Persistence {
 
   [[nodiscard]] const StoredState& loaded() const override { return loaded_; }
   [[nodiscard]] const StoredState& current() const override { return saved; }
+  [[nodiscard]] KeptStateSeen seen() const override { return seen_files; }
   void save_offset(std::string axis, OffsetRecord offset, Callback done) override {
     if (!failing && !frozen) saved.axes[axis].offset = offset;
     answer(std::move(done));
@@ -54,6 +56,10 @@ class FakePersistence final : public Persistence {
       saved.axes[axis].eeprom_writes += writes;
       saved.axes[axis].eeprom = std::move(saves);
     }
+    answer(std::move(done));
+  }
+  void accept_state(Callback done) override {
+    if (!failing && !frozen) saved.convictions.clear();
     answer(std::move(done));
   }
 

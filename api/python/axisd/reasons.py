@@ -47,6 +47,7 @@ class Reason(enum.StrEnum):
     INTERNAL = "internal"
     RELOADING = "reloading"
     EEPROM_BUDGET = "eeprom_budget"
+    STATE_UNACCEPTED = "state_unaccepted"
 
 
 class Outcome(enum.StrEnum):

@@ -233,6 +233,7 @@ TEST_F(Calls, SystemAndBuses) {
   EXPECT_EQ(stopped.results(0).command().kind(), v1::COMMAND_KIND_STOP);
   EXPECT_EQ(stopped.results(1).axis(), "turntable");
   EXPECT_EQ(stopped.results(1).error().reason(), v1::REASON_NOT_CONFIRMED);
+  EXPECT_FALSE(stopped.has_not_durable());
   v1::ReleaseStopAllResponse released;
   EXPECT_TRUE(system->ReleaseStopAll(&c3, {}, &released).ok());
   EXPECT_THAT(machine_.log(), ElementsAre("stop_all local:unix done", "release_inhibit local:unix"));
@@ -255,6 +256,44 @@ TEST_F(Calls, SystemAndBuses) {
             "foreign_frames: 42 unknown_frames: 41 malformed_frames: 43 "
             "link_helper_error { reason: REASON_BUS_DOWN message: \"no helper\" remedy: \"enable it\" "
             "outcome: OUTCOME_NOT_SENT bus: \"can0\" }");
+}
+
+TEST_F(Calls, StateIsToldAndAccepted) {
+  machine_.state_report = {.seen = {.state = {.found = 12, .expected = 40}, .journal = {.found = 120}},
+                           .convictions = {{.file = KeptFile::previous,
+                                            .fault = KeptFault::foreign,
+                                            .found = 12,
+                                            .expected = 40,
+                                            .detail = "more",
+                                            .since = WallTime(std::chrono::seconds(7))}},
+                           .start_count = 65'544};
+  machine_.latch_trouble = Error{.reason = Reason::storage, .message = "full", .remedy = "free space"};
+  serve();
+  const auto system = v1::SystemService::NewStub(channel_);
+  grpc::ClientContext c1, c2, c3, c4;
+  v1::GetStateResponse state;
+  EXPECT_TRUE(system->GetState(&c1, {}, &state).ok());
+  const std::string conviction =
+      "file: \"state.v1.previous\" fault: STATE_FAULT_FOREIGN found: 12 expected: 40 text: "
+      "\"state.v1.previous "
+      "does not belong to the other files: it has generation 12, but there was generation 40 (more)\" "
+      "since { seconds: 7 }";
+  EXPECT_EQ(state.ShortDebugString(),
+            "files { name: \"state.v1\" generation: 12 expected: 40 } "
+            "files { name: \"journal.v1\" generation: 120 } convictions { " +
+                conviction + " } start_count: 65544");
+  v1::AcceptStateResponse accepted;
+  EXPECT_TRUE(system->AcceptState(&c2, {}, &accepted).ok());
+  EXPECT_EQ(accepted.ShortDebugString(), "accepted { " + conviction + " }");
+  v1::GetInfoResponse info;
+  EXPECT_TRUE(system->GetInfo(&c3, {}, &info).ok());
+  EXPECT_EQ(info.state_unaccepted(), state.convictions(0).text());
+  v1::StopAllResponse stopped;
+  EXPECT_TRUE(system->StopAll(&c4, {}, &stopped).ok());
+  EXPECT_EQ(stopped.not_durable().reason(), v1::REASON_STORAGE);
+  EXPECT_EQ(stopped.not_durable().message(), "full");
+  EXPECT_THAT(machine_.log(),
+              ElementsAre("kept_state", "accept_state local:unix", "stop_all local:unix accepted"));
 }
 
 TEST_F(Calls, BudgetsOfAllBusesOrOfOne) {

@@ -122,8 +122,12 @@ AxisSnapshotPtr FakeMachine::snapshot(std::string_view axis) const {
 }
 
 MachineInfo FakeMachine::info() const {
-  return {
-      .machine = "press-1", .version = "0.1", .instance_id = "i-1", .inhibited = true, .inhibited_by = "hmi"};
+  return {.machine = "press-1",
+          .version = "0.1",
+          .instance_id = "i-1",
+          .inhibited = true,
+          .inhibited_by = "hmi",
+          .state_unaccepted = state_report.convictions.empty() ? "" : to_string(state_report.convictions)};
 }
 
 Result<Command> FakeMachine::result_of(std::string axis, CommandKind kind) {
@@ -176,12 +180,23 @@ void FakeMachine::release_stop(std::string axis, HoldRelease release,
   post([callback = std::move(callback), released = std::move(released)] { callback(released); });
 }
 
-void FakeMachine::stop_all(std::string client, WaitUntil until,
-                           std::function<void(std::vector<Result<Command>>)> callback) {
+void FakeMachine::stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) {
   note("stop_all " + client + (until == WaitUntil::done ? " done" : " accepted"));
-  std::vector<Result<Command>> results{result_of("feeder", CommandKind::stop),
-                                       fail(Reason::not_confirmed, "still moving")};
-  post([callback = std::move(callback), results = std::move(results)] { callback(results); });
+  AllStopped answer{
+      .stops = {result_of("feeder", CommandKind::stop), fail(Reason::not_confirmed, "still moving")},
+      .not_durable = latch_trouble};
+  post([callback = std::move(callback), answer = std::move(answer)] { callback(answer); });
+}
+
+void FakeMachine::kept_state(std::function<void(KeptStateReport)> callback) {
+  note("kept_state");
+  post([callback = std::move(callback), report = state_report] { callback(report); });
+}
+
+void FakeMachine::accept_state(std::string client,
+                               std::function<void(Result<std::vector<Conviction>>)> callback) {
+  note("accept_state " + client);
+  post([callback = std::move(callback), accepted = state_report.convictions] { callback(accepted); });
 }
 
 void FakeMachine::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {

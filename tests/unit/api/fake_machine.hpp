@@ -39,6 +39,8 @@ class FakeMachine final : public Machine {
   /// A change of command "c-1" for those who watch it.
   void change(const Command& command);
   void set_now(TimePoint now) { now_ = now; }
+  std::optional<Error> latch_trouble{};  ///< that StopAll answers with; set before it is called
+  KeptStateReport state_report{};        ///< likewise
 
   FakeDrives& drives() { return drives_; }
   FakeBuses& nodes() { return buses_; }
@@ -62,8 +64,10 @@ class FakeMachine final : public Machine {
                std::function<void(Result<std::vector<Obstacle>>)> callback) override;
   void release_stop(std::string axis, HoldRelease release,
                     std::function<void(Result<StopReleased>)> callback) override;
-  void stop_all(std::string client, WaitUntil until,
-                std::function<void(std::vector<Result<Command>>)> callback) override;
+  void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override;
+  void kept_state(std::function<void(KeptStateReport)> callback) override;
+  void accept_state(std::string client,
+                    std::function<void(Result<std::vector<Conviction>>)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
   void list_commands(std::string axis, std::size_t most,
                      std::function<void(std::vector<Command>)> callback) override;

@@ -41,6 +41,7 @@ void expect_same_names(Domain last, const std::string& prefix, auto name_of) {
 
 TEST(Convert, EveryEnumValueHasItsNamesakeInTheContract) {
   expect_same_names(Reason::internal, "REASON_", [](auto v) { return v1::Reason_Name(v); });
+  EXPECT_EQ(v1::Reason_Name(to_proto(Reason::state_unaccepted)), "REASON_STATE_UNACCEPTED");
   expect_same_names(AxisState::error_stop, "STATE_", [](auto v) { return v1::State_Name(v); });
   expect_same_names(LinkState::online, "LINK_STATE_", [](auto v) { return v1::LinkState_Name(v); });
   expect_same_names(PositionTrust::restored, "POSITION_TRUST_",
@@ -216,6 +217,7 @@ TEST(Status, CodesAreThoseOfTheContract) {
   EXPECT_EQ(status_code(Reason::not_supported), grpc::StatusCode::UNIMPLEMENTED);
   EXPECT_EQ(status_code(Reason::no_reply), grpc::StatusCode::UNAVAILABLE);
   EXPECT_EQ(status_code(Reason::inhibited), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(status_code(Reason::state_unaccepted), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(status_code(Reason::superseded), grpc::StatusCode::ABORTED);
   EXPECT_EQ(status_code(Reason::expired), grpc::StatusCode::DEADLINE_EXCEEDED);
   EXPECT_EQ(status_code(Reason::lease_required), grpc::StatusCode::PERMISSION_DENIED);

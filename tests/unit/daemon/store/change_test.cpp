@@ -106,12 +106,14 @@ TEST(Change, FailedSavesOfTheDayAreKeptAndDoNotReplaceNewerOnes) {
   EXPECT_EQ(state.axes.at("x").eeprom, two_saves);
 }
 
-TEST(Change, AnOlderStateIsNotTrustedAndInhibitsMotion) {
+TEST(Change, AnOlderStateIsNotTrustedAndWhatIsNotKnownInhibitsMotion) {
   StoredState state;
   state.start_count = 3;
   apply(state, SetOffset{.axis = "x", .offset = homed});
   apply(state, CountEepromWrites{.axis = "x", .writes = 2});
-  distrust(state, WallTime(std::chrono::seconds(9)));
+  distrust_offsets(state);
+  EXPECT_FALSE(state.inhibit.active);
+  latch_by_caution(state, WallTime(std::chrono::seconds(9)));
   EXPECT_EQ(state.axes.at("x").offset, std::nullopt);
   EXPECT_EQ(state.axes.at("x").eeprom_writes, 2U);
   EXPECT_TRUE(state.inhibit.active);
@@ -120,9 +122,19 @@ TEST(Change, AnOlderStateIsNotTrustedAndInhibitsMotion) {
   apply(state, SetHold{.axis = "x", .hold = hmi, .since = noon});
 
   state.inhibit = latched;
-  distrust(state, WallTime(std::chrono::seconds(9)));
+  distrust_offsets(state);
+  latch_by_caution(state, WallTime(std::chrono::seconds(9)));
   EXPECT_EQ(state.inhibit, latched) << "who latched it must not get lost";
   EXPECT_EQ(state.axes.at("x").holds.size(), 1U) << "holds stand";
+}
+
+TEST(Change, ConvictionsStandUntilTheirAcceptanceIsSaved) {
+  StoredState state;
+  state.convictions = {{.file = KeptFile::journal, .fault = KeptFault::missing}};
+  apply_after_failure(state, AcceptState{});
+  EXPECT_EQ(state.convictions.size(), 1U);
+  apply(state, AcceptState{});
+  EXPECT_TRUE(state.convictions.empty());
 }
 
 }  // namespace

@@ -1,5 +1,3 @@
-#include "daemon/store/file_store.hpp"
-
 #include <gmock/gmock.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -9,12 +7,16 @@
 #include <csignal>
 #include <random>
 
+#include "daemon/store/kept_state.hpp"
+#include "daemon/store/state_pair.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace axisd::store {
 namespace {
 
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
 
 OffsetRecord offset(std::int64_t pulses) {
   return {.offset_pulses = pulses,
@@ -27,13 +29,16 @@ OffsetRecord offset(std::int64_t pulses) {
 
 class FileStoreTest : public testing::Test {
  protected:
-  std::unique_ptr<FileStore> open() {
-    auto store = FileStore::open(temporary_.path(), core_.get_executor());
-    if (!store) {
-      ADD_FAILURE() << to_string(store.error());
-      return nullptr;
-    }
-    return *std::move(store);
+  /// As a start of the daemon does it, with the journal beside it.
+  struct Opened {
+    std::unique_ptr<KeptState> kept;
+    FileStore* operator->() const { return &kept->state(); }
+    explicit operator bool() const { return kept != nullptr; }
+  };
+  Opened open() {
+    auto kept = KeptState::open(temporary_.path(), WallTime(std::chrono::hours(1)), core_.get_executor());
+    if (!kept) ADD_FAILURE() << to_string(kept.error());
+    return {kept ? *std::move(kept) : nullptr};
   }
   /// Runs the core until `count` results have arrived.
   void wait_for(std::size_t count) {
@@ -69,7 +74,7 @@ TEST_F(FileStoreTest, SavesAreThereAfterARestart) {
     EXPECT_TRUE(store->loaded().axes.empty()) << "loaded() stays what it was";
   }
   const auto store = open();
-  EXPECT_FALSE(store->damage());
+  EXPECT_THAT(store->loaded().convictions, IsEmpty());
   EXPECT_EQ(store->loaded().axes.at("x").offset, offset(2));
   EXPECT_EQ(store->loaded().axes.at("y"),
             (AxisRecord{.offset = {}, .eeprom_writes = 4, .holds = {}, .eeprom = saves}));
@@ -125,12 +130,13 @@ TEST_F(FileStoreTest, ClosingSavesWhatIsPending) {
 TEST_F(FileStoreTest, StartsAreCountedStrictly) {
   for (std::uint64_t start = 1; start < 5; ++start) EXPECT_EQ(open()->loaded().start_count, start);
   temporary_.write("state.v1", "damaged");
-  EXPECT_EQ(open()->loaded().start_count, 5U);
+  EXPECT_EQ(open()->loaded().start_count, 5U + start_count_jump);
   temporary_.write("state.v1", "damaged");
-  EXPECT_EQ(open()->loaded().start_count, 6U) << "a second damage must not repeat a count";
+  EXPECT_EQ(open()->loaded().start_count, 6U + 2 * start_count_jump)
+      << "a second damage must not repeat a count";
 }
 
-TEST_F(FileStoreTest, DamageCostsTrustAndInhibitsMotion) {
+TEST_F(FileStoreTest, DamageCostsTrustAndNothingElseThatTheJournalKnows) {
   {
     auto store = open();
     store->save_offset("x", offset(1), {});
@@ -142,14 +148,9 @@ TEST_F(FileStoreTest, DamageCostsTrustAndInhibitsMotion) {
   temporary_.write("state.v1", temporary_.read("state.v1").substr(1));
   for (int start = 0; start < 2; ++start) {
     const auto store = open();
-    if (start == 0) {
-      ASSERT_TRUE(store->damage());
-      EXPECT_THAT(store->damage()->message, HasSubstr("damaged"));
-    } else {
-      EXPECT_FALSE(store->damage()) << "reported once; its consequences are saved";
-    }
+    EXPECT_THAT(store->loaded().convictions, SizeIs(1)) << "until it is accepted";
     EXPECT_EQ(store->loaded().axes.at("x"), (AxisRecord{.offset = {}, .eeprom_writes = 2, .holds = {}}));
-    EXPECT_TRUE(store->loaded().inhibit.active);
+    EXPECT_FALSE(store->loaded().inhibit.active) << "the journal knows that it was not";
   }
 }
 
@@ -215,7 +216,7 @@ TEST_F(FileStoreTest, ManySavesShareWrites) {
 
 TEST_F(FileStoreTest, OpenFailsClearlyWhereNothingCanBeSaved) {
   break_disk();
-  const auto store = FileStore::open(temporary_.path(), core_.get_executor());
+  const auto store = KeptState::open(temporary_.path(), {}, core_.get_executor());
   ASSERT_FALSE(store);
   EXPECT_EQ(store.error().reason, Reason::storage);
   EXPECT_FALSE(store.error().remedy.empty());
@@ -223,26 +224,94 @@ TEST_F(FileStoreTest, OpenFailsClearlyWhereNothingCanBeSaved) {
 
 TEST_F(FileStoreTest, ASecondStoreIsRefusedWhileOneIsOpen) {
   const auto store = open();
-  const auto second = FileStore::open(temporary_.path(), core_.get_executor());
+  const auto second = KeptState::open(temporary_.path(), {}, core_.get_executor());
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error().message, HasSubstr("another axisd"));
+}
+
+/// Whoever has an older copy of the journal, made in this run, does not get it past the next start.
+TEST_F(FileStoreTest, AtItsEndTheStateKnowsTheWholeJournal) {
+  std::string older;
+  {
+    auto store = open();
+    older = temporary_.read("journal.v1");
+    auto& journal = store.kept->journal();
+    const Command command{.id = "1", .axis = "x", .request_id = "r1", .client = "c"};
+    journal.accepted(command, "d");
+    journal.sending(command, {}, record());
+    wait_for(1);
+    journal.ended(command);
+  }
+  EXPECT_THAT(open()->loaded().convictions, IsEmpty());
+  temporary_.write("journal.v1", older);
+  const auto store = open();
+  ASSERT_THAT(store->loaded().convictions, SizeIs(1));
+  EXPECT_EQ(store->loaded().convictions[0].fault, KeptFault::rolled_back);
+  EXPECT_EQ(temporary_.read("journal.v1.damaged"), older);
+}
+
+/// The journal's disk fails, the state file's does not.
+struct BrokenWitness final : StateWitness {
+  bool failing = false;
+  std::vector<StateLine> told;
+  Result<void> note(StateLine line) override {
+    told.push_back(std::move(line));
+    if (failing) return fail(Reason::storage, "full", "free space");
+    return {};
+  }
+  [[nodiscard]] std::uint64_t durable_line() const override { return 0; }
+};
+
+TEST_F(FileStoreTest, WhatIsInOneFileOnlyIsNotGranted) {
+  BrokenWitness witness;
+  {
+    auto directory = StateDirectory::open(temporary_.path());
+    ASSERT_TRUE(directory);
+    auto begun =
+        FileStore::begin(*std::move(directory), {.journal = {.pair = "p"}}, {}, core_.get_executor());
+    ASSERT_TRUE(begun);
+    const auto store = *std::move(begun);
+    ASSERT_TRUE(store->serve(witness));
+    EXPECT_EQ(witness.told.back().generation, 2U);
+    store->save_inhibit({.active = true, .by = "panel", .since = {}}, record());
+    wait_for(1);
+    EXPECT_TRUE(results_[0]);
+    EXPECT_TRUE(witness.told.back().inhibit.active);
+    witness.failing = true;
+    store->save_inhibit({.active = false, .by = "hmi", .since = {}}, record());
+    wait_for(2);
+    EXPECT_EQ(results_[1].error().reason, Reason::storage);
+    EXPECT_TRUE(decode(temporary_.read("state.v1"))->state.inhibit.active)
+        << "the release does not stand there";
+    witness.failing = false;
+    break_disk();
+    store->save_hold("x", {.holder = "hmi", .request_id = {}}, {}, record());
+    store->save_inhibit({.active = false, .by = "hmi", .since = {}}, record());
+    wait_for(4);
+    EXPECT_FALSE(results_[2]);
+    EXPECT_TRUE(witness.told.back().inhibit.active);
+    EXPECT_EQ(witness.told.back().holds.size(), 1U) << "what the state file could not take";
+    repair_disk();
+  }
+  EXPECT_TRUE(decode(temporary_.read("state.v1"))->state.inhibit.active);
 }
 
 /// Saves rising offsets without end and reports each durable one through `acknowledge`.
 [[noreturn]] void save_until_killed(const std::filesystem::path& directory, int acknowledge) {
   boost::asio::io_context core;
   const auto guard = boost::asio::make_work_guard(core);
-  auto store = FileStore::open(directory, core.get_executor());
+  auto store = KeptState::open(directory, std::chrono::system_clock::now(), core.get_executor());
   if (!store) _exit(1);
   std::function<void(std::int64_t)> save = [&](std::int64_t number) {
-    (*store)->save_offset("x", offset(number), [&, number](const Result<void>& result) {
+    (*store)->state().save_offset("x", offset(number), [&, number](const Result<void>& result) {
       if (!result || write(acknowledge, &number, sizeof number) != sizeof number) _exit(2);
       save(number + 1);
     });
   };
-  const auto& loaded = (*store)->loaded().axes;
+  const auto& loaded = (*store)->state().loaded().axes;
   save(loaded.contains("x") ? loaded.at("x").offset->offset_pulses + 1 : 1);
   core.run();
+  (void)guard;
   _exit(3);
 }
 
@@ -271,7 +340,7 @@ TEST_F(FileStoreTest, NoAcknowledgedSaveIsLostByAKill) {
 
     const auto store = open();
     ASSERT_TRUE(store);
-    EXPECT_FALSE(store->damage());
+    EXPECT_THAT(store->loaded().convictions, IsEmpty());
     EXPECT_GE(store->loaded().axes.at("x").offset->offset_pulses, last);
     EXPECT_EQ(store->loaded().start_count, 2U * static_cast<unsigned>(round) + 2U);
   }

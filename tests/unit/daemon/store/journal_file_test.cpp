@@ -25,7 +25,7 @@ class FaultyDisk final : public JournalDisk {
  public:
   FaultyDisk(std::unique_ptr<JournalDisk> disk, std::shared_ptr<Faults> faults)
       : disk_(std::move(disk)), faults_(std::move(faults)) {}
-  Result<std::optional<std::string>> read() override { return disk_->read(); }
+  Result<FoundFile> read() override { return disk_->read(); }
   Result<void> append(std::string_view text) override {
     if (!faults_->append) return disk_->append(text);
     (void)disk_->append(text.substr(0, text.size() / 2));
@@ -293,12 +293,12 @@ TEST_F(JournalFileTest, AFullDiskLosesNoIds) {
 }
 
 TEST_F(JournalFileTest, ANewerFormatIsNotTakenForDamage) {
-  temporary_.write("journal.v1", "axisd-journal 3\nwhatever\n");
+  temporary_.write("journal.v1", "axisd-journal 4\nwhatever\n");
   auto disk = open_journal_disk(temporary_.path());
   const auto journal = JournalFile::open(std::move(*disk), WallTime(), core_.get_executor());
   ASSERT_FALSE(journal);
   EXPECT_THAT(journal.error().message, HasSubstr("newer"));
-  EXPECT_EQ(text(), "axisd-journal 3\nwhatever\n");
+  EXPECT_EQ(text(), "axisd-journal 4\nwhatever\n");
 }
 
 /// What was told to be durable is there when the process is killed at any moment.

@@ -60,6 +60,14 @@ std::vector<JournalLine> all_kinds() {
                   .count = 50'000,
                   .begin = milliseconds(1),
                   .newest = milliseconds(2)},
+          StateLine{.pair = "5fd3",
+                    .generation = 41,
+                    .start_count = 7,
+                    .inhibit = {.active = true, .by = "tls:hmi 1", .since = WallTime(milliseconds(3))},
+                    .holds = {{"feeder",
+                               {{{.holder = "hmi 1", .request_id = "r1"}, WallTime(milliseconds(4))},
+                                {{.holder = "panel", .request_id = ""}, WallTime(milliseconds(5))}}},
+                              {"table", {{{.holder = "hmi", .request_id = ""}, WallTime{}}}}}},
           EndedLine{.command = ended(command("a-3", CommandKind::reset), CommandState::done),
                     .awaits_reset = false}};
 }
@@ -240,21 +248,24 @@ TEST(JournalModel, DamageAnywhereIsNoticedAndTheRestIsRead) {
   const auto load = load_journal(gone);
   EXPECT_NE(load.damage, "");
   EXPECT_EQ(load.model.size(), 4);
-  EXPECT_TRUE(load_journal("axisd-journal 3\nwhatever\n").newer_format);
+  EXPECT_TRUE(load_journal("axisd-journal 4\nwhatever\n").newer_format);
 }
 
-TEST(JournalModel, TheFormatBeforeThisOneIsRead) {
+TEST(JournalModel, TheFormatsBeforeThisOneAreRead) {
   auto lines = all_kinds();
   std::erase_if(lines, [](const JournalLine& line) {
     return std::holds_alternative<TimeLine>(line) || std::holds_alternative<HeardLine>(line) ||
-           std::holds_alternative<IdsLine>(line);
+           std::holds_alternative<IdsLine>(line) || std::holds_alternative<StateLine>(line);
   });
-  auto text = journal_of(lines);
-  text.replace(0, journal_header.size(), journal_header_1);
-  const auto load = load_journal(text);
-  EXPECT_EQ(load.damage, "");
-  EXPECT_EQ(load.model.size(), 3);
-  EXPECT_EQ(load.model.now(), Duration{0}) << "all counts as being heard of now";
+  for (const auto header : {journal_header_1, journal_header_2}) {
+    auto text = journal_of(lines);
+    text.replace(0, journal_header.size(), header);
+    const auto load = load_journal(text);
+    EXPECT_EQ(load.damage, "");
+    EXPECT_EQ(load.model.size(), 3);
+    EXPECT_EQ(load.model.now(), Duration{0}) << "all counts as being heard of now";
+    EXPECT_FALSE(load.model.state());
+  }
 }
 
 }  // namespace

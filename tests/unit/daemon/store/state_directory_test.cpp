@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "daemon/store/state_pair.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace axisd::store {
@@ -15,11 +16,13 @@ Generation generation(std::uint64_t number) {
   return result;
 }
 
-/// Opens, loads and closes again, as a start would.
-Result<StateDirectory::Loaded> load(const std::filesystem::path& path) {
+/// Opens, judges and closes again, as a start would; without a journal.
+Result<Verdict> load(const std::filesystem::path& path) {
   auto directory = StateDirectory::open(path);
   if (!directory) return std::unexpected(directory.error());
-  return directory->load();
+  auto found = directory->find();
+  if (!found) return std::unexpected(found.error());
+  return judge({.state = found->newest, .previous = found->previous}, {}, {});
 }
 
 class StateDirectoryTest : public testing::Test {
@@ -32,8 +35,9 @@ class StateDirectoryTest : public testing::Test {
   void expect_loads(std::uint64_t number, bool damaged = false) {
     const auto loaded = load(temporary_.path());
     ASSERT_TRUE(loaded) << to_string(loaded.error());
-    EXPECT_EQ(loaded->generation, generation(number));
-    EXPECT_EQ(loaded->damage.has_value(), damaged);
+    EXPECT_EQ(loaded->state.number, number);
+    EXPECT_EQ(loaded->state.state.axes, generation(number).state.axes);
+    EXPECT_EQ(!loaded->fresh.empty(), damaged);
   }
   test::TemporaryDirectory temporary_;
 };
@@ -41,8 +45,8 @@ class StateDirectoryTest : public testing::Test {
 TEST_F(StateDirectoryTest, AnEmptyDirectoryIsAFreshStart) {
   const auto loaded = load(temporary_.path() / "made" / "here");
   ASSERT_TRUE(loaded);
-  EXPECT_EQ(loaded->generation, std::nullopt);
-  EXPECT_FALSE(loaded->damage);
+  EXPECT_EQ(loaded->state.number, 0U);
+  EXPECT_TRUE(loaded->fresh.empty());
 }
 
 TEST_F(StateDirectoryTest, KeepsTheGenerationBefore) {
@@ -74,7 +78,7 @@ TEST_F(StateDirectoryTest, BothDamagedIsAnErrorThatSaysWhatToDo) {
   const auto loaded = load(temporary_.path());
   ASSERT_FALSE(loaded);
   EXPECT_EQ(loaded.error().reason, Reason::storage);
-  EXPECT_THAT(loaded.error().message, HasSubstr((temporary_.path() / "state.v1").string()));
+  EXPECT_THAT(loaded.error().message, HasSubstr("state.v1"));
   EXPECT_THAT(loaded.error().remedy, HasSubstr("homing"));
 }
 
@@ -104,12 +108,12 @@ TEST_F(StateDirectoryTest, ADamagedFileSetAsideNeverBecomesThePreviousOne) {
   {
     auto directory = StateDirectory::open(temporary_.path());
     ASSERT_TRUE(directory);
-    ASSERT_TRUE(directory->set_aside());
+    ASSERT_TRUE(directory->set_aside(KeptFile::state));
   }
   EXPECT_EQ(temporary_.read("state.v1.damaged"), "x");
   expect_loads(1, true);
-  save(3);
-  expect_loads(3);
+  save(2);
+  expect_loads(2);
   EXPECT_EQ(temporary_.read("state.v1.previous"), encode(generation(1)));
 }
 
@@ -132,12 +136,12 @@ TEST_F(StateDirectoryTest, EveryInterruptedSaveLeavesACompleteGeneration) {
   expect_loads(2);
   EXPECT_EQ(fs::hard_link_count(at("state.v1")), 2U);
 
-  save(4);  // goes through over what the interruption left
-  expect_loads(4);
+  save(3);  // goes through over what the interruption left
+  expect_loads(3);
   EXPECT_EQ(temporary_.read("state.v1.previous"), encode(generation(2)));
-  save(5);
-  expect_loads(5);
-  EXPECT_EQ(temporary_.read("state.v1.previous"), encode(generation(4)));
+  save(4);
+  expect_loads(4);
+  EXPECT_EQ(temporary_.read("state.v1.previous"), encode(generation(3)));
 }
 
 TEST_F(StateDirectoryTest, TwoDaemonsCannotShareIt) {
@@ -168,7 +172,7 @@ TEST_F(StateDirectoryTest, AFailedSaveIsAnErrorAndLeavesTheFilesAlone) {
   ASSERT_FALSE(saved);
   EXPECT_EQ(saved.error().reason, Reason::storage);
   EXPECT_THAT(saved.error().message, HasSubstr("state.v1.new"));
-  EXPECT_EQ(directory->load()->generation, generation(1));
+  EXPECT_EQ(directory->find()->newest.text, encode(generation(1)));
 }
 
 }  // namespace

@@ -31,9 +31,24 @@ Generation example() {
   return generation;
 }
 
+/// As it is since the journal vouches for it.
+Generation paired() {
+  auto generation = example();
+  generation.journal = {.pair = "5fd30001", .line = 1234};
+  generation.state.convictions = {{.file = KeptFile::previous,
+                                   .fault = KeptFault::foreign,
+                                   .found = 3,
+                                   .expected = 40,
+                                   .detail = "of another set",
+                                   .since = WallTime(std::chrono::nanoseconds(1'700'000'000'000'000'001))},
+                                  {}};
+  return generation;
+}
+
 TEST(StateText, ReadsBackWhatItWrites) {
   EXPECT_EQ(decode(encode(example())), example());
   EXPECT_EQ(decode(encode({})), Generation{});
+  EXPECT_EQ(decode(encode(paired())), paired());
 }
 
 TEST(StateText, FormatIsFixed) {
@@ -54,20 +69,32 @@ TEST(StateText, FormatIsFixed) {
           encode(example()).substr(encode(example()).size() - 9));
 }
 
+TEST(StateText, TheFormatOfTodayIsFixed) {
+  EXPECT_THAT(encode(paired()),
+              HasSubstr("axisd-state 2\n"
+                        "generation 41\n"
+                        "pair 5fd30001 journal_line=1234\n"
+                        "start_count 7\n"
+                        "inhibit active=1 since_ns=1700000000123456789 "
+                        "by=tls:CN%3dhmi%201%2c%20panel%0a%22left%22%20100%25\n"
+                        "convicted file=previous fault=foreign found=3 expected=40 "
+                        "since_ns=1700000000000000001 detail=of%20another%20set\n"
+                        "convicted file=state fault=missing found=0 expected=0 since_ns=0 detail=\n"
+                        "axis feeder eeprom_writes=3\n"));
+}
+
 Generation with_saves() {
-  auto generation = example();
+  auto generation = paired();
   generation.state.axes["feeder"].eeprom = {.saves = 12, .by_hour = {{-3, 1}, {472'222, 9}}};
   generation.state.axes["idle"].eeprom = {.saves = 7};
   return generation;
 }
 
-TEST(StateText, SavesOfTheDayAreVersion2AndOnlyThey) {
+TEST(StateText, SavesOfTheDayStandWithTheirAxis) {
   const auto text = encode(with_saves());
-  EXPECT_TRUE(text.starts_with("axisd-state 2\n"));
   EXPECT_THAT(text, HasSubstr("axis feeder eeprom_writes=3\neeprom saves=12 by_hour=-3:1,472222:9\noffset "));
   EXPECT_THAT(text, HasSubstr("axis idle eeprom_writes=0\neeprom saves=7 by_hour=\naxis "));
   EXPECT_EQ(decode(text), with_saves());
-  EXPECT_FALSE(newer_format(text));
 }
 
 TEST(StateText, ReadsWhatWasWrittenBeforeThereWereHolds) {
@@ -169,7 +196,7 @@ TEST(StateText, AcceptsOnlyTheCanonicalForm) {
            {"turn-table_2", "feeder"},
            {"turn-table_2", "aaa"},
            {"turn-table_2 eeprom_writes=0\n", "turn-table_2 eeprom_writes=0\nmore\n"},
-           {"axisd-state 1", "axisd-state 2"},  // which it is only with saves
+           {"axisd-state 1", "axisd-state 2"},
            {"axisd-state 1", "axisd-state 3"},
            {"\n", "\r\n"}}) {
     const auto changed = replaced(text, what, by);
@@ -200,8 +227,8 @@ TEST(StateText, AcceptsOnlyTheCanonicalFormOfSaves) {
 
 TEST(StateText, TellsANewerFormatFromDamage) {
   EXPECT_TRUE(newer_format(with_checksum("axisd-state 3\nwhatever\n")));
-  EXPECT_FALSE(newer_format(with_checksum("axisd-state 2\nwhatever\n")));
   EXPECT_FALSE(newer_format(encode(example())));
+  EXPECT_FALSE(newer_format(encode(paired())));
   EXPECT_FALSE(newer_format(with_checksum("something else\n")));
 }
 
@@ -213,6 +240,7 @@ TEST(StateText, NoiseIsRejected) {
     ASSERT_FALSE(decode(noise));
     ASSERT_FALSE(decode(with_checksum(noise)));
     ASSERT_FALSE(decode(with_checksum("axisd-state 1\n" + noise)));
+    ASSERT_FALSE(decode(with_checksum("axisd-state 2\n" + noise)));
   }
 }
 
