@@ -1,5 +1,6 @@
-// list, state, watch: what the axes do.
+// list, state, watch: what the axes do; and what the daemon keeps of them.
 #include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -15,9 +16,12 @@
 #include "api/axisctl/state_view.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
+#include "axisd/v1/system_service.grpc.pb.h"
 
 namespace axisd::axisctl {
 namespace {
+
+using google::protobuf::util::TimeUtil;
 
 void list(Invocation& invocation, bool names) {
   const auto response =
@@ -43,6 +47,37 @@ std::string line_of(const v1::WatchAxesResponse& batch, const std::vector<std::s
                     bool as_json) {
   if (fields.empty()) return as_json ? json(batch) : tick_line(batch);
   return as_json ? field_json(batch, fields) : field_line(batch, fields);
+}
+
+std::string line_of(const v1::StateConviction& conviction) {
+  const auto since = TimeUtil::SecondsToTimestamp(TimeUtil::TimestampToSeconds(conviction.since()));
+  return fmt::format("{}, since {}", conviction.text(), TimeUtil::ToString(since));
+}
+
+void kept_state(Invocation& invocation) {
+  const auto response =
+      invocation.client().call(&v1::SystemService::Stub::GetState, v1::GetStateRequest(), std::string_view());
+  if (invocation.json) return print_line(json(response));
+  for (const auto& file : response.files())
+    print_line(fmt::format("{:<12}generation {} at the start of the daemon, {}", file.name() + ":",
+                           file.generation(),
+                           file.expected() == 0 ? "the other file does not say which there was"
+                                                : fmt::format("at least {} expected", file.expected())));
+  print_line(fmt::format("{:<12}{}", "starts:", response.start_count()));
+  if (response.convictions().empty()) return print_line("accepted:   yes");
+  for (const auto& conviction : response.convictions())
+    print_line(coloured(line_of(conviction), Colour::red, use_colour()));
+  print_line("motion waits: look at the machine, then 'axisctl state accept'");
+}
+
+void accept_state(Invocation& invocation) {
+  const auto response = invocation.client().call(&v1::SystemService::Stub::AcceptState,
+                                                 v1::AcceptStateRequest(), std::string_view());
+  if (invocation.json) return print_line(json(response));
+  for (const auto& conviction : response.accepted()) print_line("accepted: " + line_of(conviction));
+  print_line(response.accepted().empty()
+                 ? "there was nothing to accept"
+                 : "every axis needs a new command to move; home where positions count");
 }
 
 struct WatchArguments {
@@ -79,10 +114,16 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
   list_command->add_flag("--names", *names, "Names only, for completion")->group("");
   list_command->callback([&invocation, names] { list(invocation, *names); });
 
-  auto* state_command = app.add_subcommand("state", "Everything known about an axis");
+  auto* state_command = app.add_subcommand(
+      "state", "Everything known about an axis; without one: what the daemon keeps over restarts");
   const auto axis = std::make_shared<std::string>();
-  state_command->add_option("AXIS", *axis, "Name of the axis")->required();
-  state_command->callback([&invocation, axis] {
+  state_command->add_option("AXIS", *axis, "Name of the axis (of one called 'accept': -- accept)");
+  auto* accept_command = state_command->add_subcommand(
+      "accept", "Take what the daemon remembers as it is: look at the machine first. Motion waits no longer");
+  accept_command->callback([&invocation] { accept_state(invocation); });
+  state_command->callback([&invocation, accept_command, axis] {
+    if (accept_command->parsed()) return;
+    if (axis->empty()) return kept_state(invocation);
     const auto state = invocation.state(*axis);
     print(invocation.json ? json(state) + "\n" : state_details(state, use_colour()));
   });

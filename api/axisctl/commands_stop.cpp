@@ -122,6 +122,9 @@ void stop_all(Invocation& invocation, bool wait) {
                    : command_line(result.command(), ""));
   }
   if (!invocation.json) print_line("all motion is refused until 'axisctl release-stop --all'");
+  if (!response.has_not_durable()) return;
+  fmt::print(stderr, "axisctl: {}\n", describe(response.not_durable()));
+  invocation.status = ExitCode::ended_otherwise;
 }
 
 template <class Request, class Response>

@@ -16,16 +16,21 @@ void info(Invocation& invocation) {
   const auto response =
       invocation.client().call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(), std::string_view());
   if (invocation.json) return print_line(json(response));
-  const std::string held =
-      response.inhibited()
-          ? fmt::format("all axes stopped{}{}; 'axisctl release-stop --all' ends it",
-                        response.inhibited_by().empty() ? "" : " by ", response.inhibited_by())
-          : "permitted";
+  const bool waits = !response.state_unaccepted().empty();
+  std::string held = response.inhibited()
+                         ? fmt::format("all axes stopped{}{}; 'axisctl release-stop --all' ends it",
+                                       response.inhibited_by().empty() ? "" : " by ", response.inhibited_by())
+                         : "permitted";
+  if (waits) {
+    if (!response.inhibited()) held.clear();
+    held += fmt::format("{}waits until the state is accepted ('axisctl state accept'): {}",
+                        held.empty() ? "" : "; ", response.state_unaccepted());
+  }
   print(fmt::format(
       "machine:    {}\naxisd:      {}\naxisctl:    {}\nserver:     {}\ninstance:   {}\nmotion:     {}\n",
       response.machine(), response.version(), AXISD_VERSION, invocation.connection.server,
       response.instance_id(),
-      coloured(held, response.inhibited() ? Colour::yellow : Colour::none, use_colour())));
+      coloured(held, response.inhibited() || waits ? Colour::yellow : Colour::none, use_colour())));
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ void collect_valued(const CLI::App& app, std::set<std::string>& names) {
   for (const auto* command : app.get_subcommands(nullptr)) collect_valued(*command, names);
 }
 
-/// What the words after a subcommand are: subcommands, axes, files or nothing. Subcommands of a group follow.
+/// What the words after a subcommand are: subcommands, axes (or subcommands), files or nothing. Subcommands
+/// of a group follow.
 std::string case_of(const CLI::App& command, const std::string& path) {
   std::string kind = "none";
   for (const auto* option : command.get_options()) {
@@ -42,7 +43,7 @@ std::string case_of(const CLI::App& command, const std::string& path) {
     if (option->get_name() == "FILE") kind = "file";
   }
   const std::string words = subcommands_of(command);
-  if (!words.empty()) kind = "words";
+  if (!words.empty() && kind != "axis") kind = "words";
   std::string text =
       fmt::format("    '{}') kind={}; words='{}'; options='{}' ;;\n", path, kind, words, options_of(command));
   for (const auto* part : command.get_subcommands(nullptr))
@@ -50,11 +51,14 @@ std::string case_of(const CLI::App& command, const std::string& path) {
   return text;
 }
 
-/// Subcommands that have subcommands.
-std::string groups_of(const CLI::App& app) {
+/// "command get|command watch|...|": of the groups of subcommands.
+std::string paths_of(const CLI::App& app, const std::string& before) {
   std::string text;
-  for (const auto* command : app.get_subcommands(nullptr))
-    if (!command->get_subcommands(nullptr).empty()) text += fmt::format(" {}", command->get_name());
+  for (const auto* command : app.get_subcommands(nullptr)) {
+    const auto path = before + command->get_name();
+    if (!before.empty()) text += path + "|";
+    text += paths_of(*command, path + " ");
+  }
   return text;
 }
 
@@ -79,7 +83,7 @@ _axisctl() {{
     elif [[ ' {1} ' == *" $word "* ]]; then skip=$word
     elif [[ $word == -* ]]; then :
     elif [[ -z $command ]]; then command=$word
-    elif [[ ' {4} ' == *" $command "* ]]; then command="$command $word"
+    elif [[ '|{4}' == *"|$command $word|"* ]]; then command="$command $word"
     else ((seen++)); fi
   done
   case $command in
@@ -95,13 +99,13 @@ _axisctl() {{
   case $kind in
     words) mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current") ;;
     axis|axes) mapfile -t COMPREPLY < <(
-      compgen -W "$("${{COMP_WORDS[0]}}" "${{connection[@]}}" --timeout 1s list --names 2>/dev/null)" -- "$current") ;;
+      compgen -W "$words $("${{COMP_WORDS[0]}}" "${{connection[@]}}" --timeout 1s list --names 2>/dev/null)" -- "$current") ;;
     file) compopt -o filenames; mapfile -t COMPREPLY < <(compgen -f -- "$current") ;;
   esac
 }}
 complete -F _axisctl axisctl
 )bash",
-                     subcommands_of(app), fmt::join(valued, " "), cases, options_of(app), groups_of(app));
+                     subcommands_of(app), fmt::join(valued, " "), cases, options_of(app), paths_of(app, ""));
 }
 
 }  // namespace axisd::axisctl

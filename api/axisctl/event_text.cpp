@@ -86,6 +86,13 @@ std::string text_of(const v1::CommandChange& change) {
 
 std::string text_of(const v1::AxisFault& fault) { return "fault: " + describe(fault.cause()); }
 
+std::string text_of(const v1::KeptStateChange& change) {
+  std::string text;
+  for (const auto& conviction : change.convictions()) text += (text.empty() ? "" : "; ") + conviction.text();
+  return change.accepted_by().empty() ? "motion waits until the state is accepted: " + text
+                                      : fmt::format("state accepted by {}: {}", change.accepted_by(), text);
+}
+
 std::string content(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
@@ -108,6 +115,8 @@ std::string content(const v1::Event& event) {
       return text_of(event.command_change());
     case v1::Event::kAxisFault:
       return text_of(event.axis_fault());
+    case v1::Event::kKeptStateChange:
+      return text_of(event.kept_state_change());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -135,12 +144,12 @@ v1::EventKind parse_event_kind(std::string_view text) {
     const auto kind = static_cast<v1::EventKind>(number);
     auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
     std::ranges::replace(name, ' ', '-');
-    if (text == name || text == name.substr(0, name.find('-'))) return kind;
+    if (text == name || name.starts_with(fmt::format("{}-", text))) return kind;
   }
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
                             "configuration (of a drive), configuration-reloaded, flight, lease, stop "
-                            "(holds), command, axis-fault",
+                            "(holds), command, axis-fault, kept-state",
                             text));
 }
 

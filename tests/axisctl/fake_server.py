@@ -16,6 +16,7 @@ from fake_drives import SERVICES, FakeDrives, FakeEvents, FakeNodes
 from fake_explain import FakeExplain
 from fake_groups import SERVICES as GROUP_SERVICES, FakeGroups
 from fake_leases import SERVICES as LEASE_SERVICES, FakeLeases
+from fake_state import FakeState
 from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes_rpc,
                       budget_pb2 as budget_pb, bus_service_pb2 as bus_pb, bus_service_pb2_grpc as bus_rpc,
                       command_service_pb2 as command_pb, command_service_pb2_grpc as command_rpc,
@@ -24,7 +25,7 @@ from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes
 GRANTED_STEP = 3.0
 
 
-class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, FakeExplain,
+class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, FakeExplain, FakeState,
                   axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer,
                   system_rpc.SystemServiceServicer):
     """All services. `calls` records (method, request, peer) of every call, for assertions. `losing`: of how many calls
@@ -34,6 +35,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         FakeDrives.__init__(self)
         FakeEvents.__init__(self)
         FakeLeases.__init__(self)
+        FakeState.__init__(self)
         self.inhibited = False
         self.calls = []
         self.losing = {}
@@ -82,6 +84,8 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         if self.inhibited and powered:
             await refuse(context, grpc.StatusCode.FAILED_PRECONDITION, error_pb2.ErrorDetail(
                 reason=error_pb2.REASON_INHIBITED, message="all axes are stopped", remedy="release the stop first"))
+        if powered:
+            await self.accepted(context)
         if powered and not axis.state.enabled:
             await refuse(context, grpc.StatusCode.FAILED_PRECONDITION, error_pb2.ErrorDetail(
                 reason=error_pb2.REASON_DISABLED, message="the power stage is off", remedy="enable the axis"))
@@ -351,7 +355,8 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
     async def GetInfo(self, request, context):
         self.note("GetInfo", request, context)
         return system_pb.GetInfoResponse(machine="press-1", version="0.1.0", instance_id="fake",
-                                         inhibited=self.inhibited, inhibited_by="test" if self.inhibited else "")
+                                         inhibited=self.inhibited, inhibited_by="test" if self.inhibited else "",
+                                         state_unaccepted="; ".join(each.text for each in self.convictions))
 
     async def StopAll(self, request, context):
         self.note("StopAll", request, context)
@@ -365,7 +370,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
             command = types_pb2.Command(id=f"s-{axis.name}", axis=axis.name, kind=types_pb2.COMMAND_KIND_STOP,
                                         state=types_pb2.COMMAND_STATE_DONE)
             results.append(system_pb.StopResult(axis=axis.name, command=command))
-        return system_pb.StopAllResponse(results=results)
+        return system_pb.StopAllResponse(results=results, not_durable=self.latch_trouble)
 
     async def ReleaseStopAll(self, request, context):
         self.note("ReleaseStopAll", request, context)

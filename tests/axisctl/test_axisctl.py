@@ -377,6 +377,9 @@ class Completion(AxisctlTest):
         self.assertEqual(self.complete("move", "fe"), ["feeder"])
         self.assertEqual(self.complete("stop", "feeder", "t"), ["turntable"])
         self.assertEqual(self.complete("--timeout", "2s", "state", "gh"), ["ghost"])
+        self.assertEqual(self.complete("state", "acc"), ["accept"])
+        self.assertEqual(self.complete("state", "feeder", ""), [])
+        self.assertEqual(self.complete("state", "accept", ""), [])
         self.assertEqual(self.complete("move", "feeder", ""), [])
         self.assertEqual(sorted(self.complete("bus", "")),
                          ["list", "read", "record", "record-now", "records", "scan", "statistics", "status",

@@ -11,12 +11,13 @@ from .budget import AxisBudget, BusBudget, StopBudget
 from .configuration import ConfigChange, ConfigCheck, ConfigFinding, Configuration, Reload
 from .drive import Drive
 from .drives import (Alarm, AxisFault, CommandChange, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
-                     LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
+                     KeptStateChange, LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
                      StateChange, StopHoldChange, TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import (ArgumentError, AxisdError, LeaseLostError, MotionError, RefusedError, StopError,
                      UnreachableError)
 from .group import Group, GroupMember, GroupMove
 from .holds import StopHold
+from .kept_state import AllStopped, Conviction, KeptFile, KeptState
 from .lease import Lease, LeaseInfo
 from .machine import Machine, connect
 from .reasons import Outcome, Reason
@@ -26,11 +27,11 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
                     Network, NetworkLink, Obstacle, PermittedRange, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
-    "Alarm", "ArgumentError", "Axis", "AxisBudget", "AxisFault", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
+    "Alarm", "AllStopped", "ArgumentError", "Axis", "AxisBudget", "AxisFault", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
     "ClassStatistics", "Command", "CommandChange", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
-    "ConfigurationDrift", "ConfigurationReloaded", "Cursor", "Device", "Drive", "DriveInfo",
+    "ConfigurationDrift", "ConfigurationReloaded", "Conviction", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
-    "GroupMove", "Info", "Jog", "Latency", "Lease",
+    "GroupMove", "Info", "Jog", "KeptFile", "KeptState", "KeptStateChange", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle", "Outcome",
     "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Reload", "ScanProgress", "Segments",

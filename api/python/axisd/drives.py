@@ -8,6 +8,7 @@ from typing import Any
 from google.protobuf.duration_pb2 import Duration
 
 from .configuration import ConfigChange
+from .kept_state import Conviction
 from .types import (Command, ErrorDetail, Link, MotionCause, State, _member, _optional, _optional_error, _optional_time, seconds)
 from .v1 import bus_service_pb2, drive_service_pb2, event_service_pb2, types_pb2
 
@@ -269,8 +270,15 @@ class AxisFault:
     cause: ErrorDetail
 
 
+@dataclasses.dataclass(frozen=True)
+class KeptStateChange:
+    """Files of the state convict each other, so that motion waits; or somebody has accepted that (`accepted_by`)."""
+    convictions: tuple[Conviction, ...]
+    accepted_by: str
+
+
 Content = (TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
-           | ConfigurationReloaded | StopHoldChange | CommandChange | AxisFault)
+           | ConfigurationReloaded | StopHoldChange | CommandChange | AxisFault | KeptStateChange)
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -300,6 +308,8 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
         return CommandChange(Command.of(content.command))
     if kind == "axis_fault":
         return AxisFault(ErrorDetail.of(content.cause))
+    if kind == "kept_state_change":
+        return KeptStateChange(tuple(Conviction.of(each) for each in content.convictions), content.accepted_by)
     if kind == "stop_hold_change":
         name = event_service_pb2.StopHoldChangeKind.Name(content.kind)
         return StopHoldChange(name.removeprefix("STOP_HOLD_CHANGE_KIND_").lower(), content.holder, content.request_id,

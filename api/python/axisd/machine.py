@@ -21,11 +21,12 @@ from .drives import Cursor, Device, Event, ScanProgress
 from .errors import AxisdError, RefusedError, UnreachableError, translate
 from .group import Group
 from .holds import Holds
+from .kept_state import AllStopped, Conviction, KeptState
 from .lease import Lease, LeaseInfo
 from .reasons import Reason
 from .stop_lane import StopCalls, StopLane, stop_lane_of
 from .traffic import BusStatistics, FlightRecord, TracedFrame
-from .types import AxisState, Bus, Command, Info, StopResult, Tick
+from .types import AxisState, Bus, Command, Info, Tick
 from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
                  command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
                  group_service_pb2_grpc, lease_service_pb2, lease_service_pb2_grpc, system_service_pb2,
@@ -220,13 +221,13 @@ class Machine:
         request = command_service_pb2.ListCommandsRequest(axis=axis, limit=limit)
         return [Command.of(raw) for raw in (await self._call(self._commands.ListCommands, request, axis)).commands]
 
-    async def stop_all(self, *, wait: bool = True) -> list[StopResult]:
+    async def stop_all(self, *, wait: bool = True) -> AllStopped:
         """Stops every axis and refuses all motion until release_stop_all(). An operational stop, without safety
-        rating. Never raises for a single axis: look at each result."""
+        rating. Never raises for a single axis: look at each result, and at `not_durable`."""
         request = system_service_pb2.StopAllRequest(
             wait_until=types_pb2.WAIT_UNTIL_DONE if wait else types_pb2.WAIT_UNTIL_ACCEPTED)
         response = await self._stop_call(self._stops.StopAll, request, "stop all", wait)
-        return [StopResult.of(result) for result in response.results]
+        return AllStopped.of(response)
 
     async def release_stop_all(self) -> None:
         """Permits motion again; nothing moves by itself."""
@@ -344,6 +345,16 @@ class Machine:
 
     async def info(self) -> Info:
         return Info.of(await self._call(self._system.GetInfo, system_service_pb2.GetInfoRequest(), ""))
+
+    async def state(self) -> KeptState:
+        """What the daemon remembers over restarts, and whether that is certain."""
+        return KeptState.of(await self._call(self._system.GetState, system_service_pb2.GetStateRequest(), "state"))
+
+    async def accept_state(self) -> list[Conviction]:
+        """Takes what the daemon remembers as it is: motion waits no longer. Look at the machine first. Returns what was
+        accepted."""
+        response = await self._call(self._system.AcceptState, system_service_pb2.AcceptStateRequest(), "accept state")
+        return [Conviction.of(conviction) for conviction in response.accepted]
 
     async def configuration(self) -> Configuration:
         """What is served: the daemon's file as it was at its start or at the last reload."""

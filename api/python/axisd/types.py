@@ -297,10 +297,13 @@ class Info:
     instance_id: str
     inhibited: bool
     inhibited_by: str
+    state_unaccepted: str = ""
+    """Why motion waits until Machine.accept_state(); empty: it does not."""
 
     @classmethod
     def of(cls, raw: system_service_pb2.GetInfoResponse) -> Info:
-        return cls(raw.machine, raw.version, raw.instance_id, raw.inhibited, raw.inhibited_by)
+        return cls(raw.machine, raw.version, raw.instance_id, raw.inhibited, raw.inhibited_by,
+                   raw.state_unaccepted)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,0 +1,95 @@
+"""What the daemon remembers, and its acceptance: axisctl state and Machine.state() against the fake daemon."""
+import json
+import unittest
+
+import fake_server
+from fake_state import TEXT
+from support import AxisctlTest
+import axisd
+from axisd.v1 import error_pb2
+
+FULL = error_pb2.ErrorDetail(reason=error_pb2.REASON_STORAGE, message="the latch would not outlive a restart",
+                             remedy="free space on the disk")
+
+
+class Axisctl(AxisctlTest):
+    def test_all_is_well(self):
+        shown = self.ok("state")
+        self.assertIn("state.v1:   generation 12 at the start of the daemon, at least 40 expected\n", shown)
+        self.assertIn("journal.v1: generation 120 at the start of the daemon, the other file does not say", shown)
+        self.assertIn("accepted:   yes", shown)
+        self.assertEqual(self.ok("state", "accept"), "there was nothing to accept\n")
+
+    def test_what_is_wrong_and_since_when_until_it_is_accepted(self):
+        self.server.machine.convict()
+        line = f"{TEXT}, since 2023-11-14T22:13:20Z"
+        self.assertIn(f"{line}\nmotion waits: look at the machine, then 'axisctl state accept'\n", self.ok("state"))
+        self.assertIn(f"waits until the state is accepted ('axisctl state accept'): {TEXT}", self.ok("info"))
+        self.assertIn(TEXT, self.fails(4, "move", "feeder", "1"))
+        self.ok("stop", "feeder")
+        self.ok("state", "feeder")
+        self.assertIn(f"accepted: {line}\n", self.ok("state", "accept"))
+        self.assertIn("permitted", self.ok("info"))
+        self.ok("move", "feeder", "1", "--wait")
+        shown = self.ok("events", "--kind", "kept-state")
+        self.assertIn(f"motion waits until the state is accepted: {TEXT}", shown)
+        self.assertIn(f"state accepted by test: {TEXT}", shown)
+
+    def test_json(self):
+        self.server.machine.convict()
+        self.assertEqual(self.json("state")[0]["convictions"][0]["fault"], "STATE_FAULT_ROLLED_BACK")
+        self.assertEqual(self.json("state", "accept")[0]["accepted"][0]["text"], TEXT)
+        self.assertEqual(self.json("state")[0]["convictions"], [])
+
+    def test_stop_all_says_that_its_latch_is_not_on_the_disk(self):
+        self.server.machine.latch_trouble = FULL
+        done = self.run_axisctl("stop", "--all")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("feeder  Stop", done.stdout)
+        self.assertEqual(done.stderr, "axisctl: the latch would not outlive a restart; free space on the disk\n")
+        done = self.run_axisctl("--json", "stop", "--all")
+        self.assertEqual(json.loads(done.stdout)["not_durable"]["reason"], "REASON_STORAGE")
+
+
+class Python(unittest.IsolatedAsyncioTestCase):
+    async def asyncSetUp(self):
+        self.fake = fake_server.FakeMachine()
+        server, port = await fake_server.serve(self.fake, ["127.0.0.1:0"])
+        self.addAsyncCleanup(server.stop, 0)
+        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
+
+    async def test_what_is_wrong_until_it_is_accepted(self):
+        self.assertTrue((await self.machine.state()).accepted)
+        self.assertEqual(await self.machine.accept_state(), [])
+        self.assertEqual((await self.machine.info()).state_unaccepted, "")
+        self.fake.convict()
+        state = await self.machine.state()
+        self.assertFalse(state.accepted)
+        self.assertEqual((state.start_count, state.files[0]), (65544, axisd.KeptFile("state.v1", 12, 40)))
+        (conviction,) = state.convictions
+        self.assertEqual((conviction.file, conviction.fault, conviction.found, conviction.expected, str(conviction),
+                          conviction.since.timestamp()), ("state.v1", "rolled_back", 12, 40, TEXT, 1_700_000_000))
+        self.assertEqual((await self.machine.info()).state_unaccepted, TEXT)
+        with self.assertRaises(axisd.RefusedError) as raised:
+            await self.machine.axis("feeder").move(1)
+        self.assertIs(raised.exception.reason, axisd.Reason.STATE_UNACCEPTED)
+        self.assertEqual(await self.machine.accept_state(), [conviction])
+        await self.machine.axis("feeder").move(1)
+        seen = []
+        async for event in self.machine.events(kept=True):
+            if isinstance(event.content, axisd.KeptStateChange):
+                seen.append(event.content)
+                if event.content.accepted_by:
+                    break
+        self.assertEqual(seen, [axisd.KeptStateChange((conviction,), ""), axisd.KeptStateChange((conviction,), "test")])
+
+    async def test_stop_all_says_that_its_latch_is_not_on_the_disk(self):
+        self.assertIsNone((await self.machine.stop_all()).not_durable)
+        self.fake.latch_trouble = FULL
+        stopped = await self.machine.stop_all()
+        self.assertEqual(stopped.not_durable.reason, "storage")
+        self.assertIn("feeder", [result.axis for result in stopped])
+
+
+if __name__ == "__main__":
+    unittest.main()
