@@ -189,8 +189,9 @@ std::optional<std::string_view> intact_body(std::string_view text) {
 
 std::string encode(const Generation& generation) {
   const auto& [number, mark, state] = generation;
-  const bool before = mark == JournalMark{} && state.convictions.empty() &&
-                      std::ranges::all_of(state.axes, [](const auto& axis) { return axis.second.eeprom == EepromRecord{}; });
+  const bool before =
+      mark == JournalMark{} && state.convictions.empty() &&
+      std::ranges::all_of(state.axes, [](const auto& axis) { return axis.second.eeprom == EepromRecord{}; });
   std::string text(before ? version_line_1 : version_line);
   text += fmt::format("generation {}\n", number);
   if (!before) text += fmt::format("pair {} journal_line={}\n", escape(mark.pair), mark.line);

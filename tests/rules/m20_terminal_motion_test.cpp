@@ -70,5 +70,33 @@ TEST(M20TerminalMotion, ThatEndsWithItsTerminalKeepsIt) {
     });
 }
 
+/// Of an axis whose drive has homed before, so that the homed bit tells nothing.
+TEST(M20TerminalMotion, HomingBetweenTwoReadingsLosesThePosition) {
+  for (const auto poll_idle : {20ms, 5000ms})
+    both_directions(jogged(poll_idle), [](RigOptions options) {
+      options.adjust = [adjust = options.adjust](AxisSettings& axis) {
+        adjust(axis);
+        axis.inputs.back().function = "homing_start";
+      };
+      Rig rig(options);
+      rig.ready();
+      EXPECT_EQ(rig.complete(HomeRequest{}).state, CommandState::done);
+      EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 1}).state, CommandState::done);
+      rig.complete(DisableRequest{});
+      rig.drive->advance(rig.world.now());
+      ASSERT_TRUE(rig.drive->push_shaft(options.invert ? -100 : 100)) << "which an open loop does not count";
+      rig.enable();
+      EXPECT_EQ(rig.complete(SetPositionRequest{.position = 8}).state, CommandState::done);
+      EXPECT_EQ(rig.state()->trust, PositionTrust::set);
+      rig.set_input("X4", true);
+      rig.run(50ms);
+      rig.set_input("X4", false);
+      rig.run(10s);
+      ASSERT_FALSE(rig.drive->shaft_moving());
+      ASSERT_NEAR(rig.load_mm(), -50, 0.2) << "it came home";
+      EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    });
+}
+
 }  // namespace
 }  // namespace axisd::test
