@@ -143,12 +143,11 @@ void Axis::on_sample(const DriveSample& sample) {
   const bool homing = activity_ && activity_->state == AxisState::homing;
   // Homing that is not ours zeroes the counter; so does one that came and went between two samples (M20).
   // Where a drive zeroes its counter by homing on the spot, that is ours.
-  const bool homed_by_others =
-      !homing && !rezeroing_ && !stopping_.running && before && !before->homed && sample.homed;
+  const bool homed_by_others = !homing && !rezeroing_ && before && !before->homed && sample.homed;
   if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
-  if (before && ended_abruptly(*before, turned_by)) lose_trust();
+  if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = left_running_ = false;
   if (link_ == LinkState::online)
@@ -174,6 +173,15 @@ bool Axis::ended_abruptly(const DriveSample& before, std::int64_t turned_by) con
   if (before.mode == DriveMode::homing || now.mode == DriveMode::homing) return false;
   const bool positive = before.moving ? last_positive_ : (turned_by > 0) != settings_.scale.invert;
   return limit_active(positive) || input_active("quick_stop");
+}
+
+/// Homing that a terminal started may have begun and ended between two readings, and left neither its mode nor
+/// a new homed bit: the counter tells of it where nothing of ours can have turned the shaft.
+bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const {
+  const auto& now = *sample_;
+  const bool ours = rezeroing_ || left_running_ || (activity_ && activity_->may_run);
+  if (ours || !has_input("homing_start") || before.moving || now.moving) return false;
+  return (before.enabled || now.enabled) && std::abs(turned_by) > drive_->position_window();
 }
 
 Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {

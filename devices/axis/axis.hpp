@@ -234,6 +234,7 @@ class Axis {
   [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
   [[nodiscard]] bool ended_abruptly(const DriveSample& before, std::int64_t turned_by) const;
+  [[nodiscard]] bool homed_unseen(const DriveSample& before, std::int64_t turned_by) const;
   void lose_trust();
   void remember_position();
 

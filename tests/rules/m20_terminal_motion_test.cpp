@@ -70,32 +70,56 @@ TEST(M20TerminalMotion, ThatEndsWithItsTerminalKeepsIt) {
     });
 }
 
-/// Of an axis whose drive has homed before, so that the homed bit tells nothing.
+/// A stop ends the mode before anybody has read it.
+void home_by_terminal(Rig& rig, double home_mm, Duration after_a_reading) {
+  rig.run(after_a_reading);
+  rig.set_input("X4", true);
+  rig.run(50ms);
+  rig.set_input("X4", false);
+  rig.run(3s);
+  ASSERT_FALSE(rig.drive->shaft_moving());
+  ASSERT_NEAR(rig.load_mm(), home_mm, 0.2) << "it came home";
+  EXPECT_EQ(rig.complete(StopRequest{.kind = StopKind::halt}).state, CommandState::done);
+  rig.run(6s);
+  EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+}
+
+/// Of a drive that has homed before, so that the homed bit tells nothing.
+void home_again(const RigOptions& options, Duration after_a_reading) {
+  Rig rig(options);
+  rig.ready();
+  EXPECT_EQ(rig.complete(HomeRequest{}).state, CommandState::done);
+  EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 1}).state, CommandState::done);
+  rig.complete(DisableRequest{});
+  rig.drive->advance(rig.world.now());
+  ASSERT_TRUE(rig.drive->push_shaft(options.invert ? -100 : 100)) << "which an open loop does not count";
+  rig.enable();
+  EXPECT_EQ(rig.complete(SetPositionRequest{.position = 8}).state, CommandState::done);
+  home_by_terminal(rig, -50, after_a_reading);
+}
+
+/// Of one that is not homed, so that the counter may tell nothing: it was 0 before.
+void home_from_zero(RigOptions options, Duration after_a_reading) {
+  options.adjust_drive = [&](simulation::SimulatedNodeSettings& drive) {
+    drive.mechanics.home_switch_from = options.invert ? 100 : -300;
+    drive.mechanics.home_switch_to = options.invert ? 300 : -100;
+  };
+  Rig rig(options);
+  rig.ready();
+  home_by_terminal(rig, -1, after_a_reading);
+}
+
 TEST(M20TerminalMotion, HomingBetweenTwoReadingsLosesThePosition) {
-  for (const auto poll_idle : {20ms, 5000ms})
-    both_directions(jogged(poll_idle), [](RigOptions options) {
-      options.adjust = [adjust = options.adjust](AxisSettings& axis) {
-        adjust(axis);
-        axis.inputs.back().function = "homing_start";
-      };
-      Rig rig(options);
-      rig.ready();
-      EXPECT_EQ(rig.complete(HomeRequest{}).state, CommandState::done);
-      EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 1}).state, CommandState::done);
-      rig.complete(DisableRequest{});
-      rig.drive->advance(rig.world.now());
-      ASSERT_TRUE(rig.drive->push_shaft(options.invert ? -100 : 100)) << "which an open loop does not count";
-      rig.enable();
-      EXPECT_EQ(rig.complete(SetPositionRequest{.position = 8}).state, CommandState::done);
-      EXPECT_EQ(rig.state()->trust, PositionTrust::set);
-      rig.set_input("X4", true);
-      rig.run(50ms);
-      rig.set_input("X4", false);
-      rig.run(10s);
-      ASSERT_FALSE(rig.drive->shaft_moving());
-      ASSERT_NEAR(rig.load_mm(), -50, 0.2) << "it came home";
-      EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
-    });
+  for (const auto poll_idle : {20ms, 6000ms})
+    for (const auto after : {0ms, 1000ms, 2000ms, 3000ms, 4000ms, 5000ms})
+      both_directions(jogged(poll_idle), [after](RigOptions options) {
+        options.adjust = [adjust = options.adjust](AxisSettings& axis) {
+          adjust(axis);
+          axis.inputs.back().function = "homing_start";
+        };
+        home_again(options, after);
+        home_from_zero(options, after);
+      });
 }
 
 }  // namespace
