@@ -38,12 +38,13 @@ std::string_view name_of(KeptFile file) {
 }
 
 std::string to_string(const Conviction& conviction) {
+  const auto* const counted = conviction.file == KeptFile::journal ? "line" : "generation";
   auto text = fmt::format("{} {}", name_of(conviction.file), text_of(conviction.fault));
   if (conviction.found != 0 && conviction.expected > conviction.found)
-    text += fmt::format(": it has generation {}, but there was generation {}", conviction.found,
+    text += fmt::format(": it has {0} {1}, but there was {0} {2}", counted, conviction.found,
                         conviction.expected);
   else if (conviction.found == 0 && conviction.expected != 0)
-    text += fmt::format(": there was generation {}", conviction.expected);
+    text += fmt::format(": there was {} {}", counted, conviction.expected);
   if (!conviction.detail.empty()) text += fmt::format(" ({})", conviction.detail);
   return text;
 }

@@ -120,7 +120,10 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
   state_command->add_option("AXIS", *axis, "Name of the axis (of one called 'accept': -- accept)");
   auto* accept_command = state_command->add_subcommand(
       "accept", "Take what the daemon remembers as it is: look at the machine first. Motion waits no longer");
-  accept_command->callback([&invocation] { accept_state(invocation); });
+  accept_command->callback([&invocation, axis] {
+    if (!axis->empty()) throw CLI::ValidationError("accept", "of the whole machine: it takes no axis");
+    accept_state(invocation);
+  });
   state_command->callback([&invocation, accept_command, axis] {
     if (accept_command->parsed()) return;
     if (axis->empty()) return kept_state(invocation);

@@ -42,6 +42,8 @@ FoundFile find_file(int directory, const char* name, std::size_t most) {
   if (fstat(file.get(), &is) != 0) return failed(errno);
   if (!S_ISREG(is.st_mode)) return {.kind = FoundFile::Kind::other, .what = kind_of(is.st_mode)};
   FoundFile found{.kind = FoundFile::Kind::regular};
+  found.text.reserve(
+      std::min(static_cast<std::size_t>(is.st_size), most + 1));  // grown, it would be there twice
   std::array<char, 65536> chunk{};
   while (found.text.size() <= most) {
     const auto got = ::read(file.get(), chunk.data(), std::min(chunk.size(), most + 1 - found.text.size()));

@@ -97,7 +97,7 @@ class Court {
     const auto before = previous_ ? previous_->number : 0;
     const auto told = line() != nullptr && belongs() ? line()->generation : 0;
     const auto expected = std::max(before, told);
-    newest_unknown_ = (!state_ || state_->number < before) && before >= told;
+    newest_unknown_ = state_ && state_->number < before && before >= told;
     verdict_.seen.state = {.found = state_ ? state_->number : 0, .expected = expected};
     if (!state_)
       convict_unusable(KeptFile::state, found_.state, state_trouble_, expected);
@@ -111,7 +111,8 @@ class Court {
     const auto one_before = count - std::min(count, std::uint64_t{1});
     if (!previous_ && (one_before > 0 || found_.previous.kind != FoundFile::Kind::absent))
       convict_unusable(KeptFile::previous, found_.previous, previous_trouble_, one_before);
-    else if (const auto newest = state_ ? state_->number : told; previous_ && before + 1 < newest)
+    else if (const auto newest = state_ ? state_->number : told;
+             previous_ && before + 1 < newest && !begun_anew(state_ ? &*state_ : nullptr))
       convict({.file = KeptFile::previous,
                .fault = KeptFault::rolled_back,
                .found = before,
@@ -130,6 +131,12 @@ class Court {
            (state == nullptr || state->journal.pair == line()->pair || state->journal.pair.empty());
   }
 
+  /// By a start that convicted, and was killed before it began a journal anew: neither the journal nor the
+  /// generation before is at fault.
+  [[nodiscard]] static bool begun_anew(const Generation* state) {
+    return state != nullptr && !state->state.convictions.empty() && state->journal.line == 0;
+  }
+
   void look_at_journal() {
     std::uint64_t expected = 0;
     const auto* state = newest();
@@ -137,15 +144,14 @@ class Court {
       if (each != nullptr && each->journal.pair == state->journal.pair)
         expected = std::max(expected, each->journal.line);
     verdict_.seen.journal = {.found = journal_ ? journal_->last_number : 0, .expected = expected};
-    // A start that convicted, and was killed before it began a journal anew: that is not the journal's fault.
-    const bool begun_anew = state != nullptr && !state->state.convictions.empty() && state->journal.line == 0;
-    if (begun_anew) verdict_.doubt = "it was to be begun anew";
+    const bool anew = begun_anew(state);
+    if (anew) verdict_.doubt = "it was to be begun anew";
     if (!journal_) {
       if (found_.journal.kind != FoundFile::Kind::absent || expected > 0)
         convict_unusable(KeptFile::journal, found_.journal, {}, expected);
     } else if (!journal_->damage.empty()) {
       convict_unusable(KeptFile::journal, found_.journal, journal_->damage, expected);
-    } else if (line() == nullptr ? expected > 0 : !belongs() && !begun_anew) {
+    } else if (line() == nullptr ? expected > 0 : !belongs() && !anew) {
       // One without a word of the state file is of before that was recorded, and so an old copy.
       const auto fault = line() == nullptr ? KeptFault::rolled_back : KeptFault::foreign;
       convict({.file = KeptFile::journal,
@@ -189,14 +195,11 @@ class Court {
 
   void go_on_by_caution(const std::string& new_pair) {
     auto& state = verdict_.state.state;
-    const bool state_lost = convicted(KeptFile::state) || convicted(KeptFile::previous);
-    if (state_lost) distrust_offsets(state);
-    // Old copies of both vouch for each other: without the generation before nobody convicts them. Nor does
-    // anybody vouch for a journal beside an old one of the state, or for its end.
-    const bool alone = newest_unknown_ || (convicted(KeptFile::previous) && (!previous_ || !state_));
-    // Where the journal is not what it was, a state file that equals the one before it may be an old copy.
-    const bool unsure = state_ && previous_ && previous_->number >= state_->number;
-    if (alone || (convicted(KeptFile::journal) && (state_lost || unsure))) latch_by_caution(state, now_);
+    // Where the journal is not what it was, nobody vouches that the state files are not both old copies.
+    distrust_offsets(state);
+    // Two that agree may be old copies, both of them: the third has to tell.
+    const bool alone = !state_ || !previous_ || newest_unknown_;
+    if (alone || convicted(KeptFile::journal)) latch_by_caution(state, now_);
     if (alone && verdict_.doubt.empty()) verdict_.doubt = to_string(verdict_.fresh);
     state.start_count += start_count_jump;
     // No copy of what there was before fits what there is from now on.
@@ -237,7 +240,7 @@ class Court {
   std::optional<Generation> state_, previous_;
   std::string state_trouble_, previous_trouble_;
   std::optional<JournalLoad> journal_;
-  /// The newest state is not there, and the journal does not tell of it: its end may be gone, too.
+  /// The state file is an old copy, and the journal does not tell of the newest: its end may be gone, too.
   bool newest_unknown_ = false;
   Verdict verdict_;
 };

@@ -21,6 +21,7 @@ Task<> Axis::run() {
     co_await connect();
     co_await poll();
   }
+  note_eeprom_writes();  // of a configuration that was under way
 }
 
 Task<> Axis::connect() {

@@ -261,6 +261,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> bring_to(std::vector<ObjectSetting> required);
   Task<Result<void>> write_all(const std::vector<ObjectSetting>& required, Values& present);
   Task<Result<void>> neutralise_inputs(const std::vector<ObjectSetting>& required, Values& present);
+  Task<Result<void>> prepare_write(const ObjectSetting& setting);
   Task<Result<void>> check_inactive(const ObjectSetting& setting);
   Task<Result<void>> verify(const std::vector<ObjectSetting>& required);
   /// Writes one object of the configuration and counts it if it goes to the EEPROM.

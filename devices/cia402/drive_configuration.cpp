@@ -57,9 +57,23 @@ Task<Result<void>> Cia402Drive::save_writes(bool saved) {
     if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   saving_.reset();
   const auto written = co_await write_object(*model_->objects.eeprom_switch, saved ? 0 : 1, 0, patiently());
+  if (written || written.error().outcome == Outcome::unknown)
+    count_save(1);  // whether this object saves itself is not said: counted
   if (!written) co_return written;
   saving_ = saved;
-  count_save(1);  // whether this object saves itself is not said: counted
+  co_return Result<void>{};
+}
+
+/// What can start motion is checked right before it is written; and before the switch of saving is turned,
+/// which each further attempt would turn again, and wear.
+Task<Result<void>> Cia402Drive::prepare_write(const ObjectSetting& setting) {
+  // Of what no write saves the switch says nothing, and to turn it is a write itself.
+  const bool turns = can_be_saved(setting.address) && saving_ != setting.saved;
+  if (setting.starts_motion && turns)
+    if (const auto inactive = co_await check_inactive(setting); !inactive) co_return inactive;
+  if (turns)
+    if (const auto switched = co_await save_writes(setting.saved); !switched) co_return switched;
+  if (setting.starts_motion) co_return co_await check_inactive(setting);
   co_return Result<void>{};
 }
 
@@ -70,11 +84,7 @@ Task<Result<void>> Cia402Drive::write_all(const std::vector<ObjectSetting>& requ
     if (setting.holds(held)) continue;  // spares the EEPROM
     // Again and again it would only wear the EEPROM.
     if (setting.saved && unsaved_.contains(setting.address)) co_return fail(not_held(setting, held));
-    // Of what no write saves the switch says nothing, and to turn it is a write itself.
-    if (can_be_saved(setting.address))
-      if (const auto switched = co_await save_writes(setting.saved); !switched) co_return switched;
-    if (setting.starts_motion)
-      if (const auto inactive = co_await check_inactive(setting); !inactive) co_return inactive;
+    if (const auto ready = co_await prepare_write(setting); !ready) co_return ready;
     const auto written = co_await write_counted(setting.address, setting.applied_to(held), setting.bytes);
     if (!written) co_return written;
   }

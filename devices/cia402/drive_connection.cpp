@@ -319,7 +319,8 @@ Task<Result<std::string>> Cia402Drive::set_state_pdos() {
     }
     auto outcome = co_await set_pdo(wanted);
     const bool gone = outcome.error && outcome.error->outcome != Outcome::refused &&
-                      outcome.error->reason != Reason::invalid_argument;
+                      outcome.error->reason != Reason::invalid_argument &&
+                      outcome.error->reason != Reason::eeprom_budget;
     if (gone) co_return failed(*outcome.error);
     if (auto why = objection(outcome, wanted); !why.empty()) co_return why;
     outcomes.push_back(std::move(outcome));

@@ -189,7 +189,10 @@ Task<Result<std::string>> Cia402Drive::factory_address(const std::vector<std::ui
 Task<Result<std::string>> Cia402Drive::restore_factory(std::vector<std::uint8_t> taken) {
   if (!model_->objects.restore)
     co_return fail(not_supported("the drive cannot restore its factory settings", "use its maker's tool"));
-  if (const auto permitted = permit_saves(1); !permitted) co_return fail(permitted.error());
+  // The drive stays out of use until it is configured again, and what is kept there is saved once more.
+  const auto kept = static_cast<std::uint64_t>(std::ranges::count_if(required_, &ObjectSetting::saved));
+  const auto saves = 1 + (kept == 0 ? 0 : kept + 2);  // two turn the switch, there and back
+  if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   auto address = co_await factory_address(taken);
   if (!address) co_return address;
   const auto& command = *model_->objects.restore;

@@ -102,6 +102,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> verify(const std::vector<RegisterSetting>& required);
   Task<Result<void>> silence_segments(const std::vector<RegisterSetting>& required, Registers& present);
   Task<Result<void>> neutralise_inputs(const std::vector<RegisterSetting>& required, Registers& present);
+  Task<Result<void>> prepare_write(const RegisterSetting& setting);
   Task<Result<void>> check_inactive(const RegisterSetting& setting) const;
   Task<Result<void>> write_run(std::uint16_t address, std::vector<std::uint16_t> values);
   [[nodiscard]] std::uint64_t saved_registers(std::uint16_t first, std::size_t count) const;

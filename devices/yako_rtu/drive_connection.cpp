@@ -231,10 +231,12 @@ Task<Result<void>> YakoRtuDrive::silence_segments(const std::vector<RegisterSett
     for (const auto speed : {at(reg::segment_speed), at(reg::segment_pv_speed)}) {
       const auto held = present.find(speed);
       if (!changes || held == present.end() || held->second == 0) continue;
-      const RegisterSetting silence{
-          .address = speed, .key = "segments", .starts_motion = true, .input_bits = enables};
-      if (const auto switched = co_await save_writes(setup_.persist.segments); !switched) co_return switched;
-      if (const auto inactive = co_await check_inactive(silence); !inactive) co_return inactive;
+      const RegisterSetting silence{.address = speed,
+                                    .key = "segments",
+                                    .saved = setup_.persist.segments,
+                                    .starts_motion = true,
+                                    .input_bits = enables};
+      if (const auto ready = co_await prepare_write(silence); !ready) co_return ready;
       if (const auto written = co_await write_run(speed, {0}); !written) co_return written;
       held->second = 0;
     }
@@ -252,9 +254,20 @@ Task<Result<void>> YakoRtuDrive::save_writes(bool saved) {
   const auto written =
       co_await node_.write_patiently(reg::eeprom_update, value, in(TransactionClass::parameters));
   saving_.reset();
+  if (written || written.error().outcome == Outcome::unknown)
+    count_save(1);  // whether this register saves itself is not said: counted
   if (!written) co_return failed(written.error());
   saving_ = saved;
-  count_save(1);  // whether this register saves itself is not said: counted
+  co_return Result<void>{};
+}
+
+/// What can start motion is checked right before it is written; and before the switch of saving is turned,
+/// which each further attempt would turn again, and wear.
+Task<Result<void>> YakoRtuDrive::prepare_write(const RegisterSetting& setting) {
+  if (setting.starts_motion && saving_ != setting.saved)
+    if (const auto inactive = co_await check_inactive(setting); !inactive) co_return inactive;
+  if (const auto switched = co_await save_writes(setting.saved); !switched) co_return switched;
+  if (setting.starts_motion) co_return co_await check_inactive(setting);
   co_return Result<void>{};
 }
 
@@ -278,9 +291,7 @@ Task<Result<void>> YakoRtuDrive::write_differences(const std::vector<RegisterSet
     // Again and again it would only wear the EEPROM.
     if (first.saved && unsaved_.contains(first.address))
       co_return fail(not_held(first, present.at(first.address)));
-    if (const auto switched = co_await save_writes(first.saved); !switched) co_return switched;
-    if (first.starts_motion)
-      if (const auto inactive = co_await check_inactive(first); !inactive) co_return inactive;
+    if (const auto ready = co_await prepare_write(first); !ready) co_return ready;
     if (const auto written = co_await write_run(first.address, std::move(values)); !written)
       co_return written;
   }

@@ -155,7 +155,10 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
 }
 
 Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t> taken) {
-  if (const auto permitted = permit_saves(1); !permitted) co_return fail(permitted.error());
+  // The drive stays out of use until it is configured again, and what is kept there is saved once more.
+  const auto kept = static_cast<std::uint64_t>(std::ranges::count_if(required_, &RegisterSetting::saved));
+  const auto saves = 1 + (kept == 0 ? 0 : kept + 2);  // two turn the switch, there and back
+  if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   const auto before = co_await read_registers({reg::node, reg::custom_node}, parameters());
   if (!before) co_return fail(before.error());
   const auto node = before->at(reg::node);

@@ -35,6 +35,11 @@ class Axisctl(AxisctlTest):
         self.assertIn(f"motion waits until the state is accepted: {TEXT}", shown)
         self.assertIn(f"state accepted by test: {TEXT}", shown)
 
+    def test_accepting_is_not_of_one_axis(self):
+        self.server.machine.convict()
+        self.assertIn("of the whole machine", self.fails(2, "state", "feeder", "accept"))
+        self.assertIn(TEXT, self.ok("state"))
+
     def test_json(self):
         self.server.machine.convict()
         self.assertEqual(self.json("state")[0]["convictions"][0]["fault"], "STATE_FAULT_ROLLED_BACK")

@@ -176,6 +176,34 @@ TEST(M27, AConfigurationBeyondTheBudgetIsNotSavedAndSaysSo) {
   }
 }
 
+/// The switch of saving is turned before each write that is saved, and back: not for one that is not permitted.
+TEST(M27, WaitingForATerminalToOpenWearsNothing) {
+  for (const bool saved : {false, true}) {
+    auto of_this = options({.terminals = saved, .segments = !saved}, 100);
+    of_this.connect = false;
+    of_this.switches = {{"enabled_at_power_up", false}};
+    of_this.adjust = [adjust = of_this.adjust](AxisSettings& axis) {
+      adjust(axis);
+      axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+    };
+    of_this.before_start = [](simulation::SimulatedRtuNode& drive, VirtualWorld&) {
+      drive.set_input("X4", true);
+    };
+    Rig rig(of_this);
+    const auto waits = [&] {
+      const auto state = rig.state();
+      return state->link_error && state->link_error->reason == Reason::misconfigured;
+    };
+    ASSERT_TRUE(rig.run_until(waits, 10s));
+    const auto counted = kept(rig);
+    rig.run(60s);
+    EXPECT_TRUE(waits());
+    EXPECT_LE(kept(rig), counted + 1) << "the switch that ends saving";
+    rig.set_input("X4", false);
+    rig.reconnect();
+  }
+}
+
 /// Two masters that want another terminal each would wear a drive out within hours.
 TEST(M27, AStruggleForASavedTerminalEndsWithTheBudget) {
   Rig rig(options(PersistSettings::all(), 40));

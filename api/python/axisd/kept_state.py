@@ -11,7 +11,7 @@ from .v1 import system_service_pb2, types_pb2
 @dataclasses.dataclass(frozen=True)
 class Conviction:
     """A file of the state directory that the others convict. `fault`: "missing", "rolled_back", "damaged", "not_regular",
-    "swapped" or "foreign". `found` and `expected`: generations; 0: none, or not known. `text`: all of it, for people."""
+    "swapped" or "foreign". `found` and `expected`: generations, of the journal numbers of lines; 0: none, or not known. `text`: all of it, for people."""
     file: str
     fault: str
     found: int

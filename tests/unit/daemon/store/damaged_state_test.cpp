@@ -170,9 +170,10 @@ class Generator {
     Damages all{};
     for (auto& damage : all)
       if (random_() % 2 == 0) damage = static_cast<Damage>(random_() % 10);
-    // Old copies that fit each other are as good as what they were copied from: the third file tells.
-    if (all[state] == Damage::old || all[journal] == Damage::old)
-      if (all[previous] == Damage::old) all[previous] = Damage::none;
+    // Old copies of all three are as good as what they were copied from; so is a journal cut to its old
+    // length.
+    if (all[state] == Damage::old && all[previous] == Damage::old)
+      if (all[journal] == Damage::old || all[journal] == Damage::truncated) all[journal] = Damage::missing;
     // Without any file it is a first start.
     if (std::ranges::count(all, Damage::missing) == std::ssize(all)) all[journal] = Damage::none;
     if (all[state] == Damage::swapped || all[journal] == Damage::swapped)

@@ -104,13 +104,13 @@ TEST(StatePair, EachFileConvictsTheOther) {
               HasSubstr("state.v1 is damaged: there was generation 40"));
   EXPECT_EQ(found(with(&FoundFiles::state, not_regular())),
             "state.v1 is no regular file: there was generation 40 (it is a FIFO)");
-  EXPECT_EQ(found(with(&FoundFiles::journal, {})), "journal.v1 is missing: there was generation 100");
+  EXPECT_EQ(found(with(&FoundFiles::journal, {})), "journal.v1 is missing: there was line 100");
   EXPECT_EQ(found(with(&FoundFiles::journal, not_regular())),
-            "journal.v1 is no regular file: there was generation 100 (it is a FIFO)");
+            "journal.v1 is no regular file: there was line 100 (it is a FIFO)");
   EXPECT_EQ(found(with(&FoundFiles::journal, journal(99, 40))),
-            "journal.v1 was rolled back: it has generation 99, but there was generation 100");
+            "journal.v1 was rolled back: it has line 99, but there was line 100");
   EXPECT_EQ(found(with(&FoundFiles::journal, journal_of_before())),
-            "journal.v1 was rolled back: it has generation 9, but there was generation 100");
+            "journal.v1 was rolled back: it has line 9, but there was line 100");
   EXPECT_THAT(found(with(&FoundFiles::journal, journal(120, 40, "q"))),
               HasSubstr("does not belong to the other"));
   EXPECT_THAT(found(with(&FoundFiles::journal, file("noise"))), HasSubstr("journal.v1 is damaged"));
@@ -121,7 +121,7 @@ TEST(StatePair, EachFileConvictsTheOther) {
   EXPECT_EQ(
       found({.state = state(12, "p", 30), .previous = state(39), .journal = journal(31, 12)}),
       "state.v1 was rolled back: it has generation 12, but there was generation 39; journal.v1 was rolled "
-      "back: it has generation 31, but there was generation 100")
+      "back: it has line 31, but there was line 100")
       << "old copies of both";
 }
 
@@ -147,8 +147,7 @@ TEST(StatePair, AConvictionCostsTrustAndCountsFarAhead) {
   ASSERT_EQ(rolled_back.state.state.convictions.size(), 1U);
   EXPECT_EQ(rolled_back.state.state.convictions[0].since, noon);
   const auto lost = judged(with(&FoundFiles::journal, {}));
-  EXPECT_EQ(lost.state.state.axes.at("x").offset, generation(1).state.axes["x"].offset)
-      << "the state is whole";
+  EXPECT_EQ(lost.state.state.axes.at("x").offset, std::nullopt) << "nobody vouches for the state";
   EXPECT_EQ(lost.state.state.start_count, 20U + start_count_jump);
   EXPECT_THAT(lost.doubt, HasSubstr("journal.v1 is missing"));
 }
@@ -170,6 +169,11 @@ TEST(StatePair, AKillAfterAConvictionKeepsTheDoubt) {
     EXPECT_EQ(again.state.state.convictions.size(), 1U);
     EXPECT_NE(again.doubt, "");
   }
+  // As the one before, with a state that was missing: the generation before it is further back.
+  convicted.state.convictions = {{.file = KeptFile::state, .fault = KeptFault::missing}};
+  const auto again =
+      judged({.state = file(encode(convicted)), .previous = state(39), .journal = journal(120, 40)});
+  EXPECT_EQ(to_string(again.fresh), "");
 }
 
 TEST(StatePair, LatchAndHoldsOutliveEitherFile) {
@@ -202,13 +206,18 @@ TEST(StatePair, WhereNobodyKnowsTheMachineIsLatched) {
   EXPECT_TRUE(judged({.state = state(39), .previous = state(39), .journal = file("noise")})
                   .state.state.inhibit.active)
       << "the generation before may have taken the newest one's place";
-  EXPECT_FALSE(judged(with(&FoundFiles::journal, {})).state.state.inhibit.active);
+  for (const auto& journal : {FoundFile{}, file("noise"), not_regular(), journal_of_before()})
+    EXPECT_TRUE(judged({.state = state(12, "p", 30), .previous = state(11, "p", 30), .journal = journal})
+                    .state.state.inhibit.active)
+        << "old copies of both state files, which no journal convicts";
+  EXPECT_FALSE(judged(with(&FoundFiles::state, state(12))).state.state.inhibit.active) << "the journal knows";
 }
 
 TEST(StatePair, OldCopiesThatNobodyElseKnowsAreNotTrusted) {
   // Each time two files agree, and may be old; the third that would tell cannot be read.
   for (const auto& files :
        {FoundFiles{.state = state(12, "p", 30), .previous = {}, .journal = journal(31, 12)},
+        FoundFiles{.state = not_regular(), .previous = state(11, "p", 30), .journal = journal(31, 12)},
         FoundFiles{.state = file("noise"), .previous = state(9), .journal = journal(120, 40)},
         FoundFiles{.state = file("noise"), .previous = state(39), .journal = journal(110, 39)},
         FoundFiles{.state = state(12, "p", 30), .previous = state(39), .journal = journal(110, 39)}}) {
