@@ -113,7 +113,10 @@ class Cia402Drive::Prepared final : public PreparedMove {
   }
 
   Task<> follow_up(TimePoint at) {
-    if (stops_ != drive_->stops_) co_return;
+    if (stops_ != drive_->stops_) {
+      drive_->standstill_.doubt();
+      co_return;
+    }
     drive_->note_move_began(at);
     auto options = urgent();
     options.guard = guard_;

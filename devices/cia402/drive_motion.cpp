@@ -127,6 +127,7 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
   auto pulled = by_control ? co_await write_control(static_cast<std::uint16_t>(trigger.value), options)
                            : co_await write_object(trigger.object, trigger.value, 0, options);
   triggered = pulled || pulled.error().outcome == Outcome::unknown;
+  if (triggered && stops != stops_) standstill_.doubt();
   if (!triggered || stops != stops_) co_return pulled;
   live_ = Live{.since = began};
   if (mode == OperationMode::profile_velocity) negative_ = trigger.value < 0;

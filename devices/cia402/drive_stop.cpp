@@ -145,6 +145,7 @@ Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   give_up_common_start();
   leave_homing_ = leave_homing_ || homing_.active() || mode_ == OperationMode::homing;
   homing_.end();
+  if (live_) standstill_.doubt();
   live_.reset();
   ++stopping_;
   const auto sent = co_await send_stop(kind == StopKind::quick_stop);

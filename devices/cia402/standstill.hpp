@@ -35,6 +35,11 @@ class Standstill {
   /// Takes a look. True: it moves.
   bool moves(const Look& look, const Gauge& gauge);
   void forget() { *this = {}; }
+  /// It may have begun to move unseen, below the noise: rest has to be shown anew.
+  void doubt() {
+    since_.reset();
+    moves_ = true;
+  }
 
  private:
   bool note(const Look& look, bool moves);

@@ -74,6 +74,29 @@ TEST(M12, WhereNoEdgeEndsARampTheStopIsStillConfirmed) {
   EXPECT_EQ(rig.drive->peek(0x604000), 0x010FU);
 }
 
+/// A motion that has just begun is slower than the noise of the velocity, and still within that of the
+/// position.
+TEST(M13, AStopOfWhatHasJustBegunIsDoneAtRest) {
+  int crept = 0;
+  for (const bool polled : {false, true})
+    for (Duration after{}; after < 100ms; after += 3ms) {
+      CanRig rig({.model = "cia402", .polled = polled, .limits = false, .adjust = [](AxisSettings& axis) {
+                    axis.limits.acceleration_time = 20'000ms;
+                    axis.limits.deceleration_time = 20'000ms;
+                  }});
+      rig.ready();
+      (void)rig.submit(MoveRelativeRequest{.distance = 5});
+      ASSERT_TRUE(rig.run_until([&] { return rig.drive->shaft_moving(); }, 1s));
+      rig.run(after);
+      const auto stop = rig.submit(StopRequest{.kind = StopKind::stop});
+      crept += rig.drive->shaft_moving() ? 1 : 0;
+      ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 30s));
+      EXPECT_EQ(stop->value().state, CommandState::done);
+      EXPECT_FALSE(rig.drive->shaft_moving()) << after.count();
+    }
+  EXPECT_GT(crept, 30);
+}
+
 TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
   for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
     for_each_reading({.limits = false,

@@ -176,7 +176,8 @@ TEST(M27, AConfigurationBeyondTheBudgetIsNotSavedAndSaysSo) {
   }
 }
 
-/// The switch of saving is turned before each write that is saved, and back: not for one that is not permitted.
+/// The switch of saving is turned before each write that is saved, and back: not for one that is not
+/// permitted.
 TEST(M27, WaitingForATerminalToOpenWearsNothing) {
   for (const bool saved : {false, true}) {
     auto of_this = options({.terminals = saved, .segments = !saved}, 100);

@@ -74,5 +74,16 @@ TEST(Standstill, WhereTheDriveDoesNotSayItRestsWhenThePositionHasStayedForLongEn
   EXPECT_FALSE(other.moves(look(60ms, 1, 1), fine));
 }
 
+TEST(Standstill, WhatMayHaveBegunToMoveHasToShowItsRest) {
+  Standstill standstill;
+  EXPECT_FALSE(standstill.moves(look(0ms, 0, 0), gauge));
+  standstill.doubt();
+  EXPECT_TRUE(standstill.moves(look(20ms, 1, 1), gauge));
+  EXPECT_TRUE(standstill.moves(look(600ms, 2, 1), gauge));
+  EXPECT_FALSE(standstill.moves(look(640ms, 2, 1), gauge));
+  standstill.doubt();
+  EXPECT_FALSE(standstill.moves(look(660ms, 2, 1, false), gauge)) << "the drive's own word counts at once";
+}
+
 }  // namespace
 }  // namespace axisd::cia402
