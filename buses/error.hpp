@@ -40,17 +40,17 @@ enum class Reason : std::uint8_t {
   expired,         ///< `not_after` or a deadline passed before the frame could be sent.
   lease_lost,      ///< The lease that the command was given under is gone.
   lease_required,  ///< The axis is leased (or must be) and the token does not fit.
-  request_id_conflict,    ///< The request_id was used before for other content.
-  busy,                   ///< Too many requests in progress. Retry later.
-  refused,                ///< The drive answered with an exception or abort; `native_code` is its code.
-  no_reply,               ///< A frame was sent and no valid reply came. Whether it was executed is unknown.
-  bus_down,               ///< The port cannot be opened or was lost.
-  storage,                ///< The state directory cannot be written.
-  cancelled,              ///< Ended by CancelCommand or by the daemon's shutdown.
-  internal,               ///< A bug of axisd.
-  reloading,              ///< The configuration of the axis is being reloaded. Repeat it in a moment.
-  eeprom_budget,          ///< It would wear the drive's EEPROM beyond `limits.eeprom_saves_per_day`.
-  state_unaccepted,       ///< Files of the state are not what they were. Look at the machine, then accept it.
+  request_id_conflict,  ///< The request_id was used before for other content.
+  busy,                 ///< Too many requests in progress. Retry later.
+  refused,              ///< The drive answered with an exception or abort; `native_code` is its code.
+  no_reply,             ///< A frame was sent and no valid reply came. Whether it was executed is unknown.
+  bus_down,             ///< The port cannot be opened or was lost.
+  storage,              ///< The state directory cannot be written.
+  cancelled,            ///< Ended by CancelCommand or by the daemon's shutdown.
+  internal,             ///< A bug of axisd.
+  reloading,            ///< The configuration of the axis is being reloaded. Repeat it in a moment.
+  eeprom_budget,        ///< It would wear the drive's EEPROM beyond `limits.eeprom_saves_per_day`.
+  state_unaccepted,     ///< Files of the state are not what they were. Look at the machine, then accept it.
 };
 
 std::string_view to_string(Reason reason);

@@ -175,8 +175,8 @@ bool Axis::ended_abruptly(const DriveSample& before, std::int64_t turned_by) con
   return limit_active(positive) || input_active("quick_stop");
 }
 
-/// Homing that a terminal started may have begun and ended between two readings, and left neither its mode nor
-/// a new homed bit: the counter tells of it where nothing of ours can have turned the shaft.
+/// Homing that a terminal started may have begun and ended between two readings, and left neither its mode
+/// nor a new homed bit: the counter tells of it where nothing of ours can have turned the shaft.
 bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const {
   const auto& now = *sample_;
   const bool ours = rezeroing_ || left_running_ || (activity_ && activity_->may_run);

@@ -18,7 +18,8 @@ targets=("$@")
 deploy/install-packages.sh test
 cmake --preset fuzz >/dev/null
 ninja -C build/fuzz --quiet "${targets[@]/#/fuzz_}"
-export ASAN_OPTIONS="external_symbolizer_path=$(command -v llvm-symbolizer-19)"
+symbolizer=$(command -v llvm-symbolizer-19)
+export ASAN_OPTIONS="external_symbolizer_path=$symbolizer"
 export UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:$ASAN_OPTIONS"
 found=build/fuzz/found
 mkdir -p "$found"
