@@ -195,8 +195,8 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   // does the ramp under a quick stop.
   const bool stronger = quick && (!halt_ || !halt_->quick);
   const bool unseen = !halt_ || halt_->rested;
-  const bool runs = bits == control_word(Command::enable_operation);
-  if (was_halted && runs && (stronger || unseen) && co_await turns(urgent)) {
+  const bool may_run = is_energised(state_after(bits));  // in Switched On a terminal may have started it
+  if (was_halted && may_run && (stronger || unseen) && co_await turns(urgent)) {
     sent = co_await halt_again(bits, urgent);
     was_halted = false;
   }

@@ -122,6 +122,40 @@ TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
   }
 }
 
+/// 6.2.2: 07h energises the motor already, and the manual does not say that terminals wait for 0Fh. An enable
+/// that failed on its way leaves the drive there.
+TEST(M13, AStopEndsWhatATerminalStartedInSwitchedOn) {
+  for (const auto* function : {"jog_positive", "homing_start"})
+    for (const auto kind : {StopKind::stop, StopKind::quick_stop})
+      for_each_reading({.limits = false,
+                        .adjust =
+                            [function](AxisSettings& axis) {
+                              axis.inputs.push_back({.terminal = "X3", .function = function});
+                            }},
+                       {{"halt_release_resumes"}, {"pdo_parameters_read_only"}},
+                       [kind](const CanRigOptions& options) {
+                         CanRig rig(options);
+                         rig.ready();
+                         rig.done(HomeRequest{});
+                         rig.done(MoveAbsoluteRequest{.position = 20});
+                         rig.done(StopRequest{.kind = StopKind::stop});
+                         rig.touch([](auto& node) {
+                           node.on_frame(can::make_frame(
+                               0x600U + CanRig::node_id,
+                               std::array<std::uint8_t, 8>{0x2B, 0x40, 0x60, 0, 0x07, 0x01, 0, 0}));
+                         });
+                         rig.run(500ms);
+                         ASSERT_EQ(rig.drive->peek(0x604100) & 0x6FU, 0x23U) << "Switched On";
+                         rig.touch([](auto& node) { node.set_input("X3", true); });
+                         rig.run(500ms);
+                         ASSERT_TRUE(rig.drive->shaft_moving());
+                         (void)rig.submit(StopRequest{.kind = kind});
+                         rig.run(1s);
+                         EXPECT_FALSE(rig.drive->shaft_moving());
+                         EXPECT_EQ(rig.drive->peek(0x604000), 0x0107U);
+                       });
+}
+
 /// What gives the halt a new edge lets go of it for a moment. Where nobody answers, what a halt suspended may
 /// be behind it.
 TEST(M13, AStopOfASilentDriveStartsNothingThatAHaltSuspended) {
