@@ -219,6 +219,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> stopped_unless(Result<void> watched);
   Task<Result<State>> make_step(Transition step, SdoOptions options);
   Task<Result<void>> step_to_enabled(State state, SdoOptions options);
+  Task<> release_again(SdoOptions options);
   Task<Result<void>> confirm_nothing_pending(SdoOptions options);
   Task<Result<void>> watch_standstill(std::int64_t position, SdoOptions options);
   Task<Result<std::optional<std::int64_t>>> read_turning(SdoOptions options);

@@ -253,7 +253,20 @@ Task<Result<void>> Cia402Drive::enable(MotionGuard guard) {
   // quiet_word() may have led from Ready To Switch On to Switch On Disabled (7).
   const auto now = co_await read_status(options);
   if (!now) co_return fail(now.error());
-  co_return co_await step_to_enabled(*now, options);
+  auto enabled = co_await step_to_enabled(*now, options);
+  // A shaft that turned was stopped.
+  const bool turned = !enabled && enabled.error().reason == Reason::terminal;
+  if (!enabled && !turned && !is_energised(*now)) co_await release_again(options);
+  co_return enabled;
+}
+
+/// An enable that failed on its way leaves no motor energised, as 07h does (6.2.2). As long as nobody has
+/// asked for something else.
+Task<> Cia402Drive::release_again(SdoOptions options) {
+  constexpr int attempts = 4;
+  const auto shutdown = static_cast<std::uint16_t>(control_word(Command::shutdown) | control::halt);
+  for (int attempt = 0; attempt < attempts; ++attempt)
+    if (co_await write_control(shutdown, options)) co_return;
 }
 
 Task<bool> Cia402Drive::released(SdoOptions options) {

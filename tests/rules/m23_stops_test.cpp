@@ -224,6 +224,27 @@ TEST(M12, AVelocityIsZeroedEvenWhereTheControlWordCannotBeRead) {
   rig.nodes().clear_faults();
 }
 
+/// 6.2.2: 07h has energised the motor already.
+TEST(M23, AnEnableThatFailsOnItsWayReleasesTheMotorAgain) {
+  for (const bool polled : {false, true}) {
+    CanRig rig({.polled = polled});
+    int dropped = 0;
+    rig.network.set_fault([&](const can::Frame& frame) {
+      const bool switched_on = (rig.drive->peek(0x604100) & 0x6FU) == 0x23U;
+      const bool drop = frame.id == 0x580U + CanRig::node_id && switched_on && dropped < 4;
+      dropped += drop ? 1 : 0;
+      return can::Network::Fault{.drop = drop};
+    });
+    const auto enable = rig.complete(EnableRequest{});
+    EXPECT_EQ(enable.state, CommandState::error);
+    ASSERT_GT(dropped, 0);
+    rig.run(1s);
+    EXPECT_EQ(rig.drive->peek(0x604100) & 0x2000U, 0U) << "bit 13: energised";
+    EXPECT_EQ(rig.state()->state, AxisState::disabled);
+    rig.ready();
+  }
+}
+
 TEST(M01, AStopNeverEnergisesADriveThatSomebodyReleased) {
   CanRig rig({.limits = false});
   rig.ready();
