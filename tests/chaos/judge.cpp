@@ -18,6 +18,8 @@ constexpr auto reboot_unnoticed = 5s;
 
 /// The drive's state is read within this, on the slowest line: what begins meanwhile does not show in it.
 constexpr auto reading = 20ms;
+/// A shaft that is measured follows the last pulse so late, at most (EncoderSettings::following, five times).
+constexpr auto settling = 25ms;
 
 bool is_motion(CommandKind kind) {
   return kind == CommandKind::home || kind == CommandKind::move_absolute ||
@@ -303,8 +305,8 @@ void Judge::look() {
   for (auto& station : plant_->stations) {
     const auto state = station.axis->snapshot();
     const auto& subject = subjects_.at(station.name);
-    const bool fresh =
-        state->link == LinkState::online && state->sampled.after() > station.drive->last_moved();
+    const auto settled = station.drive->last_moved() + (station.closed_loop() ? settling : Duration{});
+    const bool fresh = state->link == LinkState::online && state->sampled.after() > settled;
     const bool rebooted = plant_->world.now() - station.drive->last_power_loss() < reboot_unnoticed;
     if (!trusted(station) || !subject.origin || !fresh || rebooted) continue;
     ++tally_.positions;
