@@ -9,6 +9,14 @@
 #include "devices/released_position.hpp"
 
 namespace axisd {
+namespace {
+
+/// What is measured comes to rest so late after its motion (M30).
+Duration settling_of(const Drive& drive) {
+  return drive.position_window() > 0 ? Duration(milliseconds(300)) : Duration{};
+}
+
+}  // namespace
 
 Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescriptor& descriptor,
            std::unique_ptr<Drive> drive, AxisFacePtr face, bool simulated)
@@ -125,6 +133,12 @@ bool Axis::start_terminal_active(const DriveSample& sample) const {
   });
 }
 
+bool Axis::homing_terminal_active(const DriveSample& sample) const {
+  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
+    return input.function == "homing_start" && active_in(sample, input);
+  });
+}
+
 bool Axis::limit_active(bool positive) const {
   return input_active(positive ? "positive_limit" : "negative_limit");
 }
@@ -177,11 +191,16 @@ bool Axis::ended_abruptly(const DriveSample& before, std::int64_t turned_by) con
 
 /// Homing that a terminal started may have begun and ended between two readings, and left neither its mode
 /// nor a new homed bit: the counter tells of it where nothing of ours can have turned the shaft.
-bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const {
+bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) {
   const auto& now = *sample_;
-  const bool ours = rezeroing_ || left_running_ || (activity_ && activity_->may_run);
-  if (ours || !has_input("homing_start") || before.moving || now.moving) return false;
-  return (before.enabled || now.enabled) && std::abs(turned_by) > drive_->position_window();
+  const bool begun = activity_ && activity_->may_run && activity_->waits_for == StartWait::begun;
+  if (rezeroing_ || left_running_ || begun) ours_until_ = now.asked_at + settling_of(*drive_);
+  if (now.asked_at <= ours_until_ || !has_input("homing_start") || before.moving || now.moving) return false;
+  // A shaft that is released and turned is counted as such.
+  const bool held = now.enabled || (before.enabled && !counts_while_released());
+  // Two readings at rest differ by so much (M30).
+  const auto noise = settings_.scale.pulses_per_revolution / 500;
+  return held && std::abs(turned_by) > std::max<std::int64_t>(2 * drive_->position_window(), noise);
 }
 
 Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {
@@ -238,6 +257,7 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
   // A motor that was told to stop, and has not confirmed it, is never a terminal's.
   if (!stop_owed_ && !fault_ && (segments || homing || started || drive_->moves_by_itself())) {
     terminal_motion_ = true;
+    if (homing_terminal_active(sample) || (before && homing_terminal_active(*before))) lose_trust();
     return;
   }
   spdlog::warn("{}: moving without a command; stopping it", settings_.name);

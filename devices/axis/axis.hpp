@@ -232,9 +232,10 @@ class Axis {
   [[nodiscard]] bool active_in(const DriveSample& sample, const TerminalSettings& input) const;
   [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;
   [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
+  [[nodiscard]] bool homing_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
   [[nodiscard]] bool ended_abruptly(const DriveSample& before, std::int64_t turned_by) const;
-  [[nodiscard]] bool homed_unseen(const DriveSample& before, std::int64_t turned_by) const;
+  bool homed_unseen(const DriveSample& before, std::int64_t turned_by);
   void lose_trust();
   void remember_position();
 
@@ -456,6 +457,7 @@ class Axis {
   /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
   std::optional<std::vector<std::int64_t>> unseen_ends_;
   bool left_running_ = false;  ///< a command has ended, and what it began may go on
+  TimePoint ours_until_{};     ///< what turned the shaft before was told to, or settles after it
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed

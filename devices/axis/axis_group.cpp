@@ -233,6 +233,7 @@ Task<Result<TimePoint>> Axis::Member::trigger() {
 
 void Axis::Member::started(TimePoint at) {
   started_at_ = at;
+  activity_->waits_for = StartWait::begun;
   axis_->continuity_checked_ = axis_->env_.clock->now();  // the canary was part of its start
   axis_->tracker_.forget_base();
   activity_->command->activate();

@@ -218,7 +218,7 @@ class Cia402Drive final : public Drive {
                                 SdoOptions options);
   Task<Result<void>> stopped_unless(Result<void> watched);
   Task<Result<State>> make_step(Transition step, SdoOptions options);
-  Task<Result<void>> step_to_enabled(State state, SdoOptions options);
+  Task<Result<void>> step_to_enabled(State state, bool& operates, SdoOptions options);
   Task<> release_again(SdoOptions options);
   Task<Result<void>> confirm_nothing_pending(SdoOptions options);
   Task<Result<void>> watch_standstill(std::int64_t position, SdoOptions options);
@@ -325,6 +325,7 @@ class Cia402Drive final : public Drive {
   std::optional<std::uint16_t> state_bits_;
   std::uint64_t control_writes_ = 0;
   int control_writing_ = 0;
+  int triggering_ = 0;               ///< starts that are on their way
   TimePoint control_at_{};           ///< when a write of it ended last
   TimePoint proven_at_{};            ///< the drive held what is known here
   std::uint64_t proven_losses_ = 0;  ///< of the port, until then

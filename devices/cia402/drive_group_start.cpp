@@ -105,25 +105,27 @@ class Cia402Drive::Prepared final : public PreparedMove {
     drive_->control_.reset();
     ++drive_->control_writes_;
     ++drive_->control_writing_;
+    ++drive_->triggering_;
   }
   void end() {
     --drive_->control_writing_;
+    --drive_->triggering_;
     drive_->control_at_ = drive_->clock_->now();
     drive_->give_up_common_start();  // once only
   }
 
   Task<> follow_up(TimePoint at) {
-    if (stops_ != drive_->stops_) {
-      drive_->standstill_.doubt();
-      co_return;
-    }
+    if (stops_ != drive_->stops_) co_return;
     drive_->note_move_began(at);
     auto options = urgent();
     options.guard = guard_;
     co_await drive_->acknowledge_set_point(options);
   }
 
-  Task<> stop() { (void)co_await drive_->stop(StopKind::stop); }
+  Task<> stop() {
+    drive_->standstill_.doubt();  // it may have started
+    (void)co_await drive_->stop(StopKind::stop);
+  }
 
   Cia402Drive* drive_;
   MotionBlock block_;

@@ -124,10 +124,11 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
   const auto began = clock_->now();
   const auto stops = stops_;
   const bool by_control = trigger.object == object::control_word;
+  ++triggering_;
   auto pulled = by_control ? co_await write_control(static_cast<std::uint16_t>(trigger.value), options)
                            : co_await write_object(trigger.object, trigger.value, 0, options);
+  --triggering_;
   triggered = pulled || pulled.error().outcome == Outcome::unknown;
-  if (triggered && stops != stops_) standstill_.doubt();
   if (!triggered || stops != stops_) co_return pulled;
   live_ = Live{.since = began};
   if (mode == OperationMode::profile_velocity) negative_ = trigger.value < 0;

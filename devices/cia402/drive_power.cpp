@@ -211,7 +211,8 @@ Task<Result<State>> Cia402Drive::make_step(Transition step, SdoOptions options) 
   }
 }
 
-Task<Result<void>> Cia402Drive::step_to_enabled(State state, SdoOptions options) {
+/// `operates`: 0Fh may have been sent.
+Task<Result<void>> Cia402Drive::step_to_enabled(State state, bool& operates, SdoOptions options) {
   std::optional<std::int64_t> position;
   while (const auto step = next_to_enabled(state)) {
     if (step->to == State::operation_enabled) {
@@ -220,6 +221,7 @@ Task<Result<void>> Cia402Drive::step_to_enabled(State state, SdoOptions options)
       const auto base = co_await read_object(object::position, options);
       if (!base) co_return fail(base.error());
       position = *base;
+      operates = true;
     }
     const auto made = co_await make_step(*step, options);
     if (!made && !position) co_return fail(made.error());
@@ -251,22 +253,29 @@ Task<Result<void>> Cia402Drive::enable(MotionGuard guard) {
     if (!ready || *state == State::operation_enabled) co_return ready;
   }
   // quiet_word() may have led from Ready To Switch On to Switch On Disabled (7).
-  const auto now = co_await read_status(options);
-  if (!now) co_return fail(now.error());
-  auto enabled = co_await step_to_enabled(*now, options);
-  // A shaft that turned was stopped.
-  const bool turned = !enabled && enabled.error().reason == Reason::terminal;
-  if (!enabled && !turned && !is_energised(*now)) co_await release_again(options);
+  const auto word = co_await read_object(object::status_word, options);
+  if (!word) co_return fail(word.error());
+  const auto now = state_of(static_cast<std::uint16_t>(*word));
+  const bool energised = is_energised(now) || (*word & model_->status.enabled) != 0;
+  bool operates = false;
+  auto enabled = co_await step_to_enabled(now, operates, options);
+  if (!enabled && !operates && !energised) co_await release_again(options);
   co_return enabled;
 }
 
-/// An enable that failed on its way leaves no motor energised, as 07h does (6.2.2). As long as nobody has
-/// asked for something else.
+/// An enable that failed before 0Fh leaves no motor energised, as 07h does (6.2.2), unless it turns. Not
+/// after somebody has asked for something else; a lease and a deadline that are over do not stand in the way.
 Task<> Cia402Drive::release_again(SdoOptions options) {
   constexpr int attempts = 4;
+  options.guard.not_after = TimePoint::max();
+  options.guard.fencing_token = MotionGuard::needs_no_lease;
   const auto shutdown = static_cast<std::uint16_t>(control_word(Command::shutdown) | control::halt);
-  for (int attempt = 0; attempt < attempts; ++attempt)
-    if (co_await write_control(shutdown, options)) co_return;
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    if (may_send(options.guard, clock_->now()) != Verdict::send || co_await turns(options)) co_return;
+    if (may_send(options.guard, clock_->now()) != Verdict::send) co_return;
+    const auto written = co_await write_control(shutdown, options);
+    if (written || written.error().reason != Reason::no_reply) co_return;
+  }
 }
 
 Task<bool> Cia402Drive::released(SdoOptions options) {

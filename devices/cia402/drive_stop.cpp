@@ -144,8 +144,8 @@ Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   bus_->purge_superseded(node_.id(), *leave_gate_);
   give_up_common_start();
   leave_homing_ = leave_homing_ || homing_.active() || mode_ == OperationMode::homing;
+  if (live_ || triggering_ > 0 || homing_.active()) standstill_.doubt();
   homing_.end();
-  if (live_) standstill_.doubt();
   live_.reset();
   ++stopping_;
   const auto sent = co_await send_stop(kind == StopKind::quick_stop);
@@ -195,8 +195,11 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   // does the ramp under a quick stop.
   const bool stronger = quick && (!halt_ || !halt_->quick);
   const bool unseen = !halt_ || halt_->rested;
-  const bool may_run = is_energised(state_after(bits));  // in Switched On a terminal may have started it
-  if (was_halted && may_run && (stronger || unseen) && co_await turns(urgent)) {
+  const bool operates = bits == control_word(Command::enable_operation);
+  const bool under_halt = operates && was_halted && (stronger || unseen);
+  // 6.2.2: the motor is energised there, too, and a terminal may have started it. Bit 8 means nothing there.
+  const bool switched_on = bits == control_word(Command::switch_on);
+  if ((under_halt || switched_on) && co_await turns(urgent)) {
     sent = co_await halt_again(bits, urgent);
     was_halted = false;
   }
@@ -235,6 +238,13 @@ Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions option
   const auto silent = [](const auto& answer) { return !answer && answer.error().reason == Reason::no_reply; };
   const auto zeroed = co_await write_object(object::target_velocity, 0, 0, options);
   if (silent(zeroed)) co_return fail(zeroed.error());
+  // In Switched On it is the change of the mode that ends a motion.
+  if (bits == control_word(Command::switch_on) && mode_ == OperationMode::profile_velocity) {
+    constexpr auto position = std::to_underlying(OperationMode::profile_position);
+    mode_.reset();
+    const auto left = co_await write_object(object::mode, position, 1, options);
+    if (silent(left)) co_return fail(left.error());
+  }
   if (mode_ != OperationMode::profile_velocity) {
     constexpr auto velocity = std::to_underlying(OperationMode::profile_velocity);
     mode_.reset();
@@ -249,6 +259,8 @@ Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions option
       leave_homing_ = false;
     }
   }
+  // Somebody has led the drive elsewhere meanwhile: these bits would lead it back.
+  if (state_bits_ && *state_bits_ != bits) co_return Result<void>{};
   co_await send_control_pdo(bits);
   co_await send_control_pdo(word);
   (void)co_await write_control(bits, options);

@@ -139,20 +139,24 @@ TEST(M13, AStopEndsWhatATerminalStartedInSwitchedOn) {
                          rig.done(HomeRequest{});
                          rig.done(MoveAbsoluteRequest{.position = 20});
                          rig.done(StopRequest{.kind = StopKind::stop});
-                         rig.touch([](auto& node) {
-                           node.on_frame(can::make_frame(
-                               0x600U + CanRig::node_id,
-                               std::array<std::uint8_t, 8>{0x2B, 0x40, 0x60, 0, 0x07, 0x01, 0, 0}));
-                         });
-                         rig.run(500ms);
-                         ASSERT_EQ(rig.drive->peek(0x604100) & 0x6FU, 0x23U) << "Switched On";
-                         rig.touch([](auto& node) { node.set_input("X3", true); });
-                         rig.run(500ms);
-                         ASSERT_TRUE(rig.drive->shaft_moving());
-                         (void)rig.submit(StopRequest{.kind = kind});
-                         rig.run(1s);
-                         EXPECT_FALSE(rig.drive->shaft_moving());
-                         EXPECT_EQ(rig.drive->peek(0x604000), 0x0107U);
+                         for (const std::uint8_t halt : {0, 1, 1}) {
+                           rig.touch([halt](auto& node) {
+                             node.on_frame(can::make_frame(
+                                 0x600U + CanRig::node_id,
+                                 std::array<std::uint8_t, 8>{0x2B, 0x40, 0x60, 0, 0x07, halt, 0, 0}));
+                           });
+                           rig.run(500ms);
+                           ASSERT_EQ(rig.drive->peek(0x604100) & 0x6FU, 0x23U) << "Switched On";
+                           rig.touch([](auto& node) { node.set_input("X3", true); });
+                           rig.run(500ms);
+                           ASSERT_TRUE(rig.drive->shaft_moving());
+                           (void)rig.submit(StopRequest{.kind = kind});
+                           rig.run(1s);
+                           EXPECT_FALSE(rig.drive->shaft_moving());
+                           EXPECT_EQ(rig.drive->peek(0x604000), 0x0107U);
+                           rig.touch([](auto& node) { node.set_input("X3", false); });
+                           rig.run(1s);
+                         }
                        });
 }
 
