@@ -339,8 +339,11 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
     ++unknown_starts_.unresolved;
     co_return false;
   }
+  // Nor is it where a pulse at a terminal, between two readings, may have ended the motion as it began.
+  const bool ended_unseen = has_input("motor_free") || has_input("stop") || has_input("quick_stop");
   const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
-  if (moves_to_a_target && !shows(activity->plan, base)) {  // it may have gone there all the same
+  // It may have gone there all the same.
+  if (ended_unseen || (moves_to_a_target && !shows(activity->plan, base))) {
     ++unknown_starts_.unresolved;
     fail_with_stop(*activity, std::move(cause));
     co_return false;

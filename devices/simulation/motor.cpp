@@ -33,7 +33,10 @@ void Motor::fall_behind(TimePoint from) {
     behind_ = 0;
     return;
   }
-  if (!moving_ && std::abs(behind_) < 1e-3) return;
+  if (!moving_ && std::abs(behind_) < 1e-3) {
+    behind_ = 0;  // of a shaft that follows within microseconds what is left would be a speed
+    return;
+  }
   if (moving_ && !blocked_)
     behind_ = direction_ * profile_.lag_after(behind_ * direction_,
                                               std::chrono::duration<double>(from - begin_).count(), elapsed(),

@@ -168,6 +168,32 @@ TEST(M06, ATimeoutInTheChainRestartsIt) {
   }
 }
 
+/// A pulse at a terminal ends a motion as it begins, between two readings: the drive rests, and did start.
+TEST(M08, AStandstillProvesNothingWhereATerminalMayHaveEndedTheMotion) {
+  for (const auto* function : {"motor_free", "stop", "quick_stop"}) {
+    Rig rig({.model = "ess42-r", .limits = false, .adjust = [function](AxisSettings& axis) {
+               axis.homing.reset();
+               axis.model_settings["released_position"] = std::string("counted");
+               axis.inputs = {{.terminal = "X3", .function = function}};
+             }});
+    rig.ready();
+    rig.fault({.kind = FaultKind::drop_reply, .function = 0x06, .register_address = 0x0027});
+    const auto move = rig.submit(MoveVelocityRequest{.velocity = 1});
+    ASSERT_TRUE(rig.run_until([&] { return rig.drive->starts() == 1; }, 1s));
+    rig.set_input("X3", true);
+    rig.fault({.kind = FaultKind::drop_reply, .function = 0x03, .count = -1});
+    rig.run(25ms);  // longer than the drive's filter, and not seen
+    rig.set_input("X3", false);
+    rig.run(5ms);
+    rig.faults().clear();
+    ASSERT_TRUE(rig.run_until([&] { return move->has_ended(); }, 5s));
+    const auto& cause = move->value().cause;
+    ASSERT_TRUE(cause) << function;
+    EXPECT_NE(cause->outcome, Outcome::not_executed) << function << ": " << describe(move->value());
+    EXPECT_FALSE(rig.drive->shaft_moving());
+  }
+}
+
 TEST(M06, ChainThatNeverSucceedsIsAnErrorAndDoesNotMove) {
   Rig rig;
   rig.ready();

@@ -53,6 +53,16 @@ TEST(Encoder, ReadingsAtRestWaverByItsCountsAndNoMore) {
   }
 }
 
+TEST(Encoder, AShaftThatHasSettledHasNoSpeed) {
+  for (const Duration following : {Duration(1us), Duration(20us), Duration(3ms)}) {
+    Shaft shaft({.following = following});
+    shaft.motor.move(-5000, rates);
+    shaft.wait(shaft.motor.ends() - shaft.now);  // a reading at its very end
+    shaft.wait(200ms);
+    EXPECT_NEAR(shaft.motor.shaft_speed(), 0, 1e-6) << following.count();
+  }
+}
+
 TEST(Encoder, IsTheSameForTheSameSeedAndTimeHoweverOftenItIsRead) {
   const EncoderSettings settings{.noise = 2, .following = 8ms};
   Shaft one(settings, 7), other(settings, 7), foreign(settings, 8);
