@@ -207,6 +207,7 @@ class Cia402Drive final : public Drive {
   Task<> zero_velocity(SdoOptions options);
   Task<Result<void>> send_stop(bool quick);
   Task<bool> turns(SdoOptions options);
+  Task<Result<void>> choose_velocity_mode(SdoOptions options);
   Task<Result<void>> halt_again(std::uint16_t bits, SdoOptions options);
 
   // drive_power.cpp

@@ -201,7 +201,7 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   const bool switched_on = bits == control_word(Command::switch_on);
   if ((under_halt || switched_on) && co_await turns(urgent)) {
     sent = co_await halt_again(bits, urgent);
-    was_halted = false;
+    if (sent) was_halted = false;
   }
   if (!was_halted) halt_ = Halt{.since = clock_->now(), .quick = quick};
   co_return sent;
@@ -229,36 +229,51 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
   co_return last_moving_ || std::abs(rpm) > velocity_noise_rpm;
 }
 
+/// Under a stop: soon, or not at all. Errors: the drive does not answer, refuses, or stays in another mode.
+Task<Result<void>> Cia402Drive::choose_velocity_mode(SdoOptions options) {
+  constexpr int attempts = 3;
+  constexpr auto velocity = std::to_underlying(OperationMode::profile_velocity);
+  Result<void> chosen;
+  for (int attempt = 0; attempt < attempts && mode_ != OperationMode::profile_velocity; ++attempt) {
+    mode_.reset();
+    chosen = co_await write_object(object::mode, velocity, 1, options);
+    if (!chosen && chosen.error().reason == Reason::no_reply) co_return chosen;
+    const auto fits = [](std::int64_t shown) { return shown == velocity; };
+    const auto shown = co_await read_until(object::mode_display, fits, urgent_mode_limit, options);
+    mode_at_ = clock_->now();
+    if (!shown && shown.error().reason == Reason::no_reply) co_return fail(shown.error());
+    if (shown && fits(*shown)) {
+      mode_ = OperationMode::profile_velocity;
+      leave_homing_ = false;
+    } else if (chosen) {
+      chosen = shown
+                   ? fail(error_at(Reason::refused, object::mode_display,
+                                   fmt::format("the drive stays in mode {} under a stop", *shown),
+                                   "look at the machine; check whether another master writes to this drive"))
+                   : fail(shown.error());
+    }
+  }
+  if (mode_ == OperationMode::profile_velocity) co_return Result<void>{};
+  co_return chosen;
+}
+
 /// An edge of bit 8 on a motor that turns under halt. Between its two words nothing can be behind it:
 /// velocity mode with 60FFh = 0, as in make_ready(). By RPDO at once, and by SDO, where the drive answers
-/// each: one that looks at the word once per cycle sees no edge in the first pair. Nothing of a drive that
-/// falls silent before that is ready: it may hear the first word of a pair alone. Errors: no_reply.
+/// each: one that looks at the word once per cycle sees no edge in the first pair. Nothing where that is not
+/// ready: in another mode a move that the halt suspended goes on, and a drive that falls silent may hear the
+/// first word of a pair alone. Errors: as of choose_velocity_mode().
 Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions options) {
   const auto word = static_cast<std::uint16_t>(bits | control::halt);
-  const auto silent = [](const auto& answer) { return !answer && answer.error().reason == Reason::no_reply; };
   const auto zeroed = co_await write_object(object::target_velocity, 0, 0, options);
-  if (silent(zeroed)) co_return fail(zeroed.error());
+  if (!zeroed) co_return fail(zeroed.error());
   // In Switched On it is the change of the mode that ends a motion.
   if (bits == control_word(Command::switch_on) && mode_ == OperationMode::profile_velocity) {
     constexpr auto position = std::to_underlying(OperationMode::profile_position);
     mode_.reset();
     const auto left = co_await write_object(object::mode, position, 1, options);
-    if (silent(left)) co_return fail(left.error());
+    if (!left) co_return fail(left.error());
   }
-  if (mode_ != OperationMode::profile_velocity) {
-    constexpr auto velocity = std::to_underlying(OperationMode::profile_velocity);
-    mode_.reset();
-    const auto written = co_await write_object(object::mode, velocity, 1, options);
-    if (silent(written)) co_return fail(written.error());
-    const auto fits = [](std::int64_t shown) { return shown == velocity; };
-    const auto shown = co_await read_until(object::mode_display, fits, urgent_mode_limit, options);
-    mode_at_ = clock_->now();
-    if (silent(shown)) co_return fail(shown.error());
-    if (shown && fits(*shown)) {
-      mode_ = OperationMode::profile_velocity;
-      leave_homing_ = false;
-    }
-  }
+  if (auto chosen = co_await choose_velocity_mode(options); !chosen) co_return chosen;
   // Somebody has led the drive elsewhere meanwhile: these bits would lead it back.
   if (state_bits_ && *state_bits_ != bits) co_return Result<void>{};
   co_await send_control_pdo(bits);

@@ -122,6 +122,32 @@ TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
   }
 }
 
+/// A new edge lets go of the halt for a moment: only in velocity mode nothing is behind it.
+TEST(M13, WhereTheModeIsRefusedAStopStartsNothingThatAHaltSuspended) {
+  for (const auto object : {0x6060, 0x6061})
+    for (const int count : {1, 2, 3, 6, -1}) {
+      CanRig rig({.limits = false, .adjust = [](AxisSettings& axis) {
+                    axis.inputs.push_back({.terminal = "X3", .function = "jog_positive"});
+                  }});
+      rig.ready();
+      (void)rig.submit(MoveRelativeRequest{.distance = 900});
+      rig.run(500ms);
+      rig.done(StopRequest{.kind = StopKind::stop});
+      rig.touch([](auto& node) { node.set_input("X3", true); });
+      rig.run(500ms);
+      ASSERT_TRUE(rig.drive->shaft_moving());
+      const auto starts = rig.drive->starts();
+      rig.nodes().add_fault({.kind = simulation::FaultKind::abort,
+                             .count = count,
+                             .object = static_cast<std::uint16_t>(object),
+                             .code = 0x08000000});
+      (void)rig.submit(StopRequest{.kind = StopKind::stop});
+      rig.run(5s);
+      EXPECT_EQ(rig.drive->starts(), starts) << count;
+      if (count > 0) EXPECT_FALSE(rig.drive->shaft_moving()) << count;
+    }
+}
+
 /// 6.2.2: 07h energises the motor already, and the manual does not say that terminals wait for 0Fh. An enable
 /// that failed on its way leaves the drive there.
 TEST(M13, AStopEndsWhatATerminalStartedInSwitchedOn) {
