@@ -454,10 +454,10 @@ class Axis {
   std::optional<Error> bus_loss_;   ///< not yet acted upon
   bool stop_owed_ = false;          ///< M4: to a silent node, until standstill is confirmed
   std::uint64_t failed_stops_ = 0;  ///< tells whether one has failed meanwhile
+  TimePoint ours_until_{};          ///< what turned the shaft before was told to, or settles after it
   /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
   std::optional<std::vector<std::int64_t>> unseen_ends_;
   bool left_running_ = false;  ///< a command has ended, and what it began may go on
-  TimePoint ours_until_{};     ///< what turned the shaft before was told to, or settles after it
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed
