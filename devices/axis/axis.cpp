@@ -9,14 +9,6 @@
 #include "devices/released_position.hpp"
 
 namespace axisd {
-namespace {
-
-/// What is measured comes to rest so late after its motion (M30).
-Duration settling_of(const Drive& drive) {
-  return drive.position_window() > 0 ? Duration(milliseconds(300)) : Duration{};
-}
-
-}  // namespace
 
 Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescriptor& descriptor,
            std::unique_ptr<Drive> drive, AxisFacePtr face, bool simulated)
@@ -102,10 +94,12 @@ bool Axis::is_from_home(std::int64_t offset) const {
   return std::abs(offset - home_offset()) <= drive_->position_window();
 }
 
-bool Axis::input_active(std::string_view function) const {
-  return sample_ && std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
-           return input.function == function && active_in(*sample_, input);
-         });
+bool Axis::input_active(std::string_view function) const { return sample_ && active_in(*sample_, function); }
+
+bool Axis::active_in(const DriveSample& sample, std::string_view function) const {
+  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
+    return input.function == function && active_in(sample, input);
+  });
 }
 
 bool Axis::active_in(const DriveSample& sample, const TerminalSettings& input) const {
@@ -133,12 +127,6 @@ bool Axis::start_terminal_active(const DriveSample& sample) const {
   });
 }
 
-bool Axis::homing_terminal_active(const DriveSample& sample) const {
-  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
-    return input.function == "homing_start" && active_in(sample, input);
-  });
-}
-
 bool Axis::limit_active(bool positive) const {
   return input_active(positive ? "positive_limit" : "negative_limit");
 }
@@ -160,6 +148,8 @@ void Axis::on_sample(const DriveSample& sample) {
   const bool homed_by_others = !homing && !rezeroing_ && before && !before->homed && sample.homed;
   if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
+  const bool begun = activity_ && activity_->may_run && activity_->waits_for == StartWait::begun;
+  if (rezeroing_ || left_running_ || begun) ours_until_ = sample.asked_at + settling();
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
@@ -191,10 +181,8 @@ bool Axis::ended_abruptly(const DriveSample& before, std::int64_t turned_by) con
 
 /// Homing that a terminal started may have begun and ended between two readings, and left neither its mode
 /// nor a new homed bit: the counter tells of it where nothing of ours can have turned the shaft.
-bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) {
+bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const {
   const auto& now = *sample_;
-  const bool begun = activity_ && activity_->may_run && activity_->waits_for == StartWait::begun;
-  if (rezeroing_ || left_running_ || begun) ours_until_ = now.asked_at + settling_of(*drive_);
   if (now.asked_at <= ours_until_ || !has_input("homing_start") || before.moving || now.moving) return false;
   // A shaft that is released and turned is counted as such.
   const bool held = now.enabled || (before.enabled && !counts_while_released());
@@ -257,7 +245,7 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
   // A motor that was told to stop, and has not confirmed it, is never a terminal's.
   if (!stop_owed_ && !fault_ && (segments || homing || started || drive_->moves_by_itself())) {
     terminal_motion_ = true;
-    if (homing_terminal_active(sample) || (before && homing_terminal_active(*before))) lose_trust();
+    if (active_in(sample, "homing_start") || (before && active_in(*before, "homing_start"))) lose_trust();
     return;
   }
   spdlog::warn("{}: moving without a command; stopping it", settings_.name);

@@ -230,12 +230,12 @@ class Axis {
   [[nodiscard]] bool terminal_may_void_position() const;
   [[nodiscard]] bool input_active(std::string_view function) const;
   [[nodiscard]] bool active_in(const DriveSample& sample, const TerminalSettings& input) const;
+  [[nodiscard]] bool active_in(const DriveSample& sample, std::string_view function) const;
   [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;
   [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
-  [[nodiscard]] bool homing_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
   [[nodiscard]] bool ended_abruptly(const DriveSample& before, std::int64_t turned_by) const;
-  bool homed_unseen(const DriveSample& before, std::int64_t turned_by);
+  [[nodiscard]] bool homed_unseen(const DriveSample& before, std::int64_t turned_by) const;
   void lose_trust();
   void remember_position();
 
@@ -347,6 +347,8 @@ class Axis {
   Task<bool> proven_continuous(ActivityPtr activity);
   /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
   /// itself takes for in position.
+  /// A measured position comes to its target so late, at most, after the drive has sent its last pulse (M30).
+  [[nodiscard]] Duration settling() const;
   [[nodiscard]] std::int64_t target_tolerance() const;
   /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
   [[nodiscard]] bool moved_from(std::int64_t counter) const;

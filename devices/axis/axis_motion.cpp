@@ -22,8 +22,6 @@ constexpr auto overrun_margin = std::chrono::seconds(1);
 constexpr auto end_window = milliseconds(300);
 /// And from so long before, at most: a motion too short for its velocity ends before its prediction.
 constexpr Duration longest_end_lead = milliseconds(100);
-/// A measured position comes to its target so late, at most, after the drive has sent its last pulse.
-constexpr auto settling_time = milliseconds(300);
 /// A motion that no sample can tell from noise is over so long after its predicted end.
 constexpr auto unseen_margin = milliseconds(100);
 
@@ -240,6 +238,10 @@ Task<bool> Axis::proven_continuous(ActivityPtr activity) {
   co_return false;
 }
 
+Duration Axis::settling() const {
+  return drive_->position_window() > 0 ? Duration(milliseconds(300)) : Duration{};
+}
+
 std::int64_t Axis::target_tolerance() const {
   return std::max<std::int64_t>(drive_->position_window(), std::llround(settings_.position_tolerance *
                                                                         std::abs(scale_.pulses_per_unit())));
@@ -339,11 +341,11 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
     ++unknown_starts_.unresolved;
     co_return false;
   }
-  // Nor is it where a pulse at a terminal, between two readings, may have ended the motion as it began.
-  const bool ended_unseen = has_input("motor_free") || has_input("stop") || has_input("quick_stop");
+  // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
+  // as it began, or the way is too short to be seen.
+  const bool may_end_it = has_input("motor_free") || has_input("stop") || has_input("quick_stop");
   const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
-  // It may have gone there all the same.
-  if (ended_unseen || (moves_to_a_target && !shows(activity->plan, base))) {
+  if (may_end_it || (moves_to_a_target && !shows(activity->plan, base))) {
     ++unknown_starts_.unresolved;
     fail_with_stop(*activity, std::move(cause));
     co_return false;
@@ -376,7 +378,6 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
   const auto tolerance = target_tolerance();
   const bool unseen = !plan.endless && !shows(plan, base);
-  const auto settling = drive_->position_window() > 0 ? Duration(settling_time) : Duration{0};
   std::optional<TimePoint> resting_since;
   // The end is expected: it is to be told at once.
   const auto end_lead = std::min(plan.predicted / 3, longest_end_lead);
@@ -415,7 +416,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
         const bool there = !plan.endless && std::abs(tracker_.counter() - plan.target->counter) <= tolerance;
         if (there && activity->started) co_return true;
         if (!resting_since) resting_since = sample.asked_at;
-        const bool settles = !held_back(plan) && sample.asked_at - *resting_since < settling;
+        const bool settles = !held_back(plan) && sample.asked_at - *resting_since < settling();
         if (activity->started && !settles && judge_rest(*activity)) co_return false;
       } else {
         resting_since.reset();
