@@ -207,12 +207,14 @@ class Cia402Drive final : public Drive {
   Task<> zero_velocity(SdoOptions options);
   Task<Result<void>> send_stop(bool quick);
   Task<bool> turns(SdoOptions options);
-  Task<Result<void>> choose_velocity_mode(SdoOptions options);
+  Task<Result<void>> choose_mode_soon(OperationMode mode, SdoOptions options);
   Task<Result<void>> halt_again(std::uint16_t bits, SdoOptions options);
 
   // drive_power.cpp
   Task<Result<State>> read_status(SdoOptions options);
-  Task<Result<void>> change_mode(OperationMode mode, SdoOptions options);
+  /// `limit`: until the drive shows it.
+  Task<Result<void>> change_mode(OperationMode mode, SdoOptions options,
+                                 Duration limit = std::chrono::milliseconds(500));
   Task<Result<void>> neutralise(State state, SdoOptions options);
   Task<Result<void>> make_ready(State state, OperationMode mode, SdoOptions options);
   Task<Result<void>> leave_halt(State state, OperationMode mode, std::optional<std::int64_t> position,

@@ -21,7 +21,6 @@ using std::chrono::milliseconds;
 constexpr auto transition_limit = milliseconds(1000);
 /// After a word whose reply was lost, before it is sent again.
 constexpr auto lost_transition_limit = milliseconds(100);
-constexpr auto mode_limit = milliseconds(500);
 constexpr auto watch_time = milliseconds(30), watch_pause = milliseconds(5);
 /// Beyond the time to watch: a shaft whose velocity has not fallen back to noise by then does not rest.
 constexpr auto longest_unrest = milliseconds(100);
@@ -46,7 +45,7 @@ Task<Result<State>> Cia402Drive::read_status(SdoOptions options) {
   co_return state_of(static_cast<std::uint16_t>(*word));
 }
 
-Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions options) {
+Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions options, Duration limit) {
   const auto present = co_await read_object(object::mode_display, options);
   if (!present) co_return fail(present.error());
   if (*present != number_of(mode)) {
@@ -56,7 +55,7 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
     if (!written) co_return written;
   }
   const auto fits = [wanted = number_of(mode)](std::int64_t shown) { return shown == wanted; };
-  const auto shown = co_await read_until(object::mode_display, fits, mode_limit, std::move(options));
+  const auto shown = co_await read_until(object::mode_display, fits, limit, std::move(options));
   if (!shown) co_return fail(shown.error());
   if (!fits(*shown))
     co_return fail(error_at(Reason::refused, object::mode_display,
@@ -271,8 +270,7 @@ Task<> Cia402Drive::release_again(SdoOptions options) {
   options.guard.fencing_token = MotionGuard::needs_no_lease;
   const auto shutdown = static_cast<std::uint16_t>(control_word(Command::shutdown) | control::halt);
   for (int attempt = 0; attempt < attempts; ++attempt) {
-    if (may_send(options.guard, clock_->now()) != Verdict::send || co_await turns(options)) co_return;
-    if (may_send(options.guard, clock_->now()) != Verdict::send) co_return;
+    if (co_await turns(options) || may_send(options.guard, clock_->now()) != Verdict::send) co_return;
     const auto written = co_await write_control(shutdown, options);
     if (written || written.error().reason != Reason::no_reply) co_return;
   }

@@ -229,51 +229,34 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
   co_return last_moving_ || std::abs(rpm) > velocity_noise_rpm;
 }
 
-/// Under a stop: soon, or not at all. Errors: the drive does not answer, refuses, or stays in another mode.
-Task<Result<void>> Cia402Drive::choose_velocity_mode(SdoOptions options) {
+/// Under a stop: soon, or not at all. Errors: of change_mode().
+Task<Result<void>> Cia402Drive::choose_mode_soon(OperationMode mode, SdoOptions options) {
   constexpr int attempts = 3;
-  constexpr auto velocity = std::to_underlying(OperationMode::profile_velocity);
-  Result<void> chosen;
-  for (int attempt = 0; attempt < attempts && mode_ != OperationMode::profile_velocity; ++attempt) {
-    mode_.reset();
-    chosen = co_await write_object(object::mode, velocity, 1, options);
-    if (!chosen && chosen.error().reason == Reason::no_reply) co_return chosen;
-    const auto fits = [](std::int64_t shown) { return shown == velocity; };
-    const auto shown = co_await read_until(object::mode_display, fits, urgent_mode_limit, options);
-    mode_at_ = clock_->now();
-    if (!shown && shown.error().reason == Reason::no_reply) co_return fail(shown.error());
-    if (shown && fits(*shown)) {
-      mode_ = OperationMode::profile_velocity;
-      leave_homing_ = false;
-    } else if (chosen) {
-      chosen = shown
-                   ? fail(error_at(Reason::refused, object::mode_display,
-                                   fmt::format("the drive stays in mode {} under a stop", *shown),
-                                   "look at the machine; check whether another master writes to this drive"))
-                   : fail(shown.error());
-    }
+  Result<void> changed;
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    changed = co_await change_mode(mode, options, urgent_mode_limit);
+    if (changed || changed.error().reason == Reason::no_reply) break;
   }
-  if (mode_ == OperationMode::profile_velocity) co_return Result<void>{};
-  co_return chosen;
+  co_return changed;
 }
 
 /// An edge of bit 8 on a motor that turns under halt. Between its two words nothing can be behind it:
 /// velocity mode with 60FFh = 0, as in make_ready(). By RPDO at once, and by SDO, where the drive answers
 /// each: one that looks at the word once per cycle sees no edge in the first pair. Nothing where that is not
 /// ready: in another mode a move that the halt suspended goes on, and a drive that falls silent may hear the
-/// first word of a pair alone. Errors: as of choose_velocity_mode().
+/// first word of a pair alone. Errors: the drive does not
+/// answer, refuses, or stays in another mode.
 Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions options) {
   const auto word = static_cast<std::uint16_t>(bits | control::halt);
   const auto zeroed = co_await write_object(object::target_velocity, 0, 0, options);
   if (!zeroed) co_return fail(zeroed.error());
   // In Switched On it is the change of the mode that ends a motion.
-  if (bits == control_word(Command::switch_on) && mode_ == OperationMode::profile_velocity) {
-    constexpr auto position = std::to_underlying(OperationMode::profile_position);
-    mode_.reset();
-    const auto left = co_await write_object(object::mode, position, 1, options);
-    if (!left) co_return fail(left.error());
-  }
-  if (auto chosen = co_await choose_velocity_mode(options); !chosen) co_return chosen;
+  if (bits == control_word(Command::switch_on) && mode_ == OperationMode::profile_velocity)
+    if (auto left = co_await choose_mode_soon(OperationMode::profile_position, options); !left)
+      co_return left;
+  if (mode_ != OperationMode::profile_velocity)
+    if (auto chosen = co_await choose_mode_soon(OperationMode::profile_velocity, options); !chosen)
+      co_return chosen;
   // Somebody has led the drive elsewhere meanwhile: these bits would lead it back.
   if (state_bits_ && *state_bits_ != bits) co_return Result<void>{};
   co_await send_control_pdo(bits);
