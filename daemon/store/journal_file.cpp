@@ -25,14 +25,6 @@ constexpr Duration time_told = std::chrono::seconds(1);
 
 }  // namespace
 
-Result<std::unique_ptr<JournalFile>> JournalFile::open(std::unique_ptr<JournalDisk> disk, WallTime now,
-                                                       Executor core, JournalOptions options) {
-  const auto found = disk->read();
-  if (!found) return fail(found.error());
-  return begin(std::move(disk), found->regular() ? std::optional(load_journal(found->text)) : std::nullopt,
-               now, std::move(core), std::move(options));
-}
-
 Result<std::unique_ptr<JournalFile>> JournalFile::begin(std::unique_ptr<JournalDisk> disk,
                                                         std::optional<JournalLoad> found, WallTime now,
                                                         Executor core, JournalOptions options) {

@@ -38,14 +38,11 @@ struct JournalOptions {
 /// into the next write together. Thread: core (created and destroyed there, too).
 class JournalFile final : public CommandJournal, public StateWitness {
  public:
-  /// Loads the journal and durably begins a new one with what is still needed. Blocks on the disk. Errors:
-  /// storage, with what to do.
-  static Result<std::unique_ptr<JournalFile>> open(std::unique_ptr<JournalDisk> disk, WallTime now,
-                                                   Executor core, JournalOptions options = {});
-  /// The same with what was read before; nothing: there is none that can be used.
+  /// Durably begins a new journal with what is still needed of the one that was found; nothing: there is none
+  /// that can be used. Blocks on the disk. Errors: storage, with what to do.
   static Result<std::unique_ptr<JournalFile>> begin(std::unique_ptr<JournalDisk> disk,
                                                     std::optional<JournalLoad> found, WallTime now,
-                                                    Executor core, JournalOptions options);
+                                                    Executor core, JournalOptions options = {});
   JournalFile(const JournalFile&) = delete;
   /// Writes what is still pending. Callbacks are posted, which no longer run if the core has ended.
   ~JournalFile() override;

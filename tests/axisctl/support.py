@@ -9,7 +9,8 @@ import subprocess
 import time
 import unittest
 
-import fake_server
+import fake_server  # makes axisd importable
+import axisd
 
 AXISCTL = os.environ["AXISCTL"]  # set by CTest
 LIMIT = 60  # s; generous, the machine may be busy
@@ -19,6 +20,16 @@ def environment():
     """The test's own: no server, certificates or colours from outside."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("AXISD_", "NO_COLOR", "GRPC_"))}
     return kept | {"TERM": "xterm"}
+
+
+class PythonTest(unittest.IsolatedAsyncioTestCase):
+    """Each test has a fake machine of its own, and the Python package's connection to it."""
+
+    async def asyncSetUp(self):
+        self.fake = fake_server.FakeMachine()
+        server, port = await fake_server.serve(self.fake, ["127.0.0.1:0"])
+        self.addAsyncCleanup(server.stop, 0)
+        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
 
 
 class AxisctlTest(unittest.TestCase):

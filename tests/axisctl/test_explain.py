@@ -1,9 +1,7 @@
 """Why an axis cannot move: axisctl explain and Axis.explain() against the fake daemon."""
 import unittest
 
-import fake_server
-from support import AxisctlTest
-import axisd
+from support import AxisctlTest, PythonTest
 
 
 class Axisctl(AxisctlTest):
@@ -50,13 +48,7 @@ class Axisctl(AxisctlTest):
         self.assertIn("no axis 'nobody'", self.fails(4, "explain", "nobody"))
 
 
-class Python(unittest.IsolatedAsyncioTestCase):
-    async def asyncSetUp(self):
-        self.fake = fake_server.FakeMachine()
-        server, port = await fake_server.serve(self.fake, ["127.0.0.1:0"])
-        self.addAsyncCleanup(server.stop, 0)
-        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
-
+class Python(PythonTest):
     def question(self):
         return self.fake.calls[-1][1]
 

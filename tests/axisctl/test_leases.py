@@ -5,7 +5,7 @@ import subprocess
 import sys
 import unittest
 
-from support import AXISCTL, LIMIT, AxisctlTest, environment
+from support import AXISCTL, LIMIT, AxisctlTest, PythonTest, environment
 import fake_server
 import axisd
 
@@ -77,13 +77,7 @@ class Axisctl(AxisctlTest):
         self.assertEqual(len(self.server.calls("ReleaseLease")), 1)
 
 
-class Python(unittest.IsolatedAsyncioTestCase):
-    async def asyncSetUp(self):
-        self.fake = fake_server.FakeMachine()
-        server, port = await fake_server.serve(self.fake, ["127.0.0.1:0"])
-        self.addAsyncCleanup(server.stop, 0)
-        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
-
+class Python(PythonTest):
     def calls(self, method):
         return [request for name, request, _ in self.fake.calls if name == method]
 

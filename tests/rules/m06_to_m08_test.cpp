@@ -171,11 +171,14 @@ TEST(M06, ATimeoutInTheChainRestartsIt) {
 /// A pulse at a terminal ends a motion as it begins, between two readings: the drive rests, and did start.
 TEST(M08, AStandstillProvesNothingWhereATerminalMayHaveEndedTheMotion) {
   for (const auto* function : {"motor_free", "stop", "quick_stop"}) {
-    Rig rig({.model = "ess42-r", .limits = false, .adjust = [function](AxisSettings& axis) {
-               axis.homing.reset();
-               axis.model_settings["released_position"] = std::string("counted");
-               axis.inputs = {{.terminal = "X3", .function = function}};
-             }});
+    Rig rig({.model = "ess42-r",
+             .adjust =
+                 [function](AxisSettings& axis) {
+                   axis.homing.reset();
+                   axis.model_settings["released_position"] = std::string("counted");
+                   axis.inputs = {{.terminal = "X3", .function = function}};
+                 },
+             .limits = false});
     rig.ready();
     rig.fault({.kind = FaultKind::drop_reply, .function = 0x06, .register_address = 0x0027});
     const auto move = rig.submit(MoveVelocityRequest{.velocity = 1});

@@ -17,6 +17,19 @@ void slow_ramps(AxisSettings& axis) {
   axis.limits.deceleration_time = 2000ms;
 }
 
+void add_jog(AxisSettings& axis) { axis.inputs.push_back({.terminal = "X3", .function = "jog_positive"}); }
+
+/// A halt suspends a move, and then a terminal jogs under that halt.
+void halt_and_jog(CanRig& rig) {
+  rig.ready();
+  (void)rig.submit(MoveRelativeRequest{.distance = 900});
+  rig.run(500ms);
+  rig.done(StopRequest{.kind = StopKind::stop});
+  rig.touch([](auto& node) { node.set_input("X3", true); });
+  rig.run(500ms);
+  ASSERT_TRUE(rig.drive->shaft_moving());
+}
+
 /// Halt words on the wire, by RPDO or SDO.
 long halts(const CanRig& rig) {
   const auto sdo = rig.writes_of(0x604000);
@@ -99,21 +112,11 @@ TEST(M13, AStopOfWhatHasJustBegunIsDoneAtRest) {
 
 TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
   for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
-    for_each_reading({.limits = false,
-                      .adjust =
-                          [](AxisSettings& axis) {
-                            axis.inputs.push_back({.terminal = "X3", .function = "jog_positive"});
-                          }},
+    for_each_reading({.limits = false, .adjust = add_jog},
                      {{"halt_release_resumes"}, {"pdo_parameters_read_only"}, {"mode_change_keeps_setpoint"}},
                      [kind](const CanRigOptions& options) {
                        CanRig rig(options);
-                       rig.ready();
-                       (void)rig.submit(MoveRelativeRequest{.distance = 900});
-                       rig.run(500ms);
-                       rig.done(StopRequest{.kind = StopKind::stop});
-                       rig.touch([](auto& node) { node.set_input("X3", true); });
-                       rig.run(500ms);
-                       ASSERT_TRUE(rig.drive->shaft_moving());
+                       halt_and_jog(rig);
                        (void)rig.submit(StopRequest{.kind = kind});
                        rig.run(1s);
                        EXPECT_FALSE(rig.drive->shaft_moving());
@@ -126,16 +129,8 @@ TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
 TEST(M13, WhereTheModeIsRefusedAStopStartsNothingThatAHaltSuspended) {
   for (const auto object : {0x6060, 0x6061})
     for (const int count : {1, 2, 3, 6, -1}) {
-      CanRig rig({.limits = false, .adjust = [](AxisSettings& axis) {
-                    axis.inputs.push_back({.terminal = "X3", .function = "jog_positive"});
-                  }});
-      rig.ready();
-      (void)rig.submit(MoveRelativeRequest{.distance = 900});
-      rig.run(500ms);
-      rig.done(StopRequest{.kind = StopKind::stop});
-      rig.touch([](auto& node) { node.set_input("X3", true); });
-      rig.run(500ms);
-      ASSERT_TRUE(rig.drive->shaft_moving());
+      CanRig rig({.limits = false, .adjust = add_jog});
+      halt_and_jog(rig);
       const auto starts = rig.drive->starts();
       rig.nodes().add_fault({.kind = simulation::FaultKind::abort,
                              .count = count,
@@ -191,16 +186,8 @@ TEST(M13, AStopEndsWhatATerminalStartedInSwitchedOn) {
 TEST(M13, AStopOfASilentDriveStartsNothingThatAHaltSuspended) {
   for (auto silent = 640ms; silent < 760ms; silent += 6ms) {
     SCOPED_TRACE(silent.count());
-    CanRig rig({.limits = false, .adjust = [](AxisSettings& axis) {
-                  axis.inputs.push_back({.terminal = "X3", .function = "jog_positive"});
-                }});
-    rig.ready();
-    (void)rig.submit(MoveRelativeRequest{.distance = 900});
-    rig.run(500ms);
-    rig.done(StopRequest{.kind = StopKind::stop});
-    rig.touch([](auto& node) { node.set_input("X3", true); });
-    rig.run(500ms);
-    ASSERT_TRUE(rig.drive->shaft_moving());
+    CanRig rig({.limits = false, .adjust = add_jog});
+    halt_and_jog(rig);
     rig.nodes().set_connected(false);
     rig.touch([](auto& node) { node.set_input("X3", false); });
     rig.run(150ms);

@@ -59,13 +59,20 @@ Command done(const std::string& id) {
   return command;
 }
 
+/// With what is on the disk, as a start that convicts nothing.
+Result<std::unique_ptr<JournalFile>> begin(std::unique_ptr<JournalDisk> disk, WallTime now, Executor core) {
+  const auto found = disk->read();
+  if (!found) return fail(found.error());
+  auto loaded = found->regular() ? std::optional(load_journal(found->text)) : std::nullopt;
+  return JournalFile::begin(std::move(disk), std::move(loaded), now, std::move(core));
+}
+
 class JournalFileTest : public testing::Test {
  protected:
   std::unique_ptr<JournalFile> open(WallTime now = WallTime(std::chrono::hours(1))) {
     auto disk = open_journal_disk(temporary_.path());
     if (!disk) ADD_FAILURE() << to_string(disk.error());
-    auto journal =
-        JournalFile::open(std::make_unique<FaultyDisk>(std::move(*disk), faults_), now, core_.get_executor());
+    auto journal = begin(std::make_unique<FaultyDisk>(std::move(*disk), faults_), now, core_.get_executor());
     if (!journal) {
       ADD_FAILURE() << to_string(journal.error());
       return nullptr;
@@ -295,7 +302,7 @@ TEST_F(JournalFileTest, AFullDiskLosesNoIds) {
 TEST_F(JournalFileTest, ANewerFormatIsNotTakenForDamage) {
   temporary_.write("journal.v1", "axisd-journal 4\nwhatever\n");
   auto disk = open_journal_disk(temporary_.path());
-  const auto journal = JournalFile::open(std::move(*disk), WallTime(), core_.get_executor());
+  const auto journal = begin(std::move(*disk), WallTime(), core_.get_executor());
   ASSERT_FALSE(journal);
   EXPECT_THAT(journal.error().message, HasSubstr("newer"));
   EXPECT_EQ(text(), "axisd-journal 4\nwhatever\n");
@@ -310,8 +317,7 @@ TEST_F(JournalFileTest, WhatWasDurableSurvivesAKill) {
     if (child == 0) {
       boost::asio::io_context core;
       auto disk = open_journal_disk(temporary_.path());
-      auto journal =
-          JournalFile::open(std::move(*disk), std::chrono::system_clock::now(), core.get_executor());
+      auto journal = begin(std::move(*disk), std::chrono::system_clock::now(), core.get_executor());
       if (!journal) _exit(1);
       for (unsigned char i = 0; i < 200; ++i) {
         const auto id = std::to_string(round) + "-" + std::to_string(i);
