@@ -59,8 +59,8 @@ void kept_state(Invocation& invocation) {
       invocation.client().call(&v1::SystemService::Stub::GetState, v1::GetStateRequest(), std::string_view());
   if (invocation.json) return print_line(json(response));
   for (const auto& file : response.files())
-    print_line(fmt::format("{:<12}generation {} at the start of the daemon, {}", file.name() + ":",
-                           file.generation(),
+    print_line(fmt::format("{:<12}{} {} at the start of the daemon, {}", file.name() + ":",
+                           file.name().starts_with("journal") ? "line" : "generation", file.generation(),
                            file.expected() == 0 ? "the other file does not say which there was"
                                                 : fmt::format("at least {} expected", file.expected())));
   print_line(fmt::format("{:<12}{}", "starts:", response.start_count()));
