@@ -76,6 +76,7 @@ class CanRig {
     start_daemon();
   }
   ~CanRig() {
+    network.set_fault({});  // what it refers to may be gone
     if (machine) stop_daemon();
   }
 
