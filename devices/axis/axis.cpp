@@ -153,7 +153,9 @@ void Axis::on_sample(const DriveSample& sample) {
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
-  if (!sample.moving && !stopping_.running && link_ == LinkState::online) stop_owed_ = left_running_ = false;
+  // What a link that failed kept back was not heard, wherever the drive rests.
+  if (!sample.moving && !stopping_.running && link_ == LinkState::online && !bus_loss_)
+    stop_owed_ = left_running_ = false;
   if (link_ == LinkState::online)
     observed_.on_sample(sample, busy());
   else

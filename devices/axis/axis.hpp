@@ -100,8 +100,8 @@ class Axis {
   [[nodiscard]] Result<void> check_lease(const Requester& requester) const;
   /// A flag outside changed (inhibit, lease): publish again.
   void refresh() { publish(); }
-  /// The bus could not send for a while, however short: what the axis was doing ends, and a drive that may
-  /// move gets a stop first (M4, M26).
+  /// The bus could not send for a while, however short, or a stop was not acknowledged: what the axis was
+  /// doing ends, and a drive that may move gets a stop first (M4, M26).
   void bus_lost(Error cause);
 
   // For work on the drive beside motion: parameters, segments, memory (drive_operations.hpp).

@@ -88,6 +88,8 @@ Task<> Axis::run_stop() {
   } else {
     observed_.stop_failed();
     stop_owed_ = true;
+    // Whether it arrived is not known: the drive is connected anew, which begins with a stop (M4).
+    if (confirmed.error().outcome == Outcome::unknown) bus_lost(confirmed.error());
     ++failed_stops_;
     if (!fault_) fault_ = confirmed.error();
     spdlog::error("{}", to_string(confirmed.error()));

@@ -244,8 +244,7 @@ Task<Result<void>> Cia402Drive::choose_mode_soon(OperationMode mode, SdoOptions 
 /// velocity mode with 60FFh = 0, as in make_ready(). By RPDO at once, and by SDO, where the drive answers
 /// each: one that looks at the word once per cycle sees no edge in the first pair. Nothing where that is not
 /// ready: in another mode a move that the halt suspended goes on, and a drive that falls silent may hear the
-/// first word of a pair alone. Errors: the drive does not
-/// answer, refuses, or stays in another mode.
+/// first word of a pair alone. Errors: the drive does not answer, refuses, or stays in another mode.
 Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions options) {
   const auto word = static_cast<std::uint16_t>(bits | control::halt);
   const auto zeroed = co_await write_object(object::target_velocity, 0, 0, options);

@@ -309,6 +309,29 @@ TEST(M04, AStopThatFailsWhileTheDriveIsBeingConnectedIsSentBeforeItIsOnline) {
   }
 }
 
+TEST(M04, AStopThatTheLinkKeptBackIsSentBeforeTheDriveIsOnlineAgain) {
+  int failed = 0;
+  for (const bool polled : {false, true}) {
+    for (auto phase = 0ms; phase < 40ms; ++phase) {
+      CanRig rig({.polled = polled});
+      rig.ready();
+      rig.run(phase);
+      rig.network.set_stalled(true);
+      rig.run(phase / 2);
+      rig.frames.clear();
+      const auto stop = rig.submit(StopRequest{.kind = StopKind::stop});
+      ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 10s));
+      rig.network.set_stalled(false);
+      if (stop->value().state == CommandState::done) continue;
+      ++failed;
+      rig.run(1s);
+      rig.reconnect();
+      EXPECT_GT(halts(rig), 0) << phase.count() << " ms, polled " << polled;
+    }
+  }
+  EXPECT_GT(failed, 0);
+}
+
 TEST(M04, SoIsOneThatFailsWhileAllElseIsAnswered) {
   int failed = 0;
   for (auto phase = 0ms; phase < 120ms; phase += 3ms) {
