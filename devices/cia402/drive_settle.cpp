@@ -70,7 +70,8 @@ Task<Result<void>> Cia402Drive::disarm(SdoOptions options) {
   co_return written ? started : written;
 }
 
-/// By what stands in the drive already. An identifier that other nodes may listen to is left alone.
+/// By what stands in the drive already. An identifier that other nodes may listen to is left alone. A
+/// set-point or a reset that was taken stands there, too, and would be a new one behind a stop.
 Task<Result<void>> Cia402Drive::overwrite_waiting(std::uint16_t number, canopen::PdoState state,
                                                   SdoOptions options) {
   if (!state.enabled() || state.cob_id() != canopen::rpdo_id(number, node_.id())) co_return Result<void>{};
@@ -78,7 +79,10 @@ Task<Result<void>> Cia402Drive::overwrite_waiting(std::uint16_t number, canopen:
   for (const auto& mapped : state.mapping) {
     const auto value = co_await node_.read(mapped.object, options);
     if (!value && value.error().outcome != Outcome::refused) co_return failed(value.error());
-    values.push_back(value.value_or(0));
+    auto standing = value.value_or(0);
+    if (mapped.object == object::control_word)
+      standing &= ~std::uint64_t{control::start | control::fault_reset};
+    values.push_back(standing);
   }
   const auto sent = co_await bus_->master().send_pdo(state.cob_id(), canopen::pack_pdo(state.mapping, values),
                                                      {.transaction_class = TransactionClass::motion});

@@ -63,6 +63,24 @@ TEST(M24, WhatAnEarlierMasterArmedNeverStarts) {
                    &expect_nothing_armed_starts);
 }
 
+/// A set-point that was taken stands in the control word: where a stop comes between, it would be a new one.
+TEST(M24, WhatTakesThePlaceOfAnArmedWordStartsNothing) {
+  CanRig rig({.sync_period = 10ms, .limits = false});
+  rig.ready();
+  rig.stop_daemon();
+  constexpr std::uint32_t id = 0x300U + CanRig::node_id;
+  rig.touch([&](auto& node) {
+    write(node, 0x6060, 0, 1, 1);
+    write(node, 0x607A, 0, 4, node.peek(0x606400));
+    for (const std::uint32_t word : {0x0FU, 0x1FU}) write(node, 0x6040, 0, 2, word);
+  });
+  rig.start_daemon();
+  rig.run(1s);
+  EXPECT_GT(rig.count_of(id), 0);
+  for (const auto& [at, frame] : rig.frames)
+    if (frame.id == id) EXPECT_EQ(frame.data[0] & 0x90U, 0U) << to_string(frame);
+}
+
 TEST(M24, ANodeThatIsHeardButDoesNotAnswerKeepsSyncFromStarting) {
   CanRig rig({.sync_period = 10ms, .limits = false, .connect = false});
   rig.reconnect();
