@@ -225,7 +225,9 @@ void Judge::on_departure(Station& station, const Subject& subject, const Execute
 void Judge::on_own_start(Station& station) {
   note(station.name, "the drive starts by itself");
   ++tally_.by_terminal;
-  subjects_.at(station.name).own_start = plant_->world.now();
+  auto& subject = subjects_.at(station.name);
+  subject.own_start = plant_->world.now();
+  subject.own_start_from = station.drive->lately();
   if (!station.terminal_may_start(plant_->world.now()))
     violation(station.name, "the drive starts, and nobody touched it");
 }
@@ -264,8 +266,10 @@ void Judge::check_arrival(Station& station, const Subject& subject, const Judged
   if (command.asked.distance) {
     ++tally_.distances;
     const auto there = station.drive->shaft_pulses();
-    if (const auto wrong =
-            wrong_arrival(command, station.track, judged.departed.value_or(Stretch{there, there}), there);
+    // A terminal may have started what was loaded, before the trigger came.
+    const auto unstarted =
+        subject.own_start >= judged.accepted_at ? subject.own_start_from : Stretch{there, there};
+    if (const auto wrong = wrong_arrival(command, station.track, judged.departed.value_or(unstarted), there);
         !wrong.empty())
       violation(station.name, wrong);
     return;

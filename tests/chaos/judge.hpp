@@ -83,6 +83,7 @@ class Judge {
     std::uint64_t stop_frames_at_ask = 0;  ///< when the newest stop was asked for
     std::optional<std::int64_t> origin;    ///< the shaft at position 0, pulses, while it is known
     TimePoint own_start{};                 ///< a terminal started it last
+    Stretch own_start_from{};              ///< from there
   };
 
   void on_bind(Station& station, const Telegram& telegram);

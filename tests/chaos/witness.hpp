@@ -46,6 +46,16 @@ class Witness {
   [[nodiscard]] TimePoint last_power_loss() const { return last_power_loss_; }
   /// A start is bound within this of the last reading (M6: reboot_guard).
   static constexpr Duration start_time = std::chrono::milliseconds(100);
+  /// Everywhere the shaft was within that time.
+  [[nodiscard]] Stretch lately() const {
+    Stretch stretch{.low = last_shaft_, .high = last_shaft_};
+    for (const auto& [until, shaft] : places_) {
+      if (now_ - until > start_time) continue;
+      stretch.low = std::min(stretch.low, shaft);
+      stretch.high = std::max(stretch.high, shaft);
+    }
+    return stretch;
+  }
 
  protected:
   void time_passed(TimePoint now) {
@@ -81,16 +91,6 @@ class Witness {
     last_moved_ = now_;
     while (!places_.empty() && now_ - places_.front().first > start_time) places_.pop_front();
     places_.emplace_back(now_, std::exchange(last_shaft_, shaft));
-  }
-  /// Everywhere the shaft was within that time.
-  [[nodiscard]] Stretch lately() const {
-    Stretch stretch{.low = last_shaft_, .high = last_shaft_};
-    for (const auto& [until, shaft] : places_) {
-      if (now_ - until > start_time) continue;
-      stretch.low = std::min(stretch.low, shaft);
-      stretch.high = std::max(stretch.high, shaft);
-    }
-    return stretch;
   }
   void note_own_start() {
     if (drive().starts() != std::exchange(starts_, drive().starts()) && on_own_start) on_own_start();
