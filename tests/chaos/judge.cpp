@@ -261,8 +261,9 @@ void Judge::on_end(Station& station, Subject& subject, const Judged& judged, con
 
 void Judge::check_arrival(Station& station, const Subject& subject, const Judged& judged,
                           const Command& command) {
-  const auto now = plant_->world.now();
-  if (now - subject.own_start <= reading || now - station.released_until <= reading) return;
+  // What begins after the reading that ended it was asked for does not show in it.
+  const auto asked = station.axis->snapshot()->sampled.after();
+  if (asked - subject.own_start <= reading || asked - station.released_until <= reading) return;
   if (command.asked.distance) {
     ++tally_.distances;
     const auto there = station.drive->shaft_pulses();
