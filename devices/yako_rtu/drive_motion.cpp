@@ -227,8 +227,12 @@ Task<Result<void>> YakoRtuDrive::send_stop(StopKind kind, bool patient) {
       if (written->certain) co_return Result<void>{};
       // After the reply to a read no older one can follow: the next echo is its own.
       const auto read = co_await node_.read(reg::moving, 1, {.transaction_class = TransactionClass::motion});
-      if (!read) co_return failed(read.error());
-      continue;
+      if (read) continue;
+      // Whatever is wrong with the reading: it is no refusal of the stop, which may not have been heard.
+      auto unheard = read.error();
+      unheard.reason = Reason::no_reply;
+      unheard.outcome = Outcome::unknown;
+      co_return failed(std::move(unheard));
     }
     // A refusal mostly means that the frame was damaged (01, which some firmware answers): at once again.
     if (written.error().reason != Reason::refused || attempt == stop_attempts)

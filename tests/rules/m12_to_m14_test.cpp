@@ -403,5 +403,31 @@ TEST(M15, AStopWaitsForOneTransactionOnly) {
   });
 }
 
+/// The echo of a stop before it is no echo of its own, and a question that came to nothing does not tell
+/// which one it was.
+TEST(M14, AStopThatMayNotHaveBeenHeardIsSentAgain) {
+  Rig rig({.switches = {{"crc_error_answered", true}}});
+  rig.ready();
+  auto& network = rig.line->network();
+  const auto on_stop = [](simulation::FaultKind kind, Duration delay = {}) {
+    return simulation::Fault{
+        .kind = kind, .function = std::uint8_t{6}, .register_address = std::uint16_t{0x0028}, .delay = delay};
+  };
+  // Its reply comes while the next one is awaited.
+  network.faults().add(on_stop(simulation::FaultKind::delay_reply, 60ms));
+  const auto first = rig.submit(StopRequest{.kind = StopKind::halt});
+  rig.run(10ms);
+  network.faults().add(on_stop(simulation::FaultKind::drop_request));
+  network.faults().add(
+      {.kind = simulation::FaultKind::corrupt_request, .function = std::uint8_t{3}, .count = 1});
+  rig.line->forget_wire();
+  const auto second = rig.submit(StopRequest{.kind = StopKind::stop});
+  ASSERT_TRUE(rig.run_until([&] { return second->has_ended(); }, 10s));
+  const auto sent = std::ranges::count_if(
+      rig.line->wire(), [](const WireEntry& entry) { return entry.is_write() && entry.address() == 0x0028; });
+  EXPECT_GE(sent, 2) << "one of them was lost";
+  EXPECT_EQ(second->value().state, CommandState::done);
+}
+
 }  // namespace
 }  // namespace axisd::test
