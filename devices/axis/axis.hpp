@@ -345,10 +345,10 @@ class Axis {
   Task<bool> is_no_reboot(ActivityPtr activity);
   Task<bool> still_there(ActivityPtr activity);
   Task<bool> proven_continuous(ActivityPtr activity);
-  /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
-  /// itself takes for in position.
   /// A measured position comes to its target so late, at most, after the drive has sent its last pulse (M30).
   [[nodiscard]] Duration settling() const;
+  /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
+  /// itself takes for in position.
   [[nodiscard]] std::int64_t target_tolerance() const;
   /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
   [[nodiscard]] bool moved_from(std::int64_t counter) const;
