@@ -6,17 +6,14 @@ import unittest
 import fake_server  # builds the package and puts it on the path
 import axisd
 from axisd.v1 import error_pb2
-from support import AXISCTL, LIMIT, AxisctlTest, environment
+from support import AXISCTL, LIMIT, AxisctlTest, PythonTest, environment
 
 ALWAYS = 1_000_000
 
 
-class ClientTest(unittest.IsolatedAsyncioTestCase):
+class ClientTest(PythonTest):
     async def asyncSetUp(self):
-        self.fake = fake_server.FakeMachine()
-        server, port = await fake_server.serve(self.fake, ["127.0.0.1:0"])
-        self.addAsyncCleanup(server.stop, 0)
-        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
+        await super().asyncSetUp()
         self.feeder = self.machine.axis("feeder")
 
     def calls(self, method):
