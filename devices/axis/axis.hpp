@@ -327,7 +327,9 @@ class Axis {
   [[nodiscard]] bool looks_restarted(const DriveSample& sample) const;
   [[nodiscard]] bool may_move_by_itself() const;
   Result<void> aim(Activity& activity);
-  [[nodiscard]] Result<void> check_way(const Plan& plan) const;
+  [[nodiscard]] Result<void> check_direction(const Activity& activity,
+                                             const PositionTracker::Target& target) const;
+  [[nodiscard]] Result<void> check_way(const Activity& activity) const;
   Task<std::optional<Result<void>>> start_unmoved(ActivityPtr activity);
 
   // axis_lateness.cpp: nothing starts late (M31)

@@ -67,18 +67,26 @@ Result<void> Axis::aim(Activity& activity) {
   }
   auto aimed = planner_.move(plan, target, tracker_);
   if (!aimed) return fail(aimed.error());
-  const bool turns_back = activity.state == AxisState::continuous_motion && velocity &&
-                          !tracker_.rests_at(target) && aimed->positive != (*velocity > 0);
-  if (turns_back)
-    return fail(error(Reason::soft_limit, "beyond the software limit already", "move the other way"));
+  if (auto way = check_direction(activity, target); !way) return way;
   plan = *std::move(aimed);
   plan.granted.velocity = velocity;  // with its sign
   activity.command->grant(plan.granted);
   return {};
 }
 
-/// The drive would go as far as was asked (M19). Errors: moving.
-Result<void> Axis::check_way(const Plan& plan) const {
+/// A velocity that ends at a limit never leads back to it. Errors: soft_limit.
+Result<void> Axis::check_direction(const Activity& activity, const PositionTracker::Target& target) const {
+  const auto& velocity = activity.plan.granted.velocity;
+  if (activity.state != AxisState::continuous_motion || !velocity || tracker_.rests_at(target) ||
+      planner_.positive(target, tracker_) == (*velocity > 0))
+    return {};
+  return fail(error(Reason::soft_limit, "beyond the software limit already", "move the other way"));
+}
+
+/// The drive would go as far as was asked (M19), and the way that was asked for. Errors: moving, soft_limit.
+Result<void> Axis::check_way(const Activity& activity) const {
+  const auto& plan = activity.plan;
+  if (auto way = check_direction(activity, *plan.target); !way) return way;
   if (tracker_.deviation(*plan.target) <= drive_->position_window() + 1) return {};
   return fail(
       error(Reason::moving,
@@ -97,7 +105,7 @@ Task<std::optional<Result<void>>> Axis::start_unmoved(ActivityPtr activity) {
   for (int attempt = 1;; ++attempt) {
     if (auto seen = co_await look(Duration{0}); !seen) co_return seen;
     if (!current(*activity) || !may_start(*activity)) co_return std::nullopt;
-    if (auto way = check_way(activity->plan); !way) co_return way;
+    if (auto way = check_way(*activity); !way) co_return way;
     const auto triggered = co_await (*loaded)->trigger(sample_->asked_at + settings_.reboot_guard);
     if (triggered) {
       co_await (*loaded)->follow_up();

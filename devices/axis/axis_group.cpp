@@ -180,7 +180,7 @@ Task<Result<void>> Axis::Member::look() {
   if (was_there && !there_)
     co_return axisd::fail(
         axis_->error(Reason::moving, "the axis left its position before the start", "repeat the move"));
-  if (auto way = axis_->check_way(activity_->plan); !way) co_return way;
+  if (auto way = axis_->check_way(*activity_); !way) co_return way;
   co_return judge(*sample);
 }
 

@@ -164,7 +164,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     const Chain chain(*this);
     if (result) result = co_await look(settings_.reboot_guard);
     if (!current(*activity) || !may_start(*activity)) co_return false;
-    if (result) result = check_way(activity->plan);
+    if (result) result = check_way(*activity);
     base = tracker_.counter();
     const auto& target = *activity->plan.target;
     there = result && tracker_.rests_at(target);

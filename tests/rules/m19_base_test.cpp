@@ -97,6 +97,45 @@ TEST(M19, AJogWithoutAKnownPositionCountsFromWhereTheShaftIs) {
   });
 }
 
+/// Between the plan and the start, while nobody looked: towards the limit would be the other way then.
+TEST(M19, AVelocityGoesNoOtherWayThanWasAskedFor) {
+  auto base = closed_loop();
+  base.persistence = base.journal = true;
+  base.adjust = [adjust = base.adjust](AxisSettings& axis) {
+    adjust(axis);
+    axis.inputs.push_back({.terminal = "X3", .function = "motor_free"});
+    axis.poll_moving = 200ms;
+  };
+  int unseen = 0;
+  both_directions(base, [&](const RigOptions& options) {
+    for (Duration phase = 0ms; phase < 200ms; phase += 20ms) {
+      Rig rig(options);
+      rig.ready();
+      expect_moves(rig, MoveAbsoluteRequest{.position = 150}, 150);
+      rig.run(500ms);  // nobody awaits its end any more
+      rig.journal.slow = true;
+      const auto jog = rig.submit(JogRequest{.velocity = 10, .hold = 2s}, {.client = "a", .request_id = "r"});
+      rig.run(100ms + phase);
+      rig.set_input("X3", true);
+      rig.run(20ms);
+      rig.drive->advance(rig.world.now());
+      const bool turned = rig.drive->push_shaft(options.invert ? -30000 : 30000);
+      rig.set_input("X3", false);
+      rig.run(30ms);
+      const bool seen = jog->has_ended();
+      const auto before = rig.load_mm();
+      rig.journal.release();
+      rig.run(3s);
+      if (!turned || seen) continue;
+      ++unseen;
+      EXPECT_NEAR(rig.load_mm(), before, 0.12) << describe(jog->value());
+      EXPECT_EQ(jog->value().state, CommandState::error) << describe(jog->value());
+      EXPECT_EQ(jog->value().cause->reason, Reason::soft_limit) << describe(jog->value());
+    }
+  });
+  EXPECT_GT(unseen, 0);
+}
+
 /// The drive reaches home, and zeroes its counter, while the halt before the jog is under way.
 TEST(M19, AJogThatFollowsHomingCountsAfterTheCounterWasZeroed) {
   both_directions({}, [](const RigOptions& options) {
