@@ -33,6 +33,9 @@ struct LoadBudget {
   double utilisation_max = 0;  ///< the same where every node takes turnaround_max
   /// Between two readings of one axis, at most. Duration::max(): without bound.
   Duration refresh_moving{}, refresh_idle{};
+  /// On RS-485, from a start that is asked for, and durably noted, to the last byte of its start frame, at
+  /// most, where all that move start at once: one after the other. 0: they do not wait for each other.
+  Duration start{};
 };
 
 /// A stop of `axes` axes at once, at most; from its request's arrival, without the way that the motors need.

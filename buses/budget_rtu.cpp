@@ -63,6 +63,7 @@ class Analysis {
   [[nodiscard]] Duration reservations(std::int64_t overtaking) const;
   [[nodiscard]] Duration wait_moving(int moving, int starting, Duration late) const;
   [[nodiscard]] Duration wait_idle(int moving) const;
+  [[nodiscard]] Duration start(int starting) const;
   [[nodiscard]] Duration refresh_moving(const AxisDemand& axis, Duration wait) const;
   [[nodiscard]] Duration refresh_idle(const AxisDemand& axis, Duration wait) const;
   [[nodiscard]] double utilisation(int moving, bool slow) const;
@@ -155,6 +156,15 @@ Duration Analysis::wait_idle(int moving) const {
   return std::min(wait, by_reservation);
 }
 
+/// Each has its turn: it is read, then comes its chain. Before it has it, it may be read once, too.
+Duration Analysis::start(int starting) const {
+  const auto turn = [this](const AxisDemand& axis) {
+    return 2 * cost(axis.set.state, axis) + cost(axis.set.start, axis);
+  };
+  return in_flight_ + late_ + dearest(static_cast<std::size_t>(starting), turn) +
+         reservations(starting * (longest_chain_ + 2));
+}
+
 /// One reading may be preceded by the canary; the next one is asked for a period after the last, or at once.
 Duration Analysis::refresh_moving(const AxisDemand& axis, Duration wait) const {
   return std::max(axis.poll_moving, answered(axis.set.state, axis)) + wait +
@@ -201,6 +211,7 @@ LoadBudget Analysis::load(int moving) const {
   const auto sensible = [](Duration time) { return time > longest_bound ? Duration::max() : time; };
   load.refresh_moving = sensible(load.refresh_moving);
   load.refresh_idle = sensible(load.refresh_idle);
+  if (moving > 0) load.start = sensible(start(moving));
   return load;
 }
 

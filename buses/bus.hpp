@@ -12,6 +12,8 @@
 
 namespace axisd {
 
+class StartTurns;
+
 /// State of the port below a bus.
 struct PortStatus {
   bool open = false;
@@ -56,6 +58,8 @@ class Bus {
   }
   /// Where stops are announced before the core knows of them. May be null: the bus gains nothing by it.
   [[nodiscard]] virtual std::shared_ptr<StopNotice> stop_notice() const { return nullptr; }
+  /// Where starts of motion keep each other from ending in time: each has its turn there. Null: they do not.
+  [[nodiscard]] virtual StartTurns* start_turns() { return nullptr; }
   /// A node of this bus is about to be energised: what would be noise to it ends as superseded, unless it has
   /// gone out.
   virtual void about_to_energise() = 0;

@@ -39,13 +39,14 @@ std::string joined(const Table& table, bool colour) {
 }
 
 Table load_table(const v1::BusBudget& budget) {
-  Table table({"MOVING", "UTILISATION", "AT MOST", "REFRESH MOVING", "REFRESH IDLE"}, {0, 1, 2, 3, 4});
+  Table table({"MOVING", "UTILISATION", "AT MOST", "REFRESH MOVING", "REFRESH IDLE", "START"},
+              {0, 1, 2, 3, 4, 5});
   const auto last = static_cast<std::uint32_t>(budget.load_size() - 1);
   for (const auto& row : budget.load())
     if (is_shown(row.moving(), last))
       table.add({std::to_string(row.moving()), fmt::format("{:.2f}", row.utilisation()),
                  fmt::format("{:.2f}", row.utilisation_max()), predicted(row.refresh_moving()),
-                 predicted(row.refresh_idle())});
+                 predicted(row.refresh_idle()), predicted(row.start())});
   return table;
 }
 

@@ -18,6 +18,7 @@ void to_proto(const LoadBudget& from, v1::LoadBudget& to) {
   to.set_utilisation_max(from.utilisation_max);
   set(from.refresh_moving, &v1::LoadBudget::mutable_refresh_moving, to);
   set(from.refresh_idle, &v1::LoadBudget::mutable_refresh_idle, to);
+  set(from.start, &v1::LoadBudget::mutable_start, to);
 }
 
 void to_proto(const StopBudget& from, v1::StopBudget& to) {

@@ -11,6 +11,12 @@ ExchangeResult not_sent(Verdict verdict, TimePoint now) {
   return {.status = ExchangeStatus::not_sent, .verdict = verdict, .request_begin = now, .request_end = now};
 }
 
+/// State twice, canary, block and trigger, and a reading of another axis between them, where all answer at
+/// once: 169 characters and twelve silences.
+Duration usual_start(const LineSettings& settings) {
+  return wire_time(settings, 169) + 12 * silence(settings);
+}
+
 }  // namespace
 
 RtuBus::RtuBus(Executor executor, Clock& clock, LineSettings settings, std::unique_ptr<Line> line)
@@ -19,6 +25,7 @@ RtuBus::RtuBus(Executor executor, Clock& clock, LineSettings settings, std::uniq
       settings_(std::move(settings)),
       line_(std::move(line)),
       port_changed_(executor_, clock),
+      start_turns_(executor_, clock, usual_start(settings_)),
       statistics_(settings_.serial(), clock.now()) {}
 
 RtuBus::~RtuBus() { line_.reset(); }  // it looks at what is armed

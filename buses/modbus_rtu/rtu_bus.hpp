@@ -20,6 +20,7 @@
 #include "buses/modbus_rtu/transaction_queue.hpp"
 #include "buses/modbus_rtu/watch.hpp"
 #include "buses/signal.hpp"
+#include "buses/start_turns.hpp"
 #include "buses/task.hpp"
 
 namespace axisd::modbus_rtu {
@@ -63,6 +64,7 @@ class RtuBus final : public Bus {
   /// Exchanges with serial settings of their own end.
   void about_to_energise() override;
   void hasten(std::uint8_t node, TransactionClass to) override;
+  [[nodiscard]] StartTurns* start_turns() override { return &start_turns_; }
   void give_up_readings(std::uint8_t node) override;
   [[nodiscard]] bool holds_back(std::uint8_t node) const override;
   [[nodiscard]] std::optional<QuarantinedNode> quarantined(std::uint8_t node) const override;
@@ -139,6 +141,7 @@ class RtuBus final : public Bus {
   std::unique_ptr<Line> line_;
   PortStatus port_;
   Signal port_changed_;
+  StartTurns start_turns_;
   TransactionQueue queue_;
   std::vector<TransactionPtr> round_;          ///< armed or under way, in the order of the line
   NodeTable<std::unique_ptr<Watch>> watches_;  ///< null: no more

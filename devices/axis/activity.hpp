@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "buses/clock.hpp"
+#include "buses/start_turns.hpp"
 #include "devices/axis/command.hpp"
 #include "devices/axis/command_book.hpp"
 #include "devices/axis/planner.hpp"
@@ -19,6 +20,7 @@ namespace axisd {
 enum class StartWait : std::uint8_t {
   halt,   ///< the end of the motion before it (M9)
   disk,   ///< its durable record, or that of the position
+  turn,   ///< the starts of other axes on its bus that asked before it
   line,   ///< its frames are with the bus, whose gate decides
   begun,  ///< nothing any more
 };
@@ -38,7 +40,8 @@ struct Activity {
   TimePoint start_by = TimePoint::max();  ///< no start frame goes out later (M31)
   TimePoint waits_since{};                ///< the time from which start_by counts
   StartWait waits_for = StartWait::line;
-  Clock::Timer late{};  ///< at start_by
+  Clock::Timer late{};      ///< at start_by
+  StartTurns::Turn turn{};  ///< of its start; as long as that is being prepared
 };
 using ActivityPtr = std::shared_ptr<Activity>;
 

@@ -77,6 +77,12 @@ bool Axis::busy() const {
   return activity_ || stopping_.running || stop_owed_ || terminal_motion_ || (sample_ && sample_->moving);
 }
 
+bool Axis::works() const {
+  const bool only_waits = activity_ && activity_->waits_for == StartWait::turn && !stopping_.running &&
+                          !stop_owed_ && !terminal_motion_ && !(sample_ && sample_->moving);
+  return busy() && !only_waits;
+}
+
 bool Axis::at_rest() const {
   return !stopping_.running && !stop_owed_ && !(activity_ && activity_->state != AxisState::standstill) &&
          !(sample_ && sample_->moving);

@@ -17,6 +17,7 @@
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
 #include "buses/signal.hpp"
+#include "buses/start_turns.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/activity.hpp"
 #include "devices/axis/axis_environment.hpp"
@@ -218,6 +219,8 @@ class Axis {
   [[nodiscard]] AxisState state() const;
   [[nodiscard]] MotionCause motion_cause() const;
   [[nodiscard]] bool busy() const;
+  /// Busy, and not only because others start first.
+  [[nodiscard]] bool works() const;
   [[nodiscard]] std::int64_t home_offset() const;
   [[nodiscard]] bool has_input(std::string_view function) const;
   /// This offset of the position is that of home, as far as a reading tells (M30).
@@ -306,6 +309,7 @@ class Axis {
   void look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const;
   void look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const;
   void look_at_present_motion(Obstacles& found) const;
+  void look_at_line(Obstacles& found) const;
   void look_at_what_forbids_some(Obstacles& found) const;
   [[nodiscard]] std::string shell(std::string_view command, std::string_view rest = {}) const;
   [[nodiscard]] Error not_trusted(std::string message) const;
@@ -321,6 +325,7 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   bool may_start(Activity& activity);
+  Task<bool> take_turn(ActivityPtr activity, StartTurns::Turn& turn);
 
   // axis_aim.cpp: where a motion starts from, and where it goes (M19)
   Task<Result<void>> look(Duration oldest);
@@ -425,6 +430,7 @@ class Axis {
   TimePoint continuity_checked_{}, drift_checked_{};
   Duration waited_{};  ///< for the line, the longest of the last of what the bus repeats
   Clock::Timer continuity_watch_;
+  TimePoint had_turn_{};  ///< the last time that it was its turn to start
   TimePoint settle_by_{};
   std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon
   TimePoint fast_from_{}, fast_until_{};                  ///< of poll_fast()

@@ -85,6 +85,11 @@ void Axis::Member::wait_for_others(Duration more) {
   axis_->start_by(activity_, activity_->waits_since, latest);
 }
 
+void Axis::Member::waits_for_turn(bool waits) {
+  activity_->waits_for = waits ? StartWait::turn : StartWait::line;
+  if (!waits) axis_->had_turn_ = axis_->env_.clock->now();
+}
+
 void Axis::Member::tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after) {
   all_ = std::move(all);
   not_after_ = not_after;

@@ -57,13 +57,16 @@ Task<> Axis::run_home(ActivityPtr activity) {
     co_return;
   }
   if (!co_await noted(activity, note_of(*activity, {}))) co_return;
-  if (!may_start(*activity)) co_return;
-  lose_trust();
-  const bool homed_before = sample_->homed;
-  const auto base = tracker_.counter();
-  activity->started = false;
+  bool homed_before = false;
+  std::int64_t base = 0;
   Result<void> result;
   {
+    StartTurns::Turn turn;
+    if (!co_await take_turn(activity, turn) || !may_start(*activity)) co_return;
+    lose_trust();
+    homed_before = sample_->homed;
+    base = tracker_.counter();
+    activity->started = false;
     const Chain chain(*this);
     result = co_await drive_->start_homing(**profile, guard(*activity));
   }

@@ -30,6 +30,8 @@ std::string_view to_string(StartWait wait) {
       return "for the motion before it to end";
     case StartWait::disk:
       return "for the disk";
+    case StartWait::turn:
+      return "for its turn on the line";
     default:
       return "for its line";
   }
@@ -70,7 +72,7 @@ void Axis::start_by(const ActivityPtr& activity, TimePoint since, TimePoint late
 
 /// What is with the bus is ended by its gate.
 void Axis::end_late(Activity& activity) {
-  if (activity.waits_for != StartWait::halt && activity.waits_for != StartWait::disk) return;
+  if (activity.waits_for >= StartWait::line) return;
   if (!current(activity)) return;
   revoke_motion();
   auto cause = late(activity, {});

@@ -45,7 +45,10 @@ MotionGuard Axis::guard(const Activity& activity) const {
 
 /// It may be kept by whoever began it; nothing of it comes back to the axis.
 ActivityPtr Axis::take_activity() {
-  if (activity_) activity_->late.reset();
+  if (activity_) {
+    activity_->late.reset();
+    activity_->turn.leave();
+  }
   return std::exchange(activity_, nullptr);
 }
 
@@ -147,6 +150,22 @@ bool Axis::may_start(Activity& activity) {
   return false;
 }
 
+/// Lets others start that asked before, and then nobody else for a while (M6). False: the activity has ended,
+/// and nothing was sent.
+Task<bool> Axis::take_turn(ActivityPtr activity, StartTurns::Turn& turn) {
+  auto* turns = env_.bus->start_turns();
+  if (turns == nullptr) co_return true;
+  const bool may_run = std::exchange(activity->may_run, false);
+  activity->waits_for = StartWait::turn;
+  turn = activity->turn ? std::move(activity->turn) : turns->announce();
+  co_await turns->take(turn);
+  if (!current(*activity)) co_return false;
+  had_turn_ = env_.clock->now();
+  activity->may_run = may_run;
+  activity->waits_for = StartWait::line;
+  co_return true;
+}
+
 /// One positioning motion to the plan's target. False: the activity has ended.
 Task<bool> Axis::positioned(ActivityPtr activity) {
   if (!co_await reach_standstill(activity)) co_return false;
@@ -161,6 +180,8 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   std::int64_t base = 0;
   bool there = false;
   {
+    StartTurns::Turn turn;
+    if (result && !co_await take_turn(activity, turn)) co_return false;
     const Chain chain(*this);
     if (result) result = co_await look(settings_.reboot_guard);
     if (!current(*activity) || !may_start(*activity)) co_return false;
@@ -277,11 +298,13 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
                                 .acceleration_time = activity->plan.acceleration_time,
                                 .deceleration_time = activity->plan.deceleration_time};
   if (!co_await noted(activity, note_of(*activity, drive_->marks_until(profile)))) co_return;
-  if (!may_start(*activity)) co_return;
   Result<void> result;
-  const auto base = tracker_.counter();
+  std::int64_t base = 0;
   {
+    StartTurns::Turn turn;
+    if (!co_await take_turn(activity, turn) || !may_start(*activity)) co_return;
     const Chain chain(*this);
+    base = tracker_.counter();
     result = co_await drive_->start_velocity(profile, guard(*activity));
   }
   const auto since = env_.clock->now();
@@ -302,6 +325,8 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   if (!current(*activity)) co_return false;
   if (result || result.error().outcome == Outcome::unknown) activity->waits_for = StartWait::begun;
   if (result) {
+    // The canary was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.
+    continuity_checked_ = std::max(continuity_checked_, since - 2 * settings_.reboot_guard);
     activity->command->activate();
     publish();
     co_return true;

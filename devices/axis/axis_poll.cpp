@@ -44,7 +44,7 @@ Task<> Axis::poll() {
     if (polling.woken || polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
     co_await look_for_drift();
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
-    const auto canary = busy() ? continuity_checked_ + continuity_latest : canary_latest();
+    const auto canary = works() ? continuity_checked_ + continuity_latest : canary_latest();
     const auto next = std::min(next_poll(asked), canary);
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }
@@ -57,7 +57,7 @@ void Axis::poll_fast(TimePoint from, Duration longest) {
 }
 
 TimePoint Axis::next_poll(TimePoint began) const {
-  if (!busy()) return began + settings_.poll_idle;
+  if (!works()) return began + settings_.poll_idle;
   if (began >= fast_from_ && began < fast_until_) return began + fastest_poll;
   const auto next = began + settings_.poll_moving;
   return began < fast_from_ ? std::min(next, fast_from_) : next;
@@ -77,13 +77,13 @@ Task<bool> Axis::poll_once(Polling& polling) {
   Result<void> result;
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
-  const bool urgent = now >= fast_from_ && now < fast_until_ && busy();
+  const bool urgent = now >= fast_from_ && now < fast_until_ && works();
   const bool asked_in_vain = !urgent && now >= polling.proof_due && continuity_checked_ < polling.proof_due;
-  const bool late = !busy() && now >= canary_latest();
+  const bool late = !works() && now >= canary_latest();
   if (asked_in_vain || late ||
       now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
     result =
-        co_await prove_continuity(busy() ? TransactionClass::moving_state : TransactionClass::idle_state);
+        co_await prove_continuity(works() ? TransactionClass::moving_state : TransactionClass::idle_state);
     if (!result && result.error().reason == Reason::rebooted) {
       on_reboot(result.error());
       co_return false;
@@ -120,7 +120,7 @@ Task<bool> Axis::poll_once(Polling& polling) {
 /// At rest the bus reads the state again and again, and tells what is new. Nothing: the axis was woken
 /// before.
 Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
-  if (busy()) co_return co_await drive_->read_state(TransactionClass::moving_state);
+  if (works()) co_return co_await drive_->read_state(TransactionClass::moving_state);
   if (polling.failures > 0) co_return co_await drive_->read_state(TransactionClass::idle_state);
   StateWatch watch{.period = settings_.poll_idle};
   watch.goes_on = [this, &polling](const DriveSample& sample) {

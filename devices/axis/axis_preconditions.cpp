@@ -227,6 +227,28 @@ void Axis::look_at_present_motion(Obstacles& found) const {
     found.note(error(Reason::busy, "another command is being executed: " + executed, "it ends Aborted"));
 }
 
+/// Its start waits for those of others on its line: one that could not be in time is told so at once (M31).
+/// Who started lately leaves the last third of that time to the others. What was buffered was accepted
+/// before.
+void Axis::look_at_line(Obstacles& found) const {
+  const auto* turns = env_.bus->start_turns();
+  if (turns == nullptr || next_ || found.blocked()) return;
+  const auto wait = turns->expected_wait();
+  const bool lately = env_.clock->now() - had_turn_ < settings_.start_within;
+  const auto most = lately ? settings_.start_within / 2 : settings_.start_within * 3 / 4;
+  const auto in_ms = std::chrono::round<std::chrono::milliseconds>(wait).count();
+  if (wait > most)
+    found.block(error(
+        Reason::busy,
+        fmt::format("the line is full: starts of {} axes wait already, for {} ms", turns->waiting(), in_ms),
+        "repeat it later; fewer axes on the line, a higher baud rate or a longer "
+        "start_within permit more starts"));
+  else if (turns->waiting() > 0)
+    found.note(error(Reason::busy,
+                     fmt::format("starts of {} axes on the line come before it", turns->waiting()),
+                     fmt::format("it waits for about {} ms", in_ms)));
+}
+
 void Axis::look_at_target(const PositionTracker::Target& target, Obstacles& found) const {
   planner_.check_move(target, tracker_, found);
   if (target.counter != tracker_.counter()) look_at_direction(planner_.positive(target, tracker_), found);
@@ -258,6 +280,7 @@ void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options
                       "move away from it, or configure homing: { backoff: ... }"));
   }
   look_at_present_motion(found);
+  look_at_line(found);
 }
 
 /// A rotary axis goes the shorter way round.
@@ -280,6 +303,7 @@ void Axis::look_at(const MoveAbsoluteRequest& request, const CommandOptions& opt
   planner_.check_profile(velocity_of(request.with), request.with, found);
   if (number && !lost) look_at_target(target_of(request, tracker_), found);
   look_at_present_motion(found);
+  look_at_line(found);
 }
 
 void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& options,
@@ -303,6 +327,7 @@ void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& opt
   }
   planner_.check_profile(velocity_of(request.with), request.with, found);
   if (number) look_at_target(tracker_.plan_relative(request.distance), found);
+  look_at_line(found);
 }
 
 void Axis::look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const {
@@ -320,6 +345,7 @@ void Axis::look_at(const MoveVelocityRequest& request, const CommandOptions& opt
   if (request.hold && renews(request, options)) return;
   look_at_velocity(request.velocity, request.with, false, found);
   look_at_present_motion(found);
+  look_at_line(found);
 }
 
 void Axis::look_at(const JogRequest& request, const CommandOptions& options, Obstacles& found) const {
@@ -327,6 +353,7 @@ void Axis::look_at(const JogRequest& request, const CommandOptions& options, Obs
   if (renews(request, options)) return;
   look_at_velocity(request.velocity, request.with, true, found);
   look_at_present_motion(found);
+  look_at_line(found);
 }
 
 void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {

@@ -91,6 +91,10 @@ ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, Axi
                                                   .options = options,
                                                   .plan = std::move(plan)});
   bound_start(activity_, waited, moving || stopping_.running);
+  // A group has one for all its members.
+  auto* turns = env_.bus->start_turns();
+  if (turns != nullptr && state != AxisState::standstill && state != AxisState::synchronized_motion)
+    activity_->turn = turns->announce();
   publish();
   return activity_;
 }

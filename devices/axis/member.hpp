@@ -33,6 +33,10 @@ class Axis::Member {
   void wait_for_others(Duration more);
   /// Nothing goes out any more where one of `all` forbids it, nor after `not_after`.
   void tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after);
+  /// Where its start has to wait for its turn; nullptr: nowhere.
+  [[nodiscard]] StartTurns* start_turns() const { return axis_->env_.bus->start_turns(); }
+  /// Whether it waits there now.
+  void waits_for_turn(bool waits);
   /// Makes room at the drive, and the move known to a restart of the daemon, before anything of it is sent.
   Task<Result<void>> note();
   /// Writes all but the trigger. The axis is not polled from here on until follow() or the end.

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "devices/group/arrival.hpp"
@@ -86,6 +87,7 @@ Task<> GroupRun::run() {
   running_ = true;
   auto failure = co_await prepare();
   if (!failure && !given_up_) failure = co_await start();
+  turns_.clear();
   if (failure) give_up(*failure);
   if (!given_up_)
     for (const auto& member : members_) member->follow();
@@ -123,16 +125,44 @@ GroupRun::Failure GroupRun::attributed(std::size_t member, Error cause) const {
 }
 
 Task<GroupRun::MaybeFailure> GroupRun::prepare() {
-  using Step = Task<Result<void>> (Axis::Member::*)();
-  for (const Step step :
-       {&Axis::Member::note, &Axis::Member::load, &Axis::Member::look, &Axis::Member::verify}) {
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      if (const auto done = co_await ((*members_[i]).*step)(); !done) co_return attributed(i, done.error());
-      if (given_up_) co_return std::nullopt;
-    }
-    if (auto lost = unready()) co_return lost;
-  }
+  if (auto failure = co_await each(&Axis::Member::note); failure || given_up_) co_return failure;
+  co_await take_turns();
+  if (given_up_) co_return std::nullopt;
+  for (const Step step : {&Axis::Member::load, &Axis::Member::look, &Axis::Member::verify})
+    if (auto failure = co_await each(step); failure || given_up_) co_return failure;
   co_return check_arrival();
+}
+
+Task<GroupRun::MaybeFailure> GroupRun::each(Step step) {
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    if (const auto done = co_await ((*members_[i]).*step)(); !done) co_return attributed(i, done.error());
+    if (given_up_) co_return std::nullopt;
+  }
+  co_return unready();
+}
+
+/// Those of all lines at which members start, in the order of the lines' names: no two groups hold what the
+/// other waits for.
+Task<> GroupRun::take_turns() {
+  struct Line {
+    StartTurns* turns;
+    int members = 0;
+  };
+  std::map<std::string, Line> lines;
+  for (const auto& member : members_) {
+    auto* turns = member->start_turns();
+    if (turns == nullptr) continue;
+    ++lines.try_emplace(member->axis().settings().bus, turns).first->second.members;
+    member->waits_for_turn(true);
+  }
+  for (const auto& [name, line] : lines) {
+    auto turn = line.turns->announce(line.members);
+    co_await line.turns->take(turn);
+    turns_.push_back(std::move(turn));
+    if (given_up_) co_return;
+  }
+  for (const auto& member : members_)
+    if (member->start_turns() != nullptr) member->waits_for_turn(false);
 }
 
 /// Once more: where the members really stand decides.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "buses/clock.hpp"
+#include "buses/start_turns.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/member.hpp"
 #include "devices/group/group.hpp"
@@ -58,7 +59,12 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   };
   using MaybeFailure = std::optional<Failure>;
 
+  using Step = Task<Result<void>> (Axis::Member::*)();
+
   Task<MaybeFailure> prepare();
+  /// One step with each member, one after the other.
+  Task<MaybeFailure> each(Step step);
+  Task<> take_turns();
   Task<MaybeFailure> start();
   Task<MaybeFailure> start_by_sync(std::vector<std::size_t> together);
   Task<MaybeFailure> look_after_the_started();
@@ -76,6 +82,7 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   std::vector<CommandPtr> commands_;
   std::vector<bool> by_sync_;
   std::vector<Observer> observers_;
+  std::vector<StartTurns::Turn> turns_;  ///< until all have started
   std::optional<Error> cause_;
   bool given_up_ = false;
   bool running_ = false;
