@@ -5,48 +5,62 @@
 
 namespace axisd {
 
+struct StartTurns::Place {
+  Place(const Executor& executor, Clock& clock, int starts) : starts(starts), changed(executor, clock) {}
+  int starts;
+  State state = State::announced;
+  TimePoint since{};  ///< when it got its turn
+  Signal changed;
+};
+
+StartTurns::Turn::Turn(Turn&& other) noexcept : turns_(other.turns_), place_(std::move(other.place_)) {}
+
 StartTurns::Turn& StartTurns::Turn::operator=(Turn&& other) noexcept {
   if (this == &other) return *this;
   leave();
-  turns_ = std::exchange(other.turns_, nullptr);
-  place_ = other.place_;
+  turns_ = other.turns_;
+  place_ = std::move(other.place_);
   return *this;
 }
 
 void StartTurns::Turn::leave() {
-  if (auto* turns = std::exchange(turns_, nullptr)) turns->leave(place_);
+  if (const auto place = std::exchange(place_, nullptr)) turns_->leave(place);
 }
 
 StartTurns::Turn StartTurns::announce(int starts) {
-  return {*this, places_.emplace(places_.end(), executor_, *clock_, starts)};
+  return {*this, places_.emplace_back(std::make_shared<Place>(executor_, *clock_, starts))};
 }
 
-Task<> StartTurns::take(Turn& turn) {
-  const auto place = turn.place_;
+Task<> StartTurns::take(const Turn& turn) {
+  const auto place = turn.place_;  // it may leave meanwhile
   place->state = State::waiting;
   give_to_next();
   while (place->state == State::waiting) co_await place->changed.wait();
 }
 
-void StartTurns::leave(Places::iterator place) {
-  if (place->state == State::has_turn) {
+void StartTurns::leave(const PlacePtr& place) {
+  const auto before = std::exchange(place->state, State::left);
+  places_.remove(place);
+  place->changed.notify_all();
+  if (before == State::has_turn) {
     constexpr int weight = 8;
     const auto took = (clock_->now() - place->since) / place->starts;
     usual_ += (took - usual_) / weight;
     over_.reset();
   }
-  places_.erase(place);
   give_to_next();
 }
 
 void StartTurns::give_to_next() {
-  if (std::ranges::find(places_, State::has_turn, &Place::state) != places_.end()) return;
-  const auto next = std::ranges::find(places_, State::waiting, &Place::state);
-  if (next == places_.end()) return;
+  const auto first_of = [this](State state) { return std::ranges::find(places_, state, &Place::state); };
+  if (first_of(State::has_turn) != places_.end()) return;
+  const auto waiting = first_of(State::waiting);
+  if (waiting == places_.end()) return;
+  const auto& next = *waiting;
   next->state = State::has_turn;
   next->since = clock_->now();
-  over_ = clock_->call_at(next->since + longest_start * next->starts, [this, next] {
-    next->state = State::overstayed;
+  over_ = clock_->call_at(next->since + longest_start * next->starts, [this, overdue = next] {
+    overdue->state = State::overstayed;
     give_to_next();
   });
   next->changed.notify_all();
@@ -59,7 +73,7 @@ std::size_t StartTurns::waiting() const {
 Duration StartTurns::expected_wait() const {
   int before = 0;
   for (const auto& place : places_)
-    if (place.state != State::overstayed) before += place.starts;
+    if (place->state != State::overstayed) before += place->starts;
   return usual_ * before;
 }
 

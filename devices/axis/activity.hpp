@@ -41,7 +41,7 @@ struct Activity {
   TimePoint waits_since{};                ///< the time from which start_by counts
   StartWait waits_for = StartWait::line;
   Clock::Timer late{};      ///< at start_by
-  StartTurns::Turn turn{};  ///< of its start; as long as that is being prepared
+  StartTurns::Turn turn{};  ///< of its start, until that was sent
 };
 using ActivityPtr = std::shared_ptr<Activity>;
 

@@ -17,7 +17,6 @@
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
 #include "buses/signal.hpp"
-#include "buses/start_turns.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/activity.hpp"
 #include "devices/axis/axis_environment.hpp"
@@ -325,7 +324,7 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   bool may_start(Activity& activity);
-  Task<bool> take_turn(ActivityPtr activity, StartTurns::Turn& turn);
+  Task<bool> take_turn(ActivityPtr activity);
 
   // axis_aim.cpp: where a motion starts from, and where it goes (M19)
   Task<Result<void>> look(Duration oldest);

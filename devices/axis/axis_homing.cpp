@@ -61,8 +61,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
   std::int64_t base = 0;
   Result<void> result;
   {
-    StartTurns::Turn turn;
-    if (!co_await take_turn(activity, turn) || !may_start(*activity)) co_return;
+    if (!co_await take_turn(activity) || !may_start(*activity)) co_return;
     lose_trust();
     homed_before = sample_->homed;
     base = tracker_.counter();
@@ -70,6 +69,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
     const Chain chain(*this);
     result = co_await drive_->start_homing(**profile, guard(*activity));
   }
+  activity->turn.leave();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   if (!co_await follow_homing(activity, since, homed_before)) co_return;

@@ -150,15 +150,15 @@ bool Axis::may_start(Activity& activity) {
   return false;
 }
 
-/// Lets others start that asked before, and then nobody else for a while (M6). False: the activity has ended,
-/// and nothing was sent.
-Task<bool> Axis::take_turn(ActivityPtr activity, StartTurns::Turn& turn) {
+/// Lets others start that asked before; then nobody else does until the turn is left (M6). False: the
+/// activity has ended, and nothing was sent.
+Task<bool> Axis::take_turn(ActivityPtr activity) {
   auto* turns = env_.bus->start_turns();
   if (turns == nullptr) co_return true;
   const bool may_run = std::exchange(activity->may_run, false);
   activity->waits_for = StartWait::turn;
-  turn = activity->turn ? std::move(activity->turn) : turns->announce();
-  co_await turns->take(turn);
+  if (!activity->turn) activity->turn = turns->announce();
+  co_await turns->take(activity->turn);
   if (!current(*activity)) co_return false;
   had_turn_ = env_.clock->now();
   activity->may_run = may_run;
@@ -180,8 +180,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   std::int64_t base = 0;
   bool there = false;
   {
-    StartTurns::Turn turn;
-    if (result && !co_await take_turn(activity, turn)) co_return false;
+    if (result && !co_await take_turn(activity)) co_return false;
     const Chain chain(*this);
     if (result) result = co_await look(settings_.reboot_guard);
     if (!current(*activity) || !may_start(*activity)) co_return false;
@@ -202,6 +201,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
       if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
     }
   }
+  activity->turn.leave();
   const auto since = env_.clock->now();
   if (there) {  // nothing to do, and nothing is sent
     activity->command->activate();
@@ -301,12 +301,12 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
   Result<void> result;
   std::int64_t base = 0;
   {
-    StartTurns::Turn turn;
-    if (!co_await take_turn(activity, turn) || !may_start(*activity)) co_return;
+    if (!co_await take_turn(activity) || !may_start(*activity)) co_return;
     const Chain chain(*this);
     base = tracker_.counter();
     result = co_await drive_->start_velocity(profile, guard(*activity));
   }
+  activity->turn.leave();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   co_await follow(activity, base, since);

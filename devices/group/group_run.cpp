@@ -156,9 +156,8 @@ Task<> GroupRun::take_turns() {
     member->waits_for_turn(true);
   }
   for (const auto& [name, line] : lines) {
-    auto turn = line.turns->announce(line.members);
-    co_await line.turns->take(turn);
-    turns_.push_back(std::move(turn));
+    turns_.push_back(line.turns->announce(line.members));
+    co_await line.turns->take(turns_.back());
     if (given_up_) co_return;
   }
   for (const auto& member : members_)
@@ -267,6 +266,7 @@ std::size_t GroupRun::member_at(const Address& where, const std::vector<std::siz
 /// Those that may move first, and at once: all of these stops are queued before anything else happens.
 void GroupRun::give_up(const Failure& failure) {
   if (std::exchange(given_up_, true)) return;
+  turns_.clear();
   const std::string axis(axis_of(commands_[failure.member]));
   if (std::ranges::any_of(commands_, [](const auto& command) { return !command->has_ended(); }))
     spdlog::warn("group move {} ends: {}", parts_.id, to_string(failure.cause));

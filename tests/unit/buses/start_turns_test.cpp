@@ -91,6 +91,28 @@ TEST_F(StartTurnsTest, WhatIsAnnouncedIsExpectedAndKeepsNobodyWaiting) {
   EXPECT_EQ(turns.expected_wait(), 0ms);
 }
 
+/// A stop came: it neither waits on, nor counts as a short start.
+TEST_F(StartTurnsTest, WhoLeavesWaitsNoLonger) {
+  start('a', 100ms);
+  auto given_up = turns.announce();
+  bool returned = false;
+  auto sequence = [](StartTurnsTest& test, const StartTurns::Turn& turn, bool& done) -> Task<> {
+    co_await test.turns.take(turn);
+    done = true;
+  };
+  spawn(world.executor(), sequence(*this, given_up, returned), "start");
+  start('c', 10ms);
+  world.run_for(10ms);
+  EXPECT_FALSE(returned);
+  given_up.leave();
+  world.run_for(0ms);
+  EXPECT_TRUE(returned);
+  EXPECT_EQ(turns.waiting(), 1U);
+  EXPECT_EQ(turns.expected_wait(), 20ms);
+  world.run_for(1s);
+  EXPECT_EQ(began, (std::vector<Duration>{0ms, 100ms}));
+}
+
 TEST_F(StartTurnsTest, WhoOverstaysIsNotWaitedForTwice) {
   start('a', 1s);
   world.run_for(600ms);
