@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "tests/rules/m22_group_rig.hpp"
 #include "tests/rules/shared_line.hpp"
 #include "tests/support/rig.hpp"
 
@@ -113,6 +114,9 @@ TEST_P(FullLine, NoChainIsTriedTwiceAndNoCommandExpires) {
   for (int i = 0; i < axes; ++i)
     EXPECT_NEAR(indexing.done_of(static_cast<std::size_t>(i)), share, 1 + share / 10);
   if (baud == 115200) EXPECT_EQ(indexing.refused, 0);
+  fmt::print("{} axes at {} bit/s: {:.1f} moves a second, {:.2f} exchanges a move\n", axes, baud,
+             indexing.all_done() / 20.0,
+             static_cast<double>(indexing.line.line->wire().size()) / indexing.all_done());
   const auto budgets = indexing.line.machine().budgets();
   EXPECT_LE(indexing.longest_wait, budgets.front().predicted.load.at(static_cast<std::size_t>(axes)).start);
 }
@@ -125,6 +129,44 @@ TEST(M06, ALineThatIsTooFullRefusesAtOnce) {
   EXPECT_GT(indexing.refused, 0);
   EXPECT_GT(indexing.all_done(), 150);
   for (std::size_t i = 0; i < 30; ++i) EXPECT_GT(indexing.done_of(i), 2) << i;
+}
+
+/// What starts between two of its members would make them start further apart.
+TEST(M06, AGroupHasOneTurnForAllItsMembers) {
+  const std::vector<std::string> others = {"e", "f", "g", "h"};
+  const std::map<std::string, double> there = {{"a", 1}, {"b", 1}, {"c", 1}, {"d", 1}},
+                                      back = {{"a", 0}, {"b", 0}, {"c", 0}, {"d", 0}};
+  const auto in_group = [](const WireEntry& one) { return one.node() >= 11 && one.node() <= 14; };
+  const auto loads = [](const WireEntry& one) { return one.is_write() && one.address() == block; };
+  GroupRig rig({.can_axes = 0, .more_serial_axes = 8});
+  std::map<std::string, CommandPtr> moves;
+  const auto index = [&] {
+    for (const auto& name : others) {
+      auto& command = moves[name];
+      if (command && !command->has_ended()) continue;
+      if (command) EXPECT_EQ(command->value().state, CommandState::done) << describe(command->value());
+      const auto away = rig.load_mm(name) < 0.3;
+      command = *rig.machine->submit(name, MoveAbsoluteRequest{.position = away ? 0.4 : 0.2}, {});
+    }
+  };
+  for (int round = 0; round < 10; ++round) {
+    rig.line->forget_wire();
+    const auto run = rig.move(GroupRig::to(round % 2 == 0 ? there : back));
+    while (!ended(run->state())) {
+      index();
+      rig.run(1ms);
+    }
+    ASSERT_EQ(run->state(), CommandState::done);
+    const auto& wire = rig.line->wire();
+    const auto first =
+        std::ranges::find_if(wire, [&](const auto& one) { return in_group(one) && loads(one); });
+    const auto last = std::find_if(wire.rbegin(), wire.rend(), [&](const auto& one) {
+                        return in_group(one) && one.is_write() && one.address() == trigger;
+                      }).base();
+    EXPECT_EQ(std::count_if(first, last, [&](const auto& one) { return in_group(one) && loads(one); }), 4);
+    EXPECT_EQ(std::count_if(first, last, [&](const auto& one) { return !in_group(one) && loads(one); }), 0);
+    EXPECT_GT(std::ranges::count_if(wire, [&](const auto& one) { return !in_group(one) && loads(one); }), 4);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(M06, FullLine,

@@ -304,13 +304,13 @@ TEST_F(Calls, BudgetsOfAllBusesOrOfOne) {
   v1::GetBudgetResponse all, one;
   EXPECT_TRUE(buses->GetBudget(&c1, request, &all).ok());
   ASSERT_EQ(all.budgets_size(), 1);
-  EXPECT_EQ(
-      all.budgets(0).ShortDebugString(),
-      "bus: \"line-a\" load { utilisation: 0.25 utilisation_max: 0.5 refresh_idle { nanos: 300000000 } } "
-      "stops { axes: 1 last_frame { nanos: 28000000 } standstill { nanos: 120000000 } } "
-      "axes { axis: \"feeder\" stop_alone { } stop_all { } deceleration_time { nanos: 150000000 } "
-      "way_alone: 10.5 unit: \"mm\" observed { stop_frame { nanos: 7000000 } } } "
-      "excess { key: \"stop_bound\" message: \"too late\" remedy: \"raise it\" } notes: \"a note\"");
+  EXPECT_EQ(all.budgets(0).ShortDebugString(),
+            "bus: \"line-a\" load { utilisation: 0.25 utilisation_max: 0.5 refresh_idle { nanos: 300000000 } "
+            "start { nanos: 80000000 } } "
+            "stops { axes: 1 last_frame { nanos: 28000000 } standstill { nanos: 120000000 } } "
+            "axes { axis: \"feeder\" stop_alone { } stop_all { } deceleration_time { nanos: 150000000 } "
+            "way_alone: 10.5 unit: \"mm\" observed { stop_frame { nanos: 7000000 } } } "
+            "excess { key: \"stop_bound\" message: \"too late\" remedy: \"raise it\" } notes: \"a note\"");
   request.set_bus("line-a");
   EXPECT_TRUE(buses->GetBudget(&c2, request, &one).ok());
   EXPECT_EQ(one.budgets_size(), 1);

@@ -239,7 +239,8 @@ void FakeMachine::budgets(std::function<void(std::vector<BusBudgetReport>)> call
   BusBudgetReport report;
   report.predicted = {
       .bus = "line-a",
-      .load = {{.moving = 0, .utilisation = 0.25, .utilisation_max = 0.5, .refresh_idle = 300ms}},
+      .load =
+          {{.moving = 0, .utilisation = 0.25, .utilisation_max = 0.5, .refresh_idle = 300ms, .start = 80ms}},
       .stops = {{.axes = 1, .last_frame = 28ms, .standstill = 120ms}},
       .notes = {"a note"}};
   report.axes.push_back({.predicted = {.axis = "feeder", .refresh_moving_all = Duration::max()},

@@ -43,6 +43,13 @@ TEST(BudgetView, SaysWhereRowsAreLeftOut) {
   EXPECT_THAT(budget_text(line_with(0), {}, false), Not(HasSubstr(note)));
 }
 
+TEST(BudgetView, SaysHowLongTheLastOfSeveralStartsWaits) {
+  auto budget = line_with(2);
+  *budget.mutable_load(2)->mutable_start() = TimeUtil::MillisecondsToDuration(80);
+  EXPECT_THAT(budget_text(budget, {}, false),
+              AllOf(ContainsRegex("MOVING .* START\n"), ContainsRegex("\n +2 .* 80.0 ms\n")));
+}
+
 TEST(BudgetView, GroupsHaveWhatTheirAxesOnTheBusHave) {
   v1::ListGroupsResponse groups;
   const auto add = [&](const char* name, std::initializer_list<const char*> axes) {
