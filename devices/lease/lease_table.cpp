@@ -10,7 +10,7 @@ namespace axisd {
 namespace {
 
 /// Ended leases whose late holders are told what became of them.
-constexpr std::size_t remembered = 256;
+constexpr std::size_t ended_remembered = 256;
 /// Of a token: the rest is the epoch. Clients that count in doubles keep both exact for 2^21 starts.
 constexpr int counter_bits = 32;
 
@@ -133,7 +133,7 @@ EndedLease LeaseTable::end(Leases::iterator lease, LeaseEnd how, std::string by,
   leases_.erase(lease);
   for (const auto& axis : over.lease.axes) by_axis_.erase(axis);
   ended_.push_back(over);
-  if (ended_.size() > remembered) ended_.pop_front();
+  if (ended_.size() > ended_remembered) ended_.pop_front();
   return over;
 }
 

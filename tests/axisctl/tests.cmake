@@ -1,7 +1,7 @@
 # axisctl and the Python client need gRPC on both sides.
 if(AXISD_GRPC)
   file(GLOB sources CONFIGURE_DEPENDS unit/axisctl/*.cpp)
-  axisd_test(test_axisctl SOURCES ${sources} LINK axisctl_commands)
+  axisd_test(test_axisctl SOURCES ${sources} PRECOMPILED axisctl LINK axisctl_commands)
 
   # Debian's interpreter: python3-grpcio is a package of that one only.
   find_program(AXISD_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)

@@ -1,0 +1,5 @@
+// Of every test.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
