@@ -16,6 +16,8 @@ namespace {
 
 /// 0x011F and 204Fh by default; in pulses, as the encoders of these drives are no coarser than their pulses.
 constexpr std::int64_t in_position_window = 10;
+/// That a reading of their encoders is off, in pulses: a shaft within the window may be further away by it.
+constexpr int largest_noise = 2;
 
 /// A terminal that releases the motor is no more than the daemon can see where the position is measured: in
 /// open loop nothing tells what the load did meanwhile.
@@ -102,7 +104,7 @@ AxisSettings make_axis(Station& station, Dice& dice) {
   station.wired = choose_wired(station, dice);
   assign_inputs(station, axis);
   station.track = {.pulses_per_unit = station.invert ? -pulses_per_mm : pulses_per_mm,
-                   .slack = station.closed_loop() ? 1 + in_position_window : 1,
+                   .slack = station.closed_loop() ? 1 + in_position_window + largest_noise : 1,
                    .minimum = axis.limits.position_minimum,
                    .maximum = axis.limits.position_maximum,
                    .jog_travel = axis.jog_travel,
@@ -118,7 +120,7 @@ simulation::SimulatedNodeSettings make_drive(const Station& station, Dice& dice)
   settings.mechanics.positive_limit_from = at(150);
   settings.mechanics.negative_limit_from = at(-150);
   if (station.closed_loop())
-    settings.encoder = {.noise = dice.pick(3),
+    settings.encoder = {.noise = dice.pick(largest_noise + 1),
                         .following = dice.up_to(5ms),
                         .quantised = dice.chance(0.5),
                         .compliance = dice.pick(6)};
