@@ -27,6 +27,11 @@ void StartTurns::Turn::leave() {
   if (const auto place = std::exchange(place_, nullptr)) turns_->leave(place);
 }
 
+void StartTurns::Turn::done() {
+  if (place_) turns_->learn(*place_);
+  leave();
+}
+
 StartTurns::Turn StartTurns::announce(int starts) {
   return {*this, places_.emplace_back(std::make_shared<Place>(executor_, *clock_, starts))};
 }
@@ -42,13 +47,14 @@ void StartTurns::leave(const PlacePtr& place) {
   const auto before = std::exchange(place->state, State::left);
   places_.remove(place);
   place->changed.notify_all();
-  if (before == State::has_turn) {
-    constexpr int weight = 8;
-    const auto took = (clock_->now() - place->since) / place->starts;
-    usual_ += (took - usual_) / weight;
-    over_.reset();
-  }
+  if (before == State::has_turn) over_.reset();
   give_to_next();
+}
+
+void StartTurns::learn(const Place& place) {
+  constexpr int weight = 8;
+  if (place.state != State::has_turn && place.state != State::overstayed) return;
+  usual_ += ((clock_->now() - place.since) / place.starts - usual_) / weight;
 }
 
 void StartTurns::give_to_next() {

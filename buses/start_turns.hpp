@@ -37,6 +37,8 @@ class StartTurns {
     Turn& operator=(Turn&& other) noexcept;
     /// The next one's turn begins; a take() that still waits returns.
     void leave();
+    /// Leaves; and its starts were sent, so that how long they took tells of the next ones.
+    void done();
     /// It was announced, and not left.
     explicit operator bool() const { return place_ != nullptr; }
 
@@ -64,13 +66,14 @@ class StartTurns {
   enum class State : std::uint8_t { announced, waiting, has_turn, overstayed, left };
 
   void leave(const PlacePtr& place);
+  void learn(const Place& place);
   void give_to_next();
 
   Executor executor_;
   Clock* clock_;
   std::list<PlacePtr> places_;  ///< in the order in which they were announced; none has left
   Clock::Timer over_;
-  Duration usual_;  ///< of a start: a mean of the last
+  Duration usual_;  ///< of a start: a mean of the last that were sent
 };
 
 }  // namespace axisd

@@ -78,10 +78,12 @@ bool Axis::busy() const {
 }
 
 bool Axis::works() const {
-  const bool only_waits = activity_ && activity_->waits_for == StartWait::turn && !stopping_.running &&
-                          !stop_owed_ && !terminal_motion_ && !(sample_ && sample_->moving);
+  const bool only_waits =
+      queues() && !stopping_.running && !stop_owed_ && !terminal_motion_ && !(sample_ && sample_->moving);
   return busy() && !only_waits;
 }
+
+bool Axis::queues() const { return activity_ && activity_->waits_for == StartWait::turn; }
 
 bool Axis::at_rest() const {
   return !stopping_.running && !stop_owed_ && !(activity_ && activity_->state != AxisState::standstill) &&
@@ -169,7 +171,7 @@ void Axis::on_sample(const DriveSample& sample) {
   if (terminal_motion_ && !sample.moving) {
     terminal_motion_ = false;
   }
-  if (sample.moving && !activity_ && !stopping_.running && link_ == LinkState::online)
+  if (sample.moving && (!activity_ || queues()) && !stopping_.running && link_ == LinkState::online)
     on_unexplained_motion(sample, before);
   release_as_owed();
   publish();
@@ -257,6 +259,7 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
     return;
   }
   spdlog::warn("{}: moving without a command; stopping it", settings_.name);
+  if (queues()) supersede(moved_before_start());
   begin_stop(StopKind::stop, nullptr);
 }
 

@@ -220,6 +220,8 @@ class Axis {
   [[nodiscard]] bool busy() const;
   /// Busy, and not only because others start first.
   [[nodiscard]] bool works() const;
+  /// Its start waits for those of others: its drive rests until then.
+  [[nodiscard]] bool queues() const;
   [[nodiscard]] std::int64_t home_offset() const;
   [[nodiscard]] bool has_input(std::string_view function) const;
   /// This offset of the position is that of home, as far as a reading tells (M30).
@@ -324,6 +326,7 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   bool may_start(Activity& activity);
+  [[nodiscard]] Error moved_before_start() const;
   Task<bool> take_turn(ActivityPtr activity);
 
   // axis_aim.cpp: where a motion starts from, and where it goes (M19)
@@ -384,6 +387,7 @@ class Axis {
   Task<bool> back_off(ActivityPtr activity);
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
   [[nodiscard]] std::string_view homing_switch() const;
+  [[nodiscard]] Error reached_switch() const;
   [[nodiscard]] std::int64_t counter_at_home() const;
 
   // axis_lease.cpp: lease_lost() and what stands beside it

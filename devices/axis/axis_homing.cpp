@@ -61,15 +61,20 @@ Task<> Axis::run_home(ActivityPtr activity) {
   std::int64_t base = 0;
   Result<void> result;
   {
-    if (!co_await take_turn(activity) || !may_start(*activity)) co_return;
-    lose_trust();
-    homed_before = sample_->homed;
-    base = tracker_.counter();
-    activity->started = false;
+    if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
-    result = co_await drive_->start_homing(**profile, guard(*activity));
+    result = co_await look(settings_.reboot_guard);
+    if (!current(*activity) || !may_start(*activity)) co_return;
+    if (result && input_active(homing_switch())) result = axisd::fail(reached_switch());
+    if (result) {
+      lose_trust();
+      homed_before = sample_->homed;
+      base = tracker_.counter();
+      activity->started = false;
+      result = co_await drive_->start_homing(**profile, guard(*activity));
+    }
   }
-  activity->turn.leave();
+  activity->turn.done();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   if (!co_await follow_homing(activity, since, homed_before)) co_return;
@@ -87,6 +92,15 @@ Task<> Axis::run_home(ActivityPtr activity) {
   }
   tracker_.declare(offset, PositionTrust::homed);
   finish(*activity, [](CommandRecord& command) { command.done(); });
+}
+
+/// The drive would search for an edge that is behind it.
+Error Axis::reached_switch() const {
+  auto cause = error(Reason::limit_switch,
+                     fmt::format("the {} switch became active before homing could start", homing_switch()),
+                     "home again: it is left first then");
+  cause.outcome = Outcome::not_executed;
+  return cause;
 }
 
 /// Where the drive put its counter at home: a measured one only wavers about it. Which of the two it is after

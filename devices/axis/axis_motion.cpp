@@ -135,14 +135,18 @@ Task<> Axis::run_move(ActivityPtr activity) {
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
 
+Error Axis::moved_before_start() const {
+  return error(Reason::moving, "the drive began to move before the start",
+               "check its terminals, and other masters on the bus");
+}
+
 /// What was true at its acceptance, or before the disk was waited for, may have changed. False: the activity
 /// has ended, and nothing was sent.
 bool Axis::may_start(Activity& activity) {
   auto cause = error(Reason::not_trusted, "the position was lost before the move could start",
                      "home the axis, or set its position");
   if (found_in_motion())
-    cause = error(Reason::moving, "the drive began to move before the start",
-                  "check its terminals, and other masters on the bus");
+    cause = moved_before_start();
   else if (!activity.plan.trusted || tracker_.trust() != PositionTrust::unknown)
     return true;
   tell_part(activity, cause);
@@ -201,7 +205,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
       if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
     }
   }
-  activity->turn.leave();
+  there ? activity->turn.leave() : activity->turn.done();
   const auto since = env_.clock->now();
   if (there) {  // nothing to do, and nothing is sent
     activity->command->activate();
@@ -301,12 +305,14 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
   Result<void> result;
   std::int64_t base = 0;
   {
-    if (!co_await take_turn(activity) || !may_start(*activity)) co_return;
+    if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
+    result = co_await look(settings_.reboot_guard);
+    if (!current(*activity) || !may_start(*activity)) co_return;
     base = tracker_.counter();
-    result = co_await drive_->start_velocity(profile, guard(*activity));
+    if (result) result = co_await drive_->start_velocity(profile, guard(*activity));
   }
-  activity->turn.leave();
+  activity->turn.done();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   co_await follow(activity, base, since);

@@ -87,6 +87,8 @@ Task<> GroupRun::run() {
   running_ = true;
   auto failure = co_await prepare();
   if (!failure && !given_up_) failure = co_await start();
+  // On several lines it waited for one while it had the turn on another.
+  if (!failure && turns_.size() == 1) turns_.front().done();
   turns_.clear();
   if (failure) give_up(*failure);
   if (!given_up_)
@@ -155,9 +157,11 @@ Task<> GroupRun::take_turns() {
     ++lines.try_emplace(member->axis().settings().bus, turns).first->second.members;
     member->waits_for_turn(true);
   }
+  // Its places on all lines at once: nobody who asks later passes it while it waits for another line.
+  for (const auto& [name, line] : lines) turns_.push_back(line.turns->announce(line.members));
+  auto turn = turns_.begin();
   for (const auto& [name, line] : lines) {
-    turns_.push_back(line.turns->announce(line.members));
-    co_await line.turns->take(turns_.back());
+    co_await line.turns->take(*turn++);
     if (given_up_) co_return;
   }
   for (const auto& member : members_)

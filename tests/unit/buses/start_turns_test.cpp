@@ -23,6 +23,7 @@ class StartTurnsTest : public ::testing::Test {
       test.order += who;
       test.began.push_back(test.world.now() - test.begun);
       co_await sleep_until(test.world.executor(), test.world.clock(), test.world.now() + time);
+      turn.done();
     };
     spawn(world.executor(), sequence(*this, name, takes, starts), "start");
   }
@@ -111,6 +112,22 @@ TEST_F(StartTurnsTest, WhoLeavesWaitsNoLonger) {
   EXPECT_EQ(turns.expected_wait(), 20ms);
   world.run_for(1s);
   EXPECT_EQ(began, (std::vector<Duration>{0ms, 100ms}));
+}
+
+/// A StopAll takes all of them from the queue, and each has its turn for a moment.
+TEST_F(StartTurnsTest, StartsThatWereGivenUpTellNothing) {
+  std::vector<StartTurns::Turn> given_up;
+  given_up.reserve(16);
+  for (int i = 0; i < 16; ++i) {
+    given_up.push_back(turns.announce());
+    spawn(world.executor(), turns.take(given_up.back()), "start");
+  }
+  world.run_for(0ms);
+  given_up.clear();
+  start('a', 10ms);
+  start('b', 10ms);
+  world.run_for(0ms);
+  EXPECT_EQ(turns.expected_wait(), 20ms);
 }
 
 TEST_F(StartTurnsTest, WhoOverstaysIsNotWaitedForTwice) {
