@@ -59,7 +59,7 @@ TEST(M15, StopAllServesWhatMovesFirstAndWhatIsSilentLast) {
 }
 
 /// A cabinet has lost its supply: what its drives cost is in the published bounds, and nobody else waits for
-/// those of whom it is known.
+/// those of whom it is known (M33).
 class StopAllWithSilentDrives : public testing::TestWithParam<std::tuple<int, int, bool>> {};
 
 TEST_P(StopAllWithSilentDrives, KeepsWhatIsPublished) {

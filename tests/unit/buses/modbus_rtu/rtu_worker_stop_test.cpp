@@ -167,7 +167,7 @@ TEST(RtuWorkerStop, TheEchoOfAStopThatGoesFirstIsNoReply) {
   EXPECT_EQ(line.result.status, ExchangeStatus::timeout);
 }
 
-/// An adapter that echoes no more is asked again, and that takes 0.1 s without an answer.
+/// An adapter that echoes no more is asked again, and that takes 0.1 s without an answer (M33).
 TEST(RtuWorkerStop, AStopEndsTheWaitForAnEcho) {
   std::atomic<bool> echoing = false;
   const ScriptedNode node([&](ScriptedNode& self, const Bytes& request) {
