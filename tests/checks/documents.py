@@ -1,5 +1,6 @@
 """What the documents promise: each rule of motion that is cited has a heading in docs/rules.md, each rule there has a
-test that cites it, and each path (in docs/rules.md also each name behind it) that a document cites is in the tree."""
+test that cites it, and each path that a document cites is in the tree. In rules and glossary, so is each name beside
+a path."""
 
 import fnmatch
 import re
@@ -9,6 +10,7 @@ from pathlib import Path
 import tree
 
 RULES = "docs/rules.md"
+GLOSSARY = "docs/glossary.md"
 HEADING = re.compile(r"^## M(\d{1,2}) \S", re.MULTILINE)
 # "M14", "M06" and "M22Group" are citations; "M90.0 292.2" is a path of a picture.
 CITATION = re.compile(r"(?<![\w'\"/.+-])M0?([1-9]\d?)(?![\da-z])(?!\.\d)")
@@ -20,8 +22,8 @@ THIS_CHECK = {"tests/checks/documents.py", "tests/checks/test_checks.py"}
 QUOTED = re.compile(r"`([^`\n]+)`")
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)]*)?\)")
 NAME = re.compile(r"[A-Za-z_]\w*")
-# Part of a path that stands for any: MODEL, NAME.
-PLACEHOLDER = re.compile(r"\b[A-Z][A-Z_]+\b(?!\.)")
+# Part of a path that stands for any.
+PLACEHOLDER = re.compile(r"(?<![A-Za-z])(MODEL|NAME|SERVICE|SUBJECT)(?![A-Za-z])")
 
 
 def line_of(text, position):
@@ -135,8 +137,8 @@ def findings(root):
     for name, text in texts.items():
         if is_document(Path(name)):
             found += path_findings(name, text, known)
-    if RULES in texts:
-        found += name_findings(RULES, texts[RULES], known, texts)
+            if name in (RULES, GLOSSARY):
+                found += name_findings(name, text, known, texts)
     return found
 
 

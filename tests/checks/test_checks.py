@@ -6,6 +6,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import documents
 import layering
 import texts
 
@@ -28,6 +29,11 @@ GOOD = {
     "tests/unit/buses/queue_test.cpp": '#include "anything/at/all.hpp"\n',
     "README.md": "A stop, a halt and a quick stop. Timestops and estopple are words. See /workshop and ../work/x.\n",
     "deploy/run.sh": "mktemp -d name.XXXXXX\n",
+    "docs/rules.md": "## M1 Nothing by itself\n\nEnforced:\n\n- `devices/m1/drive.cpp`,\n  `buses/`: `include`\n\n"
+                     "## M14 Stop\n",
+    "CONTRIBUTING.md": "`devices/MODEL/drive.cpp`, `devices/*/simulator.cpp`, `buses/`, `mm/s`, `build/dev/x`,\n"
+                       "[rules](docs/rules.md#m14-stop), [elsewhere](https://example.org/x).\n",
+    "tests/rules/m01_test.cpp": "TEST(M01, NothingByItself) {}\nTEST(M14Holds, Each) {}  // a line: d='M90.0 1L2'\n",
 }
 
 BAD_INCLUDES = {  # path -> (text, what the finding says)
@@ -90,6 +96,22 @@ BAD_TEXTS = {
     "long.cpp": ("x\n" * 601, "601 lines"),
 }
 
+BAD_DOCUMENTS = {  # path -> (text, what the finding says)
+    "devices/m1/a.cpp": ("/// M2: whoever wrote this knows.", "M2 has no heading"),
+    "tests/rules/b_test.cpp": ("TEST(M03Late, Never) {}", "M3 has no heading"),
+    "docs/c.md": ("As M33 says.", "M33 has no heading"),
+    "docs/d.md": ("See `devices/m1/gone.cpp`.", "there is no devices/m1/gone.cpp"),
+    "docs/e.md": ("See `devices/MODEL/gone.cpp`.", "there is no devices/MODEL/gone.cpp"),
+    "docs/f.md": ("See `devices/*.cpp` first.", "there is no devices/*.cpp"),
+    "docs/g.md": ("See [the rules](../rules.md).", "there is no ../rules.md"),
+}
+
+BAD_RULES = {  # docs/rules.md -> what the finding says
+    "## M1 Nothing\n## M14 Stop\n## M15 Bounds\n": "M15 is cited by no test",
+    "## M1 Nothing\n## M14 Stop\n## M14 Stop\n": "M14 has two headings",
+    "## M1 Nothing\n## M14 Stop\n\n- `devices/m1/drive.cpp`:\n  `gone`\n": "gone is in none of the files",
+}
+
 
 def make_tree(folder, files):
     for name, text in files.items():
@@ -108,6 +130,7 @@ class Checks(unittest.TestCase):
     def test_a_good_tree_passes(self):
         self.assertEqual(layering.findings(self.root), [])
         self.assertEqual(texts.findings(self.root), ([], []))
+        self.assertEqual(documents.findings(self.root), [])
 
     def expect_only(self, found, expected):
         """Each bad file has one finding, which says why; no other file has any."""
@@ -128,6 +151,20 @@ class Checks(unittest.TestCase):
         failures, warnings = texts.findings(self.root)
         self.expect_only(failures, {name: why for name, (_, why) in BAD_TEXTS.items()})
         self.assertEqual(warnings, [])
+
+    def test_what_documents_do_not_keep_is_found(self):
+        make_tree(self.root, {name: text for name, (text, _) in BAD_DOCUMENTS.items()})
+        self.expect_only(documents.findings(self.root), {name: why for name, (_, why) in BAD_DOCUMENTS.items()})
+
+    def test_each_fault_of_the_rules_is_found(self):
+        for rules, why in BAD_RULES.items():
+            make_tree(self.root, {"docs/rules.md": rules})
+            self.expect_only(documents.findings(self.root), {"docs/rules.md": why})
+
+    def test_a_tree_without_rules_fails(self):
+        (self.root / "docs/rules.md").unlink()
+        found = documents.findings(self.root)
+        self.assertTrue(any("M14 has no heading" in line for line in found), found)
 
     def test_long_files_are_warned_of(self):
         make_tree(self.root, {"longish.cpp": "x\n" * 401})
