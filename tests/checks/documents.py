@@ -32,7 +32,7 @@ def line_of(text, position):
 
 def is_document(path):
     name = path.as_posix()
-    return name == "CONTRIBUTING.md" or (name.startswith("docs/") and path.suffix == ".md")
+    return name in ("README.md", "CONTRIBUTING.md") or (name.startswith("docs/") and path.suffix == ".md")
 
 
 class Tree:
