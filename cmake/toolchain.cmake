@@ -1,7 +1,10 @@
 # Compiler settings for every target.
 find_program(AXISD_CCACHE ccache)
 if(AXISD_CCACHE)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_SOURCE_DIR}/cmake/ccache.sh ${AXISD_CCACHE} ${CMAKE_SOURCE_DIR})
+  # A base directory and no hashed working directory: clones at other places share one cache. What a precompiled header
+  # defines is in its own hash (pch_defines), and no file prints when it was compiled (time_macros).
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1
+                                  CCACHE_SLOPPINESS=pch_defines,time_macros ${AXISD_CCACHE})
   set(CMAKE_C_COMPILER_LAUNCHER ${CMAKE_CXX_COMPILER_LAUNCHER})
 endif()
 
