@@ -60,7 +60,8 @@ constexpr KeySpec limit_keys[] = {
                  const Value& v) { t.configuration->server.limits.streams = static_cast<int>(v.integer); }},
     {.key = "connections",
      .kind = Kind::integer,
-     .description = "Connections of all clients together, about; those beyond are closed at once.",
+     .description = "Connections of all clients together; those beyond are closed at once. One address has "
+                    "three quarters of them at most.",
      .example = "32",
      .default_value = "256",
      .minimum = 4,

@@ -26,7 +26,7 @@ Result<void> check_descriptor_limit(const config::Configuration& configuration) 
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return {};
   const auto buses = configuration.lines.size() + configuration.networks.size();
   const auto connections = static_cast<rlim_t>(configuration.server.limits.connections);
-  const auto needed = own + per_bus * buses + connections;
+  const auto needed = own + per_bus * buses + 2 * connections;  // each is watched, too
   if (limit.rlim_cur >= needed) return {};
   return fail(Reason::invalid_argument,
               fmt::format("only {} file descriptors may be open at a time, and {} may be needed",

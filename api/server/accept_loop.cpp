@@ -16,11 +16,15 @@
 #include <system_error>
 #include <utility>
 
+#include "api/server/peer_socket.hpp"
+
 namespace axisd::server {
 namespace {
 
 // Kept free for serial ports that come back, state files and the like.
 constexpr int kept_descriptors = 64;
+/// A flood of requests lasts no longer before it is noticed; that it is looked for costs some microseconds.
+constexpr Duration count_every = std::chrono::milliseconds(250);
 
 int descriptor_limit() {
   rlimit limit{};
@@ -38,10 +42,8 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, int most) {
                 "cannot open descriptors for the accept loop: " + std::generic_category().message(errno),
                 "raise LimitNOFILE of the service");
   // The kernel gives out the lowest free number, so the number of a new descriptor tells how many are open.
-  // gRPC does not tell when it closes a connection.
-  first_refused_descriptor_ =
-      std::max(reserve_.get() + 1,
-               std::min(descriptor_limit() - kept_descriptors, reserve_.get() + kept_descriptors + most));
+  first_refused_descriptor_ = std::max(reserve_.get() + 1, descriptor_limit() - kept_descriptors);
+  budgets_.emplace(PeerBudgets::Limits{.connections = most, .per_address = std::max(1, most * 3 / 4)});
   entries_ = std::move(entries);
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "axisd-accept");
@@ -58,19 +60,57 @@ void AcceptLoop::stop() {
 }
 
 void AcceptLoop::run() {
-  std::vector<pollfd> polled{{.fd = wake_.get(), .events = POLLIN, .revents = 0}};
-  for (const auto& entry : entries_)
-    polled.push_back({.fd = entry.socket.fd.get(), .events = POLLIN, .revents = 0});
+  std::vector<pollfd> polled;
+  std::vector<PeerBudgets::Id> watched;
   while (!stopping_) {
-    if (poll(polled.data(), polled.size(), -1) < 0 && errno != EINTR) {
+    polled = {{.fd = wake_.get(), .events = POLLIN, .revents = 0}};
+    for (const auto& entry : entries_)
+      polled.push_back({.fd = entry.socket.fd.get(), .events = POLLIN, .revents = 0});
+    watched.clear();
+    for (const auto& [id, connection] : connections_) {
+      polled.push_back({.fd = connection.get(), .events = POLLRDHUP, .revents = 0});
+      watched.push_back(id);
+    }
+    const auto pause =
+        connections_.empty()
+            ? -1
+            : static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(count_every).count());
+    if (poll(polled.data(), polled.size(), pause) < 0 && errno != EINTR) {
       spdlog::error("accept loop: poll: {}", std::generic_category().message(errno));
       return;
     }
+    for (std::size_t i = 0; i < watched.size(); ++i)
+      if (polled[1 + entries_.size() + i].revents != 0) close(watched[i]);
     bool fine = true;
     for (std::size_t i = 0; i < entries_.size(); ++i)
       if (polled[i + 1].revents != 0) fine = accept_one(entries_[i]) && fine;
+    if (const auto now = monotonic_now(); now - counted_ >= count_every) {
+      counted_ = now;
+      count_traffic(now);
+    }
     // The system is short of memory or descriptors: the connection waits in the backlog.
     if (!fine) poll(polled.data(), 1, 100);
+  }
+  connections_.clear();
+}
+
+/// gRPC closes its own descriptor by itself.
+void AcceptLoop::close(PeerBudgets::Id connection) {
+  budgets_->leave(connection);
+  connections_.erase(connection);
+}
+
+void AcceptLoop::count_traffic(TimePoint now) {
+  std::map<PeerBudgets::Id, PeerBudgets::Traffic> traffic;
+  for (const auto& [id, connection] : connections_) traffic.emplace(id, traffic_of(connection.get()));
+  for (const auto id : budgets_->count(traffic, now)) {
+    const auto& connection = connections_.at(id);
+    if (std::has_single_bit(++cut_off_))
+      spdlog::warn(
+          "a client at {} sends floods of requests that it wants no answers to: cut off ({} since start)",
+          address_of_peer(connection.get()), cut_off_);
+    ::shutdown(connection.get(), SHUT_RDWR);
+    close(id);
   }
 }
 
@@ -81,13 +121,16 @@ bool AcceptLoop::accept_one(const Entry& entry) {
     if (code == EMFILE || code == ENFILE) return turn_away(entry);
     return code != ENOBUFS && code != ENOMEM;  // the rest concerns one connection that is gone already
   }
-  if (connection.get() >= first_refused_descriptor_) {
-    connection = {};
-    const auto count = ++refused_;
-    if (std::has_single_bit(count))
-      spdlog::warn("too many connections (server.limits.connections): {} turned away since start", count);
+  const auto address = address_of_peer(connection.get());
+  FileDescriptor watched(fcntl(connection.get(), F_DUPFD_CLOEXEC, 0));
+  const bool none_left = watched.get() < 0 || watched.get() >= first_refused_descriptor_;
+  const auto place =
+      none_left ? PeerBudgets::Entry::full : budgets_->enter(++last_id_, address, monotonic_now());
+  if (place != PeerBudgets::Entry::granted) {
+    refuse(place, address);
     return true;
   }
+  connections_.emplace(last_id_, std::move(watched));
   if (entry.socket.unix_path.empty()) {
     const int on = 1;
     setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
@@ -97,6 +140,16 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   parameters.fd = connection.release();
   entry.acceptor->HandleNewConnection(&parameters);
   return true;
+}
+
+void AcceptLoop::refuse(PeerBudgets::Entry why, const std::string& address) {
+  const auto count = ++refused_;
+  if (!std::has_single_bit(count)) return;
+  const auto* reason = why == PeerBudgets::Entry::address_floods ? "it floods"
+                       : why == PeerBudgets::Entry::address_full
+                           ? "it has three quarters of server.limits.connections"
+                           : "there are too many (server.limits.connections)";
+  spdlog::warn("a connection from {} is turned away, as {}: {} since start", address, reason, count);
 }
 
 bool AcceptLoop::turn_away(const Entry& entry) {

@@ -4,16 +4,21 @@
 #include <grpcpp/server_builder.h>
 
 #include <atomic>
+#include <map>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
 #include "api/server/listen.hpp"
+#include "api/server/peer_budgets.hpp"
 
 namespace axisd::server {
 
 /// Accepts connections and hands them to gRPC. gRPC 1.51's own listener never accepts again after one EMFILE
 /// (CVE-2023-4785); this one keeps a descriptor in reserve, turns the surplus connection away and goes on.
+/// Each connection is watched through a second descriptor: how many an address has, and what it sends without
+/// getting anything for it (PeerBudgets). gRPC 1.51 bounds none of that (CVE-2023-44487).
 class AcceptLoop {
  public:
   using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
@@ -27,7 +32,7 @@ class AcceptLoop {
   AcceptLoop(const AcceptLoop&) = delete;
   AcceptLoop& operator=(const AcceptLoop&) = delete;
 
-  /// Connections beyond `most` (about: it is the number of descriptors that is bounded) are closed at once.
+  /// Connections beyond `most`, or beyond three quarters of them from one address, are closed at once.
   Result<void> start(std::vector<Entry> entries, int most);
   /// Closes the listening sockets. Idempotent.
   void stop();
@@ -40,10 +45,19 @@ class AcceptLoop {
   /// False: nothing could be accepted, and trying again at once would spin.
   bool accept_one(const Entry& entry);
   bool turn_away(const Entry& entry);
+  void refuse(PeerBudgets::Entry why, const std::string& address);
+  /// Cuts off who floods, by what the kernel has counted.
+  void count_traffic(TimePoint now);
+  void close(PeerBudgets::Id connection);
 
   std::vector<Entry> entries_;
   int first_refused_descriptor_ = 0;
   FileDescriptor wake_, reserve_;
+  std::optional<PeerBudgets> budgets_;
+  std::map<PeerBudgets::Id, FileDescriptor> connections_;  ///< of each that gRPC has, one of our own
+  PeerBudgets::Id last_id_ = 0;
+  TimePoint counted_{};
+  std::uint64_t cut_off_ = 0;
   std::atomic<std::uint64_t> refused_{0};
   std::atomic<bool> stopping_{false};
   std::thread thread_;

@@ -1,0 +1,71 @@
+#include "api/server/peer_budgets.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace axisd::server {
+
+double PeerBudgets::level_of(const Bucket& bucket, TimePoint now) const {
+  const auto seconds = std::chrono::duration<double>(now - bucket.since).count();
+  return std::max(0.0, bucket.level - seconds * limits_.rate);
+}
+
+void PeerBudgets::fill(Bucket& bucket, double more, TimePoint now) const {
+  bucket = {.level = std::max(0.0, level_of(bucket, now) + more), .since = now};
+}
+
+void PeerBudgets::forget_idle(TimePoint now) {
+  std::erase_if(addresses_, [&](const auto& entry) {
+    return entry.second.connections == 0 && level_of(entry.second.bucket, now) <= 0;
+  });
+}
+
+PeerBudgets::Entry PeerBudgets::enter(Id id, const std::string& address, TimePoint now) {
+  forget_idle(now);
+  if (std::cmp_greater_equal(connections_.size(), limits_.connections)) return Entry::full;
+  auto& from = addresses_.try_emplace(address, Address{.bucket = {.since = now}}).first->second;
+  if (from.connections >= limits_.per_address) return Entry::address_full;
+  if (level_of(from.bucket, now) > limits_.burst / 2) return Entry::address_floods;
+  ++from.connections;
+  connections_.emplace(id, Connection{.address = address, .bucket = {.since = now}});
+  return Entry::granted;
+}
+
+void PeerBudgets::leave(Id id) {
+  const auto connection = connections_.find(id);
+  if (connection == connections_.end()) return;
+  --addresses_.at(connection->second.address).connections;
+  connections_.erase(connection);
+}
+
+std::vector<PeerBudgets::Id> PeerBudgets::count(const std::map<Id, Traffic>& traffic, TimePoint now) {
+  std::map<std::string, std::vector<std::pair<double, Id>>> by_address;
+  for (const auto& [id, total] : traffic) {
+    const auto found = connections_.find(id);
+    if (found == connections_.end()) continue;
+    auto& connection = found->second;
+    auto& address = addresses_.at(connection.address);
+    const auto before = std::exchange(connection.counted, total);
+    const auto one_sided = static_cast<double>(total.received - before.received) -
+                           limits_.proportion * static_cast<double>(total.sent - before.sent);
+    // An answer may come later than its request was counted. What one connection gets excuses no other.
+    fill(connection.bucket, one_sided, now);
+    fill(address.bucket, std::max(0.0, one_sided), now);
+    by_address[connection.address].emplace_back(connection.bucket.level, id);
+  }
+  std::vector<Id> cut;
+  for (auto& [name, connections] : by_address) {
+    auto& bucket = addresses_.at(name).bucket;
+    auto excess = bucket.level - limits_.burst;
+    bucket.level = std::min(bucket.level, limits_.rate * limits_.longest_penalty);
+    std::ranges::sort(connections, std::greater{});
+    for (const auto& [level, id] : connections) {
+      if (excess <= 0 || level <= 0) break;
+      cut.push_back(id);
+      excess -= level;
+    }
+  }
+  return cut;
+}
+
+}  // namespace axisd::server

@@ -1,0 +1,70 @@
+// What clients of one address may take of the main address. Pure.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "buses/clock.hpp"
+
+namespace axisd::server {
+
+/// Places: an address never has all of them. Bytes: who asks gets answers, so that what is sent is in
+/// proportion to what comes back; a flood (rapid reset, half-open streams, CONTINUATION) brings nothing back.
+/// What an address sends beyond `proportion` times what it gets runs into a bucket that empties at `rate`.
+/// Where it is above `burst` those connections that filled it most are to be cut off, and no further one is
+/// let in until it is down to half of that. Thread: one at a time.
+class PeerBudgets {
+ public:
+  using Id = std::uint64_t;
+  struct Limits {
+    int connections = 256;  ///< in all
+    int per_address = 192;
+    double proportion = 4;
+    double rate = 256 * 1024;        ///< bytes per second
+    double burst = 2 * 1024 * 1024;  ///< bytes: several of the longest messages
+    double longest_penalty = 10;     ///< seconds until a bucket is empty, at most
+  };
+  /// Since the connection began, as the kernel counts it.
+  struct Traffic {
+    std::uint64_t received = 0, sent = 0;  ///< bytes
+  };
+  enum class Entry : std::uint8_t { granted, full, address_full, address_floods };
+
+  explicit PeerBudgets(Limits limits) : limits_(limits) {}
+
+  /// A new connection from `address`; it is known from then on if it is granted.
+  [[nodiscard]] Entry enter(Id id, const std::string& address, TimePoint now);
+  void leave(Id id);
+  /// Takes over what was counted by now. Those to cut off, which are to leave then.
+  [[nodiscard]] std::vector<Id> count(const std::map<Id, Traffic>& traffic, TimePoint now);
+  [[nodiscard]] std::size_t connections() const { return connections_.size(); }
+  /// That are remembered: with connections, or a bucket that is not empty yet.
+  [[nodiscard]] std::size_t addresses() const { return addresses_.size(); }
+
+ private:
+  struct Bucket {
+    double level = 0;  ///< bytes
+    TimePoint since{};
+  };
+  struct Address {
+    int connections = 0;
+    Bucket bucket;
+  };
+  struct Connection {
+    std::string address;
+    Traffic counted;
+    Bucket bucket;
+  };
+  [[nodiscard]] double level_of(const Bucket& bucket, TimePoint now) const;
+  void fill(Bucket& bucket, double more, TimePoint now) const;
+  void forget_idle(TimePoint now);
+
+  Limits limits_;
+  std::map<Id, Connection> connections_;
+  std::map<std::string, Address> addresses_;
+};
+
+}  // namespace axisd::server

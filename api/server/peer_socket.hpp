@@ -1,0 +1,16 @@
+// What the kernel knows of the other end of a connection.
+#pragma once
+
+#include <string>
+
+#include "api/server/peer_budgets.hpp"
+
+namespace axisd::server {
+
+/// The address by which a peer is counted: an IPv4 address, the first 64 bit of an IPv6 address, or the user
+/// at the other end of a unix socket.
+[[nodiscard]] std::string address_of_peer(int connection);
+/// What the kernel has counted on it; nothing for unix sockets.
+[[nodiscard]] PeerBudgets::Traffic traffic_of(int connection);
+
+}  // namespace axisd::server

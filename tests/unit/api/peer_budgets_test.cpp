@@ -1,0 +1,127 @@
+// What clients of one address may take of the main address.
+#include "api/server/peer_budgets.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <vector>
+
+namespace axisd::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using server::PeerBudgets;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using Entry = PeerBudgets::Entry;
+
+class PeerBudgetsTest : public ::testing::Test {
+ protected:
+  static TimePoint at(Duration since) { return TimePoint{} + 1h + since; }
+  Entry enter(PeerBudgets::Id id, const std::string& address, Duration when = 0ms) {
+    return budgets_.enter(id, address, at(when));
+  }
+  /// Each quarter of a second this connection sends and gets so much more; those that are cut off.
+  std::vector<PeerBudgets::Id> run(PeerBudgets::Id id, std::uint64_t received, std::uint64_t sent,
+                                   Duration time) {
+    std::vector<PeerBudgets::Id> cut;
+    for (const auto until = now_ + time; now_ < until && cut.empty();) {
+      now_ += 250ms;
+      traffic_[id].received += received;
+      traffic_[id].sent += sent;
+      cut = budgets_.count(traffic_, at(now_));
+    }
+    return cut;
+  }
+
+  PeerBudgets budgets_{{.connections = 8,
+                        .per_address = 6,
+                        .proportion = 4,
+                        .rate = 1000,
+                        .burst = 10'000,
+                        .longest_penalty = 20}};
+  std::map<PeerBudgets::Id, PeerBudgets::Traffic> traffic_;
+  Duration now_{};
+};
+
+TEST_F(PeerBudgetsTest, OneAddressLeavesPlacesToOthers) {
+  for (PeerBudgets::Id id = 1; id <= 6; ++id) EXPECT_EQ(enter(id, "a"), Entry::granted);
+  EXPECT_EQ(enter(7, "a"), Entry::address_full);
+  EXPECT_EQ(enter(8, "b"), Entry::granted);
+  EXPECT_EQ(enter(9, "c"), Entry::granted);
+  EXPECT_EQ(enter(10, "d"), Entry::full);
+  budgets_.leave(1);
+  EXPECT_EQ(enter(11, "a"), Entry::granted);
+  budgets_.leave(77);  // was never there
+  EXPECT_EQ(budgets_.connections(), 8U);
+}
+
+TEST_F(PeerBudgetsTest, WhoGetsAnswersMaySendWhatHeLikes) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  EXPECT_THAT(run(1, 1'000'000, 250'000, 60s), IsEmpty());
+}
+
+TEST_F(PeerBudgetsTest, AnAnswerThatComesLaterCounts) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_THAT(run(1, 8000, 0, 250ms), IsEmpty()) << i;
+    ASSERT_THAT(run(1, 0, 2000, 8s), IsEmpty()) << i;
+  }
+}
+
+TEST_F(PeerBudgetsTest, ALongMessageNowAndThenIsNoFlood) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_THAT(run(1, 9000, 10, 250ms), IsEmpty());
+    EXPECT_THAT(run(1, 0, 0, 10s), IsEmpty());
+  }
+}
+
+TEST_F(PeerBudgetsTest, AFloodIsCutOffAndKeptOutForAWhile) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  ASSERT_EQ(enter(2, "a"), Entry::granted);
+  ASSERT_EQ(enter(3, "b"), Entry::granted);
+  traffic_[2] = {.received = 900, .sent = 300};
+  traffic_[3] = {.received = 900, .sent = 300};
+  EXPECT_THAT(run(1, 20'000, 100, 10s), ElementsAre(1));
+  budgets_.leave(1);
+  traffic_.erase(1);
+  EXPECT_EQ(enter(4, "a", now_), Entry::address_floods);
+  EXPECT_EQ(enter(5, "b", now_), Entry::granted);
+  EXPECT_THAT(run(2, 900, 300, 15s), IsEmpty()) << "of the same address, and honest";
+  EXPECT_EQ(enter(6, "a", now_), Entry::granted) << "its bucket is half empty again";
+}
+
+TEST_F(PeerBudgetsTest, NobodyIsKeptOutLongerThanThePenalty) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  EXPECT_THAT(run(1, 1'000'000'000, 0, 1s), ElementsAre(1));
+  budgets_.leave(1);
+  EXPECT_EQ(enter(2, "a", now_ + 14s), Entry::address_floods);
+  EXPECT_EQ(enter(2, "a", now_ + 15s), Entry::granted);
+}
+
+TEST_F(PeerBudgetsTest, ManyThatFloodALittleAreCutOffTogether) {
+  for (PeerBudgets::Id id = 1; id <= 6; ++id) ASSERT_EQ(enter(id, "a"), Entry::granted);
+  std::vector<PeerBudgets::Id> cut;
+  for (int i = 0; i < 100 && cut.empty(); ++i) {
+    now_ += 250ms;
+    for (PeerBudgets::Id id = 1; id <= 6; ++id) traffic_[id].received += 600;
+    cut = budgets_.count(traffic_, at(now_));
+  }
+  EXPECT_FALSE(cut.empty());
+}
+
+TEST_F(PeerBudgetsTest, AnAddressIsForgottenWhenItIsGone) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  ASSERT_THAT(run(1, 20'000, 0, 1s), ElementsAre(1));
+  budgets_.leave(1);
+  ASSERT_EQ(enter(2, "b", now_), Entry::granted);
+  EXPECT_EQ(budgets_.addresses(), 2U);
+  budgets_.leave(2);
+  ASSERT_EQ(enter(3, "c", now_ + 60s), Entry::granted);
+  EXPECT_EQ(budgets_.addresses(), 1U);
+}
+
+}  // namespace
+}  // namespace axisd::testing
