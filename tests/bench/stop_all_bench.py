@@ -19,7 +19,7 @@ import sys
 import tempfile
 import time
 
-from figures import running, table
+from figures import go_first, running, table
 from rtu_cell import SERVER, Cell, Line
 from rtu_stops import HOST_ALLOWANCE, STOP, bare_waits, late_wakes
 
@@ -157,13 +157,6 @@ def measure(build, baud, given, silent_counts):
     for count, since, silent, arrived in calls:
         found.setdefault((count, since), []).append(judge(line, ours, theirs, waits, silent, arrived))
     return found, bound
-
-
-def go_first():
-    """This process and all that it starts go before ordinary programs, as bare threads do: whatever else a computer is busy
-    with is then held back, and not what is measured."""
-    with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
 
 
 def milliseconds(values):
