@@ -87,7 +87,7 @@ class Cell:
     """axisd with an axis for each drive of some lines."""
 
     def __init__(self, build, lines, poll, calls=256):
-        """`poll`: the refresh period of each axis; `calls`: that one client may have waiting."""
+        """`poll`: the refresh period of each axis, None: the default; `calls`: that one client may have waiting."""
         self.build, self.lines, self.poll, self.calls = build, lines, poll, calls
 
     def configuration(self):
@@ -99,11 +99,12 @@ buses:
         for index, line in enumerate(self.lines):
             text += f"  line-{index}: {{ modbus_rtu: {{ port: {line.port}, baud: {line.baud} }} }}\n"
         text += "axes:\n"
+        poll = f", poll: {{ idle: {self.poll}, moving: {self.poll} }}" if self.poll else ""
         for index, line in enumerate(self.lines):
             for node in range(1, line.nodes + 1):
                 text += f"""  axis-{index}-{node}: {{ bus: line-{index}, node: {node}, model: ykd2405pr, unit: mm,
     scale: {{ microstep: 10000 pulses/rev, travel: 5 mm/rev }},
-    limits: {{ position: [0, 400], velocity: 90 mm/s }}, poll: {{ idle: {self.poll}, moving: {self.poll} }} }}
+    limits: {{ position: [0, 400], velocity: 90 mm/s }}{poll} }}
 """
         return text
 
@@ -116,9 +117,9 @@ buses:
             yield process
 
     @contextlib.contextmanager
-    def online(self, *words):
+    def online(self, *words, **options):
         """Its id, when each drive that has power is online."""
-        with self.run(*words) as process:
+        with self.run(*words, **options) as process:
             self.wait_online(process)
             yield process.pid
 
