@@ -10,12 +10,15 @@ add_executable(bench_bare_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_l
 add_executable(bench_bare_waits EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_waits.cpp)
 add_executable(bench_modbus_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/modbus_loop.cpp)
 target_link_libraries(bench_modbus_loop PRIVATE PkgConfig::MODBUS)
+add_executable(bench_index_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/index_loop.cpp)
+target_link_libraries(bench_index_loop PRIVATE PkgConfig::MODBUS)
+add_library(bench_sync_counter MODULE EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/sync_counter.cpp)
 add_executable(bench_untimed_line EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/untimed_line.cpp)
 target_include_directories(bench_untimed_line PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(bench_untimed_line PRIVATE axisd_simulation)
 
 if(AXISD_GRPC)
-  foreach(program rpc_client command_client bare_server)
+  foreach(program rpc_client command_client index_client bare_server)
     add_executable(bench_${program} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/${program}.cpp)
     target_link_libraries(bench_${program} PRIVATE axisd_proto)
   endforeach()
@@ -23,7 +26,8 @@ if(AXISD_GRPC)
   target_include_directories(bench_full_journal PRIVATE ${CMAKE_SOURCE_DIR})
   target_link_libraries(bench_full_journal PRIVATE axisd_core)
   add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop bench_bare_waits bench_modbus_loop bench_untimed_line bench_rpc_client
-                                           bench_command_client bench_full_journal bench_bare_server axisd axisd-sim axisctl)
+                                           bench_command_client bench_full_journal bench_bare_server bench_index_client
+                                           bench_index_loop bench_sync_counter axisd axisd-sim axisctl)
   set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
   set(text "")
   foreach(command bring-up core)
@@ -42,6 +46,8 @@ if(AXISD_GRPC)
     "--rounds 1 --seconds 1 --nodes 4 --baud 115200 --stops 5)\n"
     "add_test(bench.stop_all /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/stop_all_bench.py ${CMAKE_BINARY_DIR} --nodes 4 "
     "--silent 1 3 --baud 115200 --stops 2 --report-only)\n"
+    "add_test(bench.index /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/index_bench.py ${CMAKE_BINARY_DIR} --axes 2 1/3 "
+    "--baud 115200 --rounds 1 --seconds 1 --report-only)\n"
     "add_test(bench.rpc /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rpc_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
     "--seconds 1)\n"
     "add_test(bench.machine /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/machine_bench.py ${CMAKE_BINARY_DIR} "
@@ -50,7 +56,7 @@ if(AXISD_GRPC)
     "--rounds 1 --seconds 1 --axes 2 --ids 20000)\n"
     "add_test(bench.siege /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/siege_bench.py ${CMAKE_BINARY_DIR} --seconds 2 "
     "--after 1 --only nobody --only \"rapid reset\" --only \"silent connections\")\n"
-    "set_tests_properties(bench.rtu bench.stop_all bench.rpc bench.machine bench.admission bench.siege PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
+    "set_tests_properties(bench.rtu bench.stop_all bench.index bench.rpc bench.machine bench.admission bench.siege PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
     "set_tests_properties(bench.bring-up bench.core bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"
     "set_tests_properties(bench.sync_in_guest PROPERTIES RESOURCE_LOCK guest COST 100)\n")
   file(GENERATE OUTPUT ${include_file} CONTENT "${text}")

@@ -1,0 +1,212 @@
+"""Axes of one RS-485 line that index at once: short moves to and fro, each as soon as the last one is done. axisd with a
+lean client, a loop on libmodbus that writes block and trigger apart or in one frame, and python3-pymodbus, in turns at the
+same simulated drives. README.md says what is measured. Ends with 1 where a command expired, or where 1 % of the starts came
+later than axisd publishes.
+
+    index_bench.py BUILD [--axes N|N/DRIVES ...] [--baud BAUD ...] [--rounds N] [--seconds S] [--wire] [--report-only]
+"""
+import argparse
+import dataclasses
+import mmap
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import index_plot
+import index_wire
+from figures import cpu_seconds, go_first, running, spread, table
+from rtu_cell import SERVER, Cell, Line
+
+DISTANCE, PULSES = 0.1, 200  # the way of each move, in mm and as the drives of Cell count
+SETTLE = 1.0  # s
+BYTES = 100  # more than a move takes on the wire
+PROGRAMS = {"axisd": "axisd", "apart": "libmodbus, apart", "one": "libmodbus, one frame", "pymodbus": "pymodbus"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    axes: int  # that index
+    drives: int  # on the line; axisd refreshes the others, the loops leave them alone
+
+    @staticmethod
+    def of(text):
+        axes, _, drives = text.partition("/")
+        return Case(int(axes), int(drives or axes))
+
+    def __str__(self):
+        return str(self.axes) if self.axes == self.drives else f"{self.axes} of {self.drives}"
+
+
+class Syncs:
+    """How often a program has the disk confirm something."""
+
+    def __init__(self, build, path):
+        path.write_bytes(bytes(8))
+        library = f"{build}/tests/libbench_sync_counter.so"
+        self.environment = {**os.environ, "LD_PRELOAD": library, "AXISD_SYNC_COUNT": str(path)}
+        with path.open("r+b") as file:
+            self.shared = mmap.mmap(file.fileno(), 8)
+
+    def count(self):
+        return int.from_bytes(self.shared[:8], sys.byteorder)
+
+
+def look(line, case, pid, seconds, syncs=None):
+    """What was done in `seconds`, and the requests."""
+    begin, cpu, synced = time.monotonic(), cpu_seconds(pid), syncs.count() if syncs else 0
+    time.sleep(seconds)
+    end, cpu, synced = time.monotonic(), cpu_seconds(pid) - cpu, (syncs.count() if syncs else 0) - synced
+    requests = index_wire.requests_of(line, line.frames(begin, end))
+    found = index_wire.figures_of(requests, end - begin, case.axes)
+    moves = max(found["moves"], 1)
+    return found | {"cpu": cpu / moves * 1e3, "syncs": synced / moves}, requests
+
+
+def lap(line, case):
+    """Until each axis has moved once, in s."""
+    return case.axes * line.wire(BYTES)
+
+
+def published(cell, case):
+    """From a start that is asked for to its frame where as many axes start at once, in ms; 0: nothing is published."""
+    load = cell.ask("budget")["budgets"][0]["load"]
+    start = next(row for row in load if int(row.get("moving", 0)) == case.axes).get("start", "0s")
+    return float(start.rstrip("s")) * 1e3
+
+
+def client_figures(text):
+    """What bench_index_client prints."""
+    words = {name: list(map(float, values)) for name, *values in (entry.split() for entry in text.splitlines())}
+    found = dict(zip(("done", "expired", "refused", "otherwise"), words["moves"]))
+    for what in ("call", "start"):
+        found |= dict(zip((f"{what} median", f"{what} p99", f"{what} longest"), words[what]))
+    return found
+
+
+def with_axisd(build, line, case, seconds):
+    syncs = Syncs(build, line.directory / "syncs")
+    cell = Cell(build, [line], None)
+    with cell.online(env=syncs.environment) as pid:
+        subprocess.run([f"{build}/tests/bench_command_client", SERVER, "ready"], check=True)
+        settle, seconds = SETTLE + lap(line, case), seconds + 2 * lap(line, case)
+        words = [SERVER, str(case.axes), str(DISTANCE), str(settle + seconds + SETTLE)]
+        with subprocess.Popen([f"{build}/tests/bench_index_client", *words], stdout=subprocess.PIPE, text=True) as client:
+            time.sleep(settle)
+            found, requests = look(line, case, pid, seconds, syncs)
+            printed = client.communicate()[0]
+        if client.returncode != 0:
+            sys.exit(f"index_bench.py: bench_index_client ended with {client.returncode}")
+        return found | client_figures(printed) | {"bound": published(cell, case)}, requests
+
+
+def with_loop(build, name, line, case, seconds, profile):
+    common = [line.port, str(line.baud), str(case.axes)]
+    program = ([sys.executable, "-B", pathlib.Path(__file__).with_name("index_pymodbus.py"), *common] if name == "pymodbus"
+               else [f"{build}/tests/bench_index_loop", *common, name])
+    with running(*program, *map(str, (*profile, 0, PULSES))) as process:
+        time.sleep(SETTLE + lap(line, case))
+        return look(line, case, process.pid, seconds + 2 * lap(line, case))
+
+
+def measure(build, given, baud, case):
+    """program -> what -> the figures of the rounds. axisd comes first: it configures the drives, and the loops move by what
+    it writes."""
+    found, profile = {name: {} for name in PROGRAMS}, None
+    with tempfile.TemporaryDirectory() as directory, Line(build, directory, baud, case.drives).open() as line:
+        for number in range(given.rounds):
+            for name in PROGRAMS:
+                if name == "axisd":
+                    figures, requests = with_axisd(build, line, case, given.seconds)
+                    profile = index_wire.profile_of(requests) or profile
+                    if profile is None:
+                        sys.exit("index_bench.py: axisd started nothing")
+                else:
+                    figures, requests = with_loop(build, name, line, case, given.seconds, profile)
+                for what, figure in figures.items():
+                    found[name].setdefault(what, []).append(figure)
+                if given.wire and number == 0:
+                    index_wire.print_move(f"{baud} bit/s, {case}, {PROGRAMS[name]}", requests, node=1)
+            print(".", end="", file=sys.stderr, flush=True)
+    return found
+
+
+def median(figures, what, digits=1):
+    return f"{statistics.median(figures[what]):.{digits}f}"
+
+
+def print_rates(baud, cases):
+    kinds = ("state", "canary", "block", "trigger", "one", "other", "resting")
+    rows = [["axes", "", "moves/s", "axisd / it", "transactions a move", *kinds, "line used, %", "CPU a move, ms",
+             "least share"]]
+    for case, found in cases.items():
+        for name, title in PROGRAMS.items():
+            figures = found[name]
+            ratios = [mine / its for mine, its in zip(found["axisd"]["rate"], figures["rate"])]
+            all_of_them = sum(statistics.median(figures[kind]) for kind in kinds)
+            rows.append([str(case), title, spread(figures["rate"], 1), "" if name == "axisd" else spread(ratios, 2),
+                         f"{all_of_them:.1f}", *(median(figures, kind, 2) for kind in kinds), median(figures, "used"),
+                         median(figures, "cpu", 2), median(figures, "share", 2)])
+    print(f"\n{baud} bit/s: axes of one line that index at once; min / median / max of the rounds, else medians; `resting`: "
+          "whatever was asked of other axes; `least share`: of the axis that moved least, 1 is even")
+    table(rows)
+
+
+def print_commands(baud, cases):
+    """True: no command expired, and 99 % of the starts came within the bound."""
+    rows, within = [["axes", "done", "expired", "refused", "otherwise", "call, ms, median", "99 %",
+                     "acceptance to start, ms, median", "99 %", "longest", "published", "met", "fsyncs a move"]], True
+    for case, found in cases.items():
+        figures = found["axisd"]
+        bound, late = figures["bound"][0], max(figures["start p99"])
+        met = (late <= bound or bound == 0) and sum(figures["expired"]) == 0
+        within = within and met
+        rows.append([str(case), *(f"{sum(figures[what]):.0f}" for what in ("done", "expired", "refused", "otherwise")),
+                     median(figures, "call median"), median(figures, "call p99"), median(figures, "start median"),
+                     f"{late:.1f}", f"{max(figures['start longest']):.1f}", f"{bound:.1f}", "yes" if met else "NO",
+                     median(figures, "syncs", 2)])
+    print(f"\n{baud} bit/s: commands of axisd, all rounds; times of those that were done; 99 % and longest of acceptance to "
+          "start are those of the worst round")
+    table(rows)
+    return within
+
+
+def plot(path, found):
+    panels = {}
+    for baud, cases in found.items():
+        whole = {case.axes: figures for case, figures in cases.items() if case.axes == case.drives}
+        panels[f"{baud} bit/s"] = {
+            title: {axes: (min(rates), statistics.median(rates), max(rates))
+                    for axes, rates in ((axes, figures[name]["rate"]) for axes, figures in whole.items())}
+            for name, title in PROGRAMS.items()}
+    path.parent.mkdir(exist_ok=True)
+    index_plot.write(path, "moves/s of the line", panels)
+    print(f"\nplot: {path}")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("build")
+    parser.add_argument("--axes", type=Case.of, nargs="*", help="that index; N/DRIVES: others are on the line, too",
+                        default=list(map(Case.of, ("1", "2", "4", "8", "16", "30", "1/16", "4/16"))))
+    parser.add_argument("--baud", type=int, nargs="*", default=[115200, 19200])
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--seconds", type=float, default=4, help="of each turn, and two laps of all axes")
+    parser.add_argument("--wire", action="store_true", help="print one move of each program, frame by frame")
+    parser.add_argument("--report-only", action="store_true", help="ends with 0 whatever was seen")
+    given = parser.parse_args()
+    build, within = os.path.abspath(given.build), True
+    go_first()
+    found = {baud: {case: measure(build, given, baud, case) for case in given.axes} for baud in given.baud}
+    for baud, cases in found.items():
+        print_rates(baud, cases)
+        within = print_commands(baud, cases) and within
+    plot(pathlib.Path(build) / "bench" / "index.svg", found)
+    return 0 if within or given.report_only else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
