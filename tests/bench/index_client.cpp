@@ -88,6 +88,7 @@ class Indexing {
     }
     static const auto run = std::to_string(Clock::now().time_since_epoch().count());
     request_.Clear();
+    response_.Clear();
     request_.set_axis(axis_);
     request_.set_position(away_ ? 0 : distance_);
     request_.mutable_acceleration_time()->set_nanos(ramp_ns);
