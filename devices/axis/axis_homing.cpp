@@ -63,7 +63,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
   {
     if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
-    result = co_await look(settings_.reboot_guard);
+    if (activity->turn) result = co_await look(settings_.reboot_guard);
     if (!current(*activity) || !may_start(*activity)) co_return;
     if (result && input_active(homing_switch())) result = axisd::fail(reached_switch());
     if (result) {

@@ -307,7 +307,7 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
   {
     if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
-    result = co_await look(settings_.reboot_guard);
+    if (activity->turn) result = co_await look(settings_.reboot_guard);
     if (!current(*activity) || !may_start(*activity)) co_return;
     base = tracker_.counter();
     if (result) result = co_await drive_->start_velocity(profile, guard(*activity));

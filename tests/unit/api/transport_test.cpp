@@ -78,6 +78,7 @@ TEST_F(Transport, UnixSocketLeftBehindIsReplaced) {
     address.sun_family = AF_UNIX;
     file.copy(address.sun_path, sizeof address.sun_path - 1);
     const FileDescriptor dead(socket(AF_UNIX, SOCK_STREAM, 0));
+    ASSERT_GE(dead.get(), 0);
     ASSERT_EQ(bind(dead.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
   }
   ASSERT_TRUE(std::filesystem::exists(file));
