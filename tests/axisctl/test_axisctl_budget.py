@@ -14,7 +14,7 @@ EXCEEDED = SOURCE / "tests/broken/budget.yaml"
 class OfTheDaemon(AxisctlTest):
     def test_predicted_beside_seen(self):
         text = self.ok("budget")
-        self.assertRegex(text, r"\n +0 +0\.25 +0\.50 +- +300\.0 ms\n")
+        self.assertRegex(text, r"\n +0 +0\.25 +0\.50 +- +300\.0 ms +-\n")
         self.assertRegex(text, r"\nfeeder +alone +28\.0 ms +7\.0 ms +- \+ 150\.0 ms +10\.5 mm\n")
         self.assertRegex(text, r"\ntransfer +1 +28\.0 ms +-\n")
         self.assertIn("exceeded (stop_bound): too late; raise it\nnote: a note\n", text)
