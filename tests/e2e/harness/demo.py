@@ -5,7 +5,9 @@ import re
 import shutil
 import tempfile
 
-from .client import Client, pb
+import grpc
+
+from .client import CallFailed, Client, pb
 from .machine import PATIENT
 from .programs import AXISD, ROOT, Program, wait_for
 
@@ -33,7 +35,12 @@ class Demo:
             raise AssertionError(f"axisd ended: {self.daemon.log()}")
         if not os.path.exists(self.server.removeprefix("unix:")):
             return False
-        return all(state.link != pb.LINK_STATE_OFFLINE for state in self.client.states())
+        try:
+            return all(state.link != pb.LINK_STATE_OFFLINE for state in self.client.states())
+        except CallFailed as failed:  # the socket has its name before anybody listens
+            if failed.code != grpc.StatusCode.UNAVAILABLE:
+                raise
+            return False
 
     def models(self):
         """An axis of each model."""
