@@ -144,7 +144,7 @@ server::ServerOptions server_options(const config::ServerSettings& settings) {
           .tls = tls_files(settings),
           .reflection = settings.reflection,
           .limits = {.calls = limits.calls, .streams = limits.streams},
-          .connections = limits.connections,
+          .peers = {.connections = limits.connections},
           .stalled_reader_limit = limits.stalled_reader};
 }
 

@@ -34,7 +34,7 @@ int descriptor_limit() {
 
 }  // namespace
 
-Result<void> AcceptLoop::start(std::vector<Entry> entries, int most) {
+Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Limits& limits) {
   wake_ = FileDescriptor(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   reserve_ = FileDescriptor(open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (wake_.get() < 0 || reserve_.get() < 0)
@@ -43,7 +43,7 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, int most) {
                 "raise LimitNOFILE of the service");
   // The kernel gives out the lowest free number, so the number of a new descriptor tells how many are open.
   first_refused_descriptor_ = std::max(reserve_.get() + 1, descriptor_limit() - kept_descriptors);
-  budgets_.emplace(PeerBudgets::Limits{.connections = most, .per_address = std::max(1, most * 3 / 4)});
+  budgets_.emplace(limits);
   entries_ = std::move(entries);
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "axisd-accept");
@@ -145,11 +145,11 @@ bool AcceptLoop::accept_one(const Entry& entry) {
 void AcceptLoop::refuse(PeerBudgets::Entry why, const std::string& address) {
   const auto count = ++refused_;
   if (!std::has_single_bit(count)) return;
-  const auto* reason = why == PeerBudgets::Entry::address_floods ? "it floods"
+  const auto* reason = why == PeerBudgets::Entry::address_floods ? "it sends floods of requests"
                        : why == PeerBudgets::Entry::address_full
                            ? "it has three quarters of server.limits.connections"
-                           : "there are too many (server.limits.connections)";
-  spdlog::warn("a connection from {} is turned away, as {}: {} since start", address, reason, count);
+                           : "server.limits.connections is reached";
+  spdlog::warn("no place for a connection from {}, {}: {} turned away since start", address, reason, count);
 }
 
 bool AcceptLoop::turn_away(const Entry& entry) {

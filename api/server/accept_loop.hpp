@@ -32,8 +32,8 @@ class AcceptLoop {
   AcceptLoop(const AcceptLoop&) = delete;
   AcceptLoop& operator=(const AcceptLoop&) = delete;
 
-  /// Connections beyond `most`, or beyond three quarters of them from one address, are closed at once.
-  Result<void> start(std::vector<Entry> entries, int most);
+  /// Connections beyond these limits are closed at once.
+  Result<void> start(std::vector<Entry> entries, const PeerBudgets::Limits& limits);
   /// Closes the listening sockets. Idempotent.
   void stop();
 

@@ -24,7 +24,7 @@ PeerBudgets::Entry PeerBudgets::enter(Id id, const std::string& address, TimePoi
   forget_idle(now);
   if (std::cmp_greater_equal(connections_.size(), limits_.connections)) return Entry::full;
   auto& from = addresses_.try_emplace(address, Address{.bucket = {.since = now}}).first->second;
-  if (from.connections >= limits_.per_address) return Entry::address_full;
+  if (from.connections >= std::max(1, limits_.connections * 3 / 4)) return Entry::address_full;
   if (level_of(from.bucket, now) > limits_.burst / 2) return Entry::address_floods;
   ++from.connections;
   connections_.emplace(id, Connection{.address = address, .bucket = {.since = now}});

@@ -11,17 +11,16 @@
 
 namespace axisd::server {
 
-/// Places: an address never has all of them. Bytes: who asks gets answers, so that what is sent is in
-/// proportion to what comes back; a flood (rapid reset, half-open streams, CONTINUATION) brings nothing back.
-/// What an address sends beyond `proportion` times what it gets runs into a bucket that empties at `rate`.
-/// Where it is above `burst` those connections that filled it most are to be cut off, and no further one is
-/// let in until it is down to half of that. Thread: one at a time.
+/// Places: an address has three quarters of them at most. Bytes: who asks gets answers, so that what is sent
+/// is in proportion to what comes back; a flood (rapid reset, half-open streams, CONTINUATION) brings nothing
+/// back. What an address sends beyond `proportion` times what it gets runs into a bucket that empties at
+/// `rate`. Where it is above `burst` those connections that filled it most are to be cut off, and no further
+/// one is let in until it is down to half of that. Thread: one at a time.
 class PeerBudgets {
  public:
   using Id = std::uint64_t;
   struct Limits {
     int connections = 256;  ///< in all
-    int per_address = 192;
     double proportion = 4;
     double rate = 256 * 1024;        ///< bytes per second
     double burst = 2 * 1024 * 1024;  ///< bytes: several of the longest messages

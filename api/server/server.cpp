@@ -160,7 +160,7 @@ Result<int> Server::start() {
     auto* acceptor = socket.unix_path.empty() ? parts_->tcp_acceptor.get() : parts_->unix_acceptor.get();
     entries.push_back({.socket = std::move(socket), .acceptor = acceptor});
   }
-  if (auto accepting = parts_->accept.start(std::move(entries), options_.connections); !accepting)
+  if (auto accepting = parts_->accept.start(std::move(entries), options_.peers); !accepting)
     return fail(std::move(accepting).error());
   auto* health = parts_->server->GetHealthCheckService();
   health->SetServingStatus(true);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "api/server/admission.hpp"
+#include "api/server/peer_budgets.hpp"
 #include "api/server/tls.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
@@ -23,7 +24,7 @@ struct ServerOptions {
   /// gRPC's reflection; without it its clients get UNIMPLEMENTED.
   bool reflection = false;
   Admission::Limits limits{};
-  int connections = 256;
+  PeerBudgets::Limits peers{};
   /// A stream whose reader has not read for so long is cancelled.
   Duration stalled_reader_limit = std::chrono::seconds(2);
   /// What GetConfig, CheckConfig and ReloadConfig ask; outlives the server. nullptr: they are refused.

@@ -35,12 +35,8 @@ class PeerBudgetsTest : public ::testing::Test {
     return cut;
   }
 
-  PeerBudgets budgets_{{.connections = 8,
-                        .per_address = 6,
-                        .proportion = 4,
-                        .rate = 1000,
-                        .burst = 10'000,
-                        .longest_penalty = 20}};
+  PeerBudgets budgets_{
+      {.connections = 8, .proportion = 4, .rate = 1000, .burst = 10'000, .longest_penalty = 20}};
   std::map<PeerBudgets::Id, PeerBudgets::Traffic> traffic_;
   Duration now_{};
 };

@@ -1,10 +1,13 @@
 // Addresses, the accept loop and TLS.
 #include <gmock/gmock.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include <array>
+#include <cerrno>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -124,7 +127,7 @@ TEST_F(Transport, SurvivesRunningOutOfDescriptors) {
 }
 
 TEST_F(Transport, ConnectionsAreBounded) {
-  const auto port = start({.listen = {"127.0.0.1:0"}, .connections = 8});
+  const auto port = start({.listen = {"127.0.0.1:0"}, .peers = {.connections = 8}});
   ASSERT_TRUE(port);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -142,6 +145,44 @@ TEST_F(Transport, ConnectionsAreBounded) {
   EXPECT_TRUE(turned_away);
   clients.clear();
   EXPECT_TRUE(eventually([&] { return stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok(); }));
+}
+
+/// HTTP/2 rapid reset: requests that are taken back at once (CVE-2023-44487).
+TEST_F(Transport, AFloodOfRequestsThatAreTakenBackIsCutOff) {
+  // So little that a slow computer reads more.
+  const auto port = start({.listen = {"127.0.0.1:0"}, .peers = {.rate = 4096, .burst = 32 * 1024}});
+  ASSERT_TRUE(port);
+  const auto honest = connect("127.0.0.1:" + std::to_string(*port));
+  ASSERT_TRUE(stop(honest).first.ok());
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(*port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const FileDescriptor flood(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  ASSERT_EQ(::connect(flood.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  const auto frame = [](char kind, char flags, std::uint32_t stream, std::string_view payload) {
+    std::string bytes{0, 0, static_cast<char>(payload.size()), kind, flags};
+    for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(stream >> shift);
+    return bytes + std::string(payload);
+  };
+  std::string bytes = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(4, 0, 0, "");
+  const std::string path = "/axisd.v1.SystemService/GetInfo";
+  const auto headers = std::string("\x83\x86\x04", 3) + static_cast<char>(path.size()) + path;
+  bool cut_off = false;
+  std::array<char, 65536> answers{};
+  for (std::uint32_t stream = 1; stream < 200'000'000 && !cut_off;) {
+    if (bytes.size() < 100'000)
+      for (int i = 0; i < 200; ++i, stream += 2)
+        bytes += frame(1, 4, stream, headers) + frame(3, 0, stream, std::string_view("\0\0\0\x08", 4));
+    pollfd ready{.fd = flood.get(), .events = POLLIN | POLLOUT, .revents = 0};
+    ASSERT_GT(poll(&ready, 1, 10'000), 0);
+    const auto got = recv(flood.get(), answers.data(), answers.size(), MSG_DONTWAIT);
+    const auto sent = send(flood.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent > 0) bytes.erase(0, static_cast<std::size_t>(sent));
+    cut_off = got == 0 || (sent < 0 && errno != EAGAIN);
+  }
+  EXPECT_TRUE(cut_off);
+  EXPECT_TRUE(stop(honest).first.ok()) << "of the same address, and goes on";
 }
 
 class Tls : public Transport {
