@@ -63,7 +63,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
   {
     if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
-    if (activity->turn) result = co_await look(settings_.reboot_guard);
+    if (activity->turn) result = co_await look(settings_.reboot_guard);  // it may have waited long
     if (!current(*activity) || !may_start(*activity)) co_return;
     if (result && input_active(homing_switch())) result = axisd::fail(reached_switch());
     if (result) {
@@ -74,7 +74,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
       result = co_await drive_->start_homing(**profile, guard(*activity));
     }
   }
-  activity->turn.done();
+  result ? activity->turn.done() : activity->turn.leave();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   if (!co_await follow_homing(activity, since, homed_before)) co_return;

@@ -205,7 +205,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
       if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
     }
   }
-  there ? activity->turn.leave() : activity->turn.done();
+  result && !there ? activity->turn.done() : activity->turn.leave();
   const auto since = env_.clock->now();
   if (there) {  // nothing to do, and nothing is sent
     activity->command->activate();
@@ -307,12 +307,12 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
   {
     if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
-    if (activity->turn) result = co_await look(settings_.reboot_guard);
+    if (activity->turn) result = co_await look(settings_.reboot_guard);  // it may have waited long
     if (!current(*activity) || !may_start(*activity)) co_return;
     base = tracker_.counter();
     if (result) result = co_await drive_->start_velocity(profile, guard(*activity));
   }
-  activity->turn.done();
+  result ? activity->turn.done() : activity->turn.leave();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   co_await follow(activity, base, since);
