@@ -3,8 +3,9 @@
 //   of 1 test_conformance --matrix                                  prints the capability matrix
 //   test_conformance --indexings COUNT [MODEL]                 moves by thirds of a unit: do they add up?
 //   test_conformance --random-moves COUNT [MODEL]              of any size: is each exact, and none refused?
-//   test_conformance --vcan AXISD AXISD_SIM [NAME [PART OF]]   runs the scenarios against these programs, on
+//   test_conformance --vcan AXISD AXISD_SIM [NAME]             runs the scenarios against these programs, on
 //   vcan
+//   test_conformance --vcan-sample AXISD AXISD_SIM PART OF     each of them at least once, in parts
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
@@ -90,11 +91,14 @@ int main(int argc, char** argv) {
     return index_models(std::stoi(arguments[2]), argc == 4 ? arguments[3] : "");
   if (mode == "--random-moves" && (argc == 3 || argc == 4))
     return move_models_at_random(std::stoi(arguments[2]), argc == 4 ? arguments[3] : "");
-  if (mode == "--vcan" && (argc == 4 || argc == 5 || argc == 7)) {
-    Part part;
-    if (argc == 7) part = {.part = std::stoul(arguments[5]), .of = std::stoul(arguments[6])};
-    const auto* const named = argc > 4 ? arguments[4] : "";
-    return run_vcan_suite({.axisd = arguments[2], .axisd_sim = arguments[3]}, part, named) ? 0 : 1;
-  }
+  if (mode == "--vcan" && (argc == 4 || argc == 5))
+    return run_vcan_suite({.axisd = arguments[2], .axisd_sim = arguments[3]}, argc > 4 ? arguments[4] : "")
+               ? 0
+               : 1;
+  if (mode == "--vcan-sample" && argc == 6)
+    return run_vcan_sample({.axisd = arguments[2], .axisd_sim = arguments[3]},
+                           {.part = std::stoul(arguments[4]), .of = std::stoul(arguments[5])})
+               ? 0
+               : 1;
   return RUN_ALL_TESTS();
 }
