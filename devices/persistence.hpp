@@ -84,6 +84,8 @@ class Persistence {
   /// What the start of the daemon found of the files.
   [[nodiscard]] virtual KeptStateSeen seen() const = 0;
 
+  /// Without `done` it may wait up to 1 s for what comes next: of motions that follow each other the last one
+  /// counts. A restart before then finds the axis elsewhere than saved, and restores nothing.
   virtual void save_offset(std::string axis, OffsetRecord offset, Callback done) = 0;
   /// The position is no longer known: after a restart there is nothing to restore.
   virtual void forget_offset(std::string axis, Callback done) = 0;

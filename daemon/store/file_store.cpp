@@ -11,14 +11,28 @@ namespace axisd::store {
 namespace {
 
 /// The journal may have got so much further than the state file knows, in time.
-constexpr auto longest_unknown = std::chrono::seconds(10);
+constexpr Duration longest_unknown = std::chrono::seconds(10);
+
+/// The axis rests elsewhere, and its counter means what it meant: until this is saved the older record fits
+/// nowhere but where the axis was. A record with another meaning fits where it is, and is not waited with.
+bool only_moved(const StoredState& state, const Change& change) {
+  const auto* set = std::get_if<SetOffset>(&change);
+  if (set == nullptr) return false;
+  const auto axis = state.axes.find(set->axis);
+  if (axis == state.axes.end() || !axis->second.offset) return false;
+  auto moved = *axis->second.offset;
+  if (moved.last_position_pulses == set->offset.last_position_pulses) return false;
+  moved.last_position_pulses = set->offset.last_position_pulses;
+  moved.canary = set->offset.canary;
+  return moved == set->offset;
+}
 
 }  // namespace
 
 Result<std::unique_ptr<FileStore>> FileStore::begin(StateDirectory directory, Generation found,
-                                                    KeptStateSeen seen, Executor core) {
+                                                    KeptStateSeen seen, Executor core, SaveDelays delays) {
   std::unique_ptr<FileStore> store(
-      new FileStore(std::move(directory), std::move(found), seen, std::move(core)));
+      new FileStore(std::move(directory), std::move(found), seen, std::move(core), delays));
   auto counted = store->durable_.state;
   ++counted.start_count;
   if (auto written = store->write(counted, store->durable_.state); !written) return fail(written.error());
@@ -35,8 +49,13 @@ Result<void> FileStore::serve(StateWitness& witness) {
   return {};
 }
 
-FileStore::FileStore(StateDirectory directory, Generation found, KeptStateSeen seen, Executor core)
-    : core_(std::move(core)), seen_(seen), directory_(std::move(directory)), durable_(std::move(found)) {}
+FileStore::FileStore(StateDirectory directory, Generation found, KeptStateSeen seen, Executor core,
+                     SaveDelays delays)
+    : core_(std::move(core)),
+      delays_(delays),
+      seen_(seen),
+      directory_(std::move(directory)),
+      durable_(std::move(found)) {}
 
 void FileStore::close() {
   if (!thread_.joinable()) return;
@@ -77,19 +96,34 @@ void FileStore::count_eeprom_writes(std::string axis, std::uint64_t writes, Eepr
 void FileStore::accept_state(Callback done) { enqueue(AcceptState{}, std::move(done)); }
 
 void FileStore::enqueue(Change change, Callback done) {
+  const auto now = monotonic_now();
+  const bool may_wait = !done && only_moved(*current_, change);
   store::apply(*current_, change);
   {
-    const std::scoped_lock lock(
-        mutex_);  // held by the writer only for a swap: the core does not wait for the disk
+    // Held by the writer only for a swap: the core does not wait for the disk.
+    const std::scoped_lock lock(mutex_);
+    if (pending_.empty()) save_latest_ = now + delays_.latest;
+    save_at_ = may_wait ? std::min(now + delays_.settled, save_latest_) : now;
+    if (!may_wait) save_latest_ = now;
     pending_.push_back({.change = std::move(change), .done = std::move(done)});
   }
   wake_.notify_one();
 }
 
+void FileStore::wait_for_work(std::unique_lock<std::mutex>& lock) {
+  const auto look_at = monotonic_now() + longest_unknown;
+  for (;;) {
+    const auto until = pending_.empty() ? look_at : save_at_;
+    const auto left = until - monotonic_now();
+    if (closing_ || left <= Duration{}) return;
+    wake_.wait_for(lock, left);
+  }
+}
+
 void FileStore::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    wake_.wait_for(lock, longest_unknown, [this] { return closing_ || !pending_.empty(); });
+    wait_for_work(lock);
     auto batch = std::exchange(pending_, {});
     const bool last = closing_ && batch.empty();
     lock.unlock();

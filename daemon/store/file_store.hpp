@@ -1,11 +1,13 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
 
+#include "buses/clock.hpp"
 #include "buses/task.hpp"
 #include "daemon/store/change.hpp"
 #include "daemon/store/state_directory.hpp"
@@ -15,14 +17,22 @@
 
 namespace axisd::store {
 
+/// How long the place of an axis that has moved may wait for the next one, where nobody waits for the save. A
+/// restart before it is saved finds the axis elsewhere than at the rest before, and restores no position.
+struct SaveDelays {
+  Duration settled = std::chrono::milliseconds(100);  ///< after the last one
+  Duration latest = std::chrono::seconds(1);          ///< after the first one
+};
+
 /// Persistent state in one directory, written by a thread of its own: everything that was asked for while the
-/// disk was busy goes into the next write together. Thread: core (created and destroyed there, too).
+/// disk was busy goes into the next write together. Where an axis rests is written once for motions that
+/// follow each other. Thread: core (created and destroyed there, too).
 class FileStore final : public Persistence {
  public:
   /// Goes on with what was found in the directory, and durably counts this start, before anything runs.
   /// Blocks on the disk. Errors: storage, with what to do.
   static Result<std::unique_ptr<FileStore>> begin(StateDirectory directory, Generation found,
-                                                  KeptStateSeen seen, Executor core);
+                                                  KeptStateSeen seen, Executor core, SaveDelays delays = {});
   /// Saves once more, so that each file knows the other, and begins to serve. Until then nothing is saved.
   /// `witness` outlives this. Errors: as begin().
   Result<void> serve(StateWitness& witness);
@@ -51,9 +61,10 @@ class FileStore final : public Persistence {
     Change change;
     Callback done;
   };
-  FileStore(StateDirectory directory, Generation found, KeptStateSeen seen, Executor core);
+  FileStore(StateDirectory directory, Generation found, KeptStateSeen seen, Executor core, SaveDelays delays);
   void enqueue(Change change, Callback done);
   void run();
+  void wait_for_work(std::unique_lock<std::mutex>& lock);
   void commit(std::vector<Pending> batch);
   [[nodiscard]] Result<void> write(const StoredState& state, const StoredState& after_failure);
   [[nodiscard]] Result<void> tell_journal(const Generation& generation);
@@ -61,6 +72,7 @@ class FileStore final : public Persistence {
   void report(Pending pending, const Result<void>& result);
 
   Executor core_;
+  const SaveDelays delays_;
   KeptStateSeen seen_;
   StoredState loaded_;
   std::shared_ptr<StoredState> current_ = std::make_shared<StoredState>();  ///< of the core
@@ -75,6 +87,8 @@ class FileStore final : public Persistence {
   std::mutex mutex_;
   std::condition_variable wake_;
   std::vector<Pending> pending_;  // guarded by mutex_
+  TimePoint save_at_{};           // guarded by mutex_: when what is pending is written
+  TimePoint save_latest_{};       // guarded by mutex_: not later than this, whatever else comes
   bool closing_ = false;          // guarded by mutex_
   std::thread thread_;
 };

@@ -112,12 +112,16 @@ void JournalFile::attached(const std::string& command, RequestKey request, Callb
 
 void JournalFile::sending(const Command& command, SendingNote note, Callback done) {
   enqueue({.line = SendingLine{.command = command, .note = std::move(note)},
-           .durable = true,
+           .durable = Durable::at_once,
            .done = std::move(done)});
 }
 
 void JournalFile::ended(const Command& command) {
-  enqueue({.line = EndedLine{.command = command}, .durable = true});
+  // Without it a restart asks the drive what became of a motion. It cannot tell so much of these.
+  const bool drive_knows_less = command.state == CommandState::unknown || command.kind == CommandKind::home ||
+                                command.kind == CommandKind::reset || command.kind == CommandKind::enable;
+  enqueue({.line = EndedLine{.command = command},
+           .durable = drive_knows_less ? Durable::at_once : Durable::soon});
 }
 
 void JournalFile::heard(const Command& command, RequestKey request) {
@@ -127,7 +131,7 @@ void JournalFile::heard(const Command& command, RequestKey request) {
 Result<void> JournalFile::note(StateLine line) {
   std::promise<Result<void>> told;
   auto answer = told.get_future();
-  enqueue({.line = std::move(line), .durable = true, .told = &told});
+  enqueue({.line = std::move(line), .durable = Durable::at_once, .told = &told});
   return answer.get();
 }
 
@@ -146,12 +150,14 @@ void JournalFile::run() {
     const auto something = [this] { return closing_ || !pending_.empty(); };
     if (broken_)
       wake_.wait_for(lock, retry, something);
+    else if (sync_by_)
+      wake_.wait_for(lock, *sync_by_ - monotonic_now(), something);
     else
       wake_.wait(lock, something);
     auto batch = std::exchange(pending_, {});
     const bool last = closing_ && batch.empty();
     lock.unlock();
-    if (!batch.empty() || broken_) commit(std::move(batch));
+    if (!batch.empty() || broken_ || sync_by_) commit(std::move(batch));
     if (last) return;
     lock.lock();
   }
@@ -197,6 +203,21 @@ Result<void> JournalFile::settle() {
 }
 
 Result<void> JournalFile::write(const std::vector<Pending>& batch) {
+  if (auto appended = append(batch); !appended) return appended;
+  const auto asks_for = [&batch](Durable durable) {
+    return std::ranges::find(batch, durable, &Pending::durable) != batch.end();
+  };
+  if (!sync_by_ && asks_for(Durable::soon)) sync_by_ = monotonic_now() + options_.sync_within;
+  // Nothing new: the time is over, or the journal is closed.
+  const bool due = sync_by_ && (batch.empty() || monotonic_now() >= *sync_by_);
+  if (!due && !asks_for(Durable::at_once)) return {};
+  if (auto synced = disk_->sync(); !synced) return synced;
+  synced_to(last_number_);
+  return {};
+}
+
+Result<void> JournalFile::append(const std::vector<Pending>& batch) {
+  if (batch.empty()) return {};
   std::string text;
   if (!told_time_ || model_.now() - *told_time_ >= time_told) {
     told_time_ = model_.now();
@@ -205,17 +226,19 @@ Result<void> JournalFile::write(const std::vector<Pending>& batch) {
   for (const auto& pending : batch) text += encode_line(++last_number_, pending.line);
   if (auto appended = disk_->append(text); !appended) return appended;
   size_ += text.size();
-  if (std::ranges::none_of(batch, &Pending::durable)) return {};
-  if (auto synced = disk_->sync(); !synced) return synced;
-  durable_line_ = last_number_;
   return {};
+}
+
+void JournalFile::synced_to(std::uint64_t line) {
+  durable_line_ = line;
+  sync_by_.reset();
 }
 
 Result<void> JournalFile::rewrite() {
   std::string text(journal_header);
   for (const auto& line : model_.lines()) text += encode_line(++last_number_, line);
   if (auto replaced = disk_->replace(text); !replaced) return replaced;
-  durable_line_ = last_number_;
+  synced_to(last_number_);
   size_ = size_when_rewritten_ = text.size();
   return {};
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <future>
@@ -11,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "buses/clock.hpp"
 #include "buses/task.hpp"
 #include "daemon/store/id_files.hpp"
 #include "daemon/store/journal_disk.hpp"
@@ -32,6 +34,8 @@ struct JournalOptions {
   /// Why it does not know all that it should, beside what its lines tell; empty: it does.
   std::string doubt{};
   std::uint64_t last_number = 0;  ///< its lines have higher ones
+  /// What need not be durable at once shares a sync with all that comes in this time.
+  Duration sync_within = std::chrono::milliseconds(250);
 };
 
 /// The command journal in a file, written by a thread of its own: what is told while the disk is busy goes
@@ -58,9 +62,16 @@ class JournalFile final : public CommandJournal, public StateWitness {
   [[nodiscard]] std::uint64_t durable_line() const override { return durable_line_; }
 
  private:
+  /// When the line is on the disk, where a crash of the computer leaves it. A crash of the daemon alone loses
+  /// nothing that was written.
+  enum class Durable {
+    with_the_next,  ///< that asks for more
+    soon,           ///< within JournalOptions::sync_within
+    at_once,
+  };
   struct Pending {
     JournalLine line;
-    bool durable = false;
+    Durable durable = Durable::with_the_next;
     Callback done{};
     std::promise<Result<void>>* told = nullptr;  ///< waits for it, on a thread of its own
   };
@@ -72,6 +83,8 @@ class JournalFile final : public CommandJournal, public StateWitness {
   void run();
   void commit(std::vector<Pending> batch);
   [[nodiscard]] Result<void> write(const std::vector<Pending>& batch);
+  [[nodiscard]] Result<void> append(const std::vector<Pending>& batch);
+  void synced_to(std::uint64_t line);
   [[nodiscard]] Result<void> rewrite();
   void tell(const std::optional<Error>& trouble);
 
@@ -88,7 +101,8 @@ class JournalFile final : public CommandJournal, public StateWitness {
   std::uint64_t last_number_ = 0;
   std::atomic<std::uint64_t> durable_line_ = 0;
   std::size_t size_ = 0, size_when_rewritten_ = 0;  ///< of the file, bytes
-  bool broken_ = false;  ///< the last write failed: what the file ends with is not known
+  bool broken_ = false;               ///< the last write failed: what the file ends with is not known
+  std::optional<TimePoint> sync_by_;  ///< something was written that is durable `soon`
 
   std::mutex mutex_;
   std::condition_variable wake_;

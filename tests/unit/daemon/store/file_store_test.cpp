@@ -5,7 +5,9 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <csignal>
+#include <optional>
 #include <random>
+#include <thread>
 
 #include "daemon/store/kept_state.hpp"
 #include "daemon/store/state_pair.hpp"
@@ -294,6 +296,101 @@ TEST_F(FileStoreTest, WhatIsInOneFileOnlyIsNotGranted) {
     repair_disk();
   }
   EXPECT_TRUE(decode(temporary_.read("state.v1"))->state.inhibit.active);
+}
+
+/// As of an axis that rests there.
+OffsetRecord at(std::int64_t pulses) {
+  auto record = offset(1);
+  record.last_position_pulses = pulses;
+  record.canary[0] = static_cast<std::uint16_t>(pulses);
+  return record;
+}
+
+/// A file store alone, with delays of its own, and an axis that rests at 0.
+class SaveDelaysTest : public FileStoreTest {
+ protected:
+  void begin(SaveDelays delays) {
+    auto directory = StateDirectory::open(temporary_.path());
+    if (!directory) ADD_FAILURE() << to_string(directory.error());
+    auto begun =
+        FileStore::begin(*std::move(directory), {.journal = {.pair = "p"}}, {}, core_.get_executor(), delays);
+    ASSERT_TRUE(begun && (*begun)->serve(witness_));
+    store_ = *std::move(begun);
+    store_->save_offset("x", at(0), record());
+    wait_for(1);
+    told_ = witness_.told.size();
+  }
+  [[nodiscard]] std::optional<OffsetRecord> saved() const {
+    return decode(temporary_.read("state.v1"))->state.axes.at("x").offset;
+  }
+  [[nodiscard]] std::size_t writes() const { return witness_.told.size() - told_; }
+  /// Ends with the test's time limit where it is never saved.
+  void wait_until_saved(const std::optional<OffsetRecord>& record) const {
+    while (saved() != record) std::this_thread::yield();
+  }
+  static constexpr SaveDelays never{.settled = std::chrono::hours(1), .latest = std::chrono::hours(1)};
+
+  BrokenWitness witness_;
+  std::unique_ptr<FileStore> store_;  // ends first
+  std::size_t told_ = 0;
+};
+
+TEST_F(SaveDelaysTest, WhereAnAxisRestsSharesTheNextWrite) {
+  begin(never);
+  for (std::int64_t pulses = 1; pulses <= 20; ++pulses) store_->save_offset("x", at(pulses), {});
+  EXPECT_EQ(store_->current().axes.at("x").offset, at(20));
+  store_->save_hold("x", {.holder = "hmi", .request_id = {}}, {}, record());
+  wait_for(2);
+  EXPECT_TRUE(results_[1]);
+  EXPECT_EQ(saved(), at(20));
+  EXPECT_EQ(writes(), 1U);
+}
+
+TEST_F(SaveDelaysTest, ASaveThatSomebodyWaitsForIsNotDelayed) {
+  begin(never);
+  store_->save_offset("x", at(1), {});
+  store_->save_offset("x", at(2), record());
+  wait_for(2);
+  EXPECT_EQ(saved(), at(2));
+}
+
+/// The record on the disk fits where the axis stands: a restart would find it.
+TEST_F(SaveDelaysTest, WhatTheCounterMeansIsSavedAtOnce) {
+  begin(never);
+  auto meaning = at(0);
+  meaning.offset_pulses = 7;
+  store_->save_offset("x", meaning, {});
+  wait_until_saved(meaning);
+  meaning.trust = PositionTrust::set;
+  store_->save_offset("x", meaning, {});
+  wait_until_saved(meaning);
+  meaning.canary = {9, 9, 9, 9, 9, 9};
+  store_->save_offset("x", meaning, {});
+  wait_until_saved(meaning);
+  store_->forget_offset("x", {});
+  wait_until_saved(std::nullopt);
+  store_->save_offset("x", at(1), {});
+  wait_until_saved(at(1));
+}
+
+TEST_F(SaveDelaysTest, WhereAnAxisRestsIsSavedWhenItGoesOnResting) {
+  begin({.settled = std::chrono::milliseconds(1), .latest = std::chrono::hours(1)});
+  store_->save_offset("x", at(1), {});
+  wait_until_saved(at(1));
+}
+
+TEST_F(SaveDelaysTest, WhereAnAxisRestsIsSavedAtTheLatestWhateverElseComes) {
+  begin({.settled = std::chrono::hours(1), .latest = std::chrono::milliseconds(1)});
+  store_->save_offset("x", at(1), {});
+  store_->save_offset("x", at(2), {});
+  wait_until_saved(at(2));
+}
+
+TEST_F(SaveDelaysTest, ClosingWaitsForNoDelay) {
+  begin(never);
+  store_->save_offset("x", at(3), {});
+  store_->close();
+  EXPECT_EQ(saved(), at(3));
 }
 
 /// Saves rising offsets without end and reports each durable one through `acknowledge`.

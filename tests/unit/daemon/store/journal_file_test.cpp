@@ -9,6 +9,7 @@
 #include <boost/asio/io_context.hpp>
 #include <csignal>
 #include <set>
+#include <thread>
 
 #include "tests/support/temporary_directory.hpp"
 
@@ -20,6 +21,7 @@ using testing::HasSubstr;
 /// A disk that can be full.
 struct Faults {
   std::atomic<bool> append{false}, sync{false}, replace{false};
+  std::atomic<int> syncs{0};  ///< those asked for
 };
 class FaultyDisk final : public JournalDisk {
  public:
@@ -31,7 +33,10 @@ class FaultyDisk final : public JournalDisk {
     (void)disk_->append(text.substr(0, text.size() / 2));
     return full();
   }
-  Result<void> sync() override { return faults_->sync ? full() : disk_->sync(); }
+  Result<void> sync() override {
+    ++faults_->syncs;
+    return faults_->sync ? full() : disk_->sync();
+  }
   Result<void> replace(std::string_view text) override {
     return faults_->replace ? full() : disk_->replace(text);
   }
@@ -60,19 +65,22 @@ Command done(const std::string& id) {
 }
 
 /// With what is on the disk, as a start that convicts nothing.
-Result<std::unique_ptr<JournalFile>> begin(std::unique_ptr<JournalDisk> disk, WallTime now, Executor core) {
+Result<std::unique_ptr<JournalFile>> begin(std::unique_ptr<JournalDisk> disk, WallTime now, Executor core,
+                                           JournalOptions options = {}) {
   const auto found = disk->read();
   if (!found) return fail(found.error());
   auto loaded = found->regular() ? std::optional(load_journal(found->text)) : std::nullopt;
-  return JournalFile::begin(std::move(disk), std::move(loaded), now, std::move(core));
+  return JournalFile::begin(std::move(disk), std::move(loaded), now, std::move(core), std::move(options));
 }
 
 class JournalFileTest : public testing::Test {
  protected:
-  std::unique_ptr<JournalFile> open(WallTime now = WallTime(std::chrono::hours(1))) {
+  std::unique_ptr<JournalFile> open(WallTime now = WallTime(std::chrono::hours(1)),
+                                    JournalOptions options = {}) {
     auto disk = open_journal_disk(temporary_.path());
     if (!disk) ADD_FAILURE() << to_string(disk.error());
-    auto journal = begin(std::make_unique<FaultyDisk>(std::move(*disk), faults_), now, core_.get_executor());
+    auto journal = begin(std::make_unique<FaultyDisk>(std::move(*disk), faults_), now, core_.get_executor(),
+                         std::move(options));
     if (!journal) {
       ADD_FAILURE() << to_string(journal.error());
       return nullptr;
@@ -123,6 +131,35 @@ TEST_F(JournalFileTest, CommandsAreKnownAfterARestart) {
     EXPECT_EQ(content.commands[1].attached, (std::vector<RequestKey>{{"c", "more", "two"}}));
     EXPECT_FALSE(content.doubtful_until);
   }
+}
+
+/// An end without its sync costs a restart a look at the drive, and nothing else.
+TEST_F(JournalFileTest, EndsShareASync) {
+  const WallTime now(std::chrono::hours(1));
+  {
+    const auto journal = open(now, {.sync_within = std::chrono::hours(1)});
+    const auto before = faults_->syncs.load();
+    for (int number = 1; number <= 20; ++number) {
+      const auto id = std::to_string(number);
+      journal->accepted(command(id), id);
+      journal->ended(done(id));
+      while (!text().contains("ended id=" + id + " ")) std::this_thread::yield();  // a crash leaves it known
+    }
+    EXPECT_EQ(faults_->syncs, before);
+    journal->sending(command("21"), {}, record());
+    wait_for(1);
+    EXPECT_EQ(faults_->syncs, before + 1);
+    journal->ended(done("21"));
+  }
+  EXPECT_EQ(open()->take_loaded().commands.back().command.state, CommandState::done) << "closing syncs";
+}
+
+TEST_F(JournalFileTest, AnEndIsDurableSoonByItself) {
+  const auto journal = open(WallTime(std::chrono::hours(1)), {.sync_within = std::chrono::milliseconds(1)});
+  const auto before = faults_->syncs.load();
+  journal->accepted(command("1"), "one");
+  journal->ended(done("1"));
+  while (faults_->syncs == before) std::this_thread::yield();
 }
 
 TEST_F(JournalFileTest, AFullDiskFailsWhatIsToBeSentUntilThereIsSpaceAgain) {
