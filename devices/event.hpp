@@ -88,9 +88,20 @@ struct KeptStateChange {
   std::string accepted_by;              ///< empty: they stand
 };
 
-using EventContent =
-    std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten, LeaseChange,
-                 ConfigurationReloaded, StopHoldChange, CommandChange, AxisFault, KeptStateChange>;
+/// StopAll inhibits motion of the whole machine, or was released (M14).
+struct InhibitChange {
+  enum class What {
+    latched,      ///< by a StopAll, also one on top of another
+    released,     ///< by a ReleaseStopAll
+    stands,       ///< that of an earlier run, at the start of the daemon
+    not_durable,  ///< it would not outlive a restart of the daemon
+  } what = What::latched;
+  std::string by;  ///< who called StopAll, or released it
+};
+
+using EventContent = std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift,
+                                  FlightRecordWritten, LeaseChange, ConfigurationReloaded, StopHoldChange,
+                                  CommandChange, AxisFault, KeptStateChange, InhibitChange>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon

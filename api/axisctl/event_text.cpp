@@ -93,6 +93,21 @@ std::string text_of(const v1::KeptStateChange& change) {
                                       : fmt::format("state accepted by {}: {}", change.accepted_by(), text);
 }
 
+std::string text_of(const v1::InhibitChange& change) {
+  switch (change.kind()) {
+    case v1::INHIBIT_CHANGE_KIND_LATCHED:
+      return fmt::format("StopAll by {}: motion is inhibited until it is released", change.by());
+    case v1::INHIBIT_CHANGE_KIND_RELEASED:
+      return "StopAll released by " + change.by();
+    case v1::INHIBIT_CHANGE_KIND_STANDS:
+      return fmt::format("the daemon was started, and StopAll by {} stands", change.by());
+    case v1::INHIBIT_CHANGE_KIND_NOT_DURABLE:
+      return fmt::format("StopAll by {} would not outlive a restart: the disk failed", change.by());
+    default:
+      return "a change of StopAll that this axisctl does not know";
+  }
+}
+
 std::string content(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
@@ -117,6 +132,8 @@ std::string content(const v1::Event& event) {
       return text_of(event.axis_fault());
     case v1::Event::kKeptStateChange:
       return text_of(event.kept_state_change());
+    case v1::Event::kInhibitChange:
+      return text_of(event.inhibit_change());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -149,7 +166,7 @@ v1::EventKind parse_event_kind(std::string_view text) {
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
                             "configuration (of a drive), configuration-reloaded, flight, lease, stop "
-                            "(holds), command, axis-fault, kept-state",
+                            "(holds), command, axis-fault, kept-state, inhibit (StopAll)",
                             text));
 }
 

@@ -78,6 +78,14 @@ void fill(const KeptStateChange& from, v1::Event& event) {
   for (const auto& conviction : from.convictions) to_proto(conviction, *to.add_convictions());
   to.set_accepted_by(from.accepted_by);
 }
+
+void fill(const InhibitChange& from, v1::Event& event) {
+  auto& to = *event.mutable_inhibit_change();
+  to.set_kind(static_cast<v1::InhibitChangeKind>(std::to_underlying(from.what) + 1));  // 0 is "unspecified"
+  to.set_by(from.by);
+}
+static_assert(std::to_underlying(InhibitChange::What::not_durable) + 1 ==
+              v1::INHIBIT_CHANGE_KIND_NOT_DURABLE);
 static_assert(std::to_underlying(StopHoldChange::What::not_durable) + 1 ==
               v1::STOP_HOLD_CHANGE_KIND_NOT_DURABLE);
 
@@ -98,6 +106,7 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const CommandChange&) const { return v1::EVENT_KIND_COMMAND_CHANGE; }
     v1::EventKind operator()(const AxisFault&) const { return v1::EVENT_KIND_AXIS_FAULT; }
     v1::EventKind operator()(const KeptStateChange&) const { return v1::EVENT_KIND_KEPT_STATE_CHANGE; }
+    v1::EventKind operator()(const InhibitChange&) const { return v1::EVENT_KIND_INHIBIT_CHANGE; }
   };
   return std::visit(Kind{}, event.content);
 }

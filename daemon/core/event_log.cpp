@@ -12,6 +12,7 @@ namespace {
 std::string owner_of(const std::string& axis, const EventContent& content) {
   if (const auto* change = std::get_if<CommandChange>(&content)) return change->command->client;
   if (const auto* change = std::get_if<StopHoldChange>(&content)) return change->hold.holder;
+  if (const auto* change = std::get_if<InhibitChange>(&content)) return change->by;
   return axis;
 }
 

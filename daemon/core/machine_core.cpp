@@ -135,8 +135,13 @@ void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
   inhibited_by_.store(inhibited ? boost::make_shared<const std::string>(by) : nullptr);
 }
 
+void MachineCore::tell_inhibit(InhibitChange::What what, const std::string& by) {
+  events_.record(parts_.clock->wall(parts_.clock->now()), {}, InhibitChange{.what = what, .by = by});
+}
+
 void MachineCore::start() {
   state_gate_.start();
+  if (inhibited_) tell_inhibit(InhibitChange::What::stands, *inhibited_by());
   expect_stops();
   for (std::size_t i = 0; i < lines_.size(); ++i) lines_[i]->start(recorders_[i]->exchange_observer());
   for (const auto& network : networks_) network->start();
@@ -269,11 +274,12 @@ void MachineCore::save_latch(const std::string& client, std::function<void(std::
       }));
   parts_.persistence->save_inhibit(
       {.active = true, .by = client, .since = parts_.clock->wall(parts_.clock->now())},
-      [this, alive = std::weak_ptr(alive_), latch = latches_, tell](const Result<void>& saved) {
+      [this, client, alive = std::weak_ptr(alive_), latch = latches_, tell](const Result<void>& saved) {
         if (!saved) spdlog::error("the inhibit would not survive a restart: {}", to_string(saved.error()));
         if (alive.expired()) return;
         latch_waits_.erase(latch);
         if (saved) return tell(std::nullopt);
+        tell_inhibit(InhibitChange::What::not_durable, client);
         auto error = saved.error();
         error.message = "the latch of StopAll would not outlive a restart of the daemon: " + error.message;
         tell(std::move(error));
@@ -284,6 +290,7 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
                                                       std::function<void(std::optional<Error>)> latched) {
   ++latches_;
   set_inhibit(true, client);
+  tell_inhibit(InhibitChange::What::latched, client);
   spdlog::warn("StopAll by {}: motion is inhibited until it is released", client);
   save_latch(client, std::move(latched));
   // The line serves stops in the order in which they are queued.
@@ -310,6 +317,7 @@ void MachineCore::release_inhibit(const std::string& client, std::function<void(
                        "release it again if that is right"));
     if (saved) {
       set_inhibit(false, client);
+      tell_inhibit(InhibitChange::What::released, client);
       spdlog::warn("StopAll released by {}", client);
       for (const auto& axis : axes_) axis->refresh();
     }

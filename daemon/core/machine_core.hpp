@@ -166,6 +166,7 @@ class MachineCore {
   void on_event(const std::string& axis, EventContent content);
   void note_fault(const Axis& axis, const EventContent& content);
   void set_inhibit(bool inhibited, const std::string& by);
+  void tell_inhibit(InhibitChange::What what, const std::string& by);
   void save_latch(const std::string& client, std::function<void(std::optional<Error>)> latched);
 
   MachineParts parts_;

@@ -361,6 +361,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
     async def StopAll(self, request, context):
         self.note("StopAll", request, context)
         self.inhibited = True
+        self.happen("", inhibit_change={"kind": "INHIBIT_CHANGE_KIND_LATCHED", "by": "test"})
         results = []
         for axis in self.axes.values():
             if axis.name == "ghost":
@@ -375,6 +376,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
     async def ReleaseStopAll(self, request, context):
         self.note("ReleaseStopAll", request, context)
         self.inhibited = False
+        self.happen("", inhibit_change={"kind": "INHIBIT_CHANGE_KIND_RELEASED", "by": "test"})
         return system_pb.ReleaseStopAllResponse()
 
 

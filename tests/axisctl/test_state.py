@@ -45,6 +45,13 @@ class Axisctl(AxisctlTest):
         self.assertEqual(self.json("state", "accept")[0]["accepted"][0]["text"], TEXT)
         self.assertEqual(self.json("state")[0]["convictions"], [])
 
+    def test_who_called_and_who_released_stop_all_are_events(self):
+        self.run_axisctl("stop", "--all")
+        self.ok("release-stop", "--all")
+        shown = self.ok("events", "--kind", "inhibit")
+        self.assertIn("StopAll by test: motion is inhibited until it is released\n", shown)
+        self.assertIn("StopAll released by test\n", shown)
+
     def test_stop_all_says_that_its_latch_is_not_on_the_disk(self):
         self.server.machine.latch_trouble = FULL
         done = self.run_axisctl("stop", "--all")
@@ -80,6 +87,17 @@ class Python(PythonTest):
                 if event.content.accepted_by:
                     break
         self.assertEqual(seen, [axisd.KeptStateChange((conviction,), ""), axisd.KeptStateChange((conviction,), "test")])
+
+    async def test_who_called_and_who_released_stop_all_are_events(self):
+        await self.machine.stop_all()
+        await self.machine.release_stop_all()
+        seen = []
+        async for event in self.machine.events(kept=True):
+            if isinstance(event.content, axisd.InhibitChange):
+                seen.append(event.content)
+                if event.content.kind == "released":
+                    break
+        self.assertEqual(seen, [axisd.InhibitChange("latched", "test"), axisd.InhibitChange("released", "test")])
 
     async def test_stop_all_says_that_its_latch_is_not_on_the_disk(self):
         self.assertIsNone((await self.machine.stop_all()).not_durable)

@@ -351,6 +351,15 @@ TEST(M14, StopAllInhibitsUntilReleasedAndSurvivesARestart) {
   rig.start_daemon();
   refuse_all();
   EXPECT_EQ(*rig.machine->inhibited_by(), "operator");
+  const auto changes = [&] {
+    std::vector<std::pair<InhibitChange::What, std::string>> all;
+    for (const auto& event : rig.machine->events().events_after(0, 1000).events)
+      if (const auto* change = std::get_if<InhibitChange>(&event.content))
+        all.emplace_back(change->what, change->by);
+    return all;
+  };
+  EXPECT_THAT(changes(), testing::ElementsAre(std::pair(InhibitChange::What::stands, "operator")))
+      << "those of the run before are gone with it";
 
   // The release counts once it is durable.
   rig.store.failing = true;
@@ -360,9 +369,17 @@ TEST(M14, StopAllInhibitsUntilReleasedAndSurvivesARestart) {
   EXPECT_FALSE(released->has_value());
   EXPECT_TRUE(rig.state()->inhibited);
   rig.store.failing = false;
-  rig.machine->release_inhibit("operator", [&](Result<void> result) { released = result; });
+  rig.machine->release_inhibit("shift leader", [&](Result<void> result) { released = result; });
   rig.run(10ms);
   EXPECT_TRUE(released->has_value());
+  rig.machine->stop_all("hmi");
+  rig.run(10ms);
+  rig.machine->release_inhibit("hmi", [&](Result<void> result) { released = result; });
+  rig.run(10ms);
+  EXPECT_THAT(changes(), testing::ElementsAre(std::pair(InhibitChange::What::stands, "operator"),
+                                              std::pair(InhibitChange::What::released, "shift leader"),
+                                              std::pair(InhibitChange::What::latched, "hmi"),
+                                              std::pair(InhibitChange::What::released, "hmi")));
   EXPECT_FALSE(rig.state()->inhibited);
   EXPECT_EQ(rig.complete(MoveRelativeRequest{.distance = 1}).state, CommandState::done);
 }

@@ -122,6 +122,11 @@ TEST(M14KeptState, StopAllSaysWhetherItsLatchIsOnTheDisk) {
   EXPECT_EQ(trouble->reason, Reason::storage);
   EXPECT_THAT(trouble->message, HasSubstr("would not outlive a restart"));
   EXPECT_FALSE(trouble->remedy.empty());
+  std::vector<InhibitChange::What> told;
+  for (const auto& event : rig.machine->events().events_after(0, 1000).events)
+    if (const auto* change = std::get_if<InhibitChange>(&event.content)) told.push_back(change->what);
+  EXPECT_THAT(told, ElementsAre(InhibitChange::What::latched, InhibitChange::What::latched,
+                                InhibitChange::What::not_durable));
   rig.store.failing = false;
   rig.store.slow = true;
   stop_all();

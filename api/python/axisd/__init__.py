@@ -11,7 +11,7 @@ from .budget import AxisBudget, BusBudget, StopBudget
 from .configuration import ConfigChange, ConfigCheck, ConfigFinding, Configuration, Reload
 from .drive import Drive
 from .drives import (Alarm, AxisFault, CommandChange, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
-                     KeptStateChange, LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
+                     InhibitChange, KeptStateChange, LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
                      StateChange, StopHoldChange, TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import (ArgumentError, AxisdError, LeaseLostError, MotionError, RefusedError, StopError,
                      UnreachableError)
@@ -31,7 +31,7 @@ __all__ = [
     "ClassStatistics", "Command", "CommandChange", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
     "ConfigurationDrift", "ConfigurationReloaded", "Conviction", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
-    "GroupMove", "Info", "Jog", "KeptFile", "KeptState", "KeptStateChange", "Latency", "Lease",
+    "GroupMove", "Info", "InhibitChange", "Jog", "KeptFile", "KeptState", "KeptStateChange", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle", "Outcome",
     "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Reload", "ScanProgress", "Segments",

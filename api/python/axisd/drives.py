@@ -277,8 +277,17 @@ class KeptStateChange:
     accepted_by: str
 
 
+@dataclasses.dataclass(frozen=True)
+class InhibitChange:
+    """StopAll inhibits motion of the whole machine, or was released. `kind`: "latched", "released", "stands" (at the
+    start of the daemon) or "not_durable"; `by`: who called StopAll, or released it."""
+    kind: str
+    by: str
+
+
 Content = (TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
-           | ConfigurationReloaded | StopHoldChange | CommandChange | AxisFault | KeptStateChange)
+           | ConfigurationReloaded | StopHoldChange | CommandChange | AxisFault | KeptStateChange
+           | InhibitChange)
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -310,6 +319,9 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
         return AxisFault(ErrorDetail.of(content.cause))
     if kind == "kept_state_change":
         return KeptStateChange(tuple(Conviction.of(each) for each in content.convictions), content.accepted_by)
+    if kind == "inhibit_change":
+        name = event_service_pb2.InhibitChangeKind.Name(content.kind)
+        return InhibitChange(name.removeprefix("INHIBIT_CHANGE_KIND_").lower(), content.by)
     if kind == "stop_hold_change":
         name = event_service_pb2.StopHoldChangeKind.Name(content.kind)
         return StopHoldChange(name.removeprefix("STOP_HOLD_CHANGE_KIND_").lower(), content.holder, content.request_id,

@@ -75,6 +75,18 @@ TEST(EventLog, AClientThatFloodsPushesOutOnlyItsOwn) {
   EXPECT_EQ(all.back().sequence, static_cast<std::uint64_t>(3 * flood + 4));
 }
 
+TEST(EventLog, AClientThatFloodsWithStopAllPushesOutOnlyItsOwn) {
+  EventLog log;
+  log.record({}, "", InhibitChange{.by = "hmi"});
+  log.record({}, "", InhibitChange{.what = InhibitChange::What::released, .by = "panel"});
+  for (std::size_t i = 0; i < 3 * EventLog::capacity; ++i) log.record({}, "", InhibitChange{.by = "flood"});
+  std::uint64_t lost = 0;
+  const auto all = kept(log, lost);
+  EXPECT_GT(lost, 0U);
+  EXPECT_EQ(std::get<InhibitChange>(all.at(0).content).by, "hmi");
+  EXPECT_EQ(std::get<InhibitChange>(all.at(1).content).by, "panel");
+}
+
 TEST(EventLog, ManyClientsShareEvenly) {
   EventLog log;
   for (std::size_t i = 0; i < 2 * EventLog::capacity; ++i) log.record({}, "x", command("a"));
