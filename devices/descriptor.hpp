@@ -82,7 +82,9 @@ struct AlarmSpec {
 /// A key that this model adds to the YAML's `drive:` section.
 struct SettingSpec {
   std::string_view key;
-  std::string_view kind;                      ///< "enum", "integer", "boolean", "path"
+  /// "enum", "integer", "boolean", "path"; "objects": what the drive's file says wrongly, by object. Its keys
+  /// become settings of their own: "objects.6084h:00.access".
+  std::string_view kind;
   std::span<const std::string_view> choices;  ///< of an enum
   std::int64_t minimum = 0, maximum = 0;
   std::string_view default_value;  ///< empty: the drive's value is left alone
@@ -169,6 +171,8 @@ struct DriveDescriptor {
   /// nullptr: this descriptor is every drive's. Errors (invalid_argument): one finding per line.
   Result<std::shared_ptr<const DriveDescriptor>> (*specialise)(
       const DriveDescriptor& model, const std::map<std::string, SettingValue>& settings) = nullptr;
+  /// Of a descriptor made from a file: what is wrong there and does not matter, "FILE:LINE: ..." each.
+  std::span<const std::string> warnings{};
 };
 
 /// All models, generated from the folders. The pointers live as long as the program.

@@ -26,7 +26,8 @@ Conventions conventions_of(const std::map<std::string, SettingValue>& settings);
 class EdsDrive final : public DriveDescriptor {
  public:
   /// Precondition: check_eds() found nothing.
-  EdsDrive(const DriveDescriptor& base, const canopen::Eds& eds, const Conventions& conventions);
+  EdsDrive(const DriveDescriptor& base, const canopen::Eds& eds, const Conventions& conventions,
+           std::vector<std::string> warnings_of_file = {});
   EdsDrive(const EdsDrive&) = delete;
   EdsDrive& operator=(const EdsDrive&) = delete;
 
@@ -35,15 +36,12 @@ class EdsDrive final : public DriveDescriptor {
  private:
   Catalogue catalogue_;
   std::vector<cia402::HomingCode> homing_codes_;
+  std::vector<std::string> warnings_;
   cia402::Model model_;
 };
 
-/// What of the EDS keeps the driver from running such a drive, one text each: objects that are missing, of
-/// the wrong kind, or not writable.
-std::vector<std::string> check_eds(const canopen::Eds& eds);
-
-/// Reads the file of the setting `eds`. Errors (invalid_argument): none is named, it cannot be read, it has
-/// errors
+/// Reads the file of the setting `eds`, with what the settings of its objects say in its place. Errors
+/// (invalid_argument): none is named, it cannot be read, it has errors
 /// ("FILE:LINE: ..." one per line), or check_eds() found something.
 Result<std::shared_ptr<const DriveDescriptor>> specialise(
     const DriveDescriptor& base, const std::map<std::string, SettingValue>& settings);

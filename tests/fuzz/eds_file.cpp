@@ -7,7 +7,8 @@ namespace axisd::fuzz {
 void run(Input input) {
   const auto eds = canopen::parse_eds(text(input.rest()));
   if (eds)
-    expect(eds->objects.size() <= canopen::eds_object_limit, "a file has so many objects at most");
+    expect(eds->objects.size() <= canopen::eds_object_limit && eds->flaws.size() <= canopen::eds_flaw_limit,
+           "a file has so many objects and flaws at most");
   else
     expect(!eds.error().empty() && eds.error().size() <= canopen::eds_problem_limit + 1,
            "what is refused is told, so much of it at most");

@@ -72,6 +72,11 @@ class EdsFile : public ::testing::Test {
     return findings(load(axis));
   }
 
+  [[nodiscard]] std::ptrdiff_t line_of(std::string_view text) const {
+    const auto all = read_text(path_);
+    return 1 + std::ranges::count(all.substr(0, all.find(text)), '\n');
+  }
+
   std::filesystem::path path_;
 };
 
@@ -134,13 +139,13 @@ TEST(Eds, NothingIsSavedByTheWay) {
 }
 
 TEST_F(EdsFile, ErrorsAreNamedWithTheirLines) {
-  write_changed("DefaultValue=0x00020192", "DefaultValue=many");
-  const auto line = [&] {
-    const auto text = read_text(path_);
-    return 1 + std::ranges::count(text.substr(0, text.find("DefaultValue=many")), '\n');
-  }();
+  write_changed("HighLimit=2000000\n", "HighLimit=many\n");
   const auto text = found({.velocity = "1 mm/min"});
-  EXPECT_THAT(text, HasSubstr(fmt::format("test.yaml:15:12: {}:{}: ", path_.string(), line)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("test.yaml:15:12: {}:{}: highlimit=many", path_.string(),
+                                          line_of("HighLimit=many"))));
+  EXPECT_THAT(text,
+              HasSubstr("and axisd uses object 6081h:00; say what the drive's manual says: drive: { objects: "
+                        "{ 6081h: { maximum: NUMBER } } }"));
   EXPECT_THAT(text, HasSubstr("test.yaml:12:")) << "the rest is judged all the same";
 }
 
