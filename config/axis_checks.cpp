@@ -73,7 +73,7 @@ void AxisChecks::specialise() {
   if (model_ == nullptr || model_->specialise == nullptr || !usable("drive")) return;
   for (const auto& setting : model_->settings) {
     const auto key = fmt::format("drive.{}", setting.key);
-    if (!usable(key)) return;
+    if (!clean(key)) return;
     if (!setting.required || axis_.model_settings.contains(std::string(setting.key))) continue;
     add("drive", fmt::format("missing key '{}' in {}drive", setting.key, path_),
         fmt::format("model {} needs it: {}", axis_.model, setting.description));

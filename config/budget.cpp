@@ -9,6 +9,7 @@
 #include "buses/budget_can.hpp"
 #include "buses/budget_rtu.hpp"
 #include "config/checks.hpp"
+#include "config/file_warnings.hpp"
 #include "config/position_warnings.hpp"
 #include "config/quantity.hpp"
 #include "devices/descriptor.hpp"
@@ -166,6 +167,7 @@ std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports) {
 std::vector<std::string> warnings(const Configuration& configuration) {
   auto lines = warnings(budgets(configuration));
   std::ranges::move(position_warnings(configuration), std::back_inserter(lines));
+  std::ranges::move(file_warnings(configuration), std::back_inserter(lines));
   return lines;
 }
 

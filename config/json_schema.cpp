@@ -161,6 +161,11 @@ Object type_of(const KeySpec& spec) {
     case Kind::terminals:
     case Kind::model_settings:
       return result.text("type", "object");  // refined per model
+    case Kind::model_objects:
+      return result.text("type", "object")
+          .raw("minProperties", "1")
+          .raw("propertyNames", Object().text("pattern", whole(spec.pattern)).json())
+          .raw("additionalProperties", section(spec.children).json());
     case Kind::text:
       return result.text("type", "string")
           .text("pattern", whole(spec.pattern))

@@ -3,7 +3,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
+#include <set>
+#include <utility>
 
+#include "buses/canopen/object.hpp"
+#include "config/quantity.hpp"
 #include "config/reader.hpp"
 #include "config/text.hpp"
 #include "config/value.hpp"
@@ -31,6 +36,56 @@ constexpr KeySpec terminal_keys[] = {
      .default_value = "high",
      .choices = levels,
      .apply = [](Target& t, const Value& v) { t.terminal->active_low = v.text == "low"; }},
+};
+
+constexpr std::string_view object_types[] = {"u8", "i8", "u16", "i16", "u32", "i32"};
+constexpr std::string_view object_accesses[] = {"ro", "wo", "rw", "none"};
+constexpr double lowest_value = std::numeric_limits<std::int32_t>::min();
+constexpr double highest_value = std::numeric_limits<std::uint32_t>::max();
+
+void set_of_object(Target& t, std::string_view key, SettingValue value) {
+  t.axis->axis.model_settings.insert_or_assign(fmt::format("{}.{}", t.object, key), std::move(value));
+}
+
+constexpr KeySpec object_keys[] = {
+    {.key = "type",
+     .kind = Kind::choice,
+     .description = "What the object holds.",
+     .example = "i32",
+     .choices = object_types,
+     .apply = [](Target& t, const Value& v) { set_of_object(t, "type", v.text); }},
+    {.key = "access",
+     .kind = Kind::choice,
+     .description = "Whether the object can be read and written; none: the drive does not have it.",
+     .example = "ro",
+     .choices = object_accesses,
+     .apply = [](Target& t, const Value& v) { set_of_object(t, "access", v.text); }},
+    {.key = "minimum",
+     .kind = Kind::integer,
+     .description = "Lowest value that the drive takes.",
+     .example = "1",
+     .minimum = lowest_value,
+     .maximum = highest_value,
+     .apply = [](Target& t, const Value& v) { set_of_object(t, "minimum", v.integer); }},
+    {.key = "maximum",
+     .kind = Kind::integer,
+     .description = "Highest value that the drive takes.",
+     .example = "100000",
+     .minimum = lowest_value,
+     .maximum = highest_value,
+     .apply = [](Target& t, const Value& v) { set_of_object(t, "maximum", v.integer); }},
+    {.key = "default",
+     .kind = Kind::integer,
+     .description = "What the object holds after a power-up; of 6502h and 1018h, always.",
+     .example = "1000",
+     .minimum = lowest_value,
+     .maximum = highest_value,
+     .apply = [](Target& t, const Value& v) { set_of_object(t, "default", v.integer); }},
+    {.key = "pdo",
+     .kind = Kind::boolean,
+     .description = "Whether a PDO can carry the object.",
+     .example = "false",
+     .apply = [](Target& t, const Value& v) { set_of_object(t, "pdo", v.boolean); }},
 };
 
 /// Then it is no typing error: this model lacks it.
@@ -67,6 +122,11 @@ KeySpec setting_schema(const SettingSpec& setting) {
     spec.example = "standard-drive.eds";
     spec.pattern = "[^\\n]+";
     spec.pattern_hint = "write the path of a file";
+  } else if (setting.kind == "objects") {
+    spec.kind = Kind::model_objects;
+    spec.pattern = "[0-9A-Fa-f]{4}h(:[0-9A-Fa-f]{2})?";
+    spec.pattern_hint = "write INDEXh or INDEXh:SUB, both hexadecimal, such as 6084h or 6099h:01";
+    spec.children = object_keys;
   } else if (setting.kind == "integer") {
     spec.kind = Kind::integer;
     spec.example = "1";
@@ -139,13 +199,39 @@ void Reader::read_model_settings(const Node& value, const std::string& path) {
              suggest(key.text, names));
       continue;
     }
-    const auto parsed = parse_value(setting_schema(*setting), node, "");
+    const auto spec = setting_schema(*setting);
+    if (spec.kind == Kind::model_objects) {
+      read_model_objects(spec, node, here);
+      continue;
+    }
+    const auto parsed = parse_value(spec, node, "");
     if (!parsed) {
       report(here, places_.mark(here), parsed.error().message, parsed.error().suggestion);
       continue;
     }
     target_.axis->axis.model_settings.insert_or_assign(std::string(setting->key),
                                                        to_setting(*setting, *parsed, folder));
+  }
+}
+
+void Reader::read_model_objects(const KeySpec& spec, const Node& value, const std::string& path) {
+  if (!check_is_section(value, spec.key, path)) return;
+  std::set<std::string> seen;
+  for (const auto& [key, section] : unique_entries(value)) {
+    const auto here = fmt::format("{}.{}", path, printable(key.text));
+    places_.add(here, key.mark);
+    if (!matches(key.text, spec.pattern)) {
+      report(here, key.mark, fmt::format("{} is no object", config::quoted(key.text)),
+             std::string(spec.pattern_hint));
+      continue;
+    }
+    const auto whole = key.text.contains(':') ? key.text : key.text + ":00";
+    const auto object = canopen::to_string(canopen::Object::of(*parse_object_address(whole)));
+    if (!seen.insert(object).second)
+      report(here, key.mark, fmt::format("object {} stands there twice", object), "write it once");
+    if (!check_is_section(section, key.text, here)) continue;
+    target_.object = fmt::format("{}.{}", spec.key, object);
+    read_section(section, key.mark, spec.children, here);
   }
 }
 

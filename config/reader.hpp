@@ -66,6 +66,7 @@ class Reader {
   void read_terminals(const Node& value, const std::string& path, bool inputs);
   void read_terminal(const Node& value, const std::string& path, bool inputs);
   void read_model_settings(const Node& value, const std::string& path);
+  void read_model_objects(const KeySpec& spec, const Node& value, const std::string& path);
 
   bool check_is_section(const Node& value, std::string_view name, const std::string& path);
   /// The entries of a section without those whose key was there before; reports these.

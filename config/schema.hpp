@@ -19,6 +19,7 @@ enum class Kind : std::uint8_t {
   numbered_sections,  ///< the same under numbers, minimum..maximum
   terminals,          ///< terminals of the model: function, or {function, active}
   model_settings,     ///< keys of the model's descriptor
+  model_objects,      ///< of these: sections with `children`, under objects of the model's file
   text,               ///< matches `pattern`, at most longest_text_value characters
   model,              ///< name of a drive model
   integer,            ///< minimum..maximum
@@ -64,6 +65,7 @@ struct Target {
   DeviceSettings* device = nullptr;
   GroupSettings* group = nullptr;
   ValueSettings* device_value = nullptr;
+  std::string object = {};  ///< of `drive: { objects: ... }`: its settings begin with this
 };
 
 struct KeySpec {

@@ -308,6 +308,7 @@ std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& no
     case Kind::numbered_sections:
     case Kind::terminals:
     case Kind::model_settings:
+    case Kind::model_objects:
       break;
   }
   return wrong(node, fmt::format("'{}' must be a section", spec.key));

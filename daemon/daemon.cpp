@@ -21,6 +21,7 @@
 #include "api/server/server.hpp"
 #include "api/tls/pem_files.hpp"
 #include "config/budget.hpp"
+#include "config/file_warnings.hpp"
 #include "config/position_warnings.hpp"
 #include "daemon/configuration_service.hpp"
 #include "daemon/core/core_loop.hpp"
@@ -208,6 +209,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
   const auto budgets = config::budgets(configuration);
   for (const auto& budget : budgets) log_budget(budget);
   for (const auto& warning : config::position_warnings(configuration)) spdlog::warn("{}", warning);
+  for (const auto& warning : config::file_warnings(configuration)) spdlog::warn("{}", warning);
   const auto instance_id = make_instance_id((*state)->state().loaded().start_count);
   core::MachineService* published_to = nullptr;
   core::MachineCore machine(

@@ -53,6 +53,9 @@ constexpr SettingSpec settings[] = {
      .default_value = "closed",
      .description =
          "Whether 6064h is measured. Open: a release, a quick stop or a limit loses the position."},
+    {.key = "objects",
+     .kind = "objects",
+     .description = "What the drive's manual says of objects and its data sheet does not, or says wrongly."},
 };
 
 std::unique_ptr<Drive> make(DriveContext context) {

@@ -3,12 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "config/budget.hpp"
+#include "config/fields.hpp"
+#include "config/file_warnings.hpp"
 #include "devices/descriptor.hpp"
 #include "tests/unit/config/support.hpp"
 
 namespace axisd::config {
 namespace {
 
+using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr std::string_view template_text = R"(machine: press-1
@@ -147,6 +152,64 @@ TEST_F(EdsFile, ErrorsAreNamedWithTheirLines) {
               HasSubstr("and axisd uses object 6081h:00; say what the drive's manual says: drive: { objects: "
                         "{ 6081h: { maximum: NUMBER } } }"));
   EXPECT_THAT(text, HasSubstr("test.yaml:12:")) << "the rest is judged all the same";
+}
+
+TEST_F(EdsFile, WhatTheConfigurationSaysStandsBeforeIt) {
+  write_changed("HighLimit=2000000\n", "HighLimit=many\n");
+  Axis axis{.velocity = "70 mm/s",
+            .eds = path_.string(),
+            .more = "      objects: { 6081h: { maximum: 1000000 } }\n"};
+  const auto result = load(axis);
+  ASSERT_TRUE(result.configuration) << findings(result);
+  const auto& loaded = result.configuration->axes[0].axis;
+  EXPECT_EQ(find_parameter(loaded.own_descriptor->parameters, 0x608100)->maximum, 1'000'000);
+  EXPECT_EQ(loaded.model_settings.at("objects.6081h:00.maximum"), SettingValue(std::int64_t{1'000'000}));
+  EXPECT_TRUE(file_warnings(*result.configuration).empty()) << "it is settled";
+  axis.velocity = "100 mm/s";  // 1'310'720 increments/s
+  EXPECT_THAT(findings(load(axis)), HasSubstr("at most 915 r/min"));
+  axis.more = "      objects: { 6081h: { maximum: 999999 } }\n";
+  axis.velocity = "70 mm/s";
+  const auto other = load(axis);
+  ASSERT_TRUE(other.configuration) << findings(other);
+  EXPECT_EQ(differences(*result.configuration, *other.configuration).at(0).keys,
+            std::vector<std::string>{"drive.objects.6081h:00.maximum"});
+}
+
+TEST_F(EdsFile, FlawsThatDoNotMatterAreToldOnce) {
+  write_changed("DefaultValue=0x00020192", "DefaultValue=many");
+  Axis axis{.eds = path_.string()};
+  const auto result = load(axis);
+  ASSERT_TRUE(result.configuration) << findings(result);
+  const auto warning =
+      fmt::format("{}:{}: defaultvalue=many: not a number", path_.string(), line_of("DefaultValue=many"));
+  EXPECT_THAT(file_warnings(*result.configuration), ElementsAre(HasSubstr(warning)));
+  EXPECT_THAT(warnings(*result.configuration), Contains(HasSubstr(warning)));
+}
+
+TEST(EdsObjects, KeysAreChecked) {
+  const auto refused = [](const std::string& objects) {
+    return findings(load({.more = fmt::format("      objects: {}\n", objects)}));
+  };
+  EXPECT_EQ(refused("{ 6084h: { type: u32, access: rw, minimum: 1, maximum: 5, default: 2, pdo: false } }"),
+            "");
+  EXPECT_THAT(refused("{ 0x6084: { type: u32 } }"),
+              HasSubstr("'0x6084' is no object; write INDEXh or INDEXh:SUB"));
+  EXPECT_THAT(refused("{ 6084h: { typ: u32 } }"), HasSubstr("did you mean 'type'?"));
+  EXPECT_THAT(refused("{ 6084h: { type: u64 } }"), HasSubstr("'type' cannot be 'u64'"));
+  EXPECT_THAT(refused("{ 6084h: { access: rww } }"), HasSubstr("'access' cannot be 'rww'"));
+  EXPECT_THAT(refused("{ 6084h: u32 }"), HasSubstr("must be a section of keys"));
+  EXPECT_THAT(refused("u32"), HasSubstr("'objects' must be a section of keys"));
+  EXPECT_THAT(refused("{ 6084h: { maximum: 1 }, 6084h:00: { minimum: 1 } }"),
+              HasSubstr("object 6084h:00 stands there twice"));
+  EXPECT_THAT(refused("{ 6084h: { maximum: 4294967296 } }"), HasSubstr("'maximum' is out of range"));
+  EXPECT_THAT(refused("{ 6060h: { maximum: 300 } }"),
+              HasSubstr("drive.objects, 6060h:00: its type cannot hold 'maximum' 300"));
+  EXPECT_THAT(refused("{ 6084h: { minimum: 6, maximum: 5 } }"),
+              HasSubstr("its minimum 6 is above its maximum 5"));
+  EXPECT_THAT(refused("{ 2999h: { type: u8 } }"), HasSubstr("the file does not describe it"));
+  EXPECT_THAT(refused("{ 6084h: { access: none } }"),
+              HasSubstr("object 6084h:00 (profile deceleration) is missing"));
+  EXPECT_THAT(refused("{ 60FDh: { access: none } }"), HasSubstr("has no terminal NEG"));
 }
 
 TEST_F(EdsFile, EachMissingObjectIsNamed) {
