@@ -216,6 +216,11 @@ void AxisChecks::check_time(std::string_view key, Duration value, int minimum_ms
 void AxisChecks::check_times() {
   const auto& capabilities = model_->capabilities;
   check_time("limits.acceleration_time", axis_.limits.acceleration_time, capabilities.minimum_time_ms);
+  if (!capabilities.own_deceleration && given("limits.deceleration_time"))
+    add("limits.deceleration_time",
+        fmt::format("'deceleration_time' has no effect: this drive of model {} brakes as it accelerates",
+                    axis_.model),
+        "leave it out; acceleration_time is for both");
   check_time("limits.deceleration_time", axis_.limits.deceleration_time.value_or(Duration::zero()),
              capabilities.minimum_time_ms);
   if (axis_.homing) {

@@ -126,8 +126,9 @@ struct Capabilities {
   std::int32_t minimum_target_pulses = std::numeric_limits<std::int32_t>::min();
   std::int32_t maximum_target_pulses = std::numeric_limits<std::int32_t>::max();
   bool homing = true;
-  bool homing_ramp = true;    ///< homing has an acceleration time of its own
-  int maximum_segments = 16;  ///< of positions and velocities that the inputs can select
+  bool homing_ramp = true;       ///< homing has an acceleration time of its own
+  bool own_deceleration = true;  ///< motions have a deceleration time of their own; else both ramps are alike
+  int maximum_segments = 16;     ///< of positions and velocities that the inputs can select
   int minimum_segment_time_ms = 30;
   /// The last approach to a home switch follows the search; else an inverted axis cannot use these methods
   /// (M18), unless the model's setting `home_approach` says otherwise.

@@ -54,6 +54,10 @@ double Planner::minimum_velocity() const {
 
 Planner::Ramps Planner::ramps(const MotionValues& asked) const {
   const auto& limits = settings_->limits;
+  if (!capabilities_->own_deceleration) {
+    const auto both = asked.acceleration_time.value_or(limits.acceleration_time);
+    return {.acceleration = both, .deceleration = both};
+  }
   return {.acceleration = asked.acceleration_time.value_or(limits.acceleration_time),
           .deceleration = asked.deceleration_time.value_or(
               asked.acceleration_time.value_or(limits.deceleration_time.value_or(limits.acceleration_time)))};
@@ -78,6 +82,13 @@ void Planner::check_profile(double velocity, const MotionValues& asked, Obstacle
     found.block(out_of_range(fmt::format("velocity {} {}", negative_in_move ? velocity : speed, unit),
                              minimum_velocity(), maximum_velocity(), unit));
   const auto [acceleration, deceleration] = ramps(asked);
+  if (asked.deceleration_time && *asked.deceleration_time != deceleration)
+    found.block(
+        {.reason = Reason::not_supported,
+         .message = fmt::format("deceleration time of {} ms beside an acceleration time of {} ms: the "
+                                "drive brakes as it accelerates",
+                                milliseconds_of(*asked.deceleration_time), milliseconds_of(acceleration)),
+         .remedy = "leave the deceleration time out"});
   check_ramp(acceleration, "acceleration time", found);
   check_ramp(deceleration, "deceleration time", found);
 }

@@ -41,7 +41,9 @@ Plan Planner::lengthened(Plan plan, std::int64_t pulses, Duration wanted) const 
   candidate.acceleration_time = std::min<Duration>(plan.acceleration_time + longer / 2, longest);
   const auto rest =
       longer - std::chrono::duration_cast<milliseconds>(candidate.acceleration_time - plan.acceleration_time);
-  candidate.deceleration_time = std::min<Duration>(plan.deceleration_time + rest, longest);
+  candidate.deceleration_time = capabilities_->own_deceleration
+                                    ? std::min<Duration>(plan.deceleration_time + rest, longest)
+                                    : candidate.acceleration_time;
   candidate.granted.acceleration_time = candidate.acceleration_time;
   candidate.granted.deceleration_time = candidate.deceleration_time;
   const auto per_rpm = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;

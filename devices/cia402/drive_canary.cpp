@@ -51,8 +51,9 @@ std::vector<ContinuityMark> Cia402Drive::marks_until(const MotionBlock& block) c
 
 MotionBlock Cia402Drive::fresh_neutral_block() const {
   constexpr int neutral_rpm = 60, neutral_time = 100, lowest_start = 5;
-  // The deceleration differs a little each time: a record of an earlier power cycle then never fits this one.
+  // One ramp differs a little each time: a record of an earlier power cycle then never fits this one.
   const auto moment = clock_->now().time_since_epoch() / std::chrono::milliseconds(1);
+  const auto differs = 1 + static_cast<std::int32_t>(moment % 61);
   // The data sheet of a drive may not allow as little.
   const auto at_least = [this](Object object, std::int32_t value) {
     const auto* known = find_parameter(model_->descriptor->parameters, object.key());
@@ -60,9 +61,11 @@ MotionBlock Cia402Drive::fresh_neutral_block() const {
                             : static_cast<std::int32_t>(std::max<std::int64_t>(value, known->minimum));
   };
   const auto velocity = encode_velocity(*model_, setup_.pulses_per_revolution, neutral_rpm);
+  const bool two_ramps = model_->descriptor->capabilities.own_deceleration;
   // Target 0: should a terminal start a relative move, it goes nowhere.
-  return {0, at_least(object::profile_velocity, velocity), at_least(object::acceleration, neutral_time),
-          at_least(object::deceleration, neutral_time) + 1 + static_cast<std::int32_t>(moment % 61),
+  return {0, at_least(object::profile_velocity, velocity),
+          at_least(object::acceleration, neutral_time) + (two_ramps ? 0 : differs),
+          two_ramps ? at_least(object::deceleration, neutral_time) + differs : 0,
           model_->objects.start_speed ? lowest_start : 0};
 }
 
@@ -88,11 +91,10 @@ bool Cia402Drive::is_expected(const MotionBlock& block) const {
 
 Task<Result<MotionBlock>> Cia402Drive::read_block(SdoOptions options) {
   MotionBlock block{};
-  std::size_t field = 0;
-  for (const auto object : motion_objects(*model_)) {
+  for (const auto& [field, object] : motion_objects(*model_)) {
     const auto value = co_await read_object(object, options);
     if (!value) co_return fail(value.error());
-    block.at(field++) = static_cast<std::int32_t>(*value);
+    block.at(field) = static_cast<std::int32_t>(*value);
   }
   co_return block;
 }
@@ -118,14 +120,14 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
   const auto objects = motion_objects(*model_);
   const bool known = expected_.size() == 1;
   auto present = known ? expected_.front() : MotionBlock{};
-  std::vector<std::size_t> written;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (known && present.at(i) == block.at(i)) continue;
-    const auto done = co_await write_object(objects[i], block.at(i), 0, options);
+  std::vector<MotionObject> written;
+  for (const auto& one : objects) {
+    if (known && present.at(one.field) == block.at(one.field)) continue;
+    const auto done = co_await write_object(one.object, block.at(one.field), 0, options);
     if (rebooted_) co_return fail(lost_memory());
     const bool uncertain = !done && done.error().outcome == Outcome::unknown;
     auto after = present;
-    after.at(i) = block.at(i);
+    after.at(one.field) = block.at(one.field);
     if (known) {
       expected_ = {present};
       if (uncertain) expected_.push_back(after);  // without a reply either content may stand there now
@@ -135,16 +137,16 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
     }
     if (!done) co_return done;
     present = after;
-    written.push_back(i);
+    written.push_back(one);
   }
   expected_ = {block};
   expected_marks_.clear();
-  for (const auto i : written) {
-    const auto value = co_await read_object(objects[i], options);
+  for (const auto& [field, object] : written) {
+    const auto value = co_await read_object(object, options);
     if (!value) co_return fail(value.error());
-    if (*value != block.at(i))
-      co_return fail(error_at(Reason::misconfigured, objects[i],
-                              fmt::format("it reads {} after {} was written", *value, block.at(i)),
+    if (*value != block.at(field))
+      co_return fail(error_at(Reason::misconfigured, object,
+                              fmt::format("it reads {} after {} was written", *value, block.at(field)),
                               "check whether another master writes to this drive"));
   }
   co_return Result<void>{};

@@ -61,6 +61,11 @@ std::int32_t ramp(const Model& model, std::int64_t pulses_per_revolution, int rp
   return std::max(1, clamped(std::abs(rpm) * per_rpm / seconds));
 }
 
+/// 0: the drive has none of its own.
+std::int32_t braking_ramp(const Model& model, std::int64_t pulses_per_revolution, int rpm, Duration time) {
+  return model.descriptor->capabilities.own_deceleration ? ramp(model, pulses_per_revolution, rpm, time) : 0;
+}
+
 std::int64_t value_of(const Values& values, const std::optional<canopen::Object>& object) {
   if (!object) return 0;
   const auto found = values.find(object->key());
@@ -199,10 +204,13 @@ std::optional<bool> home_bit(const Model& model, const Values& values) {
   return model.status.homed != 0 ? std::optional(false) : std::nullopt;
 }
 
-std::vector<canopen::Object> motion_objects(const Model& model) {
-  std::vector<canopen::Object> objects{object::target_position, object::profile_velocity,
-                                       object::acceleration, object::deceleration};
-  if (model.objects.start_speed) objects.push_back(*model.objects.start_speed);
+std::vector<MotionObject> motion_objects(const Model& model) {
+  std::vector<MotionObject> objects{{target, object::target_position},
+                                    {speed, object::profile_velocity},
+                                    {acceleration, object::acceleration}};
+  if (model.descriptor->capabilities.own_deceleration)
+    objects.push_back({deceleration, object::deceleration});
+  if (model.objects.start_speed) objects.push_back({start_speed, *model.objects.start_speed});
   return objects;
 }
 
@@ -214,7 +222,7 @@ std::int32_t encode_velocity(const Model& model, std::int64_t pulses_per_revolut
 MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const MoveProfile& profile) {
   return {profile.target_pulses, encode_velocity(model, pulses_per_revolution, profile.velocity_rpm),
           ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
-          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
+          braking_ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
           model.objects.start_speed ? profile.start_rpm : 0};
 }
 
@@ -222,7 +230,7 @@ MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const
                    const MotionBlock& present) {
   return {present[target], present[speed],
           ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
-          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
+          braking_ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
           model.objects.start_speed ? profile.start_rpm : 0};
 }
 
@@ -242,10 +250,9 @@ std::vector<std::pair<canopen::Object, std::int64_t>> encode(const Model& model,
 
 MotionBlock default_block(const Model& model) {
   MotionBlock block{};
-  std::size_t field = 0;
-  for (const auto object : motion_objects(model)) {
+  for (const auto& [field, object] : motion_objects(model)) {
     const auto* known = find_parameter(model.descriptor->parameters, object.key());
-    block.at(field++) = known == nullptr ? 0 : static_cast<std::int32_t>(known->default_value.value_or(0));
+    block.at(field) = known == nullptr ? 0 : static_cast<std::int32_t>(known->default_value.value_or(0));
   }
   return block;
 }

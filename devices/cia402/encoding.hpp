@@ -65,11 +65,16 @@ std::optional<bool> home_bit(const Model& model, const Values& values);
 /// Alarm code of a 603Fh or EMCY error code; 0: none, or none of the drive's own.
 std::uint16_t alarm_of(const Model& model, std::uint16_t error_code);
 
-/// Objects that a start uses and that stand in RAM; where the model has no start speed, one less.
-std::vector<canopen::Object> motion_objects(const Model& model);
-/// What they hold: 607Ah, 6081h, 6083h, 6084h, start speed (0 where there is none).
+/// What the objects hold that a start uses: 607Ah, 6081h, 6083h, 6084h, start speed; 0 where a drive has
+/// none.
 using MotionBlock = std::array<std::int32_t, 5>;
 enum MotionField : std::uint8_t { target, speed, acceleration, deceleration, start_speed };
+struct MotionObject {
+  MotionField field;
+  canopen::Object object;
+};
+/// Those that the drive has, in the order of writing. They stand in RAM.
+std::vector<MotionObject> motion_objects(const Model& model);
 
 MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const MoveProfile& profile);
 /// `present`: what a velocity motion leaves as it is.

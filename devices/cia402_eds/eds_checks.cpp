@@ -63,26 +63,27 @@ constexpr auto used_if_there = std::to_array<Used>({
     {object::drive_modes, bit(EdsPart::value)},
 });
 
+enum class Use : std::uint8_t { read, written, written_if_possible };
 struct Needed {
   Object object;
   std::string_view name;
-  bool written;
+  Use use;
   std::string_view type;  ///< as drive: { objects: ... } has it
   unsigned parts = kind;
 };
 /// What each start, stop and reading of the driver uses, whatever else a drive has.
 constexpr auto needed = std::to_array<Needed>({
-    {cia402::object::control_word, "control word", true, "u16"},
-    {cia402::object::status_word, "status word", false, "u16"},
-    {cia402::object::mode, "modes of operation", true, "i8"},
-    {cia402::object::mode_display, "modes of operation display", false, "i8"},
-    {cia402::object::position, "position actual value", false, "i32"},
-    {object::velocity_value, "velocity actual value: nothing else tells standstill", false, "i32"},
-    {cia402::object::target_position, "target position", true, "i32", whole},
-    {cia402::object::profile_velocity, "profile velocity", true, "u32", whole},
-    {cia402::object::acceleration, "profile acceleration", true, "u32", whole},
-    {cia402::object::deceleration, "profile deceleration", true, "u32", whole},
-    {cia402::object::target_velocity, "target velocity", true, "i32", whole},
+    {cia402::object::control_word, "control word", Use::written, "u16"},
+    {cia402::object::status_word, "status word", Use::read, "u16"},
+    {cia402::object::mode, "modes of operation", Use::written, "i8"},
+    {cia402::object::mode_display, "modes of operation display", Use::read, "i8"},
+    {cia402::object::position, "position actual value", Use::read, "i32"},
+    {object::velocity_value, "velocity actual value: nothing else tells standstill", Use::read, "i32"},
+    {cia402::object::target_position, "target position", Use::written, "i32", whole},
+    {cia402::object::profile_velocity, "profile velocity", Use::written, "u32", whole},
+    {cia402::object::acceleration, "profile acceleration", Use::written, "u32", whole},
+    {cia402::object::deceleration, "profile deceleration", Use::written_if_possible, "u32", whole},
+    {cia402::object::target_velocity, "target velocity", Use::written, "i32", whole},
 });
 
 /// As the configuration names it: without a sub-index of 0.
@@ -112,12 +113,14 @@ std::optional<Object> left_open(const EdsFlaw& flaw, const Overrides& overrides)
 }
 
 void check_needed(const Eds& eds, const Needed& one, std::vector<EdsFinding>& found) {
-  const auto& [object, name, written, type, parts] = one;
+  const auto& [object, name, use, type, parts] = one;
+  if (use == Use::written_if_possible && !can_write(eds, object)) return;
   const auto* entry = eds.find(object);
   const auto add = [&](std::string_view what, std::string settled_by) {
     found.push_back(
         {0, fmt::format("object {} ({}) {}", to_string(object), name, what), std::move(settled_by)});
   };
+  const bool written = use != Use::read;
   const std::string_view access = written ? "rw" : "ro";
   if (entry == nullptr) {
     add("is missing", fmt::format("{}: {{ type: {}, access: {} }}", name_of(object), type, access));
@@ -139,6 +142,11 @@ bool supports(const Eds& eds, unsigned mode_bit) {
   const auto* modes = eds.find(object::drive_modes);
   const auto value = modes == nullptr || !modes->known() ? 0 : modes->known()->value;
   return value == 0 || (static_cast<std::uint64_t>(value) >> mode_bit & 1U) != 0;
+}
+
+bool can_write(const Eds& eds, Object object) {
+  const auto* entry = eds.find(object);
+  return entry != nullptr && canopen::writable(entry->access);
 }
 
 std::vector<EdsFinding> check_eds(const Eds& eds, const Overrides& overrides) {
@@ -178,8 +186,7 @@ std::string remedy_of(const std::vector<EdsFinding>& findings) {
                                   fmt::join(keys_to_write, ", "));
   if (!of_the_drive) return by_key;
   return "model cia402 needs a drive with profile position and profile velocity mode; where the drive has "
-         "what its "
-         "file lacks, " +
+         "what its file lacks, " +
          by_key;
 }
 

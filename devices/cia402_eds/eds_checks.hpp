@@ -27,6 +27,8 @@ std::vector<std::string> warnings_of(const canopen::Eds& eds, const Overrides& o
 
 /// 6502h; without it, or without its value, a drive is taken to have every mode.
 bool supports(const canopen::Eds& eds, unsigned mode_bit);
+/// The drive has it, and it is not read-only.
+bool can_write(const canopen::Eds& eds, canopen::Object object);
 
 namespace object {
 

@@ -35,7 +35,7 @@ bool can_home(const Eds& eds) {
   constexpr unsigned homing_bit = 5;
   for (const auto object :
        {cia402::object::homing_method, cia402::object::homing_speed, cia402::object::homing_search_speed})
-    if (eds.find(object) == nullptr || !canopen::writable(eds.find(object)->access)) return false;
+    if (!can_write(eds, object)) return false;
   return supports(eds, homing_bit);
 }
 
@@ -101,6 +101,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   capabilities = capabilities_of(base.capabilities, parameters, conventions);
   capabilities.homing = !homing_codes_.empty();
   capabilities.homing_ramp = eds.find(cia402::object::homing_acceleration) != nullptr;
+  capabilities.own_deceleration = can_write(eds, cia402::object::deceleration);
   const bool has_inputs = eds.find(object::inputs_value) != nullptr;
   if (!has_inputs) inputs = {};
   specialise = nullptr;

@@ -41,8 +41,8 @@ class EdsDrive final : public DriveDescriptor {
 };
 
 /// Reads the file of the setting `eds`, with what the settings of its objects say in its place. Errors
-/// (invalid_argument): none is named, it cannot be read, it has errors
-/// ("FILE:LINE: ..." one per line), or check_eds() found something.
+/// (invalid_argument): none is named, it cannot be read, an object cannot be as its settings say, or
+/// check_eds() found something ("FILE:LINE: ..." one per line).
 Result<std::shared_ptr<const DriveDescriptor>> specialise(
     const DriveDescriptor& base, const std::map<std::string, SettingValue>& settings);
 

@@ -207,9 +207,18 @@ TEST(EdsObjects, KeysAreChecked) {
   EXPECT_THAT(refused("{ 6084h: { minimum: 6, maximum: 5 } }"),
               HasSubstr("its minimum 6 is above its maximum 5"));
   EXPECT_THAT(refused("{ 2999h: { type: u8 } }"), HasSubstr("the file does not describe it"));
-  EXPECT_THAT(refused("{ 6084h: { access: none } }"),
-              HasSubstr("object 6084h:00 (profile deceleration) is missing"));
+  EXPECT_THAT(refused("{ 6083h: { access: none } }"),
+              HasSubstr("object 6083h:00 (profile acceleration) is missing"));
   EXPECT_THAT(refused("{ 60FDh: { access: none } }"), HasSubstr("has no terminal NEG"));
+}
+
+TEST(EdsObjects, WithoutADecelerationBothRampsAreAlike) {
+  for (const std::string access : {"none", "ro"}) {
+    Axis axis{.more = fmt::format("      objects: {{ 6084h: {{ access: {} }} }}\n", access)};
+    EXPECT_EQ(findings(load(axis)), "") << access;
+    axis.velocity = "100 mm/s, deceleration_time: 80 ms";
+    EXPECT_THAT(findings(load(axis)), HasSubstr("'deceleration_time' has no effect")) << access;
+  }
 }
 
 TEST_F(EdsFile, EachMissingObjectIsNamed) {

@@ -73,6 +73,7 @@ TEST(EdsChecks, AFlawInWhatIsUsedIsAnErrorThatAKeySettles) {
        "6081h: { maximum: NUMBER }"},
       {"60FF", "LowLimit", "LowLimit=0xFFFFFFFFF", "60FFh:00", "minimum", std::int64_t{-5000},
        "60FFh: { minimum: NUMBER }"},
+      {"6084", "AccessType", "AccessType=maybe", "6084h:00", "access", "ro", "6084h: { access: ACCESS }"},
       {"6083", "DefaultValue", "DefaultValue=-1", "6083h:00", "default", std::int64_t{100},
        "6083h: { default: NUMBER }"},
       {"6083", "DefaultValue", "DefaultValue=1\nDefaultValue=2", "6083h:00", "default", std::int64_t{100},
@@ -131,20 +132,20 @@ TEST(EdsChecks, TheRemedyNamesKeysAndNeverTheFile) {
   const auto of = [](const std::string& text) { return remedy_of(judge(text).findings); };
   EXPECT_EQ(of(changed("6081", "HighLimit", "HighLimit=x")),
             "say what the drive's manual says: drive: { objects: { 6081h: { maximum: NUMBER } } }");
-  EXPECT_THAT(of(changed("6084", "AccessType", "AccessType=ro")),
+  EXPECT_THAT(of(changed("6083", "AccessType", "AccessType=ro")),
               AllOf(HasSubstr("profile position and profile velocity mode"),
-                    HasSubstr("drive: { objects: { 6084h: { access: rw } } }")));
+                    HasSubstr("drive: { objects: { 6083h: { access: rw } } }")));
   EXPECT_THAT(of(changed("6502", "DefaultValue", "DefaultValue=1")), HasSubstr("6502h: { default: NUMBER }"));
   EXPECT_THAT(of("[1000]\nParameterName=a\nDataType=7\nAccessType=ro\n"), Not(HasSubstr("correct")));
 }
 
 TEST(EdsChecks, WhatTheFileLacksCanBeSaid) {
   auto text = example();
-  const auto at = text.find("\n[6084]");
+  const auto at = text.find("\n[6083]");
   text.replace(at, 7, "\n[Unused]");
-  EXPECT_EQ(judge(text).findings.at(0).settled_by, "6084h: { type: u32, access: rw }");
-  EXPECT_THAT(judge(text, {{"objects.6084h:00.type", "u32"}}).refused_settings, SizeIs(1));
-  const Settings settings{{"objects.6084h:00.type", "u32"}, {"objects.6084h:00.access", "rw"}};
+  EXPECT_EQ(judge(text).findings.at(0).settled_by, "6083h: { type: u32, access: rw }");
+  EXPECT_THAT(judge(text, {{"objects.6083h:00.type", "u32"}}).refused_settings, SizeIs(1));
+  const Settings settings{{"objects.6083h:00.type", "u32"}, {"objects.6083h:00.access", "rw"}};
   EXPECT_THAT(judge(text, settings).findings, IsEmpty());
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "devices/cia402/encoding.hpp"
 #include "devices/cia402/objects.hpp"
 #include "devices/cia402_eds/eds_checks.hpp"
 #include "devices/cia402_eds/simulator_dictionary.hpp"
@@ -15,6 +16,7 @@
 namespace axisd::cia402_eds {
 namespace {
 
+using namespace std::chrono_literals;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -153,6 +155,24 @@ std::vector<std::string> missing_in(const std::string& text) {
   std::vector<std::string> messages;
   for (const auto& finding : check_eds(parsed(text))) messages.push_back(finding.message);
   return messages;
+}
+
+TEST(EdsDrive, BrakesAsItAcceleratesWithoutADeceleration) {
+  auto read_only = example();
+  read_only.replace(read_only.find("AccessType=rww", read_only.find("\n[6084]")), 14, "AccessType=ro");
+  const MoveProfile profile{
+      .target_pulses = 5, .velocity_rpm = 60, .acceleration_time = 100ms, .deceleration_time = 100ms};
+  for (const auto& text : {without(example(), "6084"), read_only}) {
+    EXPECT_THAT(missing_in(text), ElementsAre());
+    const auto drive = drive_of(text);
+    EXPECT_FALSE(drive.capabilities.own_deceleration);
+    EXPECT_EQ(drive.can_transactions.continuity_transfers, 3);
+    EXPECT_EQ(cia402::encode(drive.model(), 1000, profile), (cia402::MotionBlock{5, 1000, 10'000, 0, 0}));
+    EXPECT_EQ(cia402::default_block(drive.model()), (cia402::MotionBlock{0, 10'000, 100'000, 0, 0}));
+  }
+  const auto both = drive_of(example());
+  EXPECT_TRUE(both.capabilities.own_deceleration);
+  EXPECT_EQ(cia402::encode(both.model(), 1000, profile), (cia402::MotionBlock{5, 1000, 10'000, 10'000, 0}));
 }
 
 TEST(EdsDrive, NeedsWhatTheDriverUses) {

@@ -1,0 +1,41 @@
+// M12 on a CiA 402 drive without 6084h: it brakes as it accelerates.
+#include <gtest/gtest.h>
+
+#include "tests/rules/model_rig.hpp"
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(M12, WithoutADecelerationOfItsOwnTheDriveBrakesAsItAccelerates) {
+  ModelRig rig({.model = "cia402", .limits = false, .drive_keys = "objects: { 6084h: { access: none } }"});
+  const auto done = [&rig](const Action& action) {
+    auto command = rig.complete(action);
+    EXPECT_EQ(command.state, CommandState::done) << describe(command);
+    return command;
+  };
+  const auto untouched = rig.drive->peek(0x608400);
+  done(EnableRequest{});
+  done(SetPositionRequest{.position = 100});
+  const auto move = done(MoveRelativeRequest{.distance = 20, .with = {.acceleration_time = 250ms}});
+  EXPECT_EQ(move.granted.deceleration_time, std::optional<Duration>(250ms));
+  const auto refused = rig.try_submit(
+      MoveRelativeRequest{.distance = 1, .with = {.acceleration_time = 250ms, .deceleration_time = 100ms}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::not_supported) << to_string(refused.error());
+  for (const Action& action :
+       {Action(MoveRelativeRequest{.distance = 200, .with = {.acceleration_time = 300ms}}),
+        Action(MoveVelocityRequest{.velocity = -50, .with = {.acceleration_time = 300ms}})}) {
+    ASSERT_TRUE(rig.try_submit(action));
+    rig.run(800ms);
+    EXPECT_TRUE(rig.moving());
+    EXPECT_EQ(done(StopRequest{}).granted.deceleration_time, std::optional<Duration>(300ms));
+    EXPECT_FALSE(rig.moving());
+  }
+  EXPECT_EQ(rig.drive->peek(0x608400), untouched) << "it was never written";
+}
+
+}  // namespace
+}  // namespace axisd::test
