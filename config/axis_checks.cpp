@@ -369,6 +369,11 @@ void AxisChecks::check_homing() {
         fmt::format("'acceleration_time' has no effect: this drive of model {} has none for homing",
                     axis_.model),
         "leave it out");
+  if (model_ != nullptr && model_->inputs.empty() && given("homing.backoff"))
+    add("homing.backoff",
+        fmt::format("'backoff' has no effect: this drive of model {} does not show its switches",
+                    axis_.model),
+        "leave it out: the drive leaves an active switch by itself");
   check_below("homing.velocity", homing.velocity, "limits.velocity", axis_.limits.velocity);
   check_below("homing.search_velocity", homing.search_velocity, "homing.velocity", homing.velocity);
 }

@@ -125,6 +125,8 @@ void AxisChecks::check_fixed_function(const TerminalSettings& terminal, const Te
 
 void AxisChecks::need_input(std::string_view key, std::string_view function, const std::string& message) {
   if (input_with(function) != nullptr || model_ == nullptr || !clean("inputs")) return;
+  // A drive that shows no inputs may have its switches all the same.
+  if (model_->inputs.empty()) return;
   const auto free = free_terminal(model_->inputs, axis_.inputs);
   add(key, fmt::format("{} needs an input with function '{}'", message, function),
       free.empty() ? "no input is free for it" : fmt::format("add inputs: {{ {}: {} }}", free, function));

@@ -47,7 +47,7 @@ bool is_standard_drive(std::string_view model) { return model == "cia402"; }
 
 /// Empty: this model has none with that function.
 std::string_view terminal_of(const ModelRigOptions& options, std::string_view function) {
-  if (function == "motor_free" && !options.free_input) return {};
+  if (!options.shows_inputs || (function == "motor_free" && !options.free_input)) return {};
   const auto* found = std::ranges::find(terminals, function, &Terminal::function);
   if (found == std::end(terminals)) return {};
   if (!is_standard_drive(options.model)) return found->terminal;
@@ -66,6 +66,7 @@ std::string yaml_of(const ModelRigOptions& options, bool on_can) {
     keys += fmt::format("{}{}: {}", keys.empty() ? "" : ", ", key, value);
   };
   if (is_standard_drive(options.model)) add("eds", in_source_tree("config/examples/standard-drive.eds"));
+  if (!options.shows_inputs) add("objects", "{ 60FDh: { access: none } }");
   for (const auto& one : other_readings)
     if (const auto found = options.switches.find(one.switch_name);
         found != options.switches.end() && found->second)
@@ -74,13 +75,14 @@ std::string yaml_of(const ModelRigOptions& options, bool on_can) {
       "machine: test\nbuses:\n  line: {{ {} }}\naxes:\n  axis:\n    bus: line\n    node: 5\n    model: {}\n"
       "    unit: mm\n    scale: {{ microstep: 1000 pulses/rev, travel: 10 mm/rev, invert: {} }}\n"
       "    limits: {{ {}velocity: 100 mm/s }}\n{}"
-      "    homing: {{ method: {}, velocity: 40 mm/s, search_velocity: 5 mm/s, position: 3, backoff: 5 mm, "
-      "timeout: 40 s{}{} }}\n    inputs:\n{}{}",
+      "    homing: {{ method: {}, velocity: 40 mm/s, search_velocity: 5 mm/s, position: 3, {}"
+      "timeout: 40 s{}{} }}\n{}{}{}",
       on_can ? "canopen: { interface: sim, bitrate: 1000000, sync_period: 20 ms }"
              : "modbus_rtu: { port: sim, baud: 115200 }",
       options.model, options.invert, options.limits ? "position: [-58, 408], " : "",
       options.limits ? "    jog_travel: 10 mm\n" : "", options.invert ? "negative_limit" : "home_negative",
-      options.homing_keys.empty() ? "" : ", ", options.homing_keys, inputs,
+      options.shows_inputs ? "backoff: 5 mm, " : "", options.homing_keys.empty() ? "" : ", ",
+      options.homing_keys, inputs.empty() ? "" : "    inputs:\n", inputs,
       keys.empty() ? "" : fmt::format("    drive: {{ {} }}\n", keys));
 }
 

@@ -26,9 +26,10 @@ struct ModelRigOptions {
   std::string model;
   bool invert = false;
   simulation::Switches switches{};
-  int noise = 1;           ///< counts of the encoder, where there is one; it follows and settles, too
-  bool free_input = true;  ///< motor_free at terminal X3, where the model has such a function
-  bool limits = true;      ///< of the position; without them endless motion is in the drive's velocity mode
+  int noise = 1;             ///< counts of the encoder, where there is one; it follows and settles, too
+  bool free_input = true;    ///< motor_free at terminal X3, where the model has such a function
+  bool shows_inputs = true;  ///< of cia402: 60FDh is there
+  bool limits = true;        ///< of the position; without them endless motion is in the drive's velocity mode
   std::string homing_keys{};  ///< further keys under homing:, "offset: 2 mm"
   std::string drive_keys{};   ///< further keys under drive:, "a: b, c: d"
 };

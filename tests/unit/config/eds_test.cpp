@@ -245,6 +245,11 @@ TEST_F(EdsFile, ADriveWithoutDigitalInputsHasNoTerminals) {
   EXPECT_THAT(
       found({.inputs = "NEG: negative_limit"}),
       HasSubstr("this drive of model cia402 has no terminal NEG: its data sheet has no object for it"));
+  const std::string homing =
+      "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 mm/s";
+  EXPECT_EQ(found({.inputs = "", .more = homing + " }\n"}), "") << "the switch is the drive's own affair";
+  EXPECT_THAT(found({.inputs = "", .more = homing + ", backoff: 5 mm }\n"}),
+              HasSubstr("'backoff' has no effect: this drive of model cia402 does not show its switches"));
 }
 
 TEST_F(EdsFile, ADriveWithoutHomingAccelerationTakesNoTimeForIt) {
