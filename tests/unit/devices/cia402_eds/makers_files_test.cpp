@@ -1,0 +1,143 @@
+// Data sheets as their makers ship them: which are taken, and why the others are not. The files are not part
+// of this project. They are read from the folder that AXISD_EDS_FOLDER names, else from ../shared/eds beside
+// the tree; what is not there is skipped by name.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <set>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "devices/descriptor.hpp"
+#include "tests/support/source_tree.hpp"
+
+namespace axisd::cia402_eds {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+struct Row {
+  std::string_view file;
+  /// Each is in the refusal; none: it is accepted.
+  std::vector<std::string_view> refused_for;
+  std::size_t warnings = 0;  ///< of an accepted one
+};
+
+constexpr std::string_view no_velocity_mode = "object 60FFh:00 (target velocity) is missing";
+constexpr std::string_view no_control_word = "object 6040h:00 (control word) is missing";
+
+const std::vector<Row>& table() {
+  static const std::vector<Row> rows{
+      {"cia-402-profile.eds", {}, 1},  // a template; its list of objects has another length than it says
+      {"curtis-f.eds", {no_control_word}},
+      {"elmo-gold-whistle-v002.dcf", {}},
+      {"elmo-simpliq.dcf", {}, 1},  // lists 6406h without describing it
+      {"elmo.eds", {}},
+      {"emec-drv5-rev09.eds", {no_velocity_mode, "object 6081h:00 (profile velocity) is missing"}},
+      {"eyou-yiyou-servo-1.4.eds", {}, 2},  // limits of 2023h and 2025h beyond their type
+      {"faulhaber-327-3150-1.eds", {}, 2},  // limits of 6061h, which is only read, the wrong way round
+      {"faulhaber-605-3150-67-b.eds", {}},
+      {"golems-dsp402.eds", {"[60fd] has no DataType, and axisd uses object 60FDh:00"}},
+      {"ingenia-eve-net-1.4.2.eds",
+       {"object 6081h:00 (profile velocity) is missing",
+        "object 6083h:00 (profile acceleration) is missing"}},
+      {"maxon-epos-70-10.eds", {}, 3},  // counts of its lists
+      {"maxon-epos4.eds", {}},
+      {"nanotec-cl4-e-1-12.eds", {}},
+      {"oriental-motor-blvd-krd-v400.eds", {}, 2},  // default and limit of 403Dh beyond their type
+      {"pilz-prbt-0-1.dcf", {no_velocity_mode, "the drive has no profile velocity mode"}},
+      {"roboteq-v60.eds", {no_control_word}},
+      {"ros2-canopen-fake-slave.eds", {}},
+      {"ros2-canopen-robot-control.eds", {}},  // without 6084h
+      {"schunk-golems.eds", {no_control_word}},
+      {"schunk-lwa4p-0-63.dcf", {no_velocity_mode, "the drive has no profile velocity mode"}},
+      {"schunk-prl120.eds", {no_velocity_mode}},
+      {"sevcon-gen4.eds", {no_control_word}},
+      {"technosoft-isd860.eds", {}},  // without 6084h
+      {"trinamic-tmcc-160.eds", {}},  // 6084h is read-only
+      {"trinamic-tmcm-1231.eds", {}},
+      {"trinamic-tmcm-1270.eds", {}},
+      {"trinamic-tmcm-1636.eds", {}},
+      {"zltech-zlac8015d.eds", {"object 6061h:00 (modes of operation display) is missing"}},  // two axes
+  };
+  return rows;
+}
+
+std::filesystem::path folder() {
+  const char* named = std::getenv("AXISD_EDS_FOLDER");
+  return named != nullptr ? std::filesystem::path(named)
+                          : std::filesystem::path(test::in_source_tree("../shared/eds"));
+}
+
+Result<std::shared_ptr<const DriveDescriptor>> made(const std::filesystem::path& path) {
+  const auto* model = find_drive_model("cia402");
+  return model->specialise(*model, {{"eds", path.string()}});
+}
+
+void expect_clear(const Error& refusal, const std::filesystem::path& path) {
+  EXPECT_EQ(refusal.reason, Reason::invalid_argument);
+  EXPECT_THAT(refusal.message, StartsWith(path.string() + ":"));
+  EXPECT_FALSE(refusal.remedy.empty());
+  EXPECT_THAT(refusal.remedy, Not(HasSubstr("correct the file")));
+}
+
+void PrintTo(const Row& row, std::ostream* out) { *out << row.file; }
+
+class MakersFile : public ::testing::TestWithParam<Row> {};
+
+TEST_P(MakersFile, IsTakenOrRefusedAsTheTableSays) {
+  const auto& row = GetParam();
+  const auto path = folder() / row.file;
+  if (!std::filesystem::exists(path))
+    GTEST_SKIP() << path << " is not there; name the folder of makers' files in AXISD_EDS_FOLDER";
+  const auto drive = made(path);
+  if (row.refused_for.empty()) {
+    ASSERT_TRUE(drive) << to_string(drive.error());
+    EXPECT_THAT((*drive)->warnings, SizeIs(row.warnings));
+    return;
+  }
+  ASSERT_FALSE(drive);
+  expect_clear(drive.error(), path);
+  for (const auto reason : row.refused_for) EXPECT_THAT(drive.error().message, HasSubstr(reason));
+  EXPECT_THAT(drive.error().remedy, HasSubstr("drive: { objects: {"));
+}
+
+std::string name_of(const ::testing::TestParamInfo<Row>& info) {
+  std::string name(info.param.file);
+  std::ranges::replace_if(name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+  return name;
+}
+INSTANTIATE_TEST_SUITE_P(Each, MakersFile, ::testing::ValuesIn(table()), name_of);
+
+/// Also those without a row: what is said of them is shown, so that their rows can be written.
+TEST(MakersFiles, GetAClearAnswer) {
+  std::set<std::string_view> known;
+  for (const auto& row : table()) known.insert(row.file);
+  int seen = 0;
+  for (std::error_code error; const auto& entry : std::filesystem::directory_iterator(folder(), error)) {
+    const auto extension = entry.path().extension();
+    if (extension != ".eds" && extension != ".dcf") continue;
+    SCOPED_TRACE(entry.path());
+    ++seen;
+    const auto drive = made(entry.path());
+    if (!drive) expect_clear(drive.error(), entry.path());
+    if (!known.contains(entry.path().filename().string()))
+      std::cout << entry.path().filename() << ": no row; it is "
+                << (drive ? "accepted" : "refused: " + to_string(drive.error())) << "\n";
+  }
+  if (seen == 0)
+    GTEST_SKIP() << "no file in " << folder() << "; name the folder of makers' files in AXISD_EDS_FOLDER";
+}
+
+}  // namespace
+}  // namespace axisd::cia402_eds
