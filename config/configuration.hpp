@@ -108,5 +108,7 @@ LoadResult load_text(std::string_view text, const std::string& file_name, const 
 
 /// JSON Schema (draft 2020-12) of the file, generated from the definitions that the loader uses.
 std::string json_schema();
+/// axisd.yaml(5), in the language of man(7), generated from the same.
+std::string manual_page();
 
 }  // namespace axisd::config

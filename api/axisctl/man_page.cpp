@@ -9,48 +9,38 @@
 #include <sstream>
 #include <vector>
 
+#include "config/roff.hpp"
+
 namespace axisd::axisctl {
 namespace {
-
-/// Text as roff prints it: "-" stays one, and no line is taken for a request.
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if ((result.empty() || result.back() == '\n') && (c == '.' || c == '\'')) result += "\\&";
-    if (c == '\\')
-      result += "\\e";
-    else if (c == '-')
-      result += "\\-";
-    else
-      result += c;
-  }
-  return result;
-}
 
 bool visible(const CLI::Option* option) { return !option->get_group().empty(); }
 
 /// "--velocity VALUE", "-h, --help", or the name of an argument.
 std::string syntax(const CLI::Option& option) {
-  if (option.get_positional()) return fmt::format("\\fI{}\\fR", escaped(option.get_name()));
+  if (option.get_positional()) return fmt::format("\\fI{}\\fR", config::roff(option.get_name()));
   std::vector<std::string> names;
-  for (const auto& name : option.get_snames()) names.push_back("\\fB\\-" + escaped(name) + "\\fR");
-  for (const auto& name : option.get_lnames()) names.push_back("\\fB\\-\\-" + escaped(name) + "\\fR");
+  for (const auto& name : option.get_snames()) names.push_back("\\fB\\-" + config::roff(name) + "\\fR");
+  for (const auto& name : option.get_lnames()) names.push_back("\\fB\\-\\-" + config::roff(name) + "\\fR");
   std::string text = fmt::format("{}", fmt::join(names, ", "));
   if (option.get_items_expected_max() > 0)
-    text += fmt::format(" \\fI{}\\fR", escaped(option.get_type_name()));
+    text += fmt::format(" \\fI{}\\fR", config::roff(option.get_type_name()));
   return text;
 }
 
 std::string entry(const CLI::Option& option) {
-  std::string text = fmt::format(".TP\n{}\n{}", syntax(option), escaped(option.get_description()));
+  std::string text = fmt::format(".TP\n{}\n{}", syntax(option), config::roff(option.get_description()));
   if (!option.get_default_str().empty())
-    text += fmt::format(" (default: {})", escaped(option.get_default_str()));
-  if (!option.get_envname().empty()) text += fmt::format(" (environment: {})", escaped(option.get_envname()));
+    text += fmt::format(" (default: {})", config::roff(option.get_default_str()));
+  if (!option.get_envname().empty())
+    text += fmt::format(" (environment: {})", config::roff(option.get_envname()));
   return text + "\n";
 }
 
 /// Text that is laid out already.
-std::string verbatim(const std::string& text) { return fmt::format(".PP\n.nf\n{}\n.fi\n", escaped(text)); }
+std::string verbatim(const std::string& text) {
+  return fmt::format(".PP\n.nf\n{}\n.fi\n", config::roff(text));
+}
 
 std::string trimmed(const std::string& text) {
   const auto first = text.find_first_not_of('\n');
@@ -59,21 +49,21 @@ std::string trimmed(const std::string& text) {
 
 /// A command with what stands behind it: "move AXIS VALUE [OPTIONS]". Those of a group follow it.
 std::string section(const CLI::App& command, const std::string& path) {
-  std::string synopsis = escaped(path);
+  std::string synopsis = config::roff(path);
   std::string arguments;
   std::string options;
   for (const auto* option : command.get_options()) {
     if (!visible(option) || option == command.get_help_ptr()) continue;
     (option->get_positional() ? arguments : options) += entry(*option);
     if (!option->get_positional()) continue;
-    const auto name = escaped(option->get_name()) + (option->get_items_expected_max() > 1 ? " ..." : "");
+    const auto name = config::roff(option->get_name()) + (option->get_items_expected_max() > 1 ? " ..." : "");
     synopsis += option->get_required() ? " " + name : " [" + name + "]";
   }
   const auto parts = command.get_subcommands(nullptr);
   if (!options.empty()) synopsis += " [OPTIONS]";
   if (!parts.empty()) synopsis += " COMMAND";
   std::string text =
-      fmt::format(".SS {}\n{}\n{}{}", synopsis, escaped(command.get_description()), arguments, options);
+      fmt::format(".SS {}\n{}\n{}{}", synopsis, config::roff(command.get_description()), arguments, options);
   // CLI11 lets commands inherit the footer of what they belong to.
   if (const auto footer = trimmed(command.get_footer());
       footer != trimmed(command.get_parent()->get_footer()))
@@ -117,13 +107,13 @@ std::string man_page(const CLI::App& app) {
   std::string text = fmt::format(
       ".TH AXISCTL 1 \"\" \"axisd {}\" \"axisd\"\n.SH NAME\naxisctl \\- {}\n"
       ".SH SYNOPSIS\n\\fBaxisctl\\fR [OPTIONS] COMMAND ...\n.SH OPTIONS\n",
-      AXISD_VERSION, escaped(app.get_description()));
+      AXISD_VERSION, config::roff(app.get_description()));
   for (const auto* option : app.get_options())
     if (visible(option)) text += entry(*option);
   text += ".SH COMMANDS\nThe options above may also stand behind a command.\n";
   for (const auto* command : app.get_subcommands(nullptr)) text += section(*command, command->get_name());
   text += ".SH NOTES\n" + sections_of_footer(app.get_footer());
-  return text + ".SH SEE ALSO\n\\fB/usr/share/doc/axisd/api.html\\fR\n";
+  return text + ".SH SEE ALSO\n.BR axisd (8),\n.BR axisd.yaml (5),\n.I /usr/share/doc/axisd/api.html\n";
 }
 
 }  // namespace axisd::axisctl
