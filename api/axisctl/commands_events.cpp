@@ -85,7 +85,7 @@ void add_event_commands(CLI::App& app, Invocation& invocation) {
           "--kind", arguments->kinds,
           "terminal, state, link, configuration, configuration-reloaded, flight, lease, stop, command, "
           "axis-fault, kept-state, inhibit; several with commas")
-      ->type_name("LIST")
+      ->type_name("KIND,...")
       ->delimiter(',');
   command->add_flag("--follow", arguments->follow, "Go on with new events until Ctrl-C");
   command

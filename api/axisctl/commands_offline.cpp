@@ -76,17 +76,21 @@ void add_offline_commands(CLI::App& app, Invocation& invocation) {
     print_line(config::json_schema());
   });
 
-  auto* completion =
-      app.add_subcommand("completion", "Completion script: eval \"$(axisctl completion bash)\"");
+  auto* completion = app.add_subcommand("completion",
+                                        "Completion script: eval \"$(axisctl completion bash)\"; zsh alike; "
+                                        "fish: axisctl completion fish | source");
   const auto shell = std::make_shared<std::string>();
-  completion->add_option("SHELL", *shell, "bash")->required()->check(CLI::IsMember({"bash"}));
-  completion->callback([&app, shell] {
-    if (*shell == "bash") print(bash_completion(app));
-  });
+  completion->add_option("SHELL", *shell, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember(completion_shells()));
+  completion->callback([shell] { print(completion_script(*shell)); });
 
-  app.add_subcommand("man", "This program's manual page: axisctl man | man -l -")->callback([&app] {
-    print(man_page(app));
-  });
+  auto* man = app.add_subcommand("man", "A manual page: axisctl man | man -l -");
+  const auto page = std::make_shared<std::string>("axisctl");
+  man->add_option("PAGE", *page, "axisctl, or axisd.yaml, the configuration file")
+      ->check(CLI::IsMember({"axisctl", "axisd.yaml"}))
+      ->capture_default_str();
+  man->callback([&app, page] { print(*page == "axisctl" ? man_page(app) : config::manual_page()); });
 }
 
 }  // namespace axisd::axisctl

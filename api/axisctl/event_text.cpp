@@ -140,6 +140,12 @@ std::string content(const v1::Event& event) {
   return "an event that this axisctl does not know";
 }
 
+std::string kind_name(v1::EventKind kind) {
+  auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
+  std::ranges::replace(name, ' ', '-');
+  return name;
+}
+
 }  // namespace
 
 std::string text_of(const v1::ConfigChange& change) {
@@ -156,11 +162,17 @@ std::string event_line(const v1::Event& event) {
                      event.axis().empty() ? "-" : event.axis(), content(event));
 }
 
+std::vector<std::string> event_kinds() {
+  std::vector<std::string> names;
+  for (int number = v1::EventKind_MIN + 1; number <= v1::EventKind_MAX; ++number)
+    names.push_back(kind_name(static_cast<v1::EventKind>(number)));
+  return names;
+}
+
 v1::EventKind parse_event_kind(std::string_view text) {
   for (int number = v1::EventKind_MIN + 1; number <= v1::EventKind_MAX; ++number) {
     const auto kind = static_cast<v1::EventKind>(number);
-    auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
-    std::ranges::replace(name, ' ', '-');
+    const auto name = kind_name(kind);
     if (text == name || name.starts_with(fmt::format("{}-", text))) return kind;
   }
   throw Failure(ExitCode::usage,

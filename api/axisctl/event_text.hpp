@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "axisd/v1/event_service.pb.h"
 
@@ -15,5 +16,7 @@ std::string text_of(const v1::ConfigChange& change);
 /// "terminal-edge", "configuration-reloaded" ..., or their first words, of which "configuration" is the
 /// drift. Throws Failure (usage).
 v1::EventKind parse_event_kind(std::string_view text);
+/// "terminal-edge", "state-change" ...: all of them.
+std::vector<std::string> event_kinds();
 
 }  // namespace axisd::axisctl

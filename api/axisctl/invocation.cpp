@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "api/axisctl/completion.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "config/text.hpp"
@@ -153,6 +154,11 @@ void execute(CLI::App& app, const std::vector<std::string>& words) {
 }
 
 int run(int argc, const char* const* argv) {
+  // Words of a line that is being typed are no command line yet.
+  if (argc > 1 && std::string_view(argv[1]) == "complete-words") {
+    complete({argv + 2, argv + argc});
+    return 0;
+  }
   Invocation invocation;
   const auto app = make_app(invocation);
   try {

@@ -1,5 +1,7 @@
 """The real axisctl against the fake daemon: every subcommand, its output and its exit status."""
+import os
 import pathlib
+import shutil
 import signal
 import socket
 import subprocess
@@ -349,7 +351,7 @@ class Offline(AxisctlTest):
 
     def test_usage(self):
         for words in ([], ["move"], ["move", "feeder"], ["fly"], ["move", "feeder", "1", "--velcity", "2"],
-                      ["completion", "fish"], ["command"]):
+                      ["completion", "tcsh"], ["command"]):
             self.assertRegex(self.fails(2, *words), r"see 'axisctl.* --help'$")
         self.assertIn("--timeout", self.fails(2, "--timeout", "5", "list"))
 
@@ -389,6 +391,53 @@ class Completion(AxisctlTest):
         self.assertIn("--verify", self.complete("drive", "readdress", "feeder", "--v"))
         self.assertEqual(self.complete("events", "feeder", "gh"), ["ghost"])
         self.assertEqual(self.complete("command", "get", ""), [])
+
+    def test_names_from_the_daemon(self):
+        self.assertIn("line-a", self.complete("trace", ""))
+        self.assertIn("line-a", self.complete("bus", "status", "li"))
+        self.assertEqual(self.complete("drive", "read", "feeder", "start_sp"), ["start_speed"])
+        self.assertEqual(self.complete("drive", "write", "feeder", "start_sp"), ["start_speed="])
+        self.assertEqual(self.complete("drive", "write", "feeder", "start_speed", "=", "5", "start_sp"), ["start_speed="])
+        self.assertEqual(self.complete("group", "move", "t"), ["transfer", "turntable="])
+        self.assertEqual(self.complete("group", "stop", "--axis", "tu"), ["turntable"])
+        self.assertEqual(self.complete("--server", self.server.address, "move", "fe"), ["feeder"])
+        self.assertEqual(self.complete("--server", "localhost:1", "move", "fe"), [])
+
+    def test_values_of_options(self):
+        self.assertEqual(self.complete("events", "--kind", "term"), ["terminal-edge"])
+        self.assertEqual(self.complete("events", "--kind", "terminal,axis"), ["terminal,axis-fault"])
+        self.assertEqual(self.complete("events", "--kind=term"), ["terminal-edge"])
+        self.assertEqual(self.complete("completion", ""), ["bash", "zsh", "fish"])
+        self.assertIn("home", self.complete("explain", "feeder", ""))
+
+    def run_shell(self, *words):
+        if shutil.which(words[0]) is None:
+            self.skipTest(f"there is no {words[0]}: deploy/install-packages.sh test")
+        with tempfile.TemporaryDirectory() as folder:
+            os.symlink(AXISCTL, f"{folder}/axisctl")
+            done = subprocess.run(
+                words, capture_output=True, text=True, timeout=LIMIT, check=False,
+                env=environment() | {"AXISD_SERVER": self.server.address, "HOME": folder,
+                                     "PATH": f"{folder}:{os.environ['PATH']}"})
+        self.assertEqual(done.stderr, "")
+        return [line.split("\t")[0] for line in done.stdout.splitlines()]
+
+    def test_fish(self):
+        def complete(line):
+            return self.run_shell("fish", "--no-config", "-c", f"axisctl completion fish | source; complete -C '{line}'")
+        self.assertEqual(complete("axisctl move fe"), ["feeder"])
+        self.assertEqual(complete("axisctl sto"), ["stop"])
+        self.assertEqual(complete("axisctl stop feeder tu"), ["turntable"])
+
+    def test_zsh(self):
+        def complete(*words):
+            shown = "_describe() { local list=$2; print -rl -- ${(P)list}; }; compdef() { :; }; "
+            quoted = " ".join(f"'{word}'" for word in words)
+            return self.run_shell("zsh", "-f", "-c", f'{shown} eval "$(axisctl completion zsh)"; words=({quoted}); '
+                                                     "CURRENT=$#words; PREFIX=$words[-1]; _axisctl")
+        self.assertEqual(complete("axisctl", "move", "fe"), ["feeder"])
+        self.assertEqual([line.split(":")[0] for line in complete("axisctl", "sto")], ["stop"])
+        self.assertEqual(complete("axisctl", "group", "move", "tu"), ["turntable="])
 
 
 if __name__ == "__main__":
