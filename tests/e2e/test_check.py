@@ -8,7 +8,7 @@ from certificates import Certificates
 from harness import AXISCTL, AXISD, ROOT, Scenario, feeder, run
 
 BROKEN = sorted((ROOT / "tests" / "broken").glob("*.yaml"))
-EXAMPLES = sorted((ROOT / "config" / "examples").glob("*.yaml"))
+EXAMPLES = [*sorted((ROOT / "config" / "examples").glob("*.yaml")), ROOT / "deploy" / "axisd.yaml"]
 
 
 class Check(Scenario):
