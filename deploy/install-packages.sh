@@ -1,7 +1,8 @@
 #!/bin/bash
 # Installs what axisd needs on Debian 12. Quick, and without a network, when everything is there.
-#   deploy/install-packages.sh [build|run|test|all]      (default: all)
-# build: compiler and libraries; run: what built programs need; test: what tests/run.sh needs beside build.
+#   deploy/install-packages.sh [build|run|test|package|all]      (default: all)
+# build: compiler and libraries; run: what built programs need; test: what tests/run.sh needs beside build;
+# package: what deploy/package.sh and its test need beside build; all: everything but package.
 # Run as root, or as a user who may use sudo.
 set -euo pipefail
 
@@ -17,6 +18,9 @@ test=(
   python3-grpcio python3-jsonschema python3-pymodbus python3-serial python3-serial-asyncio
   python3-setuptools python3-venv python3-wheel python3-yaml shellcheck systemd user-mode-linux zsh
 )
+package=(
+  debhelper dh-python dpkg-dev fakeroot iproute2 lintian mmdebstrap pybuild-plugin-pyproject python3-all python3-setuptools
+)
 
 die() { echo "install-packages.sh: $*" >&2; exit 1; }
 
@@ -27,8 +31,9 @@ die() { echo "install-packages.sh: $*" >&2; exit 1; }
 case "${1:-all}" in
   build) wanted=("${build[@]}") ;;
   run) wanted=("${run[@]}") ;;
+  package) wanted=("${package[@]}") ;;
   test | all) wanted=("${build[@]}" "${run[@]}" "${test[@]}") ;;
-  *) die "unknown set '$1': use build, run, test or all" ;;
+  *) die "unknown set '$1': use build, run, test, package or all" ;;
 esac
 
 # One query for all: names that dpkg does not know appear only on its standard error and are missing, too.
