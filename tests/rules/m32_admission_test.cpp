@@ -142,6 +142,29 @@ TEST_F(M32, RenewalsOfAJogNeedNoNewId) {
   EXPECT_EQ(rig_.submit(jog, of("hmi", "jog")), running) << "and the id begins no other one";
 }
 
+/// Leases cannot run out: they are as many as the axes at most, and one that is held can be taken.
+TEST_F(M32, WhoeverLeasesEverythingKeepsNobodyFromMovingOrStopping) {
+  const auto& leases = rig_.machine->leases();
+  for (int i = 0; i < 1'000; ++i) {
+    const auto grant = rig_.machine->leases().acquire({.client = "greedy",
+                                                       .axes = {"feeder"},
+                                                       .ttl = seconds(60),
+                                                       .take = true,
+                                                       .request_id = fmt::format("{}", i)});
+    ASSERT_TRUE(grant) << to_string(grant.error());
+    ASSERT_EQ(leases.table().list().size(), 1U);
+  }
+  EXPECT_FALSE(rig_.try_submit(EnableRequest{}, of("hmi", "refused"))) << "the axis is leased";
+  expect_stops("hmi");
+  const auto taken =
+      rig_.machine->leases().acquire({.client = "hmi", .axes = {"feeder"}, .ttl = seconds(60), .take = true});
+  ASSERT_TRUE(taken) << to_string(taken.error());
+  EXPECT_EQ(leases.table().list().size(), 1U);
+  auto enable = of("hmi", "enable");
+  enable.lease_token = taken->lease.token;
+  EXPECT_TRUE(rig_.try_submit(EnableRequest{}, enable));
+}
+
 /// With a new id each time renewals count against the client's own share, and stops remain.
 TEST_F(M32, AClientThatRunsOutOfIdsStillStops) {
   int renewals = 0;

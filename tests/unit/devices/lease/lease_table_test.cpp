@@ -1,6 +1,7 @@
 // Who may command which axis: pure, time comes with each call.
 #include "devices/lease/lease_table.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 namespace axisd {
@@ -163,6 +164,21 @@ TEST_F(Leases, ARepeatedRequestGetsItsLease) {
             Reason::request_id_conflict);
   EXPECT_FALSE(table_.acquire({.client = "b", .axes = {"x"}, .request_id = "r"}, start));
   EXPECT_NE(acquire(request, start + 3s).token, lease.token) << "a lease that is over is another one";
+}
+
+/// Nobody has to be counted: a lease needs an axis that no other has, whoever asks and however often.
+TEST_F(Leases, ThereAreNoMoreThanAxes) {
+  const std::vector<std::string> axes = {"x", "y", "z"};
+  for (int i = 0; i < 1'000; ++i) {
+    const auto client = fmt::format("client {}", i % 100);
+    const auto& axis = axes[static_cast<std::size_t>(i) % axes.size()];
+    (void)table_.acquire({.client = client, .axes = {axis}, .request_id = fmt::format("{}", i)}, start);
+    (void)table_.acquire({.client = client, .axes = {axis}, .take = i % 7 == 0}, start);
+    if (i % 11 == 0) (void)table_.acquire({.client = client, .axes = axes, .take = true}, start);
+    ASSERT_LE(table_.list().size(), axes.size());
+    for (const auto& lease : table_.list())
+      for (const auto& leased : lease.axes) ASSERT_EQ(table_.find(leased)->token, lease.token);
+  }
 }
 
 TEST_F(Leases, ManyEndedOnesAreForgottenInTheEnd) {
