@@ -3,8 +3,9 @@
     reference.py DESCRIPTORS PAGE [--check]
 
 DESCRIPTORS: protoc --include_source_info --include_imports --descriptor_set_out=DESCRIPTORS axisd/v1/*.proto
---check: an error if anything is not described. What speaks for itself needs no comment: a request or response (its RPC
-says it), the zero of an enum, a field whose type is one of ours (that is described), and the names in OBVIOUS.
+--check: an error if anything is not described, or a field of a request has no bound (bounds.proto). What speaks for
+itself needs no comment: a request or response (its RPC says it), the zero of an enum, a field whose type is one of ours
+(that is described), and the names in OBVIOUS.
 """
 import argparse
 import dataclasses
@@ -13,7 +14,7 @@ import pathlib
 import re
 import sys
 
-from google.protobuf import descriptor_pb2
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 OBVIOUS = {
     "at": "When.",
@@ -44,6 +45,14 @@ ENUM_VALUE, SERVICE_METHOD = 2, 2
 
 
 @dataclasses.dataclass
+class Bounds:
+    """How much a field of a request may carry (bounds.proto). 0: it does not say."""
+    items: int = 0
+    bytes: int = 0
+    tolerated: bool = False
+
+
+@dataclasses.dataclass
 class Row:
     """A field or a value."""
     name: str
@@ -51,6 +60,7 @@ class Row:
     number: int
     text: str
     choice: str = ""  # the oneof that it is part of
+    bounds: Bounds = dataclasses.field(default_factory=Bounds)
 
 
 @dataclasses.dataclass
@@ -88,7 +98,8 @@ class File:
 class Reader:
     """One file of the descriptor set."""
 
-    def __init__(self, file):
+    def __init__(self, file, bounds):
+        self._bounds = bounds
         self._comments = {tuple(place.path): place.leading_comments for place in file.source_code_info.location}
         self.file = File(file.name, [], [])
         for index, service in enumerate(file.service):
@@ -114,7 +125,7 @@ class Reader:
             if field.HasField("oneof_index") and not field.proto3_optional:
                 choice = message.oneof_decl[field.oneof_index].name
             rows.append(Row(field.name, label + (field.type_name or SCALARS[field.type]), field.number,
-                            self._text((*path, MESSAGE_FIELD, index)), choice))
+                            self._text((*path, MESSAGE_FIELD, index)), choice, self._bounds(field)))
         self.file.types.append(Type(outer + message.name, "message", self._text(path), rows))
         for index, nested in enumerate(message.nested_type):
             self._message(nested, (*path, MESSAGE_NESTED, index), f"{outer}{message.name}.")
@@ -127,10 +138,30 @@ class Reader:
         self.file.types.append(Type(outer + enum.name, "enum", self._text(path), rows))
 
 
+def bounds_reader(files):
+    """What gives the Bounds of a field. The option is known from `files` alone, not from generated code."""
+    pool = descriptor_pool.DescriptorPool()
+    for file in files:
+        pool.Add(file)
+    try:
+        extension = pool.FindExtensionByName("axisd.v1.bounds")
+    except KeyError:
+        return lambda field: Bounds()
+    types = message_factory.MessageFactory(pool).GetMessages([file.name for file in files])
+    options_of = types["google.protobuf.FieldOptions"]
+
+    def bounds(field):
+        found = options_of.FromString(field.options.SerializeToString()).Extensions[extension]
+        return Bounds(found.max_items, found.max_bytes, found.tolerated)
+    return bounds
+
+
 def read(descriptors):
     """The files of axisd.v1, in the order of their names."""
     files = descriptor_pb2.FileDescriptorSet.FromString(descriptors).file
-    return [Reader(file).file for file in sorted(files, key=lambda file: file.name) if file.package == "axisd.v1"]
+    bounds = bounds_reader(files)
+    return [Reader(file, bounds).file for file in sorted(files, key=lambda file: file.name)
+            if file.package == "axisd.v1"]
 
 
 def exchanged(name):
@@ -165,6 +196,37 @@ def missing(files):
             if not one.text and not exchanged(one.name):
                 yield one.name
             yield from (f"{one.name}.{row.name}" for row in one.rows if not text_of(row, one.kind))
+
+
+def bounds_text(row):
+    """What the page says about how much a field may carry."""
+    entries = f"{row.bounds.items} entries" if row.bounds.items else ""
+    length = f"{row.bounds.bytes} bytes" if row.bounds.bytes else ""
+    if not entries and not length:
+        return ""
+    said = f"{entries} of {length} each" if entries and length else entries or length
+    longer = " What is longer is as if it had not been given." if row.bounds.tolerated and length else ""
+    return f"At most {said}.{longer}"
+
+
+def unbounded(files):
+    """Every repeated field, string and bytes of a request that may carry any amount."""
+    types = {one.name: one for file in files for one in file.types}
+    waiting = [method.request for file in files for service in file.services for method in service.methods]
+    seen = set(waiting)
+    while waiting:
+        one = types[waiting.pop().removeprefix(PACKAGE)]
+        for row in one.rows:
+            base = row.type.rpartition(" ")[2]
+            if row.type.startswith("repeated ") and not row.bounds.items:
+                yield f"{one.name}.{row.name}: max_items"
+            if base in ("string", "bytes", ".google.protobuf.FieldMask") and not row.bounds.bytes:
+                yield f"{one.name}.{row.name}: max_bytes"
+            if base == ".google.protobuf.FieldMask" and not row.bounds.items:
+                yield f"{one.name}.{row.name}: max_items"
+            if base.startswith(PACKAGE) and base not in seen and types[base.removeprefix(PACKAGE)].kind == "message":
+                seen.add(base)
+                waiting.append(base)
 
 
 class Page:
@@ -203,8 +265,12 @@ class Page:
         for row in one.rows:
             choice = f' <span class="choice">one of {html.escape(row.choice)}</span>' if row.choice else ""
             type_cell = f"<td class=type>{self.link(row.type)}{choice}</td>" if one.kind == "message" else ""
+            bounds = bounds_text(row)
+            if bounds and not one.name.endswith("Request"):
+                bounds = f"In requests: {bounds[0].lower()}{bounds[1:]}"
+            bounds = f' <span class="bounds">{bounds}</span>' if bounds else ""
             lines.append(f'<tr id="{one.name}.{row.name}"><td class=name>{row.name}</td>{type_cell}'
-                         f"<td class=number>{row.number}</td><td>{self.prose(text_of(row, one.kind))}</td></tr>")
+                         f"<td class=number>{row.number}</td><td>{self.prose(text_of(row, one.kind))}{bounds}</td></tr>")
         return f"<table>{''.join(lines)}</table>"
 
     def method(self, service, method):
@@ -264,7 +330,7 @@ h4 {{ margin: 1em 0 0.3em; font-weight: normal; color: var(--dim); font-family: 
 table {{ border-collapse: collapse; width: 100%; }}
 td {{ border-top: 1px solid var(--line); padding: 0.25em 0.8em 0.25em 0; vertical-align: top; }}
 .name, .type, .number, code {{ font-family: ui-monospace, monospace; font-size: 13px; }}
-.number, .choice, .empty {{ color: var(--dim); }}
+.number, .choice, .bounds, .empty {{ color: var(--dim); }}
 .name, .type {{ overflow-wrap: anywhere; min-width: 9em; }}
 :target {{ background: #fd06; }}
 @media (max-width: 50em) {{ body {{ display: block; }} nav {{ display: none; }} main {{ padding: 0 1em; }} }}
@@ -288,14 +354,17 @@ def main():
     parser = argparse.ArgumentParser(description="Writes the reference documentation of the API.")
     parser.add_argument("descriptors", type=pathlib.Path)
     parser.add_argument("page", type=pathlib.Path)
-    parser.add_argument("--check", action="store_true", help="an error if anything is not described")
+    parser.add_argument("--check", action="store_true", help="an error if anything is not described or bounded")
     arguments = parser.parse_args()
     files = read(arguments.descriptors.read_bytes())
     arguments.page.write_text(page(files), encoding="utf-8")
     silent = list(missing(files)) if arguments.check else []
     for name in silent:
         print(f"reference.py: {name} has no comment", file=sys.stderr)
-    return 1 if silent else 0
+    open_ended = list(unbounded(files)) if arguments.check else []
+    for name in open_ended:
+        print(f"reference.py: {name} is missing in its bounds", file=sys.stderr)
+    return 1 if silent or open_ended else 0
 
 
 if __name__ == "__main__":

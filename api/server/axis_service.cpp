@@ -28,6 +28,14 @@ grpc::ServerUnaryReactor* refuse(grpc::CallbackServerContext* context, const std
 
 }  // namespace
 
+AxisServiceImpl::AxisServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(&AxisServiceImpl::ListAxes, &AxisServiceImpl::GetAxis, &AxisServiceImpl::Enable,
+                      &AxisServiceImpl::Disable, &AxisServiceImpl::Home, &AxisServiceImpl::MoveAbsolute,
+                      &AxisServiceImpl::MoveRelative, &AxisServiceImpl::MoveVelocity, &AxisServiceImpl::Jog,
+                      &AxisServiceImpl::Halt, &AxisServiceImpl::Stop, &AxisServiceImpl::QuickStop,
+                      &AxisServiceImpl::ReleaseStop, &AxisServiceImpl::Reset, &AxisServiceImpl::SetPosition);
+}
+
 template <class Request>
 AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request& request,
                                                 v1::Command* command) {
@@ -93,6 +101,8 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* AxisServiceImpl::WatchAxes(Context* 
     return new RefusedStream<grpc::ByteBuffer>(to_status({.reason = Reason::invalid_argument,
                                                           .message = "the request is not a WatchAxesRequest",
                                                           .remedy = "use the published proto files"}));
+  if (const auto within = check_bounds(parsed); !within)
+    return new RefusedStream<grpc::ByteBuffer>(to_status(within.error()));
   auto axes = watched_axes(parsed, services_.machine);
   if (!axes) return new RefusedStream<grpc::ByteBuffer>(to_status(axes.error()));
   const auto period = watch_period(parsed);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/services.hpp"
 #include "api/server/validate.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
@@ -9,9 +10,10 @@ namespace axisd::server {
 /// AxisService: validates, converts, asks the machine. WatchAxes answers in raw bytes, so that serialised
 /// batches are shared between streams. Thread: gRPC.
 class AxisServiceImpl final
-    : public v1::AxisService::WithRawCallbackMethod_WatchAxes<v1::AxisService::CallbackService> {
+    : public BoundedService<
+          v1::AxisService::WithRawCallbackMethod_WatchAxes<v1::AxisService::CallbackService>> {
  public:
-  explicit AxisServiceImpl(const Services& services) : services_(services) {}
+  explicit AxisServiceImpl(const Services& services);
 
   using Context = grpc::CallbackServerContext;
   using Reactor = grpc::ServerUnaryReactor;

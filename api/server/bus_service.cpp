@@ -24,6 +24,14 @@ using Call = std::shared_ptr<PendingCall>;
 using Words = std::vector<std::uint16_t>;
 using Bytes = std::vector<std::uint8_t>;
 
+BusServiceImpl::BusServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(&BusServiceImpl::ListBuses, &BusServiceImpl::GetBudget, &BusServiceImpl::ListDevices,
+                      &BusServiceImpl::WriteDevice, &BusServiceImpl::Transact, &BusServiceImpl::Scan,
+                      &BusServiceImpl::GetBusStatistics, &BusServiceImpl::WatchBusStatistics,
+                      &BusServiceImpl::ListFlightRecords, &BusServiceImpl::GetFlightRecord,
+                      &BusServiceImpl::WriteFlightRecord, &BusServiceImpl::TraceBus);
+}
+
 BusServiceImpl::Reactor* BusServiceImpl::ListBuses(Context* context, const v1::ListBusesRequest*,
                                                    v1::ListBusesResponse* response) {
   auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);

@@ -1,14 +1,15 @@
 #pragma once
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/services.hpp"
 #include "axisd/v1/bus_service.grpc.pb.h"
 
 namespace axisd::server {
 
 /// BusService: validates, converts, asks the machine. Thread: gRPC.
-class BusServiceImpl final : public v1::BusService::CallbackService {
+class BusServiceImpl final : public BoundedService<v1::BusService::CallbackService> {
  public:
-  explicit BusServiceImpl(const Services& services) : services_(services) {}
+  explicit BusServiceImpl(const Services& services);
 
   using Context = grpc::CallbackServerContext;
   using Reactor = grpc::ServerUnaryReactor;

@@ -23,6 +23,11 @@ constexpr std::size_t usual_commands = 20, most_commands = 500;
 
 }  // namespace
 
+CommandServiceImpl::CommandServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(&CommandServiceImpl::ListCommands, &CommandServiceImpl::GetCommand,
+                      &CommandServiceImpl::WatchCommand, &CommandServiceImpl::CancelCommand);
+}
+
 grpc::ServerUnaryReactor* CommandServiceImpl::ListCommands(Context* context,
                                                            const v1::ListCommandsRequest* request,
                                                            v1::ListCommandsResponse* response) {

@@ -1,14 +1,15 @@
 #pragma once
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/services.hpp"
 #include "axisd/v1/command_service.grpc.pb.h"
 
 namespace axisd::server {
 
 /// CommandService: validates, converts, asks the machine. Thread: gRPC.
-class CommandServiceImpl final : public v1::CommandService::CallbackService {
+class CommandServiceImpl final : public BoundedService<v1::CommandService::CallbackService> {
  public:
-  explicit CommandServiceImpl(const Services& services) : services_(services) {}
+  explicit CommandServiceImpl(const Services& services);
 
   using Context = grpc::CallbackServerContext;
   grpc::ServerUnaryReactor* ListCommands(Context* context, const v1::ListCommandsRequest* request,

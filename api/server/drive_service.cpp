@@ -34,6 +34,14 @@ Requester requester(const grpc::CallbackServerContext& context, const Request& r
 
 }  // namespace
 
+DriveServiceImpl::DriveServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(&DriveServiceImpl::GetDrive, &DriveServiceImpl::ListParameters,
+                      &DriveServiceImpl::ReadParameters, &DriveServiceImpl::WriteParameters,
+                      &DriveServiceImpl::SaveParameters, &DriveServiceImpl::RestoreFactory,
+                      &DriveServiceImpl::ReadSegments, &DriveServiceImpl::WriteSegments,
+                      &DriveServiceImpl::Readdress, &DriveServiceImpl::SetSerial);
+}
+
 DriveServiceImpl::Reactor* DriveServiceImpl::refuse(Context* context, std::string_view what,
                                                     const Error& error) {
   spdlog::info("{}: {} refused: {}", client_of(*context), what, to_string(error));

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string_view>
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/services.hpp"
 #include "axisd/v1/drive_service.grpc.pb.h"
@@ -11,9 +12,9 @@
 namespace axisd::server {
 
 /// DriveService: validates, converts, asks the machine's DriveAccess. Thread: gRPC.
-class DriveServiceImpl final : public v1::DriveService::CallbackService {
+class DriveServiceImpl final : public BoundedService<v1::DriveService::CallbackService> {
  public:
-  explicit DriveServiceImpl(const Services& services) : services_(services) {}
+  explicit DriveServiceImpl(const Services& services);
 
   using Context = grpc::CallbackServerContext;
   using Reactor = grpc::ServerUnaryReactor;

@@ -9,6 +9,10 @@
 
 namespace axisd::server {
 
+EventServiceImpl::EventServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(&EventServiceImpl::WatchEvents);
+}
+
 grpc::ServerWriteReactor<v1::WatchEventsResponse>* EventServiceImpl::WatchEvents(
     grpc::CallbackServerContext* context, const v1::WatchEventsRequest* request) {
   using Refused = RefusedStream<v1::WatchEventsResponse>;

@@ -1,14 +1,15 @@
 #pragma once
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/services.hpp"
 #include "axisd/v1/event_service.grpc.pb.h"
 
 namespace axisd::server {
 
 /// EventService. Thread: gRPC.
-class EventServiceImpl final : public v1::EventService::CallbackService {
+class EventServiceImpl final : public BoundedService<v1::EventService::CallbackService> {
  public:
-  explicit EventServiceImpl(const Services& services) : services_(services) {}
+  explicit EventServiceImpl(const Services& services);
 
   grpc::ServerWriteReactor<v1::WatchEventsResponse>* WatchEvents(
       grpc::CallbackServerContext* context, const v1::WatchEventsRequest* request) override;

@@ -19,6 +19,13 @@
 #include "api/server/value_reply.hpp"
 
 namespace axisd::server {
+
+GroupServiceImpl::GroupServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(&GroupServiceImpl::ListGroups, &GroupServiceImpl::MoveGroup,
+                      &GroupServiceImpl::GetGroupMove, &GroupServiceImpl::GroupHalt,
+                      &GroupServiceImpl::GroupStop, &GroupServiceImpl::GroupReleaseStop);
+}
+
 GroupServiceImpl::Reactor* GroupServiceImpl::ListGroups(Context* context, const v1::ListGroupsRequest*,
                                                         v1::ListGroupsResponse* response) {
   for (const auto& group : services_.machine.group_access().groups())

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/services.hpp"
 #include "axisd/v1/group_service.grpc.pb.h"
 
@@ -7,9 +8,9 @@ namespace axisd::server {
 
 /// GroupService: validates, converts, asks the machine. Stops are never limited, nor refused for anything in
 /// them that is not known. Thread: gRPC.
-class GroupServiceImpl final : public v1::GroupService::CallbackService {
+class GroupServiceImpl final : public BoundedService<v1::GroupService::CallbackService> {
  public:
-  explicit GroupServiceImpl(const Services& services) : services_(services) {}
+  explicit GroupServiceImpl(const Services& services);
 
   using Context = grpc::CallbackServerContext;
   using Reactor = grpc::ServerUnaryReactor;

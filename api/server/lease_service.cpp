@@ -72,6 +72,11 @@ Result<LeaseRequest> lease_request(const v1::AcquireLeaseRequest& from, std::str
 
 }  // namespace
 
+LeaseServiceImpl::LeaseServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(&LeaseServiceImpl::AcquireLease, &LeaseServiceImpl::RenewLease,
+                      &LeaseServiceImpl::ReleaseLease, &LeaseServiceImpl::ListLeases);
+}
+
 LeaseServiceImpl::Reactor* LeaseServiceImpl::AcquireLease(Context* context,
                                                           const v1::AcquireLeaseRequest* request,
                                                           v1::AcquireLeaseResponse* response) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/services.hpp"
 #include "axisd/v1/lease_service.grpc.pb.h"
 
@@ -7,9 +8,9 @@ namespace axisd::server {
 
 /// LeaseService: validates, converts, asks the machine. Renewing and releasing do not count among a client's
 /// calls in progress: what it waits for must never cost it its leases. Thread: gRPC.
-class LeaseServiceImpl final : public v1::LeaseService::CallbackService {
+class LeaseServiceImpl final : public BoundedService<v1::LeaseService::CallbackService> {
  public:
-  explicit LeaseServiceImpl(const Services& services) : services_(services) {}
+  explicit LeaseServiceImpl(const Services& services);
 
   using Context = grpc::CallbackServerContext;
   using Reactor = grpc::ServerUnaryReactor;

@@ -1,6 +1,5 @@
 #include "api/server/stop_requests.hpp"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -18,9 +17,6 @@
 
 namespace axisd::server {
 namespace {
-
-/// No machine has as many axes and groups; looking for names that there are not must cost no stop its time.
-constexpr int most_names = 1024;
 
 void refuse(const ReplyPtr& reply, const std::string& client, std::string_view what, const Error& error) {
   reply->complete([error] { return to_status(error); },
@@ -52,11 +48,6 @@ void stop_axis(Machine& machine, const Request& request, const std::string& clie
 template <class Request, class Response>
 void stop_group(Machine& machine, const Request& request, StopKind kind, const std::string& client,
                 const ReplyPtr& reply, Response* response) {
-  if (request.axes_size() > most_names)
-    return refuse(reply, client, Request::descriptor()->name(),
-                  {.reason = Reason::invalid_argument,
-                   .message = fmt::format("axes has {} names, more than {}", request.axes_size(), most_names),
-                   .remedy = "name each axis once, or use StopAll"});
   GroupStopRequest wanted{
       .group = request.group(), .axes = {request.axes().begin(), request.axes().end()}, .kind = kind};
   if constexpr (requires { request.hold(); }) {

@@ -56,6 +56,13 @@ void to_proto(const KeptStateReport& from, v1::GetStateResponse& to) {
 
 }  // namespace
 
+SystemServiceImpl::SystemServiceImpl(const Services& services) : services_(services) {
+  begin_within_bounds(
+      &SystemServiceImpl::GetInfo, &SystemServiceImpl::StopAll, &SystemServiceImpl::ReleaseStopAll,
+      &SystemServiceImpl::GetState, &SystemServiceImpl::AcceptState, &SystemServiceImpl::Explain,
+      &SystemServiceImpl::GetConfig, &SystemServiceImpl::CheckConfig, &SystemServiceImpl::ReloadConfig);
+}
+
 grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1::GetInfoRequest*,
                                                      v1::GetInfoResponse* response) {
   const auto info = services_.machine.info();

@@ -1,14 +1,15 @@
 #pragma once
 
+#include "api/server/bounded_service.hpp"
 #include "api/server/services.hpp"
 #include "axisd/v1/system_service.grpc.pb.h"
 
 namespace axisd::server {
 
 /// SystemService: the machine as a whole. Thread: gRPC.
-class SystemServiceImpl final : public v1::SystemService::CallbackService {
+class SystemServiceImpl final : public BoundedService<v1::SystemService::CallbackService> {
  public:
-  explicit SystemServiceImpl(const Services& services) : services_(services) {}
+  explicit SystemServiceImpl(const Services& services);
 
   using Context = grpc::CallbackServerContext;
   grpc::ServerUnaryReactor* GetInfo(Context* context, const v1::GetInfoRequest* request,

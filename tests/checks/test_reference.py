@@ -1,6 +1,8 @@
-"""proto/reference.py: the whole contract is on its page, with a comment for everything; what has none is found."""
+"""proto/reference.py: the whole contract is on its page, with a comment for everything; what has none is found, and what
+a request may carry without bound."""
 
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -49,6 +51,30 @@ enum Side {
 }
 '''
 
+BOUNDED = '''syntax = "proto3";
+package axisd.v1;
+import "axisd/v1/bounds.proto";
+import "google/protobuf/field_mask.proto";
+
+service PlaceService {
+  rpc GetPlace(GetPlaceRequest) returns (GetPlaceResponse);
+}
+message GetPlaceRequest {
+  string axis = 1 [(bounds).max_bytes = 64];
+  repeated Cell cells = 2 [(bounds).max_items = 8];
+  google.protobuf.FieldMask fields = 3 [(bounds) = {max_items: 9, max_bytes: 10}];
+  repeated string names = 4 [(bounds) = {max_items: 11, max_bytes: 12, tolerated: true}];
+}
+message GetPlaceResponse {
+  repeated string axes = 1;
+}
+message Cell {
+  oneof content {
+    bytes data = 1 [(bounds).max_bytes = 7];
+  }
+}
+'''
+
 
 def descriptors(folder):
     with tempfile.NamedTemporaryFile() as out:
@@ -62,11 +88,16 @@ class Contract(unittest.TestCase):
     def test_everything_has_a_comment(self):
         self.assertEqual(list(reference.missing(reference.read(descriptors(PROTO)))), [])
 
+    def test_every_request_is_bounded(self):
+        self.assertEqual(list(reference.unbounded(reference.read(descriptors(PROTO)))), [])
+
     def test_everything_is_on_the_page(self):
         page = reference.page(reference.read(descriptors(PROTO)))
         shown = set(re.findall(r'id="([^"]+)"', page))
         wanted, scope = set(), []
-        for line in "\n".join(path.read_text() for path in PROTO.glob("axisd/v1/*.proto")).splitlines():
+        text = "\n".join(path.read_text() for path in PROTO.glob("axisd/v1/*.proto"))
+        # An option is told with the fields that have it.
+        for line in re.sub(r"(?ms)^extend .*?^}$", "", text).splitlines():
             # Not by the descriptors again: as one reads it.
             line = line.split("//")[0].strip()
             if opened := re.match(r"(message|enum|service|oneof) (\w+) \{(\})?", line):
@@ -76,7 +107,7 @@ class Contract(unittest.TestCase):
                     scope.append(opened[2] if opened[1] != "oneof" else "")
             elif line == "}":
                 scope.pop()
-            elif element := re.match(r"rpc (\w+)\(|(?:[\w.]+ )*([\w]+) = \d+;", line):
+            elif element := re.match(r"rpc (\w+)\(|(?:[\w.]+ )*([\w]+) = \d+(?: \[.*\])?;", line):
                 wanted.add(".".join([*filter(None, scope), element[1] or element[2]]))
         self.assertGreater(len(wanted), 600)
         self.assertEqual(wanted - shown, set())
@@ -90,6 +121,7 @@ class Small(unittest.TestCase):
             path = Path(folder) / "axisd" / "v1" / "place.proto"
             path.parent.mkdir(parents=True)
             path.write_text(text)
+            shutil.copy(PROTO / "axisd" / "v1" / "bounds.proto", path.parent)
             return reference.read(descriptors(Path(folder)))
 
     def test_the_page(self):
@@ -109,6 +141,24 @@ class Small(unittest.TestCase):
                               ("// Counts from 1.", "Place.Cell.row"), ("// Which side.", "Side"),
                               ("// The left one.", "Side.SIDE_LEFT")):
             self.assertEqual(list(reference.missing(self.read(SMALL.replace(comment, "")))), [name])
+
+    def test_bounds_are_on_the_page(self):
+        page = reference.page(self.read(BOUNDED))
+        for part in ('At most 64 bytes.', 'At most 8 entries.', 'At most 9 entries of 10 bytes each.',
+                     'At most 11 entries of 12 bytes each. What is longer is as if it had not been given.',
+                     'In requests: at most 7 bytes.'):
+            self.assertIn(part, page)
+
+    def test_each_missing_bound_is_found(self):
+        self.assertEqual(list(reference.unbounded(self.read(BOUNDED))), [])
+        for bound, name in ((" [(bounds).max_bytes = 64]", "GetPlaceRequest.axis: max_bytes"),
+                            (" [(bounds).max_items = 8]", "GetPlaceRequest.cells: max_items"),
+                            ("max_items: 9, ", "GetPlaceRequest.fields: max_items"),
+                            ("max_bytes: 10", "GetPlaceRequest.fields: max_bytes"),
+                            ("max_items: 11, ", "GetPlaceRequest.names: max_items"),
+                            ("max_bytes: 12, ", "GetPlaceRequest.names: max_bytes"),
+                            (" [(bounds).max_bytes = 7]", "Cell.data: max_bytes")):
+            self.assertEqual(list(reference.unbounded(self.read(BOUNDED.replace(bound, "")))), [name])
 
 
 if __name__ == "__main__":

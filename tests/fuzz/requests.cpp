@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 
+#include "api/server/bounds.hpp"
 #include "api/server/bus_validate.hpp"
 #include "api/server/drive_validate.hpp"
 #include "api/server/event_validate.hpp"
@@ -23,6 +24,7 @@ template <class Message>
 Message parsed(std::span<const std::uint8_t> bytes) {
   Message message;
   (void)message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  (void)server::check_bounds(message);
   return message;
 }
 

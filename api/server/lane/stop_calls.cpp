@@ -5,6 +5,7 @@
 #include <ranges>
 #include <utility>
 
+#include "api/server/bounds.hpp"
 #include "api/server/command_reply.hpp"
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
@@ -58,11 +59,17 @@ void refuse(const StopCalls::Done& done, const Error& error) {
 template <class Request>
 std::optional<Request> parsed(const Context& context) {
   Request request;
-  if (request.ParseFromString(context.call.message)) return request;
-  refuse(context.done, {.reason = Reason::invalid_argument,
-                        .message = "the request is no " + Request::descriptor()->name(),
-                        .remedy = "use the published proto files"});
-  return std::nullopt;
+  if (!request.ParseFromString(context.call.message)) {
+    refuse(context.done, {.reason = Reason::invalid_argument,
+                          .message = "the request is no " + Request::descriptor()->name(),
+                          .remedy = "use the published proto files"});
+    return std::nullopt;
+  }
+  if (const auto within = check_bounds(request); !within) {
+    refuse(context.done, within.error());
+    return std::nullopt;
+  }
+  return request;
 }
 
 template <class Request, class Response>
