@@ -8,6 +8,7 @@
 #include <future>
 #include <utility>
 
+#include "buses/limited_log.hpp"
 #include "buses/regular_file.hpp"
 #include "config/budget.hpp"
 #include "config/document.hpp"
@@ -157,8 +158,9 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
   if (!loaded.configuration) {
     result.findings = findings_of(std::move(loaded.diagnostics));
     for (const auto& found : result.findings)
-      spdlog::warn("{} reloads the configuration: {}:{}:{}: {}", request.client, parts_.path, found.line,
-                   found.column, found.message);
+      log_limited(spdlog::level::warn, request.client, "reloads",
+                  fmt::format("reloads the configuration: {}:{}:{}: {}", parts_.path, found.line,
+                              found.column, found.message));
     return result;
   }
   auto& configuration = *loaded.configuration;
@@ -176,7 +178,8 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
                [answer](std::vector<Error> refusals) { answer->set_value(std::move(refusals)); });
   result.refusals = answer->get_future().get();
   for (const auto& refusal : result.refusals)
-    spdlog::warn("{} reloads the configuration, which is refused: {}", request.client, to_string(refusal));
+    log_limited(spdlog::level::warn, request.client, "reloads",
+                fmt::format("reloads the configuration, which is refused: {}", to_string(refusal)));
   result.applied = result.refusals.empty() && !request.dry_run;
   if (!result.applied) return result;
   for (const auto& warning : result.warnings) spdlog::warn("{}", warning);

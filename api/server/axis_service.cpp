@@ -16,13 +16,15 @@
 #include "api/server/stop_requests.hpp"
 #include "api/server/value_reply.hpp"
 #include "api/server/watch_hub.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
 
 grpc::ServerUnaryReactor* refuse(grpc::CallbackServerContext* context, const std::string& client,
                                  std::string_view what, const Error& error) {
-  spdlog::info("{}: {} refused: {}", client, what, to_string(error));
+  log_limited(spdlog::level::info, client, "refused calls",
+              fmt::format("{} refused: {}", what, to_string(error)));
   return answer(context, to_status(error));
 }
 

@@ -1,7 +1,6 @@
 #include "api/server/bus_service.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <memory>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "api/server/progress_stream.hpp"
 #include "api/server/status.hpp"
 #include "api/server/value_reply.hpp"
+#include "buses/limited_log.hpp"
 #include "devices/nearest.hpp"
 
 namespace axisd::server {
@@ -144,7 +144,8 @@ grpc::ServerWriteReactor<v1::ScanResponse>* BusServiceImpl::Scan(Context* contex
   const auto client = client_of(*context);
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
   if (!ticket) return new Refused(to_status(ticket.error()));
-  spdlog::info("{}: scans {} from node {} to {}", client, scan->bus, scan->first_node, scan->last_node);
+  log_limited(spdlog::level::info, client, "streams",
+              fmt::format("scans {} from node {} to {}", scan->bus, scan->first_node, scan->last_node));
   auto* stream = Stream::start(
       services_, context, *std::move(ticket),
       [&](Stream::Callback callback) {

@@ -1,6 +1,5 @@
 // BusService: what goes over a bus. Statistics, traces, flight records.
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <utility>
 
@@ -12,6 +11,7 @@
 #include "api/server/status.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 
@@ -67,7 +67,7 @@ grpc::ServerWriteReactor<v1::TraceBusResponse>* BusServiceImpl::TraceBus(Context
   const auto client = client_of(*context);
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
   if (!ticket) return new Refused(to_status(ticket.error()));
-  spdlog::info("{}: traces {}", client, trace.bus);
+  log_limited(spdlog::level::info, client, "streams", fmt::format("traces {}", trace.bus));
   auto* stream = Stream::start(
       services_, context, *std::move(ticket),
       [&](Stream::Take take) {

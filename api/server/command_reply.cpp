@@ -1,32 +1,48 @@
 #include "api/server/command_reply.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <utility>
 
 #include "api/server/convert.hpp"
 #include "api/server/status.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
 
+bool is_repeat(const Command& command, const std::optional<WallTime>& called) {
+  return called && command.accepted_at < *called;
+}
+
 /// Three times in each hold, for as long as somebody jogs.
 bool is_renewal(const Command& command, const std::optional<WallTime>& called) {
   const bool renewable = command.kind == CommandKind::jog || command.kind == CommandKind::move_velocity;
-  return called && renewable && !ended(command.state) && command.accepted_at < *called;
+  return renewable && !ended(command.state) && is_repeat(command, called);
+}
+
+/// A client begins as many commands as it has request ids. Everything else it may ask for as often as it
+/// likes, and its lines are limited.
+std::string_view unlimited_kind(const Command& command, const std::optional<WallTime>& called) {
+  if (is_repeat(command, called)) return "repeated calls";
+  const bool stops = command.kind == CommandKind::halt || command.kind == CommandKind::stop ||
+                     command.kind == CommandKind::quick_stop || command.kind == CommandKind::disable;
+  return stops ? "stops" : std::string_view();
 }
 
 void log(std::string_view client, std::string_view subject, std::string_view what,
          const Result<Command>& result, const std::optional<WallTime>& called) {
-  if (!result) {
-    spdlog::info("{}: {} {} refused: {}", client, subject, what, to_string(result.error()));
-  } else if (result->cause) {
-    spdlog::info("{}: {} {} {} ({}): {}", client, subject, what, to_string(result->state), result->id,
-                 to_string(*result->cause));
-  } else {
-    spdlog::log(is_renewal(*result, called) ? spdlog::level::debug : spdlog::level::info, "{}: {} {} {} ({})",
-                client, subject, what, to_string(result->state), result->id);
-  }
+  if (!result)
+    return log_limited(spdlog::level::info, client, "refused calls",
+                       fmt::format("{} {} refused: {}", subject, what, to_string(result.error())));
+  const auto level = is_renewal(*result, called) ? spdlog::level::debug : spdlog::level::info;
+  const auto text = fmt::format("{} {} {} ({}){}", subject, what, to_string(result->state), result->id,
+                                result->cause ? ": " + to_string(*result->cause) : std::string());
+  if (const auto kind = unlimited_kind(*result, called); !kind.empty())
+    log_limited(level, client, kind, text);
+  else
+    spdlog::log(level, "{}: {}", client, text);
 }
 
 }  // namespace

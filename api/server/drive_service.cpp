@@ -1,7 +1,6 @@
 #include "api/server/drive_service.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <memory>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "api/server/status.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
@@ -44,7 +44,8 @@ DriveServiceImpl::DriveServiceImpl(const Services& services) : services_(service
 
 DriveServiceImpl::Reactor* DriveServiceImpl::refuse(Context* context, std::string_view what,
                                                     const Error& error) {
-  spdlog::info("{}: {} refused: {}", client_of(*context), what, to_string(error));
+  log_limited(spdlog::level::info, client_of(*context), "refused calls",
+              fmt::format("{} refused: {}", what, to_string(error)));
   return answer(context, to_status(error));
 }
 
@@ -191,7 +192,8 @@ grpc::ServerWriteReactor<Response>* DriveServiceImpl::change_serial(Context* con
   const auto client = client_of(*context);
   const auto& what = Request::descriptor()->name();
   const auto refused = [&](const Error& error) {
-    spdlog::info("{}: {} {} refused: {}", client, request.axis(), what, to_string(error));
+    log_limited(spdlog::level::info, client, "refused calls",
+                fmt::format("{} {} refused: {}", request.axis(), what, to_string(error)));
     return new RefusedStream<Response>(to_status(error));
   };
   const auto drive = find_drive(services_.machine, request.axis());
@@ -200,7 +202,7 @@ grpc::ServerWriteReactor<Response>* DriveServiceImpl::change_serial(Context* con
   if (!change) return refused(change.error());
   auto ticket = services_.admission.admit(client, Admission::Kind::stream);
   if (!ticket) return refused(ticket.error());
-  spdlog::info("{}: {} {} accepted", client, request.axis(), what);
+  log_limited(spdlog::level::info, client, "calls", fmt::format("{} {} accepted", request.axis(), what));
   using Stream = ProgressStream<Response, SerialProgress>;
   const auto last =
       change->verify > Duration::zero() ? SerialProgress::Phase::verified : SerialProgress::Phase::written;

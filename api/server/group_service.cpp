@@ -1,7 +1,6 @@
 #include "api/server/group_service.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <memory>
@@ -17,6 +16,7 @@
 #include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 
@@ -106,7 +106,8 @@ GroupServiceImpl::Reactor* GroupServiceImpl::GroupReleaseStop(Context* context,
                 return nothing ? to_status(shared->front().holds.error()) : grpc::Status::OK;
               },
               [client, shared] {
-                spdlog::info("{}: group release_stop of {} axes", client, shared->size());
+                log_limited(spdlog::level::info, client, "calls",
+                            fmt::format("group release_stop of {} axes", shared->size()));
               });
         });
   });

@@ -1,7 +1,6 @@
 #include "api/server/lease_service.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>

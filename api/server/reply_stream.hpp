@@ -3,15 +3,16 @@
 
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/server_callback.h>
-#include <spdlog/spdlog.h>
 
 #include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
 
+#include "api/server/peer.hpp"
 #include "api/server/services.hpp"
 #include "api/server/stall_guard.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 
@@ -59,7 +60,8 @@ class ReplyStream : public grpc::ServerWriteReactor<Response>,
   [[nodiscard]] bool closing() const final { return closing_; }
   void cancel() final {
     if (finished_) return;
-    spdlog::warn("{} stopped reading its stream: cancelled", context_->peer());
+    log_limited(spdlog::level::warn, client_of(*context_), "streams",
+                fmt::format("{} stopped reading its stream: cancelled", context_->peer()));
     context_->TryCancel();
   }
 

@@ -1,5 +1,7 @@
 #include "api/server/server.hpp"
 
+#include <fmt/format.h>
+#include <grpc/support/log.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
@@ -22,6 +24,7 @@
 #include "api/server/status.hpp"
 #include "api/server/system_service.hpp"
 #include "api/server/watch_hub.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
@@ -46,6 +49,17 @@ void limit_transport(grpc::ServerBuilder& builder) {
   builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::MIN_POLLERS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
+}
+
+/// What gRPC says goes to the daemon's log. Whoever connects can make it complain, without a certificate,
+/// too: each place in its sources is an origin of its own.
+void log_of_grpc(gpr_log_func_args* args) {
+  std::string text(args->message);
+  std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
+  if (args->severity != GPR_LOG_SEVERITY_ERROR) return spdlog::info("gRPC: {}", text);
+  const std::string_view file(args->file);
+  log_limited(spdlog::level::warn, "gRPC", fmt::format("{}:{}", file.substr(file.rfind('/') + 1), args->line),
+              text);
 }
 
 /// gRPC would serve reflection in every server of a process, or in none.
@@ -133,6 +147,7 @@ Result<int> Server::start() {
     std::ranges::move(*opened, std::back_inserter(sockets));
   }
 
+  gpr_set_log_function(log_of_grpc);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
   limit_transport(builder);
@@ -150,7 +165,7 @@ Result<int> Server::start() {
     return fail(Reason::internal, "gRPC refuses to start", "see the log; GRPC_VERBOSITY=debug tells more");
   parts_->serving = true;
   parts_->reply->start([hub = parts_->hub.get(), guard = parts_->guard.get()](TimePoint now) {
-    return std::min(hub->tick(now), guard->tick(now));
+    return std::min({hub->tick(now), guard->tick(now), tell_left_out(now)});
   });
 
   int port = 0;
@@ -184,6 +199,8 @@ void Server::shutdown(Duration deadline) {
   // with the whole deadline, Shutdown() would wait for all of it.
   parts_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(50));
   parts_->reply->stop();
+  (void)tell_left_out(TimePoint::max());
+  gpr_set_log_function(nullptr);  // gRPC's own: its threads outlive the daemon's log
 }
 
 FileDescriptor Server::connect_inside() {

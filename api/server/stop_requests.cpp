@@ -1,6 +1,6 @@
 #include "api/server/stop_requests.hpp"
 
-#include <spdlog/spdlog.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <memory>
@@ -14,6 +14,7 @@
 #include "api/server/status.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
@@ -21,7 +22,8 @@ namespace {
 void refuse(const ReplyPtr& reply, const std::string& client, std::string_view what, const Error& error) {
   reply->complete([error] { return to_status(error); },
                   [client, what = std::string(what), error] {
-                    spdlog::info("{}: {} refused: {}", client, what, to_string(error));
+                    log_limited(spdlog::level::info, client, "refused calls",
+                                fmt::format("{} refused: {}", what, to_string(error)));
                   });
 }
 
@@ -75,8 +77,9 @@ void stop_group(Machine& machine, const Request& request, StopKind kind, const s
             },
             [client, kind, shared] {
               if (shared->empty()) return;  // the daemon asks this of itself, each second
-              spdlog::info("{}: group {} of {} axes", client, kind == StopKind::halt ? "halt" : "stop",
-                           shared->size());
+              log_limited(spdlog::level::info, client, "stops",
+                          fmt::format("group {} of {} axes", kind == StopKind::halt ? "halt" : "stop",
+                                      shared->size()));
             });
       });
 }
@@ -137,8 +140,10 @@ void handle(Machine& machine, const v1::StopAllRequest& request, const std::stri
                            return grpc::Status::OK;
                          },
                          [client, shared] {
-                           spdlog::info("{}: stop_all of {} axes, inhibit latched{}", client,
-                                        shared->stops.size(), shared->not_durable ? ", not durable" : "");
+                           log_limited(
+                               spdlog::level::info, client, "stops",
+                               fmt::format("stop_all of {} axes, inhibit latched{}", shared->stops.size(),
+                                           shared->not_durable ? ", not durable" : ""));
                          });
                    });
 }

@@ -1,7 +1,5 @@
 #include "api/server/system_service.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <memory>
 #include <string>
 #include <utility>
@@ -14,6 +12,7 @@
 #include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
@@ -94,8 +93,9 @@ grpc::ServerUnaryReactor* SystemServiceImpl::ReleaseStopAll(Context* context,
           const auto error = result ? nullptr : std::make_shared<const Error>(result.error());
           call->complete([error] { return error ? to_status(*error) : grpc::Status::OK; },
                          [client, error] {
-                           spdlog::info("{}: release_stop_all {}", client,
-                                        error ? to_string(*error) : "done");
+                           log_limited(
+                               spdlog::level::info, client, "calls",
+                               fmt::format("release_stop_all {}", error ? to_string(*error) : "done"));
                          });
         });
       });

@@ -1,22 +1,25 @@
 // Values as answers.
 #pragma once
 
-#include <spdlog/spdlog.h>
+#include <fmt/format.h>
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
 #include "api/server/reply.hpp"
 #include "api/server/status.hpp"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 
 /// The callback that ends `call`: with the value, given to `fill` on the reply thread while the response
-/// exists, or with the error's status. `what` ("local:unix: feeder save_parameters") is logged with the
-/// outcome, also if the client has left; empty: nothing is logged.
+/// exists, or with the error's status. `what` ("local:unix: feeder save_parameters", first who asked) is
+/// logged with the outcome, also if the client has left; empty: nothing is logged.
 template <class Value, class Fill>
 [[nodiscard]] std::function<void(Result<Value>)> reply_with_value(ReplyPtr call, Fill fill,
                                                                   std::string what = {}) {
@@ -35,11 +38,11 @@ template <class Value, class Fill>
         },
         [what, shared] {
           if (what.empty()) return;
-          if (*shared) {
-            spdlog::info("{}: done", what);
-          } else {
-            spdlog::info("{}: {}", what, to_string(shared->error()));
-          }
+          const auto end_of_client = std::min(what.find(": "), what.size());
+          const auto client = std::string_view(what).substr(0, end_of_client);
+          const auto rest = std::string_view(what).substr(std::min(end_of_client + 2, what.size()));
+          log_limited(spdlog::level::info, client, *shared ? "calls" : "refused calls",
+                      fmt::format("{}: {}", rest, *shared ? "done" : to_string(shared->error())));
         });
   };
 }

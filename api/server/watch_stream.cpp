@@ -1,13 +1,14 @@
 #include "api/server/watch_stream.hpp"
 
 #include <grpcpp/server_context.h>
-#include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <string>
 #include <utility>
 
+#include "api/server/peer.hpp"
 #include "axisd/v1/axis_service.pb.h"
+#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 
@@ -57,8 +58,9 @@ void WatchStream::cancel_if_stalled(TimePoint now, Duration limit) {
   if (finished_ || cancelled_ || idle()) return;
   if (now - write_began_ <= (closing_with_ ? milliseconds(100) : limit)) return;
   cancelled_ = true;
-  spdlog::warn("{} stopped reading its axis stream: cancelled after {} batches, {} dropped", context_->peer(),
-               tick_, dropped_);
+  log_limited(spdlog::level::warn, client_of(*context_), "streams",
+              fmt::format("{} stopped reading its axis stream: cancelled after {} batches, {} dropped",
+                          context_->peer(), tick_, dropped_));
   context_->TryCancel();  // fails the pending write, which ends the stream
 }
 

@@ -1,10 +1,11 @@
 #include "daemon/core/lease_keeper.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "buses/limited_log.hpp"
 
 namespace axisd::core {
 
@@ -64,7 +65,8 @@ Result<LeaseGrant> LeaseKeeper::acquire(const LeaseRequest& request) {
   for (const auto& over : grant->taken) end(over, &lease);
   prolong(lease);
   if (!grant->repeated) {
-    spdlog::info("{} leases {}", lease.holder(), fmt::join(lease.axes, ", "));
+    log_limited(spdlog::level::info, lease.client, "leases",
+                fmt::format("{} leases {}", lease.holder(), fmt::join(lease.axes, ", ")));
     for (const auto& name : lease.axes) {
       const bool was_taken = std::ranges::any_of(grant->taken, [&](const EndedLease& over) {
         return over.end == LeaseEnd::taken &&
@@ -76,8 +78,9 @@ Result<LeaseGrant> LeaseKeeper::acquire(const LeaseRequest& request) {
       if (const auto* command = axis->commanded_without_lease(); command != nullptr) {
         change.what = LeaseChange::What::taken;
         change.before = command->client;
-        spdlog::warn("{}: {} takes the axis over from {} {} of {}", name, lease.holder(),
-                     to_string(command->kind), command->id, command->client);
+        log_limited(spdlog::level::warn, lease.client, "leases",
+                    fmt::format("{}: {} takes the axis over from {} {} of {}", name, lease.holder(),
+                                to_string(command->kind), command->id, command->client));
         axis->lease_lost({.reason = Reason::lease_lost,
                           .message = fmt::format("{} took the axis over", lease.holder()),
                           .remedy = "acquire a lease"});
@@ -112,10 +115,10 @@ void LeaseKeeper::prolong(const Lease& lease) {
 /// `next`: who has some of the axes from now on, or nullptr.
 void LeaseKeeper::end(const EndedLease& over, const Lease* next) {
   const auto cause = cause_of(over);
-  if (over.end == LeaseEnd::released)
-    spdlog::info("{}: {}", fmt::join(over.lease.axes, ", "), cause.message);
-  else
-    spdlog::warn("{}: {}", fmt::join(over.lease.axes, ", "), cause.message);
+  const auto level = over.end == LeaseEnd::released ? spdlog::level::info : spdlog::level::warn;
+  // Whoever takes leases in a row must not fill the log as somebody else.
+  log_limited(level, over.end == LeaseEnd::taken && next != nullptr ? next->client : over.lease.client,
+              "leases", fmt::format("{}: {}", fmt::join(over.lease.axes, ", "), cause.message));
   const auto follows = [&](const std::string& axis) {
     return next != nullptr && std::ranges::find(next->axes, axis) != next->axes.end();
   };

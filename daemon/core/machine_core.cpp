@@ -7,6 +7,7 @@
 #include <boost/smart_ptr/make_shared.hpp>
 #include <utility>
 
+#include "buses/limited_log.hpp"
 #include "devices/nearest.hpp"
 
 namespace axisd::core {
@@ -290,8 +291,6 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
                                                       std::function<void(std::optional<Error>)> latched) {
   ++latches_;
   set_inhibit(true, client);
-  tell_inhibit(InhibitChange::What::latched, client);
-  spdlog::warn("StopAll by {}: motion is inhibited until it is released", client);
   save_latch(client, std::move(latched));
   // The line serves stops in the order in which they are queued.
   const auto rank = [](const Axis& axis) {
@@ -306,6 +305,10 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
   for (const auto& [urgency, i] : order)
     results[i] = submit(axes_[i]->settings().name, StopRequest{.kind = StopKind::stop, .all = true},
                         {.client = client, .arrived = arrived});
+  // After the stops: nobody's look at the events or the log may hold them up.
+  tell_inhibit(InhibitChange::What::latched, client);
+  log_limited(spdlog::level::warn, "StopAll by " + client, "stops",
+              "motion is inhibited until it is released");
   return results;
 }
 
@@ -318,7 +321,7 @@ void MachineCore::release_inhibit(const std::string& client, std::function<void(
     if (saved) {
       set_inhibit(false, client);
       tell_inhibit(InhibitChange::What::released, client);
-      spdlog::warn("StopAll released by {}", client);
+      log_limited(spdlog::level::warn, client, "releases", "StopAll is released");
       for (const auto& axis : axes_) axis->refresh();
     }
     done(saved);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "buses/limited_log.hpp"
 #include "daemon/core/machine_core.hpp"
 
 namespace axisd::core {
@@ -372,8 +373,9 @@ void MachineCore::clear_away() {
 
 void MachineCore::tell_reloaded(const Reload& reload) {
   if (reload.changes.empty())
-    spdlog::info("{} reloads the configuration: nothing has changed{}", reload.client,
-                 reload.before == reload.revision ? "" : " but how it is written");
+    log_limited(spdlog::level::info, reload.client, "reloads",
+                fmt::format("reloads the configuration: nothing has changed{}",
+                            reload.before == reload.revision ? "" : " but how it is written"));
   if (reload.changes.empty() && reload.before == reload.revision) return;
   for (const auto& change : reload.changes)
     spdlog::warn("{} reloads the configuration: {}", reload.client, to_string(change));
