@@ -96,6 +96,8 @@ std::string form(const KeySpec& spec) {
       return "terminals of the model, each with a function, or with { function, active: high or low }";
     case Kind::model_settings:
       return "keys of the model";
+    case Kind::model_objects:
+      return "sections by object, such as 6084h or 6099h:01, each with some of the keys below";
     case Kind::text:
       return "text";
     case Kind::model:
@@ -197,6 +199,11 @@ std::string of_model(const DriveDescriptor& model) {
     spec.key = key;
     spec.required = setting.required;
     text += entry(spec);
+    for (auto child : spec.children) {
+      const auto below = fmt::format("{}.OBJECT.{}", key, child.key);
+      child.key = below;
+      text += entry(child);
+    }
   }
   return text;
 }
