@@ -111,8 +111,9 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
 /// Open loop: what moved while nobody saw it may have run onto a limit, where it stops without a ramp and
 /// loses steps (M20). Not so where it rests at its target, or has not left, or still runs as it did.
 bool Axis::may_have_been_stopped_abruptly() const {
-  const bool by_terminal =
-      has_input("positive_limit") || has_input("negative_limit") || has_input("quick_stop");
+  // A drive that shows no inputs may have limits all the same.
+  const bool by_terminal = descriptor_->inputs.empty() || has_input("positive_limit") ||
+                           has_input("negative_limit") || has_input("quick_stop");
   if (drive_->closed_loop() || !unseen_ends_ || !by_terminal) return false;
   const bool runs_on =
       sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_owed_;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "tests/rules/model_rig.hpp"
 #include "tests/support/rig.hpp"
 
 namespace axisd::test {
@@ -107,6 +108,31 @@ TEST(M20OutOfReach, AMotionThatTheOwedStopEndsKeepsIt) {
     axis.expect_truth();
     EXPECT_EQ(axis.rig().state()->trust, PositionTrust::set);
   });
+}
+
+/// What its limits do the drive keeps to itself.
+TEST(M20OutOfReach, ADriveThatShowsNoInputsMayHaveLimits) {
+  for (const bool ended : {true, false}) {
+    ModelRig rig({.model = "cia402", .noise = 0, .shows_inputs = false, .drive_keys = "loop_mode: open"});
+    for (const Action& action : {Action(EnableRequest{}), Action(SetPositionRequest{.position = 0})}) {
+      const auto command = rig.complete(action);
+      ASSERT_EQ(command.state, CommandState::done) << describe(command);
+    }
+    const auto move = rig.try_submit(MoveAbsoluteRequest{.position = 100});
+    ASSERT_TRUE(move) << to_string(move.error());
+    rig.run(300ms);
+    ASSERT_TRUE(rig.moving());
+    rig.cut(true);
+    constexpr std::uint32_t control_word = 0x604000, halt = 0x010F;
+    if (ended) rig.write_behind(control_word, halt);
+    rig.run(5s);
+    ASSERT_EQ(rig.state()->link, LinkState::offline);
+    ASSERT_FALSE(rig.moving());
+    rig.cut(false);
+    rig.reconnect();
+    rig.run(1s);
+    EXPECT_EQ(rig.state()->trust, ended ? PositionTrust::unknown : PositionTrust::set);
+  }
 }
 
 }  // namespace

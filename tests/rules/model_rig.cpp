@@ -235,6 +235,11 @@ bool ModelRig::turn(double mm) {
   return turned;
 }
 
+void ModelRig::cut(bool cut) {
+  network_->set_fault(cut ? [](const can::Frame&) { return can::Network::Fault{.drop = true}; }
+                          : std::function<can::Network::Fault(const can::Frame&)>());
+}
+
 void ModelRig::write_behind(std::uint32_t address, std::uint32_t value, int bytes) {
   if (!on_can()) {
     touch([&](auto&) {

@@ -72,6 +72,8 @@ class ModelRig {
   /// What another master writes, past the wire: a register of 16 bit, or an object (index << 8 | sub-index)
   /// of so many bytes.
   void write_behind(std::uint32_t address, std::uint32_t value, int bytes = 2);
+  /// On CAN: no frame passes any more, until it is mended.
+  void cut(bool cut);
   void set_input(std::string_view function, bool active);
   void free_input(std::string_view function);
   [[nodiscard]] bool has_terminal(std::string_view function) const;
