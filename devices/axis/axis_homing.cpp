@@ -86,6 +86,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
   (void)co_await journal_offset(offset, PositionTrust::homed);
   if (!current(*activity)) co_return correct_saved_position();
   if (moved_from(counter)) {
+    correct_saved_position();
     fail_with_stop(*activity, error(Reason::moving, "the axis moved after it had reached home",
                                     "check terminals, and other masters on the bus; home again"));
     co_return;

@@ -166,6 +166,7 @@ Task<> Axis::run_set_position(ActivityPtr activity) {
   if (!current(*activity)) co_return correct_saved_position();
   if (!saved || moved_from(counter)) {
     lose_trust();
+    correct_saved_position();
     finish(*activity, [&](CommandRecord& command) {
       command.error(saved ? error(Reason::moving, "the axis moved meanwhile", "repeat it at standstill")
                           : saved.error());
