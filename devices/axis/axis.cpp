@@ -265,6 +265,12 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
 
 void Axis::lose_trust() {
   tracker_.forget_base();
+  // What is being set was meant for the shaft as it stood, also where the counter shows the same again.
+  if (activity_ && activity_->command->value().kind == CommandKind::set_position)
+    finish(*activity_, [this](CommandRecord& command) {
+      command.error(error(Reason::moving, "the axis lost its position while another was being set",
+                          "repeat it at standstill"));
+    });
   if (tracker_.trust() == PositionTrust::unknown) return;
   tracker_.lose_trust();
   if (env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});

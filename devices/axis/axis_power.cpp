@@ -165,12 +165,12 @@ Task<> Axis::run_set_position(ActivityPtr activity) {
   const auto saved = co_await journal_offset(offset, PositionTrust::set);
   if (!current(*activity)) co_return correct_saved_position();
   if (!saved || moved_from(counter)) {
-    lose_trust();
-    correct_saved_position();
     finish(*activity, [&](CommandRecord& command) {
       command.error(saved ? error(Reason::moving, "the axis moved meanwhile", "repeat it at standstill")
                           : saved.error());
     });
+    lose_trust();
+    correct_saved_position();
     co_return;
   }
   tracker_.declare(offset, PositionTrust::set);
