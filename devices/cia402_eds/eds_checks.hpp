@@ -17,7 +17,7 @@ struct EdsFinding {
 };
 
 /// Objects that are missing, of the wrong kind or not writable, and flaws in what axisd takes from the file
-/// of the objects that it uses. Precondition: apply() found nothing.
+/// of the objects that it uses. Precondition: apply_overrides() found nothing.
 std::vector<EdsFinding> check_eds(const canopen::Eds& eds, const Overrides& overrides = {});
 /// What to do about them, in one sentence.
 std::string remedy_of(const std::vector<EdsFinding>& findings);

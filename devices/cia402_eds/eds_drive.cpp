@@ -143,7 +143,7 @@ Result<std::shared_ptr<const DriveDescriptor>> specialise(
   };
   const auto overrides = overrides_of(settings);
   std::vector<EdsFinding> findings;
-  for (auto& problem : apply(overrides, *eds)) findings.push_back({0, std::move(problem)});
+  for (auto& problem : apply_overrides(overrides, *eds)) findings.push_back({0, std::move(problem)});
   if (!findings.empty()) return refused(findings, "correct drive: { objects: ... } by the drive's manual");
   findings = check_eds(*eds, overrides);
   if (!findings.empty()) return refused(findings, remedy_of(findings));

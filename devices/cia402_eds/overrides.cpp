@@ -141,7 +141,7 @@ Overrides overrides_of(const std::map<std::string, SettingValue>& settings) {
   return all;
 }
 
-std::vector<std::string> apply(const Overrides& overrides, canopen::Eds& eds) {
+std::vector<std::string> apply_overrides(const Overrides& overrides, canopen::Eds& eds) {
   std::vector<std::string> problems;
   for (const auto& [object, by] : overrides) {
     if (by.absent) {

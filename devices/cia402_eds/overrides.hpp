@@ -27,6 +27,6 @@ Overrides overrides_of(const std::map<std::string, SettingValue>& settings);
 
 /// Changes the objects. Returns what cannot be so, one text each: an object that the file does not have and
 /// that gets no type or no access, a value that the type cannot hold, a minimum above the maximum.
-std::vector<std::string> apply(const Overrides& overrides, canopen::Eds& eds);
+std::vector<std::string> apply_overrides(const Overrides& overrides, canopen::Eds& eds);
 
 }  // namespace axisd::cia402_eds

@@ -51,7 +51,7 @@ Judged judge(const std::string& text, const Settings& settings = {}) {
   Judged judged;
   if (!eds) return judged;
   const auto overrides = overrides_of(settings);
-  judged.refused_settings = cia402_eds::apply(overrides, *eds);
+  judged.refused_settings = apply_overrides(overrides, *eds);
   judged.findings = check_eds(*eds, overrides);
   judged.warnings = warnings_of(*eds, overrides, "drive.eds");
   return judged;
@@ -152,7 +152,7 @@ TEST(EdsChecks, WhatTheFileLacksCanBeSaid) {
 TEST(EdsChecks, AnotherTypeKeepsTheLimitsThatItCanHold) {
   auto eds = canopen::parse_eds(example());
   ASSERT_TRUE(eds);
-  EXPECT_THAT(cia402_eds::apply(overrides_of({{"objects.6081h:00.type", "u16"}}), *eds), IsEmpty());
+  EXPECT_THAT(apply_overrides(overrides_of({{"objects.6081h:00.type", "u16"}}), *eds), IsEmpty());
   EXPECT_FALSE(eds->find({0x6081, 0})->high) << "2'000'000";
   EXPECT_TRUE(eds->find({0x6081, 0})->initial) << "10'000";
 }
