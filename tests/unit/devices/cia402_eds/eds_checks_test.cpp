@@ -112,7 +112,7 @@ TEST(EdsChecks, AFlawInWhatIsNotUsedIsAWarning) {
       {"1008", "AccessType", "AccessType=maybe"},
   };
   for (const auto& [section, key, to] : cases) {
-    SCOPED_TRACE(section + " " + key + " -> " + to);
+    SCOPED_TRACE(fmt::format("{} {} -> {}", section, key, to));
     const auto judged = judge(changed(section, key, to));
     EXPECT_THAT(judged.findings, IsEmpty());
     ASSERT_THAT(judged.warnings, SizeIs(1));
