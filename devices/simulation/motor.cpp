@@ -68,22 +68,35 @@ void Motor::begin(int direction, const Profile& profile, const Rates& rates) {
   braking_ = false;
 }
 
-void Motor::move(std::int64_t distance, const Rates& rates) {
+Rates Motor::really(const Rates& told) const {
+  return {.start = told.start * factor_,
+          .cruise = told.cruise * factor_,
+          .acceleration = told.acceleration * factor_,
+          .deceleration = told.deceleration * factor_};
+}
+
+void Motor::move(std::int64_t distance, const Rates& told) {
+  const auto rates = really(told);
   begin(distance < 0 ? -1 : 1,
         Profile::move(moving_ ? speed() : rates.start, rates, static_cast<double>(std::llabs(distance))),
         rates);
 }
 
-void Motor::run(int direction, const Rates& rates) {
+void Motor::run(int direction, const Rates& told) {
+  const auto rates = really(told);
   begin(direction, Profile::run(moving_ ? speed() : rates.start, rates), rates);
 }
 
-void Motor::brake() { brake(rates_.deceleration); }
+void Motor::brake() { halt(rates_); }
 
 void Motor::brake(double deceleration) {
-  if (!moving_) return;
   auto rates = rates_;
-  rates.deceleration = deceleration;
+  rates.deceleration = deceleration * factor_;
+  halt(rates);
+}
+
+void Motor::halt(const Rates& rates) {
+  if (!moving_) return;
   begin(direction_, Profile::halt(speed(), rates), rates);
   braking_ = true;
 }
@@ -105,8 +118,8 @@ bool Motor::cruising() const {
   return moving_ && !braking_ && std::abs(speed() - rates_.cruise) <= rates_.cruise * 1e-9;
 }
 
-double Motor::stopping_distance(const Rates& rates) const {
-  return moving_ ? Profile::stopping_distance(speed(), rates) : 0;
+double Motor::stopping_distance(const Rates& told) const {
+  return moving_ ? Profile::stopping_distance(speed(), really(told)) : 0;
 }
 
 double Motor::elapsed() const { return std::chrono::duration<double>(now_ - begin_).count(); }

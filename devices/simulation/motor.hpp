@@ -17,11 +17,14 @@ class Motor {
   bool advance(TimePoint now, bool follows = false);
 
   /// Begins a motion, or goes on from the present speed if one in the same direction is under way.
-  void move(std::int64_t distance, const Rates& rates);
-  void run(int direction, const Rates& rates);
+  void move(std::int64_t distance, const Rates& told);
+  void run(int direction, const Rates& told);
   /// Brakes with the deceleration of the motion under way (7.6.2: the one set before it started).
   void brake();
   void brake(double deceleration);
+  /// Whatever begins from now on is `factor` (> 0) times as fast as it is told to be, its ramps as well: the
+  /// unit of its velocities is another one. Distances are as told.
+  void run_at(double factor) { factor_ = factor; }
   /// No more pulses. `slips`: the rotor loses the field and turns on for 10 ms at its last speed.
   void stop(bool slips);
   /// The supply is gone: the counter begins at 0 where the shaft stands.
@@ -55,8 +58,8 @@ class Motor {
   [[nodiscard]] double behind() const { return behind_; }
   [[nodiscard]] std::int32_t counter() const { return static_cast<std::int32_t>(commanded_ + offset_); }
   [[nodiscard]] std::int32_t encoder() const { return static_cast<std::int32_t>(shaft() + offset_); }
-  /// Pulses that it takes to stop from the present speed with `rates`.
-  [[nodiscard]] double stopping_distance(const Rates& rates) const;
+  /// Pulses that it takes to stop from the present speed with those rates.
+  [[nodiscard]] double stopping_distance(const Rates& told) const;
   /// When the motion ends by itself; TimePoint::max() if it does not.
   [[nodiscard]] TimePoint ends() const;
   /// When the shaft gets to `shaft`, which lies ahead; TimePoint::max() if it does not.
@@ -66,6 +69,8 @@ class Motor {
 
  private:
   void begin(int direction, const Profile& profile, const Rates& rates);
+  void halt(const Rates& rates);
+  [[nodiscard]] Rates really(const Rates& told) const;
   void fall_behind(TimePoint from);
   [[nodiscard]] double elapsed() const;
   [[nodiscard]] TimePoint after(double seconds) const;
@@ -77,6 +82,7 @@ class Motor {
   int direction_ = 1;
   bool moving_ = false, braking_ = false, blocked_ = false;
   std::int64_t commanded_ = 0, lag_ = 0, from_ = 0, offset_ = 0;
+  double factor_ = 1;
   double following_ = 0;  ///< seconds
   double behind_ = 0;
 };

@@ -55,6 +55,9 @@ class SimulatedNode {
   [[nodiscard]] virtual std::span<const int> alarms() const { return {}; }
   /// Holds the shaft (a collision), or lets it go.
   virtual void block_shaft(bool /*blocked*/) {}
+  /// Its motor runs `factor` times as fast as it is told, from the next motion on. False: it has no such
+  /// switch.
+  virtual bool run_at(double /*factor*/) { return false; }
   /// The load turns the shaft by so many pulses. False: it does not give way (energised or blocked).
   virtual bool push_shaft(std::int64_t /*pulses*/) { return false; }
   /// A hand presses on the energised shaft: it bends by so many counts of its encoder, until it is told 0.

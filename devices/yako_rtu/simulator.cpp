@@ -197,6 +197,11 @@ void SimulatedDrive::block_shaft(bool blocked) {
   step(now_);
 }
 
+bool SimulatedDrive::run_at(double factor) {
+  motor_.run_at(factor);
+  return true;
+}
+
 bool SimulatedDrive::lean_on_shaft(int counts) { return in_control() && encoder_.lean(counts); }
 
 bool SimulatedDrive::push_shaft(std::int64_t pulses) {

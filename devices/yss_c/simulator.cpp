@@ -247,6 +247,11 @@ void SimulatedDrive::block_shaft(bool blocked) {
   step(now_);
 }
 
+bool SimulatedDrive::run_at(double factor) {
+  motor_.run_at(factor);
+  return true;
+}
+
 bool SimulatedDrive::push_shaft(std::int64_t pulses) {
   if (motor_.blocked() || (ready() && energised())) return false;
   motor_.push(pulses, ready() && closed_loop() && !behaviour_.released_position_frozen);

@@ -28,6 +28,7 @@ class BorrowedCanNode : public simulation::SimulatedCanNode {
   void raise_alarm(int code) override { node_->raise_alarm(code); }
   [[nodiscard]] std::span<const int> alarms() const override { return node_->alarms(); }
   void block_shaft(bool blocked) override { node_->block_shaft(blocked); }
+  bool run_at(double factor) override { return node_->run_at(factor); }
   bool push_shaft(std::int64_t pulses) override { return node_->push_shaft(pulses); }
   bool lean_on_shaft(int counts) override { return node_->lean_on_shaft(counts); }
   [[nodiscard]] simulation::Encoder* encoder() override { return node_->encoder(); }
