@@ -26,7 +26,8 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       absolute_segments_(settings_.segments && settings_.segments->absolute),
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
-      stopped_(env_.executor, *env_.clock) {
+      stopped_(env_.executor, *env_.clock),
+      speed_watch_(static_cast<double>(settings_.scale.pulses_per_revolution)) {
   if (env_.persistence != nullptr) {
     const auto& axes = env_.persistence->current().axes;
     if (const auto found = axes.find(settings_.name); found != axes.end()) {
@@ -161,6 +162,7 @@ void Axis::on_sample(const DriveSample& sample) {
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
+  watch_speed(SpeedWatch::Event::sampled);
   // What a link that failed kept back was not heard, wherever the drive rests.
   if (!sample.moving && !stopping_.running && link_ == LinkState::online && !bus_loss_)
     stop_owed_ = left_running_ = false;

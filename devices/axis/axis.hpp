@@ -27,6 +27,7 @@
 #include "devices/axis/planner.hpp"
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
+#include "devices/axis/speed_watch.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
@@ -371,6 +372,9 @@ class Axis {
   void abort_at_rest(Activity& activity, Error cause);
   void enter_error_stop(const Error& cause);
 
+  // axis_speed.cpp: ends what is under way as a fault where it is far faster than told. True: it has.
+  bool watch_speed(SpeedWatch::Event event);
+
   // axis_group.cpp
   Task<> run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
                     std::shared_ptr<std::optional<TimePoint>> arrived);
@@ -464,6 +468,7 @@ class Axis {
   /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
   std::optional<TimePoint> release_owed_;
   ObservedTimes observed_;
+  SpeedWatch speed_watch_;
   std::optional<Error> bus_loss_;   ///< not yet acted upon
   bool stop_owed_ = false;          ///< M4: to a silent node, until standstill is confirmed
   std::uint64_t failed_stops_ = 0;  ///< tells whether one has failed meanwhile

@@ -57,6 +57,7 @@ Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since
   }
   if (!co_await is_no_reboot(activity)) co_return;
   if (there && !co_await still_there(activity)) co_return;
+  if (!there && watch_speed(SpeedWatch::Event::arrived)) co_return;
   tracker_.reached(*activity->plan.target, drive_->position_window());
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
@@ -239,6 +240,7 @@ Task<Result<TimePoint>> Axis::Member::trigger() {
 void Axis::Member::started(TimePoint at) {
   started_at_ = at;
   activity_->waits_for = StartWait::begun;
+  axis_->watch_speed(SpeedWatch::Event::begun);
   axis_->continuity_checked_ = axis_->env_.clock->now();  // the canary was part of its start
   axis_->tracker_.forget_base();
   activity_->command->activate();

@@ -214,7 +214,8 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     if (!co_await follow(activity, base, since)) co_return false;
   }
   if (!co_await is_no_reboot(activity)) co_return false;
-  co_return !there || co_await still_there(activity);
+  if (!there) co_return !watch_speed(SpeedWatch::Event::arrived);
+  co_return co_await still_there(activity);
 }
 
 /// A drive that was restarted, on the way or before, shows the counter 0: only where that is the target, too,
@@ -330,6 +331,7 @@ void Axis::end_unsent(Activity& activity, Error cause) {
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
   if (!current(*activity)) co_return false;
   if (result || result.error().outcome == Outcome::unknown) activity->waits_for = StartWait::begun;
+  watch_speed(SpeedWatch::Event::begun);
   if (result) {
     // The canary was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.
     continuity_checked_ = std::max(continuity_checked_, since - 2 * settings_.reboot_guard);

@@ -1,0 +1,68 @@
+// A motion that is far faster than it was told to be is a fault, whatever the drive says of its velocity.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// r/min, the fastest of all that the drive may use for it: homing has two velocities and a start speed, and
+/// backs off with the plan's.
+double fastest_of(const Activity& activity, const AxisSettings& settings, const Scale& scale) {
+  auto fastest = std::abs(static_cast<double>(activity.plan.velocity_rpm));
+  if (activity.state != AxisState::homing || !settings.homing) return fastest;
+  fastest = std::max(fastest, static_cast<double>(settings.limits.start_speed_rpm));
+  for (const auto velocity : {settings.homing->velocity, settings.homing->search_velocity})
+    fastest = std::max(fastest, std::abs(scale.velocity_to_rpm(velocity)));
+  return fastest;
+}
+
+/// "60 r/min (10 mm/s)".
+std::string text_of(double pulses_per_second, const Scale& scale) {
+  const auto& settings = scale.settings();
+  const auto rpm = pulses_per_second * 60 / static_cast<double>(settings.pulses_per_revolution);
+  return fmt::format("{:.0f} r/min ({:.4g} {}/s)", rpm, std::abs(scale.velocity_to_units(rpm)),
+                     settings.unit);
+}
+
+}  // namespace
+
+/// Only what axisd has started: what a terminal started, or a hand turns, was told nothing. The position is
+/// lost with it: what a pulse is to the drive may not be what the configuration says (M20 has it lost with a
+/// microstep that changed), and an open loop may not have followed at such a speed.
+bool Axis::watch_speed(SpeedWatch::Event event) {
+  if (!sample_) return false;
+  const SpeedWatch::Reading reading{.asked_at = sample_->asked_at,
+                                    .measured_at = sample_->measured_at,
+                                    .pulses = sample_->position_pulses,
+                                    .moving = sample_->moving};
+  const bool under_way = activity_ && activity_->waits_for == StartWait::begun;
+  if (!under_way) {
+    speed_watch_.rest(reading);
+    return false;
+  }
+  if (event == SpeedWatch::Event::begun) {
+    const auto per_rpm = static_cast<double>(settings_.scale.pulses_per_revolution) / 60;
+    speed_watch_.begin(reading, fastest_of(*activity_, settings_, scale_) * per_rpm);
+    return false;
+  }
+  const bool found =
+      event == SpeedWatch::Event::arrived ? speed_watch_.arrive(reading) : speed_watch_.follow(reading);
+  if (!found) return false;
+  lose_trust();
+  fail_with_stop(
+      *activity_,
+      error(Reason::misconfigured,
+            fmt::format("the shaft turned at {} or more, but was told to turn at {} at most; most likely the "
+                        "units of the axis are not those of the drive",
+                        text_of(speed_watch_.seen(), scale_), text_of(speed_watch_.fastest(), scale_)),
+            "compare pulses_per_revolution (scale: microstep), the drive's own gear and drive: velocity_unit "
+            "with the drive; then reset the axis, try slowly, and home it"));
+  return true;
+}
+
+}  // namespace axisd

@@ -1,0 +1,270 @@
+// A motion that is far faster than it was told is a fault, on every model; one that is as fast as told never
+// is.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/rules/m22_group_rig.hpp"
+#include "tests/rules/model_rig.hpp"
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// From the first motion of a shaft that runs 90 times too fast. At 10 mm/s, with ramps of 100 ms and an
+/// encoder that is 8 ms late, it is further than possible after 40 ms, though 150 ms before its start may
+/// count for it. The next reading shows that, and the one after confirms it: poll_moving (20 ms) apart, and
+/// 25 ms more where one is left out as too near, or waits for its SYNC. A reply and a canary take 10 ms each.
+constexpr auto noticed_within = 40ms + 2 * (20ms + 25ms) + 2 * 10ms;
+/// From there on: the stop frame, and the ramp that the drive was given.
+constexpr auto rests_within = 50ms + 100ms;
+
+class Speed : public ::testing::TestWithParam<std::string> {
+ protected:
+  static void expect(const Command& command, CommandState state) {
+    EXPECT_EQ(command.state, state) << describe(command);
+  }
+  static CommandPtr start(ModelRig& rig, const Action& action) {
+    auto command = rig.try_submit(action);
+    if (!command) throw std::runtime_error(to_string(command.error()));
+    return *command;
+  }
+  /// Enabled, at 250 mm: 140 mm from any limit, and more from the switches. It has settled.
+  static void make_ready(ModelRig& rig) {
+    expect(rig.complete(EnableRequest{}), CommandState::done);
+    expect(rig.complete(SetPositionRequest{.position = 100}), CommandState::done);
+    expect(rig.complete(MoveAbsoluteRequest{.position = 250}), CommandState::done);
+    rig.run(1s);
+  }
+  static bool run_at(ModelRig& rig, double factor) {
+    bool switched = false;
+    rig.touch([&](auto& node) { switched = node.run_at(factor); });
+    return switched;
+  }
+  /// Without such a switch another master makes the set-point that is under way a faster one.
+  static void hurry(ModelRig& rig, double factor) {
+    constexpr std::uint32_t profile[] = {0x608100, 0x608300, 0x608400};
+    std::vector<std::uint32_t> told;
+    for (const auto object : profile) {
+      told.push_back(rig.drive->peek(object));
+      rig.write_behind(object, static_cast<std::uint32_t>(std::lround(told.back() * factor)), 4);
+    }
+    for (const auto control : {0x2FU, 0x3FU, 0x2FU}) rig.write_behind(0x604000, control);
+    for (std::size_t i = 0; i < told.size(); ++i) rig.write_behind(profile[i], told[i], 4);
+  }
+  static void expect_fault(ModelRig& rig, const Command& command) {
+    expect(command, CommandState::error);
+    ASSERT_TRUE(command.cause);
+    EXPECT_EQ(command.cause->reason, Reason::misconfigured) << describe(command);
+    EXPECT_NE(command.cause->message.find("r/min"), std::string::npos) << command.cause->message;
+    EXPECT_NE(command.cause->remedy.find("velocity_unit"), std::string::npos);
+    EXPECT_EQ(rig.state()->state, AxisState::error_stop);
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+  }
+  /// Nothing runs until a reset.
+  static void expect_reset(ModelRig& rig) {
+    rig.run(3s);
+    EXPECT_FALSE(rig.moving());
+    const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().reason, Reason::fault);
+    run_at(rig, 1);
+    expect(rig.complete(ResetRequest{}), CommandState::done);
+    EXPECT_EQ(rig.state()->state, AxisState::standstill);
+    expect(rig.complete(MoveRelativeRequest{.distance = 1}), CommandState::done);
+  }
+  /// Plain and inverted; true: its motor has the switch.
+  static void each(double factor, const std::function<void(ModelRig&, bool)>& test) {
+    for (const bool invert : {false, true}) {
+      SCOPED_TRACE(invert ? "inverted" : "plain");
+      ModelRig rig({.model = GetParam(), .invert = invert, .free_input = false});
+      make_ready(rig);
+      test(rig, run_at(rig, factor));
+    }
+  }
+  [[nodiscard]] static bool has_switch() { return GetParam() != "cia402"; }
+};
+
+const Action slow_motions[] = {MoveAbsoluteRequest{.position = 390, .with = {.velocity = 10}},
+                               MoveVelocityRequest{.velocity = 10}, MoveVelocityRequest{.velocity = -10},
+                               JogRequest{.velocity = 10, .hold = 2s}};
+
+TEST_P(Speed, FarTooFastIsStoppedAndAFault) {
+  if (!has_switch()) GTEST_SKIP() << "see HurriedUnderWay";
+  for (const auto& action : slow_motions)
+    each(90, [&](ModelRig& rig, bool) {
+      SCOPED_TRACE(to_string(kind_of(action)));
+      const auto command = start(rig, action);
+      ASSERT_TRUE(rig.run_until([&] { return rig.moving(); }, 2s));
+      EXPECT_TRUE(rig.run_until([&] { return command->has_ended(); }, noticed_within));
+      EXPECT_TRUE(rig.run_until([&] { return !rig.moving(); }, rests_within));
+      ASSERT_TRUE(rig.run_until([&] { return command->has_ended(); }, 5s));
+      expect_fault(rig, command->value());
+      EXPECT_NE(command->value().cause->message.find("told to turn at 60 r/min (10 mm/s)"), std::string::npos)
+          << describe(command->value());
+      expect_reset(rig);
+    });
+}
+
+/// In velocity mode, where nothing ends it.
+TEST_P(Speed, FarTooFastWithoutAnEnd) {
+  if (!has_switch()) GTEST_SKIP() << "see HurriedUnderWay";
+  ModelRig rig({.model = GetParam(), .free_input = false, .limits = false});
+  make_ready(rig);
+  run_at(rig, 90);
+  const auto command = start(rig, MoveVelocityRequest{.velocity = 10});
+  ASSERT_TRUE(rig.run_until([&] { return rig.moving(); }, 2s));
+  EXPECT_TRUE(rig.run_until([&] { return command->has_ended(); }, noticed_within));
+  EXPECT_TRUE(rig.run_until([&] { return !rig.moving(); }, rests_within));
+  ASSERT_TRUE(rig.run_until([&] { return command->has_ended(); }, 5s));
+  expect_fault(rig, command->value());
+}
+
+/// What has run as told before may have fallen behind by a revolution, and catch up: at 10 times its velocity
+/// it is further than that after 150 ms. Braking from it takes 10 times the ramp.
+TEST_P(Speed, HurriedUnderWay) {
+  if (has_switch()) GTEST_SKIP() << "its motor has a switch for it";
+  for (const auto& action : slow_motions)
+    each(10, [&](ModelRig& rig, bool) {
+      SCOPED_TRACE(to_string(kind_of(action)));
+      const auto command = start(rig, action);
+      rig.run(300ms);
+      hurry(rig, 10);
+      EXPECT_TRUE(rig.run_until([&] { return command->has_ended(); }, 150ms + noticed_within));
+      EXPECT_TRUE(rig.run_until([&] { return !rig.moving(); }, 10 * rests_within));
+      ASSERT_TRUE(rig.run_until([&] { return command->has_ended(); }, 5s));
+      expect_fault(rig, command->value());
+      expect_reset(rig);
+    });
+}
+
+/// It gets ahead by half of its velocity: a revolution a second, of which it needs one and a quarter at most.
+TEST_P(Speed, TwiceAsFastIsAFault) {
+  for (const double velocity : {20.0, -20.0})
+    each(2, [&](ModelRig& rig, bool switched) {
+      const auto command = start(rig, MoveVelocityRequest{.velocity = velocity});
+      rig.run(300ms);
+      if (!switched) hurry(rig, 2);
+      ASSERT_TRUE(rig.run_until([&] { return command->has_ended(); }, 1700ms));
+      expect_fault(rig, command->value());
+    });
+}
+
+/// Over before two readings could tell.
+TEST_P(Speed, AShortMoveIsJudgedByItsWholeWay) {
+  if (!has_switch()) GTEST_SKIP() << "it is over before another master could change it";
+  for (const double distance : {20.0, -20.0, 12.0})
+    each(90, [&](ModelRig& rig, bool) {
+      const auto move = rig.complete(MoveRelativeRequest{.distance = distance, .with = {.velocity = 10}});
+      expect_fault(rig, move);
+    });
+}
+
+TEST_P(Speed, HomingThatIsTooFastIsAFault) {
+  if (!has_switch()) GTEST_SKIP() << "its speeds cannot be changed under way";
+  each(10, [&](ModelRig& rig, bool) {
+    const auto home = start(rig, HomeRequest{});
+    ASSERT_TRUE(rig.run_until([&] { return home->has_ended(); }, 60s));
+    expect_fault(rig, home->value());
+    rig.run(3s);
+    EXPECT_FALSE(rig.moving());
+  });
+}
+
+TEST_P(Speed, AsFastAsToldNeverIs) {
+  for (const bool invert : {false, true})
+    for (const int noise : {0, 1, 2}) {
+      SCOPED_TRACE((invert ? "inverted, noise " : "noise ") + std::to_string(noise));
+      ModelRig rig({.model = GetParam(), .invert = invert, .noise = noise, .free_input = false});
+      make_ready(rig);
+      const auto slow = MotionValues{.velocity = 0.5};
+      expect(rig.complete(MoveAbsoluteRequest{.position = 300}), CommandState::done);
+      expect(rig.complete(MoveAbsoluteRequest{.position = 100}), CommandState::done);
+      expect(rig.complete(MoveRelativeRequest{.distance = 0.01}), CommandState::done);
+      expect(rig.complete(MoveRelativeRequest{.distance = 1, .with = slow}), CommandState::done);
+      // Slowly, right after a fast one.
+      for (const Action& fast : {Action(JogRequest{.velocity = 100, .hold = 300ms}),
+                                 Action(MoveVelocityRequest{.velocity = -100})}) {
+        start(rig, fast);
+        rig.run(500ms);
+        expect(rig.complete(MoveRelativeRequest{.distance = -1, .with = slow}), CommandState::done);
+      }
+      start(rig, MoveVelocityRequest{.velocity = 100});
+      rig.run(500ms);
+      expect(rig.complete(StopRequest{.kind = StopKind::quick_stop}), CommandState::done);
+      expect(rig.complete(MoveRelativeRequest{.distance = 1, .with = slow}), CommandState::done);
+      for (int i = 0; i < 2; ++i) {
+        expect(rig.complete(HomeRequest{}), CommandState::done);
+        expect(rig.complete(MoveAbsoluteRequest{.position = 20}), CommandState::done);
+      }
+      EXPECT_EQ(rig.state()->state, AxisState::standstill);
+    }
+}
+
+/// A shaft that was held by less than the drive puts up with goes on at its own pace.
+TEST_P(Speed, CatchingUpIsNoFault) {
+  ModelRig rig({.model = GetParam(), .free_input = false});
+  if (rig.drive->encoder() == nullptr) GTEST_SKIP() << "what it has lost it does not catch up";
+  make_ready(rig);
+  for (const auto held : {100ms, 400ms, 900ms}) {
+    const auto move = start(rig, MoveRelativeRequest{.distance = 40, .with = {.velocity = 10}});
+    rig.run(1s);
+    rig.touch([](auto& node) { node.block_shaft(true); });
+    rig.run(held);
+    rig.touch([](auto& node) { node.block_shaft(false); });
+    ASSERT_TRUE(rig.run_until([&] { return move->has_ended(); }, 20s));
+    const auto command = move->value();  // some take a shaft that rests so long for stopped
+    if (command.cause) EXPECT_NE(command.cause->reason, Reason::misconfigured) << describe(command);
+    if (rig.state()->state == AxisState::error_stop) expect(rig.complete(ResetRequest{}), CommandState::done);
+    rig.run(1s);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Motion, Speed, ::testing::ValuesIn(simulated_models()), [](const auto& info) {
+  std::string name = info.param;
+  std::erase(name, '-');
+  return name;
+});
+
+/// Readings that come late, one in three of them: the time between is taken at its longest.
+TEST(SpeedOnALine, LateReadingsAreNoFault) {
+  using simulation::FaultKind;
+  for (const std::string model : {"ykd2405pr", "ess42-r"})
+    for (const auto late : {5ms, 20ms, 45ms}) {
+      SCOPED_TRACE(model + " " + std::to_string(late.count()) + " ms");
+      Rig rig({.model = model});
+      rig.ready();
+      for (int i = 0; i < 12; ++i) {
+        for (int k = 0; k < 8; ++k)
+          rig.fault({.kind = i % 4 == 3 ? FaultKind::drop_reply : FaultKind::delay_reply,
+                     .function = 0x03,
+                     .skip = 10 + (3 * k),
+                     .delay = late});
+        const auto move = rig.complete(MoveAbsoluteRequest{.position = i % 2 == 0 ? 150.0 : 3.0});
+        if (move.cause) EXPECT_NE(move.cause->reason, Reason::misconfigured) << describe(move);
+        if (late == 5ms) EXPECT_EQ(move.state, CommandState::done) << describe(move);
+        rig.faults().clear();
+      }
+    }
+}
+
+TEST(SpeedOfAGroup, AMemberThatIsTooFastStopsAll) {
+  GroupRig rig;
+  rig.serial(0).run_at(90);
+  const auto move = rig.move(GroupRig::to({{"x", 380}, {"y", 380}, {"z", 380}}));
+  ASSERT_TRUE(rig.run_until([&] { return ended(move->state()); }, 10s));
+  EXPECT_NE(move->state(), CommandState::done);
+  EXPECT_EQ(rig.state("x")->state, AxisState::error_stop);
+  rig.run(2s);
+  EXPECT_TRUE(rig.rests(1s));
+  EXPECT_LT(rig.load_mm("y"), 200);
+  EXPECT_LT(rig.load_mm("z"), 200);
+}
+
+}  // namespace
+}  // namespace axisd::test
