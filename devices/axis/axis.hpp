@@ -352,6 +352,7 @@ class Axis {
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
   [[nodiscard]] bool shows(const Plan& plan, std::int64_t base) const;
   [[nodiscard]] bool held_back(const Plan& plan) const;
+  Task<std::optional<TimePoint>> arrived(ActivityPtr activity, std::int64_t base, TimePoint since);
   Task<bool> is_no_reboot(ActivityPtr activity);
   Task<bool> still_there(ActivityPtr activity);
   Task<bool> proven_continuous(ActivityPtr activity);
@@ -360,6 +361,7 @@ class Axis {
   /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
   /// itself takes for in position.
   [[nodiscard]] std::int64_t target_tolerance() const;
+  [[nodiscard]] bool is_at(const Target& target) const;
   /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
   [[nodiscard]] bool moved_from(std::int64_t counter) const;
   bool judge_rest(Activity& activity);
@@ -377,7 +379,7 @@ class Axis {
 
   // axis_group.cpp
   Task<> run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
-                    std::shared_ptr<std::optional<TimePoint>> arrived);
+                    std::shared_ptr<std::optional<TimePoint>> arrival);
 
   // axis_power.cpp: sequences that move nothing
   void on_turned_by_power(const Error& cause);

@@ -50,14 +50,14 @@ Result<CommandPtr> Axis::accept(const GroupMemberRequest&, const CommandOptions&
 }
 
 Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
-                        std::shared_ptr<std::optional<TimePoint>> arrived) {
-  if (!there) {
-    if (!co_await follow(activity, base, since)) co_return;
-    *arrived = sample_->measured_at;
+                        std::shared_ptr<std::optional<TimePoint>> arrival) {
+  if (there) {
+    if (!co_await is_no_reboot(activity) || !co_await still_there(activity)) co_return;
+  } else {
+    const auto when = co_await arrived(activity, base, since);
+    if (!when) co_return;
+    *arrival = when;
   }
-  if (!co_await is_no_reboot(activity)) co_return;
-  if (there && !co_await still_there(activity)) co_return;
-  if (!there && watch_speed(SpeedWatch::Event::arrived)) co_return;
   tracker_.reached(*activity->plan.target, drive_->position_window());
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });

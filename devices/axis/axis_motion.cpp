@@ -209,13 +209,29 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   const auto since = env_.clock->now();
   if (there) {  // nothing to do, and nothing is sent
     activity->command->activate();
-  } else {
-    if (!co_await started(activity, std::move(result), base, since)) co_return false;
-    if (!co_await follow(activity, base, since)) co_return false;
+    co_return co_await is_no_reboot(activity) && co_await still_there(activity);
   }
-  if (!co_await is_no_reboot(activity)) co_return false;
-  if (!there) co_return !watch_speed(SpeedWatch::Event::arrived);
-  co_return co_await still_there(activity);
+  if (!co_await started(activity, std::move(result), base, since)) co_return false;
+  co_return (co_await arrived(activity, base, since)).has_value();
+}
+
+/// When a motion was read at rest at its target, and not too fast, by the drive that began it. Nothing: the
+/// activity has ended otherwise.
+Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t base, TimePoint since) {
+  for (;;) {
+    if (!co_await follow(activity, base, since)) co_return std::nullopt;
+    const auto when = sample_->measured_at;
+    if (!co_await is_no_reboot(activity)) co_return std::nullopt;
+    // While its proof was waited for a terminal may have begun another motion.
+    if (sample_->moving || sample_->mode != DriveMode::positioning || !is_at(*activity->plan.target))
+      continue;
+    if (watch_speed(SpeedWatch::Event::arrived)) co_return std::nullopt;
+    co_return when;
+  }
+}
+
+bool Axis::is_at(const Target& target) const {
+  return std::abs(tracker_.counter() - target.counter) <= target_tolerance();
 }
 
 /// A drive that was restarted, on the way or before, shows the counter 0: only where that is the target, too,
@@ -235,8 +251,7 @@ Task<bool> Axis::still_there(ActivityPtr activity) {
     co_await sampled_.wait_until(env_.clock->now() + milliseconds(50));
     if (!current(*activity)) co_return false;  // offline, too
   }
-  const auto away = std::abs(tracker_.counter() - activity->plan.target->counter);
-  if (!found_in_motion() && away <= target_tolerance()) co_return true;
+  if (!found_in_motion() && is_at(*activity->plan.target)) co_return true;
   auto cause = error(Reason::moving, "the shaft was moved while the axis rested at its target",
                      "see what moves it; then repeat the move");
   cause.outcome = Outcome::not_executed;
@@ -409,7 +424,6 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
   const auto& plan = activity->plan;
   const auto latest =
       plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
-  const auto tolerance = target_tolerance();
   const bool unseen = !plan.endless && !shows(plan, base);
   std::optional<TimePoint> resting_since;
   // The end is expected: it is to be told at once.
@@ -446,7 +460,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       }
       if (!sample.moving) {
         // Before it moved it may rest within the tolerance, too.
-        const bool there = !plan.endless && std::abs(tracker_.counter() - plan.target->counter) <= tolerance;
+        const bool there = !plan.endless && is_at(*plan.target);
         if (there && activity->started) co_return true;
         if (!resting_since) resting_since = sample.asked_at;
         const bool settles = !held_back(plan) && sample.asked_at - *resting_since < settling();

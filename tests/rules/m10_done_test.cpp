@@ -1,4 +1,4 @@
-// M10: where nothing had to be sent, a terminal may have moved the axis since it was seen at its target.
+// M10: a terminal may have moved the axis since it was seen at its target.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +12,31 @@ using namespace std::chrono_literals;
 
 void jogs_by_terminal(AxisSettings& axis) {
   axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+}
+
+/// The counter 0 is what a restarted drive shows, too: the canary has to be read before Done.
+TEST(M10Done, IsNotToldOfAnAxisThatATerminalMovesBeforeItIsProven) {
+  both_directions({.switches = {{"enabled_at_power_up", false}}, .adjust = jogs_by_terminal},
+                  [](const RigOptions& options) {
+                    Rig rig(options);
+                    rig.ready();
+                    ASSERT_EQ(rig.complete(MoveAbsoluteRequest{.position = 5}).state, CommandState::done);
+                    const auto back = rig.submit(MoveAbsoluteRequest{.position = 0});
+                    ASSERT_TRUE(rig.run_until([&] { return rig.drive->shaft_moving(); }, 2s));
+                    rig.fault({.kind = simulation::FaultKind::drop_reply,
+                               .function = 0x03,
+                               .register_address = 0x0020,
+                               .count = -1});
+                    ASSERT_TRUE(rig.run_until([&] { return !rig.drive->shaft_moving(); }, 2s));
+                    rig.run(30ms);
+                    ASSERT_FALSE(ended(back->value().state));
+                    rig.set_input("X4", true);
+                    rig.run(60ms);
+                    rig.faults().clear();
+                    ASSERT_TRUE(rig.run_until([&] { return ended(back->value().state); }, 5s));
+                    EXPECT_EQ(back->value().state, CommandState::error) << describe(back->value());
+                    EXPECT_EQ(back->value().cause->reason, Reason::terminal) << describe(back->value());
+                  });
 }
 
 /// The members' starts take their time: a member that rests at its target was read before all of them.
