@@ -138,6 +138,8 @@ class Cia402Drive final : public Drive {
   // drive_connection.cpp
   /// What one of two nodes with the same node-ID says is not what the other does.
   [[nodiscard]] Result<void> check_alone() const;
+  /// The drive counts as the axis was planned; else misconfigured.
+  Task<Result<void>> check_units();
   Task<Result<void>> set_emergency_id();
   Task<Result<void>> set_heartbeat();
   Task<Result<void>> set_pdos();

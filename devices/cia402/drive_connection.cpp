@@ -176,6 +176,7 @@ Task<Result<void>> Cia402Drive::configure() {
   expected_.clear();
   if (const auto marked = co_await write_canary(distinct(fresh_neutral_block()), patiently()); !marked)
     co_return marked;
+  if (const auto fitting = co_await check_units(); !fitting) co_return fitting;
   if (model_->objects.loop_mode && !found_closed_) {
     const auto mode = co_await read_object(*model_->objects.loop_mode, patiently());
     if (!mode) co_return fail(mode.error());
@@ -198,6 +199,24 @@ Task<Result<void>> Cia402Drive::configure() {
   if (switched) switched = co_await set_pdos();
   if (!switched) co_return switched;
   co_return co_await check_continuity(TransactionClass::parameters);
+}
+
+/// Within the canary: what a power-up may have changed is read in the power cycle that it counts for.
+Task<Result<void>> Cia402Drive::check_units() {
+  Values values;
+  for (const auto object : model_->unit_objects) {
+    const auto value = co_await read_object(object, patiently());
+    if (value) values[object.key()] = *value;
+    if (value || canopen::is_missing(value.error())) continue;  // what it does not have tells nothing
+    auto error = value.error();
+    if (error.outcome == Outcome::refused)
+      error.remedy = fmt::format("where the drive does not have it, add drive: {{ objects: {{ {} }} }}",
+                                 without(object));
+    co_return fail(std::move(error));
+  }
+  const auto conflict = find_conflict(model_->meaning.units, setup_.pulses_per_revolution, values);
+  if (!conflict) co_return Result<void>{};
+  co_return fail(error_at(Reason::misconfigured, conflict->object, conflict->message, conflict->remedy));
 }
 
 Task<Result<void>> Cia402Drive::set_emergency_id() {

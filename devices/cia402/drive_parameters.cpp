@@ -57,6 +57,8 @@ std::string Cia402Drive::configured_by(std::uint32_t address) const {
       owner != std::end(motion_owners))
     return std::string(owner->key);
   if (object == object::homing_method && setup_.homing) return "homing.method";
+  if (std::ranges::find(model_->unit_objects, object) != model_->unit_objects.end())
+    return "drive.velocity_unit";
   if (object == model_->objects.start_speed) return "limits.start_speed";
   if (object == model_->objects.eeprom_switch) return "persist";
   if (model_->addressing && object == model_->addressing->custom_node) return "DriveService.Readdress";

@@ -1,9 +1,7 @@
 #include "devices/cia402/encoding.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
-#include <limits>
 
 #include "devices/cia402/standstill.hpp"
 #include "devices/cia402/status_word.hpp"
@@ -47,18 +45,11 @@ std::int32_t milliseconds_of(Duration time) {
   return static_cast<std::int32_t>(std::chrono::duration_cast<std::chrono::milliseconds>(time).count());
 }
 
-std::int32_t clamped(double value) {
-  constexpr double most = std::numeric_limits<std::int32_t>::max();
-  return static_cast<std::int32_t>(std::clamp(std::round(value), -most, most));
-}
-
 /// A time from `from_rpm` to `rpm` as the drive wants its ramps.
 std::int32_t ramp(const Model& model, std::int64_t pulses_per_revolution, int rpm, Duration time) {
-  if (model.meaning.ramps_are_times) return milliseconds_of(time);
-  const double per_rpm =
-      model.meaning.velocity_in_rpm ? 1.0 : static_cast<double>(pulses_per_revolution) / 60.0;
-  const double seconds = std::max(std::chrono::duration<double>(time).count(), 0.001);
-  return std::max(1, clamped(std::abs(rpm) * per_rpm / seconds));
+  const auto& units = model.meaning.units;
+  if (units.ramps == Ramps::times) return milliseconds_of(time);
+  return ramp_of(units.acceleration, pulses_per_revolution, rpm, time);
 }
 
 /// 0: the drive has none of its own.
@@ -136,9 +127,7 @@ std::uint16_t alarm_of(const Model& model, std::uint16_t error_code) {
 }
 
 int decode_velocity(const Model& model, std::int64_t pulses_per_revolution, std::int64_t value) {
-  if (model.meaning.velocity_in_rpm) return static_cast<std::int32_t>(value);
-  return clamped(static_cast<double>(value) * 60 /
-                 static_cast<double>(std::max<std::int64_t>(1, pulses_per_revolution)));
+  return rpm_of(model.meaning.units.velocity, pulses_per_revolution, value);
 }
 
 std::optional<bool> told_motion(const Model& model, const Values& values) {
@@ -215,8 +204,7 @@ std::vector<MotionObject> motion_objects(const Model& model) {
 }
 
 std::int32_t encode_velocity(const Model& model, std::int64_t pulses_per_revolution, int rpm) {
-  if (model.meaning.velocity_in_rpm) return rpm;
-  return clamped(rpm * static_cast<double>(pulses_per_revolution) / 60.0);
+  return counts_of(model.meaning.units.velocity, pulses_per_revolution, rpm);
 }
 
 MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const MoveProfile& profile) {

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "buses/canopen/pdo.hpp"
 #include "devices/cia402/model.hpp"
 #include "devices/cia402/objects.hpp"
+#include "devices/cia402/unit_objects.hpp"
 #include "devices/drive.hpp"
 
 namespace axisd::cia402 {
@@ -24,9 +24,6 @@ ObjectType type_of(const Model& model, canopen::Object object);
 
 /// The model's dictionary has the object.
 bool has(const Model& model, canopen::Object object);
-
-/// Values of objects by Object::key(), with their signs.
-using Values = std::map<std::uint32_t, std::int64_t>;
 
 /// The objects that tell a drive's state, in the order in which PDOs carry them.
 std::vector<canopen::Object> state_objects(const Model& model);
@@ -80,7 +77,7 @@ MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const
 /// `present`: what a velocity motion leaves as it is.
 MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const VelocityProfile& profile,
                    const MotionBlock& present);
-/// 60FFh.
+/// 60FFh: never faster than `rpm`.
 std::int32_t encode_velocity(const Model& model, std::int64_t pulses_per_revolution, int rpm);
 /// 6099h:01, 6099h:02, 609Ah, 607Ch, those that the drive has, in this order. The method (6098h) is
 /// negotiated.

@@ -8,6 +8,7 @@
 
 #include "buses/canopen/object.hpp"
 #include "buses/canopen/remote_node.hpp"
+#include "devices/cia402/units.hpp"
 #include "devices/descriptor.hpp"
 
 namespace axisd::cia402 {
@@ -63,11 +64,7 @@ struct VendorObjects {
 
 /// What a drive's values mean.
 struct Meaning {
-  /// 6083h, 6084h and 609Ah are times in ms from start speed to speed; else rates in velocity units per
-  /// second.
-  bool ramps_are_times = true;
-  /// Velocities are r/min; else in pulses per second.
-  bool velocity_in_rpm = true;
+  Units units{};
   /// Of the encoder, where it is not said whether position_window is in counts or in pulses; 0: in pulses.
   std::int64_t counts_per_revolution = 0;
   /// 603Fh and EMCY: `code & alarm_mask` is the alarm's code where `code & ~alarm_mask` is `alarm_prefix`;
@@ -97,6 +94,8 @@ struct Model {
   StatusBits status{};
   VendorObjects objects{};
   Meaning meaning{};
+  /// Those of unit_objects() that the drive has: they are compared with `meaning` before it is configured.
+  std::span<const canopen::Object> unit_objects{};
   std::optional<Addressing> addressing{};  ///< nothing: only the drive's switches or tools can
   /// The manual prints an EMCY identifier that is another service's: 1014h is set to 80h + node first (M24).
   bool sets_emergency_id = true;

@@ -27,7 +27,6 @@ constexpr TerminalFunctionSpec input_functions[] = {
     {"negative_limit", 3, "positive_limit"},
 };
 
-constexpr std::string_view velocity_units[] = {"pulses_per_second", "rpm"};
 constexpr std::string_view ramp_kinds[] = {"rate", "time"};
 constexpr std::string_view loop_modes[] = {"closed", "open"};
 constexpr SettingSpec settings[] = {
@@ -37,16 +36,15 @@ constexpr SettingSpec settings[] = {
      .required = true},
     {.key = "velocity_unit",
      .kind = "enum",
-     .choices = velocity_units,
-     .default_value = "pulses_per_second",
-     .description =
-         "What 6081h, 6099h, 606Ch and 60FFh count: position increments per second (CiA 402) or r/min."},
+     .choices = cia402::unit_names,
+     .description = "What 6081h, 6099h, 606Ch and 60FFh count, where the data sheet does not tell it (60A9h): "
+                    "position increments per second, or a power of ten of r/min, r/s, degrees/s or rad/s."},
     {.key = "ramps",
      .kind = "enum",
      .choices = ramp_kinds,
      .default_value = "rate",
      .description =
-         "What 6083h, 6084h and 609Ah hold: velocity units per second (CiA 402), or a time in ms."},
+         "What 6083h, 6084h and 609Ah hold: velocity units per second (or what 60AAh says), or a time in ms."},
     {.key = "loop_mode",
      .kind = "enum",
      .choices = loop_modes,

@@ -9,6 +9,7 @@
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/objects.hpp"
 #include "devices/cia402_eds/eds_checks.hpp"
+#include "devices/cia402_eds/unit_plan.hpp"
 
 namespace axisd::cia402_eds {
 
@@ -52,6 +53,20 @@ int as_int(std::int64_t value) {
   return static_cast<int>(std::clamp<std::int64_t>(value, 0, std::numeric_limits<std::int32_t>::max()));
 }
 
+/// The fastest and the slowest motion that the drive's own range and unit of velocities permit.
+void limit_velocities(Capabilities& all, std::int64_t most_counts, cia402::Rate unit) {
+  const auto fastest = std::min<std::int64_t>(most_counts, std::numeric_limits<std::int32_t>::max());
+  if (unit.angle == cia402::Angle::pulse) {
+    all.maximum_pulse_rate_hz = cia402::fastest_pulse_rate(unit, fastest);
+  } else {
+    all.maximum_rpm = cia402::fastest_rpm(unit, fastest);
+    all.minimum_rpm = std::max(all.minimum_rpm, cia402::slowest_rpm(unit));
+    all.minimum_homing_rpm = std::max(all.minimum_homing_rpm, all.minimum_rpm);
+    all.minimum_search_rpm = std::max(all.minimum_search_rpm, all.minimum_rpm);
+  }
+  all.maximum_homing_rpm = all.maximum_search_rpm = all.maximum_rpm;
+}
+
 /// In the units that axisd plans in: r/min, pulses per second, ms.
 Capabilities capabilities_of(const Capabilities& base, std::span<const ParameterSpec> rows,
                              const Conventions& conventions) {
@@ -59,10 +74,7 @@ Capabilities capabilities_of(const Capabilities& base, std::span<const Parameter
   auto all = base;
   const auto fastest =
       std::min(row(cia402::object::profile_velocity)->maximum, row(cia402::object::target_velocity)->maximum);
-  if (conventions.velocity_in_rpm)
-    all.maximum_rpm = as_int(fastest);
-  else
-    all.maximum_pulse_rate_hz = fastest;
+  limit_velocities(all, fastest, conventions.units.velocity);
   const auto* target = row(cia402::object::target_position);
   const auto whole = [](std::int64_t value) {
     using Limits = std::numeric_limits<std::int32_t>;
@@ -71,12 +83,11 @@ Capabilities capabilities_of(const Capabilities& base, std::span<const Parameter
   all.minimum_target_pulses = whole(target->minimum);
   all.maximum_target_pulses = whole(target->maximum);
   const auto* ramp = row(cia402::object::acceleration);
-  if (conventions.ramps_are_times) {
+  if (conventions.units.ramps == cia402::Ramps::times) {
     all.minimum_time_ms = as_int(ramp->minimum);
     all.maximum_time_ms = std::min(all.maximum_time_ms, as_int(ramp->maximum));
     all.minimum_homing_time_ms = all.minimum_time_ms;
   }
-  all.maximum_homing_rpm = all.maximum_search_rpm = all.maximum_rpm;
   all.closed_loop = conventions.closed_loop;
   all.position_source = conventions.closed_loop ? PositionSource::encoder : PositionSource::commanded;
   return all;
@@ -84,10 +95,10 @@ Capabilities capabilities_of(const Capabilities& base, std::span<const Parameter
 
 }  // namespace
 
-Conventions conventions_of(const std::map<std::string, SettingValue>& settings) {
-  return {.velocity_in_rpm = text_setting(settings, "velocity_unit") == "rpm",
-          .ramps_are_times = text_setting(settings, "ramps") == "time",
-          .closed_loop = text_setting(settings, "loop_mode") != "open"};
+Result<Conventions> conventions_of(const Eds& eds, const std::map<std::string, SettingValue>& settings) {
+  const auto units = plan_units(eds, settings);
+  if (!units) return fail(units.error());
+  return Conventions{.units = *units, .closed_loop = text_setting(settings, "loop_mode") != "open"};
 }
 
 EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Conventions& conventions,
@@ -95,7 +106,8 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
     : DriveDescriptor(base),
       catalogue_(catalogue_of(eds)),
       homing_codes_(homing_codes_of(eds)),
-      warnings_(std::move(warnings_of_file)) {
+      warnings_(std::move(warnings_of_file)),
+      unit_objects_(unit_objects_of(eds)) {
   warnings = warnings_;
   parameters = catalogue_.rows;
   capabilities = capabilities_of(base.capabilities, parameters, conventions);
@@ -121,8 +133,8 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
     model_.objects.save = cia402::MemoryCommand{object::store_all, save};
   if (eds.find(object::restore_all) != nullptr)
     model_.objects.restore = cia402::MemoryCommand{object::restore_all, load};
-  model_.meaning.ramps_are_times = conventions.ramps_are_times;
-  model_.meaning.velocity_in_rpm = conventions.velocity_in_rpm;
+  model_.meaning.units = conventions.units;
+  model_.unit_objects = unit_objects_;
   can_transactions = cia402::transactions_of(model_, 0);  // it has nothing that could drift
 }
 
@@ -147,8 +159,9 @@ Result<std::shared_ptr<const DriveDescriptor>> specialise(
   if (!findings.empty()) return refused(findings, "correct drive: { objects: ... } by the drive's manual");
   findings = check_eds(*eds, overrides);
   if (!findings.empty()) return refused(findings, remedy_of(findings));
-  return std::make_shared<const EdsDrive>(base, *eds, conventions_of(settings),
-                                          warnings_of(*eds, overrides, path));
+  const auto conventions = conventions_of(*eds, settings);
+  if (!conventions) return refused({{0, conventions.error().message}}, conventions.error().remedy);
+  return std::make_shared<const EdsDrive>(base, *eds, *conventions, warnings_of(*eds, overrides, path));
 }
 
 }  // namespace axisd::cia402_eds

@@ -13,13 +13,17 @@
 
 namespace axisd::cia402_eds {
 
-/// What an EDS does not say.
+/// What an EDS does not say of itself.
 struct Conventions {
-  bool velocity_in_rpm = false;  ///< else in position increments per second
-  bool ramps_are_times = false;  ///< 6083h, 6084h, 609Ah in ms; else in velocity units per second
-  bool closed_loop = true;       ///< 6064h is measured
+  cia402::Units units{.velocity = cia402::pulses_per_second,
+                      .ramps = cia402::Ramps::rates,
+                      .acceleration = cia402::pulses_per_second,
+                      .velocity_source = cia402::UnitSource::configuration};
+  bool closed_loop = true;  ///< 6064h is measured
 };
-Conventions conventions_of(const std::map<std::string, SettingValue>& settings);
+/// Errors: of plan_units().
+Result<Conventions> conventions_of(const canopen::Eds& eds,
+                                   const std::map<std::string, SettingValue>& settings);
 
 /// Lives as long as an axis refers to it; everything that it points to is its own or lives as long as the
 /// program.
@@ -37,12 +41,13 @@ class EdsDrive final : public DriveDescriptor {
   Catalogue catalogue_;
   std::vector<cia402::HomingCode> homing_codes_;
   std::vector<std::string> warnings_;
+  std::vector<canopen::Object> unit_objects_;
   cia402::Model model_;
 };
 
 /// Reads the file of the setting `eds`, with what the settings of its objects say in its place. Errors
-/// (invalid_argument): none is named, it cannot be read, an object cannot be as its settings say, or
-/// check_eds() found something ("FILE:LINE: ..." one per line).
+/// (invalid_argument): none is named, it cannot be read, an object cannot be as its settings say,
+/// check_eds() found something ("FILE:LINE: ..." one per line), or those of plan_units().
 Result<std::shared_ptr<const DriveDescriptor>> specialise(
     const DriveDescriptor& base, const std::map<std::string, SettingValue>& settings);
 

@@ -247,7 +247,8 @@ std::string other_nodes(const Setup& setup) {
 /// Empty: the model needs none.
 std::string data_sheet_line(const Manual& manual) {
   if (!manual.has("data_sheet")) return {};
-  return fmt::format("    drive: {{ eds: {} }}\n", test::in_source_tree(manual.text("data_sheet")));
+  return fmt::format("    drive: {{ eds: {}, velocity_unit: {} }}\n",
+                     test::in_source_tree(manual.text("data_sheet")), manual.text("velocity_unit"));
 }
 
 /// Switches and, where it has outputs, two of them, as the lines of an axis.

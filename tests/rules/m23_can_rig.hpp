@@ -217,7 +217,8 @@ class CanRig {
         {.terminal = standard ? "POS" : "X1", .function = turned ? "negative_limit" : "positive_limit"},
         {.terminal = standard ? "NEG" : "X2", .function = turned ? "positive_limit" : "negative_limit"}};
     if (standard) {
-      axis.model_settings = {{"eds", in_source_tree("config/examples/standard-drive.eds")}};
+      axis.model_settings = {{"eds", in_source_tree("config/examples/standard-drive.eds")},
+                             {"velocity_unit", std::string("pulses_per_second")}};
       const auto* model = find_drive_model("cia402");
       auto made = model->specialise(*model, axis.model_settings);
       if (!made) throw std::invalid_argument(to_string(made.error()));

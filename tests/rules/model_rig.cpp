@@ -65,7 +65,10 @@ std::string yaml_of(const ModelRigOptions& options, bool on_can) {
   const auto add = [&keys](std::string_view key, std::string_view value) {
     keys += fmt::format("{}{}: {}", keys.empty() ? "" : ", ", key, value);
   };
-  if (is_standard_drive(options.model)) add("eds", in_source_tree("config/examples/standard-drive.eds"));
+  if (is_standard_drive(options.model)) {
+    add("eds", in_source_tree("config/examples/standard-drive.eds"));
+    add("velocity_unit", "pulses_per_second");
+  }
   if (!options.shows_inputs) add("objects", "{ 60FDh: { access: none } }");
   for (const auto& one : other_readings)
     if (const auto found = options.switches.find(one.switch_name);

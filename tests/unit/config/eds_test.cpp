@@ -12,6 +12,7 @@
 namespace axisd::config {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -31,17 +32,19 @@ axes:
     inputs: {{ {} }}
     drive:
       eds: {}
+      velocity_unit: {}
 {})";
 
 struct Axis {
   std::string pulses = "65536", invert = "false", velocity = "100 mm/s";
   std::string inputs = "NEG: negative_limit, POS: positive_limit, HOME: home";
   std::string eds = "standard-drive.eds", more{};
+  std::string velocity_unit = "pulses_per_second";
 };
 
 LoadResult load(const Axis& axis) {
   const auto text = fmt::format(fmt::runtime(template_text), axis.pulses, axis.invert, axis.velocity,
-                                axis.inputs, axis.eds, axis.more);
+                                axis.inputs, axis.eds, axis.velocity_unit, axis.more);
   return load_text(text, source_path("config/examples/test.yaml").string());
 }
 
@@ -101,6 +104,50 @@ TEST(Eds, TakesAnyNumberOfPulses) {
   EXPECT_TRUE(load({.pulses = "12345"}).configuration);
   // 2,000,000 increments/s: 30 r/s at 65536 pulses/rev.
   EXPECT_THAT(findings(load({.velocity = "200 mm/s"})), HasSubstr("at most 1831 r/min at 65536 pulses/rev"));
+}
+
+TEST(Eds, LimitsAreThoseOfTheUnit) {
+  // 2,000,000 of 0.1 r/min, and of 0.001 r/min.
+  EXPECT_EQ(findings(load({.velocity = "200 mm/s", .velocity_unit = "0.1rpm"})), "");
+  EXPECT_THAT(findings(load({.velocity = "200 mm/s", .velocity_unit = "0.001rpm"})),
+              HasSubstr("at most 2000 r/min"));
+  EXPECT_THAT(findings(load({.velocity_unit = "0.1"})), HasSubstr("velocity_unit"));
+}
+
+TEST(Eds, TheUnitOfVelocitiesIsNeverGuessed) {
+  auto text = fmt::format(fmt::runtime(template_text), "1000", "false", "10 mm/s", "", "standard-drive.eds",
+                          "", "");
+  const std::string line = "      velocity_unit: \n";
+  const auto at = text.find(line);
+  ASSERT_NE(at, std::string::npos);
+  text.erase(at, line.size());
+  const auto loaded = [&text](const std::string& more) {
+    return findings(load_text(text + more, source_path("config/examples/test.yaml").string()));
+  };
+  // As if it were a drive that does not tell.
+  EXPECT_THAT(loaded("      objects: { 60A9h: { access: none } }\n"),
+              AllOf(HasSubstr("test.yaml:15:12: "), HasSubstr("nothing in it tells what the drive's velocities count"),
+                    HasSubstr("drive: { velocity_unit: UNIT }")));
+  const auto told = [&loaded](const std::string& value) {
+    return loaded("      objects: { 60A9h: { type: u32, access: ro, default: " + value + " } }\n");
+  };
+  EXPECT_EQ(told("0x00B44700"), "");
+  EXPECT_THAT(told("0x00010300"), HasSubstr("is not clear: 60A9h is 00010300h")) << "metres";
+}
+
+TEST(Eds, AKeyThatContradictsTheDriveIsRefused) {
+  const auto said = [](const std::string& unit, const std::string& access) {
+    return findings(load({.velocity = "10 mm/s",
+                          .more = "      objects: { 60A9h: { type: u32, access: " + access +
+                                  ", default: 0x00B44700 } }\n",
+                          .velocity_unit = unit}));
+  };
+  EXPECT_EQ(said("rpm", "ro"), "");
+  EXPECT_THAT(said("pulses_per_second", "ro"),
+              AllOf(HasSubstr("its velocities count r/min (60A9h is 00B44700h), and drive.velocity_unit says "
+                              "pulses/s"),
+                    HasSubstr("write drive: { velocity_unit: rpm }")));
+  EXPECT_EQ(said("pulses_per_second", "rw"), "") << "the drive itself is asked";
 }
 
 TEST(Eds, TerminalsHaveOneFunctionEach) {

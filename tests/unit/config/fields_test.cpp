@@ -107,7 +107,7 @@ axes:
     scale: { microstep: 65536 pulses/rev }
     limits: { velocity: 10 rev/s }
     drive: { eds: )" +
-                    eds.string() + " }\n";
+                    eds.string() + ", velocity_unit: pulses_per_second }\n";
   const auto before = read(text);
   EXPECT_THAT(differences(before, read(text)), IsEmpty());
   std::ofstream(eds, std::ios::app) << "; another edition\n";

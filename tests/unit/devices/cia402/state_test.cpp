@@ -226,7 +226,8 @@ TEST(Decoding, AlarmsAreTheLowByteOfTheMakersCodes) {
 
 TEST(Encoding, ForDrivesWithRatesAndPulsesPerSecond) {
   auto other = model();
-  other.meaning.ramps_are_times = other.meaning.velocity_in_rpm = false;
+  other.meaning.units = {
+      .velocity = pulses_per_second, .ramps = Ramps::rates, .acceleration = pulses_per_second};
   other.objects.start_speed.reset();
   const MoveProfile profile{
       .target_pulses = -5, .velocity_rpm = 60, .acceleration_time = 100ms, .deceleration_time = 0ms};

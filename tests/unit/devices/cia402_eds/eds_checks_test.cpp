@@ -177,6 +177,7 @@ TEST(EdsChecks, TheFileIsNamedInErrorsAndWarnings) {
   const auto specialised = [&](const std::string& text, Settings settings = {}) {
     std::ofstream(path, std::ios::binary) << text;
     settings["eds"] = path.string();
+    settings["velocity_unit"] = std::string("pulses_per_second");
     return model->specialise(*model, settings);
   };
   const auto flawed = specialised(changed("6081", "HighLimit", "HighLimit=x"));

@@ -119,19 +119,35 @@ TEST(EdsDrive, IsToldByItsIdentity) {
 TEST(EdsDrive, ConvertsAsItsConventionsSay) {
   const auto by_pulses = drive_of(example());
   EXPECT_EQ(by_pulses.capabilities.maximum_pulse_rate_hz, 2'000'000);
-  EXPECT_FALSE(by_pulses.model().meaning.velocity_in_rpm);
-  EXPECT_FALSE(by_pulses.model().meaning.ramps_are_times);
+  EXPECT_EQ(by_pulses.model().meaning.units.velocity, cia402::pulses_per_second);
+  EXPECT_EQ(by_pulses.model().meaning.units.ramps, cia402::Ramps::rates);
   EXPECT_TRUE(by_pulses.capabilities.closed_loop);
-  const auto by_rpm =
-      drive_of(example(), {.velocity_in_rpm = true, .ramps_are_times = true, .closed_loop = false});
+  const auto by_rpm = drive_of(example(), {.units = {}, .closed_loop = false});
   EXPECT_EQ(by_rpm.capabilities.maximum_rpm, 2'000'000);
   EXPECT_EQ(by_rpm.capabilities.minimum_time_ms, 1);
-  EXPECT_TRUE(by_rpm.model().meaning.velocity_in_rpm);
+  EXPECT_EQ(by_rpm.model().meaning.units.velocity, cia402::revolutions_per_minute);
   EXPECT_FALSE(by_rpm.capabilities.closed_loop);
   EXPECT_EQ(by_rpm.capabilities.position_source, PositionSource::commanded);
-  const auto conventions =
-      conventions_of({{"velocity_unit", "rpm"}, {"ramps", "time"}, {"loop_mode", "open"}});
-  EXPECT_TRUE(conventions.velocity_in_rpm && conventions.ramps_are_times && !conventions.closed_loop);
+  const auto conventions = conventions_of(
+      parsed(example()), {{"velocity_unit", "rpm"}, {"ramps", "time"}, {"loop_mode", "open"}});
+  ASSERT_TRUE(conventions) << to_string(conventions.error());
+  EXPECT_EQ(conventions->units.velocity, cia402::revolutions_per_minute);
+  EXPECT_EQ(conventions->units.ramps, cia402::Ramps::times);
+  EXPECT_FALSE(conventions->closed_loop);
+}
+
+TEST(EdsDrive, LimitsFollowTheUnitOfVelocities) {
+  const auto limits = [](std::string_view unit) {
+    return drive_of(example(), {.units = {.velocity = *cia402::unit_named(unit)}}).capabilities;
+  };
+  // 6081h and 60FFh: at most 2,000,000.
+  EXPECT_EQ(limits("0.001rpm").maximum_rpm, 2000);
+  EXPECT_EQ(limits("0.001rpm").minimum_rpm, 1);
+  EXPECT_EQ(limits("0.1degrees_per_second").maximum_rpm, 33'333);
+  EXPECT_EQ(limits("rev_per_second").maximum_rpm, 120'000'000);
+  EXPECT_EQ(limits("rev_per_second").minimum_rpm, 60) << "less is not to be had";
+  EXPECT_EQ(limits("rev_per_second").minimum_search_rpm, 60);
+  EXPECT_EQ(limits("radians_per_second").minimum_homing_rpm, 10);
 }
 
 TEST(EdsDrive, LacksWhatItsEdsLacks) {
@@ -193,7 +209,7 @@ TEST(EdsDrive, NeedsWhatTheDriverUses) {
 }
 
 TEST(EdsDrive, IsMadeFromItsFile) {
-  const auto made = base().specialise(base(), {{"eds", path}});
+  const auto made = base().specialise(base(), {{"eds", path}, {"velocity_unit", "pulses_per_second"}});
   ASSERT_TRUE(made) << to_string(made.error());
   EXPECT_EQ((*made)->model, "cia402");
   EXPECT_EQ((*made)->specialise, nullptr);

@@ -1,0 +1,23 @@
+// What the velocities and ramps of a drive count, by its configuration and its data sheet.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "buses/canopen/eds.hpp"
+#include "devices/cia402/unit_objects.hpp"
+#include "devices/descriptor.hpp"
+
+namespace axisd::cia402_eds {
+
+/// `velocity_unit`, else what the values of the file's unit objects say; ramps as `ramps` has them. Errors
+/// (invalid_argument): nothing tells the unit of velocities, that of ramps is unclear, or a key contradicts
+/// what the drive cannot change.
+Result<cia402::Units> plan_units(const canopen::Eds& eds,
+                                 const std::map<std::string, SettingValue>& settings);
+
+/// The unit objects that the drive has and that can be read.
+std::vector<canopen::Object> unit_objects_of(const canopen::Eds& eds);
+
+}  // namespace axisd::cia402_eds
