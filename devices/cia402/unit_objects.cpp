@@ -39,11 +39,11 @@ constexpr Object polarity{0x607E, 0}, velocity_notation{0x608B, 0}, velocity_dim
     velocity_si{0x60A9, 0}, acceleration_si{0x60AA, 0};
 
 constexpr auto all_objects = std::to_array<Object>(
-    {polarity,         velocity_notation, velocity_dimension, acceleration_notation, acceleration_dimension,
-     {0x608F, 1},      {0x608F, 2},       {0x6091, 1},        {0x6091, 2},           {0x6092, 1},
-     {0x6092, 2},      {0x6093, 1},       {0x6093, 2},        {0x6094, 1},           {0x6094, 2},
-     {0x6095, 1},      {0x6095, 2},       {0x6096, 1},        {0x6096, 2},           {0x6097, 1},
-     {0x6097, 2},      position_si,       velocity_si,        acceleration_si});
+    {polarity,    velocity_notation, velocity_dimension, acceleration_notation, acceleration_dimension,
+     {0x608F, 1}, {0x608F, 2},       {0x6091, 1},        {0x6091, 2},           {0x6092, 1},
+     {0x6092, 2}, {0x6093, 1},       {0x6093, 2},        {0x6094, 1},           {0x6094, 2},
+     {0x6095, 1}, {0x6095, 2},       {0x6096, 1},        {0x6096, 2},           {0x6097, 1},
+     {0x6097, 2}, position_si,       velocity_si,        acceleration_si});
 
 /// Both are there, and neither is 0, which says nothing.
 std::optional<std::pair<std::int64_t, std::int64_t>> ratio_of(const Values& values, Pair pair) {
@@ -129,8 +129,9 @@ UnitTold by_dimension(const Values& values, Object dimension, Object notation) {
   const auto power = static_cast<std::int8_t>(find(values, notation).value_or(0));
   std::optional<Rate> unit;
   if (code == dimension_rpm) unit = rate_of(Angle::revolution, Per::minute, power);
-  return told(dimension, unit,
-              fmt::format("{} is {:02X}h with {} = {}", short_name(dimension), code, short_name(notation), power));
+  return told(
+      dimension, unit,
+      fmt::format("{} is {:02X}h with {} = {}", short_name(dimension), code, short_name(notation), power));
 }
 
 /// What an SI unit says, and an index; both together have to say the same.
@@ -164,9 +165,10 @@ std::optional<UnitConflict> polarity_conflict(const Values& values) {
       .object = polarity,
       .message = fmt::format("it turns positions or velocities round, and not both ({} is {:02X}h)",
                              short_name(polarity), value & 0xFF),
-      .remedy = "set both or none of bits 6 and 7 of 607Eh with the drive's own tool; scale: { invert: true } "
-                "turns the axis; " +
-                remedy_without(polarity)};
+      .remedy =
+          "set both or none of bits 6 and 7 of 607Eh with the drive's own tool; scale: { invert: true } "
+          "turns the axis; " +
+          remedy_without(polarity)};
 }
 
 std::optional<UnitConflict> velocity_conflict(const Units& planned, const Values& values) {
@@ -177,11 +179,10 @@ std::optional<UnitConflict> velocity_conflict(const Units& planned, const Values
       return std::nullopt;
     case UnitTold::Kind::unclear:
       if (by_key) return std::nullopt;
-      return UnitConflict{
-          .object = told.object,
-          .message = fmt::format("what its velocities count is not clear: {}; {} {}", told.what,
-                                 source_text(planned), text_of(planned.velocity)),
-          .remedy = "say what the drive's manual says: drive: { velocity_unit: UNIT }"};
+      return UnitConflict{.object = told.object,
+                          .message = fmt::format("what its velocities count is not clear: {}; {} {}",
+                                                 told.what, source_text(planned), text_of(planned.velocity)),
+                          .remedy = "say what the drive's manual says: drive: { velocity_unit: UNIT }"};
     case UnitTold::Kind::unit:
       break;
   }

@@ -1,4 +1,5 @@
-// What a CiA 402 drive's own objects say of its units, and whether that is what an axis was planned with. Pure.
+// What a CiA 402 drive's own objects say of its units, and whether that is what an axis was planned with.
+// Pure.
 #pragma once
 
 #include <cstdint>

@@ -63,7 +63,8 @@ std::string text_of(Rate unit) {
   static constexpr std::string_view angles[] = {"pulses", "r", "degrees", "rad"};
   std::string factor;
   if (unit.exponent > 0) factor = "1" + std::string(static_cast<std::size_t>(unit.exponent), '0') + " ";
-  if (unit.exponent < 0) factor = "0." + std::string(static_cast<std::size_t>(-unit.exponent - 1), '0') + "1 ";
+  if (unit.exponent < 0)
+    factor = "0." + std::string(static_cast<std::size_t>(-unit.exponent - 1), '0') + "1 ";
   return fmt::format("{}{}/{}", factor, angles[std::to_underlying(unit.angle)],
                      unit.per == Per::second ? "s" : "min");
 }
@@ -95,8 +96,7 @@ std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Dur
   constexpr std::int64_t second = std::chrono::nanoseconds(std::chrono::seconds(1)).count();
   const auto ratio = rpm_per_count(unit, pulses_per_revolution);
   const auto speed = std::abs(std::int64_t{rpm}) * ratio.denominator;
-  const auto counts =
-      nearest(speed * second, ratio.numerator * std::clamp(time, shortest, longest).count());
+  const auto counts = nearest(speed * second, ratio.numerator * std::clamp(time, shortest, longest).count());
   return std::max(1, whole(counts));
 }
 

@@ -15,7 +15,8 @@ enum class Angle : std::uint8_t { pulse, revolution, degree, radian };
 enum class Per : std::uint8_t { second, minute };
 
 /// One count of a velocity: 10^exponent of `angle` in the time `per`; of an acceleration: that in a second. A
-/// pulse is what 6064h counts. The revolution is that of the shaft whose pulses per revolution are configured.
+/// pulse is what 6064h counts. The revolution is that of the shaft whose pulses per revolution are
+/// configured.
 struct Rate {
   Angle angle = Angle::revolution;
   Per per = Per::minute;
@@ -30,16 +31,23 @@ inline constexpr Rate revolutions_per_minute{},
 std::string text_of(Rate unit);
 
 /// As a configuration names them: pulses per second, then each angle in 10^0 to 10^-3.
-inline constexpr std::array<std::string_view, 17> unit_names{
-    "pulses_per_second",       "rpm",
-    "0.1rpm",                  "0.01rpm",
-    "0.001rpm",                "rev_per_second",
-    "0.1rev_per_second",       "0.01rev_per_second",
-    "0.001rev_per_second",     "degrees_per_second",
-    "0.1degrees_per_second",   "0.01degrees_per_second",
-    "0.001degrees_per_second", "radians_per_second",
-    "0.1radians_per_second",   "0.01radians_per_second",
-    "0.001radians_per_second"};
+inline constexpr std::array<std::string_view, 17> unit_names{"pulses_per_second",
+                                                             "rpm",
+                                                             "0.1rpm",
+                                                             "0.01rpm",
+                                                             "0.001rpm",
+                                                             "rev_per_second",
+                                                             "0.1rev_per_second",
+                                                             "0.01rev_per_second",
+                                                             "0.001rev_per_second",
+                                                             "degrees_per_second",
+                                                             "0.1degrees_per_second",
+                                                             "0.01degrees_per_second",
+                                                             "0.001degrees_per_second",
+                                                             "radians_per_second",
+                                                             "0.1radians_per_second",
+                                                             "0.01radians_per_second",
+                                                             "0.001radians_per_second"};
 /// Nothing: no unit has this name.
 std::optional<Rate> unit_named(std::string_view name);
 /// Empty: it has no name.

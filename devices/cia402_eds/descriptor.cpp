@@ -37,14 +37,15 @@ constexpr SettingSpec settings[] = {
     {.key = "velocity_unit",
      .kind = "enum",
      .choices = cia402::unit_names,
-     .description = "What 6081h, 6099h, 606Ch and 60FFh count, where the data sheet does not tell it (60A9h): "
-                    "position increments per second, or a power of ten of r/min, r/s, degrees/s or rad/s."},
+     .description =
+         "What 6081h, 6099h, 606Ch and 60FFh count, where the data sheet does not tell it (60A9h): "
+         "position increments per second, or a power of ten of r/min, r/s, degrees/s or rad/s."},
     {.key = "ramps",
      .kind = "enum",
      .choices = ramp_kinds,
      .default_value = "rate",
-     .description =
-         "What 6083h, 6084h and 609Ah hold: velocity units per second (or what 60AAh says), or a time in ms."},
+     .description = "What 6083h, 6084h and 609Ah hold: velocity units per second (or what 60AAh says), or a "
+                    "time in ms."},
     {.key = "loop_mode",
      .kind = "enum",
      .choices = loop_modes,

@@ -44,9 +44,10 @@ std::unexpected<Error> no_velocity_unit(const UnitTold& told) {
   const auto why = told.kind == UnitTold::Kind::nothing
                        ? std::string("nothing in it tells what the drive's velocities count (60A9h)")
                        : fmt::format("what the drive's velocities count is not clear: {}", told.what);
-  return fail(Reason::invalid_argument, why,
-              "write what the drive's manual says of 6081h and 60FFh: drive: { velocity_unit: UNIT }, such as "
-              "rpm, 0.1rpm, rev_per_second or pulses_per_second; a wrong unit makes the motor too fast");
+  return fail(
+      Reason::invalid_argument, why,
+      "write what the drive's manual says of 6081h and 60FFh: drive: { velocity_unit: UNIT }, such as "
+      "rpm, 0.1rpm, rev_per_second or pulses_per_second; a wrong unit makes the motor too fast");
 }
 
 }  // namespace

@@ -137,9 +137,8 @@ Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& rec
             terminal_lines(chosen(manual, manual.list("outputs"), recipe.outputs, false), recipe.outputs);
   std::string settings = recipe.settings;
   if (manual.has("data_sheet"))
-    settings +=
-        fmt::format("{}eds: {}, velocity_unit: {}", settings.empty() ? "" : ", ",
-                    test::in_source_tree(manual.text("data_sheet")), manual.text("velocity_unit"));
+    settings += fmt::format("{}eds: {}, velocity_unit: {}", settings.empty() ? "" : ", ",
+                            test::in_source_tree(manual.text("data_sheet")), manual.text("velocity_unit"));
   for (const auto& one : other_readings)
     if (variant.switches.contains(std::string(one.switch_name)))
       settings += fmt::format("{}{}: {}", settings.empty() ? "" : ", ", one.key, one.value);

@@ -115,8 +115,8 @@ TEST(Eds, LimitsAreThoseOfTheUnit) {
 }
 
 TEST(Eds, TheUnitOfVelocitiesIsNeverGuessed) {
-  auto text = fmt::format(fmt::runtime(template_text), "1000", "false", "10 mm/s", "", "standard-drive.eds",
-                          "", "");
+  auto text =
+      fmt::format(fmt::runtime(template_text), "1000", "false", "10 mm/s", "", "standard-drive.eds", "", "");
   const std::string line = "      velocity_unit: \n";
   const auto at = text.find(line);
   ASSERT_NE(at, std::string::npos);
@@ -126,7 +126,8 @@ TEST(Eds, TheUnitOfVelocitiesIsNeverGuessed) {
   };
   // As if it were a drive that does not tell.
   EXPECT_THAT(loaded("      objects: { 60A9h: { access: none } }\n"),
-              AllOf(HasSubstr("test.yaml:15:12: "), HasSubstr("nothing in it tells what the drive's velocities count"),
+              AllOf(HasSubstr("test.yaml:15:12: "),
+                    HasSubstr("nothing in it tells what the drive's velocities count"),
                     HasSubstr("drive: { velocity_unit: UNIT }")));
   const auto told = [&loaded](const std::string& value) {
     return loaded("      objects: { 60A9h: { type: u32, access: ro, default: " + value + " } }\n");
@@ -137,10 +138,10 @@ TEST(Eds, TheUnitOfVelocitiesIsNeverGuessed) {
 
 TEST(Eds, AKeyThatContradictsTheDriveIsRefused) {
   const auto said = [](const std::string& unit, const std::string& access) {
-    return findings(load({.velocity = "10 mm/s",
-                          .more = "      objects: { 60A9h: { type: u32, access: " + access +
-                                  ", default: 0x00B44700 } }\n",
-                          .velocity_unit = unit}));
+    return findings(load(
+        {.velocity = "10 mm/s",
+         .more = "      objects: { 60A9h: { type: u32, access: " + access + ", default: 0x00B44700 } }\n",
+         .velocity_unit = unit}));
   };
   EXPECT_EQ(said("rpm", "ro"), "");
   EXPECT_THAT(said("pulses_per_second", "ro"),

@@ -128,8 +128,8 @@ TEST(EdsDrive, ConvertsAsItsConventionsSay) {
   EXPECT_EQ(by_rpm.model().meaning.units.velocity, cia402::revolutions_per_minute);
   EXPECT_FALSE(by_rpm.capabilities.closed_loop);
   EXPECT_EQ(by_rpm.capabilities.position_source, PositionSource::commanded);
-  const auto conventions = conventions_of(
-      parsed(example()), {{"velocity_unit", "rpm"}, {"ramps", "time"}, {"loop_mode", "open"}});
+  const auto conventions =
+      conventions_of(parsed(example()), {{"velocity_unit", "rpm"}, {"ramps", "time"}, {"loop_mode", "open"}});
   ASSERT_TRUE(conventions) << to_string(conventions.error());
   EXPECT_EQ(conventions->units.velocity, cia402::revolutions_per_minute);
   EXPECT_EQ(conventions->units.ramps, cia402::Ramps::times);

@@ -9,12 +9,14 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <set>
 #include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
 
+#include "devices/cia402_eds/eds_drive.hpp"
 #include "devices/descriptor.hpp"
 #include "tests/support/source_tree.hpp"
 
@@ -31,6 +33,8 @@ struct Row {
   /// Each is in the refusal; none: it is accepted.
   std::vector<std::string_view> refused_for;
   std::size_t warnings = 0;  ///< of an accepted one
+  /// Of velocities, as an accepted one tells it; none: the key is required.
+  std::string_view unit{};
 };
 
 constexpr std::string_view no_velocity_mode = "object 60FFh:00 (target velocity) is missing";
@@ -51,9 +55,9 @@ const std::vector<Row>& table() {
       {"ingenia-eve-net-1.4.2.eds",
        {"object 6081h:00 (profile velocity) is missing",
         "object 6083h:00 (profile acceleration) is missing"}},
-      {"maxon-epos-70-10.eds", {}, 3},  // counts of its lists
-      {"maxon-epos4.eds", {}},
-      {"nanotec-cl4-e-1-12.eds", {}},
+      {"maxon-epos-70-10.eds", {}, 3, "rpm"},  // counts of its lists; 608Ch
+      {"maxon-epos4.eds", {}, 0, "rpm"},       // 60A9h
+      {"nanotec-cl4-e-1-12.eds", {}, 0, "rpm"},
       {"oriental-motor-blvd-krd-v400.eds", {}, 2},  // default and limit of 403Dh beyond their type
       {"pilz-prbt-0-1.dcf", {no_velocity_mode, "the drive has no profile velocity mode"}},
       {"roboteq-v60.eds", {no_control_word}},
@@ -79,9 +83,16 @@ std::filesystem::path folder() {
                           : std::filesystem::path(test::in_source_tree("../shared/eds"));
 }
 
-Result<std::shared_ptr<const DriveDescriptor>> made(const std::filesystem::path& path) {
+Result<std::shared_ptr<const DriveDescriptor>> made(const std::filesystem::path& path,
+                                                    std::string_view unit = {}) {
   const auto* model = find_drive_model("cia402");
-  return model->specialise(*model, {{"eds", path.string()}});
+  std::map<std::string, SettingValue> settings{{"eds", path.string()}};
+  if (!unit.empty()) settings["velocity_unit"] = std::string(unit);
+  return model->specialise(*model, settings);
+}
+
+cia402::Units units_of(const DriveDescriptor& drive) {
+  return static_cast<const EdsDrive&>(drive).model().meaning.units;
 }
 
 void expect_clear(const Error& refusal, const std::filesystem::path& path) {
@@ -102,8 +113,18 @@ TEST_P(MakersFile, IsTakenOrRefusedAsTheTableSays) {
     GTEST_SKIP() << path << " is not there; name the folder of makers' files in AXISD_EDS_FOLDER";
   const auto drive = made(path);
   if (row.refused_for.empty()) {
-    ASSERT_TRUE(drive) << to_string(drive.error());
-    EXPECT_THAT((*drive)->warnings, SizeIs(row.warnings));
+    const auto with_key = made(path, row.unit.empty() ? "0.1rpm" : row.unit);
+    ASSERT_TRUE(with_key) << to_string(with_key.error());
+    EXPECT_THAT((*with_key)->warnings, SizeIs(row.warnings));
+    ASSERT_EQ(drive.has_value(), !row.unit.empty()) << "no unit may be guessed";
+    if (drive) {
+      EXPECT_EQ(cia402::name_of(units_of(**drive).velocity), row.unit);
+      EXPECT_EQ(cia402::name_of(units_of(**drive).acceleration), row.unit);
+      return;
+    }
+    expect_clear(drive.error(), path);
+    EXPECT_THAT(drive.error().remedy, HasSubstr("drive: { velocity_unit: UNIT }"));
+    EXPECT_EQ(cia402::name_of(units_of(**with_key).velocity), "0.1rpm");
     return;
   }
   ASSERT_FALSE(drive);
