@@ -107,7 +107,9 @@ std::int32_t fastest_rpm(Rate unit, std::int64_t counts) {
 
 std::int32_t slowest_rpm(Rate unit) {
   const auto ratio = rpm_per_count(unit, 1);
-  return whole((ratio.numerator + ratio.denominator - 1) / ratio.denominator);
+  if (ratio.denominator % ratio.numerator == 0) return 1;  // whole r/min are whole counts
+  constexpr int least_counts = 5;
+  return whole((least_counts * ratio.numerator + ratio.denominator - 1) / ratio.denominator);
 }
 
 std::int64_t fastest_pulse_rate(Rate unit, std::int64_t counts) {

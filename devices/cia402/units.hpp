@@ -64,7 +64,8 @@ std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Dur
 
 /// The same limits whatever a revolution has: of units that are no pulses in r/min, rounded into the range.
 std::int32_t fastest_rpm(Rate unit, std::int64_t counts);
-/// One count, rounded up to whole r/min.
+/// The lowest from which rounding costs no more than a fifth of what was asked: a motion ends in the time
+/// that is predicted for it.
 std::int32_t slowest_rpm(Rate unit);
 /// Of a unit of pulses: pulses per second, at most 10^12.
 std::int64_t fastest_pulse_rate(Rate unit, std::int64_t counts);

@@ -91,6 +91,7 @@ TEST(Units, AMotionIsNeverFasterThanAsked) {
       const double granted = counts_of(unit, 65'536, rpm) * rpm_per_count;
       EXPECT_LE(granted, rpm * (1 + 1e-12)) << name;
       EXPECT_GT(granted, rpm - rpm_per_count * (1 + 1e-9)) << name;
+      if (unit.angle != Angle::pulse && rpm >= slowest_rpm(unit)) EXPECT_GE(granted, 0.8 * rpm) << name;
     }
 }
 
@@ -123,7 +124,10 @@ TEST(Units, LimitsAreRoundedIntoTheRange) {
   EXPECT_EQ(fastest_rpm(named("rpm"), -5), 0);
   EXPECT_EQ(slowest_rpm(named("0.001rpm")), 1);
   EXPECT_EQ(slowest_rpm(named("rpm")), 1);
-  EXPECT_EQ(slowest_rpm(named("radians_per_second")), 10);
+  EXPECT_EQ(slowest_rpm(named("degrees_per_second")), 1);
+  EXPECT_EQ(slowest_rpm(named("0.001radians_per_second")), 1);
+  EXPECT_EQ(slowest_rpm(named("radians_per_second")), 48) << "5 counts";
+  EXPECT_EQ(slowest_rpm(named("rev_per_second")), 300);
   EXPECT_EQ(fastest_pulse_rate(pulses_per_second, 2'000'000), 2'000'000);
   EXPECT_EQ(fastest_pulse_rate({.angle = Angle::pulse, .per = Per::minute, .exponent = 3}, 90), 1500);
   EXPECT_EQ(fastest_pulse_rate({.angle = Angle::pulse, .per = Per::second, .exponent = 9}, most),

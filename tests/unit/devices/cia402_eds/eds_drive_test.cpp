@@ -145,9 +145,9 @@ TEST(EdsDrive, LimitsFollowTheUnitOfVelocities) {
   EXPECT_EQ(limits("0.001rpm").minimum_rpm, 1);
   EXPECT_EQ(limits("0.1degrees_per_second").maximum_rpm, 33'333);
   EXPECT_EQ(limits("rev_per_second").maximum_rpm, 120'000'000);
-  EXPECT_EQ(limits("rev_per_second").minimum_rpm, 60) << "less is not to be had";
-  EXPECT_EQ(limits("rev_per_second").minimum_search_rpm, 60);
-  EXPECT_EQ(limits("radians_per_second").minimum_homing_rpm, 10);
+  EXPECT_EQ(limits("rev_per_second").minimum_rpm, 300) << "5 counts";
+  EXPECT_EQ(limits("rev_per_second").minimum_search_rpm, 300);
+  EXPECT_EQ(limits("radians_per_second").minimum_homing_rpm, 48);
 }
 
 TEST(EdsDrive, LacksWhatItsEdsLacks) {
