@@ -151,6 +151,24 @@ TEST(Eds, AKeyThatContradictsTheDriveIsRefused) {
   EXPECT_EQ(said("pulses_per_second", "rw"), "") << "the drive itself is asked";
 }
 
+TEST(Eds, RampsAndPolarityAreLookedAt) {
+  const auto said = [](const std::string& object, const std::string& more = {}) {
+    return findings(load({.more = "      objects: { " + object + " }\n" + more}));
+  };
+  const std::string odd = "60AAh: { type: u32, access: rw, default: 0x00B45700 }";
+  EXPECT_THAT(said(odd), AllOf(HasSubstr("its ramps count something unclear (60AAh is 00B45700h)"),
+                               HasSubstr("60AAh: { access: none }")));
+  EXPECT_EQ(said(odd, "      ramps: time\n"), "");
+  const std::string in_rpm = "60AAh: { type: u32, access: ro, default: 0x00C00300 }";
+  EXPECT_EQ(said(in_rpm), "");
+  EXPECT_THAT(
+      said(in_rpm, "      ramps: time\n"),
+      HasSubstr("its ramps count r/min per second (60AAh is 00C00300h), and the axis is planned with times"));
+  EXPECT_THAT(said("607Eh: { type: u8, access: rw, default: 0x80 }"),
+              HasSubstr("it turns positions or velocities round, and not both (607Eh is 80h)"));
+  EXPECT_EQ(said("607Eh: { type: u8, access: rw, default: 0xC0 }"), "");
+}
+
 TEST(Eds, TerminalsHaveOneFunctionEach) {
   EXPECT_THAT(
       findings(load({.inputs = "NEG: home"})),
