@@ -203,7 +203,8 @@ std::optional<UnitConflict> acceleration_conflict(const Units& planned, const Va
   if (told.kind == UnitTold::Kind::nothing) return std::nullopt;
   const bool rates = planned.ramps == Ramps::rates;
   if (rates && told.kind == UnitTold::Kind::unit && told.unit == planned.acceleration) return std::nullopt;
-  if (!rates && told.kind == UnitTold::Kind::unclear) return std::nullopt;
+  const bool by_key = planned.acceleration_source == UnitSource::configuration;
+  if (told.kind == UnitTold::Kind::unclear && (by_key || !rates)) return std::nullopt;
   const auto seconds = [](Rate unit) { return text_of(unit) + " per second"; };
   return UnitConflict{
       .object = told.object,
@@ -211,9 +212,9 @@ std::optional<UnitConflict> acceleration_conflict(const Units& planned, const Va
                              told.kind == UnitTold::Kind::unit ? seconds(told.unit) : "something unclear",
                              told.what, rates ? seconds(planned.acceleration) : "times (drive.ramps)"),
       .remedy =
-          fmt::format("say what the drive's manual says: drive: {{ ramps: rate, objects: {{ {}: {{ default: "
-                      "VALUE }} }} }}, or set the drive with its own tool; {}",
-                      short_name(told.object), remedy_without(told.object))};
+          "say what the drive's manual says: drive: { ramps: rate, acceleration_unit: UNIT }, or set the "
+          "drive with its own tool; " +
+          remedy_without(told.object)};
 }
 
 std::optional<UnitConflict> revolution_conflict(std::int64_t pulses_per_revolution, const Values& values) {

@@ -74,7 +74,7 @@ std::int64_t fastest_pulse_rate(Rate unit, std::int64_t counts);
 enum class UnitSource : std::uint8_t {
   model,          ///< the manual of the model
   data_sheet,     ///< the values of unit objects in the file
-  configuration,  ///< the key `velocity_unit`
+  configuration,  ///< the key `velocity_unit` or `acceleration_unit`
 };
 enum class Ramps : std::uint8_t {
   times,  ///< ms from start speed to speed
@@ -85,7 +85,7 @@ struct Units {
   Rate velocity = revolutions_per_minute;
   Ramps ramps = Ramps::times;
   Rate acceleration = revolutions_per_minute;  ///< of ramps that are rates
-  UnitSource velocity_source = UnitSource::model;
+  UnitSource velocity_source = UnitSource::model, acceleration_source = UnitSource::model;
 };
 
 }  // namespace axisd::cia402

@@ -46,6 +46,12 @@ constexpr SettingSpec settings[] = {
      .default_value = "rate",
      .description = "What 6083h, 6084h and 609Ah hold: velocity units per second (or what 60AAh says), or a "
                     "time in ms."},
+    {.key = "acceleration_unit",
+     .kind = "enum",
+     .choices = cia402::unit_names,
+     .description =
+         "What 6083h, 6084h and 609Ah count in a second, where they are rates and neither 60AAh tells it "
+         "nor it is the unit of velocities: rpm is r/min per second."},
     {.key = "loop_mode",
      .kind = "enum",
      .choices = loop_modes,

@@ -62,9 +62,14 @@ Result<cia402::Units> plan_units(const Eds& eds, const std::map<std::string, Set
       .ramps = choice(settings, "ramps") == "time" ? cia402::Ramps::times : cia402::Ramps::rates,
       .velocity_source = key ? UnitSource::configuration : UnitSource::data_sheet};
   const auto ramps = cia402::told_acceleration(values.all);
-  units.acceleration = ramps.kind == UnitTold::Kind::unit ? ramps.unit : units.velocity;
+  const auto ramp_key = cia402::unit_named(choice(settings, "acceleration_unit"));
+  if (ramp_key && units.ramps == cia402::Ramps::times)
+    return fail(Reason::invalid_argument, "drive.acceleration_unit has no effect with ramps: time",
+                "leave one of them out");
+  units.acceleration = ramp_key.value_or(ramps.kind == UnitTold::Kind::unit ? ramps.unit : units.velocity);
+  units.acceleration_source = ramp_key ? UnitSource::configuration : UnitSource::data_sheet;
   auto conflict = cia402::find_conflict(units, std::nullopt, values.fixed);
-  if (!conflict && units.ramps == cia402::Ramps::rates && ramps.kind == UnitTold::Kind::unclear) {
+  if (!conflict && ramps.kind == UnitTold::Kind::unclear) {
     auto by_key = units;  // so that the ramps alone are judged
     by_key.velocity_source = UnitSource::configuration;
     if (told.kind == UnitTold::Kind::unit) by_key.velocity = told.unit;

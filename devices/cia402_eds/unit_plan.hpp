@@ -11,7 +11,7 @@
 
 namespace axisd::cia402_eds {
 
-/// `velocity_unit`, else what the values of the file's unit objects say; ramps as `ramps` has them. Errors
+/// `velocity_unit` and `acceleration_unit`, else what the values of the file's unit objects say. Errors
 /// (invalid_argument): nothing tells the unit of velocities, that of ramps is unclear, or a key contradicts
 /// what the drive cannot change.
 Result<cia402::Units> plan_units(const canopen::Eds& eds,

@@ -108,8 +108,9 @@ TEST(Eds, TakesAnyNumberOfPulses) {
 
 TEST(Eds, LimitsAreThoseOfTheUnit) {
   // 2,000,000 of 0.1 r/min, and of 0.001 r/min.
-  EXPECT_EQ(findings(load({.velocity = "200 mm/s", .velocity_unit = "0.1rpm"})), "");
-  EXPECT_THAT(findings(load({.velocity = "200 mm/s", .velocity_unit = "0.001rpm"})),
+  const std::string silent = "      objects: { 60A9h: { access: none } }\n";
+  EXPECT_EQ(findings(load({.velocity = "150 mm/s", .more = silent, .velocity_unit = "0.1rpm"})), "");
+  EXPECT_THAT(findings(load({.velocity = "200 mm/s", .more = silent, .velocity_unit = "0.001rpm"})),
               HasSubstr("at most 2000 r/min"));
   EXPECT_THAT(findings(load({.velocity_unit = "0.1"})), HasSubstr("velocity_unit"));
 }
@@ -157,8 +158,11 @@ TEST(Eds, RampsAndPolarityAreLookedAt) {
   };
   const std::string odd = "60AAh: { type: u32, access: rw, default: 0x00B45700 }";
   EXPECT_THAT(said(odd), AllOf(HasSubstr("its ramps count something unclear (60AAh is 00B45700h)"),
-                               HasSubstr("60AAh: { access: none }")));
+                               HasSubstr("acceleration_unit: UNIT")));
   EXPECT_EQ(said(odd, "      ramps: time\n"), "");
+  EXPECT_EQ(said(odd, "      acceleration_unit: rev_per_second\n"), "");
+  EXPECT_THAT(said(odd, "      acceleration_unit: rpm\n      ramps: time\n"),
+              HasSubstr("drive.acceleration_unit has no effect with ramps: time"));
   const std::string in_rpm = "60AAh: { type: u32, access: ro, default: 0x00C00300 }";
   EXPECT_EQ(said(in_rpm), "");
   EXPECT_THAT(

@@ -262,6 +262,9 @@ TEST(UnitConflicts, RampsAndPolarity) {
   auto units = planned(UnitSource::configuration);
   EXPECT_TRUE(find_conflict(units, 1000, {{si_acceleration, 0x00C00300}}));
   EXPECT_TRUE(find_conflict(units, 1000, {{si_acceleration, 0x00B45700}})) << "unclear";
+  units.acceleration_source = UnitSource::configuration;
+  EXPECT_FALSE(find_conflict(units, 1000, {{si_acceleration, 0x00B45700}})) << "the key settles it";
+  EXPECT_TRUE(find_conflict(units, 1000, {{si_acceleration, 0x00C00300}}));
   units.acceleration = revolutions_per_minute;
   EXPECT_FALSE(find_conflict(units, 1000, {{si_acceleration, 0x00C00300}}));
   units.ramps = Ramps::times;
