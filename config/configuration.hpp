@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +17,10 @@
 #include "devices/generic/settings.hpp"
 #include "devices/group/group.hpp"
 #include "devices/lease/lease.hpp"
+
+namespace axisd::canopen {
+struct Eds;
+}
 
 namespace axisd::config {
 
@@ -49,6 +54,8 @@ struct SimulationSettings {
   double home_width = 1;
   std::optional<double> positive_limit, negative_limit;
   double start_position = 0;  ///< where the load stands at power-up
+  /// Of a drive that its data sheet makes, on a simulated bus: read when the file is loaded.
+  std::shared_ptr<const canopen::Eds> sheet{};
 };
 
 struct AxisEntry {

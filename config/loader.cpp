@@ -2,17 +2,24 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <exception>
 #include <expected>
+#include <map>
+#include <memory>
 #include <system_error>
+#include <utility>
+#include <variant>
 
+#include "buses/canopen/eds.hpp"
 #include "buses/clock.hpp"
 #include "config/checks.hpp"
 #include "config/configuration.hpp"
 #include "config/document.hpp"
 #include "config/reader.hpp"
 #include "config/text.hpp"
+#include "devices/descriptor.hpp"
 
 namespace axisd::config {
 
@@ -41,6 +48,31 @@ std::expected<std::string, std::error_code> read_file(const std::string& path) {
   return text;
 }
 
+/// One line about a file that the configuration names.
+constexpr std::size_t longest_problem = 600;
+
+/// Data sheets that simulated drives are made of: whoever makes the drives must not wait for files.
+void read_sheets(Configuration& configuration, Diagnostics& diagnostics) {
+  std::map<std::string, std::shared_ptr<const canopen::Eds>> sheets;
+  for (auto& [axis, simulation] : configuration.axes) {
+    const auto bus = std::ranges::find(configuration.networks, axis.bus, &canopen::NetworkSettings::name);
+    if (axis.own_descriptor == nullptr || bus == configuration.networks.end() || !bus->simulated()) continue;
+    const auto file = std::ranges::find(axis.own_descriptor->settings, "path", &SettingSpec::kind);
+    if (file == axis.own_descriptor->settings.end()) continue;
+    const auto& path = std::get<std::string>(axis.model_settings.at(std::string(file->key)));
+    auto& sheet = sheets[path];
+    if (!sheet) {
+      auto read = canopen::load_eds(path);
+      if (!read) {  // it could be read a moment ago
+        diagnostics.add(Mark{}, printable(read.error().message, longest_problem), read.error().remedy);
+        return;
+      }
+      sheet = std::make_shared<const canopen::Eds>(std::move(*read));
+    }
+    simulation.sheet = sheet;
+  }
+}
+
 }  // namespace
 
 LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls,
@@ -66,6 +98,7 @@ LoadResult load_text(std::string_view text, const std::string& file_name, const 
   check_devices(configuration, diagnostics, places);
   check_machine(configuration, diagnostics, places);
   if (check_tls) check_tls_files(configuration, check_tls, diagnostics, places);
+  if (diagnostics.empty()) read_sheets(configuration, diagnostics);
   if (!diagnostics.empty()) return {{}, diagnostics.sorted()};
   check_budgets(configuration, diagnostics, places);
   if (!diagnostics.empty())

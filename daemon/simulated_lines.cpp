@@ -22,6 +22,8 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
   const auto& simulate = entry.simulation;
   const auto pulses = [&](double units) { return scale.to_pulses(units - simulate.start_position); };
   simulation::SimulatedNodeSettings node{.address = entry.axis.node, .encoder = usual_encoder};
+  node.sheet = simulate.sheet;
+  node.units.counts_per_revolution = static_cast<double>(entry.axis.scale.pulses_per_revolution);
   auto& mechanics = node.mechanics;
   if (simulate.home_switch) {
     const auto edges =

@@ -55,7 +55,8 @@ void declare_drives(CLI::App& app, Options& options, SingleDrive& single) {
                  "a drive: node=N,model=NAME[,home=FROM:TO[,turn=N]][,positive_limit=N][,negative_limit=N]"
                  "[,switch.NAME=on|off][,eeprom.ADDRESS=VALUE][,encoder.NAME=VALUE][,wire.TERMINAL=home|"
                  "positive_limit|negative_limit"
-                 "[:nc]][,dip=ADDRESS][,dip_baud=BAUD|custom][,boot_ms=N][,powered=off]; may be repeated")
+                 "[:nc]][,dip=ADDRESS][,dip_baud=BAUD|custom][,boot_ms=N][,powered=off][,eds=FILE][,counts=N]"
+                 "[,velocity_unit=NAME][,acceleration_unit=NAME]; may be repeated")
       ->allow_extra_args(false);
   app.add_option("--node", single.node, "address of a single drive")->check(CLI::Range(1, 127));
   app.add_option("--model", single.model, "its model");

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <utility>
 
@@ -41,12 +42,19 @@ std::span<const simulation::Simulator> simulators() {
 StandardDrive::StandardDrive(SimulatedNodeSettings settings)
     : behaviour_(behaviour_from(settings.switches)),
       settings_(std::move(settings)),
-      server_({.pdos = pdo_settings, .sdo = {.segmented_uploads = behaviour_.segmented_uploads}}, dictionary_,
-              hooks(), [this](bool communication_only) { nmt_reset(communication_only); }),
+      server_({.pdos = settings_.sheet ? pdo_settings_of(*settings_.sheet) : pdo_settings,
+               .sdo = {.segmented_uploads = behaviour_.segmented_uploads},
+               .error_count_grows = settings_.sheet != nullptr},
+              dictionary_, hooks(), [this](bool communication_only) { nmt_reset(communication_only); }),
       inputs_(cia402_eds::inputs, {home_switch, positive_limit, negative_limit}, settings_),
-      encoder_(settings_.encoder, settings_.address) {
-  add_rows(dictionary_);
+      encoder_(settings_.encoder, settings_.address),
+      tachometer_({.noise = 1}, settings_.address) {
+  if (settings_.sheet)
+    add_rows_of_sheet(dictionary_, settings_);
+  else
+    add_rows(dictionary_);
   for (const auto& [key, value] : settings_.eeprom) dictionary_.preset(key, value);
+  units_ = units_of(dictionary_, settings_.units);
   if (!settings_.powered) return;
   powered_ = true;
   restart(true);
@@ -61,11 +69,14 @@ void StandardDrive::restart(bool counter_lost) {
   if (std::exchange(load_defaults_, false)) dictionary_.restore_factory();
   dictionary_.power_up();
   for (const auto index : volatile_objects())
-    dictionary_.set(index, 0, dictionary_.find(index, 0)->default_value);
+    if (const auto* row = dictionary_.find(index, 0); row != nullptr)
+      dictionary_.set(index, 0, row->default_value);
+  units_ = units_of(dictionary_, settings_.units);
   if (counter_lost) motor_.power_up();
   state_ = State::disabled;
   control_ = 0;
-  mode_ = fault_ = 0;
+  mode_ = supports(dictionary_.get(0x6060)) ? static_cast<int>(dictionary_.get(0x6060)) : 0;
+  fault_ = last_fault_ = 0;
   reached_ = acknowledged_ = limited_ = attained_ = homing_error_ = homing_interrupted_ = false;
   activity_ = Activity::none;
   stopping_ = velocity_held_ = false;
@@ -103,13 +114,14 @@ void StandardDrive::advance(TimePoint now) {
 
 TimePoint StandardDrive::next_event() const {
   if (!powered_) return TimePoint::max();
-  return std::min(motion_event(), server_.next_event());
+  return std::min({motion_event(), late_bits_event(), server_.next_event()});
 }
 
 TimePoint StandardDrive::motion_event() const {
   if (boot_end_) return *boot_end_;
   if (!motor_.moving()) return std::min(phase_due_, settling_event());
-  auto next = std::min(motor_.ends(), motor_.lags(dictionary_.get(0x6065) + 1));
+  auto next = motor_.ends();
+  if (const auto most = window(0x6065)) next = std::min(next, motor_.lags(*most + 1));
   const auto change = inputs_.next_switch(motor_.shaft(), motor_.direction());
   return change ? std::min(next, motor_.reaches(*change)) : next;
 }
@@ -124,7 +136,8 @@ void StandardDrive::step(TimePoint now) {
     for (const auto& edge :
          inputs_.sample(now, motor_.shaft(), {.functions = {negative_limit, positive_limit, home_switch}}))
       homing_edge(edge);
-    if (energised() && std::llabs(motor_.lag()) > dictionary_.get(0x6065)) fail_with(following_error);
+    if (const auto most = window(0x6065); most && energised() && std::llabs(motor_.lag()) > *most)
+      fail_with(following_error);
     enforce_limits();
     if (ended && !motor_.moving()) on_stopped();
     if (phase_due_ <= now) next_phase();
@@ -144,21 +157,43 @@ TimePoint StandardDrive::settling_event() const {
   return encoder_.wavers(motor_) ? now_ + cycle : TimePoint::max();
 }
 
+TimePoint StandardDrive::late_bits_event() const {
+  auto next = TimePoint::max();
+  for (const auto due : {acknowledgement_due_, homing_bits_due_})
+    if (due > now_) next = std::min(next, due);
+  return next;
+}
+
+/// FFFFFFFFh switches either off.
+std::optional<std::int64_t> StandardDrive::window(std::uint16_t index) const {
+  constexpr std::int64_t off = 0xFFFFFFFF;
+  const auto most = value(index, off);
+  return most < 0 || most == off ? std::nullopt : std::optional(most);
+}
+
 /// What the load and the encoder do meanwhile.
 void StandardDrive::follow(TimePoint now) {
-  motor_.follow_within(encoder_.settings().following);
+  constexpr double settling = 30, longest = 0.05;  // counts, seconds
+  auto following = encoder_.settings().following;
+  if (behaviour_.settles_over_30_counts)  // at the end of a ramp it is behind by ramp x time^2
+    following = std::max(following, std::chrono::round<Duration>(std::chrono::duration<double>(
+                                        std::min(std::sqrt(settling / ramp(0x6084)), longest))));
+  motor_.follow_within(following);
   if (!energised()) encoder_.relax();
   const bool held = motor_.blocked() || motor_.moving() || energised();
   if (const auto pulses = encoder_.slipped(now, !held); pulses != 0) motor_.push(pulses, powered_);
-  if (!reached_ || std::llabs(encoder_.deviation(motor_, now)) > dictionary_.get(0x6067))
+  const auto most = window(0x6067);
+  if (!reached_ || (most && std::llabs(encoder_.deviation(motor_, now)) > *most))
     in_window_since_.reset();
   else if (!in_window_since_)
     in_window_since_ = now;
 }
 
 bool StandardDrive::in_position() const {
+  const auto most = window(0x6067);
+  if (!most) return reached_;
   return in_window_since_ && now_ - *in_window_since_ >= std::chrono::milliseconds(dictionary_.get(0x6068)) &&
-         std::llabs(encoder_.deviation(motor_, now_)) <= dictionary_.get(0x6067);
+         std::llabs(encoder_.deviation(motor_, now_)) <= *most;
 }
 
 /// All that can change by itself and shows in mappable objects, but the position.

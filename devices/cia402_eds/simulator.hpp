@@ -1,5 +1,5 @@
-// A CiA 402 servo drive as another maker would build it, from CiA 301 and CiA 402 alone; nothing here knows a
-// driver, or a drive with a manual of its own.
+// A CiA 402 servo drive as another maker would build it, from CiA 301, CiA 402 and its data sheet alone; nothing
+// here knows a driver, or a drive with a manual of its own.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "devices/cia402_eds/simulator_switches.hpp"
+#include "devices/cia402_eds/simulator_units.hpp"
 #include "devices/simulation/canopen_server.hpp"
 #include "devices/simulation/input_bank.hpp"
 #include "devices/simulation/motor.hpp"
@@ -19,8 +20,9 @@ namespace axisd::cia402_eds {
 
 std::span<const simulation::Simulator> simulators();
 
-/// Velocities in inc/s, ramps in inc/s^2. Pure, in the time given to advance(); events within it happen at
-/// their exact times.
+/// Its dictionary, identity, units and abilities are those of `settings.sheet`; without one it is a drive of its
+/// own, with velocities in inc/s and ramps in inc/s^2. Pure, in the time given to advance(); events within it
+/// happen at their exact times.
 class StandardDrive final : public simulation::SimulatedCanNode {
  public:
   explicit StandardDrive(simulation::SimulatedNodeSettings settings);
@@ -75,7 +77,12 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] bool alive() const { return powered_ && !boot_end_; }
   [[nodiscard]] bool energised() const { return state_ == State::operation || state_ == State::quick_stop; }
   [[nodiscard]] std::uint64_t appearance() const;
+  /// When a bit of the status word shows what it was slow to tell.
+  [[nodiscard]] TimePoint late_bits_event() const;
   void follow(TimePoint now);
+  /// Counts beyond which the encoder's deviation is a following error (6065h), or not in position (6067h);
+  /// nothing: this is not watched.
+  [[nodiscard]] std::optional<std::int64_t> window(std::uint16_t index) const;
   /// The encoder is within 6067h of the end of a motion, for 6068h already.
   [[nodiscard]] bool in_position() const;
   void restart(bool counter_lost);
@@ -85,6 +92,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   simulation::CanopenHooks hooks();
   [[nodiscard]] std::optional<std::int64_t> read(const simulation::ObjectRow& row) const;
   [[nodiscard]] std::int64_t velocity() const;
+  [[nodiscard]] bool supports(std::int64_t mode) const;
   std::uint32_t write(const simulation::ObjectRow& row, std::int64_t value, bool& store);
   void written(const simulation::ObjectRow& row);
 
@@ -105,7 +113,11 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   void reset_fault();
 
   // simulator_motion.cpp: starts and stops
-  [[nodiscard]] double number(std::uint16_t index, std::uint8_t sub = 0) const;
+  /// Of an object that the drive may lack.
+  [[nodiscard]] std::int64_t value(std::uint16_t index, std::int64_t without) const;
+  [[nodiscard]] double speed(std::int64_t velocity) const;
+  [[nodiscard]] double profile_speed() const;
+  [[nodiscard]] double ramp(std::uint16_t index) const;
   [[nodiscard]] simulation::Rates rates(double cruise) const;
   [[nodiscard]] std::optional<std::int64_t> soft_limit(int direction) const;
   [[nodiscard]] Plan position_plan() const;
@@ -142,7 +154,8 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   simulation::CanopenServer server_;
   simulation::InputBank inputs_;
   simulation::Motor motor_;
-  simulation::Encoder encoder_;
+  simulation::Encoder encoder_, tachometer_;
+  ShaftUnits units_{};
   TimePoint now_{};
   bool powered_ = false;
   std::optional<TimePoint> boot_end_;
@@ -153,8 +166,10 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   std::uint16_t control_ = 0;
   int mode_ = 0;
   int fault_ = 0;  ///< error code; 0: none
+  int last_fault_ = 0;
   int starts_ = 0;
   bool reached_ = false, acknowledged_ = false, limited_ = false;
+  TimePoint acknowledgement_due_{}, homing_bits_due_{};  ///< see late_bits_event()
   std::optional<TimePoint> in_window_since_;  ///< after a motion that ended at its target
   bool attained_ = false, homing_error_ = false, homing_interrupted_ = false;
 

@@ -19,11 +19,11 @@ const StandardDrive::Method* StandardDrive::find_method(std::int64_t code) {
 }
 
 void StandardDrive::start_homing() {
-  constexpr int current_position = 35;
+  constexpr int current_position = 35, current_position_too = 37;
   const auto code = dictionary_.get(0x6098);
   if (motor_.moving()) return;
   attained_ = homing_error_ = homing_interrupted_ = false;
-  if (code == current_position) {
+  if (code == current_position || code == current_position_too) {
     homing_done();
     return;
   }
@@ -43,8 +43,13 @@ void StandardDrive::start_homing() {
 }
 
 void StandardDrive::homing_run(int direction, std::uint8_t speed_sub) {
-  const auto ramp = number(0x609A);
-  motor_.run(direction, {.cruise = number(0x6099, speed_sub), .acceleration = ramp, .deceleration = ramp});
+  const auto rate = ramp(0x609A);
+  const bool has_speeds = dictionary_.find(0x6099, speed_sub) != nullptr;
+  const auto cruise = has_speeds ? speed(dictionary_.get(0x6099, speed_sub)) : profile_speed() / speed_sub;
+  if (cruise > 0)
+    motor_.run(direction, {.cruise = cruise, .acceleration = rate, .deceleration = rate});
+  else
+    homing_failed();
 }
 
 void StandardDrive::homing_edge(const simulation::FunctionEdge& edge) {
@@ -72,7 +77,7 @@ void StandardDrive::homing_limit() {
   if (ahead == method_->reference || motor_.braking()) return;
   if (phase_ == Phase::search) {
     phase_ = Phase::turn;
-    motor_.brake(number(0x6085));
+    motor_.brake(ramp(0x6085));
   } else {
     homing_failed();
   }
@@ -131,14 +136,16 @@ void StandardDrive::next_phase() {
 void StandardDrive::homing_done() {
   motor_.set_counter(static_cast<std::int32_t>(-dictionary_.get(0x607C)));
   last_target_ = motor_.commanded();
+  constexpr Duration apart = std::chrono::milliseconds(20);
   attained_ = true;
+  homing_bits_due_ = now_ + apart;
   activity_ = Activity::none;
   stopping_ = false;
 }
 
 void StandardDrive::homing_failed() {
   homing_error_ = true;
-  stop_motion(number(0x6085));
+  stop_motion(ramp(0x6085));
   if (!motor_.moving()) activity_ = Activity::none;
 }
 

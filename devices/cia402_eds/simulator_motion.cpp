@@ -9,16 +9,40 @@
 
 namespace axisd::cia402_eds {
 
-double StandardDrive::number(std::uint16_t index, std::uint8_t sub) const {
-  return static_cast<double>(dictionary_.get(index, sub));
+std::int64_t StandardDrive::value(std::uint16_t index, std::int64_t without) const {
+  return dictionary_.find(index, 0) == nullptr ? without : dictionary_.get(index);
+}
+
+/// Counts of the motor per second.
+double StandardDrive::speed(std::int64_t velocity) const {
+  return static_cast<double>(velocity) * (units_.velocity / units_.position);
+}
+
+/// 6081h, within 607Fh where that is anything.
+double StandardDrive::profile_speed() const {
+  const auto most = dictionary_.get(0x607F), wanted = dictionary_.get(0x6081);
+  return speed(most > 0 ? std::min(wanted, most) : wanted);
+}
+
+/// Counts of the motor per second squared; 0 in the object is at once. What a drive lacks has 6083h instead,
+/// and 6085h first 6084h.
+double StandardDrive::ramp(std::uint16_t index) const {
+  constexpr double at_once = 1e12, usual = 10;  // of its own: revolutions per second squared
+  while (dictionary_.find(index, 0) == nullptr) {
+    if (index == 0x6083) return usual / units_.position;
+    index = index == 0x6085 ? 0x6084 : 0x6083;
+  }
+  const auto set = dictionary_.get(index);
+  return set > 0 ? static_cast<double>(set) * (units_.acceleration / units_.position) : at_once;
 }
 
 simulation::Rates StandardDrive::rates(double cruise) const {
-  return {.cruise = cruise, .acceleration = number(0x6083), .deceleration = number(0x6084)};
+  return {.cruise = cruise, .acceleration = ramp(0x6083), .deceleration = ramp(0x6084)};
 }
 
-/// 607Dh in the motor's numbers; nothing: the end of the range is no limit.
+/// 607Dh in the motor's numbers; nothing: the end of the range is no limit, and a range without room is none.
 std::optional<std::int64_t> StandardDrive::soft_limit(int direction) const {
+  if (dictionary_.get(0x607D, 1) >= dictionary_.get(0x607D, 2)) return std::nullopt;
   const auto limit = dictionary_.get(0x607D, direction > 0 ? 2 : 1);
   const std::int64_t end =
       direction > 0 ? std::numeric_limits<std::int32_t>::max() : std::numeric_limits<std::int32_t>::min();
@@ -32,7 +56,7 @@ StandardDrive::Plan StandardDrive::position_plan() const {
   const auto base = relative ? last_target_ : motor_.commanded() - motor_.counter();
   Plan plan{.activity = Activity::position,
             .target = base + dictionary_.get(0x607A),
-            .rates = rates(number(0x6081))};
+            .rates = rates(profile_speed())};
   for (const int direction : {1, -1}) {
     const auto limit = soft_limit(direction);
     if (!limit || (*plan.target - *limit) * direction <= 0) continue;
@@ -46,7 +70,7 @@ StandardDrive::Plan StandardDrive::position_plan() const {
 StandardDrive::Plan StandardDrive::velocity_plan(std::int64_t velocity) const {
   Plan plan{.activity = Activity::velocity,
             .direction = velocity < 0 ? -1 : 1,
-            .rates = rates(static_cast<double>(std::llabs(velocity)))};
+            .rates = rates(speed(std::llabs(velocity)))};
   plan.target = soft_limit(plan.direction);
   plan.shortened = plan.target.has_value();
   return plan;
@@ -55,13 +79,15 @@ StandardDrive::Plan StandardDrive::velocity_plan(std::int64_t velocity) const {
 /// Rising edge of bit 4: 607Ah and its neighbours as they are now. Bit 5: at once, else after the one before.
 void StandardDrive::accept_set_point() {
   if (acknowledged_ || (halted() && behaviour_.set_point_in_halt_refused)) return;
+  constexpr Duration slow = std::chrono::milliseconds(10);
   acknowledged_ = true;
+  acknowledgement_due_ = now_ + (behaviour_.acknowledges_late ? slow : Duration{});
   const auto plan = position_plan();
   last_target_ = *plan.target;
   const bool under_way = activity_ == Activity::position && motor_.moving() && !stopping_;
   if (halted())
     suspended_ = plan;
-  else if (under_way && (control_ & 0x20U) == 0)
+  else if (under_way && (control_ & 0x20U) == 0 && !behaviour_.set_points_change_at_once)
     buffered_ = plan;
   else
     begin(plan);
@@ -136,7 +162,7 @@ void StandardDrive::on_stopped() {
     launch(plan);
     return;
   }
-  if (state_ == State::quick_stop && dictionary_.get(0x605A) <= 2) state_ = State::disabled;
+  if (state_ == State::quick_stop && value(0x605A, 2) <= 2) state_ = State::disabled;
   if (activity_ == Activity::homing) {
     homing_stopped();
     return;
@@ -148,6 +174,7 @@ void StandardDrive::on_stopped() {
     return;
   }
   reached_ = !limited_;
+  if (behaviour_.acknowledgement_ends_with_motion) acknowledged_ = false;
   if (auto next = std::exchange(buffered_, std::nullopt)) {
     if ((control_ & 0x10U) == 0) acknowledged_ = false;
     begin(*next);
@@ -170,7 +197,7 @@ void StandardDrive::change_velocity(std::int64_t wanted) {
   const bool turns = wanted == 0 || (wanted < 0) != (velocity_ < 0);
   velocity_ = wanted;
   if (turns) {
-    stop_motion(number(0x6084));  // and begins anew from standstill, if there is something to run
+    stop_motion(ramp(0x6084));  // and begins anew from standstill, if there is something to run
     return;
   }
   auto plan = velocity_plan(wanted);
@@ -193,7 +220,7 @@ void StandardDrive::enforce_limits() {
   velocity_held_ = !behaviour_.velocity_resumes_after_limit;
   suspended_.reset();
   buffered_.reset();
-  stop_motion(number(behaviour_.limit_stops_on_ramp ? 0x6084 : 0x6085));
+  stop_motion(ramp(behaviour_.limit_stops_on_ramp ? 0x6084 : 0x6085));
 }
 
 }  // namespace axisd::cia402_eds

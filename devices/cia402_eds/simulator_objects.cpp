@@ -1,5 +1,7 @@
 // What the objects of the simulated standard drive say, and what writing them does.
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "devices/cia402_eds/simulator.hpp"
 
@@ -22,13 +24,15 @@ simulation::CanopenHooks StandardDrive::hooks() {
                           bool& store) { return write(row, value, store); },
           .written = [this](const ObjectRow& row) { written(row); },
           .saves = [](const ObjectRow&) { return false; },  // on command only: 1010h
-          .changing = [this] { return motor_.moving() || encoder_.wavers(motor_); }};
+          .changing = [this] {
+            return motor_.moving() || encoder_.wavers(motor_) || behaviour_.velocity_wavers_at_rest;
+          }};
 }
 
 std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
   switch (row.index) {
     case 0x603F:
-      return fault_;
+      return last_fault_;
     case 0x6041:
       return status();
     case 0x6061:
@@ -48,11 +52,31 @@ std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
   }
 }
 
-/// 606Ch: measured, by a motor that takes 1000 increments per revolution.
+/// 606Ch: measured.
 std::int64_t StandardDrive::velocity() const {
-  constexpr double per_rpm = 1000.0 / 60;
-  const auto noise = encoder_.velocity_noise(now_) * per_rpm;
-  return std::lround(motor_.shaft_speed() + noise);
+  constexpr double minute = 60, most = std::numeric_limits<std::int32_t>::max();
+  const auto& meter = behaviour_.velocity_wavers_at_rest ? tachometer_ : encoder_;
+  const auto per_second = motor_.shaft_speed() * (units_.position / units_.velocity);
+  const auto noise = meter.velocity_noise(now_) / minute / units_.velocity;
+  return std::llround(std::clamp(per_second + noise, -most, most));
+}
+
+/// By 6502h where it says anything, and by the objects that the mode works with: profile position, profile
+/// velocity and homing are simulated.
+bool StandardDrive::supports(std::int64_t mode) const {
+  const auto has = [this](std::uint16_t index) { return dictionary_.find(index, 0) != nullptr; };
+  if (mode < 1 || mode > 6) return false;
+  if (const auto modes = dictionary_.get(0x6502); modes != 0 && (modes >> (mode - 1) & 1) == 0) return false;
+  switch (mode) {
+    case 1:
+      return has(0x607A) && has(0x6081);
+    case 3:
+      return has(0x60FF);
+    case 6:
+      return has(0x6098);
+    default:
+      return false;
+  }
 }
 
 std::uint32_t StandardDrive::write(const ObjectRow& row, std::int64_t value, bool& store) {
@@ -67,12 +91,14 @@ std::uint32_t StandardDrive::write(const ObjectRow& row, std::int64_t value, boo
       else
         load_defaults_ = true;  // valid with the next reset (CiA 301 7.5.2.14)
       return abort_code::none;
-    case 0x605A:
-      return value == 3 || value == 4 ? abort_code::value : abort_code::none;  // current and voltage limit
+    case 0x1003:  // 7.5.2.4: it is only cleared
+      return row.sub == 0 && value != 0 ? abort_code::value : abort_code::none;
+    case 0x605A:  // not the current and the voltage limit, nor what is a maker's own
+      return value < 0 || value > 6 || value == 3 || value == 4 ? abort_code::value : abort_code::none;
     case 0x6060:
-      return value == 0 || value == 1 || value == 3 || value == 6 ? abort_code::none : abort_code::value;
+      return value == 0 || supports(value) ? abort_code::none : abort_code::value;
     case 0x6098:
-      return value == 0 || value == 35 || find_method(value) != nullptr ? abort_code::none
+      return value == 0 || value == 35 || value == 37 || find_method(value) != nullptr ? abort_code::none
                                                                         : abort_code::value;
     default:
       return abort_code::none;
@@ -83,6 +109,7 @@ void StandardDrive::written(const ObjectRow& row) {
   if (row.index == 0x6040) control(static_cast<std::uint16_t>(dictionary_.get(0x6040)));
   if (row.index == 0x6060) set_mode(static_cast<int>(dictionary_.get(0x6060)));
   if (row.index == 0x60FF) velocity_held_ = false;
+  if (says_rates(row.index)) units_ = units_of(dictionary_, settings_.units);
 }
 
 }  // namespace axisd::cia402_eds

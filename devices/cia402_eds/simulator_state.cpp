@@ -95,7 +95,7 @@ void StandardDrive::switch_off() {
 
 /// 605Ah: 0 switches off, 1 and 5 brake with 6084h, 2 and 6 with 6085h; 5 and 6 stay in Quick Stop Active.
 void StandardDrive::quick_stop() {
-  const auto option = dictionary_.get(0x605A);
+  const auto option = value(0x605A, 2);
   suspended_.reset();
   buffered_.reset();
   acknowledged_ = false;
@@ -105,7 +105,7 @@ void StandardDrive::quick_stop() {
     return;
   }
   state_ = State::quick_stop;
-  stop_motion(number(option == 1 || option == 5 ? 0x6084 : 0x6085));
+  stop_motion(ramp(option == 1 || option == 5 ? 0x6084 : 0x6085));
   if (!motor_.moving() && option <= 2) state_ = State::disabled;
 }
 
@@ -120,10 +120,10 @@ void StandardDrive::on_halt(bool halted) {
     suspended_ = pending_ ? *pending_
                           : Plan{.activity = Activity::position,
                                  .target = last_target_,
-                                 .rates = rates(number(0x6081)),
+                                 .rates = rates(profile_speed()),
                                  .shortened = limited_};
   if (activity_ == Activity::homing) homing_interrupted_ = true;
-  stop_motion(number(dictionary_.get(0x605D) == 1 ? 0x6084 : 0x6085));
+  stop_motion(ramp(value(0x605D, 1) == 1 ? 0x6084 : 0x6085));
 }
 
 void StandardDrive::on_start_bit(bool set) {
@@ -137,7 +137,7 @@ void StandardDrive::on_start_bit(bool set) {
       start_homing();
     } else if (!set && activity_ == Activity::homing && !behaviour_.homing_goes_on_without_start_bit) {
       homing_interrupted_ = true;
-      stop_motion(number(0x609A));
+      stop_motion(ramp(0x609A));
     }
   }
 }
@@ -149,7 +149,7 @@ void StandardDrive::set_mode(int mode) {
   suspended_.reset();
   buffered_.reset();
   if (behaviour_.homing_attained_forgotten) attained_ = false;
-  stop_motion(number(0x6084));
+  stop_motion(ramp(0x6084));
 }
 
 /// Bits 0 to 3, 5 and 6.
@@ -175,15 +175,17 @@ bool StandardDrive::target_reached() const {
   if (state_ != State::operation) return false;
   if (halted()) return !motor_.moving();
   if (mode_ == position_mode) return in_position();
-  if (mode_ == homing_mode) return activity_ != Activity::homing;
+  if (mode_ == homing_mode)
+    return activity_ != Activity::homing && (!behaviour_.homing_attained_early || now_ >= homing_bits_due_);
   if (mode_ != velocity_mode) return false;
   return activity_ == Activity::velocity ? motor_.cruising() : dictionary_.get(0x60FF) == 0;
 }
 
 std::uint16_t StandardDrive::status() const {
-  const bool bit12 = mode_ == position_mode   ? acknowledged_
+  const bool homed = attained_ && (!behaviour_.homing_attained_late || now_ >= homing_bits_due_);
+  const bool bit12 = mode_ == position_mode   ? acknowledged_ && now_ >= acknowledgement_due_
                      : mode_ == velocity_mode ? !motor_.moving()
-                                              : mode_ == homing_mode && attained_;
+                                              : mode_ == homing_mode && homed;
   unsigned bits = state_bits();
   const auto set = [&bits](unsigned bit, bool on) { bits |= on ? 1U << bit : 0U; };
   set(4, fault_ != 0x3220);                                  // voltage enabled
@@ -199,7 +201,7 @@ std::uint16_t StandardDrive::status() const {
 void StandardDrive::fail_with(int code) {
   if (state_ == State::fault) return;
   switch_off();
-  fault_ = code;
+  fault_ = last_fault_ = code;
   state_ = State::fault;
   server_.emergency(static_cast<std::uint16_t>(code), error_register_of(code));
 }
@@ -207,6 +209,7 @@ void StandardDrive::fail_with(int code) {
 /// Transition 15.
 void StandardDrive::reset_fault() {
   fault_ = 0;
+  if (!behaviour_.error_code_kept) last_fault_ = 0;
   state_ = State::disabled;
   server_.emergency(0, 0);
 }

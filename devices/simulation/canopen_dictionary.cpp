@@ -9,7 +9,7 @@ std::int64_t cut_to_size(const ObjectRow& row, std::int64_t value) {
   const unsigned bits = row.size * 8U;
   auto raw = static_cast<std::uint64_t>(value);
   if (bits < 64) raw &= (std::uint64_t{1} << bits) - 1;
-  if (row.is_signed && (raw >> (bits - 1) & 1U) != 0)
+  if (bits < 64 && row.is_signed && (raw >> (bits - 1) & 1U) != 0)
     return static_cast<std::int64_t>(raw) - (std::int64_t{1} << bits);
   return static_cast<std::int64_t>(raw);
 }

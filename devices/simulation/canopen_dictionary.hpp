@@ -26,7 +26,7 @@ inline constexpr std::uint32_t none = 0, toggle = 0x05030000, bad_command = 0x05
 struct ObjectRow {
   std::uint16_t index = 0;
   std::uint8_t sub = 0;
-  std::uint8_t size = 2;  ///< bytes: 1, 2 or 4
+  std::uint8_t size = 2;  ///< bytes: 1 to 8
   bool is_signed = false;
   Access access = Access::ro;
   std::int64_t minimum = 0, maximum = 0;  ///< of a write

@@ -70,6 +70,7 @@ CanopenPdos::CanopenPdos(const PdoSettings& settings, CanopenObjects& objects, S
       held_(static_cast<std::size_t>(settings.rpdos)) {}
 
 void CanopenPdos::boot(std::uint8_t node) {
+  if (settings_.from_dictionary) return;
   auto& dictionary = objects_->dictionary();
   for (int i = 0; i < settings_.rpdos; ++i) {
     dictionary.set(at(receive_parameters, i), 1, 0x200 + 0x100 * i + node);
@@ -251,6 +252,7 @@ CanopenPdos::Bytes CanopenPdos::pack(int number) const {
   Bytes bytes;
   for (int sub = 1; sub <= parameter(transmit_mapping, number, 0); ++sub) {
     const Entry entry(parameter(transmit_mapping, number, static_cast<std::uint8_t>(sub)));
+    if (bytes.size() + entry.bytes > 8) break;  // of a dictionary that began so
     const auto* row = objects_->dictionary().find(entry.index, entry.sub);
     const auto raw = row == nullptr ? 0U : static_cast<std::uint64_t>(objects_->value(*row));
     for (unsigned i = 0; i < entry.bytes; ++i) bytes.push_back(static_cast<std::uint8_t>(raw >> (8 * i)));

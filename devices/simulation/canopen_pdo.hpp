@@ -24,15 +24,19 @@ struct SynchronousReception {
 };
 
 struct PdoSettings {
-  int rpdos = 4, tpdos = 4;  ///< at most 4 each: those of the predefined connection set
+  int rpdos = 4, tpdos = 4;  ///< at most 256 each
   int entries = 4;           ///< of each mapping
+  /// Identifiers and numbers of entries are those of the dictionary at power-up; else the identifiers are the
+  /// predefined ones of the first 4 PDOs, and each number follows its entries.
+  bool from_dictionary = false;
   /// COB-ID and number of entries cannot be written; the number follows the entries. Else as CiA 301 has it:
   /// entries are written while the number is 0.
   bool read_only = false;
   SynchronousReception reception{};
 };
 
-/// Adds 14xxh, 16xxh, 18xxh and 1Axxh, all off the wire but with their identifiers, nothing mapped.
+/// Adds 14xxh, 16xxh, 18xxh and 1Axxh of at most 4 PDOs each way, all off the wire but with their identifiers,
+/// nothing mapped.
 void add_pdo_rows(CanopenDictionary& dictionary, const PdoSettings& settings);
 
 class CanopenPdos {

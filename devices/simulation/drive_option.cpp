@@ -2,6 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+#include <memory>
+#include <utility>
+
+#include "buses/canopen/eds.hpp"
 #include "devices/simulation/text.hpp"
 
 namespace axisd::simulation {
@@ -22,6 +28,37 @@ bool parse_range(std::string_view value, Mechanics& mechanics) {
 bool parse_position(std::string_view value, std::optional<std::int64_t>& into) {
   into = parse_number<std::int64_t>(value);
   return into.has_value();
+}
+
+bool parse_counts(std::string_view value, double& into) {
+  const auto counts = parse_number<std::uint32_t>(value);
+  if (counts) into = *counts;
+  return counts && *counts > 0;
+}
+
+template <class Unit>
+struct UnitName {
+  std::string_view name;
+  Unit unit;
+};
+constexpr UnitName<VelocityUnit> velocity_units[] = {
+    {"position_per_second", VelocityUnit::position_per_second},
+    {"rpm", VelocityUnit::rpm},
+    {"tenth_rpm", VelocityUnit::tenth_rpm},
+    {"milli_revolutions_per_second", VelocityUnit::milli_revolutions_per_second},
+    {"degrees_per_second", VelocityUnit::degrees_per_second},
+};
+constexpr UnitName<AccelerationUnit> acceleration_units[] = {
+    {"velocity_per_second", AccelerationUnit::velocity_per_second},
+    {"rpm_per_second", AccelerationUnit::rpm_per_second},
+};
+
+template <class Unit, std::size_t size>
+bool parse_unit(std::string_view value, const UnitName<Unit> (&names)[size], Unit& into) {
+  const auto* found = std::ranges::find(names, value, &UnitName<Unit>::name);
+  if (found == std::end(names)) return false;
+  into = found->unit;
+  return true;
 }
 
 bool parse_switch(std::string_view name, std::string_view value, Switches& switches) {
@@ -73,6 +110,13 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
   }
   if (key == "positive_limit") return parse_position(value, settings.mechanics.positive_limit_from);
   if (key == "negative_limit") return parse_position(value, settings.mechanics.negative_limit_from);
+  if (key == "eds") {
+    option.sheet = value;
+    return !value.empty();
+  }
+  if (key == "counts") return parse_counts(value, settings.units.counts_per_revolution);
+  if (key == "velocity_unit") return parse_unit(value, velocity_units, settings.units.velocity);
+  if (key == "acceleration_unit") return parse_unit(value, acceleration_units, settings.units.acceleration);
   if (key == "model") {
     option.model = value;
     return !value.empty();
@@ -115,11 +159,17 @@ Result<DriveOption> parse_drive(std::string_view text) {
           "use node=, model=, home=FROM:TO, turn=, positive_limit=, negative_limit=, switch.NAME=on|off, "
           "eeprom.REGISTER=VALUE, encoder.noise|following_ms|quantised|backlash|compliance|slip=, "
           "wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
-          "dip_baud=BAUD|custom, boot_ms=, powered=on|off");
+          "dip_baud=BAUD|custom, boot_ms=, powered=on|off; with a data sheet eds=FILE, counts=PER_REVOLUTION, "
+          "velocity_unit=position_per_second|rpm|tenth_rpm|milli_revolutions_per_second|degrees_per_second, "
+          "acceleration_unit=velocity_per_second|rpm_per_second");
   }
   if (option.model.empty() || option.settings.address == 0)
     return fail(Reason::invalid_argument, fmt::format("\"{}\" names no drive", text),
                 "give node= and model=");
+  if (option.sheet.empty()) return option;
+  auto sheet = canopen::load_eds(option.sheet);
+  if (!sheet) return fail(sheet.error());
+  option.settings.sheet = std::make_shared<const canopen::Eds>(std::move(*sheet));
   return option;
 }
 

@@ -15,6 +15,10 @@
 #include "buses/modbus_rtu/settings.hpp"
 #include "devices/simulation/encoder.hpp"
 
+namespace axisd::canopen {
+struct Eds;
+}
+
 namespace axisd::simulation {
 
 /// The points that the manuals leave open ("not said", "likely" in facts); every test must pass either way.
@@ -116,6 +120,23 @@ struct Mechanics {
   std::optional<double> turn{};  ///< pulses after which a rotary load meets its home switch again, > 0
 };
 
+/// What the velocity objects of a CANopen drive count, where it does not say so itself.
+enum class VelocityUnit : std::uint8_t {
+  position_per_second,
+  rpm,
+  tenth_rpm,
+  milli_revolutions_per_second,
+  degrees_per_second,
+};
+/// Likewise its ramps.
+enum class AccelerationUnit : std::uint8_t { velocity_per_second, rpm_per_second };
+/// The units of a drive that is made by its data sheet, as far as the sheet does not tell them.
+struct UnitSettings {
+  double counts_per_revolution = 1000;  ///< of the encoder, per motor revolution; > 0
+  VelocityUnit velocity = VelocityUnit::position_per_second;
+  AccelerationUnit acceleration = AccelerationUnit::velocity_per_second;
+};
+
 enum class SwitchKind : std::uint8_t { home, positive_limit, negative_limit };
 
 /// A switch of the mechanics on a particular terminal. Without one, the switch is wired to whichever terminal
@@ -143,6 +164,9 @@ struct SimulatedNodeSettings {
   std::map<std::uint32_t, std::uint32_t> eeprom{};
   std::map<std::string, Wire, std::less<>> wires{};     ///< terminal -> switch
   Duration boot_time = std::chrono::milliseconds(300);  ///< silent after power-up; the manuals give no figure
+  /// The data sheet that makes the drive, of models that are made by one; none: the simulator's own drive.
+  std::shared_ptr<const canopen::Eds> sheet{};
+  UnitSettings units{};
 };
 
 }  // namespace axisd::simulation

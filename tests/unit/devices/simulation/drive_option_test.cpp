@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "buses/canopen/eds.hpp"
 #include "devices/simulation/simulator.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::simulation {
 namespace {
@@ -41,11 +43,32 @@ TEST(DriveOption, ReadsEveryPart) {
   EXPECT_EQ(38400, parse_drive("node=1,model=ess42-r,dip_baud=38400")->settings.dip_baud);
 }
 
+TEST(DriveOption, ReadsTheDataSheetAndItsUnits) {
+  const auto sheet = test::in_source_tree("config/examples/standard-drive.eds");
+  const auto option = parse_drive("node=3,model=cia402,eds=" + sheet +
+                                  ",counts=4096,velocity_unit=tenth_rpm,acceleration_unit=rpm_per_second");
+  ASSERT_TRUE(option) << to_string(option.error());
+  const auto& settings = option->settings;
+  ASSERT_NE(settings.sheet, nullptr);
+  EXPECT_EQ(settings.sheet->product, 0x00402001U);
+  EXPECT_EQ(settings.units.counts_per_revolution, 4096);
+  EXPECT_EQ(settings.units.velocity, VelocityUnit::tenth_rpm);
+  EXPECT_EQ(settings.units.acceleration, AccelerationUnit::rpm_per_second);
+  EXPECT_EQ(parse_drive("node=3,model=cia402")->settings.sheet, nullptr);
+  const auto missing = parse_drive("node=3,model=cia402,eds=/none.eds");
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().message.find("/none.eds"), std::string::npos);
+}
+
 TEST(DriveOption, NamesThePartThatIsWrong) {
   for (const std::string wrong : {"node=0x1FF",
                                   "home=5",
                                   "home=6:5",
                                   "turn=0",
+                                  "eds=",
+                                  "counts=0",
+                                  "velocity_unit=furlongs",
+                                  "acceleration_unit=rpm",
                                   "turn=x",
                                   "positive_limit=far",
                                   "switch.a=maybe",

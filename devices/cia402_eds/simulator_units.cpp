@@ -1,0 +1,133 @@
+#include "devices/cia402_eds/simulator_units.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+namespace axisd::cia402_eds {
+
+namespace {
+
+using simulation::AccelerationUnit;
+using simulation::CanopenDictionary;
+using simulation::UnitSettings;
+using simulation::VelocityUnit;
+
+constexpr double minute = 60, degrees = 360;
+
+// CiA 303-2, as bytes of an SI unit; r/min is what maxon's drives say in 60AAh.
+constexpr unsigned second = 0x03, radian = 0x10, degree = 0x41, minute_unit = 0x47, second_squared = 0x57,
+                   rpm_unit = 0xC0, revolution = 0xB4, increment = 0xB5;
+// Dimension indices.
+constexpr std::int64_t degree_index = 0x41, rpm_index = 0xA4, revolution_per_second_squared_index = 0xAF;
+
+/// Of the range that CiA 303-2 has prefixes for, so that nothing overflows.
+double power_of_ten(std::int64_t exponent) {
+  return std::pow(10.0, static_cast<double>(std::clamp<std::int64_t>(exponent, -9, 9)));
+}
+
+struct SiUnit {
+  double factor;
+  unsigned numerator, denominator;
+};
+
+/// Nothing: the drive has none, or it is 0 (not said).
+std::optional<SiUnit> si_unit(const CanopenDictionary& dictionary, std::uint16_t index) {
+  const auto bits = static_cast<std::uint32_t>(dictionary.get(index));
+  if (bits == 0) return std::nullopt;
+  return SiUnit{.factor = power_of_ten(static_cast<std::int8_t>(bits >> 24U)),
+                .numerator = bits >> 16U & 0xFFU,
+                .denominator = bits >> 8U & 0xFFU};
+}
+
+double notation(const CanopenDictionary& dictionary, std::uint16_t index) {
+  return power_of_ten(dictionary.get(index));
+}
+
+/// Counts of the encoder per revolution.
+double encoder_of(const CanopenDictionary& dictionary, const UnitSettings& settings) {
+  const auto counts = static_cast<double>(dictionary.get(0x608F, 1));
+  const auto revolutions = static_cast<double>(dictionary.get(0x608F, 2));
+  return counts > revolutions && revolutions > 0 ? counts / revolutions : settings.counts_per_revolution;
+}
+
+/// Revolutions of the shaft in one of an angle's units.
+std::optional<double> turns_of(unsigned unit, double encoder) {
+  switch (unit) {
+    case degree:
+      return 1 / degrees;
+    case radian:
+      return 1 / (2 * std::numbers::pi);
+    case revolution:
+      return 1;
+    case increment:
+      return 1 / encoder;
+    default:
+      return std::nullopt;
+  }
+}
+
+double position_of(const CanopenDictionary& dictionary, double encoder) {
+  if (const auto unit = si_unit(dictionary, 0x60A8))
+    if (const auto turns = turns_of(unit->numerator, encoder)) return unit->factor * *turns;
+  if (dictionary.get(0x608A) == degree_index) return notation(dictionary, 0x6089) / degrees;
+  return 1 / encoder;
+}
+
+std::optional<double> told_velocity(const CanopenDictionary& dictionary, double encoder) {
+  if (const auto unit = si_unit(dictionary, 0x60A9)) {
+    const auto turns = turns_of(unit->numerator, encoder);
+    if (turns && unit->denominator == second) return unit->factor * *turns;
+    if (turns && unit->denominator == minute_unit) return unit->factor * *turns / minute;
+  }
+  if (dictionary.get(0x608C) == rpm_index) return notation(dictionary, 0x608B) / minute;
+  return std::nullopt;
+}
+
+double velocity_of(const UnitSettings& settings, double position) {
+  switch (settings.velocity) {
+    case VelocityUnit::rpm:
+      return 1 / minute;
+    case VelocityUnit::tenth_rpm:
+      return 0.1 / minute;
+    case VelocityUnit::milli_revolutions_per_second:
+      return 0.001;
+    case VelocityUnit::degrees_per_second:
+      return 1 / degrees;
+    case VelocityUnit::position_per_second:
+      break;
+  }
+  return position;
+}
+
+std::optional<double> told_acceleration(const CanopenDictionary& dictionary, double encoder) {
+  if (const auto unit = si_unit(dictionary, 0x60AA)) {
+    if (unit->numerator == rpm_unit && unit->denominator == second) return unit->factor / minute;
+    const auto turns = turns_of(unit->numerator, encoder);
+    if (turns && unit->denominator == second_squared) return unit->factor * *turns;
+  }
+  const auto dimension = dictionary.get(0x608E);
+  if (dimension == rpm_index) return notation(dictionary, 0x608D) / minute;  // and per second
+  if (dimension == revolution_per_second_squared_index) return notation(dictionary, 0x608D);
+  return std::nullopt;
+}
+
+}  // namespace
+
+ShaftUnits units_of(const CanopenDictionary& dictionary, const UnitSettings& settings) {
+  const auto encoder = encoder_of(dictionary, settings);
+  const auto position = position_of(dictionary, encoder);
+  const auto velocity = told_velocity(dictionary, encoder).value_or(velocity_of(settings, position));
+  const auto otherwise =
+      settings.acceleration == AccelerationUnit::rpm_per_second ? 1 / minute : velocity;  // per second
+  return {.position = position,
+          .velocity = velocity,
+          .acceleration = told_acceleration(dictionary, encoder).value_or(otherwise)};
+}
+
+bool says_rates(std::uint16_t index) {
+  return index == 0x60A9 || index == 0x60AA || (index >= 0x608B && index <= 0x608E);
+}
+
+}  // namespace axisd::cia402_eds
