@@ -35,7 +35,8 @@ std::span<const simulation::Simulator> simulators() {
                                                           .switches = switch_specs(),
                                                           .inputs = inputs,
                                                           .last_register = 0x6502FF,
-                                                          .maximum_dip_address = 127}}};
+                                                          .maximum_dip_address = 127,
+                                                          .takes_sheet = true}}};
   return all;
 }
 

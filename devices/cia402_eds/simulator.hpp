@@ -1,5 +1,5 @@
-// A CiA 402 servo drive as another maker would build it, from CiA 301, CiA 402 and its data sheet alone; nothing
-// here knows a driver, or a drive with a manual of its own.
+// A CiA 402 servo drive as another maker would build it, from CiA 301, CiA 402 and its data sheet alone;
+// nothing here knows a driver, or a drive with a manual of its own.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,9 @@ namespace axisd::cia402_eds {
 
 std::span<const simulation::Simulator> simulators();
 
-/// Its dictionary, identity, units and abilities are those of `settings.sheet`; without one it is a drive of its
-/// own, with velocities in inc/s and ramps in inc/s^2. Pure, in the time given to advance(); events within it
-/// happen at their exact times.
+/// Its dictionary, identity, units and abilities are those of `settings.sheet`; without one it is a drive of
+/// its own, with velocities in inc/s and ramps in inc/s^2. Pure, in the time given to advance(); events
+/// within it happen at their exact times.
 class StandardDrive final : public simulation::SimulatedCanNode {
  public:
   explicit StandardDrive(simulation::SimulatedNodeSettings settings);
@@ -170,7 +170,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   int starts_ = 0;
   bool reached_ = false, acknowledged_ = false, limited_ = false;
   TimePoint acknowledgement_due_{}, homing_bits_due_{};  ///< see late_bits_event()
-  std::optional<TimePoint> in_window_since_;  ///< after a motion that ended at its target
+  std::optional<TimePoint> in_window_since_;             ///< after a motion that ended at its target
   bool attained_ = false, homing_error_ = false, homing_interrupted_ = false;
 
   Activity activity_ = Activity::none;

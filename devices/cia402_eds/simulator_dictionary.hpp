@@ -1,4 +1,5 @@
-// The objects of the simulated standard drive: its own, from CiA 301 and CiA 402 alone, or those of a data sheet.
+// The objects of the simulated standard drive: its own, from CiA 301 and CiA 402 alone, or those of a data
+// sheet.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +17,8 @@ inline constexpr simulation::PdoSettings pdo_settings{};
 
 void add_rows(simulation::CanopenDictionary& dictionary);
 
-/// What the sheet in `settings` says, which has to outlive the dictionary: types, access, limits, values, what
-/// can be mapped. An object without a value has a sensible one.
+/// What the sheet in `settings` says, which has to outlive the dictionary: types, access, limits, values,
+/// what can be mapped. An object without a value has a sensible one.
 void add_rows_of_sheet(simulation::CanopenDictionary& dictionary,
                        const simulation::SimulatedNodeSettings& settings);
 simulation::PdoSettings pdo_settings_of(const canopen::Eds& sheet);

@@ -24,9 +24,10 @@ simulation::CanopenHooks StandardDrive::hooks() {
                           bool& store) { return write(row, value, store); },
           .written = [this](const ObjectRow& row) { written(row); },
           .saves = [](const ObjectRow&) { return false; },  // on command only: 1010h
-          .changing = [this] {
-            return motor_.moving() || encoder_.wavers(motor_) || behaviour_.velocity_wavers_at_rest;
-          }};
+          .changing =
+              [this] {
+                return motor_.moving() || encoder_.wavers(motor_) || behaviour_.velocity_wavers_at_rest;
+              }};
 }
 
 std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
@@ -99,7 +100,7 @@ std::uint32_t StandardDrive::write(const ObjectRow& row, std::int64_t value, boo
       return value == 0 || supports(value) ? abort_code::none : abort_code::value;
     case 0x6098:
       return value == 0 || value == 35 || value == 37 || find_method(value) != nullptr ? abort_code::none
-                                                                        : abort_code::value;
+                                                                                       : abort_code::value;
     default:
       return abort_code::none;
   }

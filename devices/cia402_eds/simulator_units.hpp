@@ -15,9 +15,9 @@ struct ShaftUnits {
   double acceleration;  ///< revolutions per second squared: 6083h, 6084h, 6085h, 609Ah
 };
 
-/// By the SI units 60A8h to 60AAh (CiA 402-2; numbers of CiA 303-2), else by the dimension and notation indices
-/// 6089h to 608Eh of older drives, else by `settings`. An encoder resolution in 608Fh counts, unless it is the
-/// template 1/1.
+/// By the SI units 60A8h to 60AAh (CiA 402-2; numbers of CiA 303-2), else by the dimension and notation
+/// indices 6089h to 608Eh of older drives, else by `settings`. An encoder resolution in 608Fh counts, unless
+/// it is the template 1/1.
 ShaftUnits units_of(const simulation::CanopenDictionary& dictionary,
                     const simulation::UnitSettings& settings);
 

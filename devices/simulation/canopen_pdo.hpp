@@ -35,8 +35,8 @@ struct PdoSettings {
   SynchronousReception reception{};
 };
 
-/// Adds 14xxh, 16xxh, 18xxh and 1Axxh of at most 4 PDOs each way, all off the wire but with their identifiers,
-/// nothing mapped.
+/// Adds 14xxh, 16xxh, 18xxh and 1Axxh of at most 4 PDOs each way, all off the wire but with their
+/// identifiers, nothing mapped.
 void add_pdo_rows(CanopenDictionary& dictionary, const PdoSettings& settings);
 
 class CanopenPdos {

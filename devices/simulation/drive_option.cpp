@@ -159,7 +159,8 @@ Result<DriveOption> parse_drive(std::string_view text) {
           "use node=, model=, home=FROM:TO, turn=, positive_limit=, negative_limit=, switch.NAME=on|off, "
           "eeprom.REGISTER=VALUE, encoder.noise|following_ms|quantised|backlash|compliance|slip=, "
           "wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
-          "dip_baud=BAUD|custom, boot_ms=, powered=on|off; with a data sheet eds=FILE, counts=PER_REVOLUTION, "
+          "dip_baud=BAUD|custom, boot_ms=, powered=on|off; with a data sheet eds=FILE, "
+          "counts=PER_REVOLUTION, "
           "velocity_unit=position_per_second|rpm|tenth_rpm|milli_revolutions_per_second|degrees_per_second, "
           "acceleration_unit=velocity_per_second|rpm_per_second");
   }

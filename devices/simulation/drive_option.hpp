@@ -18,8 +18,8 @@ struct DriveOption {
 /// "node=1,model=ykd2405pr,home=5000:6000,positive_limit=90000,negative_limit=-2000,switch.unsigned_speed=on,
 /// eeprom.0x0011=13,encoder.noise=1,encoder.following_ms=8,wire.X0=home,wire.X1=positive_limit:nc,dip=0,dip_baud=custom,boot_ms=300,powered=off".
 /// For a drive that its data sheet makes: "eds=drive.eds,counts=4096,velocity_unit=rpm,acceleration_unit=
-/// rpm_per_second"; the file is read. node and model are needed. Errors name the part that is wrong. Models, switches, terminals and what
-/// switches can be set to are checked by make_node().
+/// rpm_per_second"; the file is read. node and model are needed. Errors name the part that is wrong. Models,
+/// switches, terminals and what switches can be set to are checked by make_node().
 Result<DriveOption> parse_drive(std::string_view text);
 
 }  // namespace axisd::simulation

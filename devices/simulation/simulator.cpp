@@ -45,6 +45,9 @@ Result<void> check(const Simulator& simulator, const SimulatedNodeSettings& sett
                 fmt::format("{} has no switch for {} bit/s", simulator.model, *settings.dip_baud),
                 fmt::format("use dip_baud=custom{}{}", simulator.dip_bauds.empty() ? "" : " or ",
                             fmt::join(simulator.dip_bauds, ", ")));
+  if (settings.sheet && !simulator.takes_sheet)
+    return fail(Reason::invalid_argument, fmt::format("{} is not made by a data sheet", simulator.model),
+                "leave eds= out, or use model=cia402");
   for (const auto& [name, on] : settings.switches)
     if (!contains(simulator.switches, name))
       return fail(Reason::invalid_argument, fmt::format("{} has no switch \"{}\"", simulator.model, name),

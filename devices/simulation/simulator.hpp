@@ -29,6 +29,7 @@ struct Simulator {
   std::uint8_t maximum_node = 127;
   std::uint8_t maximum_dip_address = 31;  ///< of the address switches
   std::span<const int> dip_bauds{};       ///< bit/s that the baud rate switches can be set to
+  bool takes_sheet = false;               ///< it can be made by a data sheet
 };
 
 /// All simulated models, generated from the folders.

@@ -1,4 +1,6 @@
 // A model that a file describes: errors of the file stand at its key, and nothing else is lost.
+#include "buses/canopen/eds.hpp"
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -42,10 +44,13 @@ struct Axis {
   std::string velocity_unit = "pulses_per_second";
 };
 
+std::string text_of(const Axis& axis) {
+  return fmt::format(fmt::runtime(template_text), axis.pulses, axis.invert, axis.velocity, axis.inputs,
+                     axis.eds, axis.velocity_unit, axis.more);
+}
+
 LoadResult load(const Axis& axis) {
-  const auto text = fmt::format(fmt::runtime(template_text), axis.pulses, axis.invert, axis.velocity,
-                                axis.inputs, axis.eds, axis.velocity_unit, axis.more);
-  return load_text(text, source_path("config/examples/test.yaml").string());
+  return load_text(text_of(axis), source_path("config/examples/test.yaml").string());
 }
 
 /// A file of its own for each test, beside which nothing else stands.
@@ -98,6 +103,20 @@ TEST(Eds, MakesTheModelThatDrive) {
   EXPECT_EQ(axis.model_settings.at("eds"),
             SettingValue(source_path("config/examples/standard-drive.eds").string()));
   EXPECT_EQ(axis.model_settings.at("ramps"), SettingValue(std::string("rate")));
+}
+
+TEST(Eds, IsKeptForTheSimulatedDriveAlone) {
+  const auto simulated = load({});
+  ASSERT_TRUE(simulated.configuration) << findings(simulated);
+  const auto& sheet = simulated.configuration->axes[0].simulation.sheet;
+  ASSERT_NE(sheet, nullptr);
+  EXPECT_EQ(sheet->product, 0x00402001U);
+  auto text = text_of({});
+  const std::string_view bus = "interface: sim";
+  text.replace(text.find(bus), bus.size(), "interface: can0");
+  const auto real = load_text(text, source_path("config/examples/test.yaml").string());
+  ASSERT_TRUE(real.configuration) << findings(real);
+  EXPECT_EQ(real.configuration->axes[0].simulation.sheet, nullptr);
 }
 
 TEST(Eds, TakesAnyNumberOfPulses) {

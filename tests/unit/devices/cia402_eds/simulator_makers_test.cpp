@@ -1,5 +1,5 @@
-// Simulated drives made of makers' data sheets, by their objects alone: raw SDO frames, and no driver. The files
-// are not part of this project: as in makers_files_test.cpp, what is not there is skipped by name.
+// Simulated drives made of makers' data sheets, by their objects alone: raw SDO frames, and no driver. The
+// files are not part of this project: as in makers_files_test.cpp, what is not there is skipped by name.
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
@@ -71,9 +71,9 @@ class SimulatedMakersDrive : public ::testing::TestWithParam<Row> {
       GTEST_SKIP() << path << " is not there; name the folder of makers' files in AXISD_EDS_FOLDER";
     auto sheet = canopen::load_eds(path.string());
     ASSERT_TRUE(sheet) << to_string(sheet.error());
-    bench_.emplace(simulation::SimulatedNodeSettings{
-        .sheet = std::make_shared<const canopen::Eds>(std::move(*sheet)),
-        .units = {.counts_per_revolution = 4096}});
+    bench_.emplace(
+        simulation::SimulatedNodeSettings{.sheet = std::make_shared<const canopen::Eds>(std::move(*sheet)),
+                                          .units = {.counts_per_revolution = 4096}});
   }
   [[nodiscard]] static const Row& row() { return GetParam(); }
   Bench& bench() { return *bench_; }

@@ -72,7 +72,8 @@ TEST(ShaftUnits, FollowTheOlderIndices) {
 
 TEST(ShaftUnits, AreAsSetWhereNothingIsTold) {
   const auto with = [](VelocityUnit velocity, AccelerationUnit acceleration) {
-    return units_with({}, {.counts_per_revolution = 4000, .velocity = velocity, .acceleration = acceleration});
+    return units_with({},
+                      {.counts_per_revolution = 4000, .velocity = velocity, .acceleration = acceleration});
   };
   const auto per_second = AccelerationUnit::velocity_per_second;
   EXPECT_DOUBLE_EQ(with(VelocityUnit::rpm, per_second).velocity, 1.0 / 60);
