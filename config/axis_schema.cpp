@@ -120,6 +120,11 @@ constexpr KeySpec poll_keys[] = {
      .apply = [](Target& t, const Value& v) { t.axis->axis.poll_idle = v.duration; }},
 };
 
+// The names of simulation::set_unit_option().
+constexpr std::string_view simulated_velocity_units[] = {"pulses_per_second", "rpm", "0.1rpm",
+                                                         "0.001rev_per_second", "degrees_per_second"};
+constexpr std::string_view simulated_acceleration_units[] = {"velocity_per_second", "rpm_per_second"};
+
 constexpr KeySpec simulate_keys[] = {
     {.key = "home_switch",
      .kind = Kind::position,
@@ -152,6 +157,22 @@ constexpr KeySpec simulate_keys[] = {
      .example = "50",
      .default_value = "0",
      .apply = [](Target& t, const Value& v) { t.axis->simulation.start_position = v.number; }},
+    {.key = "velocity_unit",
+     .kind = Kind::choice,
+     .description =
+         "What velocities of a drive that its data sheet makes count, where the sheet does not tell "
+         "it: the drive that is simulated, whatever drive: says.",
+     .example = "rpm",
+     .default_value = "pulses_per_second",
+     .choices = simulated_velocity_units,
+     .apply = [](Target& t, const Value& v) { t.axis->simulation.velocity_unit = v.text; }},
+    {.key = "acceleration_unit",
+     .kind = Kind::choice,
+     .description = "Likewise of its ramps.",
+     .example = "rpm_per_second",
+     .default_value = "velocity_per_second",
+     .choices = simulated_acceleration_units,
+     .apply = [](Target& t, const Value& v) { t.axis->simulation.acceleration_unit = v.text; }},
 };
 
 constexpr KeySpec brake_keys[] = {

@@ -54,6 +54,8 @@ struct SimulationSettings {
   double home_width = 1;
   std::optional<double> positive_limit, negative_limit;
   double start_position = 0;  ///< where the load stands at power-up
+  /// As simulation::set_unit_option() takes them.
+  std::string velocity_unit = "pulses_per_second", acceleration_unit = "velocity_per_second";
   /// Of a drive that its data sheet makes, on a simulated bus: read when the file is loaded.
   std::shared_ptr<const canopen::Eds> sheet{};
 };

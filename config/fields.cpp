@@ -163,6 +163,8 @@ Section section_of(const AxisEntry& entry) {
   fields.add("positive_limit", simulation.positive_limit);
   fields.add("negative_limit", simulation.negative_limit);
   fields.add("start_position", simulation.start_position);
+  fields.add("velocity_unit", simulation.velocity_unit);
+  fields.add("acceleration_unit", simulation.acceleration_unit);
   return fields.take();
 }
 

@@ -139,6 +139,13 @@ void AxisChecks::check_simulated_switches() {
     need_input("simulate.positive_limit", "positive_limit", "'positive_limit'");
   if (given("simulate.negative_limit"))
     need_input("simulate.negative_limit", "negative_limit", "'negative_limit'");
+  for (const std::string_view unit : {"velocity_unit", "acceleration_unit"}) {
+    const auto key = fmt::format("simulate.{}", unit);
+    if (!given(key) || model_ == nullptr) continue;
+    if (model_->specialise != nullptr || axis_.own_descriptor != nullptr) continue;  // by a file, good or bad
+    add(key, fmt::format("'{}' has no effect: no data sheet makes model {}", unit, axis_.model),
+        "leave it out");
+  }
   if (given("simulate.home_width") && !given("simulate.home_switch")) {
     add("simulate.home_width", "'home_width' has no effect without home_switch",
         "add home_switch or leave it out");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "devices/simulation/drive_option.hpp"
 #include "devices/simulation/simulator.hpp"
 #include "devices/units/scale.hpp"
 
@@ -24,6 +25,9 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
   simulation::SimulatedNodeSettings node{.address = entry.axis.node, .encoder = usual_encoder};
   node.sheet = simulate.sheet;
   node.units.counts_per_revolution = static_cast<double>(entry.axis.scale.pulses_per_revolution);
+  // The schema has no other names.
+  simulation::set_unit_option(node.units, "velocity_unit", simulate.velocity_unit);
+  simulation::set_unit_option(node.units, "acceleration_unit", simulate.acceleration_unit);
   auto& mechanics = node.mechanics;
   if (simulate.home_switch) {
     const auto edges =

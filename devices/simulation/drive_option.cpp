@@ -30,22 +30,16 @@ bool parse_position(std::string_view value, std::optional<std::int64_t>& into) {
   return into.has_value();
 }
 
-bool parse_counts(std::string_view value, double& into) {
-  const auto counts = parse_number<std::uint32_t>(value);
-  if (counts) into = *counts;
-  return counts && *counts > 0;
-}
-
 template <class Unit>
 struct UnitName {
   std::string_view name;
   Unit unit;
 };
 constexpr UnitName<VelocityUnit> velocity_units[] = {
-    {"position_per_second", VelocityUnit::position_per_second},
+    {"pulses_per_second", VelocityUnit::position_per_second},
     {"rpm", VelocityUnit::rpm},
-    {"tenth_rpm", VelocityUnit::tenth_rpm},
-    {"milli_revolutions_per_second", VelocityUnit::milli_revolutions_per_second},
+    {"0.1rpm", VelocityUnit::tenth_rpm},
+    {"0.001rev_per_second", VelocityUnit::milli_revolutions_per_second},
     {"degrees_per_second", VelocityUnit::degrees_per_second},
 };
 constexpr UnitName<AccelerationUnit> acceleration_units[] = {
@@ -114,9 +108,8 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
     option.sheet = value;
     return !value.empty();
   }
-  if (key == "counts") return parse_counts(value, settings.units.counts_per_revolution);
-  if (key == "velocity_unit") return parse_unit(value, velocity_units, settings.units.velocity);
-  if (key == "acceleration_unit") return parse_unit(value, acceleration_units, settings.units.acceleration);
+  if (key == "counts" || key == "velocity_unit" || key == "acceleration_unit")
+    return set_unit_option(settings.units, key, value);
   if (key == "model") {
     option.model = value;
     return !value.empty();
@@ -148,6 +141,15 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
 
 }  // namespace
 
+bool set_unit_option(UnitSettings& units, std::string_view name, std::string_view value) {
+  if (name == "velocity_unit") return parse_unit(value, velocity_units, units.velocity);
+  if (name == "acceleration_unit") return parse_unit(value, acceleration_units, units.acceleration);
+  const auto counts = parse_number<std::uint32_t>(value);
+  if (name != "counts" || counts.value_or(0) == 0) return false;
+  units.counts_per_revolution = *counts;
+  return true;
+}
+
 Result<DriveOption> parse_drive(std::string_view text) {
   DriveOption option;
   option.settings.address = 0;
@@ -161,7 +163,7 @@ Result<DriveOption> parse_drive(std::string_view text) {
           "wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
           "dip_baud=BAUD|custom, boot_ms=, powered=on|off; with a data sheet eds=FILE, "
           "counts=PER_REVOLUTION, "
-          "velocity_unit=position_per_second|rpm|tenth_rpm|milli_revolutions_per_second|degrees_per_second, "
+          "velocity_unit=pulses_per_second|rpm|0.1rpm|0.001rev_per_second|degrees_per_second, "
           "acceleration_unit=velocity_per_second|rpm_per_second");
   }
   if (option.model.empty() || option.settings.address == 0)

@@ -46,7 +46,7 @@ TEST(DriveOption, ReadsEveryPart) {
 TEST(DriveOption, ReadsTheDataSheetAndItsUnits) {
   const auto sheet = test::in_source_tree("config/examples/standard-drive.eds");
   const auto option = parse_drive("node=3,model=cia402,eds=" + sheet +
-                                  ",counts=4096,velocity_unit=tenth_rpm,acceleration_unit=rpm_per_second");
+                                  ",counts=4096,velocity_unit=0.1rpm,acceleration_unit=rpm_per_second");
   ASSERT_TRUE(option) << to_string(option.error());
   const auto& settings = option->settings;
   ASSERT_NE(settings.sheet, nullptr);
@@ -55,6 +55,11 @@ TEST(DriveOption, ReadsTheDataSheetAndItsUnits) {
   EXPECT_EQ(settings.units.velocity, VelocityUnit::tenth_rpm);
   EXPECT_EQ(settings.units.acceleration, AccelerationUnit::rpm_per_second);
   EXPECT_EQ(parse_drive("node=3,model=cia402")->settings.sheet, nullptr);
+  for (const auto* unit :
+       {"pulses_per_second", "rpm", "0.1rpm", "0.001rev_per_second", "degrees_per_second"}) {
+    UnitSettings units;
+    EXPECT_TRUE(set_unit_option(units, "velocity_unit", unit)) << unit;
+  }
   const auto missing = parse_drive("node=3,model=cia402,eds=/none.eds");
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().message.find("/none.eds"), std::string::npos);
