@@ -13,7 +13,7 @@ bool is_other_drive(const ConfigurationChange& change) {
   return change.kind != ConfigurationChangeKind::changed ||
          std::ranges::any_of(change.keys, [](std::string_view key) {
            return key == "bus" || key == "node" || key == "model" || key.starts_with("scale.") ||
-                  key.starts_with("simulate.");
+                  key == "drive.eds" || key.starts_with("simulate.");
          });
 }
 
