@@ -7,6 +7,7 @@
 #include <memory>
 #include <ostream>
 #include <string_view>
+#include <system_error>
 
 #include "buses/canopen/eds.hpp"
 #include "tests/support/source_tree.hpp"
@@ -205,6 +206,30 @@ TEST_P(SimulatedMakersDrive, FaultsAndIsReset) {
   bench().enable(1);
   bench().run(1s);
   EXPECT_EQ(bench().drive().starts(), 1) << "nothing resumes";
+}
+
+/// Templates, and files of drives that are none of CiA 402: whatever can be read makes a node that boots.
+TEST(SimulatedMakersDrives, BootWhateverTheyAre) {
+  int seen = 0;
+  for (std::error_code error; const auto& entry : std::filesystem::directory_iterator(folder(), error)) {
+    const auto extension = entry.path().extension();
+    if (extension != ".eds" && extension != ".dcf") continue;
+    SCOPED_TRACE(entry.path());
+    ++seen;
+    auto sheet = canopen::load_eds(entry.path().string());
+    if (!sheet) continue;
+    Bench bench({.sheet = std::make_shared<const canopen::Eds>(std::move(*sheet))});
+    bench.put(0x000, {0x81, 0x01});
+    const auto sent = bench.run(1s);
+    ASSERT_FALSE(sent.empty());
+    EXPECT_EQ(sent.front().id, 0x701U);
+    bench.put(0x000, {0x01, 0x01});
+    bench.put(0x080, {});
+    bench.run(100ms);
+    EXPECT_FALSE(bench.drive().shaft_moving());
+  }
+  if (seen == 0)
+    GTEST_SKIP() << "no file in " << folder() << "; name the folder of makers' files in AXISD_EDS_FOLDER";
 }
 
 std::string name_of(const ::testing::TestParamInfo<Row>& info) {
