@@ -105,7 +105,7 @@ std::string drive_details(const v1::GetDriveResponse& drive) {
   text += line("EEPROM", fmt::format("{} registers saved from here{}", drive.eeprom_writes(),
                                      drive.persist() ? "; the configuration says persist" : ""));
   for (const auto& alarm : drive.alarms())
-    text += line(fmt::format("alarm {}", alarm.code()),
+    text += line(fmt::format("alarm {}", alarm_text(alarm.code())),
                  fmt::format("{} ({}){}{}", alarm.name(), remedy_of(alarm.reset()),
                              alarm.remedy().empty() ? "" : ": ", alarm.remedy()));
   return text;

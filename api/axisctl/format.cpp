@@ -136,6 +136,12 @@ std::string address_text(std::uint32_t address) {
   return fmt::format("{:04X}h:{:02X}", address >> 8U, address & 0xFFU);
 }
 
+std::string alarm_text(std::uint32_t code) {
+  constexpr std::uint32_t own_list = 0xFF, without_code = 0xFFFF;
+  if (code == without_code) return "without a code";
+  return code > own_list ? fmt::format("{:04X}h", code) : std::to_string(code);
+}
+
 std::string json(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
   options.preserve_proto_field_names = true;

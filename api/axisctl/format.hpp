@@ -4,6 +4,7 @@
 #include <google/protobuf/duration.pb.h>
 #include <google/protobuf/message.h>
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -37,6 +38,9 @@ std::string command_line(const v1::Command& command, std::string_view unit);
 
 /// "0x0027", a Modbus register; beyond 16 bits, where only CANopen's are, "6041h:00": object and sub-index.
 std::string address_text(std::uint32_t address);
+
+/// "5", a number of the maker's list; beyond 8 bits, where CiA 402's are, "8611h"; FFFFh "without a code".
+std::string alarm_text(std::uint32_t code);
 
 /// One line of JSON with the names of the proto.
 std::string json(const google::protobuf::Message& message);

@@ -110,7 +110,7 @@ std::string remarks(const v1::AxisState& state) {
   if (state.stop_held()) append(text, "stop held by " + holders(state));
   if (!state.lease_holder().empty()) append(text, "leased by " + state.lease_holder());
   if (state.alarm_code() != 0)
-    append(text, fmt::format("alarm {} {}", state.alarm_code(), state.alarm_name()));
+    append(text, fmt::format("alarm {} {}", alarm_text(state.alarm_code()), state.alarm_name()));
   if (const auto cause = foreign_motion(state); !cause.empty()) append(text, cause);
   if (!state.drift().empty()) append(text, "drift: " + state.drift());
   if (state.enabled() && !state.enabled_by_daemon()) append(text, "not enabled by us");
@@ -154,7 +154,7 @@ std::string state_details(const v1::AxisState& state, bool colour) {
   if (state.has_fault())
     details.add("fault", coloured(describe(state.fault(), state.axis()), Colour::red, colour));
   if (state.alarm_code() != 0)
-    details.add("alarm", fmt::format("{} {}", state.alarm_code(), state.alarm_name()));
+    details.add("alarm", fmt::format("{} {}", alarm_text(state.alarm_code()), state.alarm_name()));
   if (!state.drift().empty()) details.add("drift", coloured(state.drift(), Colour::red, colour));
   details.add("power", power(state));
   details.add("position", position(state));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "devices/alarm_text.hpp"
 #include "devices/released_position.hpp"
 
 namespace axisd {
@@ -206,7 +207,8 @@ bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const
 Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {
   const auto* spec = find_alarm(*descriptor_, code);
   auto cause = error(Reason::alarm,
-                     fmt::format("{} alarm {} ({})", what, code, spec != nullptr ? spec->name : "unknown"),
+                     fmt::format("{} alarm {} ({})", what, alarm_text(code),
+                                 spec != nullptr ? spec->name : "unknown"),
                      spec != nullptr ? std::string(spec->remedy) : "see the drive's manual");
   cause.where.native_code = code;
   return cause;

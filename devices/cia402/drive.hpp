@@ -162,6 +162,7 @@ class Cia402Drive final : public Drive {
   // drive_state.cpp
   void on_event(const canopen::NodeEvent& event);
   void on_emergency(const canopen::Emergency& emergency);
+  [[nodiscard]] std::uint16_t alarm_by_emergency() const;
   void on_pdo(std::size_t index, const can::ReceivedFrame& received);
   [[nodiscard]] bool pdos_usable() const;
   [[nodiscard]] bool alive(TimePoint now) const;

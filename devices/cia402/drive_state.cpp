@@ -56,6 +56,13 @@ void Cia402Drive::on_emergency(const canopen::Emergency& emergency) {
   if (attention_) attention_();
 }
 
+/// Of a fault that 603Fh does not name, or of a drive without 603Fh.
+std::uint16_t Cia402Drive::alarm_by_emergency() const {
+  const auto active = bus_->master().emergencies().active(node_.id());
+  const auto code = active ? alarm_of(*model_, active->code) : std::uint16_t{0};
+  return code != 0 ? code : alarm_without_code;
+}
+
 void Cia402Drive::on_pdo(std::size_t index, const can::ReceivedFrame& received) {
   const auto bits = can::worst_case_bits(received.frame);
   const auto on_wire = std::chrono::nanoseconds(std::chrono::seconds(1)) * bits /
@@ -147,6 +154,7 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
     co_await leave_homing(options);
     sample = co_await look(false, options);
   }
+  if (sample && sample->alarm_code == alarm_without_code) sample->alarm_code = alarm_by_emergency();
   // An alarm that has gone already is told once, all the same (M5): with a sample that somebody gets.
   if (sample)
     if (const auto told = std::exchange(pending_alarm_, 0); sample->alarm_code == 0)

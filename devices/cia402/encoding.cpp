@@ -174,8 +174,9 @@ DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution,
   sample.homed = is(bits.homed) ||
                  (mode == OperationMode::homing && is(status::mode_specific) && is(status::target_reached));
   sample.in_position = bits.in_position != 0 ? is(bits.in_position) : is(status::target_reached);
-  sample.alarm_code = alarm_of(model, static_cast<std::uint16_t>(value_of(values, object::error_code)));
   const bool faulty = state == State::fault || state == State::fault_reaction_active || is(bits.alarm);
+  if (faulty || model.meaning.error_code_ends)
+    sample.alarm_code = alarm_of(model, static_cast<std::uint16_t>(value_of(values, object::error_code)));
   if (sample.alarm_code == 0 && faulty) sample.alarm_code = alarm_without_code;
   // 60FDh has inputs of the maker's beyond those that CiA 402 names.
   const auto known = (std::uint64_t{1} << model.descriptor->inputs.size()) - 1;

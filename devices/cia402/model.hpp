@@ -70,6 +70,8 @@ struct Meaning {
   /// 603Fh and EMCY: `code & alarm_mask` is the alarm's code where `code & ~alarm_mask` is `alarm_prefix`;
   /// everything else is reported as it is.
   std::uint16_t alarm_mask = 0xFFFF, alarm_prefix = 0;
+  /// 603Fh is 0 without an alarm. Else (CiA 402) it may hold the last one: the state in 6041h alone tells.
+  bool error_code_ends = false;
   /// 605Dh for a stop on the ramp, and for one without: both keep Operation Enabled.
   std::int16_t halt_on_ramp = 1, halt_at_once = 2;
 };

@@ -82,7 +82,7 @@ std::span<const DriveDescriptor> descriptors() {
       .inputs = inputs,
       .input_functions = input_functions,
       .alarms = alarms(),
-      .other_alarms = &other_alarm,
+      .other_alarms = other_alarms(),
       .settings = settings,
       .capabilities = {.maximum_rpm = 100'000,
                        .maximum_pulse_rate_hz = 4'000'000'000,

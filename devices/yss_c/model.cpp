@@ -164,10 +164,11 @@ const cia402::Model& model() {
                  .moving = 0x4000,
                  .in_position = 0x8000},
       .objects = objects,
-      // 7, 603Fh and 605Dh: the drive's 0 and 1 are not those of CiA 402.
+      // 7, 603Fh (0: no alarm) and 605Dh: the drive's 0 and 1 are not those of CiA 402.
       .meaning = {.counts_per_revolution = 4000,
                   .alarm_mask = 0x00FF,
                   .alarm_prefix = 0xFF00,
+                  .error_code_ends = true,
                   .halt_on_ramp = 0,
                   .halt_at_once = 1},
       .addressing = cia402::Addressing{.node = object::node,

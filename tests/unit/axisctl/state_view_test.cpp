@@ -36,6 +36,10 @@ TEST(StateView, RemarksNameWhatAPersonMustKnow) {
   state.set_alarm_name("overcurrent");
   state.set_enabled(true);
   EXPECT_EQ(remarks(state), "simulated, all stopped, alarm 3 overcurrent, not enabled by us");
+  state.set_alarm_code(0x8611);
+  state.set_alarm_name("following_error");
+  EXPECT_THAT(remarks(state), HasSubstr("alarm 8611h following_error"));
+  EXPECT_THAT(state_details(state, false), HasSubstr("8611h following_error"));
 }
 
 TEST(StateView, TickIsOneLine) {

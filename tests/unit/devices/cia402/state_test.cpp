@@ -224,6 +224,26 @@ TEST(Decoding, AlarmsAreTheLowByteOfTheMakersCodes) {
   EXPECT_EQ(decode_state(model(), 1000, fault).alarm_code, 0xFFFF) << "a fault without a code";
 }
 
+/// CiA 402: 603Fh holds the last error, also when the drive has left Fault.
+TEST(Decoding, ByCia402TheStateAloneTellsOfAnAlarm) {
+  auto standard = model();
+  standard.status = {};
+  standard.meaning = {};
+  Values values{{0x603F00, 0x8611}};
+  for (const std::int64_t word : {0x0040, 0x0021, 0x0023, 0x0027, 0x0007}) {
+    values[0x604100] = word;
+    EXPECT_EQ(decode_state(standard, 1000, values).alarm_code, 0) << word;
+  }
+  for (const std::int64_t word : {0x0008, 0x000F, 0x0018}) {
+    values[0x604100] = word;
+    EXPECT_EQ(decode_state(standard, 1000, values).alarm_code, 0x8611) << word;
+  }
+  values[0x603F00] = 0;
+  EXPECT_EQ(decode_state(standard, 1000, values).alarm_code, alarm_without_code);
+  const Values of_the_yss_c{{0x604100, 0x0040}, {0x603F00, 0xFF02}};
+  EXPECT_EQ(decode_state(model(), 1000, of_the_yss_c).alarm_code, 2) << "there 0 is no alarm (7)";
+}
+
 TEST(Encoding, ForDrivesWithRatesAndPulsesPerSecond) {
   auto other = model();
   other.meaning.units = {

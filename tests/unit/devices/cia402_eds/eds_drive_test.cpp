@@ -226,6 +226,12 @@ TEST(EdsDrive, IsMadeFromItsFile) {
 TEST(EdsDrive, KnowsEveryAlarm) {
   EXPECT_EQ(find_alarm(base(), 0x8611)->name, "following_error");
   EXPECT_EQ(find_alarm(base(), 0xFF17)->reset, AlarmReset::by_command);
+  EXPECT_EQ(find_alarm(base(), 0xFF17)->name, "specific_to_the_drive");
+  EXPECT_EQ(find_alarm(base(), 0x2341)->name, "short_circuit_u_v");
+  EXPECT_EQ(find_alarm(base(), 0x7308)->name, "sensor") << "by its class";
+  EXPECT_EQ(find_alarm(base(), 0x8A17)->name, "control");
+  EXPECT_EQ(find_alarm(base(), 0x90FF)->name, "external_error");
+  EXPECT_EQ(find_alarm(base(), 0xB123)->name, "specific_to_the_drive");
   EXPECT_EQ(find_alarm(*find_drive_model("ykd2405pr"), 77), nullptr);
   EXPECT_TRUE(std::ranges::is_sorted(base().alarms, {}, &AlarmSpec::code));
 }
