@@ -8,8 +8,8 @@
 
 namespace axisd {
 
-/// Codes of CiA 301 and CiA 402 in hexadecimal, as those and the makers of drives write them ("8611h"); numbers
-/// of a maker's own list in decimal ("5"). FFFFh: the drive is in alarm, and gives no code.
+/// Codes of CiA 301 and CiA 402 in hexadecimal, as those and the makers of drives write them ("8611h");
+/// numbers of a maker's own list in decimal ("5"). FFFFh: the drive is in alarm, and gives no code.
 inline std::string alarm_text(std::uint16_t code) {
   constexpr unsigned own_list = 0xFF, without_code = 0xFFFF;
   if (code == without_code) return "without a code";

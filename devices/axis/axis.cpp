@@ -206,10 +206,10 @@ bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const
 
 Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {
   const auto* spec = find_alarm(*descriptor_, code);
-  auto cause = error(Reason::alarm,
-                     fmt::format("{} alarm {} ({})", what, alarm_text(code),
-                                 spec != nullptr ? spec->name : "unknown"),
-                     spec != nullptr ? std::string(spec->remedy) : "see the drive's manual");
+  auto cause =
+      error(Reason::alarm,
+            fmt::format("{} alarm {} ({})", what, alarm_text(code), spec != nullptr ? spec->name : "unknown"),
+            spec != nullptr ? std::string(spec->remedy) : "see the drive's manual");
   cause.where.native_code = code;
   return cause;
 }
