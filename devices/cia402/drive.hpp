@@ -252,7 +252,9 @@ class Cia402Drive final : public Drive {
   /// What waits in the drive for a SYNC follows what it is told, so that no SYNC undoes it.
   Task<> follow_waiting(std::uint16_t word);
   Task<Result<void>> settle_armed(SdoOptions options);
-  Task<> prove_common_start();
+  /// `unbegun`: nothing else was begun with the drive.
+  Task<> prove_common_start(MotionGuard unbegun);
+  Task<> show_and_judge(std::uint16_t held, SdoOptions options);
   Task<std::string> obstacle_to_proof(SdoOptions options);
   Task<Result<std::string>> show_common_start(std::uint16_t held, SdoOptions options);
   Task<Result<bool>> shows(std::uint16_t word, bool stays, SdoOptions options);
@@ -323,7 +325,8 @@ class Cia402Drive final : public Drive {
   bool proof_due_ = false, disproven_ = false;
   std::string no_common_start_ = "it is not configured yet";
   std::shared_ptr<AxisGate> start_gate_ = std::make_shared<AxisGate>();  ///< of what is prepared, or proven
-  bool settling_ = false;
+  /// One sequence at a time has NMT and what waits for a SYNC: the other would undo what it does.
+  enum class SyncWork : std::uint8_t { none, settling, proving } sync_work_ = SyncWork::none;
 
   // What the drive is known to hold; nothing: unknown.
   std::optional<std::uint16_t> control_;

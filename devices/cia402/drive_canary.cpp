@@ -154,11 +154,12 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
 
 Task<Result<void>> Cia402Drive::check_continuity(TransactionClass transaction_class) {
   const SdoOptions options{.transaction_class = transaction_class};
+  const MotionGuard unbegun{.gate = start_gate_, .epoch = start_gate_->epoch()};
   if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
   // The link, or the node's state, may have been lost in between.
   if (const auto settled = co_await settle(options); !settled) co_return settled;
   if (const auto started = co_await start_node(); !started || !proof_due_) co_return started;
-  co_await prove_common_start();
+  co_await prove_common_start(unbegun);
   co_return co_await settle(options);
 }
 

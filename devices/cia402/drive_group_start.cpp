@@ -219,9 +219,9 @@ Task<Result<void>> Cia402Drive::settle_armed(SdoOptions options) {
 
 /// The manual does not say whether the type of an RPDO counts (YSS-C), so the drive shows it. It does so
 /// released, with bit 8, which means nothing there, and while nothing else waits for a SYNC on the network.
-Task<> Cia402Drive::prove_common_start() {
-  SdoOptions options{.transaction_class = TransactionClass::parameters};
-  options.guard = {.gate = start_gate_, .epoch = start_gate_->epoch()};
+/// Whatever is begun with the drive ends it, and waits in settle() until it has let go of the node.
+Task<> Cia402Drive::prove_common_start(MotionGuard unbegun) {
+  const SdoOptions options{.transaction_class = TransactionClass::parameters, .guard = std::move(unbegun)};
   // Twice: SYNC is not held for nothing, and others may have held it for long.
   auto obstacle = co_await obstacle_to_proof(options);
   std::shared_ptr<void> hold;
@@ -232,13 +232,21 @@ Task<> Cia402Drive::prove_common_start() {
   if (!obstacle.empty()) no_common_start_ = "not proven yet: " + obstacle;
   if (!obstacle.empty() || !proof_due_) co_return;
   const auto held = co_await read_object(object::control_word, options);
-  if (!held) co_return;
+  const bool begun = may_send(options.guard, clock_->now()) != Verdict::send;
+  if (!held || begun || sync_work_ != SyncWork::none) co_return;
+  sync_work_ = SyncWork::proving;
+  co_await show_and_judge(static_cast<std::uint16_t>(*held), options);
+  sync_work_ = SyncWork::none;
+  news_.notify_all();
+}
+
+Task<> Cia402Drive::show_and_judge(std::uint16_t held, SdoOptions options) {
   // Until it has shown all of it, SYNC goes on only after what waits in it was thrown away.
   bus_->set_armed(node_.id(), true);
   control_.reset();
   ++control_writes_;
   ++control_writing_;
-  const auto shown = co_await show_common_start(static_cast<std::uint16_t>(*held), options);
+  const auto shown = co_await show_common_start(held, options);
   --control_writing_;
   control_at_ = clock_->now();
   if (!shown) {
@@ -250,7 +258,7 @@ Task<> Cia402Drive::prove_common_start() {
   no_common_start_ = *shown;
   if (!disproven_) co_return bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
   start_pdo_.reset();
-  (void)co_await write_object(object::control_word, *held, word_bytes, options);
+  (void)co_await write_object(object::control_word, held, word_bytes, std::move(options));
 }
 
 Task<std::string> Cia402Drive::obstacle_to_proof(SdoOptions options) {

@@ -21,11 +21,11 @@ constexpr auto heartbeat_limit = milliseconds(500);
 
 /// Another master, or an earlier program, may have armed it; and so may a common start that was given up.
 Task<Result<void>> Cia402Drive::settle(SdoOptions options) {
-  while (settling_) co_await news_.wait_until(clock_->now() + nmt_patience);
+  while (sync_work_ != SyncWork::none) co_await news_.wait_until(clock_->now() + nmt_patience);
   if (settled_ && !bus_->armed(node_.id())) co_return Result<void>{};
-  settling_ = true;
+  sync_work_ = SyncWork::settling;
   auto disarmed = co_await disarm(std::move(options));
-  settling_ = false;
+  sync_work_ = SyncWork::none;
   news_.notify_all();
   if (!disarmed) co_return disarmed;
   settled_ = true;
@@ -90,18 +90,22 @@ Task<Result<void>> Cia402Drive::overwrite_waiting(std::uint16_t number, canopen:
   co_return Result<void>{};
 }
 
-/// A node with a heartbeat says that it followed: `confirmed` waits for that.
+/// A node with a heartbeat says that it followed: `confirmed` waits for that, and tells it once more.
 Task<Result<void>> Cia402Drive::leave_operational(bool confirmed) {
+  constexpr int attempts = 2;
   const auto state = [this] { return bus_->master().nmt().status(node_.id()).state; };
   const bool tells = confirmed && state() == canopen::NmtState::operational;
-  const auto told = co_await bus_->master().command(node_.id(), canopen::NmtCommand::enter_pre_operational);
-  if (!told) co_return told;
-  const auto until = clock_->now() + (tells ? heartbeat_limit : nmt_patience);
-  while (clock_->now() < until && state() != canopen::NmtState::pre_operational)
-    co_await news_.wait_until(until);
-  if (!tells || state() == canopen::NmtState::pre_operational) co_return Result<void>{};
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    const auto told = co_await bus_->master().command(node_.id(), canopen::NmtCommand::enter_pre_operational);
+    if (!told) co_return told;
+    const auto until = clock_->now() + (tells ? heartbeat_limit : nmt_patience);
+    while (clock_->now() < until && state() != canopen::NmtState::pre_operational)
+      co_await news_.wait_until(until);
+    if (!tells || state() == canopen::NmtState::pre_operational) co_return Result<void>{};
+  }
   co_return fail(error_at(Reason::not_confirmed, object::heartbeat_time,
-                          "the node does not say that it left Operational", "it is tried again"));
+                          "the node does not say that it left Operational",
+                          "check whether another master starts it, and how often its heartbeat comes"));
 }
 
 Task<Result<void>> Cia402Drive::enter_operational() {

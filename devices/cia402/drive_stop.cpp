@@ -109,7 +109,7 @@ Task<Result<void>> Cia402Drive::write_control(std::uint16_t word, SdoOptions opt
       co_return fail(
           error_at(Reason::no_reply, object::control_word,
                    fmt::format("the control word reads {:04X}h after {:04X}h was written", *held, word),
-                   "it is tried again"));
+                   "check whether another master writes to this drive"));
     co_return Result<void>{};
   }
   control_ = word;
