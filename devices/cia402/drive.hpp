@@ -244,6 +244,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> pull_trigger(OperationMode mode, Trigger trigger, SdoOptions options, bool& triggered);
   Task<> acknowledge_set_point(SdoOptions options);
   Task<Result<void>> prepare_homing(HomingProfile profile, SdoOptions options);
+  Task<> see_homing_begin(SdoOptions options);
   Task<Result<void>> write_homing_method(HomingMethod method, SdoOptions options);
   Task<Result<void>> home_here(SdoOptions options);
 

@@ -16,6 +16,7 @@ using std::chrono::milliseconds;
 
 constexpr int chain_attempts = 3;
 constexpr auto acknowledge_limit = milliseconds(100);
+constexpr auto begin_limit = milliseconds(50);
 
 /// From the slow speed of the last approach, on the ramp of the homing.
 std::int32_t braking_pulses(const HomingProfile& profile, std::int64_t pulses_per_revolution) {
@@ -92,7 +93,22 @@ Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode
   fresh.guard.not_after = std::min(guard.not_after, *canary + setup_.reboot_guard);
   if (const auto pulled = co_await pull_trigger(mode, trigger, fresh, triggered); !pulled) co_return pulled;
   if (mode == OperationMode::profile_position) co_await acknowledge_set_point(motion);
+  if (mode == OperationMode::homing) co_await see_homing_begin(motion);
   co_return Result<void>{};
+}
+
+/// It may be over before the state is read again, and leave nothing that was not there before: the bit of the
+/// last homing, and the counter at 0.
+Task<> Cia402Drive::see_homing_begin(SdoOptions options) {
+  if (!homing_.active() || homing_start_.was_low) co_return;
+  const auto begun = [this](std::int64_t shown) {
+    const Values values{{object::status_word.key(), shown},
+                        {object::mode_display.key(), std::to_underlying(OperationMode::homing)}};
+    const auto word = static_cast<std::uint16_t>(shown);
+    return (word & model_->status.moving) != 0 || !home_bit(*model_, values).value_or(false);
+  };
+  const auto word = co_await read_until(object::status_word, begun, begin_limit, std::move(options));
+  if (word && begun(*word)) homing_.note_begun();
 }
 
 Error Cia402Drive::not_enabled(State state) const {
@@ -164,13 +180,20 @@ Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions
   if (!word) co_return fail(word.error());
   const auto bits = static_cast<std::uint16_t>(*word);
   homing_start_.tied_to_rest = (bits & status::mode_specific) != 0 && (bits & model_->status.homed) == 0;
+  const auto both = static_cast<std::uint16_t>(status::mode_specific | model_->status.homed);
   for (const auto& [object, value] : encode(*model_, setup_.pulses_per_revolution, profile)) {
     const auto present = co_await read_object(object, options);
     if (!present) co_return fail(present.error());
     if (*present == value) continue;
     if (const auto written = co_await write_verified(object, value, options); !written) co_return written;
   }
-  co_return co_await write_homing_method(profile.method, std::move(options));
+  if (const auto chosen = co_await write_homing_method(profile.method, options); !chosen) co_return chosen;
+  if ((bits & both) != 0) co_return Result<void>{};
+  // Twice: the bits may follow the mode a cycle late.
+  const auto again = co_await read_object(object::status_word, std::move(options));
+  if (!again) co_return fail(again.error());
+  homing_start_.was_low = (*again & both) == 0;
+  co_return Result<void>{};
 }
 
 /// The manual has two lists of codes (6.2.6: 17 ... 29, chapter 7: 0 ... 3): the drive says which it knows.

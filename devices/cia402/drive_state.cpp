@@ -241,7 +241,9 @@ DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading
   if (homing_.active()) {
     const auto bit = home_bit(*model_, reading.values);
     const bool held_up = input_active(sample, {"stop", "quick_stop"});
-    if (homing_.goes_on(sample, {.low = bit == false, .held_up = held_up})) return DriveMode::homing;
+    const auto failed = homing_failed(*model_, reading.values);
+    if (homing_.goes_on(sample, {.low = bit == false, .held_up = held_up, .failed = failed}))
+      return DriveMode::homing;
     homed_ = homing_.reached();
     leave_homing_ = true;
   }

@@ -194,6 +194,12 @@ std::optional<bool> home_bit(const Model& model, const Values& values) {
   return model.status.homed != 0 ? std::optional(false) : std::nullopt;
 }
 
+bool homing_failed(const Model& model, const Values& values) {
+  const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
+  const auto mode = static_cast<OperationMode>(value_of(values, object::mode_display));
+  return mode == OperationMode::homing && (word & model.status.homing_error) != 0;
+}
+
 std::vector<MotionObject> motion_objects(const Model& model) {
   std::vector<MotionObject> objects{{target, object::target_position},
                                     {speed, object::profile_velocity},

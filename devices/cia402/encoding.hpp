@@ -59,6 +59,8 @@ int decode_velocity(const Model& model, std::int64_t pulses_per_revolution, std:
 /// The bit that says "homed", alone: CiA 402's bit 12 means that in homing mode only. Nothing: neither bit
 /// tells now.
 std::optional<bool> home_bit(const Model& model, const Values& values);
+/// The bit that says that homing has failed, in homing mode; false: the drive has none.
+bool homing_failed(const Model& model, const Values& values);
 /// Alarm code of a 603Fh or EMCY error code; 0: none, or none of the drive's own.
 std::uint16_t alarm_of(const Model& model, std::uint16_t error_code);
 

@@ -19,6 +19,7 @@ void HomingWatch::begin(TimePoint at, Start start) {
   *this = {};
   began_ = at;
   start_ = start;
+  was_low_ = start.was_low;
 }
 
 /// Which of the three it is after an offset is not said (6.2.6; CiA 402 has had both signs).
@@ -53,7 +54,9 @@ bool HomingWatch::goes_on(const DriveSample& sample, Signs signs) {
   // Elsewhere the bit may have fallen only because the motor turned, and rest is only a pause.
   const bool believable = sample.homed && !held_up_ && (was_low_ || (moved_ && close));
   const bool home = rests_ && believable && (ended || (placed && was_low_));
-  if (!home && !ended && sample.enabled) return true;
+  // What it says of an earlier one is gone as soon as this one has begun.
+  const bool failed = signs.failed && rests_ && rest >= bit_lag;
+  if (!home && !ended && !failed && sample.enabled) return true;
   began_.reset();
   reached_ = home;
   return false;

@@ -12,6 +12,7 @@ namespace axisd::cia402 {
 ///
 ///   idle --begin()--> homing --at rest with the bit, where a homing leaves the counter--> idle, reached
 ///                     homing --at rest at one place for `longest_rest`, or released--> idle, reached or not
+///                     homing --at rest, and the drive says that it failed--> idle, not reached
 ///
 /// The bit may be left from an earlier homing, by a drive that ignored this start, or that was stopped on its
 /// way: it counts once it was seen low, or the motor has moved to where only a homing leads. And with a stop
@@ -26,6 +27,7 @@ class HomingWatch {
   struct Signs {
     bool low = false;      ///< the bit itself is 0, whatever the motor does
     bool held_up = false;  ///< a stop terminal is active
+    bool failed = false;   ///< the drive says so
   };
 
   struct Start {
@@ -36,10 +38,15 @@ class HomingWatch {
     /// Before the start the bit was high, and CiA 402's own: while the motor turns it says nothing, so that a
     /// stop which nobody saw (a pulse at a terminal) would make it rise.
     bool tied_to_rest = false;
+    /// Before the start the bit was low, at rest: once it is high it has risen for this homing, however short
+    /// that was.
+    bool was_low = false;
   };
 
   void begin(TimePoint at, Start start);
   void end() { began_.reset(); }
+  /// The drive was seen to have begun it, between two samples.
+  void note_begun() { moved_ = true; }
   /// Takes a sample, and says whether homing goes on.
   bool goes_on(const DriveSample& sample, Signs signs);
   [[nodiscard]] bool active() const { return began_.has_value(); }

@@ -28,6 +28,7 @@ struct StatusBits {
   std::uint16_t homed = 0;             ///< homing was done
   std::uint16_t set_point_mirror = 0;  ///< bit 4 of the control word, as the drive holds it
   std::uint16_t enabled = 0;           ///< the power stage is on
+  std::uint16_t homing_error = 0;      ///< in homing mode: the homing has failed
   std::uint16_t moving = 0;
   std::uint16_t in_position = 0;
 };

@@ -2,6 +2,8 @@
 // five motors: nothing in their dictionary tells them apart.
 #include "devices/yss_c/model.hpp"
 
+#include <utility>
+
 #include "devices/cia402/configuration.hpp"
 #include "devices/cia402/drive.hpp"
 #include "devices/released_position.hpp"
@@ -58,6 +60,9 @@ constexpr AlarmSpec alarms[] = {yako_rtu::overcurrent, yako_rtu::overvoltage, ya
 
 constexpr std::string_view overtravel_stops[] = {"free", "quick_stop"};
 
+constexpr std::string_view status_bit_13_key = "status_bit_13";
+constexpr std::string_view status_bit_13[] = {"enabled", "homing_error"};
+
 constexpr SettingSpec settings[] = {
     {.key = "overtravel_stop",
      .kind = "enum",
@@ -86,6 +91,13 @@ constexpr SettingSpec settings[] = {
      .description =
          "What 2003h and 2004h show: active terminals, as the maker's other drives, or the levels at "
          "them, as the manual's words can be read. Seen at an input with `active: low`."},
+    {.key = status_bit_13_key,
+     .kind = "enum",
+     .choices = status_bit_13,
+     .default_value = "enabled",
+     .description =
+         "What bit 13 of 6041h says: the motor is energised (6.2.2), or homing has failed (appendix, CiA "
+         "402). With homing_error the state of the drive tells whether it is enabled."},
     yako_rtu::tuning("closed_loop_current_percent", 0x204200, 0, 150,
                      "Current in closed loop (2042h), percent."),
     yako_rtu::tuning("open_loop_current_percent", 0x204300, 0, 100, "Current in open loop (2043h), percent."),
@@ -145,7 +157,23 @@ constexpr CanTransactionSet transactions{.state_pdos = {8, 7},
                                          .drift_transfers = 30,
                                          .stop_transfers = cia402::stop_transfers};
 
-std::unique_ptr<Drive> make(DriveContext context) { return cia402::make_drive(model(), std::move(context)); }
+/// Bit 13 in the reading of the appendix (MC_HOME).
+const cia402::Model& model_with_homing_error() {
+  static const cia402::Model the_model = [] {
+    auto one = model();
+    one.status.homing_error = std::exchange(one.status.enabled, std::uint16_t{0});
+    return one;
+  }();
+  return the_model;
+}
+
+std::unique_ptr<Drive> make(DriveContext context) {
+  const auto& settings_of_drive = context.setup.model_settings;
+  const auto reading = settings_of_drive.find(std::string(status_bit_13_key));
+  const bool of_appendix =
+      reading != settings_of_drive.end() && reading->second == SettingValue(std::string(status_bit_13[1]));
+  return cia402::make_drive(of_appendix ? model_with_homing_error() : model(), std::move(context));
+}
 
 }  // namespace
 

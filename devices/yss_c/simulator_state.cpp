@@ -200,7 +200,8 @@ std::uint16_t SimulatedDrive::status() const {
   set(10, target_reached());
   set(11, b.bit11_is_limit ? limit : (control_ & start_bit) != 0);
   set(12, bit12);
-  set(13, homing && b.bit13_is_homing_error ? homing_error_ : energised());
+  const bool shows_error = b.bit13_not_enabled || (homing && b.bit13_is_homing_error);
+  set(13, shows_error ? homing && homing_error_ : energised());
   set(14, motor_.moving());
   set(15, mode_ == 1 && in_position() && !b.reached_only_bit10);
   return static_cast<std::uint16_t>(bits);

@@ -154,6 +154,10 @@ constexpr Entry entries[] = {
     {{"bit13_is_homing_error", false,
       "status bit 13 in homing mode: homing failed (appendix); off: motor energised (6.2.2)"},
      &Behaviour::bit13_is_homing_error},
+    {{"bit13_not_enabled", false,
+      "status bit 13 is set in homing mode alone, when homing failed (CiA 402); off: outside of it, motor "
+      "energised (6.2.2)"},
+     &Behaviour::bit13_not_enabled},
     {{"reached_only_bit10", false,
       "a completed move shows in bit 10 only; off: in bit 15 too"},
      &Behaviour::reached_only_bit10},

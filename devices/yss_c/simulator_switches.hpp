@@ -20,7 +20,7 @@ struct Behaviour {
   bool nmt_reset_keeps_position, position_read_only, position_is_commanded, released_position_frozen,
       position_clear_in_motion, position_clear_late;
   bool bit6_always, bit7_is_warning, homed_only_bit8, homed_only_bit12, bit11_is_limit, bit13_is_homing_error,
-      reached_only_bit10, reached_only_bit15;
+      bit13_not_enabled, reached_only_bit10, reached_only_bit15;
   bool fault_needs_reset, alarm_keeps_torque;
   bool quick_stop_releases, disable_operation_cuts, release_keeps_state;
   bool free_stop_releases, abrupt_stop_slips;

@@ -207,6 +207,36 @@ TEST(M21, HomesWithWhicheverCodesAndBitsTheDriveHas) {
   });
 }
 
+/// 6.2.2 and the appendix read bit 13 differently: with the key of the second the drive is enabled, moves and
+/// homes in both.
+TEST(M23, WithBit13InTheReadingOfTheAppendixTheStateTells) {
+  for_each_reading(
+      {.adjust =
+           [](AxisSettings& axis) { axis.model_settings["status_bit_13"] = std::string("homing_error"); }},
+      {{"bit13_is_homing_error"}, {"bit13_not_enabled"}}, [](const CanRigOptions& options) {
+        const auto& flipped = options.switches;
+        CanRig rig(options);
+        EXPECT_EQ(rig.state()->state, AxisState::disabled);
+        rig.done(EnableRequest{});
+        EXPECT_TRUE(rig.state()->enabled);
+        if (flipped.empty()) return;  // there bit 13 is 1 in homing: that it failed
+        rig.done(HomeRequest{});
+        EXPECT_EQ(rig.state()->trust, PositionTrust::homed);
+        rig.done(MoveAbsoluteRequest{.position = 5});
+        rig.done(DisableRequest{});
+        EXPECT_FALSE(rig.state()->enabled);
+      });
+}
+
+/// Without the key such a drive never shows that it is enabled.
+TEST(M23, WithBit13InTheReadingOfTheManualItIsThePowerStage) {
+  CanRig rig({.switches = {{"bit13_not_enabled", true}}});
+  const auto enabled = rig.complete(EnableRequest{});
+  EXPECT_EQ(enabled.state, CommandState::error);
+  ASSERT_TRUE(enabled.cause);
+  EXPECT_EQ(enabled.cause->reason, Reason::not_confirmed) << to_string(*enabled.cause);
+}
+
 TEST(M24, StateComesByPdoAndElseBySdo) {
   for (const Duration period : {Duration(0ms), Duration(10ms)}) {
     CanRig rig({.sync_period = period});

@@ -32,6 +32,7 @@ constexpr Reading other_readings[] = {
     {"homing_mode_1_final_approach_same", "home_approach", "as_searched"},
     {"homing_29_ends_backwards", "home_approach", "as_searched"},
     {"states_are_levels", "terminal_states", "level"},
+    {"bit13_not_enabled", "status_bit_13", "homing_error"},
 };
 
 /// Terminals by function; those of the standard drive have their names.

@@ -198,6 +198,45 @@ TEST(HomingWatch, ABitThatIsLowInAPauseIsNotTiedToRest) {
   EXPECT_TRUE(watch.reached());
 }
 
+/// At counter 0, and between two samples: nothing but the bit tells of it, and that was low before.
+TEST(HomingWatch, OneThatIsOverBeforeItIsReadIsHomeWhereItsBitHasRisen) {
+  for (const bool was_low : {false, true}) {
+    HomingWatch watch;
+    watch.begin(start, {.from = 0, .was_low = was_low});
+    EXPECT_EQ(goes_on(watch, at(20ms, false, true, 0)), !was_low);
+    if (!was_low) EXPECT_FALSE(goes_on(watch, at(530ms, false, true, 0)));
+    EXPECT_EQ(watch.reached(), was_low);
+  }
+  HomingWatch ignored;
+  ignored.begin(start, {.from = 0, .was_low = true});
+  EXPECT_TRUE(goes_on(ignored, at(20ms, false, false, 0)));
+  EXPECT_FALSE(goes_on(ignored, at(530ms, false, false, 0)));
+  EXPECT_FALSE(ignored.reached()) << "the drive does not home";
+}
+
+/// With the bit of the last time: it was seen to begin.
+TEST(HomingWatch, OneThatIsOverBeforeItIsReadIsHomeWhereItWasSeenToBegin) {
+  for (const std::int32_t end : {0, 3000}) {
+    HomingWatch watch;
+    watch.begin(start, {.from = end});
+    watch.note_begun();
+    EXPECT_TRUE(goes_on(watch, at(20ms, false, true, end)));
+    EXPECT_FALSE(goes_on(watch, at(530ms, false, true, end)));
+    EXPECT_EQ(watch.reached(), end == 0) << end;
+  }
+}
+
+TEST(HomingWatch, EndsAtRestWhereTheDriveSaysThatItFailed) {
+  HomingWatch watch;
+  watch.begin(start, {.from = away, .offset = offset});
+  EXPECT_TRUE(watch.goes_on(at(10ms, false, false, away), {.low = true, .failed = true}))
+      << "of the last one";
+  EXPECT_TRUE(watch.goes_on(at(20ms, true, false, 4000), {.low = true}));
+  EXPECT_TRUE(watch.goes_on(at(200ms, false, false, 3000), {.low = true, .failed = true}));
+  EXPECT_FALSE(watch.goes_on(at(260ms, false, false, 3000), {.low = true, .failed = true}));
+  EXPECT_FALSE(watch.reached());
+}
+
 TEST(HomingWatch, EndsWhenThePowerStageIsReleased) {
   HomingWatch watch;
   watch.begin(start, {.offset = offset});

@@ -45,6 +45,12 @@ const Reading readings[] = {
        return std::int64_t{b.bit(13)};
      },
      1, 0},
+    {"bit13_not_enabled",
+     [](Bench& b) {
+       b.enable(1);
+       return std::int64_t{b.bit(13)};
+     },
+     1, 0},
     {"reached_only_bit10",
      [](Bench& b) {
        b.enable(1);
