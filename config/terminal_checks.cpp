@@ -15,10 +15,13 @@ namespace {
 
 constexpr std::string_view brake = "brake";
 
-/// The first terminal that the axis does not name; empty if there is none.
-std::string_view free_terminal(std::span<const TerminalSpec> all, const std::vector<TerminalSettings>& used) {
+/// The first terminal that can have the function (of the drive's direction) and that the axis does not name;
+/// empty if there is none.
+std::string_view free_terminal(std::span<const TerminalSpec> all, const std::vector<TerminalSettings>& used,
+                               std::string_view function) {
   const auto free = std::ranges::find_if(all, [&](const TerminalSpec& terminal) {
-    return std::ranges::find(used, terminal.name, &TerminalSettings::terminal) == used.end();
+    const bool fits = terminal.function.empty() || terminal.function == function;
+    return fits && std::ranges::find(used, terminal.name, &TerminalSettings::terminal) == used.end();
   });
   return free == all.end() ? std::string_view() : free->name;
 }
@@ -55,7 +58,7 @@ void AxisChecks::check_brake() {
     return;
   }
   if (std::ranges::find(axis_.outputs, brake, &TerminalSettings::function) != axis_.outputs.end()) return;
-  const auto free = free_terminal(model_->outputs, axis_.outputs);
+  const auto free = free_terminal(model_->outputs, axis_.outputs, brake);
   add(brake, "'brake' needs an output with function 'brake'",
       free.empty() ? "" : fmt::format("add outputs: {{ {}: brake }}", free));
 }
@@ -127,7 +130,9 @@ void AxisChecks::need_input(std::string_view key, std::string_view function, con
   if (input_with(function) != nullptr || model_ == nullptr || !clean("inputs")) return;
   // A drive that shows no inputs may have its switches all the same.
   if (model_->inputs.empty()) return;
-  const auto free = free_terminal(model_->inputs, axis_.inputs);
+  const auto* spec = find_function(model_->input_functions, function);
+  const bool mirrored = axis_.scale.invert && spec != nullptr && !spec->mirror.empty();
+  const auto free = free_terminal(model_->inputs, axis_.inputs, mirrored ? spec->mirror : function);
   add(key, fmt::format("{} needs an input with function '{}'", message, function),
       free.empty() ? "no input is free for it" : fmt::format("add inputs: {{ {}: {} }}", free, function));
 }

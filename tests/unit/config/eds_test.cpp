@@ -205,6 +205,19 @@ TEST(Eds, TerminalsHaveOneFunctionEach) {
               HasSubstr("on an inverted axis it has the mirrored function"));
 }
 
+/// What a finding says to add is accepted.
+TEST(Eds, AMissingSwitchIsSoughtAtTheTerminalThatHasIt) {
+  const std::string homing =
+      "    homing: { method: home_positive, velocity: 50 mm/s, search_velocity: 5 mm/s }\n";
+  EXPECT_THAT(findings(load({.inputs = "NEG: negative_limit", .more = homing})),
+              HasSubstr("add inputs: { HOME: home }"));
+  EXPECT_TRUE(load({.inputs = "NEG: negative_limit, HOME: home", .more = homing}).configuration);
+  const std::string limit =
+      "    homing: { method: positive_limit, velocity: 50 mm/s, search_velocity: 5 mm/s }\n";
+  EXPECT_THAT(findings(load({.invert = "true", .inputs = "HOME: home", .more = limit})),
+              HasSubstr("add inputs: { NEG: positive_limit }"));
+}
+
 TEST(Eds, WhatTheDriveLacksIsRefused) {
   EXPECT_THAT(findings(load({.more = "    outputs: { Y0: alarm }\n"})),
               HasSubstr("model cia402 has no output terminal 'Y0'; it has none"));
