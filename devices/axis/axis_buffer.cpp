@@ -30,6 +30,8 @@ std::optional<PositionTracker> Axis::expected_end() const {
   }
   const auto& plan = activity_->plan;
   switch (activity_->command->value().kind) {
+    case CommandKind::enable:
+      return tracker_;
     case CommandKind::home: {
       auto end = tracker_;
       end.set_position(settings_.homing->position, PositionTrust::homed);
@@ -103,7 +105,9 @@ void Axis::look_at_buffered(const Action& action, const CommandOptions& options,
 /// What can be decided now is decided now; the rest in its turn.
 Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOptions& options) {
   Obstacles found;
-  look_at_buffered(action, options, found);
+  auto waiting = options;
+  waiting.buffer_mode = BufferMode::buffered;
+  look_at_buffered(action, waiting, found);
   if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
   if (!activity_) return std::visit([&](const auto& request) { return accept(request, options); }, action);
   const auto from = expected_end();

@@ -3,7 +3,8 @@
 // call, as it was known at acceptance, shortens that. The gate decides at the bind; what waits for something
 // else than the line ends when the time is over.
 // What counts from where:
-// - A command that had to wait in the buffer: from its turn. The call's deadline says nothing of that.
+// - A command that had to wait in the buffer: from its turn. The call's deadline says nothing of that. One
+// that waited only for its axis to be enabled: from its arrival.
 // - One that first has to end a motion (M9): a deceleration and `stop_margin` more, as the ramp is the
 // drive's.
 // - Homing that backs off first: each of its two starts on its own, the second from the end of the first.
@@ -43,7 +44,7 @@ double in_seconds(Duration time) { return std::chrono::duration<double>(time).co
 
 /// It arrived longer ago than it may wait, or its caller has given up. What is buffered may wait.
 bool Axis::too_late(const CommandOptions& options) const {
-  if (next_ || (options.buffer_mode == BufferMode::buffered && activity_)) return false;
+  if (options.buffer_mode == BufferMode::buffered && (next_ || activity_)) return false;
   const auto now = env_.clock->now();
   return now > options.call_deadline ||
          (options.arrived != TimePoint{} && now > options.arrived + settings_.start_within);

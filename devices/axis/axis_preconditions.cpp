@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/power_wait.hpp"
 
 namespace axisd {
 
@@ -22,8 +23,11 @@ std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
                                     const CommandOptions& options) const {
   Obstacles found;
   const bool never_waits = action && std::holds_alternative<DisableRequest>(*action);
-  if (action && options.buffer_mode == BufferMode::buffered && !never_waits) {
-    look_at_buffered(*action, options, found);
+  const bool for_power = action && buffer_.empty() && waits_for_power(activity_, *action);
+  if (action && (options.buffer_mode == BufferMode::buffered || for_power) && !never_waits) {
+    auto waiting = options;
+    waiting.buffer_mode = BufferMode::buffered;
+    look_at_buffered(*action, waiting, found);
   } else if (action) {
     std::visit([&](const auto& request) { look_at(request, options, found); }, *action);
   } else {
@@ -156,7 +160,9 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
   if (env_.state_unaccepted != nullptr && *env_.state_unaccepted) found.block(**env_.state_unaccepted);
   look_at_readiness(options, found);
   const auto executed = activity_ ? std::optional(activity_->command->value().kind) : std::nullopt;
-  if (executed == CommandKind::enable)
+  if (executed == CommandKind::enable && options.buffer_mode == BufferMode::buffered)
+    found.note(error(Reason::disabled, "the axis is being enabled", "the start waits for that"));
+  else if (executed == CommandKind::enable)
     found.block(error(Reason::disabled, "the axis is being enabled", "wait for the command to end"));
   else if (executed == CommandKind::disable)
     found.block(

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/power_wait.hpp"
 
 namespace axisd {
 
@@ -41,7 +42,8 @@ Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& opti
   if (doubtful && is_motion(kind_of(action)) && env_.state_unaccepted != nullptr && *env_.state_unaccepted)
     return fail(with_doubt(**env_.state_unaccepted, repeat.error()));
   if (!repeat || *repeat != nullptr) return repeat;
-  if (options.buffer_mode == BufferMode::buffered) return accept_buffered(action, options);
+  const bool for_power = buffer_.empty() && waits_for_power(activity_, action);
+  if (options.buffer_mode == BufferMode::buffered || for_power) return accept_buffered(action, options);
   return std::visit([&](const auto& request) { return accept(request, options); }, action);
 }
 
@@ -90,7 +92,8 @@ ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, Axi
                                                   .epoch = accept_epoch_,
                                                   .options = options,
                                                   .plan = std::move(plan)});
-  bound_start(activity_, waited, moving || stopping_.running);
+  const bool by_own_wish = waited && options.buffer_mode == BufferMode::buffered;
+  bound_start(activity_, by_own_wish, moving || stopping_.running);
   // A group has one for all its members.
   auto* turns = env_.bus->start_turns();
   if (turns != nullptr && state != AxisState::standstill && state != AxisState::synchronized_motion)

@@ -243,8 +243,9 @@ TEST(Explain, PowerOnItsWayIsWaitedFor) {
   EXPECT_THAT(rig.text(HomeRequest{}, Reason::disabled), HasSubstr("being disabled"));
   rig.run(1s);
   rig.submit(EnableRequest{});
-  EXPECT_THAT(rig.reasons(HomeRequest{}), ElementsAre("disabled"));
+  EXPECT_THAT(rig.reasons(HomeRequest{}), ElementsAre("(disabled)")) << "it waits for that";
   EXPECT_THAT(rig.text(HomeRequest{}, Reason::disabled), HasSubstr("being enabled"));
+  EXPECT_THAT(rig.reasons(JogRequest{.velocity = 5}), ElementsAre("disabled"));
   EXPECT_THAT(rig.reasons(EnableRequest{}), ElementsAre("busy"));
 }
 
