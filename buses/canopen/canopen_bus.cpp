@@ -30,14 +30,16 @@ CanopenBus::CanopenBus(Executor executor, Clock& clock, NetworkSettings settings
 CanopenBus::~CanopenBus() = default;
 
 void CanopenBus::start() {
-  master_.start({.on_node = [this](const NodeEvent& event) { on_node(event); },
-                 .on_emergency =
-                     [this](const Emergency& emergency) {
-                       const auto node = nodes_.find(emergency.node);
-                       if (node != nodes_.end() && node->second.handlers.on_emergency)
-                         node->second.handlers.on_emergency(emergency);
-                     },
-                 .on_port = [this](const can::PortState& state) { on_port(state); }});
+  master_.start(
+      {.on_node = [this](const NodeEvent& event) { on_node(event); },
+       .on_emergency =
+           [this](const Emergency& emergency) {
+             const auto node = nodes_.find(emergency.node);
+             if (node != nodes_.end() && node->second.handlers.on_emergency)
+               node->second.handlers.on_emergency(emergency);
+           },
+       .on_port = [this](const can::PortState& state) { on_port(state); },
+       .on_foreign_command = [this](const ForeignCommand& command) { on_foreign_command(command); }});
 }
 
 Result<void> CanopenBus::attach(std::uint8_t node, NodeHandlers handlers) {
@@ -221,6 +223,12 @@ void CanopenBus::on_node(const NodeEvent& event) {
     consider_sync();
   }
   if (node->second.handlers.on_event) node->second.handlers.on_event(event);
+}
+
+void CanopenBus::on_foreign_command(const ForeignCommand& command) {
+  for (const auto& [id, node] : nodes_)
+    if ((command.node == 0 || command.node == id) && node.handlers.on_foreign_command)
+      node.handlers.on_foreign_command(command.what);
 }
 
 void CanopenBus::on_port(const can::PortState& state) {

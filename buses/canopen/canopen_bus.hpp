@@ -20,6 +20,8 @@ namespace axisd::canopen {
 struct NodeHandlers {
   std::function<void(const NodeEvent&)> on_event;  ///< boot-up, heartbeat lost and back, state changed
   std::function<void(const Emergency&)> on_emergency;
+  /// Another master tells it something; `what` as in ForeignCommand.
+  std::function<void(const std::string& what)> on_foreign_command{};
 };
 
 /// The master of one network, with what its nodes share: the port's state, and SYNC. Thread: core.
@@ -123,6 +125,7 @@ class CanopenBus final : public Bus {
     [[nodiscard]] bool may_hear_sync() const { return !armed && readiness != Readiness::unknown; }
   };
   void on_port(const can::PortState& state);
+  void on_foreign_command(const ForeignCommand& command);
   void on_node(const NodeEvent& event);
   void consider_sync();
   /// The node for whose sake no SYNC is started; nullptr: none.

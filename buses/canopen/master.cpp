@@ -8,6 +8,24 @@
 
 namespace axisd::canopen {
 
+std::optional<ForeignCommand> parse_foreign_command(const can::Frame& frame) {
+  const auto [service, node, number] = classify(frame.id);
+  if (frame.rtr || frame.extended) return std::nullopt;
+  if (service == Service::nmt && frame.size >= 2) {
+    const auto command = static_cast<NmtCommand>(frame.data[0]);
+    return ForeignCommand{.node = frame.data[1], .what = fmt::format("sends NMT '{}'", to_string(command))};
+  }
+  if (service == Service::rpdo)
+    return ForeignCommand{.node = node, .what = fmt::format("sends RPDO {}", number)};
+  if (service != Service::sdo_request || frame.size < 4) return std::nullopt;
+  constexpr unsigned command_bits = 0xE0, download = 0x20;
+  constexpr Object control_word{0x6040, 0}, target_velocity{0x60FF, 0};
+  const Object object{static_cast<std::uint16_t>(frame.data[1] | frame.data[2] << 8U), frame.data[3]};
+  if ((frame.data[0] & command_bits) != download || (object != control_word && object != target_velocity))
+    return std::nullopt;
+  return ForeignCommand{.node = node, .what = fmt::format("writes {} by SDO", to_string(object))};
+}
+
 Master::Master(Executor executor, Clock& clock, std::unique_ptr<can::Port> port, SdoSettings sdo)
     : executor_(std::move(executor)),
       clock_(&clock),
@@ -133,6 +151,8 @@ void Master::on_frame(const can::ReceivedFrame& received) {
     case Service::sdo_request:
     case Service::rpdo:
       ++counters_.foreign_node;  // own frames do not come here: another master
+      if (const auto command = parse_foreign_command(frame); command && handlers_.on_foreign_command)
+        handlers_.on_foreign_command(*command);
       return;
     case Service::time:
     case Service::other:

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
 
 #include "buses/can/port.hpp"
 #include "buses/canopen/emcy.hpp"
@@ -16,11 +17,20 @@
 
 namespace axisd::canopen {
 
+/// Another master told a node what may start or stop it: by NMT, by a PDO, or by SDO in 6040h or 60FFh.
+struct ForeignCommand {
+  std::uint8_t node = 0;  ///< of NMT also 0, all nodes
+  std::string what;       ///< "sends NMT 'start'", "writes 6040h:00 by SDO", "sends RPDO 1"
+};
+/// Nothing: it starts and stops nothing. Precondition: the frame is nobody's of this program. Pure.
+std::optional<ForeignCommand> parse_foreign_command(const can::Frame& frame);
+
 /// Told on the core thread. None may destroy the master.
 struct MasterHandlers {
   std::function<void(const NodeEvent&)> on_node;
   std::function<void(const Emergency&)> on_emergency;
   std::function<void(const can::PortState&)> on_port;
+  std::function<void(const ForeignCommand&)> on_foreign_command{};
 };
 
 /// Frames that concern no configured node, and what was wrong with others; since start.

@@ -52,7 +52,7 @@ class Cia402Drive final : public Drive {
 
   // drive_state.cpp
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
-  [[nodiscard]] std::string link_note() const override { return link_note_; }
+  [[nodiscard]] std::string link_note() const override;
   void on_attention(const std::function<void()>& handler) override { attention_ = handler; }
 
   [[nodiscard]] bool in_trouble() const override { return rebooted_ || pending_alarm_ != 0; }
@@ -163,6 +163,7 @@ class Cia402Drive final : public Drive {
   void on_event(const canopen::NodeEvent& event);
   void on_emergency(const canopen::Emergency& emergency);
   [[nodiscard]] std::uint16_t alarm_by_emergency() const;
+  void on_foreign_command(const std::string& what);
   void on_pdo(std::size_t index, const can::ReceivedFrame& received);
   [[nodiscard]] bool pdos_usable() const;
   [[nodiscard]] bool alive(TimePoint now) const;
@@ -320,6 +321,9 @@ class Cia402Drive final : public Drive {
   int missed_pdos_ = 0;                         ///< readings in a row for which none came in time
   std::optional<std::uint32_t> command_pdo_{};  ///< takes the control word at once
   std::string link_note_;
+  /// What another master told this node, and when: the first of what comes in a row, and the last time.
+  std::string foreign_command_;
+  TimePoint foreign_at_ = TimePoint::min();
 
   // Starts in common with others.
   std::optional<std::uint32_t> start_pdo_{};  ///< takes the control word at the next SYNC

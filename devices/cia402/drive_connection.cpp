@@ -77,7 +77,8 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
     setup_error_ = required.error();
   const auto attached = bus_->attach(
       node_.id(), {.on_event = [this](const canopen::NodeEvent& event) { on_event(event); },
-                   .on_emergency = [this](const canopen::Emergency& one) { on_emergency(one); }});
+                   .on_emergency = [this](const canopen::Emergency& one) { on_emergency(one); },
+                   .on_foreign_command = [this](const std::string& what) { on_foreign_command(what); }});
   if (!attached) setup_error_ = attached.error();
 }
 

@@ -18,6 +18,8 @@ constexpr auto longest_pdo_wait = milliseconds(60);
 /// Of a node that is alive.
 constexpr auto longest_pdo_wait_alive = milliseconds(100);
 constexpr int missed_in_a_row = 3;
+/// After the last command of another master it is no longer a concern of today's.
+constexpr auto foreign_lasts = std::chrono::seconds(10);
 /// A motion that was triggered shows within this, or did not start.
 constexpr auto start_window = milliseconds(500);
 
@@ -54,6 +56,21 @@ void Cia402Drive::on_emergency(const canopen::Emergency& emergency) {
   give_up_common_start();
   news_.notify_all();
   if (attention_) attention_();
+}
+
+/// Whoever floods the network with such frames is told of once.
+void Cia402Drive::on_foreign_command(const std::string& what) {
+  const bool first = foreign_command_.empty() || clock_->now() - foreign_at_ > foreign_lasts;
+  foreign_at_ = clock_->now();
+  if (!first) return;
+  foreign_command_ = fmt::format("another master {}", what);
+  spdlog::warn("{} node {}: {}", bus_->name(), node_.id(), foreign_command_);
+  if (attention_) attention_();
+}
+
+std::string Cia402Drive::link_note() const {
+  if (foreign_command_.empty() || clock_->now() - foreign_at_ > foreign_lasts) return link_note_;
+  return link_note_.empty() ? foreign_command_ : fmt::format("{}; {}", foreign_command_, link_note_);
 }
 
 /// Of a fault that 603Fh does not name, or of a drive without 603Fh.
