@@ -10,7 +10,13 @@ const DriveDescriptor* find_can_model(const canopen::Identity& identity) {
     return expected && identity.vendor == expected->vendor && identity.product == expected->product &&
            identity.profile() == expected->profile();
   };
-  const auto found = std::ranges::find_if(drive_models(), fits);
+  constexpr std::uint16_t drive_profile = 402;
+  const auto described = [](const DriveDescriptor* model) {
+    return model->bus == BusKind::canopen && model->specialise != nullptr;
+  };
+  auto found = std::ranges::find_if(drive_models(), fits);
+  if (found == drive_models().end() && identity.profile() == drive_profile)
+    found = std::ranges::find_if(drive_models(), described);
   return found == drive_models().end() ? nullptr : *found;
 }
 

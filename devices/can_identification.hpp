@@ -6,7 +6,8 @@
 
 namespace axisd {
 
-/// The model with this vendor, product and profile; nullptr: none of those known here. Pure.
+/// The model with this vendor, product and profile; else, of a drive by CiA 402, the model that a data sheet
+/// describes, which has no `can_identification`. nullptr: no drive. Pure.
 const DriveDescriptor* find_can_model(const canopen::Identity& identity);
 
 }  // namespace axisd

@@ -24,6 +24,25 @@ std::string entry(const std::string& name, const v1::FoundNode& node, const Frag
       name, context.bus, node.node(), node.model(), node.pulses_per_revolution());
 }
 
+/// Of a drive by CiA 402 the data sheet and what a revolution is have to be filled in.
+std::string described_entry(const std::string& name, const v1::FoundNode& node,
+                            const FragmentContext& context) {
+  return fmt::format(
+      "  {}:   # {}vendor 0x{:08X}, product 0x{:08X}\n"
+      "    bus: {}\n"
+      "    node: {}\n"
+      "    model: {}\n"
+      "    unit: rev\n"
+      "    scale: {{ microstep: 4000 pulses/rev }}   # what 6064h counts: see the drive's manual\n"
+      "    limits: {{ velocity: 1 rev/s }}\n"
+      "    drive: {{ eds: axis-{}.eds }}   # the data sheet of the drive, from its maker\n",
+      name, node.note().empty() ? "" : node.note() + ", ", node.vendor(), node.product(), context.bus,
+      node.node(), node.model(), node.node());
+}
+
+/// The model that a data sheet describes.
+bool is_described(const v1::FoundNode& node) { return node.model() == "cia402"; }
+
 }  // namespace
 
 std::string yaml_fragment(const std::vector<v1::FoundNode>& found, const FragmentContext& context) {
@@ -37,6 +56,8 @@ std::string yaml_fragment(const std::vector<v1::FoundNode>& found, const Fragmen
       text += fmt::format("  # {}: set its switches to the bus's {} bit/s\n", which, context.baud);
     } else if (!used.insert(node.node()).second) {
       text += fmt::format("  # {}: a second drive with this address, in another format\n", which);
+    } else if (is_described(node)) {
+      text += described_entry(free_name(node, context), node, context);
     } else if (node.pulses_per_revolution() == 0) {
       text += fmt::format("  # {}: its microstep could not be read, scan again\n", which);
     } else {

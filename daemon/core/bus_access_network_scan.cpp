@@ -121,6 +121,19 @@ Task<Result<std::optional<FoundNode>>> NetworkScan::look(std::uint8_t id) const 
   co_return found;
 }
 
+/// Object 1008h: what its maker calls it, for the search for its data sheet; empty: it does not say.
+Task<std::string> NetworkScan::device_name(canopen::RemoteNode node) const {
+  constexpr canopen::Object manufacturer_device_name{0x1008, 0};
+  constexpr std::size_t longest = 64;
+  auto once = options();
+  once.upload_limit = longest;
+  const auto answer = co_await node.sdo().upload(node.id(), manufacturer_device_name, std::move(once));
+  std::string name;
+  for (const auto byte : answer ? answer->bytes : canopen::Bytes{})
+    if (byte >= 0x20 && byte < 0x7F) name += static_cast<char>(byte);
+  co_return name;
+}
+
 /// Names the model and its setting, as far as both can be told.
 Task<void> NetworkScan::identify(canopen::RemoteNode node, FoundNode& found) const {
   const auto identity = co_await canopen::read_identity(node, options());
@@ -132,6 +145,10 @@ Task<void> NetworkScan::identify(canopen::RemoteNode node, FoundNode& found) con
   const auto* model = find_can_model(*identity);
   if (model == nullptr) co_return;
   found.model = model->model;
+  if (!model->can_identification) {
+    found.note = co_await device_name(node);
+    co_return;
+  }
   const auto& known = *model->can_identification;
   if (known.microstep_object == 0) co_return;
   const canopen::Object microstep{static_cast<std::uint16_t>(known.microstep_object >> 8U),

@@ -35,6 +35,7 @@ class NetworkScan final : public NodeScan {
   /// Ends by telling the batch, whatever happens.
   Task<> ask(std::uint8_t node, Batch& batch) const;
   Task<Result<std::optional<FoundNode>>> look(std::uint8_t node) const;
+  Task<std::string> device_name(canopen::RemoteNode node) const;
   Task<void> identify(canopen::RemoteNode node, FoundNode& found) const;
 
   Executor executor_;

@@ -91,14 +91,13 @@ std::string scan(const Setup& setup) {
   const auto formats = setup.manual.list("formats");
   const bool serial = !formats.empty();
   auto plant = make_plant(setup.manual, setup.variant, {});
-  // What only its data sheet describes is found, but nothing on the bus names it.
-  const bool nameless = setup.manual.has("data_sheet");
-  const auto name_of = [&](const Manual& manual) { return nameless ? std::string() : manual.model(); };
-  std::map<int, std::pair<std::string, std::uint32_t>> expected{{1, {name_of(setup.manual), rate}}}, found;
+  // What only its data sheet describes is named by its profile (CiA 402).
+  const bool described = setup.manual.has("data_sheet");
+  std::map<int, std::pair<std::string, std::uint32_t>> expected{{1, {setup.manual.model(), rate}}}, found;
   int node = 2;
   for (const auto& manual : same_bus(setup.manual)) {
     plant.drives.push_back(fmt::format("node={},model={}", node, manual.model()));
-    expected[node++] = {name_of(manual), rate};
+    expected[node++] = {manual.model(), rate};
     if (!serial) continue;
     plant.drives.push_back(
         fmt::format("node={},model={},{}", node, manual.model(), set_to_rate(manual, std::to_string(slow))));
@@ -128,7 +127,7 @@ std::string scan(const Setup& setup) {
       EXPECT_NE(serial, one.version().empty()) << "a CAN node has an identity instead";
       EXPECT_NE(serial, one.has_product());
       EXPECT_EQ(one.configured_as(), one.node() == 1 ? "axis" : "") << one.node();
-      EXPECT_EQ(one.pulses_per_revolution() == 0, nameless);
+      EXPECT_EQ(one.pulses_per_revolution() == 0, described);
     }
   }
   const auto status = reader->Finish();
@@ -138,7 +137,7 @@ std::string scan(const Setup& setup) {
   EXPECT_EQ(total, serial ? 24U : 12U);
   bench.await_online();
   bench.finish(0);
-  return nameless ? "without its name" : "all models";
+  return described ? "by its profile" : "all models";
 }
 
 /// One exchange past all axes: a register, or an object with its type.

@@ -4,6 +4,7 @@
 
 #include "config/configuration.hpp"
 #include "devices/descriptor.hpp"
+#include "tests/support/source_tree.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -65,6 +66,25 @@ TEST(YamlFragment, ANodeOfACanNetworkHasNoFormat) {
   node.clear_format();
   EXPECT_EQ(yaml_fragment({node}, {.bus = "can0", .baud = 500'000}),
             "  # node 5 (yss-c, 500000 bit/s): its microstep could not be read, scan again\n");
+}
+
+TEST(YamlFragment, ADriveByCia402NeedsItsDataSheet) {
+  auto node = found(7, "cia402", 1'000'000, 0);
+  node.clear_format();
+  node.set_device_type(0x00020192);
+  node.set_vendor(0x0A5A);
+  node.set_product(0x00402001);
+  node.set_note("Standard servo 402");
+  auto fragment = yaml_fragment({node}, {.bus = "line-a", .baud = 1'000'000});
+  EXPECT_THAT(fragment,
+              HasSubstr("  axis-7:   # Standard servo 402, vendor 0x00000A5A, product 0x00402001\n"));
+  EXPECT_THAT(fragment, HasSubstr("    model: cia402\n"));
+  const std::string placeholder = "axis-7.eds";
+  const auto at = fragment.find(placeholder);
+  ASSERT_NE(at, std::string::npos) << fragment;
+  fragment.replace(at, placeholder.size(), test::in_source_tree("config/examples/standard-drive.eds"));
+  const auto result = load(fragment, "canopen: { interface: sim }");
+  EXPECT_TRUE(result.configuration) << fragment << to_string(result.diagnostics.at(0));
 }
 
 TEST(YamlFragment, LeavesOutWhatIsConfiguredOrUnknown) {

@@ -244,6 +244,8 @@ TEST_F(NetworkAccess, AScanAsksManyAtOnceAndNamesWhatItFinds) {
   EXPECT_EQ(log.found[1].identity->product, 0x5678U);
   EXPECT_EQ(log.found[1].identity->revision, 0x00010002U);
   EXPECT_EQ(log.found[1].identity->serial, 99U);
+  EXPECT_EQ(log.found[1].model, "cia402") << "by its profile: a data sheet describes it";
+  EXPECT_EQ(log.found[1].pulses_per_revolution, 0);
   EXPECT_EQ(log.found[2].node, 21);
   EXPECT_THAT(log.found[2].note, HasSubstr("no device type"));
   EXPECT_EQ(log.found[3].node, 22);
