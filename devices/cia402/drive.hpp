@@ -195,6 +195,8 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> write_canary(MotionBlock block, SdoOptions options);
   /// Reads the block and compares it. The time: before the first of it was asked for.
   Task<Result<TimePoint>> read_canary(SdoOptions options);
+  [[nodiscard]] std::vector<MotionObject> telling_objects(const MotionBlock& block) const;
+  Task<Result<TimePoint>> prove_block(SdoOptions options);
 
   // drive_stop.cpp
   /// What is known of the drive's words is forgotten where nothing has proven it lately.
@@ -246,6 +248,7 @@ class Cia402Drive final : public Drive {
   Task<> acknowledge_set_point(SdoOptions options);
   Task<Result<void>> prepare_homing(HomingProfile profile, SdoOptions options);
   Task<> see_homing_begin(SdoOptions options);
+  [[nodiscard]] Error answers_too_late() const;
   Task<Result<void>> write_homing_method(HomingMethod method, SdoOptions options);
   Task<Result<void>> home_here(SdoOptions options);
 
@@ -305,6 +308,7 @@ class Cia402Drive final : public Drive {
   std::optional<Error> setup_error_;
   ActiveLow active_low_;
   std::map<std::uint32_t, std::uint8_t> sizes_;  ///< of objects, as this drive was seen to have them
+  Duration answer_time_{};                       ///< of its SDO server, the longest of late
   bool other_homing_codes_ = false;              ///< it refused the first of HomingCode, and took the other
 
   // The way to the drive.

@@ -59,6 +59,7 @@ void Cia402Drive::forget_power_cycle() {
 Task<Result<std::int64_t>> Cia402Drive::read_object(Object object, SdoOptions options) {
   const auto answer = co_await node_.sdo().upload(node_.id(), object, std::move(options));
   if (!answer) co_return failed(answer.error());
+  answer_time_ = std::max(answer->answered_at - answer->sent_at, answer_time_ * 7 / 8);
   constexpr std::size_t most = 8;
   const auto type = type_of(*model_, object);
   const auto known = sizes_.find(object.key());

@@ -75,9 +75,21 @@ Task<Result<void>> Cia402Drive::start(MotionBlock block, OperationMode mode,
     const bool canary_expired = error.reason == Reason::expired && clock_->now() < guard.not_after;
     if (!canary_expired && error.reason != Reason::no_reply) break;
   }
+  if (!result && !triggered && result.error().reason == Reason::expired && clock_->now() < guard.not_after)
+    result = fail(answers_too_late());
   if (!result && !triggered && result.error().outcome == Outcome::unknown)
     result.error().outcome = Outcome::not_executed;  // only parameters were written
   co_return result;
+}
+
+Error Cia402Drive::answers_too_late() const {
+  const auto in_ms = [](Duration time) { return std::chrono::duration<double, std::milli>(time).count(); };
+  return error_at(
+      Reason::expired, object::control_word,
+      fmt::format("nothing was started: the drive takes {:.0f} ms to answer, and the proof that it "
+                  "did not restart may be {:.0f} ms old (reboot_guard)",
+                  in_ms(answer_time_), in_ms(setup_.reboot_guard)),
+      "look at the load of the network; raise reboot_guard up to what the drive needs to boot");
 }
 
 Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode,
@@ -128,15 +140,16 @@ Task<Result<TimePoint>> Cia402Drive::prepare_start(MotionBlock block, OperationM
     if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared)
       co_return fail(prepared.error());
 
-  const auto canary = co_await read_canary(motion);
-  if (!canary || homing) co_return canary;
-  if (const auto written = co_await write_canary(distinct(block), motion); !written)
-    co_return fail(written.error());
-  co_return canary;
+  if (const auto canary = co_await read_canary(motion); !canary) co_return canary;
+  if (!homing)
+    if (const auto written = co_await write_canary(distinct(block), motion); !written)
+      co_return fail(written.error());
+  co_return co_await prove_block(motion);
 }
 
 Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger, SdoOptions options,
                                              bool& triggered) {
+  if (rebooted_) co_return fail(lost_memory());
   const auto began = clock_->now();
   const auto stops = stops_;
   const bool by_control = trigger.object == object::control_word;

@@ -18,6 +18,8 @@ constexpr auto longest_pdo_wait = milliseconds(60);
 /// Of a node that is alive.
 constexpr auto longest_pdo_wait_alive = milliseconds(100);
 constexpr int missed_in_a_row = 3;
+/// A reading by SDO takes some eight of them: longer than a PDO is waited for.
+constexpr auto slow_answer = milliseconds(10);
 /// After the last command of another master it is no longer a concern of today's.
 constexpr auto foreign_lasts = std::chrono::seconds(10);
 /// A motion that was triggered shows within this, or did not start.
@@ -161,8 +163,9 @@ Task<Result<DriveSample>> Cia402Drive::look(bool by_pdo, SdoOptions options) {
 
 Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class) {
   const SdoOptions options{.transaction_class = transaction_class};
-  // A chain that starts something does not wait for a PDO.
-  auto sample = co_await look(transaction_class != TransactionClass::motion, options);
+  // A chain that starts something does not wait for a PDO, unless the objects come later still.
+  const bool slow = answer_time_ > slow_answer;
+  auto sample = co_await look(slow || transaction_class != TransactionClass::motion, options);
   // The drive may have been reset between its status word and 603Fh: neither comes with the other.
   if (sample && sample->alarm_code == alarm_without_code) sample = co_await look(false, options);
   // What a drive does with a change of its mode in motion is not said.
