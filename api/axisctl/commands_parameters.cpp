@@ -68,9 +68,9 @@ void parameters(Invocation& invocation, const Arguments& arguments) {
   if (arguments.read && !request.names().empty())
     values = invocation.client().call(&Stub::ReadParameters, request, arguments.axis);
   if (invocation.json) {
-    print_line(json(shown));
-    if (arguments.read) print_line(json(values));
-    return;
+    auto text = json(shown);
+    if (arguments.read) text = text.substr(0, text.size() - 1) + "," + json(values).substr(1);
+    return print_line(text);
   }
   parameter_table(shown, values.values(), {.values = arguments.read, .descriptions = arguments.describe})
       .print(use_colour());

@@ -74,22 +74,26 @@ class Progress {
 
 using Found = google::protobuf::RepeatedPtrField<v1::FoundNode>;
 
-/// Runs the scan; false: interrupted, with what was found until then.
+/// Runs the scan; false: interrupted, with what was found until then. As JSON all of it is one object.
 bool run(Invocation& invocation, const Arguments& arguments, Found& found) {
   const auto request = request_of(arguments);
   grpc::ClientContext context;
   const Interrupt interrupt([&context] { context.TryCancel(); });
   Stub stub(invocation.client().channel());
   const auto stream = stub.Scan(&context, request);
+  v1::ScanResponse last;
   {
     Progress line(!invocation.json && !arguments.yaml && is_terminal(STDOUT_FILENO));
-    for (v1::ScanResponse progress; stream->Read(&progress);) {
+    for (v1::ScanResponse progress; stream->Read(&progress); last = progress) {
       found.MergeFrom(progress.found());
-      if (invocation.json) print_line(json(progress));
       line.show(arguments.bus, progress, found.size());
     }
   }
   const auto status = stream->Finish();
+  if (invocation.json && (status.ok() || interrupt.requested())) {
+    *last.mutable_found() = found;
+    print_line(json(last));
+  }
   if (status.ok()) return true;
   if (interrupt.requested()) return false;
   throw invocation.client().failure(status, arguments.bus);

@@ -129,8 +129,12 @@ ExitCode outcome(const v1::Command& command) {
                                                                      : ExitCode::ok;
 }
 
-ExitCode follow(Invocation& invocation, const v1::Command& command, const Follow& options) {
-  v1::Command latest = command;
+namespace {
+
+/// `latest`: the command as it was seen last; where it has ended, nothing of it is printed yet.
+ExitCode follow_to_end(Invocation& invocation, const v1::Command& command, const Follow& options,
+                       v1::Command& latest) {
+  latest = command;
   grpc::Status status;
   {
     grpc::ClientContext context;
@@ -162,12 +166,41 @@ ExitCode follow(Invocation& invocation, const v1::Command& command, const Follow
                   fmt::format("{}; command {} may go on: 'axisctl command watch {}' follows it",
                               failure.what(), command.id(), command.id()));
   }
-  print_line(invocation.json ? json(latest) : command_line(latest, options.unit));
   return outcome(latest);
+}
+
+/// Of several commands: one object for all of them.
+ExitCode report_as_json(Invocation& invocation, const std::vector<v1::Command>& commands, bool wait,
+                        const Follow& options) {
+  v1::ListCommandsResponse all;
+  for (const auto& command : commands) *all.add_commands() = command;
+  ExitCode result = ExitCode::ok;
+  try {
+    for (auto& latest : *all.mutable_commands()) {
+      const auto command = latest;
+      const ExitCode one = wait ? follow_to_end(invocation, command, options, latest) : outcome(command);
+      if (result == ExitCode::ok) result = one;
+    }
+  } catch (const Failure&) {
+    print_line(json(all));
+    throw;
+  }
+  print_line(json(all));
+  return result;
+}
+
+}  // namespace
+
+ExitCode follow(Invocation& invocation, const v1::Command& command, const Follow& options) {
+  v1::Command latest;
+  const auto result = follow_to_end(invocation, command, options, latest);
+  if (ended(latest)) print_line(invocation.json ? json(latest) : command_line(latest, options.unit));
+  return result;
 }
 
 ExitCode report(Invocation& invocation, const std::vector<v1::Command>& commands, bool wait,
                 const Follow& options) {
+  if (invocation.json && commands.size() > 1) return report_as_json(invocation, commands, wait, options);
   ExitCode result = ExitCode::ok;
   for (const auto& command : commands)
     // JSON is one object per command: with --wait that is the ended one.

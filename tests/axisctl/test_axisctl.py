@@ -23,6 +23,11 @@ class Reading(AxisctlTest):
         self.assertRegex(lines[3], r"^ghost +Offline .*the drive does not answer")
         self.assertNotIn("\x1b", "".join(lines))
 
+    def test_json_of_several_axes_is_one_object(self):
+        for wait in ([], ["--wait"]):
+            (listed,) = self.json("enable", "feeder", "turntable", *wait)
+            self.assertEqual([command["axis"] for command in listed["commands"]], ["feeder", "turntable"])
+
     def test_list_as_json_keeps_the_names_of_the_proto(self):
         (response,) = self.json("list")
         feeder = response["axes"][0]

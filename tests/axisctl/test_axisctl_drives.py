@@ -81,8 +81,8 @@ class Drives(AxisctlTest):
         # What cannot be read is not asked for.
         self.ok("drive", "parameters", "feeder", "--read")
         self.assertNotIn("stop", self.server.calls("ReadParameters")[-1].names)
-        listed, values = self.json("drive", "parameters", "feeder", "speed", "--read")
-        self.assertEqual((len(listed["parameters"]), values["values"][1]["value"]), (2, "-60"))
+        (listed,) = self.json("drive", "parameters", "feeder", "speed", "--read")
+        self.assertEqual((len(listed["parameters"]), listed["values"][1]["value"]), (2, "-60"))
 
     def test_read_and_write(self):
         self.assertRegex(self.ok("drive", "read", "feeder", "start_speed"), r"start_speed +0x0020 +5 +r/min")
@@ -228,6 +228,10 @@ class Buses(AxisctlTest):
         self.assertRegex(text, r"9 +500000 +unknown +401 +valves\n")
         self.assertRegex(text, r"22 +500000 +unknown +it sends, but answers no SDO\n")
         self.assertIn("  axis-5:\n    bus: can0\n    node: 5\n", text)
+
+    def test_a_scan_as_json_is_one_object(self):
+        (scan,) = self.json("bus", "scan", "line-a", "--nodes", "1-10")
+        self.assertEqual([node["node"] for node in scan["found"]], [1, 5, 8])
 
     def test_list_and_status(self):
         text = self.ok("bus", "list")
