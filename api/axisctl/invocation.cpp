@@ -56,7 +56,8 @@ void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_option("--timeout", invocation.timeout, "How long the daemon may take to answer")
       ->type_name("TIME")
       ->capture_default_str();
-  app.add_flag("--json", invocation.json, "Print JSON with the names of the proto: one object; of streams, one per line");
+  app.add_flag("--json", invocation.json,
+               "Print JSON with the names of the proto: one object; of streams, one per line");
 }
 
 /// "-.5" becomes "-0.5": CLI11 takes a dash and a digit for a value, a dash and a point for an option.
