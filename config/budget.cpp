@@ -12,6 +12,7 @@
 #include "config/file_warnings.hpp"
 #include "config/position_warnings.hpp"
 #include "config/quantity.hpp"
+#include "config/start_warnings.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/generic/value.hpp"
 
@@ -167,6 +168,7 @@ std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports) {
 std::vector<std::string> warnings(const Configuration& configuration) {
   auto lines = warnings(budgets(configuration));
   std::ranges::move(position_warnings(configuration), std::back_inserter(lines));
+  std::ranges::move(start_warnings(configuration), std::back_inserter(lines));
   std::ranges::move(file_warnings(configuration), std::back_inserter(lines));
   return lines;
 }

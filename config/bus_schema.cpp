@@ -130,6 +130,16 @@ constexpr KeySpec canopen_keys[] = {
      .minimum = 5,
      .maximum = 5000,
      .apply = [](Target& t, const Value& v) { t.network->sdo_timeout = v.duration; }},
+    {.key = "sdo_answer",
+     .kind = Kind::duration,
+     .description =
+         "How long the slowest node takes to answer an SDO request as a rule. Where that is too long "
+         "for reboot_guard or start_within of an axis, check says so.",
+     .example = "40 ms",
+     .default_value = "5 ms",
+     .minimum = 1,
+     .maximum = 1000,
+     .apply = [](Target& t, const Value& v) { t.network->sdo_answer = v.duration; }},
     budget_key<&Target::network>,
     stop_bound_key<&Target::network>,
     refresh_bound_key<&Target::network>,

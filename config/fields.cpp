@@ -193,6 +193,7 @@ Section section_of(const canopen::NetworkSettings& bus) {
   fields.add("bitrate", bus.bitrate);
   fields.add("sync_period", bus.sync_period);
   fields.add("sdo_timeout", bus.sdo_timeout);
+  fields.add("sdo_answer", bus.sdo_answer);
   add_budget(fields, bus.budget);
   return fields.take();
 }
