@@ -61,8 +61,8 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
         settings_.name,
         LinkChange{.to = now.link, .detail = now.link_error ? now.link_error->message : std::string()});
   // While it is being connected the notes follow from what it was found to be.
-  const bool stays = before.link == LinkState::online && now.link == LinkState::online;
-  if (stays && !now.link_note.empty() && before.link_note != now.link_note)
+  const bool was_online = before.link == LinkState::online;
+  if (was_online && !now.link_note.empty() && before.link_note != now.link_note)
     env_.event(settings_.name, LinkChange{.to = now.link, .detail = now.link_note});
   if (before.state != now.state)
     env_.event(settings_.name, StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});

@@ -245,7 +245,7 @@ TEST(Explain, PowerOnItsWayIsWaitedFor) {
   rig.submit(EnableRequest{});
   EXPECT_THAT(rig.reasons(HomeRequest{}), ElementsAre("(disabled)")) << "it waits for that";
   EXPECT_THAT(rig.text(HomeRequest{}, Reason::disabled), HasSubstr("being enabled"));
-  EXPECT_THAT(rig.reasons(JogRequest{.velocity = 5}), ElementsAre("disabled"));
+  EXPECT_THAT(rig.reasons(JogRequest{.velocity = 5}), ::testing::Contains("disabled"));
   EXPECT_THAT(rig.reasons(EnableRequest{}), ElementsAre("busy"));
 }
 
