@@ -30,19 +30,6 @@ TEST(StandardDrive, FaultsSwitchOffAndAreReported) {
   EXPECT_EQ(bench.drive().starts(), 1) << "nothing resumes";
 }
 
-TEST(StandardDrive, TheErrorCodeIsKeptWhereTheMakerWantsIt) {
-  for (const bool kept : {false, true}) {
-    simulation::SimulatedNodeSettings settings;
-    settings.switches["error_code_kept"] = kept;
-    Bench bench(std::move(settings));
-    bench.drive().raise_alarm(0x8611);
-    EXPECT_EQ(bench.read(0x603F), 0x8611);
-    bench.control(0x80);
-    EXPECT_EQ(bench.status() & 0x4FU, 0x40U);
-    EXPECT_EQ(bench.read(0x603F), kept ? 0x8611 : 0);
-  }
-}
-
 TEST(StandardDrive, ABlockedShaftIsAFollowingError) {
   Bench bench;
   bench.enable(1);
