@@ -91,10 +91,14 @@ class Fraction {
     fits_ = fits_ && !__builtin_mul_overflow(above_ / cross, above / other, &above_) &&
             !__builtin_mul_overflow(below_ / other, below / cross, &below_);
   }
+  [[nodiscard]] std::optional<double> value() const {
+    if (!fits_) return std::nullopt;
+    return static_cast<double>(above_) / static_cast<double>(below_);
+  }
   /// As a decimal that says it exactly.
   [[nodiscard]] std::optional<std::string> text() const {
     if (!fits_) return std::nullopt;
-    auto text = format_number(static_cast<double>(above_) / static_cast<double>(below_));
+    auto text = format_number(*value());
     const auto same = parse_decimal(text);
     if (!same || same->numerator != above_ || same->denominator != below_) return std::nullopt;
     return text;
@@ -105,13 +109,11 @@ class Fraction {
   bool fits_ = true;
 };
 
-}  // namespace
-
-std::optional<std::string> converted(const Decimal& number, std::string_view from, std::string_view to) {
+std::optional<Fraction> converted_fraction(const Decimal& number, std::string_view from,
+                                           std::string_view to) {
   const auto source = quotient(from), target = quotient(to);
   if (!source || !target || source->above->kind != target->above->kind) return std::nullopt;
   if ((source->below == nullptr) != (target->below == nullptr)) return std::nullopt;
-  if (number.numerator == 0) return "0";
   Fraction result(number.numerator, number.denominator);
   const auto common = std::gcd(source->above->size, target->above->size);
   result.multiply(source->above->size / common, target->above->size / common);
@@ -120,7 +122,40 @@ std::optional<std::string> converted(const Decimal& number, std::string_view fro
     const auto shared = std::gcd(source->below->size, target->below->size);
     result.multiply(target->below->size / shared, source->below->size / shared);
   }
-  return result.text();
+  return result;
+}
+
+constexpr auto lengths = std::to_array<std::string_view>({"mm", "cm", "m", "um", "in"});
+constexpr auto angles = std::to_array<std::string_view>({"deg", "rev"});
+constexpr auto linear_rates =
+    std::to_array<std::string_view>({"mm/s", "cm/s", "m/s", "um/s", "in/s", "mm/min", "m/min"});
+constexpr auto angular_rates = std::to_array<std::string_view>({"deg/s", "deg/min", "rev/s", "rpm"});
+
+}  // namespace
+
+std::optional<std::string> converted(const Decimal& number, std::string_view from, std::string_view to) {
+  const auto result = converted_fraction(number, from, to);
+  return result ? result->text() : std::nullopt;
+}
+
+std::optional<double> converted_value(const Decimal& number, std::string_view from, std::string_view to) {
+  const auto result = converted_fraction(number, from, to);
+  return result ? result->value() : std::nullopt;
+}
+
+std::span<const std::string_view> units_like(std::string_view unit) {
+  const auto known = quotient(unit);
+  if (!known || (known->below != nullptr && known->below->kind != Kind::time)) return {};
+  const bool rate = known->below != nullptr;
+  switch (known->above->kind) {
+    case Kind::length:
+      return rate ? std::span<const std::string_view>(linear_rates) : lengths;
+    case Kind::angle:
+      return rate ? std::span<const std::string_view>(angular_rates) : angles;
+    case Kind::time:
+      break;
+  }
+  return {};
 }
 
 std::optional<std::string> converted_time(const Decimal& number, std::string_view from) {

@@ -2,10 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <iterator>
+#include <vector>
 
 #include "api/axisctl/error.hpp"
 #include "config/quantity.hpp"
+#include "config/text.hpp"
+#include "config/unit_conversion.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -15,12 +20,23 @@ Failure usage(std::string_view what, const config::QuantityError& error) {
                                        error.suggestion.empty() ? "" : "; ", error.suggestion)};
 }
 
+/// "mm, cm or m": `unit` first.
+std::string fitting(std::string_view unit) {
+  std::vector<std::string_view> units{unit};
+  std::ranges::copy_if(config::units_like(unit), std::back_inserter(units),
+                       [unit](std::string_view other) { return other != unit; });
+  return config::alternatives(units);
+}
+
 }  // namespace
 
 double parse_value(std::string_view text, std::string_view unit, std::string_view what) {
-  const auto decimal = config::parse_in_unit(text, unit, config::UnitRule::optional);
-  if (!decimal) throw usage(what, decimal.error());
-  return decimal->value;
+  const auto quantity = config::parse_quantity(text);
+  if (!quantity) throw usage(what, quantity.error());
+  if (quantity->unit.empty() || quantity->unit == unit) return quantity->number.value;
+  if (const auto same = config::converted_value(quantity->number, quantity->unit, unit)) return *same;
+  throw usage(what, {.message = fmt::format("unit {} does not fit here", config::quoted(quantity->unit)),
+                     .suggestion = fmt::format("write it in {}", fitting(unit))});
 }
 
 std::chrono::nanoseconds parse_duration(std::string_view text, std::string_view what) {

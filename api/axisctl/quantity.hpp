@@ -8,8 +8,9 @@
 
 namespace axisd::axisctl {
 
-/// A value in `unit`; the text may carry the unit or leave it out. `what` names the argument in errors.
-/// Throws Failure (usage) for anything else, NaN and infinity included.
+/// A value in `unit`; the text may carry the unit, leave it out, or have another that measures the same,
+/// which is converted: "12cm" is 120 in "mm". `what` names the argument in errors. Throws Failure (usage) for
+/// anything else, NaN and infinity included.
 double parse_value(std::string_view text, std::string_view unit, std::string_view what);
 
 /// A time with its unit, "150ms", "2s": a bare number would be ambiguous. Not negative. Throws Failure

@@ -29,9 +29,28 @@ TEST(Quantity, UnitMayBeWrittenOrLeftOut) {
   EXPECT_DOUBLE_EQ(parse_value("50mm/s", "mm/s", "--velocity"), 50);
 }
 
-TEST(Quantity, AnotherUnitIsRefusedByName) {
-  EXPECT_THAT(refusal([] { parse_value("10deg", "mm", "position"); }), StartsWith("position: "));
-  EXPECT_THAT(refusal([] { parse_value("10mm", "mm/s", "--velocity"); }), HasSubstr("mm/s"));
+TEST(Quantity, AnotherUnitThatMeasuresTheSameIsConverted) {
+  EXPECT_EQ(parse_value("12cm", "mm", "position"), 120);
+  EXPECT_EQ(parse_value("0.5m", "mm", "position"), 500);
+  EXPECT_EQ(parse_value("-0.5 in", "mm", "distance"), -12.7);
+  EXPECT_EQ(parse_value("0 cm", "mm", "position"), 0);
+  EXPECT_EQ(parse_value("30 rpm", "deg/s", "velocity"), 180);
+  EXPECT_EQ(parse_value("1 rev/s", "deg/s", "velocity"), 360);
+  EXPECT_EQ(parse_value("0.25rev", "deg", "position"), 90);
+  EXPECT_EQ(parse_value("90 deg", "rev", "position"), 0.25);
+  EXPECT_EQ(parse_value("3 m/min", "mm/s", "--velocity"), 50);
+  EXPECT_DOUBLE_EQ(parse_value("1 mm/min", "mm/s", "--velocity"), 1.0 / 60);
+}
+
+TEST(Quantity, WhatMeasuresSomethingElseIsRefusedWithTheUnitsThatFit) {
+  EXPECT_EQ(refusal([] { parse_value("10deg", "mm", "position"); }),
+            "position: unit 'deg' does not fit here; write it in mm, cm, m, um or in");
+  EXPECT_EQ(refusal([] { parse_value("10mm", "deg/s", "--velocity"); }),
+            "--velocity: unit 'mm' does not fit here; write it in deg/s, deg/min, rev/s or rpm");
+  EXPECT_EQ(refusal([] { parse_value("10mm", "pieces", "position"); }),
+            "position: unit 'mm' does not fit here; write it in pieces");
+  for (const char* text : {"1 rev", "1 mm/s", "5 s", "1 rpm", "1 mm/x", "1 pulses"})
+    EXPECT_THAT(refusal([&] { parse_value(text, "mm", "position"); }), HasSubstr("write it in mm")) << text;
 }
 
 TEST(Quantity, OnlyFiniteNumbers) {

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <optional>
 #include <string>
+
+#include "config/unit_conversion.hpp"
 
 namespace axisd::config {
 namespace {
@@ -102,6 +105,19 @@ TEST(Quantity, SaysWhatAnotherUnitComesTo) {
   EXPECT_EQ(hint("5 steps/rev", "pulses/rev"), "expected pulses/rev");
   EXPECT_EQ(parse_ratio_in_unit("1/4 cm/rev", "mm/rev").error().suggestion, "write 2.5 mm/rev");
   EXPECT_EQ(parse_ratio_in_unit("1/3 cm/rev", "mm/rev").error().suggestion, "expected mm/rev");
+}
+
+TEST(Quantity, ConvertsToTheNearestNumber) {
+  const auto number = [](std::string_view text) { return *parse_decimal(text); };
+  EXPECT_EQ(converted_value(number("4.35"), "cm", "mm"), 43.5);
+  EXPECT_EQ(converted_value(number("0"), "in", "mm"), 0);
+  EXPECT_EQ(converted_value(number("1"), "mm/min", "mm/s"), 1.0 / 60);
+  EXPECT_EQ(converted_value(number("1"), "deg", "mm"), std::nullopt);
+  EXPECT_EQ(converted_value(number("1"), "mm", "mm/s"), std::nullopt);
+  EXPECT_EQ(converted_value(number("1"), "piece", "mm"), std::nullopt);
+  EXPECT_EQ(units_like("cm").front(), "mm");
+  EXPECT_EQ(units_like("rev/s").back(), "rpm");
+  for (const auto* unit : {"s", "piece", "mm/rev", ""}) EXPECT_TRUE(units_like(unit).empty()) << unit;
 }
 
 TEST(Quantity, SaysWhatAnotherUnitOfTimeComesTo) {
