@@ -32,9 +32,15 @@ bool leaves_out(std::uint32_t last) {
   return false;
 }
 
-std::string joined(const Table& table, bool colour) {
+/// Where tables go.
+struct Place {
+  bool colour = false;
+  int columns = 0;
+};
+
+std::string joined(const Table& table, const Place& place) {
   std::string text;
-  for (const auto& line : table.lines(colour)) text += line + '\n';
+  for (const auto& line : table.lines(place.colour, place.columns, TooWide::fold)) text += line + '\n';
   return text;
 }
 
@@ -69,7 +75,8 @@ int count_here(const v1::Group& group, const v1::BusBudget& budget) {
 
 /// A stop of a group is one of as many axes as it has here: those on other buses do not delay it. Empty:
 /// none.
-std::string group_text(const v1::BusBudget& budget, const v1::ListGroupsResponse& groups, bool colour) {
+std::string group_text(const v1::BusBudget& budget, const v1::ListGroupsResponse& groups,
+                       const Place& place) {
   Table table({"GROUP", "AXES", "LAST FRAME", "STANDSTILL"}, {1, 2, 3});
   bool any = false;
   for (const auto& group : groups.groups()) {
@@ -80,7 +87,7 @@ std::string group_text(const v1::BusBudget& budget, const v1::ListGroupsResponse
     table.add(
         {group.name(), std::to_string(count), predicted(stop.last_frame()), predicted(stop.standstill())});
   }
-  return any ? joined(table, colour) + '\n' : "";
+  return any ? joined(table, place) + '\n' : "";
 }
 
 Table refresh_table(const v1::BusBudget& budget) {
@@ -111,14 +118,16 @@ Table axis_stop_table(const v1::BusBudget& budget) {
 
 }  // namespace
 
-std::string budget_text(const v1::BusBudget& budget, const v1::ListGroupsResponse& groups, bool colour) {
-  auto text = fmt::format("{}\n{}", budget.bus(), joined(load_table(budget), colour));
+std::string budget_text(const v1::BusBudget& budget, const v1::ListGroupsResponse& groups, bool colour,
+                        int columns) {
+  const Place place{.colour = colour, .columns = columns};
+  auto text = fmt::format("{}\n{}", budget.bus(), joined(load_table(budget), place));
   if (!budget.axes().empty()) {
-    text += '\n' + joined(stop_table(budget), colour);
+    text += '\n' + joined(stop_table(budget), place);
     if (leaves_out(static_cast<std::uint32_t>(budget.stops_size())))
       text += "MOVING, STOPPED: not all numbers of axes are shown; --json has them\n";
-    text += fmt::format("\n{}{}\n{}", group_text(budget, groups, colour),
-                        joined(refresh_table(budget), colour), joined(axis_stop_table(budget), colour));
+    text += fmt::format("\n{}{}\n{}", group_text(budget, groups, place), joined(refresh_table(budget), place),
+                        joined(axis_stop_table(budget), place));
   }
   for (const auto& one : budget.excess())
     text += fmt::format("exceeded ({}): {}; {}\n", one.key(), one.message(), one.remedy());

@@ -20,7 +20,7 @@ namespace {
 void print_tables(const v1::GetBudgetResponse& response, const v1::ListGroupsResponse& groups) {
   std::string text;
   for (const auto& budget : response.budgets())
-    text += (text.empty() ? "" : "\n") + budget_text(budget, groups, use_colour());
+    text += (text.empty() ? "" : "\n") + budget_text(budget, groups, use_colour(), output_columns());
   print(text);
 }
 

@@ -35,7 +35,8 @@ void statistics(Invocation& invocation, const std::string& bus) {
   request.set_bus(bus);
   const auto response = invocation.client().call(&Stub::GetBusStatistics, request, bus);
   if (invocation.json) return print_line(json(response));
-  for (const auto& line : statistics_lines(response.buses(), use_colour())) print_line(line);
+  for (const auto& line : statistics_lines(response.buses(), use_colour(), output_columns(), TooWide::fold))
+    print_line(line);
 }
 
 void watch_statistics(Invocation& invocation, const StatisticsArguments& arguments) {

@@ -124,6 +124,7 @@ Table axis_table(const google::protobuf::RepeatedPtrField<v1::AxisState>& axes) 
   Table table(
       {"AXIS", "STATE", "POSITION", "", "VELOCITY", "", "TRUST", "LINK", "MODEL", "BUS", "NODE", "REMARKS"},
       {2, 4, 10});
+  table.leave_out_first({10, 9, 8, 7});  // 'axisctl state' has them
   for (const auto& state : axes) {
     const bool known = state.has_age();
     table.add({state.axis(),

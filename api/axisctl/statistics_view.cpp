@@ -120,10 +120,10 @@ Table network_node_table(const v1::BusStatistics& bus) {
 }
 
 std::vector<std::string> statistics_lines(const google::protobuf::RepeatedPtrField<v1::BusStatistics>& buses,
-                                          bool colour, int columns) {
+                                          bool colour, int columns, TooWide too_wide) {
   std::vector<std::string> all;
   const auto add = [&](const Table& table) {
-    std::ranges::move(table.lines(colour, columns), std::back_inserter(all));
+    std::ranges::move(table.lines(colour, columns, too_wide), std::back_inserter(all));
   };
   for (const auto& bus : buses) {
     if (!all.empty()) all.emplace_back();

@@ -19,8 +19,8 @@ Table class_table(const v1::BusStatistics& bus);
 Table line_node_table(const v1::BusStatistics& bus);
 /// Of a CAN network.
 Table network_node_table(const v1::BusStatistics& bus);
-/// All of it, bus after bus; `columns` as Table::lines() has it.
+/// All of it, bus after bus; the rest as Table::lines() has it.
 std::vector<std::string> statistics_lines(const google::protobuf::RepeatedPtrField<v1::BusStatistics>& buses,
-                                          bool colour, int columns = 0);
+                                          bool colour, int columns = 0, TooWide too_wide = TooWide::clip);
 
 }  // namespace axisd::axisctl

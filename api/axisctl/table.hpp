@@ -1,6 +1,8 @@
 // Aligned columns for people.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,21 +19,43 @@ struct Cell {
   Colour colour = Colour::none;
 };
 
+/// What becomes of a line that is wider than the terminal.
+enum class TooWide : std::uint8_t {
+  clip,  ///< its end is lost: a line for each row, for what is redrawn in place
+  fold,  ///< it goes on below: nothing is lost
+};
+
 /// Columns are as wide as their widest cell; columns named in `right` align at the right, as numbers do.
 class Table {
  public:
   explicit Table(std::vector<std::string> header, std::vector<std::size_t> right = {});
   void add(std::vector<Cell> row);
-  /// The lines without line ends. `columns` > 0 clips each line to that many columns.
-  [[nodiscard]] std::vector<std::string> lines(bool colour, int columns = 0) const;
+  /// Where the table is too wide, these columns go first, in this order.
+  void leave_out_first(std::vector<std::size_t> columns);
+  /// The lines without line ends. `columns` > 0: none is wider than that.
+  [[nodiscard]] std::vector<std::string> lines(bool colour, int columns = 0,
+                                               TooWide too_wide = TooWide::clip) const;
+  /// To the standard output, as wide as the terminal.
   void print(bool colour) const;
 
  private:
-  [[nodiscard]] std::string line(const std::vector<Cell>& row, const std::vector<std::size_t>& widths,
-                                 bool colour, std::size_t columns) const;
+  using Columns = std::vector<std::size_t>;
+  [[nodiscard]] std::vector<std::size_t> widths() const;
+  [[nodiscard]] std::size_t least_width(std::size_t column, const Columns& shown,
+                                        const std::vector<std::size_t>& widths) const;
+  [[nodiscard]] Columns fitting(const std::vector<std::size_t>& widths, std::size_t limit) const;
+  [[nodiscard]] std::vector<Columns> folded(const Columns& shown, const std::vector<std::size_t>& widths,
+                                            std::size_t limit) const;
+  [[nodiscard]] std::string clipped_line(const std::vector<Cell>& row, const Columns& shown,
+                                         const std::vector<std::size_t>& widths, bool colour,
+                                         std::size_t limit) const;
+  void add_folded(std::vector<std::string>& lines, const std::vector<Cell>& row,
+                  const std::vector<Columns>& groups, const std::vector<std::size_t>& widths, bool colour,
+                  std::size_t limit) const;
 
   std::vector<Cell> header_;
   std::vector<bool> right_;
+  Columns leave_out_;
   std::vector<std::vector<Cell>> rows_;
 };
 

@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstdlib>
+#include <system_error>
 
 #include "api/axisctl/error.hpp"
 
@@ -31,9 +33,17 @@ bool use_colour() {
 }
 
 int terminal_columns() {
+  if (const char* text = std::getenv("COLUMNS")) {
+    int columns = 0;
+    const std::string_view digits(text);
+    const auto [end, error] = std::from_chars(digits.begin(), digits.end(), columns);
+    if (error == std::errc{} && end == digits.end() && columns > 0) return columns;
+  }
   const auto size = window();
   return size.ws_col > 0 ? size.ws_col : 80;
 }
+
+int output_columns() { return isatty(STDOUT_FILENO) == 1 ? terminal_columns() : 0; }
 
 int terminal_rows() {
   const auto size = window();

@@ -13,8 +13,10 @@ enum class Colour : std::uint8_t { none, red, green, yellow, dim, bold };
 bool is_terminal(int file_descriptor);
 /// Colours are wanted: standard output is a terminal and NO_COLOR is not set.
 bool use_colour();
-/// Width of the terminal in columns; 80 if unknown.
+/// Width of the terminal: that of COLUMNS if it is exported, else its own; 80 if unknown.
 int terminal_columns();
+/// The same if the standard output is a terminal, else 0: as wide as it takes.
+int output_columns();
 int terminal_rows();
 
 std::string coloured(std::string_view text, Colour colour, bool enabled);

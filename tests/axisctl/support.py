@@ -69,11 +69,11 @@ class AxisctlTest(unittest.TestCase):
             time.sleep(0.01)
         self.fail(f"no call of {method}")
 
-    def on_terminal(self, *words, interrupt_at=None):
+    def on_terminal(self, *words, interrupt_at=None, env=None):
         """Runs on a terminal; sends SIGINT, as Ctrl-C does, once the output matches. Returns status and output."""
         ours, theirs = pty.openpty()
         # Not pty.fork: a fork of a process with gRPC's threads may hang.
-        axisctl = subprocess.Popen([AXISCTL, "--server", self.server.address, *words], env=environment(),
+        axisctl = subprocess.Popen([AXISCTL, "--server", self.server.address, *words], env=environment() | (env or {}),
                                    stdin=theirs, stdout=theirs, stderr=theirs, close_fds=True)
         os.close(theirs)
         self.addCleanup(axisctl.kill)
