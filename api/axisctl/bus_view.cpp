@@ -7,6 +7,7 @@
 
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
+#include "config/text.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -68,6 +69,13 @@ std::string counters(const v1::NetworkStatus& network) {
 }
 
 }  // namespace
+
+Failure no_such_bus(const std::string& name, const v1::ListBusesResponse& buses) {
+  std::vector<std::string> names;
+  for (const auto& bus : buses.buses()) names.push_back(bus.name());
+  return {ExitCode::usage, fmt::format("there is no bus {}; {}", config::quoted(name),
+                                       did_you_mean(name, names, "axisctl bus list"))};
+}
 
 bool is_network(const v1::Bus& bus) { return bus.kind() == v1::BUS_KIND_CANOPEN; }
 

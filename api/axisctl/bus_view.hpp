@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "api/axisctl/error.hpp"
 #include "api/axisctl/table.hpp"
 #include "axisd/v1/bus_service.pb.h"
 
@@ -12,6 +13,8 @@ namespace axisd::axisctl {
 Table line_table(const v1::ListBusesResponse& buses);
 /// The CAN networks likewise.
 Table network_table(const v1::ListBusesResponse& buses);
+/// What to tell of a name that no bus has.
+Failure no_such_bus(const std::string& name, const v1::ListBusesResponse& buses);
 [[nodiscard]] bool is_network(const v1::Bus& bus);
 /// "up", "bus off", or "open"; with why it is not, and "simulated".
 std::string bus_state(const v1::Bus& bus);

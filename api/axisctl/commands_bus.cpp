@@ -136,8 +136,7 @@ void status(Invocation& invocation, const std::string& name) {
   v1::ListBusesResponse shown;
   for (const auto& bus : response.buses())
     if (name.empty() || bus.name() == name) *shown.add_buses() = bus;
-  if (shown.buses().empty() && !name.empty())
-    throw Failure(ExitCode::usage, fmt::format("there is no bus '{}'; axisctl bus list", name));
+  if (shown.buses().empty() && !name.empty()) throw no_such_bus(name, response);
   if (invocation.json) return print_line(json(shown));
   std::string text;
   for (const auto& bus : shown.buses()) text += (text.empty() ? "" : "\n") + bus_details(bus);

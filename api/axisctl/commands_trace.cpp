@@ -5,24 +5,29 @@
 #include <algorithm>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <optional>
 
 #include "api/axisctl/bus_view.hpp"
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/frame_names.hpp"
 #include "api/axisctl/interrupt.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "api/axisctl/trace_format.hpp"
+#include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/bus_service.grpc.pb.h"
+#include "axisd/v1/drive_service.grpc.pb.h"
 
 namespace axisd::axisctl {
 namespace {
 
 struct Arguments {
   std::string bus, node, output, format = "text", limit;
+  bool plain = false;
 };
 
 TraceFormat format_of(const std::string& name) {
@@ -33,8 +38,9 @@ TraceFormat format_of(const std::string& name) {
 /// Writes frames to a file or to the standard output, and counts them.
 class Sink {
  public:
-  Sink(const Arguments& arguments, bool json, v1::Bus bus)
-      : format_(format_of(arguments.format)), json_(json), bus_(std::move(bus)) {
+  /// Without `names` text is as the wire log has it.
+  Sink(const Arguments& arguments, bool json, v1::Bus bus, std::optional<FrameNames> names)
+      : format_(format_of(arguments.format)), json_(json), bus_(std::move(bus)), names_(std::move(names)) {
     if (!arguments.output.empty()) {
       file_.open(arguments.output, std::ios::binary | std::ios::trunc);
       if (!file_)
@@ -69,7 +75,8 @@ class Sink {
 
   void write(const v1::TracedFrame& frame) {
     if (format_ == TraceFormat::text) {
-      out() << frame.text() << '\n';
+      const auto meaning = names_ ? names_->text(frame) : std::string();
+      out() << frame.text() << (meaning.empty() ? "" : "  # ") << meaning << '\n';
     } else if (!on_wire(frame)) {
       return;
     } else if (format_ == TraceFormat::candump) {
@@ -83,6 +90,7 @@ class Sink {
   TraceFormat format_;
   bool json_;
   v1::Bus bus_;
+  std::optional<FrameNames> names_;
   std::ofstream file_;
   std::uint64_t frames_ = 0, lost_ = 0;
 };
@@ -92,7 +100,26 @@ v1::Bus bus_of(Invocation& invocation, const std::string& name) {
       invocation.client().call(&v1::BusService::Stub::ListBuses, v1::ListBusesRequest(), std::string_view());
   for (const auto& bus : all.buses())
     if (bus.name() == name) return bus;
-  throw Failure(ExitCode::usage, fmt::format("there is no bus '{}'; axisctl bus list", name));
+  throw no_such_bus(name, all);
+}
+
+/// What the drives on this bus call their registers and objects.
+FrameNames names_on(Invocation& invocation, const std::string& bus) {
+  FrameNames names;
+  std::map<std::string, v1::ListParametersResponse> catalogues;  // by model
+  const auto all =
+      invocation.client().call(&v1::AxisService::Stub::ListAxes, v1::ListAxesRequest(), std::string_view());
+  for (const auto& axis : all.axes()) {
+    if (axis.bus() != bus) continue;
+    auto& catalogue = catalogues[axis.model()];
+    if (catalogue.parameters().empty()) {
+      v1::ListParametersRequest request;
+      request.set_axis(axis.axis());
+      catalogue = invocation.client().call(&v1::DriveService::Stub::ListParameters, request, axis.axis());
+    }
+    names.add(axis.node(), catalogue);
+  }
+  return names;
 }
 
 void trace(Invocation& invocation, const Arguments& arguments) {
@@ -106,7 +133,10 @@ void trace(Invocation& invocation, const Arguments& arguments) {
   grpc::ClientContext context;
   std::optional<std::chrono::nanoseconds> limit;
   if (!arguments.limit.empty()) limit = parse_duration(arguments.limit, "--for");
-  Sink sink(arguments, invocation.json, bus);
+  std::optional<FrameNames> names;
+  if (arguments.format == "text" && arguments.output.empty() && !arguments.plain && !invocation.json)
+    names = names_on(invocation, bus.name());
+  Sink sink(arguments, invocation.json, bus, std::move(names));
   const Interrupt interrupt([&context] { context.TryCancel(); });
   if (limit)
     context.set_deadline(std::chrono::system_clock::now() +
@@ -132,9 +162,10 @@ void add_trace_command(CLI::App& app, Invocation& invocation) {
   command->add_option("--format", arguments->format, "text, candump (CAN only) or pcap")
       ->check(CLI::IsMember({"text", "candump", "pcap"}))
       ->capture_default_str();
+  command->add_flag("--plain", arguments->plain, "Text without the names of registers and objects");
   command->add_option("--for", arguments->limit, "End after this time, such as 10s")->type_name("TIME");
   command->footer(R"help(
-Text has what was not sent and why, too; the other formats only what was on the wire. Wireshark shows a pcap file of an
+Text has what was not sent and why, too, and on the standard output what each frame says, behind a #; the other formats only what was on the wire. Wireshark shows a pcap file of an
 RS-485 line once DLT_USER 0 (147) is set to the dissector mbrtu.
 
 Examples:

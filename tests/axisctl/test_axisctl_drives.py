@@ -30,8 +30,10 @@ class Drives(AxisctlTest):
 
     def test_a_trace_as_text_candump_and_json(self):
         trace = ("trace", "can0", "--for", "1s")
-        self.assertEqual(self.ok(*trace).splitlines(), ["# 3 frames were lost here", "5 can0 tx 605#4041600000000000",
+        self.assertEqual(self.ok(*trace).splitlines(), ["# 3 frames were lost here",
+                                                        "5 can0 tx 605#4041600000000000  # read 6041h:00",
                                                         "6 can0 link bus_off"])
+        self.assertIn("\n5 can0 tx 605#4041600000000000\n", self.ok(*trace, "--plain"))
         done = self.run_axisctl(*trace, "--format", "candump")
         self.assertEqual((done.stdout, done.stderr), ("(1700000000.123456) can0 605#4041600000000000\n",
                                                       "can0: 1 frames, 3 were lost\n"))
@@ -39,6 +41,7 @@ class Drives(AxisctlTest):
         self.assertEqual((first["lost"], second["frames"][0]["why"]), ("3", "bus_off"))
         self.assertIn("candump is a format for CAN", self.fails(2, "trace", "line-a", "--format", "candump"))
         self.assertIn("there is no bus", self.fails(2, "trace", "nowhere"))
+        self.assertEqual(self.fails(2, "trace", "line_a"), "axisctl: there is no bus 'line_a'; did you mean 'line-a'?")
         self.assertIn("cannot be written", self.fails(2, *trace, "--output", "/no/such/directory/file"))
 
     def test_flight_records(self):
