@@ -11,6 +11,8 @@
 #include <iterator>
 #include <random>
 
+#include "api/axisctl/address.hpp"
+
 namespace axisd::axisctl {
 namespace {
 
@@ -62,6 +64,8 @@ grpc::ChannelArguments arguments() {
 }  // namespace
 
 Client::Client(Connection connection) : connection_(std::move(connection)) {
+  connection_.server = with_port(connection_.server, usual_port);
+  connection_.stop_server = with_port(connection_.stop_server, usual_stop_port);
   // Errors are one line on standard error; gRPC's own log would add to it. GRPC_VERBOSITY brings it back.
   if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
   const auto trusted = credentials(connection_);

@@ -18,7 +18,7 @@
 namespace axisd::axisctl {
 
 struct Connection {
-  std::string server = "localhost:7443";  ///< HOST:PORT or unix:PATH
+  std::string server = "localhost:7443";  ///< HOST, HOST:PORT or unix:PATH
   std::string stop_server;                ///< of the stop lane; empty: where stop_lane_of() says
   std::string tls_ca;                     ///< PEM file; TLS is used if it is set
   std::string tls_certificate, tls_key;   ///< PEM files of the client, both or none

@@ -132,9 +132,8 @@ void move(Invocation& invocation, const Arguments& arguments) {
     print_move(invocation, response.move());
   } catch (const Failure& failure) {
     if (failure.code() != ExitCode::unreachable || failure.nothing_sent()) throw;
-    throw Failure(failure.code(),
-                  fmt::format("{}; if the move may have arrived, repeat it with --request-id {}",
-                              failure.what(), request.options().request_id()));
+    throw failure.saying(fmt::format("{}; if the move may have arrived, repeat it with --request-id {}",
+                                     failure.what(), request.options().request_id()));
   }
 }
 

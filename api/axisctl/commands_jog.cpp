@@ -79,8 +79,8 @@ void jog(Invocation& invocation, const JogArguments& arguments) {
     try {
       halt_axis(invocation, arguments.axis(), hold);
     } catch (const Failure&) {
-      throw Failure(failure.code(), fmt::format("{}; the axis halts when its hold of {} ends", failure.what(),
-                                                arguments.hold));
+      throw failure.saying(
+          fmt::format("{}; the axis halts when its hold of {} ends", failure.what(), arguments.hold));
     }
     throw;
   }

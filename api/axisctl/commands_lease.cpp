@@ -101,7 +101,8 @@ int hold_while(Invocation& invocation, ChildProcess& child, std::uint64_t token,
       lost = failure.code() == ExitCode::refused;
       wait = short_pause;
       if (lost || !told)
-        fmt::print(stderr, "axisctl: lease {}: {}\n", lost ? "lost" : "not renewed", failure.what());
+        complain(failure.saying(fmt::format("lease {}: {}", lost ? "lost" : "not renewed", failure.what())),
+                 invocation.json);
       told = true;
     }
   }

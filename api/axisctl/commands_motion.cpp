@@ -1,8 +1,5 @@
 // enable, disable, home, move, velocity, reset, set-position.
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 #include <type_traits>
 
@@ -108,7 +105,7 @@ void disable(Invocation& invocation, const MotionArguments& arguments,
     try {
       commands.push_back(send_simple(invocation, arguments, axis, method, Lane::stop));
     } catch (const Failure& failure) {
-      fmt::print(stderr, "axisctl: {}\n", failure.what());
+      complain(failure, invocation.json);
       worst = failure.code();
     }
   }

@@ -79,15 +79,13 @@ class Script {
   /// What goes wrong in a line names it.
   template <class Action>
   void at(const ScriptLine& line, Action&& action) const {
-    const auto failed = [&](ExitCode code, std::string_view why) {
-      return Failure(code, fmt::format("{}:{}: {}", name_, line.number, why));
-    };
+    const auto text = [&](std::string_view why) { return fmt::format("{}:{}: {}", name_, line.number, why); };
     try {
       action();
     } catch (const CLI::Success&) {
-      throw failed(ExitCode::usage, "--help and --version have no place in a script");
+      throw Failure(ExitCode::usage, text("--help and --version have no place in a script"));
     } catch (const Failure& failure) {
-      throw failed(failure.code(), failure.what());
+      throw failure.saying(text(failure.what()));
     }
   }
 
@@ -137,7 +135,7 @@ class Script {
         const auto halt = halt_axis(invocation_, command.axis(), invocation_.client().timeout());
         print_line(invocation_.json ? json(halt) : command_line(halt, {}));
       } catch (const Failure& failure) {
-        fmt::print(stderr, "axisctl: NOT halted: {}\n", failure.what());
+        complain(failure.saying(fmt::format("NOT halted: {}", failure.what())), invocation_.json);
       }
     }
   }

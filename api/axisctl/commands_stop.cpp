@@ -66,8 +66,8 @@ std::vector<Answer> ask_each(const Client& client, const std::vector<Request>& r
     if (repetition.again(client, *lost)) continue;
     for (std::size_t i = 0; i < requests.size(); ++i)
       if (auto& answer = answers[i]; !answer.command && answer.refusal->code() == ExitCode::unreachable)
-        answer.refusal = repetition.in_vain(Failure(
-            answer.refusal->code(), fmt::format("{}: {}", requests[i].axis(), answer.refusal->what())));
+        answer.refusal = repetition.in_vain(
+            answer.refusal->saying(fmt::format("{}: {}", requests[i].axis(), answer.refusal->what())));
     return answers;
   }
 }
@@ -92,7 +92,7 @@ void stop_each(Invocation& invocation, const StopArguments& arguments,
     if (answer.command) {
       commands.push_back(*std::move(answer.command));
     } else {
-      fmt::print(stderr, "axisctl: {}\n", answer.refusal->what());
+      complain(*answer.refusal, invocation.json);
       worst = answer.refusal->code();
     }
   }
@@ -123,7 +123,8 @@ void stop_all(Invocation& invocation, bool wait) {
   }
   if (!invocation.json) print_line("all motion is refused until 'axisctl release-stop --all'");
   if (!response.has_not_durable()) return;
-  fmt::print(stderr, "axisctl: {}\n", describe(response.not_durable()));
+  complain({ExitCode::ended_otherwise, describe(response.not_durable()), response.not_durable()},
+           invocation.json);
   invocation.status = ExitCode::ended_otherwise;
 }
 
@@ -160,7 +161,7 @@ void release_each(Invocation& invocation, const StopArguments& arguments) {
       const auto response = invocation.client().call(&Stub::ReleaseStop, request, axis, Lane::stop);
       print_line(invocation.json ? json(response) : released_line(axis, response.holds()));
     } catch (const Failure& failure) {
-      fmt::print(stderr, "axisctl: {}\n", failure.what());
+      complain(failure, invocation.json);
       invocation.status = failure.code();
     }
   }

@@ -1,6 +1,11 @@
 #include "api/axisctl/error.hpp"
 
 #include <fmt/format.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <cstdio>
+#include <utility>
 
 #include "api/axisctl/format.hpp"
 
@@ -51,7 +56,59 @@ std::string object_text(std::uint32_t object) {
   return fmt::format("{} {}", object <= 0xFFFF ? "register" : "object", address_text(object));
 }
 
+std::string own_reason(ExitCode code) {
+  switch (code) {
+    case ExitCode::usage:
+      return "USAGE";
+    case ExitCode::unreachable:
+      return "UNREACHABLE";
+    case ExitCode::refused:
+      return "REFUSED";
+    case ExitCode::interrupted:
+      return "INTERRUPTED";
+    case ExitCode::ok:
+    case ExitCode::ended_otherwise:
+      break;
+  }
+  return "FAILED";
+}
+
+using Fields = google::protobuf::Map<std::string, google::protobuf::Value>;
+
+/// Of a failure of this program: its line says what is wrong, and behind the last semicolon what to do.
+void add_own(Fields& fields, const Failure& failure) {
+  const std::string_view text = failure.what();
+  const auto end = text.rfind("; ");
+  fields["reason"].set_string_value(own_reason(failure.code()));
+  fields["message"].set_string_value(std::string(text.substr(0, end)));
+  fields["remedy"].set_string_value(end == text.npos ? "" : std::string(text.substr(end + 2)));
+  if (failure.code() == ExitCode::unreachable)
+    fields["outcome"].set_string_value(
+        v1::Outcome_Name(failure.nothing_sent() ? v1::OUTCOME_NOT_SENT : v1::OUTCOME_UNKNOWN));
+}
+
 }  // namespace
+
+Failure Failure::saying(const std::string& text) const {
+  Failure failure(code_, text, nothing_sent_);
+  failure.detail_ = detail_;
+  return failure;
+}
+
+std::string error_json(const Failure& failure) {
+  google::protobuf::Struct error, line;
+  auto& fields = *error.mutable_fields();
+  if (!failure.detail() || !google::protobuf::util::JsonStringToMessage(json(*failure.detail()), &error).ok())
+    add_own(fields, failure);
+  fields["exit_status"].set_number_value(std::to_underlying(failure.code()));
+  fields["text"].set_string_value(failure.what());
+  *(*line.mutable_fields())["error"].mutable_struct_value() = std::move(error);
+  return json(line);
+}
+
+void complain(const Failure& failure, bool as_json) {
+  fmt::print(stderr, "{}\n", as_json ? error_json(failure) : fmt::format("axisctl: {}", failure.what()));
+}
 
 std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status) {
   v1::StatusDetails details;
@@ -86,7 +143,7 @@ Failure failure_of(const grpc::Status& status, std::string_view subject, std::st
   const std::string lead = subject.empty() ? "" : fmt::format("{}: ", subject);
   if (const auto detail = detail_of(status))
     return {cut_off(status, *detail) ? ExitCode::unreachable : ExitCode::refused,
-            lead + describe(*detail, subject)};
+            lead + describe(*detail, subject), *detail};
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return unreachable(status, server, tls);
   if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
     return {

@@ -19,7 +19,8 @@ namespace axisd::axisctl {
 namespace {
 
 constexpr const char* footer = R"(
-Values carry the axis's unit or none: 120mm, -10, 50mm/s. Times carry theirs: 150ms, 2s.
+Values carry a unit or none, which is the axis's: 120mm, -10, 50mm/s. Others are converted: 12cm, 0.5m, 3m/min; 0.25rev,
+30rpm of an axis in degrees. Times carry theirs: 150ms, 2s.
 A command that was accepted goes on when axisctl ends, also by Ctrl-C or --timeout; only jog ends with it.
 
 Exit status:
@@ -33,7 +34,8 @@ Exit status:
 Environment: AXISD_SERVER, AXISD_STOP_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_LEASE, NO_COLOR.)";
 
 void add_global_options(CLI::App& app, Invocation& invocation) {
-  app.add_option("--server", invocation.connection.server, "The daemon: HOST:PORT or unix:PATH")
+  app.add_option("--server", invocation.connection.server,
+                 "The daemon: HOST, HOST:PORT (else 7443) or unix:PATH")
       ->envname("AXISD_SERVER")
       ->type_name("ADDRESS")
       ->capture_default_str();
@@ -56,8 +58,9 @@ void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_option("--timeout", invocation.timeout, "How long the daemon may take to answer")
       ->type_name("TIME")
       ->capture_default_str();
-  app.add_flag("--json", invocation.json,
-               "Print JSON with the names of the proto: one object; of streams, one per line");
+  app.add_flag(
+      "--json", invocation.json,
+      "Print JSON with the names of the proto: one object; of streams, one per line; errors on stderr");
 }
 
 /// "-.5" becomes "-0.5": CLI11 takes a dash and a digit for a value, a dash and a point for an option.
@@ -84,6 +87,21 @@ std::string misspelt(const CLI::App& app, const CLI::App& command, std::string_v
   return {};
 }
 
+/// The same of options.
+std::string misspelt_option(const CLI::App& app, const CLI::App* command) {
+  std::vector<std::string> known;
+  for (; command != nullptr; command = command->get_parent())
+    for (const auto* option : command->get_options())
+      for (const auto& name : option->get_lnames()) known.push_back("--" + name);
+  for (const auto& word : app.remaining(true)) {
+    const auto name = word.substr(0, word.find('='));
+    if (!name.starts_with("--") || name.size() < 4) continue;
+    if (const auto near = did_you_mean(name, known, ""); !near.empty())
+      return fmt::format("there is no option {}; {}", config::quoted(name), near);
+  }
+  return {};
+}
+
 Failure usage_error(const CLI::App& app, const CLI::ParseError& error,
                     const std::vector<std::string>& words) {
   std::string help = "axisctl";
@@ -94,6 +112,7 @@ Failure usage_error(const CLI::App& app, const CLI::ParseError& error,
   }
   if (command->get_require_subcommand_min() > 0)
     if (const auto text = misspelt(app, *command, help, words); !text.empty()) return {ExitCode::usage, text};
+  if (const auto text = misspelt_option(app, command); !text.empty()) return {ExitCode::usage, text};
   return {ExitCode::usage, fmt::format("{}; see '{} --help'", error.what(), help)};
 }
 
@@ -160,14 +179,16 @@ int run(int argc, const char* const* argv) {
     complete({argv + 2, argv + argc});
     return 0;
   }
+  const std::vector<std::string> words(argv + 1, argv + argc);
   Invocation invocation;
   const auto app = make_app(invocation);
   try {
-    execute(*app, {argv + 1, argv + argc});
+    execute(*app, words);
   } catch (const CLI::Success& text) {
     return app->exit(text);
   } catch (const Failure& failure) {
-    fmt::print(stderr, "axisctl: {}\n", failure.what());
+    // What could not be parsed has set nothing.
+    complain(failure, invocation.json || std::ranges::find(words, "--json") != words.end());
     return std::to_underlying(failure.code());
   }
   return std::to_underlying(invocation.status);

@@ -58,9 +58,8 @@ v1::Command send(Invocation& invocation,
     return invocation.started.back();
   } catch (const Failure& failure) {
     if (failure.code() != ExitCode::unreachable || failure.nothing_sent()) throw;
-    throw Failure(failure.code(), std::string(failure.what()) +
-                                      "; if the command may have arrived, repeat it with " + "--request-id " +
-                                      request.options().request_id());
+    throw failure.saying(std::string(failure.what()) + "; if the command may have arrived, repeat it with " +
+                         "--request-id " + request.options().request_id());
   }
 }
 

@@ -162,9 +162,8 @@ ExitCode follow_to_end(Invocation& invocation, const v1::Command& command, const
     const auto failure = status.ok() ? Failure(ExitCode::unreachable,
                                                fmt::format("{}: the daemon ended the stream", command.axis()))
                                      : invocation.client().failure(status, command.axis());
-    throw Failure(failure.code(),
-                  fmt::format("{}; command {} may go on: 'axisctl command watch {}' follows it",
-                              failure.what(), command.id(), command.id()));
+    throw failure.saying(fmt::format("{}; command {} may go on: 'axisctl command watch {}' follows it",
+                                     failure.what(), command.id(), command.id()));
   }
   return outcome(latest);
 }

@@ -1,6 +1,8 @@
 """The real axisctl against the fake daemon: every subcommand, its output and its exit status."""
+import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import socket
@@ -27,6 +29,16 @@ class Reading(AxisctlTest):
         for wait in ([], ["--wait"]):
             (listed,) = self.json("enable", "feeder", "turntable", *wait)
             self.assertEqual([command["axis"] for command in listed["commands"]], ["feeder", "turntable"])
+
+    def test_tables_fit_the_terminal_and_are_whole_in_a_pipe(self):
+        for columns in (80, 60):
+            status, shown = self.on_terminal("list", env={"COLUMNS": str(columns)})
+            self.assertEqual(status, 0, shown)
+            lines = re.sub(r"\x1b\[\d*m", "", shown).splitlines()
+            self.assertLessEqual(max(map(len, lines)), columns, shown)
+            self.assertIn("simulated", shown)
+            self.assertNotIn("line-a ", lines[1])
+        self.assertRegex(self.run_axisctl("list", env={"COLUMNS": "60"}).stdout, r"ykd2405pr +line-a +1 +simulated")
 
     def test_list_as_json_keeps_the_names_of_the_proto(self):
         (response,) = self.json("list")
@@ -147,6 +159,16 @@ class Motion(AxisctlTest):
         self.assertIn("--acceleration-time", self.fails(2, "move", "feeder", "10", "--acceleration-time", "150"))
         self.assertIn("position", self.fails(2, "move", "feeder", "nan"))
         self.assertEqual(self.server.calls("MoveAbsolute"), [])
+
+    def test_other_units_of_the_same_measure_are_converted(self):
+        self.ok("move", "feeder", "12cm", "--velocity", "3m/min")
+        self.assertEqual([(r.position, r.velocity) for r in self.server.calls("MoveAbsolute")], [(120, 50)])
+        self.ok("enable", "turntable")
+        self.ok("velocity", "turntable", "30 rpm", "--hold", "50ms")
+        self.ok("velocity", "turntable", "1 rev/s", "--hold", "50ms")
+        self.assertEqual([r.velocity for r in self.server.calls("MoveVelocity")], [180, 360])
+        self.assertEqual(self.fails(2, "move", "feeder", "1rev"),
+                         "axisctl: position: unit 'rev' does not fit here; write it in mm, cm, m, um or in")
 
     def test_request_id_repeats_without_moving_twice(self):
         first = self.json("move", "feeder", "--relative", "5", "--wait", "--request-id", "abc")
@@ -310,6 +332,27 @@ class Connecting(AxisctlTest):
             self.assertIn(f"cannot reach axisd at {address}", self.fails(3, "--timeout", "300ms", "stop", "--all",
                                                                             server=address))
         self.assertIn("cannot reach axisd at unix:/nonexistent/s", self.fails(3, "list", server="unix:/nonexistent/s"))
+
+    def test_errors_are_json_on_standard_error_with_json(self):
+        def error(*words, **arguments):
+            done = self.run_axisctl("--json", *words, **arguments)
+            self.assertEqual(done.stdout, "")
+            (line,) = done.stderr.splitlines()
+            error = json.loads(line)["error"]
+            self.assertEqual(error["exit_status"], done.returncode)
+            return error
+        refused = error("move", "feeder", "500")
+        self.assertEqual((refused["reason"], refused["remedy"], refused["permitted"]["maximum"]),
+                         ("REASON_SOFT_LIMIT", "choose a target inside", 400))
+        self.assertIn("feeder: position 500 mm", refused["text"])
+        usage = error("move", "feeder", "10deg")
+        self.assertEqual((usage["reason"], usage["remedy"]), ("USAGE", "write it in mm, cm, m, um or in"))
+        self.assertEqual(error("mov", "feeder", "1")["remedy"], "did you mean 'move'?")
+        lost = error("list", server="127.0.0.1:1")
+        self.assertEqual((lost["reason"], lost["outcome"], lost["exit_status"]), ("UNREACHABLE", "OUTCOME_NOT_SENT", 3))
+
+    def test_a_host_alone_means_the_usual_port(self):
+        self.assertIn("axisd at nowhere.invalid:7443", self.fails(3, "list", server="nowhere.invalid"))
 
     def test_a_silent_daemon_ends_with_the_time_limit(self):
         with socket.create_server(("127.0.0.1", 0)) as silent:

@@ -1,6 +1,8 @@
 #include "api/axisctl/error.hpp"
 
 #include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
 
 namespace axisd::axisctl {
 namespace {
@@ -96,6 +98,39 @@ TEST(ErrorText, AnOfflineDriveIsARefusalAndASilentDaemonIsNot) {
             ExitCode::unreachable);
   EXPECT_EQ(failure_of({grpc::StatusCode::PERMISSION_DENIED, "no"}, "", "x", false).code(),
             ExitCode::refused);
+}
+
+google::protobuf::Map<std::string, google::protobuf::Value> fields_of(const Failure& failure) {
+  google::protobuf::Struct line;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(error_json(failure), &line).ok());
+  return line.fields().at("error").struct_value().fields();
+}
+
+TEST(ErrorJson, ARefusalHasAllThatTheDaemonSaid) {
+  const auto status =
+      status_with(soft_limit(), grpc::StatusCode::OUT_OF_RANGE, "type.googleapis.com/axisd.v1.ErrorDetail");
+  const auto refused = failure_of(status, "feeder", "localhost:7443", false);
+  const auto error = fields_of(refused.saying("moves.txt:3: as above"));
+  EXPECT_EQ(error.at("reason").string_value(), "REASON_SOFT_LIMIT");
+  EXPECT_EQ(error.at("message").string_value(), "position 500 mm is beyond the soft limit");
+  EXPECT_EQ(error.at("remedy").string_value(), "choose a target inside");
+  EXPECT_EQ(error.at("permitted").struct_value().fields().at("maximum").number_value(), 400);
+  EXPECT_EQ(error.at("exit_status").number_value(), 4);
+  EXPECT_EQ(error.at("text").string_value(), "moves.txt:3: as above");
+}
+
+TEST(ErrorJson, FailuresOfTheProgramItselfHaveReasonAndRemedy) {
+  const auto usage = fields_of({ExitCode::usage, "there is no command 'mov'; did you mean 'move'?"});
+  EXPECT_EQ(usage.at("reason").string_value(), "USAGE");
+  EXPECT_EQ(usage.at("message").string_value(), "there is no command 'mov'");
+  EXPECT_EQ(usage.at("remedy").string_value(), "did you mean 'move'?");
+  EXPECT_FALSE(usage.contains("outcome"));
+  const auto lost = fields_of({ExitCode::unreachable, "lost axisd"});
+  EXPECT_EQ(lost.at("reason").string_value(), "UNREACHABLE");
+  EXPECT_EQ(lost.at("remedy").string_value(), "");
+  EXPECT_EQ(lost.at("outcome").string_value(), "OUTCOME_UNKNOWN");
+  EXPECT_EQ(fields_of({ExitCode::unreachable, "no connection", true}).at("outcome").string_value(),
+            "OUTCOME_NOT_SENT");
 }
 
 }  // namespace
