@@ -173,6 +173,12 @@ constexpr KeySpec simulate_keys[] = {
      .default_value = "velocity_per_second",
      .choices = simulated_acceleration_units,
      .apply = [](Target& t, const Value& v) { t.axis->simulation.acceleration_unit = v.text; }},
+    {.key = "enabled_at_power_up",
+     .kind = Kind::boolean,
+     .description = "The drive's power stage is on when it powers up, where the model has it so.",
+     .example = "false",
+     .default_value = "true",
+     .apply = [](Target& t, const Value& v) { t.axis->simulation.enabled_at_power_up = v.boolean; }},
 };
 
 constexpr KeySpec brake_keys[] = {

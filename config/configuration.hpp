@@ -53,7 +53,8 @@ struct SimulationSettings {
   std::optional<double> home_switch;  ///< position of the home switch (active for `home_width` units)
   double home_width = 1;
   std::optional<double> positive_limit, negative_limit;
-  double start_position = 0;  ///< where the load stands at power-up
+  double start_position = 0;        ///< where the load stands at power-up
+  bool enabled_at_power_up = true;  ///< of the models that may power up with their stage on
   /// As simulation::set_unit_option() takes them.
   std::string velocity_unit = "pulses_per_second", acceleration_unit = "velocity_per_second";
   /// Of a drive that its data sheet makes, on a simulated bus: read when the file is loaded.

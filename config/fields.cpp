@@ -165,6 +165,7 @@ Section section_of(const AxisEntry& entry) {
   fields.add("start_position", simulation.start_position);
   fields.add("velocity_unit", simulation.velocity_unit);
   fields.add("acceleration_unit", simulation.acceleration_unit);
+  fields.add("enabled_at_power_up", simulation.enabled_at_power_up);
   return fields.take();
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "devices/simulation/drive_option.hpp"
@@ -40,6 +41,11 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
   if (simulate.positive_limit) mechanics.positive_limit_from = pulses(*simulate.positive_limit);
   if (simulate.negative_limit) mechanics.negative_limit_from = pulses(*simulate.negative_limit);
   if (entry.axis.scale.invert) std::swap(mechanics.positive_limit_from, mechanics.negative_limit_from);
+  const auto* simulator = simulation::find_simulator(entry.axis.model);
+  constexpr std::string_view power_up = "enabled_at_power_up";
+  if (simulator != nullptr && std::ranges::find(simulator->switches, power_up,
+                                                &simulation::SwitchSpec::name) != simulator->switches.end())
+    node.switches.emplace(power_up, simulate.enabled_at_power_up);
   return node;
 }
 

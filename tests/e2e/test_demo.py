@@ -18,6 +18,14 @@ class DemoScenarios(Scenario):
         for service in (b"AxisService", b"CommandService", b"BusService", b"SystemService"):
             self.assertIn(b"axisd.v1." + service, listing)
 
+    def test_every_axis_can_be_enabled_at_once(self):
+        demo = Demo()
+        self.addCleanup(demo.close)
+        for state in demo.client.states():
+            demo.client.wait_online(state.axis)
+            demo.client.to_done("Enable", state.axis)
+            self.assertEqual(demo.client.state(state.axis).drift, "")
+
     def test_rotary_axes_home_again_wherever_they_have_turned(self):
         demo = Demo()
         self.addCleanup(demo.close)

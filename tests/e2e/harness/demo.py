@@ -23,6 +23,8 @@ class Demo:
         # A computer busy with tests is late; nothing else differs from the example.
         patience = "".join(f"\n    {key}: {text}" for key, text in PATIENT.items())
         text = re.sub(r"(?m)^    model: (?!yss-c).*$", lambda line: line[0] + patience, EXAMPLE.read_text())
+        text = text.replace("turnaround_max: 40 ms", "turnaround_max: 200 ms")
+        text = text.replace("sync_period: 10 ms }", "sync_period: 10 ms, sdo_timeout: 500 ms }")
         config = self.directory / "demo.yaml"
         config.write_text(text)
         self.daemon = Program("axisd", [AXISD, "--config", str(config), "--state-directory",

@@ -68,8 +68,9 @@ TEST(Loader, DemoIsSixSimulatedAxesOfFourModels) {
   const auto& configuration = *result.configuration;
   EXPECT_EQ(configuration.machine, "demo");
   EXPECT_EQ(configuration.server.listen, "localhost:7443");
-  ASSERT_EQ(configuration.lines.size(), 1U);
+  ASSERT_EQ(configuration.lines.size(), 2U);
   EXPECT_TRUE(configuration.lines[0].simulated());
+  EXPECT_TRUE(configuration.lines[1].simulated());
   ASSERT_EQ(configuration.networks.size(), 1U);
   EXPECT_TRUE(configuration.networks[0].simulated());
   ASSERT_EQ(configuration.axes.size(), 6U);
@@ -105,6 +106,8 @@ TEST(Loader, DemoIsSixSimulatedAxesOfFourModels) {
 
   const auto& pusher = configuration.axes[3].axis;
   EXPECT_EQ(pusher.model, "ssd2608pr");
+  EXPECT_FALSE(configuration.axes[3].simulation.enabled_at_power_up);
+  EXPECT_TRUE(mechanics.enabled_at_power_up);
   ASSERT_TRUE(pusher.segments);
   EXPECT_TRUE(pusher.segments->absolute);
   EXPECT_EQ(pusher.segments->positions[2],
