@@ -13,7 +13,7 @@ case "${1:-}" in
 esac
 
 scratch=$(mktemp -d "${TMPDIR:-/tmp}/axisd-quickstart.XXXXXX")
-daemon='' mover='' watcher='' viewer=''
+daemon='' mover=''
 
 say() { printf '\n== %s\n' "$*"; }
 die() { echo "quickstart.sh: $*" >&2; exit 1; }
@@ -29,8 +29,6 @@ clean_up() {
   local status=$?
   trap '' INT TERM
   end_group "$mover"
-  end_group "$watcher"
-  end_group "$viewer"
   end_group "$daemon"
   if [ "$status" -ne 0 ] && [ -s "$scratch/axisd.log" ]; then
     echo "-- the last lines of axisd's log:" >&2
@@ -43,16 +41,34 @@ trap clean_up EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
+# Ninja's "[12/345] ..." as one line that counts; off a terminal a line for each tenth.
+show_build() {
+  local line percent tenth=-1
+  while IFS= read -r line; do
+    [[ $line =~ ^\[([0-9]+)/([0-9]+)\] ]] || continue
+    percent=$((100 * BASH_REMATCH[1] / BASH_REMATCH[2]))
+    if [ -t 1 ]; then
+      printf '\r   %3d %%  %s of %s ' "$percent" "${BASH_REMATCH[1]}" "${BASH_REMATCH[2]}"
+    elif [ $((percent / 10)) -ne "$tenth" ]; then
+      tenth=$((percent / 10))
+      echo "   $percent %"
+    fi
+  done
+  if [ -t 1 ]; then echo; fi
+}
+
 say "Packages and build (some minutes the first time)"
 deploy/install-packages.sh build
 deploy/install-packages.sh run
-if ! { cmake --preset release && cmake --build --preset release --target axisd axisctl axisd-sim; } \
-    >"$scratch/build.log" 2>&1; then
+if ! { cmake --preset release && cmake --build --preset release --target axisd axisctl axisd-sim; } 2>&1 |
+    tee "$scratch/build.log" | show_build; then
   tail -n 60 "$scratch/build.log" >&2
   die "the build failed"
 fi
 bin=$PWD/build/release
 axisd=$bin/daemon/axisd axisctl=$bin/api/axisctl/axisctl
+printf -v folders '%q:%q' "$bin/daemon" "$bin/api/axisctl"
+path="export PATH=$folders:\"\$PATH\""
 "$axisctl" check config/examples/demo.yaml >/dev/null || die "config/examples/demo.yaml does not pass axisctl check"
 
 taken() { (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null || (exec 3<>"/dev/tcp/::1/$1") 2>/dev/null; }
@@ -61,6 +77,10 @@ while taken "$port" || taken $((port + 1)); do port=$((20000 + RANDOM % 10000));
 export AXISD_SERVER=localhost:$port
 
 say "axisd with simulated drives on RS-485 and CAN, on $AXISD_SERVER"
+if [ -z "$once" ]; then
+  echo "To command them from another terminal while this one runs, type there:"
+  echo "  $path AXISD_SERVER=$AXISD_SERVER"
+fi
 # Background jobs get process groups of their own (set -m): Ctrl-C ends the demonstration in order, and end_group
 # leaves nothing behind.
 set -m
@@ -89,26 +109,16 @@ for axis in feeder lifter turntable carousel; do
 done
 step axisctl list
 
-say "Homing and moving, as axisctl watch sees it"
-set -m
-"$axisctl" watch --period 500ms >"$scratch/watch" 2>&1 &
-watcher=$!
-(tail -n +1 -f --pid="$watcher" "$scratch/watch" | sed -u 's/^/    /') &
-viewer=$!
-set +m
+say "Homing and moving"
 step axisctl home feeder --wait
 step axisctl home lifter --wait
 step axisctl home turntable --wait
 step axisctl home carousel --wait
-step axisctl move feeder 120mm --velocity 50mm/s --wait
 step axisctl move lifter 100mm --velocity 100mm/s --wait
 step axisctl move turntable 90deg --relative --velocity 90deg/s --wait
 step axisctl move carousel 90deg --relative --velocity 90deg/s --wait
-[ -s "$scratch/watch" ] || die "axisctl watch showed nothing"
-end_group "$watcher"
-watcher=''
-wait "$viewer" || true
-viewer=''
+step axisctl move feeder 120mm --velocity 50mm/s  # goes on while it is watched
+step axisctl watch --period 500ms --count 8
 
 if [ -z "$once" ]; then
   say "To and fro until Ctrl-C"
@@ -138,4 +148,10 @@ for axis in feeder lifter turntable carousel; do step axisctl disable "$axis" --
 kill -TERM "$daemon"
 wait "$daemon" || die "axisd ended with status $?"
 daemon=''
-say "Done. Next: axisctl --help, config/examples/reference.yaml, README.md"
+say "Done"
+cat <<END
+To go on in this shell as README.md does, type:
+  $path
+  axisd --config config/examples/demo.yaml >/tmp/axisd-demo.log 2>&1 &
+  axisctl list
+END
