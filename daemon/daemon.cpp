@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <exception>
@@ -33,6 +34,7 @@
 #include "daemon/ports.hpp"
 #include "daemon/store/flight_files.hpp"
 #include "daemon/store/kept_state.hpp"
+#include "devices/simulation/control_socket.hpp"
 
 namespace axisd {
 
@@ -167,6 +169,23 @@ int give_up(const Error& error) {
   return error.reason == Reason::invalid_argument ? exit_status::configuration : exit_status::failed;
 }
 
+/// Takes what `axisctl sim` says, where there are simulated drives; nothing: there are none, or it cannot.
+/// While it lives the core runs.
+std::unique_ptr<simulation::ControlSocket> open_simulation(Ports& ports,
+                                                           const config::Configuration& configuration,
+                                                           std::string_view instance_id) {
+  const auto simulated = [](const auto& bus) { return bus.simulated(); };
+  if (std::ranges::none_of(configuration.lines, simulated) &&
+      std::ranges::none_of(configuration.networks, simulated))
+    return nullptr;
+  auto socket = simulation::ControlSocket::open(
+      simulation_socket(instance_id),
+      [&ports](std::string_view line) { return ports.simulation().execute(line); });
+  if (socket) return std::move(*socket);
+  spdlog::warn("axisctl sim will not work: {}", to_string(socket.error()));
+  return nullptr;
+}
+
 /// The core's own thread, for as long as this lives.
 class CoreThread {
  public:
@@ -268,6 +287,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
     spdlog::info("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration.machine,
                  *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
                  configuration.axes.size());
+    const auto sim_socket = open_simulation(**ports, configuration, instance_id);
     sd_notify(0, "READY=1");
     const int number = supervise(loop, machine, stop_lane, doors, served);
     spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");

@@ -19,6 +19,8 @@ Result<std::unique_ptr<Ports>> Ports::open(core::CoreLoop& loop, const config::C
   auto networks = SimulatedNetworks::open(loop.clock(), configuration);
   if (!networks) return fail(networks.error());
   ports->networks_ = std::move(*networks);
+  ports->simulation_ =
+      std::make_unique<SimulationControl>(loop, *ports->lines_, *ports->networks_, configuration);
   return ports;
 }
 
@@ -40,6 +42,7 @@ void Ports::reconfigure(const config::Configuration& configuration,
                         const std::vector<ConfigurationChange>& changes) {
   lines_->reconfigure(configuration, changes);
   networks_->reconfigure(configuration, changes);
+  simulation_->reconfigure(configuration);
 }
 
 core::LinkHelper Ports::link_helper() {

@@ -11,6 +11,7 @@
 #include "daemon/core/link_cycler.hpp"
 #include "daemon/simulated_lines.hpp"
 #include "daemon/simulated_networks.hpp"
+#include "daemon/simulation_control.hpp"
 
 namespace axisd {
 
@@ -27,6 +28,7 @@ class Ports {
   std::unique_ptr<modbus_rtu::Line> make_line(const modbus_rtu::LineSettings& settings);
   std::unique_ptr<can::Port> make_port(const canopen::NetworkSettings& settings);
   [[nodiscard]] core::LinkHelper link_helper();
+  [[nodiscard]] SimulationControl& simulation() { return *simulation_; }
   /// Simulated drives follow the configuration.
   void reconfigure(const config::Configuration& configuration,
                    const std::vector<ConfigurationChange>& changes);
@@ -38,6 +40,7 @@ class Ports {
   core::LinkClient link_client_;
   std::unique_ptr<SimulatedLines> lines_;
   std::unique_ptr<SimulatedNetworks> networks_;
+  std::unique_ptr<SimulationControl> simulation_;
 };
 
 }  // namespace axisd

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "devices/simulation/control.hpp"
 #include "devices/simulation/drive_option.hpp"
 #include "devices/simulation/simulator.hpp"
 #include "devices/units/scale.hpp"
@@ -86,6 +87,12 @@ void SimulatedLines::reconfigure(const config::Configuration& configuration,
         with(entry.axis.bus,
              [&](simulation::RtuNetwork& network) { network.add(simulator->make(simulated_node(entry))); });
       });
+}
+
+std::optional<std::string> SimulatedLines::control(const std::string& bus, std::string_view command) const {
+  const auto found = lines_.find(bus);
+  if (found == lines_.end()) return std::nullopt;
+  return simulation::execute_control(*found->second, command);
 }
 
 std::string SimulatedLines::path(const std::string& bus) const {

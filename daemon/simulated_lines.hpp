@@ -3,7 +3,9 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "buses/error.hpp"
 #include "config/configuration.hpp"
@@ -20,6 +22,8 @@ class SimulatedLines {
   static Result<std::unique_ptr<SimulatedLines>> open(const config::Configuration& configuration);
   /// What to open for the bus; empty: it is a real one.
   [[nodiscard]] std::string path(const std::string& bus) const;
+  /// A command of execute_control() on a simulated line; nothing: the bus is none. Thread: any.
+  [[nodiscard]] std::optional<std::string> control(const std::string& bus, std::string_view command) const;
   /// Drives come and go as axes do; one whose place, model or mechanics change is another one, just powered
   /// up. Buses are the same as before.
   void reconfigure(const config::Configuration& configuration,

@@ -6,6 +6,7 @@
 
 #include "daemon/simulated_lines.hpp"
 #include "devices/simulation/can_nodes.hpp"
+#include "devices/simulation/control.hpp"
 #include "devices/simulation/simulator.hpp"
 
 namespace axisd {
@@ -54,6 +55,13 @@ void SimulatedNetworks::reconfigure(const config::Configuration& configuration,
         if (auto node = simulation::make_can_node(entry.axis.model, simulated_node(entry)))
           nodes->add(std::move(*node));  // without, its axis stays offline
       });
+}
+
+std::optional<std::string> SimulatedNetworks::control(const std::string& bus,
+                                                      std::string_view command) const {
+  const auto found = networks_.find(bus);
+  if (found == networks_.end()) return std::nullopt;
+  return simulation::execute_control(found->second->drives.nodes(), command);
 }
 
 can::Network* SimulatedNetworks::find(const std::string& bus) const {

@@ -2,7 +2,9 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "buses/can/network.hpp"
 #include "buses/error.hpp"
@@ -23,6 +25,8 @@ class SimulatedNetworks {
 
   /// nullptr: the bus is a real one.
   [[nodiscard]] can::Network* find(const std::string& bus) const;
+  /// A command of execute_control() on a simulated network; nothing: the bus is none.
+  [[nodiscard]] std::optional<std::string> control(const std::string& bus, std::string_view command) const;
   /// As of SimulatedLines.
   void reconfigure(const config::Configuration& configuration,
                    const std::vector<ConfigurationChange>& changes);

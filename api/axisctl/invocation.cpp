@@ -149,6 +149,7 @@ std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   add_run_command(*app, invocation);
   add_plot_command(*app, invocation);
   add_commission_command(*app, invocation);
+  add_sim_commands(*app, invocation);
   add_drive_commands(*app, invocation);
   add_bus_commands(*app, invocation);
   add_trace_command(*app, invocation);

@@ -53,6 +53,7 @@ void add_offline_commands(CLI::App& app, Invocation& invocation);  ///< check, s
 void add_run_command(CLI::App& app, Invocation& invocation);       ///< run
 void add_plot_command(CLI::App& app, Invocation& invocation);      ///< plot
 void add_commission_command(CLI::App& app, Invocation& invocation);  ///< commission
+void add_sim_commands(CLI::App& app, Invocation& invocation);        ///< sim input|alarm|power|lose|...
 
 /// The command line with all its subcommands.
 std::unique_ptr<CLI::App> make_app(Invocation& invocation);

@@ -10,13 +10,24 @@
 
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <cstring>
 
 namespace axisd::simulation {
 
 namespace {
+
 constexpr std::size_t longest_line = 4096;
+
+/// Of this user or root. A file has its permissions instead.
+bool is_trusted(int socket) {
+  ucred peer{};
+  socklen_t size = sizeof(peer);
+  if (getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) return false;
+  return peer.uid == 0 || peer.uid == geteuid();
 }
+
+}  // namespace
 
 ControlSocket::ControlSocket(std::string path, Handler handler)
     : path_(std::move(path)), handler_(std::move(handler)) {}
@@ -36,15 +47,18 @@ Result<void> ControlSocket::listen() {
   sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
   if (path_.empty() || path_.size() >= sizeof(address.sun_path)) return failure(ENAMETOOLONG);
   path_.copy(address.sun_path, path_.size());
+  auto size = static_cast<socklen_t>(sizeof(address));
   struct stat status{};
-  if (lstat(path_.c_str(), &status) == 0) {
+  if (is_abstract()) {
+    address.sun_path[0] = '\0';
+    size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path_.size());
+  } else if (lstat(path_.c_str(), &status) == 0) {
     if (!S_ISSOCK(status.st_mode)) return failure(EEXIST);
     unlink(path_.c_str());
   }
   const int listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (listener < 0) return failure(errno);
-  if (bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 ||
-      ::listen(listener, 8) != 0) {
+  if (bind(listener, reinterpret_cast<const sockaddr*>(&address), size) != 0 || ::listen(listener, 8) != 0) {
     const int number = errno;
     close(listener);
     return failure(number);
@@ -65,7 +79,7 @@ ControlSocket::~ControlSocket() {
   if (wake_fd_ >= 0) close(wake_fd_);
   if (listener_ < 0) return;
   close(listener_);
-  unlink(path_.c_str());
+  if (!is_abstract()) unlink(path_.c_str());
 }
 
 void ControlSocket::run() {
@@ -84,7 +98,11 @@ void ControlSocket::run() {
     clients_ = std::move(kept);
     if (waited[1].revents == 0) continue;
     const int socket = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (socket >= 0) clients_.push_back({.socket = socket, .input = {}});
+    if (socket < 0) continue;
+    if (is_abstract() && !is_trusted(socket))
+      close(socket);
+    else
+      clients_.push_back({.socket = socket, .input = {}});
   }
 }
 

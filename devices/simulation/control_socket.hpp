@@ -19,7 +19,8 @@ class ControlSocket {
   /// One command to its reply, without line ends. Thread: the socket's.
   using Handler = std::function<std::string(std::string_view)>;
 
-  /// Replaces a socket left behind at `path`. Errors: the path cannot be bound.
+  /// Replaces a socket left behind at `path`. "@NAME" is a name of Linux's instead, without a file: its
+  /// clients must belong to this process's user or be root. Errors: the path cannot be bound.
   static Result<std::unique_ptr<ControlSocket>> open(std::string path, Handler handler);
   ~ControlSocket();
   ControlSocket(const ControlSocket&) = delete;
@@ -31,6 +32,7 @@ class ControlSocket {
     std::string input;
   };
   ControlSocket(std::string path, Handler handler);
+  [[nodiscard]] bool is_abstract() const { return path_.starts_with('@'); }
   Result<void> listen();
   void run();
   bool serve(Client& client);

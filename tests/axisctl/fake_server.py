@@ -37,6 +37,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         FakeLeases.__init__(self)
         FakeState.__init__(self)
         self.inhibited = False
+        self.instance_id = "fake"
         self.calls = []
         self.losing = {}
         self.commands = {}
@@ -354,7 +355,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
 
     async def GetInfo(self, request, context):
         self.note("GetInfo", request, context)
-        return system_pb.GetInfoResponse(machine="press-1", version="0.1.0", instance_id="fake",
+        return system_pb.GetInfoResponse(machine="press-1", version="0.1.0", instance_id=self.instance_id,
                                          inhibited=self.inhibited, inhibited_by="test" if self.inhibited else "",
                                          state_unaccepted="; ".join(each.text for each in self.convictions))
 

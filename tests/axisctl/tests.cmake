@@ -11,6 +11,8 @@ if(AXISD_GRPC)
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_budget.py)
   add_test(NAME axisctl.drives_against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_drives.py)
+  add_test(NAME axisctl.simulated_drives
+           COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_sim.py)
   add_test(NAME axisctl.scripts_and_plots
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_scripts.py)
   add_test(NAME python_client.against_fake_daemon
@@ -24,7 +26,7 @@ if(AXISD_GRPC)
   add_test(NAME state.against_fake_daemon
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_state.py)
   set_tests_properties(axisctl.against_fake_daemon axisctl.budgets axisctl.drives_against_fake_daemon
-                       axisctl.scripts_and_plots explain.against_fake_daemon leases.against_fake_daemon python_client.against_fake_daemon
+                       axisctl.scripts_and_plots axisctl.simulated_drives explain.against_fake_daemon leases.against_fake_daemon python_client.against_fake_daemon
                        state.against_fake_daemon stops.against_fake_daemon PROPERTIES
                        ENVIRONMENT "AXISCTL=$<TARGET_FILE:axisctl>" TIMEOUT 600)
 endif()

@@ -3,6 +3,7 @@
 
 #include <asm/termbits.h>
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -12,6 +13,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <array>
+#include <cstddef>
 #include <cstdlib>
 #include <string>
 
@@ -238,6 +241,26 @@ TEST_F(PtyLineTest, ControlSocketAnswersLineByLine) {
   close(client);
   control->reset();
   EXPECT_NE(0, access(path.c_str(), F_OK));
+}
+
+TEST_F(PtyLineTest, ControlSocketMayHaveANameWithoutAFile) {
+  const auto name = fmt::format("@axisd-test-{}", getpid());
+  const auto answer = [](std::string_view text) { return "ok " + std::string(text); };
+  auto control = ControlSocket::open(name, answer);
+  ASSERT_TRUE(control);
+  EXPECT_FALSE(ControlSocket::open(name, answer)) << "it is taken";
+  EXPECT_NE(0, access(name.c_str(), F_OK));
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  name.copy(address.sun_path, name.size());
+  address.sun_path[0] = '\0';
+  const int client = socket(AF_UNIX, SOCK_STREAM, 0);
+  ASSERT_EQ(0, connect(client, reinterpret_cast<const sockaddr*>(&address),
+                       static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size())));
+  ASSERT_EQ(3, send(client, "hi\n", 3, 0));
+  std::array<char, 6> reply{};
+  ASSERT_EQ(6, recv(client, reply.data(), reply.size(), MSG_WAITALL));
+  EXPECT_EQ(std::string(reply.data(), reply.size()), "ok hi\n");
+  close(client);
 }
 
 TEST_F(PtyLineTest, PathsThatAreTakenAreRefusedAndLeftAlone) {
