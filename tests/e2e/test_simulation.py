@@ -43,13 +43,14 @@ class Simulation(Scenario):
         self.client.to_done("Reset", "feeder")
 
     def test_supplies_and_cables(self):
-        for axis, bus in (("carousel", "can0"), ("dial", "line-b")):
+        for axis, off, on in (("carousel", ("power", "carousel", "off"), ("power", "carousel", "on")),
+                              ("dial", ("power", "dial", "off"), ("power", "dial", "on")),
+                              ("dial", ("cut", "line-b"), ("join", "line-b"))):
             self.client.wait_online(axis)
-            for off, on in ((("power", axis, "off"), ("power", axis, "on")), (("cut", bus), ("join", bus))):
-                self.sim(*off)
-                self.client.wait_state(axis, lambda state: state.link == pb.LINK_STATE_OFFLINE, f"{axis} offline")
-                self.sim(*on)
-                self.client.wait_online(axis)
+            self.sim(*off)
+            self.client.wait_state(axis, lambda state: state.link == pb.LINK_STATE_OFFLINE, f"{axis} offline")
+            self.sim(*on)
+            self.client.wait_online(axis)
 
     def test_a_released_shaft_is_pushed_and_a_blocked_one_stays(self):
         self.client.wait_online("feeder")
