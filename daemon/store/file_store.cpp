@@ -10,9 +10,6 @@ namespace axisd::store {
 
 namespace {
 
-/// The journal may have got so much further than the state file knows, in time.
-constexpr Duration longest_unknown = std::chrono::seconds(10);
-
 /// The axis rests elsewhere, and its counter means what it meant: until this is saved the older record fits
 /// nowhere but where the axis was. A record with another meaning fits where it is, and is not waited with.
 bool only_moved(const StoredState& state, const Change& change) {
@@ -111,9 +108,8 @@ void FileStore::enqueue(Change change, Callback done) {
 }
 
 void FileStore::wait_for_work(std::unique_lock<std::mutex>& lock) {
-  const auto look_at = monotonic_now() + longest_unknown;
   for (;;) {
-    const auto until = pending_.empty() ? look_at : save_at_;
+    const auto until = pending_.empty() ? look_at_ : save_at_;
     const auto left = until - monotonic_now();
     if (closing_ || left <= Duration{}) return;
     wake_.wait_for(lock, left);
@@ -129,18 +125,21 @@ void FileStore::run() {
     lock.unlock();
     // All that the journal was told is on the disk then, and so is to be known, too.
     if (last) (void)tell_journal(durable_);
+    const bool look = last || monotonic_now() >= look_at_;
+    if (look) look_at_ = monotonic_now() + delays_.known;
+    const bool mark = look && journal_is_ahead();
     // An empty last batch retries what an earlier failure left unsaved; there is no one left to tell.
-    if (!batch.empty() || journal_is_ahead(last) || (last && disk_differs_)) commit(std::move(batch));
+    if (!batch.empty() || mark || (last && disk_differs_)) commit(std::move(batch), mark);
     if (last) return;
     lock.lock();
   }
 }
 
-void FileStore::commit(std::vector<Pending> batch) {
+void FileStore::commit(std::vector<Pending> batch, bool mark) {
   auto next = durable_.state;
   for (const auto& pending : batch) apply(next, pending.change);
   Result<void> result;
-  if (disk_differs_ || batch.empty() || next != durable_.state) {
+  if (disk_differs_ || mark || next != durable_.state) {
     auto cautious = durable_.state;
     for (const auto& pending : batch) apply_after_failure(cautious, pending.change);
     result = write(next, cautious);
@@ -164,8 +163,8 @@ Result<void> FileStore::write(const StoredState& state, const StoredState& after
   else
     durable_.state = after_failure;  // of a generation that may be on the disk the journal does not know
   const auto told = tell_journal(durable_);
-  if (told && witness_ != nullptr) told_line_ = witness_->durable_line();
   disk_differs_ = !saved || !told;
+  look_at_ = monotonic_now() + delays_.known;
   return saved ? told : saved;
 }
 
@@ -174,11 +173,8 @@ Result<void> FileStore::tell_journal(const Generation& generation) {
   return witness_->note(line_of(generation));
 }
 
-bool FileStore::journal_is_ahead(bool told_again) const {
-  // To be told of a save takes it two lines: the time, and that.
-  constexpr std::uint64_t telling = 2;
-  return witness_ != nullptr && (witness_->durable_line() > told_line_ + (told_again ? telling : 0) ||
-                                 told_line_ > durable_.journal.line + telling);
+bool FileStore::journal_is_ahead() const {
+  return witness_ != nullptr && witness_->durable_fact() > durable_.journal.line;
 }
 
 void FileStore::report(Pending pending, const Result<void>& result) {

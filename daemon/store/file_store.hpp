@@ -17,11 +17,13 @@
 
 namespace axisd::store {
 
-/// How long the place of an axis that has moved may wait for the next one, where nobody waits for the save. A
-/// restart before it is saved finds the axis elsewhere than at the rest before, and restores no position.
 struct SaveDelays {
+  /// How long the place of an axis that has moved may wait for the next one, where nobody waits for the save.
+  /// A restart before it is saved finds the axis elsewhere than at the rest before, and restores no position.
   Duration settled = std::chrono::milliseconds(100);  ///< after the last one
   Duration latest = std::chrono::seconds(1);          ///< after the first one
+  /// How long the journal may know more than the state file says of it.
+  Duration known = std::chrono::seconds(10);
 };
 
 /// Persistent state in one directory, written by a thread of its own: everything that was asked for while the
@@ -65,10 +67,11 @@ class FileStore final : public Persistence {
   void enqueue(Change change, Callback done);
   void run();
   void wait_for_work(std::unique_lock<std::mutex>& lock);
-  void commit(std::vector<Pending> batch);
+  /// `mark`: also where nothing has changed.
+  void commit(std::vector<Pending> batch, bool mark);
   [[nodiscard]] Result<void> write(const StoredState& state, const StoredState& after_failure);
   [[nodiscard]] Result<void> tell_journal(const Generation& generation);
-  [[nodiscard]] bool journal_is_ahead(bool told_again) const;
+  [[nodiscard]] bool journal_is_ahead() const;
   void report(Pending pending, const Result<void>& result);
 
   Executor core_;
@@ -82,7 +85,7 @@ class FileStore final : public Persistence {
   Generation durable_;         // what the next write starts from
   bool disk_differs_ = false;  // a write failed: the files hold something else than durable_
   StateWitness* witness_ = nullptr;
-  std::uint64_t told_line_ = 0;  // the journal's newest line when it was last told of a save
+  TimePoint look_at_{};  // when the journal is next looked at, whether it is ahead
 
   std::mutex mutex_;
   std::condition_variable wake_;

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <random>
 #include <utility>
+#include <variant>
 
 #include "daemon/store/thread.hpp"
 
@@ -212,7 +213,7 @@ Result<void> JournalFile::write(const std::vector<Pending>& batch) {
   const bool due = sync_by_ && (batch.empty() || monotonic_now() >= *sync_by_);
   if (!due && !asks_for(Durable::at_once)) return {};
   if (auto synced = disk_->sync(); !synced) return synced;
-  synced_to(last_number_);
+  all_is_synced();
   return {};
 }
 
@@ -221,24 +222,32 @@ Result<void> JournalFile::append(const std::vector<Pending>& batch) {
   std::string text;
   if (!told_time_ || model_.now() - *told_time_ >= time_told) {
     told_time_ = model_.now();
-    text += encode_line(++last_number_, model_.time_after(options_.boot, monotonic_now().time_since_epoch()));
+    text += numbered(model_.time_after(options_.boot, monotonic_now().time_since_epoch()));
   }
-  for (const auto& pending : batch) text += encode_line(++last_number_, pending.line);
+  for (const auto& pending : batch) text += numbered(pending.line);
   if (auto appended = disk_->append(text); !appended) return appended;
   size_ += text.size();
   return {};
 }
 
-void JournalFile::synced_to(std::uint64_t line) {
-  durable_line_ = line;
+std::string JournalFile::numbered(const JournalLine& line) {
+  ++last_number_;
+  if (!std::holds_alternative<TimeLine>(line) && !std::holds_alternative<StateLine>(line))
+    last_fact_ = last_number_;
+  return encode_line(last_number_, line);
+}
+
+void JournalFile::all_is_synced() {
+  durable_line_ = last_number_;  // first: who sees the fact sees a line that is not before it
+  durable_fact_ = last_fact_;
   sync_by_.reset();
 }
 
 Result<void> JournalFile::rewrite() {
   std::string text(journal_header);
-  for (const auto& line : model_.lines()) text += encode_line(++last_number_, line);
+  for (const auto& line : model_.lines()) text += numbered(line);
   if (auto replaced = disk_->replace(text); !replaced) return replaced;
-  synced_to(last_number_);
+  all_is_synced();
   size_ = size_when_rewritten_ = text.size();
   return {};
 }

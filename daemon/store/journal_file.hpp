@@ -60,6 +60,7 @@ class JournalFile final : public CommandJournal, public StateWitness {
   void heard(const Command& command, RequestKey request) override;
   Result<void> note(StateLine line) override;
   [[nodiscard]] std::uint64_t durable_line() const override { return durable_line_; }
+  [[nodiscard]] std::uint64_t durable_fact() const override { return durable_fact_; }
 
  private:
   /// When the line is on the disk, where a crash of the computer leaves it. A crash of the daemon alone loses
@@ -84,7 +85,8 @@ class JournalFile final : public CommandJournal, public StateWitness {
   void commit(std::vector<Pending> batch);
   [[nodiscard]] Result<void> write(const std::vector<Pending>& batch);
   [[nodiscard]] Result<void> append(const std::vector<Pending>& batch);
-  void synced_to(std::uint64_t line);
+  [[nodiscard]] std::string numbered(const JournalLine& line);
+  void all_is_synced();
   [[nodiscard]] Result<void> rewrite();
   void tell(const std::optional<Error>& trouble);
 
@@ -98,8 +100,8 @@ class JournalFile final : public CommandJournal, public StateWitness {
   std::unique_ptr<JournalDisk> disk_;
   JournalModel model_;
   std::optional<Duration> told_time_;  ///< the last one that was written
-  std::uint64_t last_number_ = 0;
-  std::atomic<std::uint64_t> durable_line_ = 0;
+  std::uint64_t last_number_ = 0, last_fact_ = 0;
+  std::atomic<std::uint64_t> durable_line_ = 0, durable_fact_ = 0;
   std::size_t size_ = 0, size_when_rewritten_ = 0;  ///< of the file, bytes
   bool broken_ = false;               ///< the last write failed: what the file ends with is not known
   std::optional<TimePoint> sync_by_;  ///< something was written that is durable `soon`

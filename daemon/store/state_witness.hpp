@@ -15,6 +15,8 @@ class StateWitness {
   [[nodiscard]] virtual Result<void> note(StateLine line) = 0;
   /// The number of the newest line that is durable.
   [[nodiscard]] virtual std::uint64_t durable_line() const = 0;
+  /// Of the newest durable line that says more than what time it is, or what the state file is like.
+  [[nodiscard]] virtual std::uint64_t durable_fact() const = 0;
 };
 
 }  // namespace axisd::store

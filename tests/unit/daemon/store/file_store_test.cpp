@@ -262,6 +262,7 @@ struct BrokenWitness final : StateWitness {
     return {};
   }
   [[nodiscard]] std::uint64_t durable_line() const override { return 0; }
+  [[nodiscard]] std::uint64_t durable_fact() const override { return 0; }
 };
 
 TEST_F(FileStoreTest, WhatIsInOneFileOnlyIsNotGranted) {
