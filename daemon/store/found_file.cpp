@@ -1,6 +1,7 @@
 #include "daemon/store/found_file.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -61,11 +62,25 @@ int create_anew(int directory, const char* name, int flags) {
   return openat(directory, name, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC | flags, 0640);
 }
 
-int move_aside(int directory, const char* name, const char* aside) {
-  if (renameat(directory, name, directory, aside) == 0 || errno == ENOENT) return 0;
-  // A directory does not take a file's place, nor the other way round.
-  if (unlinkat(directory, aside, 0) != 0 && unlinkat(directory, aside, AT_REMOVEDIR) != 0) return errno;
-  return renameat(directory, name, directory, aside) == 0 || errno == ENOENT ? 0 : errno;
+std::string name_aside(int directory, const std::string& name) {
+  constexpr int most = 100;
+  struct stat is{};
+  if (fstatat(directory, name.c_str(), &is, AT_SYMLINK_NOFOLLOW) != 0 && errno == ENOENT) return {};
+  auto aside = name + ".damaged";
+  for (int number = 2; number <= most; ++number) {
+    // A directory does not take a file's place, nor the other way round.
+    if (unlinkat(directory, aside.c_str(), 0) == 0 || unlinkat(directory, aside.c_str(), AT_REMOVEDIR) == 0)
+      break;
+    if (errno != ENOTEMPTY && errno != EEXIST) break;
+    aside = fmt::format("{}.damaged.{}", name, number);
+  }
+  return aside;
+}
+
+int move_aside(int directory, const std::string& name) {
+  const auto aside = name_aside(directory, name);
+  if (aside.empty()) return 0;
+  return renameat(directory, name.c_str(), directory, aside.c_str()) == 0 || errno == ENOENT ? 0 : errno;
 }
 
 }  // namespace axisd::store

@@ -26,7 +26,11 @@ FoundFile find_file(int directory, const char* name, std::size_t most);
 /// A new file of this name; whatever had it is removed. Below 0: errno says why not (a directory has it).
 int create_anew(int directory, const char* name, int flags);
 
-/// Gives what has this name another one. 0, or an errno; that there is nothing is no error.
-int move_aside(int directory, const char* name, const char* aside);
+/// The name under which what has this one can be kept: "NAME.damaged", or "NAME.damaged.2" and so on where a
+/// directory that is not empty has that. What was kept under it before is removed. Empty: nothing has `name`.
+std::string name_aside(int directory, const std::string& name);
+
+/// Gives what has this name that of name_aside(). 0, or an errno; that there is nothing is no error.
+int move_aside(int directory, const std::string& name);
 
 }  // namespace axisd::store

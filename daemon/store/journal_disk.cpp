@@ -17,7 +17,6 @@ namespace {
 
 constexpr auto newest = "journal.v1";
 constexpr auto unfinished = "journal.v1.new";
-constexpr auto damaged = "journal.v1.damaged";
 /// Many times what any journal comes to (id_files.hpp); anything longer is not ours.
 constexpr std::size_t largest_journal = std::size_t{256} << 20U;
 
@@ -63,10 +62,10 @@ class FileDisk final : public JournalDisk {
 
   Result<void> keep_damaged() override {
     const int at = directory_.get();
-    if (unlinkat(at, damaged, 0) != 0) (void)unlinkat(at, damaged, AT_REMOVEDIR);
+    const auto aside = name_aside(at, newest);
     // At no moment there is no journal, unless a directory has its name: that has no second one.
-    if (linkat(at, newest, at, damaged, 0) == 0) return {};
-    if (const int error = move_aside(at, newest, damaged); error != 0) return failed("keep", newest, error);
+    if (aside.empty() || linkat(at, newest, at, aside.c_str(), 0) == 0) return {};
+    if (const int error = move_aside(at, newest); error != 0) return failed("keep", newest, error);
     return {};
   }
 

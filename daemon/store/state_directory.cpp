@@ -16,8 +16,6 @@ namespace {
 
 constexpr auto newest = "state.v1";
 constexpr auto previous = "state.v1.previous";
-constexpr auto damaged = "state.v1.damaged";
-constexpr auto previous_damaged = "state.v1.previous.damaged";
 constexpr auto newest_unfinished = "state.v1.new";
 constexpr auto previous_unfinished = "state.v1.previous.new";
 constexpr std::size_t largest_file = 16U << 20U;  // thousands of axes; anything longer is not ours
@@ -93,10 +91,8 @@ Result<void> StateDirectory::save(std::string_view text) {
 }
 
 Result<void> StateDirectory::set_aside(KeptFile file) {
-  const bool is_newest = file == KeptFile::state;
-  const auto* name = is_newest ? newest : previous;
-  if (const int error = move_aside(directory_.get(), name, is_newest ? damaged : previous_damaged);
-      error != 0)
+  const auto* name = file == KeptFile::state ? newest : previous;
+  if (const int error = move_aside(directory_.get(), name); error != 0)
     return failed("move aside", name, error);
   return {};
 }

@@ -156,6 +156,30 @@ TEST_F(FileStoreTest, DamageCostsTrustAndLatchesTheMachine) {
   }
 }
 
+/// Whatever has the names under which damaged files are kept.
+TEST_F(FileStoreTest, ADirectoryInTheWayOfADamagedFileBlocksNoStart) {
+  {
+    ASSERT_TRUE(open());
+  }
+  for (const std::string name : {"state.v1", "journal.v1"}) {
+    std::filesystem::create_directory(temporary_.path() / (name + ".damaged"));
+    temporary_.write(name + ".damaged/of-somebody", "else");
+  }
+  for (const auto* damage : {"first", "second"}) {
+    temporary_.write("state.v1", damage);
+    temporary_.write("journal.v1", damage);
+    {
+      const auto store = open();
+      ASSERT_TRUE(store);
+      EXPECT_FALSE(store->loaded().convictions.empty());
+    }
+    for (const std::string name : {"state.v1", "journal.v1"}) {
+      EXPECT_EQ(temporary_.read(name + ".damaged.2"), damage) << "the newest one is kept";
+      EXPECT_EQ(temporary_.read(name + ".damaged/of-somebody"), "else");
+    }
+  }
+}
+
 TEST_F(FileStoreTest, AFailingDiskIsReportedAndGrantsNothing) {
   const InhibitRecord latched{.active = true, .by = "panel", .since = {}};
   {

@@ -117,6 +117,15 @@ TEST_F(StateDirectoryTest, ADamagedFileSetAsideNeverBecomesThePreviousOne) {
   EXPECT_EQ(temporary_.read("state.v1.previous"), encode(generation(1)));
 }
 
+TEST_F(StateDirectoryTest, WhatWasKeptStaysWhereThereIsNothingToKeep) {
+  save(1);
+  temporary_.write("state.v1.previous.damaged", "of before");
+  auto directory = StateDirectory::open(temporary_.path());
+  ASSERT_TRUE(directory);
+  EXPECT_TRUE(directory->set_aside(KeptFile::previous));
+  EXPECT_EQ(temporary_.read("state.v1.previous.damaged"), "of before");
+}
+
 // Each state in which a power cut can leave the directory, in the order of save()'s steps.
 TEST_F(StateDirectoryTest, EveryInterruptedSaveLeavesACompleteGeneration) {
   namespace fs = std::filesystem;
