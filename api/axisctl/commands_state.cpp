@@ -54,15 +54,21 @@ std::string line_of(const v1::StateConviction& conviction) {
   return fmt::format("{}, since {}", conviction.text(), TimeUtil::ToString(since));
 }
 
+std::string line_of(const v1::KeptFileState& file) {
+  const bool none = file.generation() == 0;
+  const auto* unit = file.name().starts_with("journal") ? "line" : "generation";
+  const auto found = none ? "none" : fmt::format("{} {}", unit, file.generation());
+  const auto expected = file.expected() > 0 ? fmt::format("at least {} expected", file.expected())
+                        : none              ? "nor does the other file know of one"
+                                            : "the other file does not say which there was";
+  return fmt::format("{:<12}{} at the start of the daemon, {}", file.name() + ":", found, expected);
+}
+
 void kept_state(Invocation& invocation) {
   const auto response =
       invocation.client().call(&v1::SystemService::Stub::GetState, v1::GetStateRequest(), std::string_view());
   if (invocation.json) return print_line(json(response));
-  for (const auto& file : response.files())
-    print_line(fmt::format("{:<12}{} {} at the start of the daemon, {}", file.name() + ":",
-                           file.name().starts_with("journal") ? "line" : "generation", file.generation(),
-                           file.expected() == 0 ? "the other file does not say which there was"
-                                                : fmt::format("at least {} expected", file.expected())));
+  for (const auto& file : response.files()) print_line(line_of(file));
   print_line(fmt::format("{:<12}{}", "starts:", response.start_count()));
   if (response.convictions().empty()) return print_line("accepted:   yes");
   for (const auto& conviction : response.convictions())

@@ -10,6 +10,8 @@ TEXT = "state.v1 was rolled back: it has generation 12, but there was generation
 class FakeState:
     def __init__(self):
         self.convictions = []
+        self.kept_files = [pb.KeptFileState(name="state.v1", generation=12, expected=40),
+                           pb.KeptFileState(name="journal.v1", generation=120)]
         self.latch_trouble = None  # that StopAll answers with
 
     def convict(self):
@@ -28,9 +30,7 @@ class FakeState:
 
     async def GetState(self, request, context):
         self.note("GetState", request, context)
-        return pb.GetStateResponse(files=[pb.KeptFileState(name="state.v1", generation=12, expected=40),
-                                          pb.KeptFileState(name="journal.v1", generation=120)],
-                                   convictions=self.convictions, start_count=65544)
+        return pb.GetStateResponse(files=self.kept_files, convictions=self.convictions, start_count=65544)
 
     async def AcceptState(self, request, context):
         self.note("AcceptState", request, context)

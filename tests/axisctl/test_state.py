@@ -5,7 +5,7 @@ import unittest
 from fake_state import TEXT
 from support import AxisctlTest, PythonTest
 import axisd
-from axisd.v1 import error_pb2
+from axisd.v1 import error_pb2, system_service_pb2 as pb
 
 FULL = error_pb2.ErrorDetail(reason=error_pb2.REASON_STORAGE, message="the latch would not outlive a restart",
                              remedy="free space on the disk")
@@ -18,6 +18,12 @@ class Axisctl(AxisctlTest):
         self.assertIn("journal.v1: line 120 at the start of the daemon, the other file does not say", shown)
         self.assertIn("accepted:   yes", shown)
         self.assertEqual(self.ok("state", "accept"), "there was nothing to accept\n")
+
+    def test_where_nothing_exists_yet(self):
+        self.server.machine.kept_files = [pb.KeptFileState(name="state.v1"), pb.KeptFileState(name="journal.v1", expected=7)]
+        shown = self.ok("state")
+        self.assertIn("state.v1:   none at the start of the daemon, nor does the other file know of one\n", shown)
+        self.assertIn("journal.v1: none at the start of the daemon, at least 7 expected\n", shown)
 
     def test_what_is_wrong_and_since_when_until_it_is_accepted(self):
         self.server.machine.convict()
