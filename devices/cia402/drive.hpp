@@ -287,7 +287,8 @@ class Cia402Drive final : public Drive {
   /// It was written: counted if it went to the EEPROM.
   void count_write(std::uint32_t address);
   /// Sets the EEPROM switch (200Ch of the YSS-C), if it is not so already.
-  Task<Result<void>> save_writes(bool saved);
+  /// `then`: saves that it is turned on for; they are permitted together, as turned in vain it only wears.
+  Task<Result<void>> save_writes(bool saved, std::uint64_t then = 0);
   [[nodiscard]] bool saves_at_rest() const;
   [[nodiscard]] Error not_held(const ObjectSetting& setting, std::int64_t actual) const;
 

@@ -51,10 +51,10 @@ Task<Result<void>> Cia402Drive::bring_to(std::vector<ObjectSetting> required) {
 
 bool Cia402Drive::saves_at_rest() const { return setup_.persist == PersistSettings::all(); }
 
-Task<Result<void>> Cia402Drive::save_writes(bool saved) {
+Task<Result<void>> Cia402Drive::save_writes(bool saved, std::uint64_t then) {
   if (!model_->objects.eeprom_switch || saving_ == saved) co_return Result<void>{};
   if (saved)
-    if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
+    if (const auto permitted = permit_saves(1 + then); !permitted) co_return permitted;
   saving_.reset();
   const auto written = co_await write_object(*model_->objects.eeprom_switch, saved ? 0 : 1, 0, patiently());
   if (written || written.error().outcome == Outcome::unknown)
@@ -72,7 +72,7 @@ Task<Result<void>> Cia402Drive::prepare_write(const ObjectSetting& setting) {
   if (setting.starts_motion && turns)
     if (const auto inactive = co_await check_inactive(setting); !inactive) co_return inactive;
   if (turns)
-    if (const auto switched = co_await save_writes(setting.saved); !switched) co_return switched;
+    if (const auto switched = co_await save_writes(setting.saved, 1); !switched) co_return switched;
   if (setting.starts_motion) co_return co_await check_inactive(setting);
   co_return Result<void>{};
 }
@@ -105,7 +105,7 @@ Task<Result<void>> Cia402Drive::neutralise_inputs(const std::vector<ObjectSettin
     auto& function = present.at(input.address);
     const bool changes = function != input.value || (turned & input.input_bits) != 0;
     if (!changes || !starts_motion(model_->descriptor->input_functions, function)) continue;
-    if (const auto switched = co_await save_writes(input.saved); !switched) co_return switched;
+    if (const auto switched = co_await save_writes(input.saved, 1); !switched) co_return switched;
     if (const auto written = co_await write_counted(input.address, 0, input.bytes); !written)
       co_return written;
     function = 0;

@@ -107,7 +107,8 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> write_run(std::uint16_t address, std::vector<std::uint16_t> values);
   [[nodiscard]] std::uint64_t saved_registers(std::uint16_t first, std::size_t count) const;
   /// Sets the EEPROM switch (0x0016), if it is not so already.
-  Task<Result<void>> save_writes(bool saved);
+  /// `then`: saves that it is turned on for; they are permitted together, as turned in vain it only wears.
+  Task<Result<void>> save_writes(bool saved, std::uint64_t then = 0);
   [[nodiscard]] bool saves_at_rest() const;
 
   // drive_motion.cpp

@@ -246,10 +246,10 @@ Task<Result<void>> YakoRtuDrive::silence_segments(const std::vector<RegisterSett
 
 bool YakoRtuDrive::saves_at_rest() const { return setup_.persist == PersistSettings::all(); }
 
-Task<Result<void>> YakoRtuDrive::save_writes(bool saved) {
+Task<Result<void>> YakoRtuDrive::save_writes(bool saved, std::uint64_t then) {
   if (saving_ == saved) co_return Result<void>{};
   if (saved)
-    if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
+    if (const auto permitted = permit_saves(1 + then); !permitted) co_return permitted;
   const std::uint16_t value = saved ? 0 : 1;
   const auto written =
       co_await node_.write_patiently(reg::eeprom_update, value, in(TransactionClass::parameters));
@@ -266,7 +266,7 @@ Task<Result<void>> YakoRtuDrive::save_writes(bool saved) {
 Task<Result<void>> YakoRtuDrive::prepare_write(const RegisterSetting& setting) {
   if (setting.starts_motion && saving_ != setting.saved)
     if (const auto inactive = co_await check_inactive(setting); !inactive) co_return inactive;
-  if (const auto switched = co_await save_writes(setting.saved); !switched) co_return switched;
+  if (const auto switched = co_await save_writes(setting.saved, 1); !switched) co_return switched;
   if (setting.starts_motion) co_return co_await check_inactive(setting);
   co_return Result<void>{};
 }
@@ -356,7 +356,7 @@ Task<Result<void>> YakoRtuDrive::neutralise_inputs(const std::vector<RegisterSet
     auto& function = present.at(input.address);
     const bool changes = function != input.value || (turned & input.input_bits) != 0;
     if (!changes || !starts_motion(model_->descriptor->input_functions, function)) continue;
-    if (const auto switched = co_await save_writes(input.saved); !switched) co_return switched;
+    if (const auto switched = co_await save_writes(input.saved, 1); !switched) co_return switched;
     if (const auto written = co_await write_run(input.address, {0}); !written) co_return written;
     function = 0;
   }

@@ -176,6 +176,28 @@ TEST(M27, AConfigurationBeyondTheBudgetIsNotSavedAndSaysSo) {
   }
 }
 
+/// To turn the switch of saving is a save, too, and so is what it is turned for.
+TEST(M27, ABudgetThatIsTooSmallForTheSwitchAndASaveTurnsNoSwitch) {
+  auto of_this = options({.terminals = true}, 1);
+  of_this.connect = false;
+  Rig rig(of_this);
+  const auto refused = [&] {
+    const auto state = rig.state();
+    return state->link_error && state->link_error->reason == Reason::eeprom_budget;
+  };
+  ASSERT_TRUE(rig.run_until(refused, 10s));
+  rig.run(10s);
+  const auto counted = kept(rig);
+  const auto written = rig.drive->eeprom_writes();
+  for (int day = 1; day <= 3; ++day) {
+    rig.world.clock().set_wall_ahead(25h * day);
+    rig.run(10s);
+    EXPECT_EQ(kept(rig), counted) << day;
+    EXPECT_EQ(rig.drive->eeprom_writes(), written) << day;
+  }
+  EXPECT_THAT(rig.state()->link_error->remedy, HasSubstr("it takes 2 saves: raise limits"));
+}
+
 /// The switch of saving is turned before each write that is saved, and back: not for one that is not
 /// permitted.
 TEST(M27, WaitingForATerminalToOpenWearsNothing) {
