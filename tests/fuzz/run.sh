@@ -1,16 +1,28 @@
 #!/bin/bash
 # Looks for inputs that break what takes bytes from outside: libFuzzer under AddressSanitizer and UBSan, each target
-# for so long. What breaks one is left in build/fuzz/found/.
-#   tests/fuzz/run.sh SECONDS [TARGET ...]      (default: all targets)
-#   tests/fuzz/run.sh merge [TARGET ...]        adds what was found to be new to the corpora in the tree
+# for so long or so often. What breaks one is left in build/fuzz/found/. As many targets at a time as there are processors.
+#   tests/fuzz/run.sh SECONDS [TARGET ...]              (default: all targets)
+#   tests/fuzz/run.sh executions N [TARGET ...]         N executions of each at least
+#   tests/fuzz/run.sh merge [TARGET ...]                adds what was found to be new to the corpora in the tree
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
-what=${1:?usage: tests/fuzz/run.sh SECONDS|merge [TARGET ...]}
-shift
-case "$what" in merge | [1-9]*) ;; *)
-  echo "usage: tests/fuzz/run.sh SECONDS|merge [TARGET ...]" >&2
+usage() {
+  echo "usage: tests/fuzz/run.sh SECONDS|executions N|merge [TARGET ...]" >&2
   exit 2
-  ;;
+}
+what=${1-}
+shift || usage
+limit=-max_total_time=$what
+executions=0
+case "$what" in
+  merge) ;;
+  executions)
+    executions=${1-}
+    shift || usage
+    [[ $executions =~ ^[1-9][0-9]*$ ]] || usage
+    limit=-runs=$executions
+    ;;
+  *) [[ $what =~ ^[1-9][0-9]*$ ]] || usage ;;
 esac
 targets=("$@")
 [ "${#targets[@]}" -gt 0 ] || mapfile -t targets < <(ls tests/fuzz/corpus)
@@ -24,17 +36,24 @@ export UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:$ASAN_OPTIONS"
 found=build/fuzz/found
 mkdir -p "$found"
 fuzz_one() {
-  local target=$1 grown="build/fuzz/grown/$1" seeds="tests/fuzz/corpus/$1"
+  local target=$1 grown="build/fuzz/grown/$1" seeds="tests/fuzz/corpus/$1" count
   mkdir -p "$grown"
   if [ "$what" = merge ]; then
     "build/fuzz/tests/fuzz_$target" -merge=1 -max_len=1024 "$seeds" "$grown" 2>"$found/$target.log"
-  elif ! "build/fuzz/tests/fuzz_$target" -max_total_time="$what" -max_len=4096 -timeout=10 -rss_limit_mb=2048 \
+    return
+  fi
+  if ! "build/fuzz/tests/fuzz_$target" "$limit" -max_len=4096 -timeout=10 -rss_limit_mb=2048 \
     -print_final_stats=1 -artifact_prefix="$found/$target-" "$grown" "$seeds" 2>"$found/$target.log"; then
     echo "$target: FAILED: $found/$target.log"
     return 1
   fi
-  awk -v target="$target" '/stat::number_of_executed_units/ { print target ": " $2 " executions" }' "$found/$target.log"
+  count=$(awk '/stat::number_of_executed_units/ { print $2 }' "$found/$target.log")
+  echo "$target: ${count:-0} executions"
+  if [ "${count:-0}" -lt "$executions" ]; then
+    echo "$target: FAILED: fewer than $executions: $found/$target.log"
+    return 1
+  fi
 }
 export -f fuzz_one
-export what found
+export what limit executions found
 printf '%s\n' "${targets[@]}" | xargs -P "$(nproc)" -I{} bash -euc 'fuzz_one {}'
