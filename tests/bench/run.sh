@@ -2,7 +2,8 @@
 # Builds what the benchmarks need (preset release) and runs them; every figure stands beside a yardstick's, measured in
 # the same run. See README.md.
 #   tests/bench/run.sh [can|rtu|stop-all|index|rpc|machine|admission|siege|all]      (default: all)
-# Ends with 1 where a published bound of StopAll or of starts was exceeded, or a command expired on a full line.
+# Ends with 1 where a published bound of StopAll or of starts was exceeded, or that of the stops after a kill, or a command
+# expired on a full line.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
 part=${1:-all}
@@ -26,4 +27,5 @@ status=0
 for each in rtu stop-all index rpc machine admission siege; do
   if wants "$each"; then /usr/bin/python3 -B "tests/bench/${each//-/_}_bench.py" build/release || status=$?; fi
 done
+if wants siege; then /usr/bin/python3 -B tests/bench/siege_bench.py build/release --kill 5 || status=$?; fi
 exit "$status"

@@ -51,10 +51,12 @@ class Hands:
         self.replies = self.socket.makefile()
 
     def do(self, command):
+        """What is answered, without its "ok"."""
         self.socket.sendall(command.encode() + b"\n")
         reply = self.replies.readline()
         if not reply.startswith("ok"):
-            sys.exit(f"stop_all_bench.py: {command}: {reply}")
+            sys.exit(f"{sys.argv[0]}: {command}: {reply}")
+        return reply[2:].strip()
 
 
 def held_back(waits, begin, end):
