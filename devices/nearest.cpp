@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -20,20 +22,29 @@ std::string shown(std::string_view name) {
   return name.size() > longest_name ? text + "..." : text;
 }
 
-/// Of letters left out, added, replaced, or exchanged with the next one.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> before, above(b.size() + 1), row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
+/// Of letters left out, added, replaced, or exchanged with the next one; whatever is `most` or more is
+/// `most`. Precondition: `a` is no longer than longest_name, and `most` than longest_name / 3 + 1.
+std::size_t edit_distance(std::string_view a, std::string_view b, std::size_t most) {
+  if (std::max(a.size(), b.size()) - std::min(a.size(), b.size()) >= most) return most;
+  std::array<std::size_t, longest_name + longest_name / 3 + 1> rows[3];
+  auto *before = &rows[0], *above = &rows[1], *row = &rows[2];
+  std::iota(row->begin(), row->begin() + static_cast<std::ptrdiff_t>(b.size()) + 1, std::size_t{0});
+  std::size_t least = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    before = std::exchange(above, row);
-    row[0] = i + 1;
+    row = std::exchange(before, std::exchange(above, row));
+    (*row)[0] = i + 1;
+    const auto least_above = std::exchange(least, i + 1);
     for (std::size_t j = 0; j < b.size(); ++j) {
-      row[j + 1] = std::min({above[j] + (a[i] == b[j] ? 0 : 1), row[j] + 1, above[j + 1] + 1});
+      auto& distance = (*row)[j + 1];
+      distance = std::min({(*above)[j] + (a[i] == b[j] ? 0 : 1), (*row)[j] + 1, (*above)[j + 1] + 1});
       if (i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j])
-        row[j + 1] = std::min(row[j + 1], before[j - 1] + 1);
+        distance = std::min(distance, (*before)[j - 1] + 1);
+      least = std::min(least, distance);
     }
+    // All that comes is reached from this row, or by an exchange from the one above it.
+    if (least >= most && least_above + 1 >= most) return most;
   }
-  return row.back();
+  return std::min(row->at(b.size()), most);
 }
 
 }  // namespace
@@ -47,7 +58,8 @@ std::string_view nearest(std::string_view text, std::span<const std::string_view
   std::string_view best;
   std::size_t least = std::max<std::size_t>(1, text.size() / 3) + 1;
   for (const auto candidate : candidates) {
-    const auto distance = std::min(edit_distance(text, candidate), edit_distance(lower, candidate));
+    auto distance = edit_distance(text, candidate, least);
+    if (lower != text) distance = std::min(distance, edit_distance(lower, candidate, least));
     if (distance < least) {
       least = distance;
       best = candidate;

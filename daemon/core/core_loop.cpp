@@ -1,5 +1,6 @@
 #include "daemon/core/core_loop.hpp"
 
+#include <algorithm>
 #include <boost/asio/post.hpp>
 #include <utility>
 
@@ -12,31 +13,67 @@ constexpr int most_ready = 32;
 
 }  // namespace
 
-void StopLane::request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve) {
+void StopLane::request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve,
+                       std::string client) {
   for (const auto& gate : gates) gate->request_stop();
   {
     const std::lock_guard lock(mutex_);
-    requests_.push_back({.gates = std::move(gates), .serve = std::move(serve)});
+    requests_.push_back({.gates = std::move(gates), .serve = std::move(serve), .client = std::move(client)});
   }
   waiting_.store(true, std::memory_order_release);
   post(core_->io(), [] {});  // wakes the loop, which looks at the lane first
 }
 
 bool StopLane::drain() {
-  if (!waiting_.exchange(false, std::memory_order_acq_rel)) return false;
+  bool served = false;
+  for (take_in(); !turns_.empty(); take_in()) {
+    const auto turn = next_turn();
+    if (turn == turns_.end()) break;
+    last_ = turn->first;
+    auto request = std::move(turn->second.requests.front());
+    turn->second.requests.pop_front();
+    const bool first = turn->second.served == 0;
+    turn->second.served += std::max<std::size_t>(1, request.gates.size());
+    serve(std::move(request));
+    if (first) core_->push([this, client = last_] { go_on(client); });
+    served = true;
+  }
+  return served;
+}
+
+void StopLane::take_in() {
+  if (!waiting_.exchange(false, std::memory_order_acq_rel)) return;
   std::vector<Request> requests;
   {
     const std::lock_guard lock(mutex_);
     requests = std::exchange(requests_, {});
   }
-  for (auto& request : requests) {
-    core_->run_first(request.serve);
-    // A sequence that was waiting already is resumed by a handler, which comes before this one.
-    core_->push([gates = std::move(request.gates)] {
-      for (const auto& gate : gates) gate->stop_passed_on();
-    });
-  }
-  return true;
+  for (auto& request : requests) turns_[request.client].requests.push_back(std::move(request));
+}
+
+/// Of the clients behind the last one. end(): nobody has one that may be served now.
+StopLane::Turns::iterator StopLane::next_turn() {
+  const auto may = [](const auto& turn) {
+    return !turn.second.requests.empty() && turn.second.served < share;
+  };
+  const auto behind = std::find_if(turns_.upper_bound(last_), turns_.end(), may);
+  return behind != turns_.end() ? behind : std::find_if(turns_.begin(), turns_.end(), may);
+}
+
+void StopLane::serve(Request request) {
+  core_->run_first(request.serve);
+  // A sequence that was waiting already is resumed by a handler, which comes before this one.
+  core_->push([gates = std::move(request.gates)] {
+    for (const auto& gate : gates) gate->stop_passed_on();
+  });
+}
+
+void StopLane::go_on(const std::string& client) {
+  const auto turn = turns_.find(client);
+  if (turn->second.requests.empty())
+    turns_.erase(turn);
+  else
+    turn->second.served = 0;
 }
 
 CoreLoop::CoreLoop()

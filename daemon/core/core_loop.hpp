@@ -3,10 +3,14 @@
 #include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <cstddef>
+#include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "buses/asio_clock.hpp"
@@ -17,25 +21,42 @@
 
 namespace axisd::core {
 
-/// Stops overtake everything that waits for the core thread: the lane is emptied before each handler, and
-/// the sequences that serve a stop run at once to their first wait. Asking for a stop makes the axes'
-/// prepared motion unsendable at once, from the asking thread. Thread: any.
+/// Stops overtake everything that waits for the core thread: the lane is emptied before each handler
+/// (drain() says how far), and the sequences that serve a stop run at once to their first wait. Asking for a
+/// stop makes the axes' prepared motion unsendable at once, from the asking thread. Thread: any.
 class StopLane {
  public:
   explicit StopLane(ReadyQueue& core) : core_(&core) {}
   /// `serve` stops the axes of all `gates`; none where only the core knows which.
-  void request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve);
-  /// False: there was none. Thread: core.
+  void request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve,
+               std::string client = {});
+  /// Serves one request of each client in turn. Who has stopped `share` axes goes on once the handlers that
+  /// wait by then have run, so that no crowd of stops keeps another's from the drives. False: there was none
+  /// to serve. Thread: core.
   bool drain();
+
+  static constexpr std::size_t share = 64;
 
  private:
   struct Request {
     std::vector<std::shared_ptr<AxisGate>> gates;
     std::function<void()> serve;
+    std::string client;
   };
+  struct Turn {
+    std::deque<Request> requests;
+    std::size_t served = 0;  ///< axes, since it began or went on
+  };
+  using Turns = std::map<std::string, Turn>;
+  void take_in();
+  [[nodiscard]] Turns::iterator next_turn();
+  void serve(Request request);
+  void go_on(const std::string& client);
 
   ReadyQueue* core_;
   std::atomic<bool> waiting_{false};
+  Turns turns_;       ///< of the core
+  std::string last_;  ///< of the core: who was served last
   std::mutex mutex_;
   std::vector<Request> requests_;
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "devices/nearest.hpp"
@@ -66,10 +67,13 @@ std::vector<std::string> GroupAccessService::resolve(const MachineTable& table, 
       unknown(group, no_such_group(group, names_of(table.groups), table.axes));
   }
   std::vector<std::string> known;
+  std::set<std::string_view> seen;
   for (const auto& name : names) {
+    // What was probably meant is not looked for among all axes: of a thousand names that would hold up
+    // whoever wants to stop.
     if (table.find(name) == nullptr)
-      unknown(name, no_such_axis(name, table.axes));
-    else if (std::ranges::find(known, name) == known.end())
+      unknown(name, no_such_axis(name, {}));
+    else if (seen.insert(name).second)
       known.push_back(name);
   }
   return known;
@@ -86,8 +90,7 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
       });
   if (axes.empty())
     return post(loop_->executor(), [gathering] { gathering->callback(std::move(gathering->results)); });
-  auto serve = [this, gathering, axes, request, client = std::move(client), until,
-                arrived = loop_->clock().now()] {
+  auto serve = [this, gathering, axes, request, client, until, arrived = loop_->clock().now()] {
     const auto known = gathering->results.size();
     // One more for each whose hold the disk has to know first.
     gathering->missing = axes.size() * (request.hold ? 2 : 1);
@@ -106,7 +109,7 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
   std::vector<std::shared_ptr<AxisGate>> gates;
   gates.reserve(axes.size());
   for (const auto& axis : axes) gates.push_back(table->find(axis)->gate);
-  loop_->lane().request(std::move(gates), std::move(serve));
+  loop_->lane().request(std::move(gates), std::move(serve), std::move(client));
 }
 
 void GroupAccessService::release_stop(GroupReleaseRequest request,

@@ -77,6 +77,7 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
   const auto* stop = std::get_if<StopRequest>(&action);
   const bool disable = std::holds_alternative<DisableRequest>(action);
   options.arrived = now();
+  auto client = options.client;
   auto serve = [this, axis, action = std::move(action), options = std::move(options), until,
                 callback = std::move(callback)]() mutable {
     const bool is_stop =
@@ -87,7 +88,7 @@ void MachineService::submit(std::string axis, Action action, CommandOptions opti
     answer(machine_->submit(axis, action, options), until, std::move(callback));
   };
   if (found != nullptr && (stop != nullptr || disable))
-    loop_->lane().request({found->gate}, std::move(serve));
+    loop_->lane().request({found->gate}, std::move(serve), std::move(client));
   else
     post(loop_->executor(), std::move(serve));
 }
@@ -143,8 +144,7 @@ void MachineService::stop_all(std::string client, WaitUntil until, std::function
       if (--missing == 0) callback(std::move(answer));
     }
   };
-  auto serve = [this, client = std::move(client), arrived = now(), until,
-                callback = std::move(callback)]() mutable {
+  auto serve = [this, client, arrived = now(), until, callback = std::move(callback)]() mutable {
     auto gathering = std::make_shared<Gathering>();
     gathering->callback = std::move(callback);
     ++gathering->missing;  // until all are counted
@@ -165,7 +165,7 @@ void MachineService::stop_all(std::string client, WaitUntil until, std::function
   std::vector<std::shared_ptr<AxisGate>> gates;
   gates.reserve(table->faces.size());
   for (const auto& [name, axis] : table->faces) gates.push_back(axis->gate);
-  loop_->lane().request(std::move(gates), std::move(serve));
+  loop_->lane().request(std::move(gates), std::move(serve), std::move(client));
 }
 
 void MachineService::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {

@@ -18,6 +18,18 @@ TEST(Nearest, IsWhatWasProbablyMeant) {
   EXPECT_EQ(did_you_mean("feeder", {}, "look"), "look");
 }
 
+TEST(Nearest, OfSeveralItIsTheNearest) {
+  EXPECT_EQ(did_you_mean("axis-1", {"axis-22", "axis-2", "axis-11"}, "look"), "did you mean 'axis-2'?");
+  EXPECT_EQ(did_you_mean("axis-11x", {"axis-22", "axis-2", "axis-11"}, "look"), "did you mean 'axis-11'?");
+  EXPECT_EQ(did_you_mean("ba", {"ab"}, "look"), "did you mean 'ab'?");
+  EXPECT_EQ(did_you_mean("a", {"ab", ""}, "look"), "did you mean 'ab'?");
+  EXPECT_EQ(did_you_mean("xyfeeder", {"feeder"}, "look"), "did you mean 'feeder'?");
+  EXPECT_EQ(did_you_mean("", {"abc"}, "look"), "look");
+  const std::string longest(60, 'a');
+  EXPECT_EQ(did_you_mean(longest, {longest + std::string(20, 'b')}, "look").substr(0, 12), "did you mean");
+  EXPECT_EQ(did_you_mean(longest, {longest + std::string(21, 'b'), std::string(500, 'a')}, "look"), "look");
+}
+
 TEST(Nearest, AnErrorSaysWhereTheNamesAre) {
   const auto typo = no_such_axis("feedr", axes);
   EXPECT_EQ(typo.reason, Reason::unknown_axis);

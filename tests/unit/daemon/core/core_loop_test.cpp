@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -158,6 +159,62 @@ TEST(CoreLoop, AStopIsAnnouncedUntilTheSequenceThatWaitedForItHasGoneOn) {
   loop.run();
   seen.push_back(notice->pending());
   EXPECT_EQ(seen, (std::vector<bool>{true, false}));
+}
+
+/// Each of the stops of a crowd is served, and none of them keeps another client's waiting.
+TEST(CoreLoop, ACrowdOfStopsKeepsNoOtherClientsWaiting) {
+  CoreLoop loop;
+  Texts order;
+  const auto ask = [&](const std::string& client, std::size_t axes) {
+    std::vector<std::shared_ptr<AxisGate>> gates(axes);
+    for (auto& gate : gates) gate = std::make_shared<AxisGate>();
+    loop.lane().request(std::move(gates), [&, client] { order.push_back(client); }, client);
+  };
+  const auto at = [&](const std::string& what) {
+    return static_cast<std::size_t>(std::ranges::find(order, what) - order.begin());
+  };
+  std::size_t crowd = 0;
+  post(loop.executor(), [&] {
+    for (; crowd < 200; ++crowd) ask("crowd", 1);
+    for (; crowd < 220; ++crowd) ask("crowd", 400);
+    for (int i = 0; i < 8; ++i) ask("operator", 1);
+    ask("panel", 1);
+    post(loop.executor(), [&] { order.emplace_back("reply of a drive"); });
+  });
+  const std::function<void()> end_with_it = [&] {
+    if (std::ranges::count(order, std::string("crowd")) == static_cast<std::ptrdiff_t>(crowd) && crowd > 0)
+      return loop.stop();
+    post(loop.executor(), end_with_it);
+  };
+  end_with_it();
+  loop.run();
+  EXPECT_EQ(order.at(0), "crowd");
+  EXPECT_EQ(order.at(1), "operator");
+  EXPECT_EQ(order.at(2), "panel") << "one of each client, in turn";
+  EXPECT_EQ(std::ranges::count(order.begin(), order.begin() + 17, std::string("operator")), 8);
+  EXPECT_EQ(at("reply of a drive"), StopLane::share + 9) << "as soon as the crowd has had its share";
+  EXPECT_EQ(order.size(), crowd + 8 + 1 + 1);
+}
+
+/// In the middle of another's crowd, from another thread.
+TEST(CoreLoop, AStopThatComesLaterOvertakesACrowd) {
+  CoreLoop loop;
+  Texts order;
+  const auto gate = std::make_shared<AxisGate>();
+  post(loop.executor(), [&] {
+    for (int i = 0; i < 500; ++i)
+      loop.lane().request(
+          {gate},
+          [&, i] {
+            order.emplace_back("crowd");
+            if (i == 100) loop.lane().request({gate}, [&] { order.emplace_back("operator"); }, "operator");
+            if (i == 499) loop.stop();
+          },
+          "crowd");
+  });
+  loop.run();
+  ASSERT_EQ(order.size(), 501U);
+  EXPECT_EQ(order.at(101), "operator");
 }
 
 TEST(CoreLoop, AHandlerIsNeverRunWithinAnother) {
