@@ -12,22 +12,28 @@
 
 namespace axisd::server {
 
+std::string counted_address(const sockaddr_storage& peer) {
+  constexpr std::uint8_t loopback = 127;  // the first byte of 16 million addresses
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (peer.ss_family == AF_INET) {
+    const auto& ipv4 = reinterpret_cast<const sockaddr_in*>(&peer)->sin_addr;
+    if (ntohl(ipv4.s_addr) >> 24U == loopback) return "localhost";
+    return inet_ntop(AF_INET, &ipv4, text.data(), text.size());
+  }
+  if (peer.ss_family != AF_INET6) return {};
+  auto ipv6 = reinterpret_cast<const sockaddr_in6*>(&peer)->sin6_addr;
+  const bool mapped = IN6_IS_ADDR_V4MAPPED(&ipv6) != 0;
+  if (IN6_IS_ADDR_LOOPBACK(&ipv6) != 0 || (mapped && ipv6.s6_addr[12] == loopback)) return "localhost";
+  // One network belongs to one computer as a rule. An IPv4 address in it is one as it is.
+  if (!mapped) std::fill(ipv6.s6_addr + 8, ipv6.s6_addr + 16, std::uint8_t{0});
+  return inet_ntop(AF_INET6, &ipv6, text.data(), text.size());
+}
+
 std::string address_of_peer(int connection) {
   sockaddr_storage peer{};
   socklen_t size = sizeof peer;
-  auto* address = reinterpret_cast<sockaddr*>(&peer);
-  if (getpeername(connection, address, &size) != 0) return "gone";
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  if (peer.ss_family == AF_INET) {
-    const auto* ipv4 = reinterpret_cast<const sockaddr_in*>(&peer);
-    return inet_ntop(AF_INET, &ipv4->sin_addr, text.data(), text.size());
-  }
-  if (peer.ss_family == AF_INET6) {
-    auto ipv6 = reinterpret_cast<const sockaddr_in6*>(&peer)->sin6_addr;
-    // One network belongs to one computer as a rule. An IPv4 address in it is one as it is.
-    if (IN6_IS_ADDR_V4MAPPED(&ipv6) == 0) std::fill(ipv6.s6_addr + 8, ipv6.s6_addr + 16, std::uint8_t{0});
-    return inet_ntop(AF_INET6, &ipv6, text.data(), text.size());
-  }
+  if (getpeername(connection, reinterpret_cast<sockaddr*>(&peer), &size) != 0) return "gone";
+  if (auto address = counted_address(peer); !address.empty()) return address;
   ucred user{};
   socklen_t length = sizeof user;
   if (getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &user, &length) != 0) return "local";

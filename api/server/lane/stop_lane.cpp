@@ -21,6 +21,7 @@
 #include "api/server/lane/stop_calls.hpp"
 #include "api/server/listen.hpp"
 #include "api/server/peer.hpp"
+#include "api/server/peer_socket.hpp"
 #include "api/server/status.hpp"
 
 namespace axisd::server {
@@ -213,6 +214,7 @@ void StopLane::Loop::let_in_from_inside() {
 void StopLane::Loop::enter(FileDescriptor socket, const std::string& host, bool encrypted) {
   const auto id = ++last_;
   const auto now = monotonic_now();
+  const auto address = address_of_peer(socket.get());
   auto acceptor = encrypted ? acceptor_ : nullptr;
   const bool anonymous = acceptor == nullptr;
   auto& peer = peers_[id];
@@ -220,7 +222,7 @@ void StopLane::Loop::enter(FileDescriptor socket, const std::string& host, bool 
   peer.connection = std::make_unique<Connection>(
       std::move(socket), std::move(acceptor), [this, id](const lane::Http2::Call& call) { begin(id, call); },
       now);
-  close(places_.enter(id, host, now));
+  close(places_.enter(id, address, now));
   if (anonymous) identify(id, peer);
 }
 
