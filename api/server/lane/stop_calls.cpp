@@ -1,6 +1,7 @@
 #include "api/server/lane/stop_calls.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <memory>
 #include <ranges>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
+#include "devices/nearest.hpp"
 
 namespace axisd::server::lane {
 namespace {
@@ -17,6 +19,7 @@ namespace {
 struct Context {
   Machine& machine;
   Admission& admission;
+  Allowance& suggestions;
   const Http2::Call& call;
   const std::string& client;
   StopCalls::Done done;
@@ -72,10 +75,19 @@ std::optional<Request> parsed(const Context& context) {
   return request;
 }
 
+/// False: there is no such axis, which is all that is said.
+bool known_or_suggested(const Context& context, const std::string& axis) {
+  if (context.machine.snapshot(axis) || context.suggestions.take(context.machine.now())) return true;
+  refuse(context.done, no_such_axis(axis, {}));
+  return false;
+}
+
 template <class Request, class Response>
 void take(Context context) {
   const auto request = parsed<Request>(context);
   if (!request) return;
+  if constexpr (requires { request->axis(); })
+    if (!known_or_suggested(context, request->axis())) return;
   const auto reply = std::make_shared<LaneReply<Response>>(std::move(context.done), Admission::Ticket());
   handle(context.machine, *request, context.client, reply, reply->response());
 }
@@ -83,7 +95,7 @@ void take(Context context) {
 /// A jog and what renews it come by one way, in the order in which they were sent; so does the halt after it.
 void jog(Context context) {
   const auto request = parsed<v1::JogRequest>(context);
-  if (!request) return;
+  if (!request || !known_or_suggested(context, request->axis())) return;
   if (auto axis = find_axis(context.machine, request->axis()); !axis)
     return refuse(context.done, axis.error());
   auto action = to_action(*request);
@@ -122,6 +134,15 @@ constexpr Entry table[] = {
 
 }  // namespace
 
+bool Allowance::take(TimePoint now) {
+  const auto passed = std::chrono::duration<double>(now - refilled_).count();
+  left_ = std::min(rate_, left_ + std::max(0.0, passed) * rate_);
+  refilled_ = now;
+  if (left_ < 1) return false;
+  --left_;
+  return true;
+}
+
 void StopCalls::start(const Http2::Call& call, const std::string& client, Done done) {
   const auto* found = std::ranges::find(table, call.path, &Entry::path);
   if (found == std::end(table))
@@ -130,6 +151,7 @@ void StopCalls::start(const Http2::Call& call, const std::string& client, Done d
                          .remedy = "ask for everything else at the main port"});
   found->handler({.machine = machine_,
                   .admission = admission_,
+                  .suggestions = suggestions_,
                   .call = call,
                   .client = client,
                   .done = std::move(done)});

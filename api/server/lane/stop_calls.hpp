@@ -8,9 +8,22 @@
 
 #include "api/server/admission.hpp"
 #include "api/server/lane/http2.hpp"
+#include "buses/clock.hpp"
 #include "devices/machine.hpp"
 
 namespace axisd::server::lane {
+
+/// So many at once, and so many in a second. Thread: one at a time.
+class Allowance {
+ public:
+  explicit Allowance(double rate) : rate_(rate), left_(rate) {}
+  /// False: there is none left now.
+  [[nodiscard]] bool take(TimePoint now);
+
+ private:
+  double rate_, left_;
+  TimePoint refilled_{};
+};
 
 /// The calls of StopService: each means what the call of its name means at the main address. Jogs are counted
 /// per client, apart from what is counted there; nothing else is.
@@ -23,6 +36,9 @@ class StopCalls {
 
   /// `machine` outlives this.
   explicit StopCalls(Machine& machine) : machine_(machine), admission_({}) {}
+  /// For an axis that there is not the one that was probably meant is looked for: among hundreds that takes
+  /// longer than a stop. In all, at once and in a second.
+  static constexpr double suggestions = 20;
 
   /// Begins a call; refusals come through `done`, too. Thread: the lane's.
   void start(const Http2::Call& call, const std::string& client, Done done);
@@ -33,6 +49,7 @@ class StopCalls {
  private:
   Machine& machine_;
   Admission admission_;
+  Allowance suggestions_{suggestions};
 };
 
 }  // namespace axisd::server::lane

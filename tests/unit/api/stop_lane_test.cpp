@@ -127,6 +127,25 @@ TEST_F(Lane, ErrorsCarryTheirDetail) {
   EXPECT_EQ(detail_of(offline).remedy(), "look");
 }
 
+/// Whoever asks for axes that there are not makes nobody wait.
+TEST_F(Lane, WhatWasMeantIsLookedForNowAndThen) {
+  serve();
+  auto stub = client();
+  const auto suggested = [&] {
+    const auto [status, response] = stop(*stub, "feedr");
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+    EXPECT_EQ(detail_of(status).reason(), v1::REASON_UNKNOWN_AXIS);
+    EXPECT_EQ(detail_of(status).message(), "there is no axis 'feedr'");
+    return detail_of(status).remedy() == "did you mean 'feeder'?";
+  };
+  int count = 0;
+  while (count < 100 && suggested()) ++count;
+  EXPECT_EQ(count, static_cast<int>(server::lane::StopCalls::suggestions));
+  EXPECT_TRUE(stop(*stub).first.ok()) << "of a stop of an axis that there is nothing is counted";
+  machine_.set_now(machine_.now() + 1s);
+  EXPECT_TRUE(suggested());
+}
+
 TEST_F(Lane, WhatIsNoStopIsRefused) {
   serve();
   auto axes = v1::AxisService::NewStub(connect(target_));
