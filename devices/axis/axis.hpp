@@ -361,7 +361,7 @@ class Axis {
   /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
   /// itself takes for in position.
   [[nodiscard]] std::int64_t target_tolerance() const;
-  [[nodiscard]] bool is_at(const Target& target) const;
+  [[nodiscard]] bool is_at(const PositionTracker::Target& target) const;
   /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
   [[nodiscard]] bool moved_from(std::int64_t counter) const;
   bool judge_rest(Activity& activity);

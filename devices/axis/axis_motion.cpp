@@ -230,7 +230,7 @@ Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t 
   }
 }
 
-bool Axis::is_at(const Target& target) const {
+bool Axis::is_at(const PositionTracker::Target& target) const {
   return std::abs(tracker_.counter() - target.counter) <= target_tolerance();
 }
 
