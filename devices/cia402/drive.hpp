@@ -172,6 +172,8 @@ class Cia402Drive final : public Drive {
   Task<Result<Reading>> poll_objects(SdoOptions options);
   Task<Result<DriveSample>> look(bool by_pdo, SdoOptions options);
   DriveSample judge(const Reading& reading, bool of_one_moment);
+  /// A motion may be slower than its velocity shows: than noise, or than one count of it.
+  [[nodiscard]] bool known_by_way() const;
   void judge_motion(DriveSample& sample, const Reading& reading);
   void note_direction(const DriveSample& sample);
   Task<> leave_homing(SdoOptions options);

@@ -182,14 +182,21 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
   co_return sample;
 }
 
-/// What is measured wavers: a little of it is no motion, and has no direction.
+bool Cia402Drive::known_by_way() const {
+  return position_window() > 0 ||
+         decode_velocity(*model_, setup_.pulses_per_revolution, 1) > velocity_noise_rpm;
+}
+
+/// What is measured wavers: a little of it is no motion, and has no direction. Where positions are exact they
+/// know better than the drive's own word, which may be that it is near its target.
 void Cia402Drive::judge_motion(DriveSample& sample, const Reading& reading) {
-  if (const auto window = position_window(); window > 0) {
+  if (known_by_way()) {
+    const auto window = position_window();
     sample.moving =
         standstill_.moves({.at = sample.asked_at,
                            .position = sample.position_pulses,
                            .velocity_rpm = sample.velocity_rpm,
-                           .told = told_motion(*model_, reading.values)},
+                           .told = window > 0 ? told_motion(*model_, reading.values) : std::nullopt},
                           {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution});
     if (!sample.moving) sample.velocity_rpm = 0;
   }

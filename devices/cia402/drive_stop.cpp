@@ -223,8 +223,7 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
   const auto shown = co_await read_object(*source, std::move(options));
   if (!shown) co_return last_moving_;
   if (bit != 0) co_return (*shown & bit) != 0;
-  if (objects.moving || position_window() == 0) co_return *shown != 0;
-  // A motion as slow as noise is known by its way only.
+  if (objects.moving || !known_by_way()) co_return *shown != 0;
   const auto rpm = decode_velocity(*model_, setup_.pulses_per_revolution, *shown);
   co_return last_moving_ || std::abs(rpm) > velocity_noise_rpm;
 }

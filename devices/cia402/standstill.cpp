@@ -22,9 +22,10 @@ bool Standstill::moves(const Look& look, const Gauge& gauge) {
   if (std::abs(look.velocity_rpm) > velocity_noise_rpm) return note(look, true);
   if (look.told) return note(look, *look.told);
   if (!since_) return note(look, moves_);
-  const auto band = std::max<std::int64_t>(gauge.window / 2, 1);
+  const auto least = std::max<std::int64_t>(gauge.window / 2, 1);
+  const auto band = gauge.window > 0 ? least : 0;
   if (std::abs(way_between(since_->position, look.position)) > band) return note(look, true);
-  if (moves_ && look.at - since_->at >= time_of(band, gauge.pulses_per_revolution)) return note(look, false);
+  if (moves_ && look.at - since_->at >= time_of(least, gauge.pulses_per_revolution)) return note(look, false);
   return moves_;
 }
 

@@ -17,8 +17,8 @@ constexpr std::int64_t way_between(std::int32_t from, std::int32_t to) {
 }
 
 /// Pure. A velocity beyond its noise is a motion. Below, the drive's own word counts; where it has none, the
-/// position does: at rest it stays within half of the in-position window. How long it must do so after a
-/// motion follows from the slowest one, 1 r/min.
+/// position does: at rest it stays within half of the in-position window, or where it is, if it is exact. How
+/// long it must do so after a motion follows from the slowest one, 1 r/min.
 class Standstill {
  public:
   struct Look {
@@ -27,7 +27,7 @@ class Standstill {
     int velocity_rpm = 0;
     std::optional<bool> told{};  ///< by the drive: it moves, or rests; nothing: it does not say
   };
-  /// What positions mean, pulses; `window`: Drive::position_window(), > 0.
+  /// What positions mean, pulses; `window`: Drive::position_window(), 0 where they are exact.
   struct Gauge {
     std::int64_t window = 1, pulses_per_revolution = 1;
   };

@@ -27,6 +27,17 @@ TEST(Standstill, NoiseIsNoMotion) {
   }
 }
 
+TEST(Standstill, AnExactPositionThatChangesIsAMotionAndRestsWhenItHasStayed) {
+  constexpr Standstill::Gauge exact{.window = 0, .pulses_per_revolution = 1000};
+  Standstill standstill;
+  EXPECT_FALSE(standstill.moves(look(0ms, 500, 0), exact));
+  EXPECT_TRUE(standstill.moves(look(20ms, 501, 0), exact)) << "by one pulse";
+  for (auto after = 40ms; after < 140ms; after += 20ms)
+    EXPECT_TRUE(standstill.moves(look(after, 501, 0), exact))
+        << "the next pulse may be due " << after.count();
+  EXPECT_FALSE(standstill.moves(look(140ms, 501, 0), exact));
+}
+
 TEST(Standstill, AVelocityBeyondItsNoiseIsAMotionWhateverTheDriveSays) {
   for (const int rpm : {2, -2, 500}) {
     Standstill standstill;
