@@ -251,6 +251,8 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> prepare_homing(HomingProfile profile, SdoOptions options);
   Task<> see_homing_begin(SdoOptions options);
   [[nodiscard]] Error answers_too_late() const;
+  /// M11: what the object would take is 0.
+  [[nodiscard]] Error too_slow(Object object) const;
   Task<Result<void>> write_homing_method(HomingMethod method, SdoOptions options);
   Task<Result<void>> home_here(SdoOptions options);
 

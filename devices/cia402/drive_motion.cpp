@@ -40,6 +40,7 @@ Task<Result<void>> Cia402Drive::start_velocity(VelocityProfile profile, MotionGu
         error_at(Reason::configuring, object::target_position, "the drive is not configured yet", "wait"));
   const auto block = encode(*model_, setup_.pulses_per_revolution, profile, expected_.back());
   const auto velocity = encode_velocity(*model_, setup_.pulses_per_revolution, profile.velocity_rpm);
+  if (velocity == 0) co_return fail(too_slow(object::target_velocity));
   co_return co_await start(block, OperationMode::profile_velocity, std::nullopt,
                            {object::target_velocity, velocity}, std::move(guard));
 }
@@ -92,6 +93,11 @@ Error Cia402Drive::answers_too_late() const {
       "look at the load of the network; raise reboot_guard up to what the drive needs to boot");
 }
 
+Error Cia402Drive::too_slow(Object object) const {
+  return error_at(Reason::out_of_range, object, "the velocity is less than one of the drive's counts",
+                  "ask for a higher one, or let the drive count in a finer unit");
+}
+
 Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode,
                                            std::optional<HomingProfile> homing, Trigger trigger,
                                            MotionGuard guard, bool& triggered) {
@@ -131,6 +137,8 @@ Error Cia402Drive::not_enabled(State state) const {
 Task<Result<TimePoint>> Cia402Drive::prepare_start(MotionBlock block, OperationMode mode,
                                                    std::optional<HomingProfile> homing, SdoOptions motion) {
   if (rebooted_) co_return fail(lost_memory());
+  if (mode == OperationMode::profile_position && block[speed] <= 0)
+    co_return fail(too_slow(object::profile_velocity));
   if (const auto settled = co_await settle_armed(motion); !settled) co_return fail(settled.error());
   const auto state = co_await read_status(motion);
   if (!state) co_return fail(state.error());
@@ -195,6 +203,8 @@ Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions
   homing_start_.tied_to_rest = (bits & status::mode_specific) != 0 && (bits & model_->status.homed) == 0;
   const auto both = static_cast<std::uint16_t>(status::mode_specific | model_->status.homed);
   for (const auto& [object, value] : encode(*model_, setup_.pulses_per_revolution, profile)) {
+    const bool is_speed = object == object::homing_speed || object == object::homing_search_speed;
+    if (is_speed && value == 0) co_return fail(too_slow(object));
     const auto present = co_await read_object(object, options);
     if (!present) co_return fail(present.error());
     if (*present == value) continue;

@@ -75,5 +75,24 @@ TEST(M13, AShaftThatReadsNoVelocityIsNotAtStandstill) {
   }
 }
 
+/// 1 r/min of 10 increments per revolution is a sixth of one per second.
+TEST(M11, AVelocityOfLessThanOneCountIsNeverSent) {
+  CanRig rig({.model = "cia402", .encoder = {}, .limits = false, .adjust = [](AxisSettings& axis) {
+                axis.scale.pulses_per_revolution = 10;
+              }});
+  rig.done(EnableRequest{});
+  const auto starts = rig.drive->starts();
+  const Action slow[] = {MoveRelativeRequest{.distance = 50, .with = {.velocity = 0.2}},
+                         MoveVelocityRequest{.velocity = 0.2}, MoveVelocityRequest{.velocity = -0.2}};
+  for (const auto& action : slow) {
+    const auto command = rig.complete(action);
+    EXPECT_EQ(command.state, CommandState::error) << describe(command);
+    ASSERT_TRUE(command.cause);
+    EXPECT_EQ(command.cause->reason, Reason::out_of_range) << to_string(*command.cause);
+    EXPECT_EQ(rig.state()->state, AxisState::standstill);
+  }
+  EXPECT_EQ(rig.drive->starts(), starts);
+}
+
 }  // namespace
 }  // namespace axisd::test
