@@ -24,7 +24,8 @@ std::string entry(const std::string& name, const v1::FoundNode& node, const Frag
       name, context.bus, node.node(), node.model(), node.pulses_per_revolution());
 }
 
-/// Of a drive by CiA 402 the data sheet and what a revolution is have to be filled in.
+/// Of a drive by CiA 402 the data sheet, what a revolution is, and mostly the unit of velocities have to be
+/// filled in.
 std::string described_entry(const std::string& name, const v1::FoundNode& node,
                             const FragmentContext& context) {
   return fmt::format(
@@ -35,7 +36,9 @@ std::string described_entry(const std::string& name, const v1::FoundNode& node,
       "    unit: rev\n"
       "    scale: {{ microstep: 4000 pulses/rev }}   # what 6064h counts: see the drive's manual\n"
       "    limits: {{ velocity: 1 rev/s }}\n"
-      "    drive: {{ eds: axis-{}.eds }}   # the data sheet of the drive, from its maker\n",
+      "    drive:\n"
+      "      eds: axis-{}.eds   # the data sheet of the drive, from its maker\n"
+      "      # velocity_unit: UNIT   # where the data sheet does not tell it: what 6081h counts by the manual\n",
       name, node.note().empty() ? "" : node.note() + ", ", node.vendor(), node.product(), context.bus,
       node.node(), node.model(), node.node());
 }

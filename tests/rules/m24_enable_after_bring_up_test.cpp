@@ -103,7 +103,8 @@ class FullNetwork {
     axis.scale = {.pulses_per_revolution = 1000, .travel_numerator = 10, .unit = "mm"};
     axis.limits.velocity = 100;
     if (model != "cia402") return axis;
-    axis.model_settings = {{"eds", in_source_tree("config/examples/standard-drive.eds")}};
+    axis.model_settings = {{"eds", in_source_tree("config/examples/standard-drive.eds")},
+                           {"velocity_unit", std::string("pulses_per_second")}};
     const auto* base = find_drive_model("cia402");
     auto made = base->specialise(*base, axis.model_settings);
     if (!made) throw std::invalid_argument(to_string(made.error()));

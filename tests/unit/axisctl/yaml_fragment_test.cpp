@@ -79,10 +79,16 @@ TEST(YamlFragment, ADriveByCia402NeedsItsDataSheet) {
   EXPECT_THAT(fragment,
               HasSubstr("  axis-7:   # Standard servo 402, vendor 0x00000A5A, product 0x00402001\n"));
   EXPECT_THAT(fragment, HasSubstr("    model: cia402\n"));
-  const std::string placeholder = "axis-7.eds";
-  const auto at = fragment.find(placeholder);
-  ASSERT_NE(at, std::string::npos) << fragment;
-  fragment.replace(at, placeholder.size(), test::in_source_tree("config/examples/standard-drive.eds"));
+  const auto fill_in = [&fragment](const std::string& placeholder, const std::string& value) {
+    const auto at = fragment.find(placeholder);
+    ASSERT_NE(at, std::string::npos) << fragment;
+    fragment.replace(at, placeholder.size(), value);
+  };
+  fill_in("axis-7.eds", test::in_source_tree("config/examples/standard-drive.eds"));
+  const auto untold = load(fragment, "canopen: { interface: sim }");
+  ASSERT_FALSE(untold.configuration) << "no unit may be guessed";
+  EXPECT_THAT(to_string(untold.diagnostics.at(0)), HasSubstr("drive: { velocity_unit: UNIT }"));
+  fill_in("# velocity_unit: UNIT", "velocity_unit: pulses_per_second");
   const auto result = load(fragment, "canopen: { interface: sim }");
   EXPECT_TRUE(result.configuration) << fragment << to_string(result.diagnostics.at(0));
 }
