@@ -19,6 +19,11 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
+/// Unit objects, in decimal as a configuration has whole numbers: 00B44700h, 00010300h (metres), 00B45700h
+/// (r/s^2), 00C00300h.
+constexpr std::string_view velocities_in_rpm = "11814656", velocities_in_metres = "66304",
+                           ramps_in_revolutions = "11818752", ramps_in_rpm = "12583680";
+
 constexpr std::string_view template_text = R"(machine: press-1
 buses:
   can0:
@@ -149,19 +154,21 @@ TEST(Eds, TheUnitOfVelocitiesIsNeverGuessed) {
               AllOf(HasSubstr("test.yaml:15:12: "),
                     HasSubstr("nothing in it tells what the drive's velocities count"),
                     HasSubstr("drive: { velocity_unit: UNIT }")));
-  const auto told = [&loaded](const std::string& value) {
-    return loaded("      objects: { 60A9h: { type: u32, access: ro, default: " + value + " } }\n");
+  const auto told = [&loaded](std::string_view value) {
+    return loaded(
+        fmt::format("      objects: {{ 60A9h: {{ type: u32, access: ro, default: {} }} }}\n", value));
   };
-  EXPECT_EQ(told("0x00B44700"), "");
-  EXPECT_THAT(told("0x00010300"), HasSubstr("is not clear: 60A9h is 00010300h")) << "metres";
+  EXPECT_EQ(told(velocities_in_rpm), "");
+  EXPECT_THAT(told(velocities_in_metres), HasSubstr("is not clear: 60A9h is 00010300h"));
 }
 
 TEST(Eds, AKeyThatContradictsTheDriveIsRefused) {
   const auto said = [](const std::string& unit, const std::string& access) {
-    return findings(load(
-        {.velocity = "10 mm/s",
-         .more = "      objects: { 60A9h: { type: u32, access: " + access + ", default: 0x00B44700 } }\n",
-         .velocity_unit = unit}));
+    return findings(
+        load({.velocity = "10 mm/s",
+              .more = fmt::format("      objects: {{ 60A9h: {{ type: u32, access: {}, default: {} }} }}\n",
+                                  access, velocities_in_rpm),
+              .velocity_unit = unit}));
   };
   EXPECT_EQ(said("rpm", "ro"), "");
   EXPECT_THAT(said("pulses_per_second", "ro"),
@@ -175,21 +182,21 @@ TEST(Eds, RampsAndPolarityAreLookedAt) {
   const auto said = [](const std::string& object, const std::string& more = {}) {
     return findings(load({.more = "      objects: { " + object + " }\n" + more}));
   };
-  const std::string odd = "60AAh: { type: u32, access: rw, default: 0x00B45700 }";
+  const auto odd = fmt::format("60AAh: {{ type: u32, access: rw, default: {} }}", ramps_in_revolutions);
   EXPECT_THAT(said(odd), AllOf(HasSubstr("its ramps count something unclear (60AAh is 00B45700h)"),
                                HasSubstr("acceleration_unit: UNIT")));
   EXPECT_EQ(said(odd, "      ramps: time\n"), "");
   EXPECT_EQ(said(odd, "      acceleration_unit: rev_per_second\n"), "");
   EXPECT_THAT(said(odd, "      acceleration_unit: rpm\n      ramps: time\n"),
               HasSubstr("drive.acceleration_unit has no effect with ramps: time"));
-  const std::string in_rpm = "60AAh: { type: u32, access: ro, default: 0x00C00300 }";
+  const auto in_rpm = fmt::format("60AAh: {{ type: u32, access: ro, default: {} }}", ramps_in_rpm);
   EXPECT_EQ(said(in_rpm), "");
   EXPECT_THAT(
       said(in_rpm, "      ramps: time\n"),
       HasSubstr("its ramps count r/min per second (60AAh is 00C00300h), and the axis is planned with times"));
-  EXPECT_THAT(said("607Eh: { type: u8, access: rw, default: 0x80 }"),
+  EXPECT_THAT(said("607Eh: { type: u8, access: rw, default: 128 }"),
               HasSubstr("it turns positions or velocities round, and not both (607Eh is 80h)"));
-  EXPECT_EQ(said("607Eh: { type: u8, access: rw, default: 0xC0 }"), "");
+  EXPECT_EQ(said("607Eh: { type: u8, access: rw, default: 192 }"), "");
 }
 
 TEST(Eds, TerminalsHaveOneFunctionEach) {
