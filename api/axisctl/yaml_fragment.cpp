@@ -38,7 +38,7 @@ std::string described_entry(const std::string& name, const v1::FoundNode& node,
       "    limits: {{ velocity: 1 rev/s }}\n"
       "    drive:\n"
       "      eds: axis-{}.eds   # the data sheet of the drive, from its maker\n"
-      "      # velocity_unit: UNIT   # where the data sheet does not tell it: what 6081h counts by the manual\n",
+      "      # velocity_unit: UNIT   # what 6081h counts, where the data sheet does not tell it\n",
       name, node.note().empty() ? "" : node.note() + ", ", node.vendor(), node.product(), context.bus,
       node.node(), node.model(), node.node());
 }
