@@ -21,7 +21,8 @@ std::string summary(const BusBudgetReport& report);
 std::vector<std::string> warnings(const BusBudgetReport& report);
 /// The same of all of them.
 std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports);
-/// The same of all buses, position_warnings() and file_warnings(). Precondition: that of budgets().
+/// The same of all buses, position_warnings(), start_warnings() and file_warnings(). Precondition: that of
+/// budgets().
 std::vector<std::string> warnings(const Configuration& configuration);
 
 }  // namespace axisd::config

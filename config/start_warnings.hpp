@@ -8,8 +8,8 @@
 
 namespace axisd::config {
 
-/// One line each: "axis feeder: a start needs an SDO answer within reboot_guard (100 ms) ...". Precondition:
-/// the loader found no error in `configuration`.
+/// One line each: "axis feeder: a start is proven by 1 SDO answer within reboot_guard (50 ms), and takes
+/// ...". Precondition: the loader found no error in `configuration`.
 std::vector<std::string> start_warnings(const Configuration& configuration);
 
 }  // namespace axisd::config

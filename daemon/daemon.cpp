@@ -24,6 +24,7 @@
 #include "config/budget.hpp"
 #include "config/file_warnings.hpp"
 #include "config/position_warnings.hpp"
+#include "config/start_warnings.hpp"
 #include "daemon/configuration_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
@@ -228,6 +229,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
   const auto budgets = config::budgets(configuration);
   for (const auto& budget : budgets) log_budget(budget);
   for (const auto& warning : config::position_warnings(configuration)) spdlog::warn("{}", warning);
+  for (const auto& warning : config::start_warnings(configuration)) spdlog::warn("{}", warning);
   for (const auto& warning : config::file_warnings(configuration)) spdlog::warn("{}", warning);
   const auto instance_id = make_instance_id((*state)->state().loaded().start_count);
   core::MachineService* published_to = nullptr;
