@@ -29,6 +29,12 @@ struct Entry {
         bytes((static_cast<unsigned>(value) & 0xFFU) / 8) {}
 };
 
+/// A PDO whose COB-ID is this is there. 0, as of an object that does not exist, is NMT's.
+bool is_valid(std::int64_t cob) {
+  const auto bits = static_cast<std::uint32_t>(cob);
+  return (bits & invalid) == 0 && (bits & 0x7FFU) != 0;
+}
+
 std::uint16_t at(std::uint16_t first, int number) { return static_cast<std::uint16_t>(first + number); }
 
 void add_one(CanopenDictionary& dictionary, const PdoSettings& settings, std::uint16_t parameters,
@@ -168,13 +174,11 @@ void CanopenPdos::set_operational(bool operational, TimePoint now) {
 }
 
 bool CanopenPdos::listens(int number) const {
-  return (static_cast<std::uint32_t>(parameter(receive_parameters, number, 1)) & invalid) == 0 &&
-         parameter(receive_mapping, number, 0) > 0;
+  return is_valid(parameter(receive_parameters, number, 1)) && parameter(receive_mapping, number, 0) > 0;
 }
 
 bool CanopenPdos::transmits(int number) const {
-  return operational_ &&
-         (static_cast<std::uint32_t>(parameter(transmit_parameters, number, 1)) & invalid) == 0 &&
+  return operational_ && is_valid(parameter(transmit_parameters, number, 1)) &&
          parameter(transmit_mapping, number, 0) > 0;
 }
 

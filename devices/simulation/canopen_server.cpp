@@ -221,8 +221,10 @@ void CanopenServer::emergency(std::uint16_t code, std::uint8_t error_register,
                               std::array<std::uint8_t, 5> vendor) {
   dictionary_->set(error_register_index, 0, error_register);
   if (code != 0) {
+    constexpr std::uint8_t most = 254;  // CiA 301 7.5.2.4
     std::uint8_t last = 0;
-    while (dictionary_->find(error_history, static_cast<std::uint8_t>(last + 1)) != nullptr) ++last;
+    while (last < most && dictionary_->find(error_history, static_cast<std::uint8_t>(last + 1)) != nullptr)
+      ++last;
     for (auto sub = last; sub > 1; --sub)
       dictionary_->set(error_history, sub,
                        dictionary_->get(error_history, static_cast<std::uint8_t>(sub - 1)));

@@ -1,4 +1,6 @@
 // A simulated drive is what its data sheet says: the example's, and the example with parts taken out.
+#include <fmt/format.h>
+
 #include <fstream>
 #include <memory>
 #include <sstream>
@@ -156,12 +158,38 @@ TEST(SimulatedSheet, HasThePdosOfTheFile) {
   EXPECT_FALSE(bench.run(5ms).empty()) << "6041h, by event";
 }
 
+/// A flawed file: a mapping whose PDO has no identifier.
+TEST(SimulatedSheet, APdoWithoutIdentifierIsNone) {
+  auto text = example();
+  take_out(text, "1801sub1");
+  change(text, "1A01sub0", "DefaultValue", "1");
+  change(text, "1A01sub1", "DefaultValue", "0x60640020");
+  Bench bench(made_of(text));
+  bench.put(0x000, {0x01, 0x01});
+  for (const auto& frame : bench.run(100ms)) EXPECT_NE(frame.id, 0U) << "that is NMT";
+}
+
 TEST(SimulatedSheet, CountsItsErrors) {
   Bench bench(made_of(example()));
   EXPECT_EQ(bench.read(0x1003), 0);
   bench.drive().raise_alarm(0x2310);
   EXPECT_EQ(bench.read(0x1003), 1);
   EXPECT_EQ(bench.read(0x1003, 1), 0x2310);
+}
+
+/// One entry more than there can be.
+TEST(SimulatedSheet, HasAtMost254Errors) {
+  auto text = example();
+  for (int sub = 5; sub <= 255; ++sub)
+    text += fmt::format(
+        "\n[1003sub{:X}]\nParameterName=Error\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\n", sub);
+  Bench bench(made_of(text));
+  for (int i = 0; i < 300; ++i) {
+    bench.drive().raise_alarm(0x2310);
+    bench.control(0x00);
+    bench.control(0x80);
+  }
+  EXPECT_EQ(bench.read(0x1003), 254);
 }
 
 }  // namespace
