@@ -124,16 +124,25 @@ class Values {
       : dictionary_(&dictionary), sheet_(&sheet) {}
 
   void set(std::uint16_t index, std::uint8_t sub, double value) {
+    if (const auto* object = sheet_->find(Object{index, sub}); object != nullptr && !object->known())
+      replace(index, sub, value);
+  }
+  /// No shaft stays within a window of 0: nobody has set that one.
+  void set_window(std::uint16_t index, double value) {
+    const auto* object = sheet_->find(Object{index, 0});
+    if (object != nullptr && (!object->known() || object->known()->value == 0)) replace(index, 0, value);
+  }
+
+ private:
+  void replace(std::uint16_t index, std::uint8_t sub, double value) {
     const auto* row = dictionary_->find(index, sub);
-    const auto* object = sheet_->find(Object{index, sub});
-    if (row == nullptr || object == nullptr || object->known() || !row->text.empty()) return;
+    if (row == nullptr || !row->text.empty()) return;
     auto changed = *row;
     const auto low = static_cast<double>(row->minimum), high = static_cast<double>(row->maximum);
     changed.default_value = static_cast<std::int64_t>(std::clamp(std::round(value), low, high));
     dictionary_->add(changed);
   }
 
- private:
   CanopenDictionary* dictionary_;
   const canopen::Eds* sheet_;
 };
@@ -180,8 +189,8 @@ void set_profile_values(Values& values, const CanopenDictionary& dictionary,
   const auto speed = std::max(1.0, 1 / units.velocity), ramp = std::max(1.0, 10 / units.acceleration);
   values.set(0x605A, 0, 2);
   values.set(0x605D, 0, 1);
-  values.set(0x6065, 0, 2 / units.position);
-  values.set(0x6067, 0, 10);
+  values.set_window(0x6065, 2 / units.position);
+  values.set_window(0x6067, 10);
   values.set(0x6068, 0, 5);
   values.set(0x607D, 1, std::numeric_limits<std::int32_t>::min());
   values.set(0x607D, 2, std::numeric_limits<std::int32_t>::max());

@@ -101,6 +101,24 @@ TEST(SimulatedSheet, BrakesWithTheAccelerationWhereItHasNoOther) {
   EXPECT_NEAR(bench.position() - before, 1'000, 1) << "10,000 inc/s with 50,000 inc/s^2";
 }
 
+/// As files have it of drives that nobody has set up.
+TEST(SimulatedSheet, AWindowOf0InTheFileIsLeftOpen) {
+  auto text = example();
+  change(text, "6065", "DefaultValue", "0");
+  change(text, "6067", "DefaultValue", "0");
+  auto settings = made_of(text);
+  settings.encoder = {.noise = 1, .following = 3ms};
+  Bench bench(settings);
+  bench.enable(1);
+  bench.move(10'000);
+  bench.run(3s);
+  EXPECT_EQ(bench.status() & 0x6FU, 0x27U) << "no following error";
+  EXPECT_NEAR(bench.position(), 10'000, 1);
+  EXPECT_TRUE(bench.bit(10));
+  EXPECT_EQ(bench.write(0x6067, 4, 0), 0U) << "it can be set to 0 all the same";
+  EXPECT_EQ(bench.read(0x6067), 0);
+}
+
 TEST(SimulatedSheet, HasSwitchesThatItDoesNotShow) {
   auto text = example();
   take_out(text, "60FD");
