@@ -41,8 +41,12 @@ std::optional<SiUnit> si_unit(const CanopenDictionary& dictionary, std::uint16_t
                 .denominator = bits >> 8U & 0xFFU};
 }
 
+// One byte each, notation with a sign, whatever type the file gives them.
 double notation(const CanopenDictionary& dictionary, std::uint16_t index) {
-  return power_of_ten(dictionary.get(index));
+  return power_of_ten(static_cast<std::int8_t>(dictionary.get(index)));
+}
+std::int64_t dimension(const CanopenDictionary& dictionary, std::uint16_t index) {
+  return dictionary.get(index) & 0xFF;
 }
 
 /// Counts of the encoder per revolution.
@@ -71,7 +75,7 @@ std::optional<double> turns_of(unsigned unit, double encoder) {
 double position_of(const CanopenDictionary& dictionary, double encoder) {
   if (const auto unit = si_unit(dictionary, 0x60A8))
     if (const auto turns = turns_of(unit->numerator, encoder)) return unit->factor * *turns;
-  if (dictionary.get(0x608A) == degree_index) return notation(dictionary, 0x6089) / degrees;
+  if (dimension(dictionary, 0x608A) == degree_index) return notation(dictionary, 0x6089) / degrees;
   return 1 / encoder;
 }
 
@@ -81,7 +85,7 @@ std::optional<double> told_velocity(const CanopenDictionary& dictionary, double 
     if (turns && unit->denominator == second) return unit->factor * *turns;
     if (turns && unit->denominator == minute_unit) return unit->factor * *turns / minute;
   }
-  if (dictionary.get(0x608C) == rpm_index) return notation(dictionary, 0x608B) / minute;
+  if (dimension(dictionary, 0x608C) == rpm_index) return notation(dictionary, 0x608B) / minute;
   return std::nullopt;
 }
 
@@ -107,9 +111,9 @@ std::optional<double> told_acceleration(const CanopenDictionary& dictionary, dou
     const auto turns = turns_of(unit->numerator, encoder);
     if (turns && unit->denominator == second_squared) return unit->factor * *turns;
   }
-  const auto dimension = dictionary.get(0x608E);
-  if (dimension == rpm_index) return notation(dictionary, 0x608D) / minute;  // and per second
-  if (dimension == revolution_per_second_squared_index) return notation(dictionary, 0x608D);
+  const auto index = dimension(dictionary, 0x608E);
+  if (index == rpm_index) return notation(dictionary, 0x608D) / minute;  // and per second
+  if (index == revolution_per_second_squared_index) return notation(dictionary, 0x608D);
   return std::nullopt;
 }
 

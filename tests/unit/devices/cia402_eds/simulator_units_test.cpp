@@ -63,6 +63,8 @@ TEST(ShaftUnits, FollowTheSiUnits) {
 TEST(ShaftUnits, FollowTheOlderIndices) {
   EXPECT_DOUBLE_EQ(units_with({{0x608C, 0xA4}, {0x608B, 0}}).velocity, 1.0 / 60);
   EXPECT_DOUBLE_EQ(units_with({{0x608C, 0xA4}, {0x608B, -1}}).velocity, 0.1 / 60);
+  EXPECT_DOUBLE_EQ(units_with({{0x608C, 0xA4}, {0x608B, 0xFF}}).velocity, 0.1 / 60) << "as unsigned";
+  EXPECT_DOUBLE_EQ(units_with({{0x608C, static_cast<std::int8_t>(0xA4)}}).velocity, 1.0 / 60) << "as signed";
   EXPECT_DOUBLE_EQ(units_with({{0x608C, 0}}).velocity, 1.0 / 4000);
   EXPECT_DOUBLE_EQ(units_with({{0x608E, 0xA4}}).acceleration, 1.0 / 60);
   EXPECT_DOUBLE_EQ(units_with({{0x608E, 0xAF}}).acceleration, 1);
