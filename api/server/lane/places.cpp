@@ -9,6 +9,8 @@ namespace axisd::server::lane {
 
 namespace {
 
+constexpr auto anybody = [](const auto& /*place*/) { return true; };
+
 std::string most_of(const std::map<std::string, int>& counts) {
   const auto most = std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; });
   return most == counts.end() ? std::string() : most->first;
@@ -30,11 +32,11 @@ std::map<std::string, int> Places::count(bool known, Of of) const {
   return counts;
 }
 
-std::optional<Places::Id> Places::oldest_stranger(const std::string* address, Id but) const {
+template <class May>
+std::optional<Places::Id> Places::oldest_stranger(Id but, May may) const {
   const Entry* oldest = nullptr;
   for (const auto& entry : all_) {
-    if (entry.first == but || entry.second.known) continue;
-    if (address != nullptr && entry.second.address != *address) continue;
+    if (entry.first == but || entry.second.known || !may(entry.second)) continue;
     if (oldest == nullptr || entry.second.since < oldest->second.since) oldest = &entry;
   }
   return oldest == nullptr ? std::nullopt : std::optional(oldest->first);
@@ -52,14 +54,20 @@ std::optional<Places::Id> Places::idlest(const std::string& identity, Id but) co
   return idlest == nullptr ? std::nullopt : std::optional(idlest->first);
 }
 
-std::optional<Places::Id> Places::enter(Id id, const std::string& address, TimePoint now) {
-  all_[id] = {.address = address, .identity = {}, .since = now, .used = now};
-  const auto strangers = count(false, &Place::address);
-  if (strangers.at(address) > limits_.strangers_per_address) return oldest_stranger(&address, id);
+std::optional<Places::Id> Places::enter(Id id, Origin origin, TimePoint now) {
+  all_[id] = {.address = origin.address,
+              .network = std::move(origin.network),
+              .identity = {},
+              .since = now,
+              .used = now};
+  if (count(false, &Place::address).at(origin.address) > limits_.strangers_per_address)
+    return oldest_stranger(id, [&](const Place& place) { return place.address == origin.address; });
+  const auto strangers = count(false, &Place::network);
   if (total(strangers) > limits_.strangers) {
-    // Where each address has one, the oldest goes, whatever its address is.
+    // Where each network has one, the oldest goes, whatever its network is.
     const auto most = most_of(strangers);
-    return oldest_stranger(strangers.at(most) > 1 ? &most : nullptr, id);
+    const bool any = strangers.at(most) == 1;
+    return oldest_stranger(id, [&](const Place& place) { return any || place.network == most; });
   }
   if (std::cmp_less_equal(all_.size(), limits_.connections)) return std::nullopt;
   return idlest(most_of(count(true, &Place::identity)), id);
@@ -82,18 +90,18 @@ void Places::used(Id id, TimePoint now, int waiting) {
 }
 
 std::optional<Places::Id> Places::overdue(TimePoint now) const {
-  const auto oldest = oldest_stranger(nullptr, Id{});
+  const auto oldest = oldest_stranger(Id{}, anybody);
   if (!oldest || all_.at(*oldest).since + limits_.introduction > now) return std::nullopt;
   return oldest;
 }
 
 std::optional<Places::Id> Places::least_needed() const {
-  if (const auto stranger = oldest_stranger(nullptr, Id{})) return stranger;
+  if (const auto stranger = oldest_stranger(Id{}, anybody)) return stranger;
   return idlest(most_of(count(true, &Place::identity)), Id{});
 }
 
 TimePoint Places::next_due() const {
-  const auto oldest = oldest_stranger(nullptr, Id{});
+  const auto oldest = oldest_stranger(Id{}, anybody);
   return oldest ? all_.at(*oldest).since + limits_.introduction : TimePoint::max();
 }
 

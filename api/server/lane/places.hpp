@@ -12,10 +12,10 @@
 namespace axisd::server::lane {
 
 /// The newest connection always gets a place: whoever wants to stop connects now. What makes room is a
-/// stranger (not identified yet) from the address with most of them, or a connection of the identity with
-/// most of them: first one on which nothing was ever asked, then the one that is idle for longest. So an
-/// identity with one connection loses it last of all, and nobody takes another's place by opening many.
-/// Thread: one at a time.
+/// stranger (not identified yet) from an address that has too many of them, or from the network with most, or
+/// a connection of the identity with most of them: first one on which nothing was ever asked, then the one
+/// that is idle for longest. So an identity with one connection loses it last of all, and nobody takes
+/// another's place by opening many. Thread: one at a time.
 class Places {
  public:
   using Id = std::uint64_t;
@@ -30,8 +30,13 @@ class Places {
 
   explicit Places(Limits limits) : limits_(limits) {}
 
+  /// Where a stranger comes from. One computer may have all addresses of its network, but as a rule has one.
+  struct Origin {
+    std::string address, network;
+  };
+
   /// A new connection, which nobody has identified yet. The connection to close for it, if any.
-  [[nodiscard]] std::optional<Id> enter(Id id, const std::string& address, TimePoint now);
+  [[nodiscard]] std::optional<Id> enter(Id id, Origin origin, TimePoint now);
   /// It is this client's; `local`: of whoever is on this computer. The connection to close for it, if any.
   [[nodiscard]] std::optional<Id> identify(Id id, const std::string& identity, bool local, TimePoint now);
   /// It carried a complete request.
@@ -50,7 +55,7 @@ class Places {
 
  private:
   struct Place {
-    std::string address, identity;
+    std::string address, network, identity;
     bool known = false, asked = false;
     TimePoint since{}, used{};
     int waiting = 0;
@@ -58,7 +63,8 @@ class Places {
   using Entry = std::pair<const Id, Place>;
   template <class Of>
   [[nodiscard]] std::map<std::string, int> count(bool known, Of of) const;
-  [[nodiscard]] std::optional<Id> oldest_stranger(const std::string* address, Id but) const;
+  template <class May>
+  [[nodiscard]] std::optional<Id> oldest_stranger(Id but, May may) const;
   [[nodiscard]] std::optional<Id> idlest(const std::string& identity, Id but) const;
 
   Limits limits_;

@@ -214,7 +214,7 @@ void StopLane::Loop::let_in_from_inside() {
 void StopLane::Loop::enter(FileDescriptor socket, const std::string& host, bool encrypted) {
   const auto id = ++last_;
   const auto now = monotonic_now();
-  const auto address = address_of_peer(socket.get());
+  auto network = address_of_peer(socket.get());
   auto acceptor = encrypted ? acceptor_ : nullptr;
   const bool anonymous = acceptor == nullptr;
   auto& peer = peers_[id];
@@ -222,7 +222,7 @@ void StopLane::Loop::enter(FileDescriptor socket, const std::string& host, bool 
   peer.connection = std::make_unique<Connection>(
       std::move(socket), std::move(acceptor), [this, id](const lane::Http2::Call& call) { begin(id, call); },
       now);
-  close(places_.enter(id, address, now));
+  close(places_.enter(id, {.address = host, .network = std::move(network)}, now));
   if (anonymous) identify(id, peer);
 }
 

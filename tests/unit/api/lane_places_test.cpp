@@ -1,6 +1,8 @@
 // Who keeps a connection to the stop lane.
 #include <gtest/gtest.h>
 
+#include <string>
+
 #include "api/server/lane/places.hpp"
 
 namespace axisd::testing {
@@ -27,7 +29,7 @@ class StopPlaces : public ::testing::Test {
       gone.push_back(*each);
       places_.leave(*each);
     };
-    leave(places_.enter(id, "10.0.0.9", at(when)));
+    leave(places_.enter(id, {"10.0.0.9", "10.0.0.9"}, at(when)));
     leave(places_.identify(id, identity, false, at(when)));
     return gone;
   }
@@ -36,22 +38,39 @@ class StopPlaces : public ::testing::Test {
 };
 
 TEST_F(StopPlaces, StrangersOfOneAddressTakeEachOthersPlace) {
-  EXPECT_FALSE(places_.enter(1, "a", at(1ms)));
-  EXPECT_FALSE(places_.enter(2, "a", at(2ms)));
-  EXPECT_EQ(places_.enter(3, "a", at(3ms)), 1U);
+  EXPECT_FALSE(places_.enter(1, {"a", "a"}, at(1ms)));
+  EXPECT_FALSE(places_.enter(2, {"a", "a"}, at(2ms)));
+  EXPECT_EQ(places_.enter(3, {"a", "a"}, at(3ms)), 1U);
 }
 
-TEST_F(StopPlaces, StrangersInAllTakeThatOfTheAddressWithMost) {
-  for (Places::Id id = 1; id <= 2; ++id) EXPECT_FALSE(places_.enter(id, "a", at(id * 1ms)));
-  EXPECT_FALSE(places_.enter(3, "b", at(3ms)));
-  EXPECT_FALSE(places_.enter(4, "c", at(4ms)));
-  EXPECT_EQ(places_.enter(5, "d", at(5ms)), 1U);
+TEST_F(StopPlaces, StrangersInAllTakeThatOfTheNetworkWithMost) {
+  for (Places::Id id = 1; id <= 2; ++id) EXPECT_FALSE(places_.enter(id, {"a", "a"}, at(id * 1ms)));
+  EXPECT_FALSE(places_.enter(3, {"b", "b"}, at(3ms)));
+  EXPECT_FALSE(places_.enter(4, {"c", "c"}, at(4ms)));
+  EXPECT_EQ(places_.enter(5, {"d", "d"}, at(5ms)), 1U);
+}
+
+/// As in an IPv6 network: one computer has as many addresses as it likes, and others of its network have one.
+TEST_F(StopPlaces, AnAddressHasAShareOfItsOwnInItsNetwork) {
+  for (Places::Id id = 1; id <= 2; ++id) EXPECT_FALSE(places_.enter(id, {"n::1", "n"}, at(id * 1ms)));
+  EXPECT_FALSE(places_.enter(3, {"n::2", "n"}, at(3ms))) << "that of a neighbour is none of its business";
+  EXPECT_EQ(places_.enter(4, {"n::1", "n"}, at(4ms)), 1U) << "nor does it take the neighbour's";
+}
+
+TEST_F(StopPlaces, ManyAddressesOfANetworkPushOutNoOtherOne) {
+  EXPECT_FALSE(places_.enter(1, {"10.0.0.1", "10.0.0.1"}, at(1ms)));
+  for (Places::Id id = 2; id <= 4; ++id)
+    EXPECT_FALSE(places_.enter(id, {"n::" + std::to_string(id), "n"}, at(id * 1ms)));
+  for (Places::Id id = 5; id <= 9; ++id) {
+    EXPECT_EQ(places_.enter(id, {"n::" + std::to_string(id), "n"}, at(id * 1ms)), id - 3);
+    places_.leave(id - 3);
+  }
 }
 
 TEST_F(StopPlaces, AStrangerHasItsTime) {
   EXPECT_EQ(places_.next_due(), TimePoint::max());
-  EXPECT_FALSE(places_.enter(1, "a", at(0s)));
-  EXPECT_FALSE(places_.enter(2, "b", at(1s)));
+  EXPECT_FALSE(places_.enter(1, {"a", "a"}, at(0s)));
+  EXPECT_FALSE(places_.enter(2, {"b", "b"}, at(1s)));
   EXPECT_EQ(places_.next_due(), at(3s));
   EXPECT_FALSE(places_.overdue(at(2999ms)));
   EXPECT_EQ(places_.overdue(at(3s)), 1U);
@@ -86,10 +105,10 @@ TEST_F(StopPlaces, WhoNeverAskedGoesBeforeWhoDid) {
 
 TEST_F(StopPlaces, AComputersOwnClientsShareMore) {
   for (Places::Id id = 1; id <= 5; ++id) {
-    EXPECT_FALSE(places_.enter(id, "localhost", at(id * 1ms)));
+    EXPECT_FALSE(places_.enter(id, {"localhost", "localhost"}, at(id * 1ms)));
     EXPECT_FALSE(places_.identify(id, "local:localhost", true, at(id * 1ms)));
   }
-  EXPECT_FALSE(places_.enter(6, "localhost", at(6ms)));
+  EXPECT_FALSE(places_.enter(6, {"localhost", "localhost"}, at(6ms)));
   EXPECT_EQ(places_.identify(6, "local:localhost", true, at(6ms)), 1U);
 }
 
