@@ -152,6 +152,6 @@ say "Done"
 cat <<END
 To go on in this shell as README.md does, type:
   $path
-  axisd --config config/examples/demo.yaml >/tmp/axisd-demo.log 2>&1 &
+  axisd --config config/examples/demo.yaml >/tmp/axisd-demo.log 2>&1 & sleep 2
   axisctl list
 END
