@@ -57,8 +57,9 @@ constexpr auto units = std::to_array<Unit>({
     {"hour", Kind::time, 3'600'000'000'000},
 });
 
-/// Also in capitals and in the plural.
+/// Also in capitals and in the plural. A capital alone is none: M is no metre.
 const Unit* find(std::string_view text) {
+  if (text.size() == 1 && text[0] < 'a') return nullptr;
   std::string name(text);
   std::ranges::transform(name, name.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
   auto found = std::ranges::find(units, name, &Unit::name);

@@ -49,7 +49,7 @@ TEST(Quantity, WhatMeasuresSomethingElseIsRefusedWithTheUnitsThatFit) {
             "--velocity: unit 'mm' does not fit here; write it in deg/s, deg/min, rev/s or rpm");
   EXPECT_EQ(refusal([] { parse_value("10mm", "pieces", "position"); }),
             "position: unit 'mm' does not fit here; write it in pieces");
-  for (const char* text : {"1 rev", "1 mm/s", "5 s", "1 rpm", "1 mm/x", "1 pulses"})
+  for (const char* text : {"1 rev", "1 mm/s", "5 s", "1 rpm", "1 mm/x", "1 pulses", "5M"})
     EXPECT_THAT(refusal([&] { parse_value(text, "mm", "position"); }), HasSubstr("write it in mm")) << text;
 }
 
