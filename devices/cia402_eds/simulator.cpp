@@ -183,11 +183,16 @@ void StandardDrive::follow(TimePoint now) {
   if (!energised()) encoder_.relax();
   const bool held = motor_.blocked() || motor_.moving() || energised();
   if (const auto pulses = encoder_.slipped(now, !held); pulses != 0) motor_.push(pulses, powered_);
+  watch_window();
+}
+
+/// 6067h counts from the end of the ramp on.
+void StandardDrive::watch_window() {
   const auto most = window(0x6067);
-  if (!reached_ || (most && std::llabs(encoder_.deviation(motor_, now)) > *most))
+  if (!reached_ || (most && std::llabs(encoder_.deviation(motor_, now_)) > *most))
     in_window_since_.reset();
   else if (!in_window_since_)
-    in_window_since_ = now;
+    in_window_since_ = now_;
 }
 
 bool StandardDrive::in_position() const {

@@ -80,6 +80,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   /// When a bit of the status word shows what it was slow to tell.
   [[nodiscard]] TimePoint late_bits_event() const;
   void follow(TimePoint now);
+  void watch_window();
   /// Counts beyond which the encoder's deviation is a following error (6065h), or not in position (6067h);
   /// nothing: this is not watched.
   [[nodiscard]] std::optional<std::int64_t> window(std::uint16_t index) const;

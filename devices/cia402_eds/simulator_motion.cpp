@@ -174,6 +174,7 @@ void StandardDrive::on_stopped() {
     return;
   }
   reached_ = !limited_;
+  watch_window();
   if (behaviour_.acknowledgement_ends_with_motion) acknowledged_ = false;
   if (auto next = std::exchange(buffered_, std::nullopt)) {
     if ((control_ & 0x10U) == 0) acknowledged_ = false;
