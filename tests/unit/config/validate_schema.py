@@ -41,6 +41,7 @@ LOADER_ONLY = {
     "segment_values",
     "segments_mode",
     "simulate_on_real_bus",
+    "simulate_units",
     "simulate_without_effect",
     "start_above_velocity",
     "start_speed",
