@@ -36,6 +36,7 @@ class Stop:
     last: float  # the same of all drives, s
     late: bool  # a drive that answers seemed not to: bytes stayed in the terminal for longer than turnaround_max
     stalls: float  # how long meanwhile bare threads were held back, and bytes in the terminal, s, one after the other
+    frames: list  # (s from its arrival, is a request, frame) meanwhile
 
     def less_stalls(self):
         """`last` without what the computer took beyond what the published bound leaves to it."""
@@ -108,7 +109,8 @@ def judge(line, ours, theirs, waits, silent, arrived):
     stalls = held_back(waits + held_in_terminal(meanwhile, theirs), arrived, arrived + last)
     late = any(asked and asked_again and int(frame[:2], 16) not in silent
                for (_, asked, frame), (_, asked_again, _) in itertools.pairwise(meanwhile))
-    return Stop(answering=max(end for node, end in ends.items() if node not in silent), last=last, late=late, stalls=stalls)
+    return Stop(answering=max(end for node, end in ends.items() if node not in silent), last=last, late=late, stalls=stalls,
+                frames=[(at - arrived, asked, frame) for at, asked, frame in meanwhile])
 
 
 def wait_online(cell, count):
@@ -166,6 +168,13 @@ def milliseconds(values):
     return f"{statistics.median(values) * 1e3:.1f} / {max(values) * 1e3:.1f}"
 
 
+def tell(stop):
+    """Frame by frame."""
+    print(f"\nthe longest, {stop.last * 1e3:.1f} ms, of which {stop.stalls * 1e3:.1f} ms were stalls:")
+    for at, asked, frame in stop.frames:
+        print(f"  {at * 1e3:8.1f} ms {'to  ' if asked else 'from'} {int(frame[:2], 16):3d}: {frame}")
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
@@ -187,6 +196,8 @@ def main():
                 sys.exit("stop_all_bench.py: this computer is too busy: most bytes come too late for the simulated drives")
             met = max(stop.less_stalls() for stop in stops) <= bound
             within = within and met
+            if not met:
+                tell(max(stops, key=Stop.less_stalls))
             rows.append([str(baud), f"{count} of {given.nodes}", since, f"{len(stops)} of {len(all_of_them)}",
                          milliseconds([stop.answering for stop in stops]), milliseconds([stop.last for stop in stops]),
                          f"{max(stop.less_stalls() for stop in stops) * 1e3:.1f}", f"{bound * 1e3:.1f}",
