@@ -231,6 +231,11 @@ void StandardDrive::block_shaft(bool blocked) {
   step(now_);
 }
 
+bool StandardDrive::run_at(double factor) {
+  motor_.run_at(factor);
+  return true;
+}
+
 bool StandardDrive::push_shaft(std::int64_t pulses) {
   if (motor_.blocked() || energised()) return false;
   motor_.push(pulses, powered_);

@@ -39,6 +39,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   void raise_alarm(int code) override;
   [[nodiscard]] std::span<const int> alarms() const override;
   void block_shaft(bool blocked) override;
+  bool run_at(double factor) override;
   bool push_shaft(std::int64_t pulses) override;
   bool lean_on_shaft(int counts) override;
   [[nodiscard]] simulation::Encoder* encoder() override { return &encoder_; }

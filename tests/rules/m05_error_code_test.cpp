@@ -14,7 +14,9 @@ constexpr int following_error = 0x8611;
 
 void raise_in_mid_move(ModelRig& rig) {
   ASSERT_EQ(rig.complete(EnableRequest{}).state, CommandState::done);
-  ASSERT_TRUE(rig.try_submit(MoveRelativeRequest{.distance = 50}));
+  ASSERT_EQ(rig.complete(SetPositionRequest{.position = 100}).state, CommandState::done);
+  const auto move = rig.try_submit(MoveRelativeRequest{.distance = 50});
+  ASSERT_TRUE(move) << to_string(move.error());
   rig.run(400ms);
   rig.touch([](auto& node) { node.raise_alarm(following_error); });
   rig.run(500ms);

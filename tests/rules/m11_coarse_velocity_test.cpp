@@ -25,9 +25,9 @@ CanRigOptions whole_turns() {
   const std::map<std::string, SettingValue> settings{
       {"eds", in_source_tree("config/examples/standard-drive.eds")},
       {"loop_mode", std::string("open")},
-      {"objects.60A9h.type", std::string("u32")},
-      {"objects.60A9h.access", std::string("ro")},
-      {"objects.60A9h.default", std::int64_t{0x00B40300}}};
+      {"objects.60A9h:00.type", std::string("u32")},
+      {"objects.60A9h:00.access", std::string("ro")},
+      {"objects.60A9h:00.default", std::int64_t{0x00B40300}}};
   CanRigOptions options{.model = "cia402", .encoder = {}};
   options.adjust_drive = [settings](simulation::SimulatedNodeSettings& drive) {
     auto sheet = canopen::load_eds(in_source_tree("config/examples/standard-drive.eds"));

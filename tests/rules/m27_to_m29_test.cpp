@@ -257,11 +257,13 @@ TEST(M2, ABrakeIsGivenItsTime) {
   auto began = rig.world.now();
   const auto enable = rig.submit(EnableRequest{});
   EXPECT_TRUE(rig.run_until([&] { return rig.state()->enabled; }, 1s));
-  EXPECT_EQ(rig.try_submit(MoveRelativeRequest{.distance = 1}).error().reason, Reason::disabled);
+  const auto move = rig.submit(MoveRelativeRequest{.distance = 1});  // waits
   rig.run_until([&] { return enable->has_ended(); }, 2s);
   EXPECT_EQ(enable->value().state, CommandState::done);
   EXPECT_GE(rig.world.now() - began, 300ms);
-  EXPECT_EQ(rig.complete(MoveRelativeRequest{.distance = 1}).state, CommandState::done);
+  EXPECT_EQ(rig.triggers(), 0) << "until the brake is open";
+  EXPECT_TRUE(rig.run_until([&] { return move->has_ended(); }, 5s));
+  EXPECT_EQ(move->value().state, CommandState::done) << describe(move->value());
   began = rig.world.now();
   EXPECT_EQ(rig.complete(DisableRequest{}).state, CommandState::done);
   EXPECT_GE(rig.world.now() - began, 200ms);
