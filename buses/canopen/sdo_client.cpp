@@ -93,7 +93,11 @@ void SdoClient::pump(Node& node) {
       node.active->request->options.transaction_class != TransactionClass::stop &&
       clock_->now() >= *node.active->last_sent + settings_.turnaround)
     cut(node);
-  while (!node.active) {
+  node.yields_until.reset();
+  if (node.count() > 0 && !node.never_yields())
+    for (const auto& [id, other] : nodes_)
+      if (const auto until = other->yielded_to_until(clock_->now())) node.yields_until = until;
+  while (!node.active && !node.yields_until) {
     auto request = node.pop();
     if (!request) break;
     begin(node, std::move(request));
@@ -279,6 +283,7 @@ void SdoClient::arm(Node& node) {
     if (node.stop_waits() && node.active->request->options.transaction_class != TransactionClass::stop)
       when = std::min(when, sent + settings_.turnaround);
   }
+  if (!node.active && node.yields_until) when = std::min(when, *node.yields_until);
   for (const auto& lane : node.waiting) {
     for (const auto& request : lane) {
       const auto last = std::min(request->options.deadline, request->options.guard.not_after);

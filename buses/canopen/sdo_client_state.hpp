@@ -63,6 +63,8 @@ struct SdoClient::Node {
   LateReplies late;
   SurplusReplies surplus;
   SdoCounters counters;
+  bool answered = false;                    ///< the last transfer that ended
+  std::optional<TimePoint> yields_until{};  ///< to another node's reply; nothing: it need not
   /// Of so many requests one comes from a lower class than the highest, so that polling starves nobody.
   static constexpr unsigned reservation = 8;
   unsigned bound = 0;  ///< requests that overtook a lower class
@@ -72,6 +74,19 @@ struct SdoClient::Node {
     return waiting.at(std::to_underlying(transaction_class));
   }
   [[nodiscard]] bool stop_waits() const { return !waiting.front().empty(); }
+  /// A stop waits, or what tells whether it has worked.
+  [[nodiscard]] bool never_yields() const {
+    return stop_waits() || !waiting.at(std::to_underlying(TransactionClass::moving_state)).empty();
+  }
+  /// On a full network the reply of the highest node-ID loses each arbitration. So while the reply of a node
+  /// that answered before is overdue (longer than a cycle of SYNC with its PDOs takes), for a while nothing
+  /// is begun at the others but for stops. Nothing: they need not yield to it.
+  [[nodiscard]] std::optional<TimePoint> yielded_to_until(TimePoint now) const {
+    constexpr Duration overdue = std::chrono::milliseconds(20), patience = std::chrono::milliseconds(20);
+    if (!answered || !active || !active->last_sent) return std::nullopt;
+    const auto since = *active->last_sent + overdue;
+    return now < since || now >= since + patience ? std::nullopt : std::optional(since + patience);
+  }
   [[nodiscard]] std::size_t count() const {
     std::size_t sum = 0;
     for (const auto& one : waiting) sum += one.size();

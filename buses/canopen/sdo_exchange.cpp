@@ -94,10 +94,12 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
   auto& target = *found->second;
   if (!target.active) return on_unexpected(target);
   auto& active = *target.active;
+  const bool others_yield = target.yielded_to_until(clock_->now()).has_value();
   auto step = active.transfer.on_reply(parse_sdo_reply(received.frame));
   using Kind = SdoTransfer::Step::Kind;
   if (step.kind == Kind::ignored) return on_unexpected(target);
   target.surplus.on_answer();
+  target.answered = true;
   if (!active.ambiguous) target.late.forget();
   const bool over = step.kind != Kind::send;
   if (over && active.probe) {
@@ -125,6 +127,9 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
     finish(target, fail(std::move(step.error)));
   }
   pump(target);
+  if (!others_yield) return;
+  for (auto& [other, node] : nodes_)
+    if (node->yields_until) pump(*node);
 }
 
 /// Nobody waits for this reply: late, or of a second node with this node-ID.
@@ -142,6 +147,7 @@ void SdoClient::on_due(Node& node) {
     const bool endless = now >= active.limit;
     if (endless || now >= *active.last_sent + timeout) {
       ++node.counters.timeouts;
+      node.answered = false;
       auto error = no_reply_error(active.transfer);
       if (endless && active.limit > active.first_sent + timeout) {
         error.message =

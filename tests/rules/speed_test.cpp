@@ -145,7 +145,7 @@ TEST_P(Speed, AsFastAsToldNeverIs) {
       SCOPED_TRACE((invert ? "inverted, noise " : "noise ") + std::to_string(noise));
       ModelRig rig({.model = GetParam(), .invert = invert, .noise = noise, .free_input = false});
       make_ready(rig);
-      const auto slow = MotionValues{.velocity = 0.5};
+      const auto slow = MotionValues{.velocity = 1};
       expect(rig.complete(MoveAbsoluteRequest{.position = 300}), CommandState::done);
       expect(rig.complete(MoveAbsoluteRequest{.position = 100}), CommandState::done);
       expect(rig.complete(MoveRelativeRequest{.distance = 0.01}), CommandState::done);
