@@ -1,5 +1,5 @@
 # Benchmarks: built on demand (tests/bench/run.sh). That they run to their end is a test of tests/run.sh all, which
-# builds bench_programs in preset dev; the figures are none.
+# builds bench_programs in preset release; the figures are none.
 if(AXISD_SANITIZE)
   return()
 endif()

@@ -1,5 +1,5 @@
 # The scenarios against the built programs on a vcan interface, in guests with a time of their own, two of which fill this
-# computer. Programs with sanitizers do not start there: tests/run.sh takes this from preset dev. All of it takes
+# computer. Programs with sanitizers do not start there: tests/run.sh takes this from preset release. All of it takes
 # half an hour of CPU time: tests/guest/run.sh -v -t 7200 -m 1G env TMPDIR=/dev/shm test_conformance --vcan AXISD AXISD_SIM
 if(NOT AXISD_GRPC OR AXISD_SANITIZE)
   return()

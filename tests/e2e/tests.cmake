@@ -12,7 +12,7 @@ if(AXISD_GRPC)
 endif()
 
 # On SocketCAN, in guests whose kernel has it. AddressSanitizer programs do not start there, so these run the programs of
-# a build without: tests/run.sh builds can_scenarios in preset dev whatever else it runs. Begun
+# a build without: tests/run.sh builds can_scenarios in preset release whatever else it runs. Begun
 # early; a guest's time is its own, so that nobody in it is late.
 if(AXISD_GRPC AND NOT AXISD_SANITIZE)
   add_custom_target(can_scenarios DEPENDS axisd axisd-sim axisctl axisd-link)
