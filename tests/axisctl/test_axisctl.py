@@ -398,7 +398,7 @@ class Offline(AxisctlTest):
         self.assertTrue(self.ok("schema").startswith("{"))
 
     def test_usage(self):
-        for words in ([], ["move"], ["move", "feeder"], ["fly"], ["move", "feeder", "1", "--velcity", "2"],
+        for words in ([], ["move"], ["move", "feeder"], ["fly"], ["move", "feeder", "1", "--colour", "2"],
                       ["completion", "tcsh"], ["command"]):
             self.assertRegex(self.fails(2, *words), r"see 'axisctl.* --help'$")
         self.assertIn("--timeout", self.fails(2, "--timeout", "5", "list"))

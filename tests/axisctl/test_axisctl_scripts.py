@@ -46,8 +46,8 @@ class Run(FileTest):
 
     def test_nothing_is_executed_before_all_lines_are_right(self):
         for line, why in (("move feeder", "VALUE is required"), ("fly feeder", "see 'axisctl --help'"),
-                          ("move feeder 1 --velcity 2", "see 'axisctl move --help'"), ("run x", "cannot run another"),
-                          ("move --help", "no place in a script"), ("move 'feeder 1", "a quotation has no end")):
+                          ("move feeder 1 --velcity 2", "did you mean '--velocity'?"),
+                          ("run x", "cannot run another"), ("move --help", "no place in a script"), ("move 'feeder 1", "a quotation has no end")):
             path = self.script("enable feeder", line)
             for words in (("run", path), ("run", path, "--check")):
                 complaint = self.fails(2, *words)

@@ -48,7 +48,7 @@ class Pymodbus(Scenario):
         return [write for before, write in zip([None, *writes], writes) if write != before or write[0] == 0x0027]
 
     def test_enable_and_move(self):
-        machine = self.machine({"motor": spinner()})
+        machine = self.machine({"motor": spinner(limits="{ velocity: 50 rev/s, acceleration_time: 150 ms }")})
         bridge = Bridge(machine.directory)
         self.addCleanup(bridge.close)
         self.log = pathlib.Path(machine.path("bank"))
@@ -73,9 +73,9 @@ class Pymodbus(Scenario):
                                deceleration_time=0.1)
         self.assertEqual(self.writes()[before:], [(0x0020, [5, 200, 100, 300, 0, 2500]), (0x0027, [5])])
         before = len(self.writes())
-        machine.client.to_done("MoveRelative", "motor", distance=-100.0, velocity=5.0)
+        machine.client.to_done("MoveRelative", "motor", distance=-100.0, velocity=50.0)
         # -97500 pulses, high word first, two's complement.
-        self.assertEqual(self.writes()[before:], [(0x0020, [5, 150, 150, 300, 0xFFFE, 0x8324]), (0x0027, [5])])
+        self.assertEqual(self.writes()[before:], [(0x0020, [5, 150, 150, 3000, 0xFFFE, 0x8324]), (0x0027, [5])])
         self.assertEqual(machine.client.state("motor").position, -97.5)
         self.assert_command(machine.client.motion("Stop", "motor", wait=DONE), "DONE")
         self.assertEqual(self.writes()[-1], (0x0028, [0]))
