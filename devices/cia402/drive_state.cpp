@@ -234,6 +234,8 @@ DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
     else if (live_->moved || sample.asked_at - live_->since >= start_window)
       live_.reset();
   }
+  // Where no bit shows it the state goes on while a terminal has released the motor.
+  if (model_->status.enabled == 0 && input_active(sample, {"motor_free"})) sample.enabled = false;
   sample.mode = mode_of(sample, reading);
   // A bit that is left from an earlier homing says nothing about the last one; of CiA 402's bit 12 nothing is
   // left in another mode.

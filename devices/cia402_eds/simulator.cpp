@@ -174,7 +174,7 @@ std::optional<std::int64_t> StandardDrive::window(std::uint16_t index) const {
 
 /// What the load and the encoder do meanwhile.
 void StandardDrive::follow(TimePoint now) {
-  constexpr double settling = 30, longest = 0.05;  // counts, seconds
+  constexpr double settling = 30, longest = 0.025;  // counts, seconds
   auto following = encoder_.settings().following;
   if (behaviour_.settles_over_30_counts)  // at the end of a ramp it is behind by ramp x time^2
     following = std::max(following, std::chrono::round<Duration>(std::chrono::duration<double>(
