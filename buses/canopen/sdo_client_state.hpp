@@ -63,7 +63,8 @@ struct SdoClient::Node {
   LateReplies late;
   SurplusReplies surplus;
   SdoCounters counters;
-  bool answered = false;                    ///< the last transfer that ended
+  /// The longest of late that nobody yielded to; nothing: it has not answered, or not the last time.
+  std::optional<Duration> usual_answer{};
   std::optional<TimePoint> yields_until{};  ///< to another node's reply; nothing: it need not
   /// Of so many requests one comes from a lower class than the highest, so that polling starves nobody.
   static constexpr unsigned reservation = 8;
@@ -78,14 +79,17 @@ struct SdoClient::Node {
   [[nodiscard]] bool never_yields() const {
     return stop_waits() || !waiting.at(std::to_underlying(TransactionClass::moving_state)).empty();
   }
-  /// On a full network the reply of the highest node-ID loses each arbitration. So while the reply of a node
-  /// that answered before is overdue (longer than a cycle of SYNC with its PDOs takes), for a while nothing
-  /// is begun at the others but for stops. Nothing: they need not yield to it.
+  /// On a full network the reply of the highest node-ID loses each arbitration. So while a reply is overdue,
+  /// by what its node takes as a rule and by a cycle of SYNC with its PDOs, for a while nothing is begun at
+  /// the others but for stops. Nothing: they need not yield to it.
   [[nodiscard]] std::optional<TimePoint> yielded_to_until(TimePoint now) const {
-    constexpr Duration overdue = std::chrono::milliseconds(20), patience = std::chrono::milliseconds(20);
-    if (!answered || !active || !active->last_sent) return std::nullopt;
-    const auto since = *active->last_sent + overdue;
+    constexpr Duration cycle = std::chrono::milliseconds(20), patience = std::chrono::milliseconds(20);
+    if (!usual_answer || !active || !active->last_sent) return std::nullopt;
+    const auto since = *active->last_sent + std::max(cycle, 2 * *usual_answer);
     return now < since || now >= since + patience ? std::nullopt : std::optional(since + patience);
+  }
+  void note_answer(Duration took) {
+    usual_answer = std::max(took, usual_answer.value_or(Duration{}) * 7 / 8);
   }
   [[nodiscard]] std::size_t count() const {
     std::size_t sum = 0;

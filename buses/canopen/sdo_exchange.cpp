@@ -99,7 +99,7 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
   using Kind = SdoTransfer::Step::Kind;
   if (step.kind == Kind::ignored) return on_unexpected(target);
   target.surplus.on_answer();
-  target.answered = true;
+  if (!others_yield && active.last_sent) target.note_answer(clock_->now() - *active.last_sent);
   if (!active.ambiguous) target.late.forget();
   const bool over = step.kind != Kind::send;
   if (over && active.probe) {
@@ -147,7 +147,7 @@ void SdoClient::on_due(Node& node) {
     const bool endless = now >= active.limit;
     if (endless || now >= *active.last_sent + timeout) {
       ++node.counters.timeouts;
-      node.answered = false;
+      node.usual_answer.reset();
       auto error = no_reply_error(active.transfer);
       if (endless && active.limit > active.first_sent + timeout) {
         error.message =

@@ -145,6 +145,77 @@ TEST(SdoClient, AStopCutsWhatIsUnderWayAfterTheTurnaround) {
   EXPECT_EQ(net.results.at("read").error().reason, Reason::superseded);
 }
 
+/// Both nodes have answered; then node 2 does not for a while, and after 25 ms node 1 is asked.
+struct Overdue {
+  Network net;
+
+  explicit Overdue(Duration usual = 1ms) {
+    net.servers[1].objects = {{status, {0, 2}}, {control, {0, 2}}};
+    net.servers[2].objects = {{status, {0, 2}}};
+    net.upload("first", 1, status);
+    net.turnaround = usual;
+    net.upload("second", 2, status);
+    net.world.run_for(1ms + usual);
+    net.servers[2].answers = false;
+    net.upload("overdue", 2, status);
+    net.world.run_for(25ms);
+    net.turnaround = 1ms;
+    net.port->log.clear();
+  }
+  void ask(TransactionClass transaction_class) {
+    net.upload("asked", 1, status, {.transaction_class = transaction_class});
+  }
+  [[nodiscard]] bool sent() const { return !net.port->log.empty(); }
+};
+
+TEST(SdoClient, YieldsToTheOverdueReplyOfAnotherNode) {
+  for (const auto own_class : {TransactionClass::motion, TransactionClass::parameters}) {
+    Overdue rig;
+    rig.ask(own_class);
+    rig.net.world.run_for(5ms);
+    EXPECT_FALSE(rig.sent());
+    rig.net.reply_after({}, 2, {0x4B, 0x41, 0x60, 0, 0, 0, 0, 0});
+    rig.net.world.run_for(1ms);
+    EXPECT_TRUE(rig.net.results.contains("overdue"));
+    EXPECT_TRUE(rig.sent());
+  }
+}
+
+TEST(SdoClient, YieldsNoLongerThan20Milliseconds) {
+  Overdue rig;
+  rig.ask(TransactionClass::parameters);
+  rig.net.world.run_for(14ms);
+  EXPECT_FALSE(rig.sent());
+  rig.net.world.run_for(2ms);
+  EXPECT_TRUE(rig.sent());
+}
+
+TEST(SdoClient, WhatStopsYieldsToNobody) {
+  for (const auto own_class : {TransactionClass::stop, TransactionClass::moving_state}) {
+    Overdue rig;
+    rig.ask(own_class);
+    rig.net.world.run_for(1ms);
+    EXPECT_TRUE(rig.sent());
+  }
+}
+
+/// Nor is a node overdue that takes its time as a rule, or that has ceased to answer.
+TEST(SdoClient, ASlowNodeDelaysNobody) {
+  Overdue slow(30ms);
+  slow.ask(TransactionClass::parameters);
+  slow.net.world.run_for(1ms);
+  EXPECT_TRUE(slow.sent());
+
+  Overdue silent;
+  silent.net.world.run_for(200ms);  // two attempts
+  silent.net.upload("again", 2, name);
+  silent.net.world.run_for(25ms);
+  silent.net.port->log.clear();
+  silent.ask(TransactionClass::parameters);
+  silent.net.world.run_for(1ms);
+  EXPECT_TRUE(silent.sent());
+}
+
 TEST(SdoClient, ClassesGoInOrderAndNoneStarves) {
   Network net;
   net.servers[1].objects = {{status, {0, 2}}, {control, {0, 2}}, {name, {0, 4}}};
