@@ -18,6 +18,8 @@ namespace axisd::simulation {
 namespace {
 
 constexpr std::size_t longest_line = 4096;
+constexpr std::size_t most_clients = 16;
+constexpr int when_full_ms = 100;  ///< until a descriptor is asked for again
 
 /// Of this user or root. A file has its permissions instead.
 bool is_trusted(int socket) {
@@ -84,10 +86,14 @@ ControlSocket::~ControlSocket() {
 
 void ControlSocket::run() {
   std::vector<pollfd> waited;
+  bool out_of_descriptors = false;
   while (!stopping_) {
-    waited = {{wake_fd_, POLLIN, 0}, {listener_, POLLIN, 0}};
+    // poll() leaves out what is negative: who comes then waits in the listener's queue.
+    const bool full = out_of_descriptors || clients_.size() >= most_clients;
+    waited = {{wake_fd_, POLLIN, 0}, {full ? -1 : listener_, POLLIN, 0}};
     for (const auto& client : clients_) waited.push_back({client.socket, POLLIN, 0});
-    if (poll(waited.data(), waited.size(), -1) < 0) continue;
+    if (poll(waited.data(), waited.size(), out_of_descriptors ? when_full_ms : -1) < 0) continue;
+    out_of_descriptors = false;
     std::vector<Client> kept;
     for (std::size_t i = 0; i < clients_.size(); ++i) {
       if (waited[i + 2].revents == 0 || serve(clients_[i]))
@@ -96,14 +102,19 @@ void ControlSocket::run() {
         close(clients_[i].socket);
     }
     clients_ = std::move(kept);
-    if (waited[1].revents == 0) continue;
-    const int socket = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (socket < 0) continue;
-    if (is_abstract() && !is_trusted(socket))
-      close(socket);
-    else
-      clients_.push_back({.socket = socket, .input = {}});
+    if (waited[1].revents != 0) out_of_descriptors = !let_in();
   }
+}
+
+/// False: there is no descriptor for it.
+bool ControlSocket::let_in() {
+  const int socket = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (socket < 0) return errno != EMFILE && errno != ENFILE && errno != ENOMEM && errno != ENOBUFS;
+  if (is_abstract() && !is_trusted(socket))
+    close(socket);
+  else
+    clients_.push_back({.socket = socket, .input = {}});
+  return true;
 }
 
 /// False: the client is gone, or sends no line ends.

@@ -13,7 +13,8 @@
 
 namespace axisd::simulation {
 
-/// Serves any number of clients on a thread of its own until destroyed; then the socket is removed.
+/// Serves up to 16 clients at a time on a thread of its own until destroyed; then the socket is removed. More
+/// wait until one of them leaves.
 class ControlSocket {
  public:
   /// One command to its reply, without line ends. Thread: the socket's.
@@ -35,6 +36,7 @@ class ControlSocket {
   [[nodiscard]] bool is_abstract() const { return path_.starts_with('@'); }
   Result<void> listen();
   void run();
+  bool let_in();
   bool serve(Client& client);
 
   std::string path_;

@@ -263,6 +263,42 @@ TEST_F(PtyLineTest, ControlSocketMayHaveANameWithoutAFile) {
   close(client);
 }
 
+TEST_F(PtyLineTest, ControlSocketLetsSoManyInAndTheNextWhenOneLeaves) {
+  const auto path = folder + "/control";
+  auto control = ControlSocket::open(path, [](std::string_view text) { return "ok " + std::string(text); });
+  ASSERT_TRUE(control);
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  path.copy(address.sun_path, path.size());
+  const auto connected = [&] {
+    const int client = socket(AF_UNIX, SOCK_STREAM, 0);
+    EXPECT_EQ(0, connect(client, reinterpret_cast<const sockaddr*>(&address), sizeof(address)));
+    return client;
+  };
+  const auto expect_answer = [](int client) {
+    std::array<char, 6> reply{};
+    EXPECT_EQ(6, recv(client, reply.data(), reply.size(), MSG_WAITALL));
+  };
+  const auto ask = [](int client) { EXPECT_EQ(3, send(client, "hi\n", 3, 0)); };
+  std::array<int, 16> clients{};
+  for (int& client : clients) {
+    client = connected();
+    ask(client);
+    expect_answer(client);
+  }
+  const int next = connected();
+  ask(next);
+  for (int round = 0; round < 3; ++round) {  // each is a look at all sockets
+    ask(clients[1]);
+    expect_answer(clients[1]);
+  }
+  pollfd answered{next, POLLIN, 0};
+  EXPECT_EQ(0, poll(&answered, 1, 0));
+  close(clients[0]);
+  expect_answer(next);
+  close(next);
+  for (std::size_t i = 1; i < clients.size(); ++i) close(clients[i]);
+}
+
 TEST_F(PtyLineTest, PathsThatAreTakenAreRefusedAndLeftAlone) {
   const auto taken = folder + "/taken";
   ASSERT_EQ(0, mkdir(taken.c_str(), 0700));
