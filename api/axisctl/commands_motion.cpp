@@ -18,9 +18,11 @@ using Arguments = std::shared_ptr<MotionArguments>;
 
 void finish(Invocation& invocation, const MotionArguments& arguments,
             const std::vector<v1::Command>& commands, const v1::AxisState& before) {
-  invocation.status = report(
-      invocation, commands, arguments.wait,
-      {.unit = before.unit(), .start = before.position(), .halt_on_interrupt = arguments.halt_on_interrupt});
+  invocation.status = report(invocation, commands, arguments.wait,
+                             {.unit = before.unit(),
+                              .start = before.position(),
+                              .halt_on_interrupt = arguments.halt_on_interrupt,
+                              .several = arguments.axes.size() > 1});
 }
 
 void move(Invocation& invocation, const MotionArguments& arguments, bool relative) {
@@ -88,7 +90,9 @@ void simple(Invocation& invocation, const MotionArguments& arguments,
       commands.push_back(send_simple(invocation, arguments, axis, method));
   } catch (const Failure&) {
     report(invocation, commands, false,
-           {.unit = before.unit(), .start = {}});  // these were accepted, and go on
+           {.unit = before.unit(),
+            .start = {},
+            .several = arguments.axes.size() > 1});  // these were accepted, and go on
     throw;
   }
   finish(invocation, arguments, commands, before);
@@ -109,7 +113,8 @@ void disable(Invocation& invocation, const MotionArguments& arguments,
       worst = failure.code();
     }
   }
-  invocation.status = report(invocation, commands, arguments.wait, {.unit = {}, .start = {}});
+  invocation.status = report(invocation, commands, arguments.wait,
+                             {.unit = {}, .start = {}, .several = arguments.axes.size() > 1});
   if (worst != ExitCode::ok) invocation.status = worst;
 }
 

@@ -17,6 +17,7 @@
 #include "api/axisctl/table.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
+#include "axisd/v1/group_service.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
 
 namespace axisd::axisctl {
@@ -96,7 +97,8 @@ void stop_each(Invocation& invocation, const StopArguments& arguments,
       worst = answer.refusal->code();
     }
   }
-  invocation.status = report(invocation, commands, arguments.wait, {.unit = {}, .start = {}});
+  invocation.status = report(invocation, commands, arguments.wait,
+                             {.unit = {}, .start = {}, .several = arguments.axes.size() > 1});
   if (arguments.keep && !invocation.json)
     for (const auto& command : commands)
       print_line(fmt::format("{}: held until 'axisctl release-stop {}{}'", command.axis(), command.axis(),
@@ -151,20 +153,27 @@ void release_all(Invocation& invocation) {
   print_line(invocation.json ? json(response) : "released; every axis needs a new command to move");
 }
 
-/// Each axis once, whatever becomes of the others. Never repeated: it may be somebody else's stop by then.
+/// Each axis once, whatever becomes of the others. Never repeated: it may be somebody else's stop by then. As
+/// JSON what became of several is one object, that of group release-stop.
 void release_each(Invocation& invocation, const StopArguments& arguments) {
+  const bool as_list = invocation.json && arguments.axes.size() > 1;
+  v1::GroupReleaseStopResponse released;
   for (const auto& axis : arguments.axes) {
     v1::ReleaseStopRequest request;
     request.set_axis(axis);
     arguments.release.fill(request);
     try {
       const auto response = invocation.client().call(&Stub::ReleaseStop, request, axis, Lane::stop);
-      print_line(invocation.json ? json(response) : released_line(axis, response.holds()));
+      auto& result = *released.add_results();
+      result.set_name(axis);
+      *result.mutable_holds() = response.holds();
+      if (!as_list) print_line(invocation.json ? json(response) : released_line(axis, response.holds()));
     } catch (const Failure& failure) {
       complain(failure, invocation.json);
       invocation.status = failure.code();
     }
   }
+  if (as_list) print_line(json(released));
 }
 
 void add_release(CLI::App& app, Invocation& invocation) {

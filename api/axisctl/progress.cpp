@@ -168,7 +168,7 @@ ExitCode follow_to_end(Invocation& invocation, const v1::Command& command, const
   return outcome(latest);
 }
 
-/// Of several commands: one object for all of them.
+/// One object for all of them.
 ExitCode report_as_json(Invocation& invocation, const std::vector<v1::Command>& commands, bool wait,
                         const Follow& options) {
   v1::ListCommandsResponse all;
@@ -199,7 +199,7 @@ ExitCode follow(Invocation& invocation, const v1::Command& command, const Follow
 
 ExitCode report(Invocation& invocation, const std::vector<v1::Command>& commands, bool wait,
                 const Follow& options) {
-  if (invocation.json && commands.size() > 1) return report_as_json(invocation, commands, wait, options);
+  if (invocation.json && options.several) return report_as_json(invocation, commands, wait, options);
   ExitCode result = ExitCode::ok;
   for (const auto& command : commands)
     // JSON is one object per command: with --wait that is the ended one.

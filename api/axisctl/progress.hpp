@@ -13,6 +13,7 @@ struct Follow {
   std::string unit;             ///< of the axis
   std::optional<double> start;  ///< position before the motion, for the per cent of the way
   bool halt_on_interrupt = false;
+  bool several = false;  ///< as JSON a list, however many of the named axes have taken the command
 };
 
 /// How much of the way from `start` to `target` lies behind, 0 to 100; nothing if there is no way.
@@ -33,7 +34,8 @@ v1::Command halt_axis(Invocation& invocation, const std::string& axis, std::chro
 /// Failure.
 ExitCode follow(Invocation& invocation, const v1::Command& command, const Follow& options);
 
-/// Follows several, which run at the same time, one after the other. Returns the first that is not ok.
+/// Prints what became of commands that run at the same time; `wait`: follows one after the other. Returns the
+/// first that is not ok.
 ExitCode report(Invocation& invocation, const std::vector<v1::Command>& commands, bool wait,
                 const Follow& options);
 

@@ -29,6 +29,9 @@ class Reading(AxisctlTest):
         for wait in ([], ["--wait"]):
             (listed,) = self.json("enable", "feeder", "turntable", *wait)
             self.assertEqual([command["axis"] for command in listed["commands"]], ["feeder", "turntable"])
+        done = self.run_axisctl("--json", "stop", "ghost", "feeder")
+        self.assertEqual([command["axis"] for command in json.loads(done.stdout)["commands"]], ["feeder"])
+        self.assertEqual(json.loads(done.stderr)["error"]["exit_status"], done.returncode)
 
     def test_tables_fit_the_terminal_and_are_whole_in_a_pipe(self):
         for columns in (80, 60):
@@ -272,6 +275,14 @@ class Stopping(AxisctlTest):
         self.assertIn("turntable: no such hold", again.stdout)
         self.ok("group", "stop", "transfer", "--hold", "--request-id", "door")
         self.ok("group", "release-stop", "transfer", "--mine")
+
+    def test_a_release_of_several_axes_as_json_is_one_object(self):
+        self.ok("stop", "feeder", "turntable", "--hold")
+        self.assertEqual(self.json("release-stop", "feeder", "turntable"),
+                         [{"results": [{"name": "feeder", "holds": []}, {"name": "turntable", "holds": []}]}])
+        done = self.run_axisctl("--json", "release-stop", "feeder", "turntable")
+        self.assertEqual(json.loads(done.stdout), {"results": []})
+        self.assertEqual(len(done.stderr.splitlines()), 2)
 
     def test_one_refused_stop_does_not_keep_the_others(self):
         done = self.run_axisctl("stop", "ghost", "feeder")
