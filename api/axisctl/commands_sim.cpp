@@ -39,26 +39,31 @@ void print_done(const Invocation& invocation, const std::string& name, const std
   print_line(json(line));
 }
 
-/// `kind`: "axis" or "bus".
-void tell(Invocation& invocation, std::string_view kind, const std::string& name,
-          const std::string& command) {
-  const auto drives = connected(invocation);
+/// `kind`: "axis" or "bus". What they reply.
+std::string ask(const SimulationClient& drives, std::string_view kind, const std::string& name,
+                std::string_view command) {
   try {
-    print_done(invocation, name, command, drives.ask(fmt::format("{} {} {}", kind, name, command)));
+    return drives.ask(fmt::format("{} {} {}", kind, name, command));
   } catch (const Failure& failure) {
     throw failure.saying(fmt::format("{}: {}", name, failure.what()));
   }
 }
 
+void tell(Invocation& invocation, std::string_view kind, const std::string& name,
+          const std::string& command) {
+  print_done(invocation, name, command, ask(connected(invocation), kind, name, command));
+}
+
 void power(Invocation& invocation, const Arguments& arguments) {
   constexpr std::chrono::milliseconds off_time(1000);  // longer than any capacitor of a drive holds
   if (arguments.value != "cycle") return tell(invocation, "axis", arguments.name, "power " + arguments.value);
-  tell(invocation, "axis", arguments.name, "power off");
+  const auto drives = connected(invocation);
+  ask(drives, "axis", arguments.name, "power off");
   {
     const Interrupt interrupt([] {});
     static_cast<void>(interrupt.wait_for(off_time));
   }
-  tell(invocation, "axis", arguments.name, "power on");
+  print_done(invocation, arguments.name, "power cycle", ask(drives, "axis", arguments.name, "power on"));
 }
 
 void push(Invocation& invocation, const Arguments& arguments) {

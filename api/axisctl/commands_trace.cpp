@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <fstream>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 
@@ -106,18 +105,15 @@ v1::Bus bus_of(Invocation& invocation, const std::string& name) {
 /// What the drives on this bus call their registers and objects.
 FrameNames names_on(Invocation& invocation, const std::string& bus) {
   FrameNames names;
-  std::map<std::string, v1::ListParametersResponse> catalogues;  // by model
   const auto all =
       invocation.client().call(&v1::AxisService::Stub::ListAxes, v1::ListAxesRequest(), std::string_view());
   for (const auto& axis : all.axes()) {
     if (axis.bus() != bus) continue;
-    auto& catalogue = catalogues[axis.model()];
-    if (catalogue.parameters().empty()) {
-      v1::ListParametersRequest request;
-      request.set_axis(axis.axis());
-      catalogue = invocation.client().call(&v1::DriveService::Stub::ListParameters, request, axis.axis());
-    }
-    names.add(axis.node(), catalogue);
+    v1::ListParametersRequest request;
+    request.set_axis(axis.axis());
+    // Of each axis: drives of one model may have data sheets of their own.
+    names.add(axis.node(),
+              invocation.client().call(&v1::DriveService::Stub::ListParameters, request, axis.axis()));
   }
   return names;
 }
@@ -165,8 +161,9 @@ void add_trace_command(CLI::App& app, Invocation& invocation) {
   command->add_flag("--plain", arguments->plain, "Text without the names of registers and objects");
   command->add_option("--for", arguments->limit, "End after this time, such as 10s")->type_name("TIME");
   command->footer(R"help(
-Text has what was not sent and why, too, and on the standard output what each frame says, behind a #; the other formats only what was on the wire. Wireshark shows a pcap file of an
-RS-485 line once DLT_USER 0 (147) is set to the dissector mbrtu.
+Text has what was not sent and why, too, and on the standard output what each frame says, behind a #; the other formats
+only what was on the wire. Wireshark shows a pcap file of an RS-485 line once DLT_USER 0 (147) is set to the dissector
+mbrtu.
 
 Examples:
   axisctl trace line-a --node 3

@@ -55,8 +55,10 @@ class Sim(AxisctlTest):
             self.assertEqual(self.drives.lines[-1], line)
 
     def test_a_power_cycle_is_off_and_on(self):
-        self.assertEqual(self.ok("sim", "power", "feeder", "cycle"), "feeder: power off\nfeeder: power on\n")
+        self.assertEqual(self.ok("sim", "power", "feeder", "cycle"), "feeder: power cycle\n")
         self.assertEqual(self.drives.lines, ["axis feeder power off", "axis feeder power on"])
+        self.assertEqual(self.json("sim", "power", "feeder", "cycle"),
+                         [{"name": "feeder", "command": "power cycle", "reply": ""}])
 
     def test_what_they_reply(self):
         self.assertEqual(self.ok("sim", "show", "feeder"), "feeder: the load is at 12.5 mm, at rest, 3 starts\n")
