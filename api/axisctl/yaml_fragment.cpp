@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "config/models.hpp"
+
 namespace axisd::axisctl {
 namespace {
 
@@ -43,9 +45,6 @@ std::string described_entry(const std::string& name, const v1::FoundNode& node,
       node.node(), node.model(), node.node());
 }
 
-/// The model that a data sheet describes.
-bool is_described(const v1::FoundNode& node) { return node.model() == "cia402"; }
-
 }  // namespace
 
 std::string yaml_fragment(const std::vector<v1::FoundNode>& found, const FragmentContext& context) {
@@ -59,7 +58,7 @@ std::string yaml_fragment(const std::vector<v1::FoundNode>& found, const Fragmen
       text += fmt::format("  # {}: set its switches to the bus's {} bit/s\n", which, context.baud);
     } else if (!used.insert(node.node()).second) {
       text += fmt::format("  # {}: a second drive with this address, in another format\n", which);
-    } else if (is_described(node)) {
+    } else if (config::is_described_by_file(node.model())) {
       text += described_entry(free_name(node, context), node, context);
     } else if (node.pulses_per_revolution() == 0) {
       text += fmt::format("  # {}: its microstep could not be read, scan again\n", which);
