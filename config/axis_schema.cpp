@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "config/schema.hpp"
+#include "devices/simulation/drive_option.hpp"
 
 // The keys of an axis. Ranges that depend on the model or on other keys are in axis_checks.cpp.
 namespace axisd::config {
@@ -120,11 +121,6 @@ constexpr KeySpec poll_keys[] = {
      .apply = [](Target& t, const Value& v) { t.axis->axis.poll_idle = v.duration; }},
 };
 
-// The names of simulation::set_unit_option().
-constexpr std::string_view simulated_velocity_units[] = {"pulses_per_second", "rpm", "0.1rpm",
-                                                         "0.001rev_per_second", "degrees_per_second"};
-constexpr std::string_view simulated_acceleration_units[] = {"velocity_per_second", "rpm_per_second"};
-
 constexpr KeySpec simulate_keys[] = {
     {.key = "home_switch",
      .kind = Kind::position,
@@ -164,14 +160,14 @@ constexpr KeySpec simulate_keys[] = {
          "it: the drive that is simulated, whatever drive: says.",
      .example = "rpm",
      .default_value = "pulses_per_second",
-     .choices = simulated_velocity_units,
+     .choices = simulation::velocity_unit_names,
      .apply = [](Target& t, const Value& v) { t.axis->simulation.velocity_unit = v.text; }},
     {.key = "acceleration_unit",
      .kind = Kind::choice,
      .description = "Likewise of its ramps.",
      .example = "rpm_per_second",
      .default_value = "velocity_per_second",
-     .choices = simulated_acceleration_units,
+     .choices = simulation::acceleration_unit_names,
      .apply = [](Target& t, const Value& v) { t.axis->simulation.acceleration_unit = v.text; }},
     {.key = "enabled_at_power_up",
      .kind = Kind::boolean,

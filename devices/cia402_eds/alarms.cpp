@@ -197,6 +197,7 @@ constexpr auto others = std::to_array<AlarmSpec>({
     {0xF000, "additional_functions", reset, manual},
     {0x0000, "specific_to_the_drive", reset, manual},
 });
+static_assert(others.back().code == 0, "find_alarm() reads on until a row holds");
 
 }  // namespace
 

@@ -1,10 +1,12 @@
 #include "devices/simulation/drive_option.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <iterator>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "buses/canopen/eds.hpp"
@@ -30,28 +32,14 @@ bool parse_position(std::string_view value, std::optional<std::int64_t>& into) {
   return into.has_value();
 }
 
-template <class Unit>
-struct UnitName {
-  std::string_view name;
-  Unit unit;
-};
-constexpr UnitName<VelocityUnit> velocity_units[] = {
-    {"pulses_per_second", VelocityUnit::position_per_second},
-    {"rpm", VelocityUnit::rpm},
-    {"0.1rpm", VelocityUnit::tenth_rpm},
-    {"0.001rev_per_second", VelocityUnit::milli_revolutions_per_second},
-    {"degrees_per_second", VelocityUnit::degrees_per_second},
-};
-constexpr UnitName<AccelerationUnit> acceleration_units[] = {
-    {"velocity_per_second", AccelerationUnit::velocity_per_second},
-    {"rpm_per_second", AccelerationUnit::rpm_per_second},
-};
+static_assert(std::size(velocity_unit_names) == std::to_underlying(VelocityUnit::degrees_per_second) + 1);
+static_assert(std::size(acceleration_unit_names) == std::to_underlying(AccelerationUnit::rpm_per_second) + 1);
 
-template <class Unit, std::size_t size>
-bool parse_unit(std::string_view value, const UnitName<Unit> (&names)[size], Unit& into) {
-  const auto* found = std::ranges::find(names, value, &UnitName<Unit>::name);
-  if (found == std::end(names)) return false;
-  into = found->unit;
+template <class Unit>
+bool parse_unit(std::string_view value, std::span<const std::string_view> names, Unit& into) {
+  const auto found = std::ranges::find(names, value);
+  if (found == names.end()) return false;
+  into = static_cast<Unit>(found - names.begin());
   return true;
 }
 
@@ -142,8 +130,8 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
 }  // namespace
 
 bool set_unit_option(UnitSettings& units, std::string_view name, std::string_view value) {
-  if (name == "velocity_unit") return parse_unit(value, velocity_units, units.velocity);
-  if (name == "acceleration_unit") return parse_unit(value, acceleration_units, units.acceleration);
+  if (name == "velocity_unit") return parse_unit(value, velocity_unit_names, units.velocity);
+  if (name == "acceleration_unit") return parse_unit(value, acceleration_unit_names, units.acceleration);
   const auto counts = parse_number<std::uint32_t>(value);
   if (name != "counts" || counts.value_or(0) == 0) return false;
   units.counts_per_revolution = *counts;
@@ -156,15 +144,14 @@ Result<DriveOption> parse_drive(std::string_view text) {
   for (const auto part : split(text, ',')) {
     const auto [key, value] = key_value(part);
     if (!parse_part(key, value, option))
-      return fail(
-          Reason::invalid_argument, fmt::format("\"{}\" is not understood", part),
-          "use node=, model=, home=FROM:TO, turn=, positive_limit=, negative_limit=, switch.NAME=on|off, "
-          "eeprom.REGISTER=VALUE, encoder.noise|following_ms|quantised|backlash|compliance|slip=, "
-          "wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
-          "dip_baud=BAUD|custom, boot_ms=, powered=on|off; with a data sheet eds=FILE, "
-          "counts=PER_REVOLUTION, "
-          "velocity_unit=pulses_per_second|rpm|0.1rpm|0.001rev_per_second|degrees_per_second, "
-          "acceleration_unit=velocity_per_second|rpm_per_second");
+      return fail(Reason::invalid_argument, fmt::format("\"{}\" is not understood", part),
+                  fmt::format("use node=, model=, home=FROM:TO, turn=, positive_limit=, negative_limit=, "
+                              "switch.NAME=on|off, eeprom.REGISTER=VALUE, "
+                              "encoder.noise|following_ms|quantised|backlash|compliance|slip=, "
+                              "wire.TERMINAL=home|positive_limit|negative_limit[:nc], dip=ADDRESS, "
+                              "dip_baud=BAUD|custom, boot_ms=, powered=on|off; with a data sheet eds=FILE, "
+                              "counts=PER_REVOLUTION, velocity_unit={}, acceleration_unit={}",
+                              fmt::join(velocity_unit_names, "|"), fmt::join(acceleration_unit_names, "|")));
   }
   if (option.model.empty() || option.settings.address == 0)
     return fail(Reason::invalid_argument, fmt::format("\"{}\" names no drive", text),

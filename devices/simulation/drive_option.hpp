@@ -22,9 +22,13 @@ struct DriveOption {
 /// switches, terminals and what switches can be set to are checked by make_node().
 Result<DriveOption> parse_drive(std::string_view text);
 
-/// Takes over what a data sheet may not tell, by name: counts=N, velocity_unit=pulses_per_second|rpm|0.1rpm|
-/// 0.001rev_per_second|degrees_per_second, acceleration_unit=velocity_per_second|rpm_per_second. False: no
-/// such name, or no such value; nothing is changed then.
+/// Of each VelocityUnit and each AccelerationUnit, in their order.
+inline constexpr std::string_view velocity_unit_names[] = {"pulses_per_second", "rpm", "0.1rpm",
+                                                           "0.001rev_per_second", "degrees_per_second"};
+inline constexpr std::string_view acceleration_unit_names[] = {"velocity_per_second", "rpm_per_second"};
+
+/// Takes over what a data sheet may not tell, by name: counts=N, velocity_unit=NAME, acceleration_unit=NAME.
+/// False: no such option, or no such value; nothing is changed then.
 bool set_unit_option(UnitSettings& units, std::string_view name, std::string_view value);
 
 }  // namespace axisd::simulation

@@ -28,6 +28,13 @@ bool contains(std::span<const Named> all, std::string_view name) {
   return std::ranges::any_of(all, [&](const Named& one) { return one.name == name; });
 }
 
+std::string models_with_sheet() {
+  std::string text;
+  for (const auto* simulator : simulators())
+    if (simulator->takes_sheet) text += fmt::format("{}{}", text.empty() ? "" : ", ", simulator->model);
+  return text;
+}
+
 /// What the model cannot be set to.
 Result<void> check(const Simulator& simulator, const SimulatedNodeSettings& settings) {
   if (settings.address < 1 || settings.address > simulator.maximum_node)
@@ -47,7 +54,7 @@ Result<void> check(const Simulator& simulator, const SimulatedNodeSettings& sett
                             fmt::join(simulator.dip_bauds, ", ")));
   if (settings.sheet && !simulator.takes_sheet)
     return fail(Reason::invalid_argument, fmt::format("{} is not made by a data sheet", simulator.model),
-                "leave eds= out, or use model=cia402");
+                fmt::format("leave eds= out; models that are made by one: {}", models_with_sheet()));
   for (const auto& [name, on] : settings.switches)
     if (!contains(simulator.switches, name))
       return fail(Reason::invalid_argument, fmt::format("{} has no switch \"{}\"", simulator.model, name),

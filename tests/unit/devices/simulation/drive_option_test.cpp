@@ -55,11 +55,15 @@ TEST(DriveOption, ReadsTheDataSheetAndItsUnits) {
   EXPECT_EQ(settings.units.velocity, VelocityUnit::tenth_rpm);
   EXPECT_EQ(settings.units.acceleration, AccelerationUnit::rpm_per_second);
   EXPECT_EQ(parse_drive("node=3,model=cia402")->settings.sheet, nullptr);
-  for (const auto* unit :
-       {"pulses_per_second", "rpm", "0.1rpm", "0.001rev_per_second", "degrees_per_second"}) {
-    UnitSettings units;
-    EXPECT_TRUE(set_unit_option(units, "velocity_unit", unit)) << unit;
-  }
+  UnitSettings units;
+  EXPECT_TRUE(set_unit_option(units, "velocity_unit", "degrees_per_second"));
+  EXPECT_EQ(units.velocity, VelocityUnit::degrees_per_second);
+  EXPECT_TRUE(set_unit_option(units, "velocity_unit", "pulses_per_second"));
+  EXPECT_EQ(units.velocity, VelocityUnit::position_per_second);
+  EXPECT_TRUE(set_unit_option(units, "velocity_unit", "0.001rev_per_second"));
+  EXPECT_EQ(units.velocity, VelocityUnit::milli_revolutions_per_second);
+  EXPECT_TRUE(set_unit_option(units, "velocity_unit", "rpm"));
+  EXPECT_EQ(units.velocity, VelocityUnit::rpm);
   const auto missing = parse_drive("node=3,model=cia402,eds=/none.eds");
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().message.find("/none.eds"), std::string::npos);
