@@ -6,6 +6,7 @@
 
 #include "buses/canopen/sdo_abort.hpp"
 #include "devices/cia402/drive.hpp"
+#include "devices/cia402/unit_objects.hpp"
 #include "devices/drive_access.hpp"
 
 namespace axisd::cia402 {
@@ -58,7 +59,7 @@ std::string Cia402Drive::configured_by(std::uint32_t address) const {
     return std::string(owner->key);
   if (object == object::homing_method && setup_.homing) return "homing.method";
   if (std::ranges::find(model_->unit_objects, object) != model_->unit_objects.end())
-    return "drive.velocity_unit";
+    return std::string(key_of(object));
   if (object == model_->objects.start_speed) return "limits.start_speed";
   if (object == model_->objects.eeprom_switch) return "persist";
   if (model_->addressing && object == model_->addressing->custom_node) return "DriveService.Readdress";

@@ -298,6 +298,26 @@ std::optional<UnitConflict> find_conflict(const Units& planned,
 
 std::span<const Object> unit_objects() { return all_objects; }
 
+std::string_view key_of(Object object) {
+  switch (object.index) {
+    case polarity.index:
+      return "scale.invert";
+    case encoder.first.index:
+    case gear.first.index:
+    case feed.first.index:
+    case position_factor.first.index:
+    case position_si.index:
+      return "scale.microstep";
+    case acceleration_notation.index:
+    case acceleration_dimension.index:
+    case acceleration_factor.first.index:
+    case acceleration_si.index:
+      return "drive.acceleration_unit";
+    default:
+      return "drive.velocity_unit";
+  }
+}
+
 std::string without(Object object) { return fmt::format("{}: {{ access: none }}", short_name(object)); }
 
 }  // namespace axisd::cia402

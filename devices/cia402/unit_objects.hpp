@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "buses/canopen/object.hpp"
 #include "devices/cia402/units.hpp"
@@ -58,6 +59,8 @@ std::optional<UnitConflict> find_conflict(const Units& planned,
 
 /// The objects that these functions look at.
 std::span<const canopen::Object> unit_objects();
+/// The key of the configuration that has to agree with one of them.
+std::string_view key_of(canopen::Object object);
 /// "60A9h: { access: none }": what takes the object out of the drive's data sheet.
 std::string without(canopen::Object object);
 

@@ -222,8 +222,13 @@ TEST(UnitCheck, APowerCycleIsLookedAtAnew) {
 }
 
 TEST(UnitCheck, WhoWritesParametersLeavesUnitsAlone) {
-  UnitBench bench(with_objects({{"60A9h:00", in_pulses}}, ""), {{velocity_si, in_pulses}});
+  UnitBench bench(
+      with_objects({{"607Eh:00", 0}, {"60A8h:00", 0}, {"60A9h:00", in_pulses}, {"60AAh:00", 0}}, ""),
+      {{velocity_si, in_pulses}});
+  EXPECT_EQ(bench.drive().configured_by(0x607E00), "scale.invert");
+  EXPECT_EQ(bench.drive().configured_by(position_si), "scale.microstep");
   EXPECT_EQ(bench.drive().configured_by(velocity_si), "drive.velocity_unit");
+  EXPECT_EQ(bench.drive().configured_by(0x60AA00), "drive.acceleration_unit");
 }
 
 }  // namespace
