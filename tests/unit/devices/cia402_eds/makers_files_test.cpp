@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -18,7 +17,7 @@
 
 #include "devices/cia402_eds/eds_drive.hpp"
 #include "devices/descriptor.hpp"
-#include "tests/support/source_tree.hpp"
+#include "tests/unit/devices/cia402_eds/makers_folder.hpp"
 
 namespace axisd::cia402_eds {
 namespace {
@@ -77,12 +76,6 @@ const std::vector<Row>& table() {
   return rows;
 }
 
-std::filesystem::path folder() {
-  const char* named = std::getenv("AXISD_EDS_FOLDER");
-  return named != nullptr ? std::filesystem::path(named)
-                          : std::filesystem::path(test::in_source_tree("../shared/eds"));
-}
-
 Result<std::shared_ptr<const DriveDescriptor>> made(const std::filesystem::path& path,
                                                     std::string_view unit = {}) {
   const auto* model = find_drive_model("cia402");
@@ -108,7 +101,7 @@ class MakersFile : public ::testing::TestWithParam<Row> {};
 
 TEST_P(MakersFile, IsTakenOrRefusedAsTheTableSays) {
   const auto& row = GetParam();
-  const auto path = folder() / row.file;
+  const auto path = makers_folder() / row.file;
   if (!std::filesystem::exists(path))
     GTEST_SKIP() << path << " is not there; name the folder of makers' files in AXISD_EDS_FOLDER";
   const auto drive = made(path);
@@ -145,7 +138,8 @@ TEST(MakersFiles, GetAClearAnswer) {
   std::set<std::string_view> known;
   for (const auto& row : table()) known.insert(row.file);
   int seen = 0;
-  for (std::error_code error; const auto& entry : std::filesystem::directory_iterator(folder(), error)) {
+  for (std::error_code error;
+       const auto& entry : std::filesystem::directory_iterator(makers_folder(), error)) {
     const auto extension = entry.path().extension();
     if (extension != ".eds" && extension != ".dcf") continue;
     SCOPED_TRACE(entry.path());
@@ -157,7 +151,8 @@ TEST(MakersFiles, GetAClearAnswer) {
                 << (drive ? "accepted" : "refused: " + to_string(drive.error())) << "\n";
   }
   if (seen == 0)
-    GTEST_SKIP() << "no file in " << folder() << "; name the folder of makers' files in AXISD_EDS_FOLDER";
+    GTEST_SKIP() << "no file in " << makers_folder()
+                 << "; name the folder of makers' files in AXISD_EDS_FOLDER";
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 // files are not part of this project: as in makers_files_test.cpp, what is not there is skipped by name.
 #include <algorithm>
 #include <cctype>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <ostream>
@@ -10,7 +9,7 @@
 #include <system_error>
 
 #include "buses/canopen/eds.hpp"
-#include "tests/support/source_tree.hpp"
+#include "tests/unit/devices/cia402_eds/makers_folder.hpp"
 #include "tests/unit/devices/cia402_eds/standard_drive_bench.hpp"
 
 namespace axisd::cia402_eds {
@@ -56,18 +55,12 @@ constexpr Row table[] = {
     {"trinamic-tmcm-1636.eds", 0x286, 0x664, 4096, 8192, 40960},
 };
 
-std::filesystem::path folder() {
-  const char* named = std::getenv("AXISD_EDS_FOLDER");
-  return named != nullptr ? std::filesystem::path(named)
-                          : std::filesystem::path(test::in_source_tree("../shared/eds"));
-}
-
 void PrintTo(const Row& row, std::ostream* out) { *out << row.file; }
 
 class SimulatedMakersDrive : public ::testing::TestWithParam<Row> {
  protected:
   void SetUp() override {
-    const auto path = folder() / row().file;
+    const auto path = makers_folder() / row().file;
     if (!std::filesystem::exists(path))
       GTEST_SKIP() << path << " is not there; name the folder of makers' files in AXISD_EDS_FOLDER";
     auto sheet = canopen::load_eds(path.string());
@@ -211,7 +204,8 @@ TEST_P(SimulatedMakersDrive, FaultsAndIsReset) {
 /// Templates, and files of drives that are none of CiA 402: whatever can be read makes a node that boots.
 TEST(SimulatedMakersDrives, BootWhateverTheyAre) {
   int seen = 0;
-  for (std::error_code error; const auto& entry : std::filesystem::directory_iterator(folder(), error)) {
+  for (std::error_code error;
+       const auto& entry : std::filesystem::directory_iterator(makers_folder(), error)) {
     const auto extension = entry.path().extension();
     if (extension != ".eds" && extension != ".dcf") continue;
     SCOPED_TRACE(entry.path());
@@ -229,7 +223,8 @@ TEST(SimulatedMakersDrives, BootWhateverTheyAre) {
     EXPECT_FALSE(bench.drive().shaft_moving());
   }
   if (seen == 0)
-    GTEST_SKIP() << "no file in " << folder() << "; name the folder of makers' files in AXISD_EDS_FOLDER";
+    GTEST_SKIP() << "no file in " << makers_folder()
+                 << "; name the folder of makers' files in AXISD_EDS_FOLDER";
 }
 
 std::string name_of(const ::testing::TestParamInfo<Row>& info) {
