@@ -364,6 +364,7 @@ void RtuBus::on_port(const PortStatus& status) {
   // What may come late may still come: late_ stays.
   quarantine_.forget();
   if (!port_.open) {
+    line_disturbed_ = clock_->now();
     // What is under way gets its own result from the line; what waits can no longer be sent in time.
     const ExchangeResult lost{.status = ExchangeStatus::not_sent, .verdict = Verdict::send};
     for (auto& transaction : queue_.take_all()) end(std::move(transaction), lost);
@@ -384,6 +385,7 @@ void RtuBus::note(const Transaction& transaction, const ExchangeResult& result) 
   const bool sent = result.status != not_sent && result.status != unsupported && result.status != io_error;
   if (sent && transaction.transaction_class == TransactionClass::stop && result.request_end != TimePoint{})
     stops_sent_[transaction.exchange.request.node] = result.request_end;
+  note_disturbance(transaction.exchange.request, result);
   statistics_.ended(transaction, result);
   if (observer_) observer_(transaction, result);
 }

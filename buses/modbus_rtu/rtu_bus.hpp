@@ -86,6 +86,10 @@ class RtuBus final : public Bus {
   /// When the last stop frame to `node` had gone out, answered or not: its last byte. nullopt: there was
   /// none.
   [[nodiscard]] std::optional<TimePoint> stop_sent_at(std::uint8_t node) const;
+  /// When something last happened that voids what earlier readings of `node` proved of its power (M6): an
+  /// exchange with it that it did not answer as it should, or refused; a frame of somebody else on the line;
+  /// a lost port. Long ago: nothing did.
+  [[nodiscard]] TimePoint disturbed_at(std::uint8_t node) const;
   /// Damaged replies of `node` in a row, without a sound one or silence between them.
   [[nodiscard]] int garbled(std::uint8_t node) const;
   /// Nodes that do not answer are probed with back-off. Bus scans, and exchanges with serial settings of
@@ -129,6 +133,7 @@ class RtuBus final : public Bus {
   void reap(TimePoint now);
   void drop(TransactionPtr transaction, TimePoint now);
   void note(const Transaction& transaction, const ExchangeResult& result);
+  void note_disturbance(const Request& request, const ExchangeResult& result);
   void end(TransactionPtr transaction, const ExchangeResult& result);
   void note_garbled(const Request& request, const ExchangeResult& result);
   [[nodiscard]] Result<Answer> answer(const Transaction& transaction, const ExchangeResult& result) const;
@@ -148,6 +153,8 @@ class RtuBus final : public Bus {
   NodeTable<std::unique_ptr<KnownOfNode>> known_;
   LateReplies late_;
   NodeTable<TimePoint> stops_sent_;
+  NodeTable<TimePoint> disturbed_;
+  TimePoint line_disturbed_{};
   std::map<std::uint8_t, int> garbled_;  ///< damaged replies in a row, by node
   Quarantine quarantine_;
   Clock::Timer expiry_, release_;

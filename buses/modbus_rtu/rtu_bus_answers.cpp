@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -61,6 +62,20 @@ void RtuBus::note_garbled(const Request& request, const ExchangeResult& result) 
   } else if (result.status != ExchangeStatus::not_sent && result.status != ExchangeStatus::unsupported) {
     garbled_.erase(request.node);
   }
+}
+
+TimePoint RtuBus::disturbed_at(std::uint8_t node) const {
+  const auto* found = disturbed_.find(node);
+  return found == nullptr ? line_disturbed_ : std::max(*found, line_disturbed_);
+}
+
+/// Noted as of now: what was asked for before the core heard of it proves nothing.
+void RtuBus::note_disturbance(const Request& request, const ExchangeResult& result) {
+  using enum ExchangeStatus;
+  if (result.foreign_frames > 0) line_disturbed_ = clock_->now();
+  if (result.status == not_sent || result.status == unsupported) return;
+  if (result.status != replied || result.reply.kind == ReplyKind::exception)
+    disturbed_[request.node] = clock_->now();
 }
 
 Result<Answer> RtuBus::answer(const Transaction& transaction, const ExchangeResult& result) const {
