@@ -43,6 +43,12 @@ void Signal::notify_all() {
   }
 }
 
+Task<> let_others_run(const Executor& executor, Clock& clock) {
+  Signal turn(executor, clock);
+  post(executor, [&turn] { turn.notify_all(); });
+  co_await turn.wait();
+}
+
 Task<> sleep_until(const Executor& executor, Clock& clock, TimePoint when) {
   Signal never(executor, clock);
   co_await never.wait_until(when);

@@ -25,6 +25,9 @@ class Signal {
   std::vector<std::shared_ptr<Waiter>> waiters_;
 };
 
+/// Suspends the calling coroutine until all that is ready to run has run. Thread: core.
+Task<> let_others_run(const Executor& executor, Clock& clock);
+
 /// Suspends the calling coroutine until `when`. Thread: core.
 Task<> sleep_until(const Executor& executor, Clock& clock, TimePoint when);
 

@@ -182,6 +182,7 @@ class Axis {
   Task<Result<void>> prove_continuity(TransactionClass priority);
   /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
   void poll_fast(TimePoint from, Duration longest);
+  [[nodiscard]] bool keeps_quiet() const;
   [[nodiscard]] TimePoint next_poll(TimePoint began) const;
 
   // axis_drift.cpp
@@ -349,6 +350,7 @@ class Axis {
 
   void end_unsent(Activity& activity, Error cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
+  void expect_end(const Plan& plan, std::int64_t base, TimePoint since);
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
   [[nodiscard]] bool shows(const Plan& plan, std::int64_t base) const;
   [[nodiscard]] bool held_back(const Plan& plan) const;
@@ -443,6 +445,7 @@ class Axis {
   TimePoint settle_by_{};
   std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon
   TimePoint fast_from_{}, fast_until_{};                  ///< of poll_fast()
+  TimePoint quiet_until_{};                               ///< of expect_end()
   std::string drift_;                                     ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
   std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()

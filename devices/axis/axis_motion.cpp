@@ -20,8 +20,11 @@ constexpr auto start_window = milliseconds(500);
 constexpr auto overrun_margin = std::chrono::seconds(1);
 /// So long after the predicted end it is looked for as fast as the bus can.
 constexpr auto end_window = milliseconds(300);
-/// And from so long before, at most: a motion too short for its velocity ends before its prediction.
-constexpr Duration longest_end_lead = milliseconds(100);
+/// And from so long before, at most, and a part of the way's time: a drive has a clock of its own.
+constexpr Duration longest_end_lead = milliseconds(10);
+constexpr int end_lead_share = 32;
+/// So long after a start nothing is asked, at most, so that canaries come in time (M7).
+constexpr Duration longest_quiet = milliseconds(100);
 /// A motion that no sample can tell from noise is over so long after its predicted end.
 constexpr auto unseen_margin = milliseconds(100);
 
@@ -418,6 +421,20 @@ bool Axis::held_back(const Plan& plan) const {
   return limit_active(plan.positive) || input_active("stop") || input_active("quick_stop");
 }
 
+/// When a motion is read that was acknowledged at `since`: its end is to be told at once, and before it has
+/// something to tell the line is left to others. On a bus where starts need no turns a reading costs no other
+/// axis anything.
+void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
+  auto quiet = std::min<Duration>(settings_.poll_moving, longest_quiet);
+  if (!plan.endless) {
+    const auto soonest = planner_.soonest(plan, plan.target->counter - base);
+    const auto lead = std::min(soonest / end_lead_share, longest_end_lead);
+    quiet = std::min(quiet, soonest - lead);
+    poll_fast(since + soonest - lead, plan.predicted - soonest + lead + end_window);
+  }
+  if (env_.bus->start_turns() != nullptr) quiet_until_ = since + quiet;
+}
+
 /// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended
 /// otherwise.
 Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since) {
@@ -426,9 +443,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
   const bool unseen = !plan.endless && !shows(plan, base);
   std::optional<TimePoint> resting_since;
-  // The end is expected: it is to be told at once.
-  const auto end_lead = std::min(plan.predicted / 3, longest_end_lead);
-  if (!plan.endless) poll_fast(since + plan.predicted - end_lead, end_lead + end_window);
+  expect_end(plan, base, since);
   for (;;) {
     const auto deadline = std::min(activity->hold_until.value_or(latest), latest);
     co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(20)));

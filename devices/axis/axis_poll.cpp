@@ -39,15 +39,30 @@ Task<> Axis::poll() {
       continue;
     }
     if (bus_loss_) co_return go_offline(Error(*bus_loss_));
+    if (keeps_quiet()) {
+      co_await wake_.wait_until(quiet_until_);
+      continue;
+    }
     const auto began = env_.clock->now();
     if (!co_await poll_once(polling)) co_return;
     if (polling.woken || polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
     co_await look_for_drift();
+    if (works()) {
+      // Whoever waits for this sample goes first: it may be the last one that is wanted.
+      co_await let_others_run(env_.executor, *env_.clock);
+      if (link_ != LinkState::online || bus_loss_ || chains_ > 0) continue;
+    }
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
     const auto canary = works() ? continuity_checked_ + continuity_latest : canary_latest();
     const auto next = std::min(next_poll(asked), canary);
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }
+}
+
+/// What was started has nothing to tell yet. Whatever stops it is looked after at once.
+bool Axis::keeps_quiet() const {
+  const bool begun = activity_ && activity_->waits_for == StartWait::begun;
+  return begun && !stopping_.running && !stop_owed_ && env_.clock->now() < quiet_until_;
 }
 
 void Axis::poll_fast(TimePoint from, Duration longest) {

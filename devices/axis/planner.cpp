@@ -175,6 +175,12 @@ Duration Planner::duration(const Plan& plan, std::int64_t pulses) const {
                        plan.velocity_rpm * per_second, plan.acceleration_time, plan.deceleration_time);
 }
 
+Duration Planner::soonest(const Plan& plan, std::int64_t pulses) const {
+  const auto per_second = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
+  return soonest_duration(std::abs(static_cast<double>(pulses)), plan.start_rpm * per_second,
+                          plan.velocity_rpm * per_second, plan.acceleration_time, plan.deceleration_time);
+}
+
 Result<std::optional<HomingProfile>> Planner::homing() const {
   if (!settings_->homing) return std::optional<HomingProfile>{};
   const auto& homing = *settings_->homing;
@@ -219,6 +225,18 @@ Duration move_duration(double pulses, double start_speed, double speed, Duration
   if (in_ramps <= pulses) return to_duration(ramps + (pulses - in_ramps) / speed);
   // Too short to reach the speed: the ramps meet earlier. Bounded from above by the start speed all the way.
   return to_duration(std::min(ramps * std::sqrt(pulses / in_ramps) * 2, pulses / std::max(start_speed, 1.0)));
+}
+
+Duration soonest_duration(double pulses, double start_speed, double speed, Duration acceleration_time,
+                          Duration deceleration_time) {
+  const auto bound = move_duration(pulses, start_speed, speed, acceleration_time, deceleration_time);
+  const auto ramps = std::chrono::duration<double>(acceleration_time + deceleration_time).count();
+  if (pulses <= 0 || speed <= start_speed || (start_speed + speed) / 2 * ramps <= pulses) return bound;
+  // Where both ramps meet, the speed is `top`.
+  const auto won = speed - start_speed;
+  const auto top = std::sqrt((start_speed * start_speed) + (2 * pulses * won / ramps));
+  const std::chrono::duration<double> time(ramps * (top - start_speed) / won);
+  return std::min(bound, std::chrono::duration_cast<Duration>(time));
 }
 
 HomingMethod mirrored(HomingMethod method) {

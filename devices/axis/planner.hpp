@@ -47,6 +47,8 @@ class Planner {
   [[nodiscard]] bool positive(const PositionTracker::Target& target, const PositionTracker& tracker) const;
   /// How long a profile takes over `pulses`.
   [[nodiscard]] Duration duration(const Plan& plan, std::int64_t pulses) const;
+  /// The same where a drive is as fast as the profile permits: no reading can show it at its end before.
+  [[nodiscard]] Duration soonest(const Plan& plan, std::int64_t pulses) const;
   /// A slower profile that takes `wanted` over `pulses`, as near as the drive's whole r/min and milliseconds
   /// let it; never a shorter ramp. A motion too short for its velocity gets the one that it reaches first: it
   /// ends when predicted.
@@ -83,6 +85,11 @@ class Planner {
 /// Duration of a trapezoidal (or triangular) move (manual 7.1). Speeds in pulses per second.
 Duration move_duration(double pulses, double start_speed, double speed, Duration acceleration_time,
                        Duration deceleration_time);
+
+/// The same to the moment where the ramps of a triangular move meet as early as they can: move_duration() is
+/// a bound there.
+Duration soonest_duration(double pulses, double start_speed, double speed, Duration acceleration_time,
+                          Duration deceleration_time);
 
 /// The opposite direction for inverted axes (M18).
 HomingMethod mirrored(HomingMethod method);

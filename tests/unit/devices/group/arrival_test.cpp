@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "devices/descriptor.hpp"
+#include "devices/simulation/profile.hpp"
 
 namespace axisd {
 namespace {
@@ -72,6 +73,22 @@ TEST(Arrival, WhatIsTooShortForItsVelocityGetsTheOneThatItReaches) {
   const double in_ramps = (plan.start_rpm + plan.velocity_rpm) / 2.0 / 60 * 1000 * 0.2;
   EXPECT_LE(in_ramps, 300);
   EXPECT_GT(in_ramps, 295) << "and no slower than that";
+}
+
+/// No reading before can show the end: of a triangular move that is by as much as its ramps meet earlier.
+TEST(Arrival, TheSoonestEndIsThatOfTheProfile) {
+  const OneAxis axis;
+  for (const std::int64_t pulses : {1, 20, 300, 900, 3000, 100'000}) {
+    const auto [planner, plan, way] = axis.arrival(-pulses);
+    const auto rates = simulation::rates_from(plan.start_rpm, plan.velocity_rpm,
+                                              static_cast<double>(plan.acceleration_time / 1ms),
+                                              static_cast<double>(plan.deceleration_time / 1ms), 1000);
+    const auto profile = simulation::Profile::move(rates.start, rates, static_cast<double>(pulses));
+    EXPECT_NEAR(std::chrono::duration<double>(planner->soonest(plan, way)).count(), profile.duration(), 1e-6)
+        << pulses;
+    EXPECT_LE(planner->soonest(plan, way), plan.predicted);
+  }
+  EXPECT_EQ(axis.planner->soonest(axis.arrival(0).plan, 0), Duration{});
 }
 
 TEST(Arrival, WhoStandsAtItsTargetSlowsNobodyDown) {
