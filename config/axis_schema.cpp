@@ -329,7 +329,7 @@ const KeySpec axis_keys[] = {
      .kind = Kind::duration,
      .description =
          "How fresh the proof must be that the drive did not restart, when a motion starts. Below the "
-         "drive's shortest boot time.",
+         "drive's shortest boot time: one that is back sooner may be started with factory values.",
      .example = "80 ms",
      .default_value = "100 ms",
      .minimum = 10,

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -198,6 +199,14 @@ class Drive {
 
   /// What is not as it should be about the way the state comes ("state by SDO polling: ..."); empty: nothing.
   [[nodiscard]] virtual std::string link_note() const { return {}; }
+  /// No drive that was restarted shows this reading: such a one counts from 0. At rest, under power, and
+  /// further from 0 than its position may waver (M6, M10). False: it proves nothing.
+  [[nodiscard]] virtual bool rules_out_restart(const DriveSample& sample) const {
+    return !sample.moving && sample.enabled &&
+           std::abs(std::int64_t{sample.position_pulses}) > 2 * position_window();
+  }
+  /// When that was asked for which proved last that the drive was not restarted, where it keeps count (M7).
+  [[nodiscard]] virtual std::optional<TimePoint> proven_at() const { return std::nullopt; }
   /// Called on the core thread when the drive has something to tell that should not wait for the next poll:
   /// it booted, fell silent, or reported an alarm. read_state() then tells what.
   virtual void on_attention(const std::function<void()>& /*handler*/) {}

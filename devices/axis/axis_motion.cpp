@@ -237,10 +237,10 @@ bool Axis::is_at(const PositionTracker::Target& target) const {
   return std::abs(tracker_.counter() - target.counter) <= target_tolerance();
 }
 
-/// A drive that was restarted, on the way or before, shows the counter 0: only where that is the target, too,
-/// it has to prove that it is the same one.
+/// A drive that was restarted, on the way or before, shows the counter 0: only where the reading at the
+/// target could be that, too, it has to prove that it is the same one.
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
-  if (std::abs(activity->plan.target->counter) > target_tolerance()) co_return true;
+  if (sample_ && drive_->rules_out_restart(*sample_)) co_return true;
   co_return co_await proven_continuous(activity);
 }
 
@@ -351,8 +351,9 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   if (result || result.error().outcome == Outcome::unknown) activity->waits_for = StartWait::begun;
   watch_speed(SpeedWatch::Event::begun);
   if (result) {
-    // The canary was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.
-    continuity_checked_ = std::max(continuity_checked_, since - 2 * settings_.reboot_guard);
+    // A proof was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.
+    const auto proven = drive_->proven_at().value_or(since - 2 * settings_.reboot_guard);
+    continuity_checked_ = std::max(continuity_checked_, proven);
     activity->command->activate();
     publish();
     co_return true;

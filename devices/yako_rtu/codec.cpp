@@ -50,6 +50,10 @@ MotionBlock encode(const VelocityProfile& profile) {
           0};
 }
 
+std::int64_t target_of(const MotionBlock& block) {
+  return static_cast<std::int32_t>(std::uint32_t{block[4]} << 16U | block[5]);
+}
+
 HomingBlock encode(const HomingProfile& profile) {
   const auto offset = profile.offset_pulses;
   return {static_cast<std::uint16_t>(

@@ -26,6 +26,8 @@ MotionBlock encode(const MoveProfile& profile);
 /// In speed mode the sign of the speed is the direction (7.2); the pulses are not used and kept neutral.
 MotionBlock encode(const VelocityProfile& profile);
 HomingBlock encode(const HomingProfile& profile);
+/// Counter value to which such a block sends the drive, or by how much.
+std::int64_t target_of(const MotionBlock& block);
 /// The vendor's exception codes (6.2.4), which are not those of the Modbus standard.
 const char* exception_text(std::uint32_t code);
 

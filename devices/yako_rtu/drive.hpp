@@ -43,7 +43,12 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override {
     return expected_.size() == 1 ? std::optional(expected_.front()) : std::nullopt;
   }
-  void expect_marks(const std::vector<ContinuityMark>& marks) override { expected_ = marks; }
+  void expect_marks(const std::vector<ContinuityMark>& marks) override {
+    expected_ = marks;
+    proven_at_.reset();
+  }
+  [[nodiscard]] bool rules_out_restart(const DriveSample& sample) const override;
+  [[nodiscard]] std::optional<TimePoint> proven_at() const override { return proven_at_; }
   [[nodiscard]] std::vector<ContinuityMark> marks_until(const MoveProfile& start) const override {
     return marks_until(encode(start));
   }
@@ -125,10 +130,12 @@ class YakoRtuDrive final : public Drive {
   void forget_power_cycle(const MotionBlock& block);
   [[nodiscard]] MotionBlock fresh_neutral_block() const;
   [[nodiscard]] Result<void> check_control_mode() const;
+  void note_proof(TimePoint asked_at);
+  [[nodiscard]] std::optional<TimePoint> fresh_proof() const;
   Task<Result<void>> start(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
                            MotionGuard guard);
   Task<Result<void>> start_once(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
-                                MotionGuard guard);
+                                MotionGuard guard, std::optional<TimePoint> proven);
   Task<Result<void>> prepare_homing(HomingBlock block, TransactionOptions options);
 
   // drive_parameters.cpp
@@ -150,6 +157,10 @@ class YakoRtuDrive final : public Drive {
   std::optional<Error> setup_error_;
   /// What the motion block may hold: one entry, two after a block write whose reply was lost.
   std::vector<MotionBlock> expected_;
+  /// When the canary, or a reading of the state that no restarted drive shows, was asked for, if it was the
+  /// last of both. Kept here, and not by the axis: every answer of the drive and every write that voids a
+  /// proof passes through this class, and so does the trigger that rests on it.
+  std::optional<TimePoint> proven_at_;
   std::vector<MotionBlock> power_up_blocks_{factory_block};  ///< what a power-up may leave; the newest last
   std::optional<bool> saving_;                               ///< 0x0016, if it is known
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write

@@ -132,6 +132,10 @@ DriveSample YakoRtuDrive::sample_of(std::span<const std::uint16_t> registers, Ti
   sample.asked_at = asked_at;
   sample.measured_at = measured_at;
   sample.mode = mode_.judge(sample);
+  if (rules_out_restart(sample))
+    note_proof(asked_at);
+  else
+    proven_at_.reset();
   return sample;
 }
 
@@ -309,6 +313,7 @@ std::uint64_t YakoRtuDrive::saved_registers(std::uint16_t first, std::size_t cou
 }
 
 Task<Result<void>> YakoRtuDrive::write_run(std::uint16_t address, std::vector<std::uint16_t> values) {
+  proven_at_.reset();
   const auto saved = saving_.value_or(true) ? saved_registers(address, values.size()) : 0;
   Result<Answer> written = fail(Reason::internal, "no attempt was made");
   for (int attempt = 0; attempt < write_attempts; ++attempt) {

@@ -1,9 +1,11 @@
 // Power, starts and stops, and the canary that every start depends on.
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "devices/yako_rtu/drive.hpp"
 #include "devices/yako_rtu/registers.hpp"
+#include "devices/yako_rtu/transactions.hpp"
 
 namespace axisd::yako_rtu {
 
@@ -34,6 +36,7 @@ void YakoRtuDrive::note_power_up_block(const MotionBlock& block) {
 
 void YakoRtuDrive::forget_power_cycle(const MotionBlock& block) {
   expected_.clear();
+  proven_at_.reset();
   note_power_up_block(block);
   found_closed_.reset();
   unsaved_.clear();
@@ -65,6 +68,7 @@ Task<Result<void>> YakoRtuDrive::write_canary(MotionBlock block, TransactionOpti
 /// Whatever asks for this: a restart that nobody had noticed must not be overwritten. So the new one is
 /// written soon after the old one was read, as in start_once(), and with the class that can be soon.
 Task<Result<void>> YakoRtuDrive::replace_canary(MotionBlock block) {
+  proven_at_.reset();
   for (int attempt = 1;; ++attempt) {
     const auto found =
         co_await node_.read_patiently(reg::start_speed, canary_count, in(TransactionClass::motion));
@@ -92,6 +96,7 @@ Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions op
     forget_power_cycle(found);
     co_return fail(lost_memory());
   }
+  note_proof(answer->sent_at);
   co_return answer;
 }
 
@@ -102,6 +107,30 @@ bool YakoRtuDrive::recognise_canary(std::span<const std::uint16_t> registers) {
   if (std::ranges::find(expected_, found) == expected_.end()) return false;
   expected_ = {found};
   return true;
+}
+
+/// Where it rests just where the block in its memory sent it, too: a released shaft may have been turned off
+/// 0 by hand since a restart, but hardly to there.
+bool YakoRtuDrive::rules_out_restart(const DriveSample& sample) const {
+  if (expected_.size() != 1 || !Drive::rules_out_restart(sample)) return false;
+  return std::abs(target_of(expected_.front()) - sample.position_pulses) <= position_window();
+}
+
+void YakoRtuDrive::note_proof(TimePoint asked_at) {
+  if (!proven_at_ || *proven_at_ < asked_at) proven_at_ = asked_at;
+}
+
+/// A proof that stands for the canary of a start (M6): nothing has happened to the node since, and what is
+/// left of reboot_guard is enough for the block, also where the line has something else to do before the
+/// trigger. The gate judges its age again when that is bound.
+std::optional<TimePoint> YakoRtuDrive::fresh_proof() const {
+  if (!proven_at_ || *proven_at_ <= node_.bus().disturbed_at(node_.address())) return std::nullopt;
+  const auto& line = node_.bus().settings();
+  const auto size = writing(canary_count);
+  const auto block =
+      2 * modbus_rtu::silence(line) + modbus_rtu::wire_time(line, std::size_t{size.request} + size.reply);
+  const auto left = std::max<Duration>(setup_.reboot_guard / 4, 3 * block);
+  return clock_->now() + left <= *proven_at_ + setup_.reboot_guard ? proven_at_ : std::nullopt;
 }
 
 std::vector<ContinuityMark> YakoRtuDrive::marks_until(const MotionBlock& block) const {
@@ -126,6 +155,7 @@ Task<Result<void>> YakoRtuDrive::enable(MotionGuard guard) {
 }
 
 Task<Result<void>> YakoRtuDrive::disable(MotionGuard guard) {
+  proven_at_.reset();  // nothing holds the shaft where it was read
   const auto written = co_await node_.write_patiently(
       reg::enable, 0, {.transaction_class = TransactionClass::stop, .guard = std::move(guard)});
   if (!written) co_return failed(written.error());
@@ -165,7 +195,9 @@ Task<Result<void>> YakoRtuDrive::start(MotionBlock block, std::optional<HomingBl
   auto result = check_control_mode();
   if (!result) co_return result;
   for (int attempt = 0; attempt < chain_attempts; ++attempt) {
-    result = co_await start_once(block, homing, trigger, guard);
+    // Homing, and what did not work the first time, begin with the canary.
+    const auto proven = attempt == 0 && !homing ? fresh_proof() : std::nullopt;
+    result = co_await start_once(block, homing, trigger, guard, proven);
     if (result) break;
     const auto& error = result.error();
     const bool trigger_sent = error.where.object == trigger.address && error.outcome == Outcome::unknown;
@@ -179,16 +211,20 @@ Task<Result<void>> YakoRtuDrive::start(MotionBlock block, std::optional<HomingBl
   co_return result;
 }
 
+/// `proven`: what stands for the canary.
 Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<HomingBlock> homing,
-                                            Trigger trigger, MotionGuard guard) {
+                                            Trigger trigger, MotionGuard guard,
+                                            std::optional<TimePoint> proven) {
   const TransactionOptions motion{.transaction_class = TransactionClass::motion, .guard = guard};
-  const auto canary = co_await read_canary(motion);
-  if (!canary) co_return fail(canary.error());
-
-  // A drive that restarts after the canary was read is silent for longer than reboot_guard: a trigger bound
+  if (!proven) {
+    const auto canary = co_await read_canary(motion);
+    if (!canary) co_return fail(canary.error());
+    proven = canary->sent_at;
+  }
+  // A drive that restarts after that was asked for is silent for longer than reboot_guard: a trigger bound
   // within it never meets default parameters, and a block never hides a restart as the next canary.
   auto fresh = motion;
-  fresh.guard.not_after = std::min(guard.not_after, canary->sent_at + setup_.reboot_guard);
+  fresh.guard.not_after = std::min(guard.not_after, *proven + setup_.reboot_guard);
   if (homing) {
     if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
   } else if (const auto written = co_await write_canary(distinct(block), fresh); !written) {

@@ -138,6 +138,7 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
   if (const auto written = co_await replace_canary(neutral); !written) co_return written;
   const auto saved = co_await node_.write(reg::parameter_setting, 2, eeprom());
   const bool executed = saved || saved.error().outcome == Outcome::unknown;
+  proven_at_.reset();
   if (executed) {
     count_save(static_cast<std::uint64_t>(
         std::ranges::count_if(model_->descriptor->parameters, [](const auto& parameter) {
@@ -175,6 +176,7 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
     count_save(static_cast<std::uint64_t>(
         std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access)));
     expected_.clear();  // whatever stands there now, it is not ours
+    proven_at_.reset();
     saving_.reset();
     unsaved_.clear();
   }

@@ -23,20 +23,22 @@ void watch_triggers(Rig& rig, Duration guard = 100ms, bool powered = true) {
     const auto& wire = rig.line->wire();  // ends with this entry
     ASSERT_GE(wire.size(), 3U);
     const auto& block = wire[wire.size() - 2];
-    const auto& canary = wire[wire.size() - 3];
+    const auto& proof = wire[wire.size() - 3];
     EXPECT_EQ(block.function(), 0x10);
     EXPECT_EQ(block.address(), 0x0020);
     EXPECT_EQ(block.block().size(), 6U);
-    EXPECT_EQ(canary.function(), 0x03);
-    EXPECT_EQ(canary.address(), 0x0020);
-    EXPECT_LE(entry.begin - canary.begin, guard);
+    EXPECT_EQ(proof.function(), 0x03);
+    EXPECT_LE(entry.begin - proof.begin, guard);
     rig.drive->advance(entry.begin);
+    // The canary, or a reading of the state that no restarted drive shows.
+    const bool away_from_zero = rig.drive->peek(0x000A) != 0 || rig.drive->peek(0x000B) != 0;
+    EXPECT_TRUE(proof.address() == 0x0020 || (proof.address() == 0x0003 && (away_from_zero || !powered)));
     for (std::uint16_t i = 0; powered && i < 6; ++i)
       EXPECT_EQ(rig.drive->peek(0x0020 + i), block.block()[i]) << "the drive would start with other values";
   });
 }
 
-TEST(M06, EachStartIsCanaryBlockTrigger) {
+TEST(M06, EachStartIsProofBlockTrigger) {
   for_each_switch({}, [](const RigOptions& options) {
     Rig rig(options);
     rig.ready();
