@@ -91,8 +91,9 @@ class YakoRtuDrive final : public Drive {
   // drive_connection.cpp
   /// One reading of the state, in the order of the readings.
   DriveSample sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at, TimePoint measured_at);
-  /// Reads how far from its target the drive takes itself for in position.
-  Task<Result<void>> read_window();
+  /// Reads what note_register() keeps: how far from its target the drive takes itself for in position, and
+  /// what a start in one frame writes back.
+  Task<Result<void>> read_noted();
   void note_register(std::uint16_t address, std::uint16_t value);
   Task<bool> has_register(std::uint16_t address, TransactionClass transaction_class) const;
   [[nodiscard]] Error wrong_model(std::uint16_t code, const std::string& found) const;
@@ -132,10 +133,12 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] Result<void> check_control_mode() const;
   void note_proof(TimePoint asked_at);
   [[nodiscard]] std::optional<TimePoint> fresh_proof() const;
+  [[nodiscard]] bool may_start_in_one_frame() const;
   Task<Result<void>> start(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
                            MotionGuard guard);
   Task<Result<void>> start_once(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
                                 MotionGuard guard, std::optional<TimePoint> proven);
+  Task<Result<void>> start_in_one_frame(MotionBlock block, Trigger trigger, TransactionOptions options);
   Task<Result<void>> prepare_homing(HomingBlock block, TransactionOptions options);
 
   // drive_parameters.cpp
@@ -164,6 +167,7 @@ class YakoRtuDrive final : public Drive {
   std::vector<MotionBlock> power_up_blocks_{factory_block};  ///< what a power-up may leave; the newest last
   std::optional<bool> saving_;                               ///< 0x0016, if it is known
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
+  std::optional<std::uint16_t> terminal_move_mode_;  ///< 0x0026, if it is known
   ModeWatch mode_;
   /// 0x011F and the counts of a revolution by 0x0110, as the factory sets them until they were read.
   std::int64_t accuracy_ = 10, counts_per_revolution_ = 4000;

@@ -113,12 +113,15 @@ std::int64_t YakoRtuDrive::position_window() const {
 void YakoRtuDrive::note_register(std::uint16_t address, std::uint16_t value) {
   if (address == reg::encoder_resolution) counts_per_revolution_ = value == 1 ? 10000 : 4000;
   if (address == reg::positioning_accuracy) accuracy_ = std::max<std::uint16_t>(value, 1);
+  if (address == reg::terminal_move_mode) terminal_move_mode_ = value;
 }
 
-Task<Result<void>> YakoRtuDrive::read_window() {
-  if (!model_->descriptor->capabilities.closed_loop) co_return Result<void>{};
-  const auto found = co_await read_registers({reg::encoder_resolution, reg::positioning_accuracy},
-                                             in(TransactionClass::parameters));
+Task<Result<void>> YakoRtuDrive::read_noted() {
+  std::vector<std::uint16_t> noted;
+  if (may_start_in_one_frame()) noted.push_back(reg::terminal_move_mode);
+  if (model_->descriptor->capabilities.closed_loop)
+    noted.insert(noted.end(), {reg::encoder_resolution, reg::positioning_accuracy});
+  const auto found = co_await read_registers(std::move(noted), in(TransactionClass::parameters));
   if (!found) co_return fail(found.error());
   for (const auto& [address, value] : *found) note_register(address, value);
   co_return Result<void>{};
@@ -191,7 +194,7 @@ Task<Result<void>> YakoRtuDrive::configure() {
   // The canary goes first and is read last: a restart in between would undo what was found or written.
   if (const auto marked = co_await replace_canary(fresh_neutral_block()); !marked) co_return marked;
   if (const auto done = co_await bring_to(required_); !done) co_return done;
-  if (const auto known = co_await read_window(); !known) co_return known;
+  if (const auto known = co_await read_noted(); !known) co_return known;
   co_return co_await check_continuity(TransactionClass::parameters);
 }
 
@@ -314,6 +317,8 @@ std::uint64_t YakoRtuDrive::saved_registers(std::uint16_t first, std::size_t cou
 
 Task<Result<void>> YakoRtuDrive::write_run(std::uint16_t address, std::vector<std::uint16_t> values) {
   proven_at_.reset();
+  if (address <= reg::terminal_move_mode && address + values.size() > reg::terminal_move_mode)
+    terminal_move_mode_.reset();  // until it was read again
   const auto saved = saving_.value_or(true) ? saved_registers(address, values.size()) : 0;
   Result<Answer> written = fail(Reason::internal, "no attempt was made");
   for (int attempt = 0; attempt < write_attempts; ++attempt) {
@@ -341,6 +346,7 @@ Error YakoRtuDrive::not_held(const RegisterSetting& setting, std::uint16_t actua
 Task<Result<void>> YakoRtuDrive::verify(const std::vector<RegisterSetting>& required) {
   const auto after = co_await read_registers(addresses_of(required), in(TransactionClass::parameters));
   if (!after) co_return fail(after.error());
+  for (const auto& [address, value] : *after) note_register(address, value);
   for (const auto& setting : required)
     if (const auto actual = after->at(setting.address); !setting.holds(actual)) {
       if (setting.saved) unsaved_.insert(setting.address);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
+#include <vector>
 
 #include "devices/yako_rtu/drive.hpp"
 #include "devices/yako_rtu/registers.hpp"
@@ -227,12 +228,42 @@ Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<Hom
   fresh.guard.not_after = std::min(guard.not_after, *proven + setup_.reboot_guard);
   if (homing) {
     if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
+  } else if (terminal_move_mode_ && may_start_in_one_frame()) {
+    co_return co_await start_in_one_frame(distinct(block), trigger, std::move(fresh));
   } else if (const auto written = co_await write_canary(distinct(block), fresh); !written) {
     co_return written;
   }
   const auto triggered = co_await node_.write(trigger.address, trigger.value, fresh);
   if (!triggered) co_return failed(triggered.error());
   co_return Result<void>{};
+}
+
+bool YakoRtuDrive::may_start_in_one_frame() const {
+  const auto setting = setup_.model_settings.find("start_in_one_frame");
+  return setting != setup_.model_settings.end() && setting->second == SettingValue(true);
+}
+
+/// Whatever becomes of the frame is what becomes of the trigger: the error names that, and where it may have
+/// arrived it is never sent again (M8). Precondition: 0x0026, which lies between the two, is known.
+Task<Result<void>> YakoRtuDrive::start_in_one_frame(MotionBlock block, Trigger trigger,
+                                                    TransactionOptions options) {
+  static_assert(reg::terminal_move_mode == reg::start_speed + canary_count &&
+                reg::start == reg::terminal_move_mode + 1);
+  std::vector<std::uint16_t> frame(block.begin(), block.end());
+  frame.push_back(*terminal_move_mode_);  // as it stands there
+  frame.push_back(trigger.value);
+  const auto written = co_await node_.write_block(reg::start_speed, frame, std::move(options));
+  if (written) {
+    expected_ = {block};
+    co_return Result<void>{};
+  }
+  auto error = written.error();
+  // Refused for one register, the others may have been taken.
+  if (error.outcome == Outcome::unknown || error.outcome == Outcome::refused) expected_.push_back(block);
+  error.where.object = trigger.address;
+  if (error.outcome == Outcome::refused)
+    error.remedy = "if the drive takes no start in one frame, remove drive.start_in_one_frame";
+  co_return failed(std::move(error));
 }
 
 /// The block of homing is compared and not just written: with `persist` each write wears the EEPROM.

@@ -177,6 +177,7 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
         std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access)));
     expected_.clear();  // whatever stands there now, it is not ours
     proven_at_.reset();
+    terminal_move_mode_.reset();
     saving_.reset();
     unsaved_.clear();
   }

@@ -74,6 +74,16 @@ inline constexpr SettingSpec overtravel_setting = {
     .description = "What the drive itself does at an active limit terminal (0x0017).",
     .object = reg::overtravel_stop};
 
+/// The manuals do not say whether a drive that is sent 0x0020..0x0027 at once heeds the trigger among them.
+inline constexpr SettingSpec one_frame_setting = {
+    .key = "start_in_one_frame",
+    .kind = "boolean",
+    .choices = {},
+    .default_value = "false",
+    .description =
+        "Block and trigger of a start go in one frame (0x0020..0x0027), which spares an exchange. "
+        "The manual does not say that the drive starts then: first see it do so."};
+
 /// An integer register of the performance group, left as the drive has it when not given.
 constexpr SettingSpec tuning(std::string_view key, std::uint32_t address, std::int64_t minimum,
                              std::int64_t maximum, std::string_view description) {
@@ -90,6 +100,7 @@ constexpr SettingSpec tuning(std::string_view key, std::uint32_t address, std::i
 /// Settings that SSD2608PR and ESS42-R have alike.
 inline constexpr auto closed_loop_settings = std::to_array<SettingSpec>({
     overtravel_setting,
+    one_frame_setting,
     {.key = "loop_mode",
      .kind = "enum",
      .choices = loop_modes,

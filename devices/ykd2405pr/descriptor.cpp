@@ -55,6 +55,7 @@ constexpr SettingSpec settings[] = {
                     "and axisd then only watches the drive.",
      .object = reg::control_mode},
     yako_rtu::overtravel_setting,
+    yako_rtu::one_frame_setting,
     {.key = "current",
      .kind = "enum",
      .choices = currents,

@@ -37,6 +37,8 @@ constexpr Silent silent[] = {
     {"homing_never_gives_up", "no homing meets both limits"},
     {"inputs_undefined_at_power_up", "the functions are compared and written after each power-up"},
     {"limit_block_writes", "no block has more than 16 registers"},
+    {"one_frame_start", "block and trigger go apart"},
+    {"one_frame_start_refused", "block and trigger go apart"},
     {"partial_block_write", "no block has a bad value"},
     {"position_clear_in_motion", "the counter is cleared on axes without end, and at rest"},
     {"position_clear_late", "the counter is cleared on axes without end"},

@@ -246,6 +246,28 @@ TEST(SimulatorMotion, ReservedStartCodesDoNothingUnlessTheirSwitchesSayOtherwise
   EXPECT_EQ(1, moving.drive().starts());
 }
 
+TEST(SimulatorMotion, AStartInOneFrameIsASwitch) {
+  const std::vector<int> frame{5, 100, 100, 60, 0, 100, 1, 5};
+  Bench starting;
+  EXPECT_EQ(0, starting.write_block(reg::start_speed, frame));
+  EXPECT_EQ(1, starting.drive().starts());
+  EXPECT_EQ(1, starting.reg(reg::terminal_move_mode));
+  Bench ignoring{with_switch("one_frame_start", false)};
+  EXPECT_EQ(0, ignoring.write_block(reg::start_speed, frame));
+  EXPECT_EQ(0, ignoring.drive().starts());
+  EXPECT_EQ(60, ignoring.reg(reg::maximum_speed)) << "the rest of it counts";
+  EXPECT_EQ(0, ignoring.write_block(reg::start, {5})) << "by itself it is a start in any frame";
+  EXPECT_EQ(1, ignoring.drive().starts());
+  for (const bool partial : {false, true}) {
+    auto settings = with_switch("one_frame_start_refused");
+    settings.switches["partial_block_write"] = partial;
+    Bench refusing{settings};
+    EXPECT_EQ(6, refusing.write_block(reg::start_speed, frame));
+    EXPECT_EQ(0, refusing.drive().starts());
+    EXPECT_EQ(partial ? 100 : 5000, refusing.reg(reg::pulses_low));
+  }
+}
+
 TEST(SimulatorMotion, AReleasedMotorDoesNotStartAndOneReleasedInMotionStops) {
   Bench bench;
   bench.velocity(60);
