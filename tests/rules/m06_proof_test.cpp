@@ -126,6 +126,35 @@ TEST(M06, ARestAnywhereElseIsNoProof) {
   EXPECT_EQ(canaries_of_start(rig, 5), 1);
 }
 
+/// It would be the next canary, and hide a restart meanwhile.
+TEST(M06, ABlockThatHadToWaitIsNotWrittenOnAnOlderProof) {
+  both_directions({}, [](const RigOptions& base) {
+    auto options = base;
+    options.adjust_drive = [](auto& node) { node.boot_time = 101ms; };
+    Rig rig(options);
+    rig.ready();
+    EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
+    auto wait = [](modbus_rtu::RtuBus& bus) -> Task<> {
+      (void)co_await bus.transact({.node = 9, .address = state},
+                                  {.transaction_class = TransactionClass::stop, .turnaround_max = 400ms});
+    };
+    spawn(rig.world.executor(), wait(*rig.machine->find_line("line-a")), "wait");
+    rig.run(3ms);
+    ASSERT_EQ(rig.line->wire().back().node(), 9);
+    rig.line->forget_wire();
+    const auto move = rig.submit(MoveAbsoluteRequest{.position = 20});
+    rig.run(1ms);
+    rig.cycle_power();
+    rig.run(3s);
+    EXPECT_TRUE(move->has_ended());
+    EXPECT_EQ(rig.load_mm(), 10);
+    EXPECT_EQ(rig.triggers(), 0);
+    EXPECT_EQ(move->value().cause->reason, Reason::rebooted) << describe(move->value());
+    EXPECT_EQ(rig.state()->reboots, 1);
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+  });
+}
+
 TEST(M06, AfterSavingTheCanaryIsReadBeforeAStart) {
   Rig rig;
   rig.ready();

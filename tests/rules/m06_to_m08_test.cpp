@@ -220,7 +220,7 @@ TEST(M06, ABlockThatHadToWaitIsNotWrittenWithoutAnotherCanary) {
     Rig rig(options);
     rig.ready();
     EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
-    rig.run(50ms);
+    rig.run(85ms);  // so that the canary is read
     bool lost = false;
     auto wait = [](modbus_rtu::RtuBus& bus) -> Task<> {  // for nobody, before what is queued after it
       (void)co_await bus.transact({.node = 9, .address = 0x0003, .count = 1},
