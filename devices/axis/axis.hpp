@@ -182,6 +182,7 @@ class Axis {
   Task<Result<void>> prove_continuity(TransactionClass priority);
   /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
   void poll_fast(TimePoint from, Duration longest);
+  void keep_quiet(TimePoint until);
   [[nodiscard]] bool keeps_quiet() const;
   [[nodiscard]] TimePoint next_poll(TimePoint began) const;
 
@@ -445,7 +446,7 @@ class Axis {
   TimePoint settle_by_{};
   std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon
   TimePoint fast_from_{}, fast_until_{};                  ///< of poll_fast()
-  TimePoint quiet_until_{};                               ///< of expect_end()
+  TimePoint quiet_until_{};                               ///< of keep_quiet()
   std::string drift_;                                     ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
   std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()

@@ -25,6 +25,8 @@ constexpr Duration longest_end_lead = milliseconds(10);
 constexpr int end_lead_share = 32;
 /// So long after a start nothing is asked, at most, so that canaries come in time (M7).
 constexpr Duration longest_quiet = milliseconds(100);
+/// So long a proof at the target may take before its axis is read again.
+constexpr Duration proof_patience = milliseconds(20);
 /// A motion that no sample can tell from noise is over so long after its predicted end.
 constexpr auto unseen_margin = milliseconds(100);
 
@@ -241,6 +243,7 @@ bool Axis::is_at(const PositionTracker::Target& target) const {
 /// target could be that, too, it has to prove that it is the same one.
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
   if (sample_ && drive_->rules_out_restart(*sample_)) co_return true;
+  keep_quiet(env_.clock->now() + std::min<Duration>(settings_.poll_moving, proof_patience));
   co_return co_await proven_continuous(activity);
 }
 
@@ -423,8 +426,7 @@ bool Axis::held_back(const Plan& plan) const {
 }
 
 /// When a motion is read that was acknowledged at `since`: its end is to be told at once, and before it has
-/// something to tell the line is left to others. On a bus where starts need no turns a reading costs no other
-/// axis anything.
+/// something to tell the line is left to others.
 void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
   auto quiet = std::min<Duration>(settings_.poll_moving, longest_quiet);
   if (!plan.endless) {
@@ -433,7 +435,7 @@ void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
     quiet = std::min(quiet, soonest - lead);
     poll_fast(since + soonest - lead, plan.predicted - soonest + lead + end_window);
   }
-  if (env_.bus->start_turns() != nullptr) quiet_until_ = since + quiet;
+  keep_quiet(since + quiet);
 }
 
 /// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended

@@ -59,7 +59,12 @@ Task<> Axis::poll() {
   }
 }
 
-/// What was started has nothing to tell yet. Whatever stops it is looked after at once.
+/// What was started is not read before. Where starts need no turns a reading costs no other axis anything.
+void Axis::keep_quiet(TimePoint until) {
+  if (env_.bus->start_turns() != nullptr) quiet_until_ = until;
+}
+
+/// Whatever stops it is looked after at once.
 bool Axis::keeps_quiet() const {
   const bool begun = activity_ && activity_->waits_for == StartWait::begun;
   return begun && !stopping_.running && !stop_owed_ && env_.clock->now() < quiet_until_;
