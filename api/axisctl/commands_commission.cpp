@@ -26,9 +26,10 @@ using commission::RecordFile;
 
 constexpr const char* explanation_and_examples = R"(
 Needs a terminal and somebody at the machine. In order: what is talked to; each switch actuated by hand, without power;
-power on; a short move in each direction; each limit switch ends a motion; a stop; homing; soft limits; power off.
-Nothing moves before "yes" to that very move, which says how far and how fast; Enter stops it, and so does Ctrl-C, at any
-time. What is skipped is asked for a reason. A step that failed may be tried again.
+power on; a short move in each direction, the first at a tenth of the highest velocity and timed; each limit switch ends
+a motion; a stop; homing; soft limits; power off. Nothing moves before "yes" to that very move, which says how far and how
+fast; Enter stops it, and so does Ctrl-C, at any time. Nothing faster than the first move is done before its time was
+seen to be that which was told. What is skipped is asked for a reason. A step that failed may be tried again.
 
 The axis is leased meanwhile, so that nobody else moves it. The record is JSON, and written after each step.
 Status 0: every step passed or does not apply; 1: a step failed, was skipped or not done; 130: Ctrl-C.
@@ -143,8 +144,9 @@ void add_commission_command(CLI::App& app, Invocation& invocation) {
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("AXIS", arguments->axis, "Name of the axis")->required();
   command
-      ->add_option("--velocity", arguments->velocity,
-                   "Of all moves but homing: 5mm/s (default: a twentieth of the highest)")
+      ->add_option(
+          "--velocity", arguments->velocity,
+          "Of all moves but homing: 5mm/s (default: a twentieth of the highest; the first: a tenth at most)")
       ->type_name("VALUE");
   command
       ->add_option(

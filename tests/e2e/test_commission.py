@@ -25,7 +25,13 @@ class Commission(CommissionScenario):
         self.assertEqual(record["configuration_revision"], config["revision"])
         self.assertEqual(len(person.step("switch X0")["edges"]), 2)
         figures = {figure["name"]: figure["value"] for figure in person.step("jog positive")["figures"]}
-        self.assertEqual((figures["asked"], figures["travelled"]), (2, 2))
+        self.assertEqual((figures["asked"], figures["travelled"]), (8, 8))
+        # The first move is a tenth of 100 mm/s, and only what was measured is followed by faster ones.
+        self.assertEqual((figures["velocity"], record["speed"]), (10, "SPEED_PROOF_PROVEN"))
+        self.assertTrue(figures["time_at_least"] < figures["time_told"] * 1.05 + 0.05, figures)
+        self.assertTrue(figures["time_at_most"] > figures["time_told"] * 0.95 - 0.05, figures)
+        figures = {figure["name"]: figure["value"] for figure in person.step("jog negative")["figures"]}
+        self.assertEqual((figures["velocity"], "time_told" in figures), (20, False))
         figures = {figure["name"]: figure["value"] for figure in person.step("stop")["figures"]}
         self.assertTrue(0 < figures["standstill_after"] < figures["published_bound"], figures)
         self.assertGreaterEqual(figures["call_answered_after"], figures["standstill_after"])

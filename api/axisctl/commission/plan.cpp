@@ -8,7 +8,7 @@
 namespace axisd::axisctl::commission {
 namespace {
 
-constexpr double share_of_velocity = 0.05, share_of_range = 0.05;
+constexpr double share_of_velocity = 0.05, share_of_range = 0.05, share_of_proof = 0.1;
 constexpr double jog_seconds = 2;
 /// A hand needs so long to reach a switch after the motion has begun; after so long nobody will.
 constexpr double hand_seconds = 10, longest_hand_seconds = 30;
@@ -43,6 +43,18 @@ std::string unproven_direction(const Record& record) {
   if (!passed(record, "jog positive") && !passed(record, "jog negative"))
     return "the direction was not proven";
   return {};
+}
+
+/// What the axis was not seen to do slowly it must not do faster.
+std::string unproven_speed(const Record& record) {
+  switch (record.speed()) {
+    case SPEED_PROOF_PROVEN:
+      return {};
+    case SPEED_PROOF_WRONG:
+      return "the axis is not as fast as it was told to be";
+    default:
+      return "the speed was not proven";
+  }
 }
 
 /// Of a move that is to be stopped on its way.
@@ -105,12 +117,14 @@ std::string obstacle(const StepPlan& step, const std::vector<StepPlan>& steps, c
     case StepKind::input:
       return passed(record, "power off") ? "" : "the power stage is on: no hands at the switches";
     case StepKind::jog:
-      return passed(record, "power on") ? "" : "the power stage is off";
+      if (!passed(record, "power on")) return "the power stage is off";
+      return record.speed() == SPEED_PROOF_WRONG ? unproven_speed(record) : "";
     case StepKind::limit:
     case StepKind::stop:
     case StepKind::home: {
       if (!passed(record, "power on")) return "the power stage is off";
       if (auto why = unproven_direction(record); !why.empty()) return why;
+      if (auto why = unproven_speed(record); !why.empty()) return why;
       if (auto why = failed_switch(steps, record); !why.empty()) return why;
       if (step.kind != StepKind::home) return {};
       // Homing runs until a switch ends it: one that does not end a motion must not be relied on.
@@ -134,6 +148,11 @@ Motion default_motion(VelocityRange permitted, const std::optional<Settings>& se
                                (*settings->position_maximum - *settings->position_minimum) * share_of_range);
   if (distance) motion.distance = *distance;
   return motion;
+}
+
+double proving_velocity(VelocityRange permitted, std::optional<double> wanted) {
+  const double slow = std::max(permitted.maximum * share_of_proof, permitted.minimum);
+  return std::min(slow, wanted.value_or(slow));
 }
 
 double bounded(double wanted, bool positive, const v1::AxisState& state,

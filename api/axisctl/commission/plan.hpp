@@ -40,7 +40,8 @@ bool is_limit(const std::string& function);
 std::vector<StepPlan> plan_steps(const v1::AxisState& state, const std::optional<Settings>& settings);
 
 /// Why a step must not be done after what became of those before it; empty: it may. A direction that is
-/// wrong, or a limit switch that does not work, forbids the motions that rely on it.
+/// wrong, or a limit switch that does not work, forbids the motions that rely on it; a speed that is wrong
+/// each motion, one that is not proven all but the jogs.
 std::string obstacle(const StepPlan& step, const std::vector<StepPlan>& steps, const Record& record);
 
 /// What the motions of a commissioning are, in user units.
@@ -57,6 +58,10 @@ struct VelocityRange {
 /// positions. What the operator gave counts instead.
 Motion default_motion(VelocityRange permitted, const std::optional<Settings>& settings,
                       std::optional<double> velocity, std::optional<double> distance);
+
+/// Of the moves that go before the proof of the speed: a tenth of the highest velocity, at least what the
+/// drive can do, and not faster than the operator wants.
+double proving_velocity(VelocityRange permitted, std::optional<double> wanted);
 
 /// How far the axis may go from here in one relative move: at most `wanted`, not beyond a soft limit that
 /// counts, and not further than jog_travel while the position is unknown. Not negative.

@@ -76,6 +76,8 @@ class Procedure {
   // The power stage is on.
   Judgement enable(Step& step);
   Judgement jog(const StepPlan& plan, Step& step);
+  /// By the time of a move from `start`: before it, nothing faster than that is done.
+  Judgement prove_speed(const v1::AxisState& start, const Run& run, double distance, Step& step);
   Judgement limit(const StepPlan& plan, Step& step);
   /// Stops a move on which another limit switch became active.
   void end_by_stop(Step& step, LimitObservation& seen);

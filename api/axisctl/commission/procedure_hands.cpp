@@ -90,10 +90,11 @@ Judgement Procedure::identity(Step& step) {
             .remedy = first->detail().remedy()};
   }
   plan_motion();
-  permit(fmt::format("Is this the axis that you stand at? Moves will be {} at {}, and nothing moves before "
-                     "you say yes to it. Go on?",
+  permit(fmt::format("Is this the axis that you stand at? Moves will be {} at {}, the first at {}, and "
+                     "nothing moves before you say yes to it. Go on?",
                      with_unit(motion_.distance, record_.unit()),
-                     with_unit(motion_.velocity, record_.unit() + "/s")),
+                     with_unit(motion_.velocity, record_.unit() + "/s"),
+                     with_unit(proving_velocity(velocities_, wishes_.velocity), record_.unit() + "/s")),
          step);
   return {};
 }

@@ -64,22 +64,32 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
   const double room = bounded(motion_.distance, plan.positive, before, settings_);
   if (room <= 0) throw StepEnd(VERDICT_NOT_DONE, no_room(before), room_remedy(before));
   const double distance = plan.positive ? room : -room;
-  check_move(distance, motion_.velocity);
-  permit(fmt::format("{}. Look at the machine; Enter stops it. Move?",
-                     move_text(distance, motion_.velocity, before)),
+  const bool proves = record_.speed() != SPEED_PROOF_PROVEN;
+  const double velocity = proves ? proving_velocity(velocities_, wishes_.velocity) : motion_.velocity;
+  check_move(distance, velocity);
+  permit(fmt::format("{}{}. Look at the machine; Enter stops it. Move?",
+                     move_text(distance, velocity, before), proves ? ", and its time is measured" : ""),
          step);
-  JogObservation seen{.axis = axis_.name(),
-                      .command = follow(axis_.move(distance, motion_.velocity), step).command,
-                      .distance = distance};
+  const auto start = axis_.state();
+  auto run = follow(axis_.move(distance, velocity), step);
+  JogObservation seen{.axis = axis_.name(), .command = run.command, .distance = distance};
   const auto after = axis_.state();
+  run.samples.push_back(after);
   // A rotary axis begins anew after a turn: of all places it is the one next to the target.
   seen.travelled = unwrapped(after.position(), before.position() + distance, settings_) - before.position();
   seen.tolerance = room * share_of_distance;
   seen.invert = settings_ && settings_->invert;
+  seen.measured = after.position_source() == v1::POSITION_SOURCE_ENCODER;
   add_figure(step, "asked", distance, unit);
   add_figure(step, "travelled", seen.travelled, unit);
   add_figure(step, "velocity", seen.command.granted().velocity(), unit + "/s");
-  if (auto judgement = judge_motion(seen, unit); judgement.verdict != VERDICT_PASSED) return judgement;
+  if (auto judgement = judge_motion(seen, unit); judgement.verdict != VERDICT_PASSED) {
+    if (proves && disproves_speed(seen.command)) record_.set_speed(SPEED_PROOF_WRONG);
+    return judgement;
+  }
+  if (proves)
+    if (auto judgement = prove_speed(start, run, distance, step); judgement.verdict != VERDICT_PASSED)
+      return judgement;
   const auto right = dialogue_.choose(
       fmt::format("The drive says that it moved {}. Did the machine move by that much, in the {} direction?",
                   with_sign(seen.travelled, unit), plan.positive ? "positive" : "negative"),
@@ -93,6 +103,24 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
                                     : Seen::other_way;
   }
   return judge_jog(seen, unit);
+}
+
+Judgement Procedure::prove_speed(const v1::AxisState& start, const Run& run, double distance, Step& step) {
+  SpeedObservation move{
+      .axis = axis_.name(), .command = run.command, .distance = distance, .samples = {start}};
+  for (auto sample : run.samples) {
+    sample.set_position(unwrapped(sample.position(), move.samples.back().position(), settings_));
+    move.samples.push_back(std::move(sample));
+  }
+  const auto figures = measure_speed(move);
+  add_figure(step, "time_told", figures.told, "s");
+  if (figures.most > 0) {
+    add_figure(step, "time_at_least", figures.least, "s");
+    add_figure(step, "time_at_most", figures.most, "s");
+  }
+  auto [proof, judgement] = judge_speed(move, record_.unit());
+  record_.set_speed(proof);
+  return judgement;
 }
 
 Judgement Procedure::stop(Step& step) {

@@ -4,6 +4,7 @@
 #include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "api/axisctl/error.hpp"
@@ -28,6 +29,45 @@ std::string key_of(const ExpectedInput& input) {
 std::string end_of(const v1::Command& command) {
   return fmt::format("{} ended {}{}", command_kind(command), command_state(command),
                      command.has_cause() ? ": " + describe(command.cause(), command.axis()) : "");
+}
+
+/// Where the middle of a way begins, and as far before its end it ends.
+constexpr double share_of_edge = 0.1;
+/// What a speed may be off: of the time, and s. A drive may tell positions that are so old.
+constexpr double share_of_time = 0.05, staleness = 0.05;
+
+/// The time to go so far from rest: with the ramp first.
+double time_to(double way, double velocity, double ramp) {
+  const double in_ramp = velocity * ramp / 2;
+  return way < in_ramp ? std::sqrt(2 * way * ramp / velocity) : ramp / 2 + way / velocity;
+}
+
+/// The time of the middle of a way.
+double middle_time(double distance, double velocity, double acceleration_time, double deceleration_time) {
+  const double in_ramps = velocity * (acceleration_time + deceleration_time) / 2;
+  // Too short for the velocity: the ramps meet earlier, both in the same proportion.
+  const double share = in_ramps > distance ? std::sqrt(distance / in_ramps) : 1;
+  const double top = velocity * share;
+  const double up = acceleration_time * share;
+  const double down = deceleration_time * share;
+  const double whole = up + down + std::max(0.0, distance - in_ramps) / velocity;
+  const double edge = distance * share_of_edge;
+  return whole - time_to(edge, top, up) - time_to(edge, top, down);
+}
+
+std::string time_range(const SpeedFigures& figures) {
+  const auto least = duration_text(figures.least);
+  const auto most = duration_text(figures.most);
+  return least == most ? least : fmt::format("{} to {}", least, most);
+}
+
+/// Where an axis is not as fast as it was told to be.
+std::string compare_units(const std::string& axis) {
+  return fmt::format(
+      "compare axes.{0}.scale (microstep: pulses per revolution; gear), axes.{0}.drive.velocity_unit and the "
+      "ramps with the drive and its unit objects (6091h, 6093h to 6097h, 60A9h, 60AAh); reload the "
+      "configuration, and try again",
+      axis);
 }
 
 bool done(const v1::Command& command) { return command.state() == v1::COMMAND_STATE_DONE; }
@@ -73,11 +113,19 @@ Judgement wrong_polarity(const ExpectedInput& expected) {
 }
 
 Judgement judge_motion(const JogObservation& jog, const std::string& unit) {
-  if (!done(jog.command)) return failed(end_of(jog.command), fmt::format("axisctl explain {}", jog.axis));
+  if (!done(jog.command))
+    return failed(end_of(jog.command), jog.command.cause().reason() == v1::REASON_TOOK_TOO_LONG
+                                           ? compare_units(jog.axis)
+                                           : fmt::format("axisctl explain {}", jog.axis));
   if (std::abs(jog.travelled - jog.distance) > jog.tolerance)
-    return failed(fmt::format("the position changed by {} instead of {}", with_unit(jog.travelled, unit),
-                              with_unit(jog.distance, unit)),
-                  "look for what moved the axis beside this command");
+    return failed(
+        fmt::format("the position changed by {} instead of {}", with_unit(jog.travelled, unit),
+                    with_unit(jog.distance, unit)),
+        fmt::format("look for what moved the axis beside this command{}",
+                    jog.measured ? fmt::format("; compare axes.{}.scale.microstep (counts of a "
+                                               "revolution) with the encoder, and look at the coupling",
+                                               jog.axis)
+                                 : ""));
   return {};
 }
 
@@ -98,6 +146,56 @@ Judgement judge_jog(const JogObservation& jog, const std::string& unit) {
                     "check the motor's cable and current, and the coupling");
   }
   return failed("no verdict");
+}
+
+bool disproves_speed(const v1::Command& command) {
+  const auto reason = command.cause().reason();
+  return done(command) || reason == v1::REASON_TOOK_TOO_LONG || reason == v1::REASON_MISCONFIGURED;
+}
+
+SpeedFigures measure_speed(const SpeedObservation& move) {
+  const double distance = std::abs(move.distance);
+  const auto& granted = move.command.granted();
+  SpeedFigures figures{.told = middle_time(distance, granted.velocity(), seconds(granted.acceleration_time()),
+                                           seconds(granted.deceleration_time())),
+                       .way = distance * (1 - 2 * share_of_edge)};
+  // The last sample before each end of the middle, and the first behind it.
+  std::array<std::optional<double>, 2> before;
+  std::array<std::optional<double>, 2> behind;
+  for (const auto& sample : move.samples) {
+    const double way = (sample.position() - move.samples.front().position()) / move.distance;
+    const double at = seconds_of(sample.measured_at());
+    for (const std::size_t end : {0U, 1U}) {
+      const double place = end == 0 ? share_of_edge : 1 - share_of_edge;
+      if (way < place && !behind[end]) before[end] = at;
+      if (way >= place && !behind[end]) behind[end] = at;
+    }
+  }
+  if (!before[0] || !before[1] || !behind[0] || !behind[1]) return figures;
+  figures.least = std::max(0.0, *before[1] - *behind[0]);
+  figures.most = *behind[1] - *before[0];
+  return figures;
+}
+
+SpeedJudgement judge_speed(const SpeedObservation& move, const std::string& unit) {
+  const auto figures = measure_speed(move);
+  const double tolerance = figures.told * share_of_time + staleness;
+  const bool slow = figures.least > figures.told + tolerance;
+  const bool fast = figures.most < figures.told - tolerance;
+  const auto told = fmt::format("{} were told for it at {}", duration_text(figures.told),
+                                with_unit(move.command.granted().velocity(), unit + "/s"));
+  if (figures.most > 0 && (slow || fast)) {
+    auto reason =
+        fmt::format("it was in the middle {} of its way for {}, and {}: it is too {}",
+                    with_unit(figures.way, unit), time_range(figures), told, slow ? "slow" : "fast");
+    return {.proof = SPEED_PROOF_WRONG, .judgement = failed(std::move(reason), compare_units(move.axis))};
+  }
+  if (figures.most == 0 || figures.most - figures.least + tolerance > figures.told / 2)
+    return {.proof = SPEED_PROOF_UNSPECIFIED,
+            .judgement = failed(fmt::format("too short to tell its speed: {}, and its samples leave open {}",
+                                            told, time_range(figures)),
+                                "give a longer --distance, or a lower --velocity")};
+  return {.proof = SPEED_PROOF_PROVEN, .judgement = {}};
 }
 
 Judgement judge_limit_end(const LimitObservation& limit) {

@@ -40,13 +40,41 @@ struct JogObservation {
   double distance = 0;  ///< asked, signed
   double travelled = 0;
   double tolerance = 0;
-  bool invert = false;  ///< as configured
+  bool invert = false;    ///< as configured
+  bool measured = false;  ///< `travelled` is an encoder's
   Seen seen = Seen::as_told;
 };
 /// Of the move itself, before the operator is asked.
 Judgement judge_motion(const JogObservation& jog, const std::string& unit);
 /// With what the operator saw.
 Judgement judge_jog(const JogObservation& jog, const std::string& unit);
+
+/// A move that was done, with its samples from before its start until after its end: positions are unwrapped,
+/// and `distance` is what was told, signed.
+struct SpeedObservation {
+  std::string axis;
+  v1::Command command;
+  double distance = 0;
+  std::vector<v1::AxisState> samples;
+};
+/// How long the shaft was in the middle of its way, from a tenth of it to nine tenths, s: there neither
+/// settling nor the beginning counts. What the samples leave open lies between `least` and `most`.
+struct SpeedFigures {
+  double told = 0;  ///< by velocity and ramps, as granted
+  double least = 0, most = 0;
+  double way = 0;  ///< of the middle, user units
+};
+SpeedFigures measure_speed(const SpeedObservation& move);
+struct SpeedJudgement {
+  SpeedProof proof = SPEED_PROOF_UNSPECIFIED;  ///< unspecified: the samples do not tell
+  Judgement judgement;
+};
+/// Of a move that did not come where it was told, or was ended: because the axis counts otherwise than its
+/// drive.
+bool disproves_speed(const v1::Command& command);
+/// A speed that is off by some per cent, and by what samples may be late, is wrong; one that could be twice
+/// as high, or half, is not known.
+SpeedJudgement judge_speed(const SpeedObservation& move, const std::string& unit);
 
 struct LimitObservation {
   ExpectedInput input;

@@ -96,6 +96,7 @@ struct Rehearsal {
   Record record;
 
   Rehearsal() {
+    record.set_speed(SPEED_PROOF_PROVEN);
     for (const auto& plan : steps) {
       auto& step = *record.add_steps();
       step.set_name(plan.name);
@@ -143,6 +144,15 @@ TEST(Obstacle, IsADirectionThatIsWrongOrNotProven) {
   EXPECT_THAT(rehearsal.forbidden(), ElementsAre("limit positive", "limit negative", "stop", "homing"));
 }
 
+TEST(Obstacle, IsASpeedThatIsWrongOrNotProven) {
+  Rehearsal rehearsal;
+  rehearsal.record.set_speed(SPEED_PROOF_UNSPECIFIED);
+  EXPECT_THAT(rehearsal.forbidden(), ElementsAre("limit positive", "limit negative", "stop", "homing"));
+  rehearsal.record.set_speed(SPEED_PROOF_WRONG);
+  EXPECT_THAT(rehearsal.forbidden(), ElementsAre("jog positive", "jog negative", "limit positive",
+                                                 "limit negative", "stop", "homing"));
+}
+
 TEST(Obstacle, IsASwitchThatDoesNotWork) {
   Rehearsal rehearsal;
   rehearsal.set("switch X1", VERDICT_FAILED);
@@ -168,6 +178,13 @@ TEST(Motion, IsSlowAndShort) {
   const auto asked = default_motion(permitted, settings(), 20, 30);
   EXPECT_DOUBLE_EQ(asked.velocity, 20);
   EXPECT_DOUBLE_EQ(asked.distance, 30);
+}
+
+TEST(Motion, BeforeTheProofIsATenthOfTheHighest) {
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}), 10);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 20), 10);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 2), 2);
+  EXPECT_DOUBLE_EQ(proving_velocity({.minimum = 30, .maximum = 100}, {}), 30);
 }
 
 TEST(Motion, IsBoundedByWhatIsKnown) {

@@ -98,6 +98,80 @@ TEST(JudgeJog, TellsTheKeyByWhatWasSeen) {
   EXPECT_EQ(judge_jog(seen, "mm").verdict, VERDICT_FAILED);
 }
 
+TEST(JudgeJog, NamesTheUnitsOfAMoveThatTookTooLong) {
+  auto seen = jog();
+  seen.command = command(v1::COMMAND_STATE_ERROR, v1::REASON_TOOK_TOO_LONG);
+  EXPECT_THAT(judge_jog(seen, "mm").remedy, HasSubstr("axes.feeder.drive.velocity_unit"));
+  EXPECT_TRUE(disproves_speed(seen.command));
+  EXPECT_FALSE(disproves_speed(command(v1::COMMAND_STATE_ABORTED, v1::REASON_ALARM)));
+}
+
+/// A move of -10 mm that was told to take 2.15 s, at 5 mm/s with ramps of 100 and 200 ms. It takes `factor`
+/// times as long, and is read every `period` ms.
+SpeedObservation measured_move(double factor, int period = 20) {
+  SpeedObservation move{
+      .axis = "feeder", .command = command(v1::COMMAND_STATE_DONE), .distance = -10, .samples = {}};
+  auto& granted = *move.command.mutable_granted();
+  granted.set_velocity(5);
+  granted.mutable_acceleration_time()->set_nanos(100'000'000);
+  granted.mutable_deceleration_time()->set_nanos(200'000'000);
+  const auto way = [](double time) {
+    if (time < 0) return 0.0;
+    if (time < 0.1) return 25 * time * time;
+    if (time < 1.95) return 0.25 + (5 * (time - 0.1));
+    if (time < 2.15) return 10 - (12.5 * (2.15 - time) * (2.15 - time));
+    return 10.0;
+  };
+  for (int at = -period; at < 2300 * factor + 2 * period; at += period) {
+    v1::AxisState state;
+    state.mutable_measured_at()->set_seconds(1000 + ((at + 1000) / 1000));
+    state.mutable_measured_at()->set_nanos((at + 1000) % 1000 * 1'000'000);
+    state.set_position(3 - way(at / 1000.0 / factor));
+    move.samples.push_back(state);
+  }
+  return move;
+}
+
+TEST(JudgeSpeed, ProvesAMoveThatTakesAsLongAsTold) {
+  const auto move = measured_move(1);
+  const auto figures = measure_speed(move);
+  EXPECT_NEAR(figures.told, 1.6, 0.03);  // 8 mm, and a little of the ramp before the stop
+  EXPECT_LE(figures.least, figures.told);
+  EXPECT_GE(figures.most, figures.told);
+  EXPECT_LE(figures.most - figures.least, 0.05);
+  EXPECT_EQ(judge_speed(move, "mm").proof, SPEED_PROOF_PROVEN);
+  EXPECT_EQ(judge_speed(move, "mm").judgement.verdict, VERDICT_PASSED);
+}
+
+TEST(JudgeSpeed, TellsBothFiguresAndTheKeysOfAWrongSpeed) {
+  for (const double factor : {0.1, 0.5, 0.85, 1.15, 2.0, 10.0}) {
+    const auto judged = judge_speed(measured_move(factor), "mm");
+    EXPECT_EQ(judged.proof, SPEED_PROOF_WRONG) << factor;
+    EXPECT_EQ(judged.judgement.verdict, VERDICT_FAILED) << factor;
+    EXPECT_THAT(judged.judgement.reason, HasSubstr(factor < 1 ? "too fast" : "too slow"));
+    EXPECT_THAT(judged.judgement.reason, HasSubstr("were told for it at 5 mm/s"));
+    EXPECT_THAT(judged.judgement.remedy,
+                HasSubstr("axes.feeder.scale (microstep: pulses per revolution; gear)"));
+    EXPECT_THAT(judged.judgement.remedy, HasSubstr("axes.feeder.drive.velocity_unit"));
+  }
+}
+
+TEST(JudgeSpeed, AllowsForSamplesThatAreFarApart) {
+  EXPECT_EQ(judge_speed(measured_move(1.15, 200), "mm").proof, SPEED_PROOF_PROVEN);
+  EXPECT_EQ(judge_speed(measured_move(2, 200), "mm").proof, SPEED_PROOF_WRONG);
+  EXPECT_EQ(judge_speed(measured_move(0.5, 200), "mm").proof, SPEED_PROOF_WRONG);
+}
+
+TEST(JudgeSpeed, DoesNotKnowWhatSamplesLeaveOpen) {
+  const auto judged = judge_speed(measured_move(1, 700), "mm");
+  EXPECT_EQ(judged.proof, SPEED_PROOF_UNSPECIFIED);
+  EXPECT_EQ(judged.judgement.verdict, VERDICT_FAILED);
+  EXPECT_THAT(judged.judgement.remedy, HasSubstr("--distance"));
+  auto nothing = measured_move(1);
+  nothing.samples.clear();
+  EXPECT_EQ(judge_speed(nothing, "mm").proof, SPEED_PROOF_UNSPECIFIED);
+}
+
 LimitObservation limit() {
   return {.input = {.axis = "feeder", .terminal = "X1", .function = "positive_limit", .active = "high"},
           .command = command(v1::COMMAND_STATE_ABORTED, v1::REASON_LIMIT_SWITCH),
