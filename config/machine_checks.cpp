@@ -212,11 +212,31 @@ void check_simulation(const Configuration& configuration, std::span<const BusEnt
   for (const auto& [axis, simulation] : configuration.axes) {
     const auto path = fmt::format("axes.{}.simulate", axis.name);
     const auto* bus = find_bus(all, axis.bus);
-    if (!places.given(path) || bus == nullptr || bus->simulated) continue;
+    if (!places.given(path) || bus == nullptr) continue;
+    const auto power_up = path + ".enabled_at_power_up";
+    if (bus->kind == BusKind::canopen && places.given(power_up))
+      diagnostics.add(places.mark(power_up),
+                      fmt::format("'enabled_at_power_up' has no effect: model {} powers up released (CiA 402)",
+                                  axis.model),
+                      "leave it out");
+    if (bus->simulated) continue;
     if (!places.usable(bus->path(bus->port_key))) continue;
     diagnostics.add(places.mark(path),
                     fmt::format("'simulate' has no effect: bus '{}' is not simulated", bus->name),
                     fmt::format("leave it out, or set {}: sim", bus->port_key));
+  }
+}
+
+void check_answers(const Configuration& configuration, std::span<const BusEntry> all, Diagnostics& diagnostics,
+                   const Places& places) {
+  for (const auto& network : configuration.networks) {
+    const auto* bus = find_bus(all, network.name);
+    if (bus == nullptr || network.sdo_answer <= network.sdo_timeout) continue;
+    if (!places.usable(bus->path("sdo_answer")) || !places.usable(bus->path("sdo_timeout"))) continue;
+    diagnostics.add(places.mark(bus->path("sdo_answer")),
+                    fmt::format("answers that take {} as a rule are given up after {} (sdo_timeout)",
+                                format_duration(network.sdo_answer), format_duration(network.sdo_timeout)),
+                    "write a longer sdo_timeout, several times sdo_answer");
   }
 }
 
@@ -270,6 +290,7 @@ void check_machine(const Configuration& configuration, Diagnostics& diagnostics,
   check_drive_counts(configuration, all, diagnostics, places);
   check_rates(configuration, all, diagnostics, places);
   check_simulation(configuration, all, diagnostics, places);
+  check_answers(configuration, all, diagnostics, places);
 }
 
 }  // namespace axisd::config

@@ -24,13 +24,23 @@ bool is_read_within_guard(const AxisSettings& axis, const DriveDescriptor& drive
   });
 }
 
-void look_at(const AxisSettings& axis, const DriveDescriptor& drive, Duration answer,
+/// Of what is loaded first: control word, status word, mode and motion, the proof of the block, the trigger.
+constexpr int words_of_loaded = 6;
+
+void look_at(const AxisSettings& axis, const DriveDescriptor& drive, Duration answer, bool in_group,
              std::vector<std::string>& lines) {
   const auto& set = drive.can_transactions;
   // The proof of the block is mostly one object of it.
-  const int proven =
-      is_read_within_guard(axis, drive) ? set.state_transfers + set.continuity_transfers + 5 : 1;
-  if (proven * answer >= axis.reboot_guard)
+  const int loaded = set.state_transfers + words_of_loaded;
+  const int proven = is_read_within_guard(axis, drive) ? loaded : 1;
+  const bool alone = proven * answer < axis.reboot_guard;
+  if (alone && in_group && loaded * answer >= axis.reboot_guard)
+    lines.push_back(fmt::format(
+        "axis {}: a start in a group is proven by up to {} SDO answers within reboot_guard ({} ms), and takes {} ms "
+        "for that (sdo_answer): such moves may end as expired; raise reboot_guard up to what the drive needs to "
+        "boot, or move the axis by itself",
+        axis.name, loaded, in_ms(axis.reboot_guard), in_ms(loaded * answer)));
+  if (!alone)
     lines.push_back(fmt::format(
         "axis {}: a start is proven by {} SDO answer{} within reboot_guard ({} ms), and takes {} ms for that "
         "(sdo_answer): none would be sent; raise reboot_guard up to what the drive needs to boot",
@@ -54,7 +64,10 @@ std::vector<std::string> start_warnings(const Configuration& configuration) {
     const auto network = std::ranges::find(configuration.networks, axis.bus, &canopen::NetworkSettings::name);
     const auto* drive = descriptor_of(axis);
     if (network == configuration.networks.end() || drive == nullptr) continue;
-    look_at(axis, *drive, network->sdo_answer, lines);
+    const bool in_group = std::ranges::any_of(configuration.groups, [&axis](const GroupSettings& group) {
+      return std::ranges::find(group.axes, axis.name) != group.axes.end();
+    });
+    look_at(axis, *drive, network->sdo_answer, in_group, lines);
   }
   return lines;
 }

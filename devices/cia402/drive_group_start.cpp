@@ -169,7 +169,7 @@ Task<Result<TimePoint>> Cia402Drive::check_prepared(MotionBlock block, bool by_s
   }
   const auto state = state_of(static_cast<std::uint16_t>(*word));
   if (state != State::operation_enabled) co_return fail(not_enabled(state));
-  const auto canary = co_await read_canary(std::move(options));  // last: it is what grows old
+  const auto canary = co_await prove_block(std::move(options));  // last: it is what grows old
   if (!canary) co_return canary;
   const auto nmt = bus_->master().nmt().status(node_.id()).state;
   const bool listens = nmt == canopen::NmtState::operational || nmt == canopen::NmtState::unknown;
