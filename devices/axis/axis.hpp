@@ -295,7 +295,7 @@ class Axis {
   void look_at(const ResetRequest& request, const CommandOptions& options, Obstacles& found) const;
   void look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const;
   /// axis_buffer.cpp: of a request that may have to wait for others.
-  void look_at_buffered(const Action& action, const CommandOptions& options, Obstacles& found) const;
+  void look_at_buffered(const Action& action, CommandOptions options, Obstacles& found) const;
   void look_at(const GroupMemberRequest& request, const CommandOptions& options, Obstacles& found) const;
   void look_at_options(const CommandOptions& options, Obstacles& found) const;
   [[nodiscard]] Error reloading() const;

@@ -83,7 +83,9 @@ Result<Plan> Axis::plan_behind(const Action& action, const PositionTracker& from
   return plan;
 }
 
-void Axis::look_at_buffered(const Action& action, const CommandOptions& options, Obstacles& found) const {
+/// Whatever it asked for itself: what waits for the power is looked at like what waits by its own wish.
+void Axis::look_at_buffered(const Action& action, CommandOptions options, Obstacles& found) const {
+  options.buffer_mode = BufferMode::buffered;
   if (!can_wait(kind_of(action)))
     return found.block(error(Reason::not_supported,
                              fmt::format("{} cannot be buffered", to_string(kind_of(action))),
@@ -105,9 +107,7 @@ void Axis::look_at_buffered(const Action& action, const CommandOptions& options,
 /// What can be decided now is decided now; the rest in its turn.
 Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOptions& options) {
   Obstacles found;
-  auto waiting = options;
-  waiting.buffer_mode = BufferMode::buffered;
-  look_at_buffered(action, waiting, found);
+  look_at_buffered(action, options, found);
   if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
   if (!activity_) return std::visit([&](const auto& request) { return accept(request, options); }, action);
   const auto from = expected_end();

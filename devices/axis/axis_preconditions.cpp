@@ -25,9 +25,7 @@ std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
   const bool never_waits = action && std::holds_alternative<DisableRequest>(*action);
   const bool for_power = action && buffer_.empty() && waits_for_power(activity_, *action);
   if (action && (options.buffer_mode == BufferMode::buffered || for_power) && !never_waits) {
-    auto waiting = options;
-    waiting.buffer_mode = BufferMode::buffered;
-    look_at_buffered(*action, waiting, found);
+    look_at_buffered(*action, options, found);
   } else if (action) {
     std::visit([&](const auto& request) { look_at(request, options, found); }, *action);
   } else {
