@@ -197,6 +197,8 @@ class Drive {
   /// Reads the canary (M7). Error `rebooted` if the drive lost its memory since configure().
   virtual Task<Result<void>> check_continuity(TransactionClass transaction_class) = 0;
 
+  /// What stands between several notes.
+  static constexpr std::string_view between_notes = "; ";
   /// What is not as it should be about the way the state comes ("state by SDO polling: ..."); empty: nothing.
   [[nodiscard]] virtual std::string link_note() const { return {}; }
   /// No drive that was restarted shows this reading: such a one counts from 0. At rest, under power, and

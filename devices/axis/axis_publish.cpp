@@ -23,6 +23,21 @@ std::vector<TerminalState> terminal_states(std::span<const TerminalSpec> termina
   return states;
 }
 
+/// The notes of `now` that `before` does not have: one that comes and goes beside it makes no news of another.
+std::string new_notes(std::string_view before, std::string_view now) {
+  constexpr std::string_view between = Drive::between_notes;
+  const auto known = std::string(between).append(before).append(between);
+  std::string news;
+  for (std::size_t from = 0; from < now.size();) {
+    const auto note = now.substr(from, now.find(between, from) - from);
+    from += note.size() + between.size();
+    if (known.contains(std::string(between).append(note).append(between))) continue;
+    news += news.empty() ? "" : between;
+    news += note;
+  }
+  return news;
+}
+
 }  // namespace
 
 std::vector<TerminalState> Axis::inputs(std::uint32_t bits) const {
@@ -62,8 +77,8 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
         LinkChange{.to = now.link, .detail = now.link_error ? now.link_error->message : std::string()});
   // While it is being connected the notes follow from what it was found to be.
   const bool was_online = before.link == LinkState::online;
-  if (was_online && !now.link_note.empty() && before.link_note != now.link_note)
-    env_.event(settings_.name, LinkChange{.to = now.link, .detail = now.link_note});
+  if (auto news = new_notes(before.link_note, now.link_note); was_online && !news.empty())
+    env_.event(settings_.name, LinkChange{.to = now.link, .detail = std::move(news)});
   if (before.state != now.state)
     env_.event(settings_.name, StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});
   const bool other_fault = now.fault && (!before.fault || before.fault->reason != now.fault->reason ||

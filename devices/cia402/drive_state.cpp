@@ -72,7 +72,7 @@ void Cia402Drive::on_foreign_command(const std::string& what) {
 
 std::string Cia402Drive::link_note() const {
   if (foreign_command_.empty() || clock_->now() - foreign_at_ > foreign_lasts) return link_note_;
-  return link_note_.empty() ? foreign_command_ : fmt::format("{}; {}", foreign_command_, link_note_);
+  return link_note_.empty() ? foreign_command_ : foreign_command_ + std::string(between_notes) + link_note_;
 }
 
 /// Of a fault that 603Fh does not name, or of a drive without 603Fh.

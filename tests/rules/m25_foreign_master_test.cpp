@@ -106,5 +106,23 @@ TEST(M25, AFloodOfAnotherMasterIsOneEvent) {
   EXPECT_EQ(told(rig).size(), 1U);
 }
 
+TEST(M25, WhatComesAndGoesBesideItIsNoNewsOfAnotherMaster) {
+  CanRig rig({.limits = false});
+  rig.ready();
+  OtherMaster other(rig);
+  for (int i = 0; i < 3; ++i) {
+    other.send(0, {0x01, CanRig::node_id});
+    rig.network.set_fault([](const can::Frame& frame) {
+      return can::Network::Fault{.drop = frame.id == 0x280U + CanRig::node_id};
+    });
+    rig.run(2s);
+    EXPECT_THAT(rig.state()->link_note, HasSubstr("; state by SDO polling"));
+    rig.network.set_fault({});
+    rig.run(2s);
+    EXPECT_THAT(rig.state()->link_note, HasSubstr("another master"));
+  }
+  EXPECT_EQ(told(rig).size(), 1U);
+}
+
 }  // namespace
 }  // namespace axisd::test
