@@ -14,24 +14,14 @@ const DriveDescriptor* descriptor_of(const AxisSettings& axis) {
   return axis.own_descriptor ? axis.own_descriptor.get() : find_drive_model(axis.model);
 }
 
-namespace {
-
-/// Hexadecimal digits at the end of a row's code that are 0 stand for any (CiA 301, CiA 402).
-bool is_of_class(std::uint16_t code, const AlarmSpec& row) {
-  unsigned digits = 0xFFFF;
-  while ((row.code & digits & ~(digits << 4U)) == 0 && (digits & 0xFFFFU) != 0) digits <<= 4U;
-  return ((code ^ row.code) & digits & 0xFFFFU) == 0;
-}
-
-}  // namespace
-
-/// The table of other alarms ends with the row that holds for all.
 const AlarmSpec* find_alarm(const DriveDescriptor& drive, std::uint16_t code) {
-  const auto found = std::ranges::find(drive.alarms, code, &AlarmSpec::code);
-  if (found != drive.alarms.end()) return &*found;
-  const auto* row = drive.other_alarms;
-  while (row != nullptr && !is_of_class(code, *row)) ++row;
-  return row;
+  constexpr unsigned all_digits = 0xFFFF, digit_bits = 4;
+  for (unsigned digits = all_digits;; digits = (digits << digit_bits) & all_digits) {
+    for (const auto rows : {drive.alarms, drive.other_alarms})
+      if (const auto found = std::ranges::find(rows, code & digits, &AlarmSpec::code); found != rows.end())
+        return &*found;
+    if (digits == 0 || drive.other_alarms.empty()) return nullptr;
+  }
 }
 
 const ParameterSpec* find_parameter(std::span<const ParameterSpec> catalogue, std::uint32_t address) {

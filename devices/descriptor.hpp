@@ -158,7 +158,9 @@ struct DriveDescriptor {
   std::span<const TerminalFunctionSpec> input_functions, output_functions;
   std::span<const ParameterSpec> parameters;
   std::span<const AlarmSpec> alarms;
-  const AlarmSpec* other_alarms = nullptr;  ///< what holds for codes without a row; nullptr: nothing is known
+  /// Codes that are not listed as the model's. Where there are any, zeros at the end of a code stand for any
+  /// hexadecimal digits, as in CiA 301 and CiA 402; 0 is every code.
+  std::span<const AlarmSpec> other_alarms{};
   std::span<const SettingSpec> settings;
   Capabilities capabilities;
   PersistSettings saves = PersistSettings::all();  ///< parts of `persist:` that it saves as they are written

@@ -10,7 +10,7 @@ namespace axisd::cia402_eds {
 
 /// CiA 402 resets every fault by the same command, as soon as its cause is gone.
 std::span<const AlarmSpec> alarms();
-/// Of every code that alarms() does not have, as DriveDescriptor::other_alarms.
-const AlarmSpec* other_alarms();
+/// As DriveDescriptor::other_alarms: there is a row for every code that alarms() does not have.
+std::span<const AlarmSpec> other_alarms();
 
 }  // namespace axisd::cia402_eds

@@ -229,6 +229,8 @@ TEST(EdsDrive, KnowsEveryAlarm) {
   EXPECT_EQ(find_alarm(base(), 0xFF17)->name, "specific_to_the_drive");
   EXPECT_EQ(find_alarm(base(), 0x2341)->name, "short_circuit_u_v");
   EXPECT_EQ(find_alarm(base(), 0x7308)->name, "sensor") << "by its class";
+  EXPECT_EQ(find_alarm(base(), 0x2119)->name, "short_circuit_input") << "the nearest class, listed or not";
+  EXPECT_EQ(find_alarm(base(), 0x2139)->name, "phase_short_circuit_input");
   EXPECT_EQ(find_alarm(base(), 0x8A17)->name, "control");
   EXPECT_EQ(find_alarm(base(), 0x90FF)->name, "external_error");
   EXPECT_EQ(find_alarm(base(), 0xB123)->name, "specific_to_the_drive");
