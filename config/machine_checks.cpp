@@ -215,10 +215,11 @@ void check_simulation(const Configuration& configuration, std::span<const BusEnt
     if (!places.given(path) || bus == nullptr) continue;
     const auto power_up = path + ".enabled_at_power_up";
     if (bus->kind == BusKind::canopen && places.given(power_up))
-      diagnostics.add(places.mark(power_up),
-                      fmt::format("'enabled_at_power_up' has no effect: model {} powers up released (CiA 402)",
-                                  axis.model),
-                      "leave it out");
+      diagnostics.add(
+          places.mark(power_up),
+          fmt::format("'enabled_at_power_up' has no effect: model {} powers up released (CiA 402)",
+                      axis.model),
+          "leave it out");
     if (bus->simulated) continue;
     if (!places.usable(bus->path(bus->port_key))) continue;
     diagnostics.add(places.mark(path),
@@ -227,8 +228,8 @@ void check_simulation(const Configuration& configuration, std::span<const BusEnt
   }
 }
 
-void check_answers(const Configuration& configuration, std::span<const BusEntry> all, Diagnostics& diagnostics,
-                   const Places& places) {
+void check_answers(const Configuration& configuration, std::span<const BusEntry> all,
+                   Diagnostics& diagnostics, const Places& places) {
   for (const auto& network : configuration.networks) {
     const auto* bus = find_bus(all, network.name);
     if (bus == nullptr || network.sdo_answer <= network.sdo_timeout) continue;

@@ -35,11 +35,13 @@ void look_at(const AxisSettings& axis, const DriveDescriptor& drive, Duration an
   const int proven = is_read_within_guard(axis, drive) ? loaded : 1;
   const bool alone = proven * answer < axis.reboot_guard;
   if (alone && in_group && loaded * answer >= axis.reboot_guard)
-    lines.push_back(fmt::format(
-        "axis {}: a start in a group is proven by up to {} SDO answers within reboot_guard ({} ms), and takes {} ms "
-        "for that (sdo_answer): such moves may end as expired; raise reboot_guard up to what the drive needs to "
-        "boot, or move the axis by itself",
-        axis.name, loaded, in_ms(axis.reboot_guard), in_ms(loaded * answer)));
+    lines.push_back(
+        fmt::format("axis {}: a start in a group is proven by up to {} SDO answers within reboot_guard ({} "
+                    "ms), and takes {} ms "
+                    "for that (sdo_answer): such moves may end as expired; raise reboot_guard up to what the "
+                    "drive needs to "
+                    "boot, or move the axis by itself",
+                    axis.name, loaded, in_ms(axis.reboot_guard), in_ms(loaded * answer)));
   if (!alone)
     lines.push_back(fmt::format(
         "axis {}: a start is proven by {} SDO answer{} within reboot_guard ({} ms), and takes {} ms for that "

@@ -112,11 +112,18 @@ struct CanIdentification {
   [[nodiscard]] constexpr std::uint16_t profile() const { return static_cast<std::uint16_t>(device_type); }
 };
 
+/// What a drive's velocities are whole numbers of.
+struct VelocityCount {
+  double rpm = 0;         ///< r/min of one; 0: each whole r/min can be sent
+  bool of_pulse = false;  ///< where a revolution has one pulse: it is that much less with more
+};
+
 /// Ranges that hold for every command of this model.
 struct Capabilities {
   std::span<const std::int32_t> pulses_per_revolution;  ///< permitted microstep settings
   int minimum_rpm = 1, maximum_rpm = 3000;
   std::int64_t maximum_pulse_rate_hz = 200'000;  ///< M11
+  VelocityCount velocity_count{};                ///< motions are rounded down to it
   int minimum_start_rpm = 2, maximum_start_rpm = 300;
   int minimum_time_ms = 0, maximum_time_ms = 2000;
   int minimum_homing_rpm = 5, maximum_homing_rpm = 3000, minimum_search_rpm = 5, maximum_search_rpm = 300;

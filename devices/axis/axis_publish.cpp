@@ -23,7 +23,8 @@ std::vector<TerminalState> terminal_states(std::span<const TerminalSpec> termina
   return states;
 }
 
-/// The notes of `now` that `before` does not have: one that comes and goes beside it makes no news of another.
+/// The notes of `now` that `before` does not have: one that comes and goes beside it makes no news of
+/// another.
 std::string new_notes(std::string_view before, std::string_view now) {
   constexpr std::string_view between = Drive::between_notes;
   const auto known = std::string(between).append(before).append(between);

@@ -52,6 +52,15 @@ double Planner::minimum_velocity() const {
       scale_->velocity_to_units(std::max(capabilities_->minimum_rpm, capabilities_->minimum_start_rpm)));
 }
 
+double Planner::sent_rpm(int rpm) const {
+  const auto& count = capabilities_->velocity_count;
+  const auto step =
+      count.rpm / (count.of_pulse ? static_cast<double>(settings_->scale.pulses_per_revolution) : 1);
+  if (step <= 0) return rpm;
+  const auto sent = std::floor((rpm / step) + 1e-6) * step;
+  return sent > rpm * (1 - 1e-9) ? rpm : sent;
+}
+
 Planner::Ramps Planner::ramps(const MotionValues& asked) const {
   const auto& limits = settings_->limits;
   if (!capabilities_->own_deceleration) {
@@ -109,7 +118,7 @@ Result<Plan> Planner::profile(double velocity, const MotionValues& asked) const 
                               capabilities_->minimum_start_rpm, capabilities_->maximum_start_rpm);
   plan.acceleration_time = whole_ms(acceleration);
   plan.deceleration_time = whole_ms(deceleration);
-  plan.granted.velocity = std::abs(scale_->velocity_to_units(plan.velocity_rpm));
+  plan.granted.velocity = std::abs(scale_->velocity_to_units(sent_rpm(plan.velocity_rpm)));
   plan.granted.acceleration_time = plan.acceleration_time;
   plan.granted.deceleration_time = plan.deceleration_time;
   return plan;
@@ -171,8 +180,14 @@ Plan Planner::aimed(Plan plan, const PositionTracker::Target& target, const Posi
 
 Duration Planner::duration(const Plan& plan, std::int64_t pulses) const {
   const auto per_second = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
-  return move_duration(std::abs(static_cast<double>(pulses)), plan.start_rpm * per_second,
-                       plan.velocity_rpm * per_second, plan.acceleration_time, plan.deceleration_time);
+  // A drive whose counts are coarse is slower than planned, and there the sooner: its ramps are as planned.
+  const auto sent = sent_rpm(plan.velocity_rpm);
+  const auto shortened = [share = sent / std::max(plan.velocity_rpm, 1)](Duration ramp) {
+    return std::chrono::duration_cast<Duration>(share *
+                                                std::chrono::duration<double, Duration::period>(ramp));
+  };
+  return move_duration(std::abs(static_cast<double>(pulses)), plan.start_rpm * per_second, sent * per_second,
+                       shortened(plan.acceleration_time), shortened(plan.deceleration_time));
 }
 
 Duration Planner::soonest(const Plan& plan, std::int64_t pulses) const {

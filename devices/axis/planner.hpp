@@ -73,6 +73,8 @@ class Planner {
     Duration acceleration, deceleration;
   };
   [[nodiscard]] Ramps ramps(const MotionValues& asked) const;
+  /// What comes of so many r/min in the drive's own counts: never faster.
+  [[nodiscard]] double sent_rpm(int rpm) const;
   void check_ramp(Duration time, const char* name, Obstacles& found) const;
   [[nodiscard]] Plan at_speed(Plan plan, int rpm) const;
   [[nodiscard]] Plan lengthened(Plan plan, std::int64_t pulses, Duration wanted) const;

@@ -25,7 +25,7 @@ Plan Planner::at_speed(Plan plan, int rpm) const {
   plan.velocity_rpm = rpm;
   plan.start_rpm = std::clamp(std::min(settings_->limits.start_speed_rpm, rpm),
                               capabilities_->minimum_start_rpm, capabilities_->maximum_start_rpm);
-  plan.granted.velocity = std::abs(scale_->velocity_to_units(rpm));
+  plan.granted.velocity = std::abs(scale_->velocity_to_units(sent_rpm(rpm)));
   return plan;
 }
 

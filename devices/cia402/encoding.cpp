@@ -46,15 +46,24 @@ std::int32_t milliseconds_of(Duration time) {
 }
 
 /// A time from `from_rpm` to `rpm` as the drive wants its ramps.
-std::int32_t ramp(const Model& model, std::int64_t pulses_per_revolution, int rpm, Duration time) {
+std::int32_t ramp(const Model& model, std::int64_t pulses_per_revolution, int rpm, Duration time,
+                  RampUse use) {
   const auto& units = model.meaning.units;
   if (units.ramps == Ramps::times) return milliseconds_of(time);
-  return ramp_of(units.acceleration, pulses_per_revolution, rpm, time);
+  return ramp_of(units.acceleration, pulses_per_revolution, rpm, time, use);
+}
+
+/// With which a drive that has no other brakes, too.
+std::int32_t starting_ramp(const Model& model, std::int64_t pulses_per_revolution, int rpm, Duration time) {
+  const auto use = model.descriptor->capabilities.own_deceleration ? RampUse::start : RampUse::brake;
+  return ramp(model, pulses_per_revolution, rpm, time, use);
 }
 
 /// 0: the drive has none of its own.
 std::int32_t braking_ramp(const Model& model, std::int64_t pulses_per_revolution, int rpm, Duration time) {
-  return model.descriptor->capabilities.own_deceleration ? ramp(model, pulses_per_revolution, rpm, time) : 0;
+  return model.descriptor->capabilities.own_deceleration
+             ? ramp(model, pulses_per_revolution, rpm, time, RampUse::brake)
+             : 0;
 }
 
 std::int64_t value_of(const Values& values, const std::optional<canopen::Object>& object) {
@@ -216,7 +225,7 @@ std::int32_t encode_velocity(const Model& model, std::int64_t pulses_per_revolut
 
 MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const MoveProfile& profile) {
   return {profile.target_pulses, encode_velocity(model, pulses_per_revolution, profile.velocity_rpm),
-          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
+          starting_ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
           braking_ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
           model.objects.start_speed ? profile.start_rpm : 0};
 }
@@ -224,7 +233,7 @@ MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const
 MotionBlock encode(const Model& model, std::int64_t pulses_per_revolution, const VelocityProfile& profile,
                    const MotionBlock& present) {
   return {present[target], present[speed],
-          ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
+          starting_ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time),
           braking_ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.deceleration_time),
           model.objects.start_speed ? profile.start_rpm : 0};
 }
@@ -237,7 +246,7 @@ std::vector<std::pair<canopen::Object, std::int64_t>> encode(const Model& model,
       {object::homing_search_speed,
        encode_velocity(model, pulses_per_revolution, profile.search_velocity_rpm)},
       {object::homing_acceleration,
-       ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time)},
+       ramp(model, pulses_per_revolution, profile.velocity_rpm, profile.acceleration_time, RampUse::brake)},
       {object::home_offset, profile.offset_pulses}};
   std::erase_if(values, [&](const auto& value) { return !has(model, value.first); });
   return values;

@@ -91,13 +91,19 @@ std::int32_t rpm_of(Rate unit, std::int64_t pulses_per_revolution, std::int64_t 
   return whole(nearest(counts * ratio.numerator, ratio.denominator));
 }
 
-std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Duration time) {
+std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Duration time, RampUse use) {
   constexpr Duration shortest = std::chrono::milliseconds(1), longest = std::chrono::hours(24);
   constexpr std::int64_t second = std::chrono::nanoseconds(std::chrono::seconds(1)).count();
   const auto ratio = rpm_per_count(unit, pulses_per_revolution);
-  const auto speed = std::abs(std::int64_t{rpm}) * ratio.denominator;
-  const auto counts = nearest(speed * second, ratio.numerator * std::clamp(time, shortest, longest).count());
+  const Wide speed = std::abs(std::int64_t{rpm}) * ratio.denominator * second;
+  const Wide per_count = ratio.numerator * std::clamp(time, shortest, longest).count();
+  const Wide counts = (speed + (use == RampUse::brake ? per_count - 1 : 0)) / per_count;
   return std::max(1, whole(counts));
+}
+
+double rpm_of_count(Rate unit) {
+  const auto ratio = rpm_per_count(unit, 1);
+  return static_cast<double>(ratio.numerator) / static_cast<double>(ratio.denominator);
 }
 
 std::int32_t fastest_rpm(Rate unit, std::int64_t counts) {

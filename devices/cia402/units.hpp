@@ -59,8 +59,16 @@ std::string_view name_of(Rate unit);
 std::int32_t counts_of(Rate unit, std::int64_t pulses_per_revolution, int rpm);
 /// r/min of so many counts, the nearest, half away from 0.
 std::int32_t rpm_of(Rate unit, std::int64_t pulses_per_revolution, std::int64_t counts);
-/// Counts of an acceleration from rest to `rpm` in `time` (at least 1 ms), the nearest, at least 1.
-std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Duration time);
+/// What a ramp is for, and so what its rounding must not do.
+enum class RampUse : std::uint8_t {
+  start,  ///< never harder than told: rounded down
+  brake,  ///< never softer than told, by which the bounds of stops are: rounded up. Of a ramp for both, too
+};
+/// Counts of an acceleration between rest and `rpm` in `time` (at least 1 ms); at least 1, without which
+/// nothing would move.
+std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Duration time, RampUse use);
+/// r/min of one count, of pulses where a revolution has one.
+double rpm_of_count(Rate unit);
 
 /// The same limits whatever a revolution has: of units that are no pulses in r/min, rounded into the range.
 std::int32_t fastest_rpm(Rate unit, std::int64_t counts);

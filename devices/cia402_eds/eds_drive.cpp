@@ -56,6 +56,7 @@ int as_int(std::int64_t value) {
 /// The fastest and the slowest motion that the drive's own range and unit of velocities permit.
 void limit_velocities(Capabilities& all, std::int64_t most_counts, cia402::Rate unit) {
   const auto fastest = std::min<std::int64_t>(most_counts, std::numeric_limits<std::int32_t>::max());
+  all.velocity_count = {.rpm = cia402::rpm_of_count(unit), .of_pulse = unit.angle == cia402::Angle::pulse};
   if (unit.angle == cia402::Angle::pulse) {
     all.maximum_pulse_rate_hz = cia402::fastest_pulse_rate(unit, fastest);
   } else {

@@ -49,8 +49,9 @@ TEST(StartWarnings, AStartInAGroupTakesMoreAnswers) {
       "limits: { velocity: 1 rev/s }, reboot_guard: 400 ms }\n"
       "groups: { both: { axes: [feeder, other] } }\n";
   EXPECT_THAT(warnings_of("", "", group), IsEmpty());
-  EXPECT_THAT(warnings_of(", sdo_answer: 20 ms", "", group),
-              ElementsAre(HasSubstr("a start in a group is proven by up to 14 SDO answers within reboot_guard")));
+  EXPECT_THAT(
+      warnings_of(", sdo_answer: 20 ms", "", group),
+      ElementsAre(HasSubstr("a start in a group is proven by up to 14 SDO answers within reboot_guard")));
   EXPECT_THAT(warnings_of(", sdo_answer: 20 ms", ", reboot_guard: 300 ms", group), IsEmpty());
 }
 

@@ -69,11 +69,13 @@ TEST(Units, EachUnitCountsTheSameMotion) {
     EXPECT_EQ(counts_of(unit, 4000, 0), 0);
     if (unit.angle != Angle::radian) {
       EXPECT_EQ(rpm_of(unit, 4000, counts), 120);
-      EXPECT_EQ(ramp_of(unit, 4000, 120, 500ms), 2 * counts);
+      EXPECT_EQ(ramp_of(unit, 4000, 120, 500ms, RampUse::start), 2 * counts);
+      EXPECT_EQ(ramp_of(unit, 4000, 120, 500ms, RampUse::brake), 2 * counts);
     }
   }
   EXPECT_EQ(rpm_of(named("0.001radians_per_second"), 4000, 12'566), 120);
-  EXPECT_EQ(ramp_of(named("0.001radians_per_second"), 4000, -120, 1s), 12'566) << "a ramp has no sign";
+  EXPECT_EQ(ramp_of(named("0.001radians_per_second"), 4000, -120, 1s, RampUse::start), 12'566)
+      << "a ramp has no sign";
   EXPECT_EQ(counts_of(Rate{.angle = Angle::pulse, .per = Per::minute}, 4000, 120), 480'000);
   EXPECT_EQ(counts_of(Rate{.angle = Angle::pulse, .per = Per::second, .exponent = 3}, 4000, 120), 8);
 }
@@ -95,15 +97,33 @@ TEST(Units, AMotionIsNeverFasterThanAsked) {
     }
 }
 
+TEST(Units, ARampStartsNoHarderAndBrakesNoSofterThanTold) {
+  const auto turns = named("rev_per_second");  // 60 r/min
+  EXPECT_EQ(ramp_of(turns, 4000, 300, 1s, RampUse::start), 5);
+  EXPECT_EQ(ramp_of(turns, 4000, 300, 1s, RampUse::brake), 5);
+  EXPECT_EQ(ramp_of(turns, 4000, 299, 1s, RampUse::start), 4);
+  EXPECT_EQ(ramp_of(turns, 4000, 299, 1s, RampUse::brake), 5);
+  EXPECT_EQ(ramp_of(turns, 4000, 301, 1s, RampUse::start), 5);
+  EXPECT_EQ(ramp_of(turns, 4000, -301, 1s, RampUse::brake), 6);
+  EXPECT_EQ(ramp_of(turns, 4000, 1, 1s, RampUse::brake), 1);
+}
+
+TEST(Units, ACountIsWorthAsMuchAsItsUnit) {
+  EXPECT_DOUBLE_EQ(rpm_of_count(named("rpm")), 1);
+  EXPECT_DOUBLE_EQ(rpm_of_count(named("0.1rpm")), 0.1);
+  EXPECT_DOUBLE_EQ(rpm_of_count(named("rev_per_second")), 60);
+  EXPECT_DOUBLE_EQ(rpm_of_count(pulses_per_second), 60) << "of one pulse per revolution";
+}
+
 TEST(Units, WhatDoesNotFitSaturates) {
   const Rate fine{.angle = Angle::degree, .per = Per::minute, .exponent = -largest_exponent};
   EXPECT_EQ(counts_of(fine, 1, most), most);
   EXPECT_EQ(counts_of(fine, 1, -most), -most);
-  EXPECT_EQ(ramp_of(fine, 1, most, 0ns), most);
-  EXPECT_EQ(ramp_of(fine, 1, 1, -1s), most) << "no less than 1 ms";
+  EXPECT_EQ(ramp_of(fine, 1, most, 0ns, RampUse::start), most);
+  EXPECT_EQ(ramp_of(fine, 1, 1, -1s, RampUse::start), most) << "no less than 1 ms";
   const Rate coarse{.angle = Angle::radian, .per = Per::second, .exponent = largest_exponent};
   EXPECT_EQ(counts_of(coarse, 1, 3000), 0);
-  EXPECT_EQ(ramp_of(coarse, 1, 3000, 1s), 1) << "0 would be no ramp at all";
+  EXPECT_EQ(ramp_of(coarse, 1, 3000, 1s, RampUse::start), 1) << "0 would be no ramp at all";
   EXPECT_EQ(rpm_of(coarse, 1, std::numeric_limits<std::int64_t>::max()), most);
   EXPECT_EQ(rpm_of(coarse, 1, std::numeric_limits<std::int64_t>::min()), -most);
   EXPECT_EQ(rpm_of(pulses_per_second, 0, 5), 300) << "no revolution is empty";

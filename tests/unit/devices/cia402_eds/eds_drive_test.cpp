@@ -148,6 +148,9 @@ TEST(EdsDrive, LimitsFollowTheUnitOfVelocities) {
   EXPECT_EQ(limits("rev_per_second").minimum_rpm, 300) << "5 counts";
   EXPECT_EQ(limits("rev_per_second").minimum_search_rpm, 300);
   EXPECT_EQ(limits("radians_per_second").minimum_homing_rpm, 48);
+  EXPECT_DOUBLE_EQ(limits("rev_per_second").velocity_count.rpm, 60);
+  EXPECT_FALSE(limits("rev_per_second").velocity_count.of_pulse);
+  EXPECT_TRUE(limits("pulses_per_second").velocity_count.of_pulse);
 }
 
 TEST(EdsDrive, LacksWhatItsEdsLacks) {
