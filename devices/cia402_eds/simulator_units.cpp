@@ -49,11 +49,17 @@ std::int64_t dimension(const CanopenDictionary& dictionary, std::uint16_t index)
   return dictionary.get(index) & 0xFF;
 }
 
+/// So much in a revolution, by two numbers of the same object; nothing: it has none, or as templates have it.
+std::optional<double> per_revolution(const CanopenDictionary& dictionary, std::uint16_t index) {
+  const auto counts = static_cast<double>(dictionary.get(index, 1));
+  const auto revolutions = static_cast<double>(dictionary.get(index, 2));
+  if (counts <= revolutions || revolutions <= 0) return std::nullopt;
+  return counts / revolutions;
+}
+
 /// Counts of the encoder per revolution.
 double encoder_of(const CanopenDictionary& dictionary, const UnitSettings& settings) {
-  const auto counts = static_cast<double>(dictionary.get(0x608F, 1));
-  const auto revolutions = static_cast<double>(dictionary.get(0x608F, 2));
-  return counts > revolutions && revolutions > 0 ? counts / revolutions : settings.counts_per_revolution;
+  return per_revolution(dictionary, 0x608F).value_or(settings.counts_per_revolution);
 }
 
 /// Revolutions of the shaft in one of an angle's units.
@@ -76,7 +82,7 @@ double position_of(const CanopenDictionary& dictionary, double encoder) {
   if (const auto unit = si_unit(dictionary, 0x60A8))
     if (const auto turns = turns_of(unit->numerator, encoder)) return unit->factor * *turns;
   if (dimension(dictionary, 0x608A) == degree_index) return notation(dictionary, 0x6089) / degrees;
-  return 1 / encoder;
+  return 1 / per_revolution(dictionary, 0x6092).value_or(encoder);  // the feed of a revolution
 }
 
 std::optional<double> told_velocity(const CanopenDictionary& dictionary, double encoder) {

@@ -16,8 +16,8 @@ struct ShaftUnits {
 };
 
 /// By the SI units 60A8h to 60AAh (CiA 402-2; numbers of CiA 303-2), else by the dimension and notation
-/// indices 6089h to 608Eh of older drives, else by `settings`. An encoder resolution in 608Fh counts, unless
-/// it is the template 1/1.
+/// indices 6089h to 608Eh of older drives, else by `settings`. An encoder resolution in 608Fh counts, and a
+/// feed in 6092h for positions, unless it is the template 1/1.
 ShaftUnits units_of(const simulation::CanopenDictionary& dictionary,
                     const simulation::UnitSettings& settings);
 

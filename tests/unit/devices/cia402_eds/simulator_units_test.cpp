@@ -44,6 +44,16 @@ TEST(ShaftUnits, AreIncrementsOfTheEncoderWhereNothingIsTold) {
   EXPECT_DOUBLE_EQ(units_with({{0x60A8, 0}, {0x60A9, 0}, {0x60AA, 0}}).velocity, 1.0 / 4000);
 }
 
+TEST(ShaftUnits, AreThoseOfTheFeedWhereThereIsOne) {
+  const auto fed = units_with({{0x608F, 2048, 1}, {0x608F, 1, 2}, {0x6092, 36'000, 1}, {0x6092, 1, 2}});
+  EXPECT_DOUBLE_EQ(fed.position, 1.0 / 36'000);
+  EXPECT_DOUBLE_EQ(fed.velocity, 1.0 / 36'000) << "positions per second";
+  EXPECT_DOUBLE_EQ(units_with({{0x6092, 36'000, 1}, {0x6092, 5, 2}}).position, 1.0 / 7200);
+  EXPECT_DOUBLE_EQ(units_with({{0x6092, 1, 1}, {0x6092, 1, 2}}).position, 1.0 / 4000) << "a template";
+  EXPECT_DOUBLE_EQ(units_with({{0x60A8, 0xFF410000}, {0x6092, 36'000, 1}, {0x6092, 1, 2}}).position,
+                   1.0 / 3600);
+}
+
 TEST(ShaftUnits, FollowTheSiUnits) {
   EXPECT_DOUBLE_EQ(units_with({{0x60A8, 0x00B50000}}).position, 1.0 / 4000);
   EXPECT_DOUBLE_EQ(units_with({{0x60A8, 0xFF410000}}).position, 1.0 / 3600) << "0.1 degrees";
