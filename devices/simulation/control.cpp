@@ -15,7 +15,7 @@ using Words = std::span<const std::string_view>;
 
 constexpr std::string_view usage =
     "power N on|off; input N TERMINAL on|off|auto; alarm N CODE; block N on|off; push N PULSES; lean N "
-    "COUNTS; shaft N; "
+    "COUNTS; pace N PERCENT; shaft N; "
     "encoder N KEY=VALUE...; "
     "peek N ADDRESS; poke N ADDRESS VALUE; eeprom N; fault KIND key=value...; fault clear; cut; join; "
     "hangup; replug; help (N: an address, or @K for the K-th drive)";
@@ -64,6 +64,13 @@ std::string lean(SimulatedNode& node, Words words) {
   return node.lean_on_shaft(*counts) ? "ok" : "error the shaft is held; see encoder N compliance=COUNTS";
 }
 
+std::string pace(SimulatedNode& node, Words words) {
+  constexpr int highest = 10'000;
+  const auto percent = words.size() == 1 ? parse_number<int>(words[0]) : std::nullopt;
+  if (!percent || *percent < 1 || *percent > highest) return "error use: pace N PERCENT, 1 to 10000";
+  return node.run_at(*percent / 100.0) ? "ok" : "error its motor has no such switch";
+}
+
 std::string encoder(SimulatedNode& node, Words words) {
   if (node.encoder() == nullptr) return "error it has no encoder";
   auto settings = node.encoder()->settings();
@@ -108,10 +115,10 @@ struct NodeCommand {
   std::string_view name;
   std::string (*run)(SimulatedNode& node, Words words);
 };
-constexpr NodeCommand node_commands[] = {{"power", &power},   {"input", &input},    {"alarm", &alarm},
-                                         {"block", &block},   {"push", &push},      {"lean", &lean},
-                                         {"shaft", &shaft},   {"peek", &peek},      {"poke", &poke},
-                                         {"eeprom", &eeprom}, {"encoder", &encoder}};
+constexpr NodeCommand node_commands[] = {{"power", &power}, {"input", &input},   {"alarm", &alarm},
+                                         {"block", &block}, {"push", &push},     {"lean", &lean},
+                                         {"pace", &pace},   {"shaft", &shaft},   {"peek", &peek},
+                                         {"poke", &poke},   {"eeprom", &eeprom}, {"encoder", &encoder}};
 
 /// "5": address; "@2": the second drive of the line. nullptr: there is none.
 template <class Network>

@@ -12,7 +12,8 @@ namespace axisd::simulation {
 
 /// Executes one of these, at the network's present time:
 ///   power N on|off; input N TERMINAL on|off|auto; alarm N CODE (0: its cause is gone); block N on|off (the
-///   shaft cannot turn); push N PULSES (the load turns the shaft); shaft N; peek N REGISTER;
+///   shaft cannot turn); push N PULSES (the load turns the shaft); pace N PERCENT (of the speed that
+///   the motor is told, from its next motion on); shaft N; peek N REGISTER;
 ///   poke N REGISTER VALUE; eeprom N; fault KIND key=value ...; fault clear; cut; join; help
 /// N is an address, or @K for the K-th drive of the line (two drives may have one address, or none). Replies
 /// "ok ..." or "error ...". Thread: the network's.

@@ -25,9 +25,9 @@ class Commission(CommissionScenario):
         self.assertEqual(record["configuration_revision"], config["revision"])
         self.assertEqual(len(person.step("switch X0")["edges"]), 2)
         figures = {figure["name"]: figure["value"] for figure in person.step("jog positive")["figures"]}
-        self.assertEqual((figures["asked"], figures["travelled"]), (8, 8))
-        # The first move is a tenth of 100 mm/s, and only what was measured is followed by faster ones.
-        self.assertEqual((figures["velocity"], record["speed"]), (10, "SPEED_PROOF_PROVEN"))
+        self.assertEqual((figures["asked"], figures["travelled"]), (5, 5))
+        # The first move lasts a second, and only what was measured is followed by faster ones.
+        self.assertEqual((figures["velocity"], record["speed"]), (5, "SPEED_PROOF_PROVEN"))
         self.assertTrue(figures["time_at_least"] < figures["time_told"] * 1.05 + 0.05, figures)
         self.assertTrue(figures["time_at_most"] > figures["time_told"] * 0.95 - 0.05, figures)
         figures = {figure["name"]: figure["value"] for figure in person.step("jog negative")["figures"]}
@@ -126,6 +126,20 @@ class Commission(CommissionScenario):
                              stop="NOT_DONE", homing="NOT_DONE")
         self.assertEqual(person.step("jog positive")["remedy"], "axes.feeder.scale: { invert: true }")
         self.assertEqual(machine.sim.shaft().starts, 2)
+
+    def test_a_wrong_speed_ends_all_motion(self):
+        """A motor that is a little slower than the drive tells it: nothing else would find that."""
+        machine = self.cell()
+        machine.sim.control("pace 1 60")
+        person = self.person(machine, (r"Actuate ", "skip"))
+        self.assertEqual(person.finish(), 1, person.text)
+        self.assert_verdicts(person, power_on="PASSED", jog_positive="FAILED", jog_negative="NOT_DONE",
+                             limit_positive="NOT_DONE", stop="NOT_DONE", homing="NOT_DONE", power_off_again="PASSED")
+        step = person.step("jog positive")
+        self.assertRegex(step["reason"], r"for 1\.\d+ s.*, and \d+.* were told for it at 5 mm/s: it is too slow")
+        self.assertIn("axes.feeder.scale (microstep", step["remedy"])
+        self.assertEqual(person.record()["speed"], "SPEED_PROOF_WRONG")
+        self.assertEqual(machine.sim.shaft().starts, 1)
 
     def test_an_axis_with_a_fault_says_what_to_do(self):
         machine = self.cell()

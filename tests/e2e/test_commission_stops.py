@@ -124,7 +124,7 @@ class CommissionStops(CommissionScenario):
 
         person = self.person(machine, (r"in the positive direction\? [^\]]*\] ",
                                        lambda _: person.type_ahead("yes", "yes", "yes")),
-                             (r"moves -8 mm[^?]*\? [^\]]*\] ", "no"), (r"Actuate ", "skip"),
+                             (r"moves -5 mm[^?]*\? [^\]]*\] ", "no"), (r"Actuate ", "skip"),
                              (r"(Go to the switch|a third)[^\]]*\] ", "abort"))
         self.assertEqual(person.finish(), 1, person.text)
         self.assert_verdicts(person, jog_positive="PASSED", jog_negative="SKIPPED")

@@ -69,6 +69,18 @@ TEST(M24GroupStart, PreparingMovesNothingAndLeavesNothing) {
   for (auto& member : bench.members) EXPECT_EQ(member.node->starts(), 0);
 }
 
+/// The proof of the block is one answer of each, and not all five.
+TEST(M24GroupStart, SlowAnswersPermitIt) {
+  GroupBench bench;
+  bench.ready();
+  bench.fault({.kind = simulation::FaultKind::delay_reply, .count = -1, .delay = 25ms});
+  ASSERT_TRUE(bench.prepare(2000));
+  const auto started = bench.start();
+  ASSERT_TRUE(started) << to_string(started.error());
+  bench.run(3s);
+  expect_started_once(bench, 2000);
+}
+
 /// Each way in which a drive may differ from CiA 301: known before anything is started by it.
 TEST(M24GroupStart, WhereAnRpdoIsNotAsItMustBeThereIsNone) {
   for (const auto* name :

@@ -9,7 +9,7 @@ namespace axisd::axisctl::commission {
 namespace {
 
 constexpr double share_of_velocity = 0.05, share_of_range = 0.05, share_of_proof = 0.1;
-constexpr double jog_seconds = 2;
+constexpr double jog_seconds = 2, proof_seconds = 1;
 /// A hand needs so long to reach a switch after the motion has begun; after so long nobody will.
 constexpr double hand_seconds = 10, longest_hand_seconds = 30;
 
@@ -150,8 +150,9 @@ Motion default_motion(VelocityRange permitted, const std::optional<Settings>& se
   return motion;
 }
 
-double proving_velocity(VelocityRange permitted, std::optional<double> wanted) {
-  const double slow = std::max(permitted.maximum * share_of_proof, permitted.minimum);
+double proving_velocity(VelocityRange permitted, std::optional<double> wanted, double distance) {
+  const double tenth = permitted.maximum * share_of_proof;
+  const double slow = std::max(std::min(tenth, distance / proof_seconds), permitted.minimum);
   return std::min(slow, wanted.value_or(slow));
 }
 

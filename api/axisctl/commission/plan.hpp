@@ -59,9 +59,9 @@ struct VelocityRange {
 Motion default_motion(VelocityRange permitted, const std::optional<Settings>& settings,
                       std::optional<double> velocity, std::optional<double> distance);
 
-/// Of the moves that go before the proof of the speed: a tenth of the highest velocity, at least what the
-/// drive can do, and not faster than the operator wants.
-double proving_velocity(VelocityRange permitted, std::optional<double> wanted);
+/// Of a move that proves the speed: a tenth of the highest velocity, slower where the way would be over too
+/// soon to be timed, at least what the drive can do, and not faster than the operator wants.
+double proving_velocity(VelocityRange permitted, std::optional<double> wanted, double distance);
 
 /// How far the axis may go from here in one relative move: at most `wanted`, not beyond a soft limit that
 /// counts, and not further than jog_travel while the position is unknown. Not negative.

@@ -94,7 +94,8 @@ Judgement Procedure::identity(Step& step) {
                      "nothing moves before you say yes to it. Go on?",
                      with_unit(motion_.distance, record_.unit()),
                      with_unit(motion_.velocity, record_.unit() + "/s"),
-                     with_unit(proving_velocity(velocities_, wishes_.velocity), record_.unit() + "/s")),
+                     with_unit(proving_velocity(velocities_, wishes_.velocity, motion_.distance),
+                               record_.unit() + "/s")),
          step);
   return {};
 }

@@ -65,7 +65,7 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
   if (room <= 0) throw StepEnd(VERDICT_NOT_DONE, no_room(before), room_remedy(before));
   const double distance = plan.positive ? room : -room;
   const bool proves = record_.speed() != SPEED_PROOF_PROVEN;
-  const double velocity = proves ? proving_velocity(velocities_, wishes_.velocity) : motion_.velocity;
+  const double velocity = proves ? proving_velocity(velocities_, wishes_.velocity, room) : motion_.velocity;
   check_move(distance, velocity);
   permit(fmt::format("{}{}. Look at the machine; Enter stops it. Move?",
                      move_text(distance, velocity, before), proves ? ", and its time is measured" : ""),

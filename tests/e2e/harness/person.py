@@ -20,8 +20,8 @@ from .wire import HOMING, START
 SHORT_WAITS = {"poll": "{ idle: 20 ms }", "jog_travel": "400 mm",
                "homing": "{ method: home_negative, velocity: 80 mm/s, search_velocity: 5 mm/s, backoff: 5 mm, "
                          "max_travel: 450 mm, timeout: 60 s }"}
-#: Quicker than the default; long enough for a tenth of the highest velocity to be measured.
-QUICK = ("--velocity", "20mm/s", "--distance", "8mm")
+#: Quicker than the default.
+QUICK = ("--velocity", "20mm/s", "--distance", "5mm")
 
 
 class ScriptedOperator:

@@ -180,11 +180,13 @@ TEST(Motion, IsSlowAndShort) {
   EXPECT_DOUBLE_EQ(asked.distance, 30);
 }
 
-TEST(Motion, BeforeTheProofIsATenthOfTheHighest) {
-  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}), 10);
-  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 20), 10);
-  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 2), 2);
-  EXPECT_DOUBLE_EQ(proving_velocity({.minimum = 30, .maximum = 100}, {}), 30);
+TEST(Motion, ThatProvesTheSpeedIsATenthOfTheHighestAndLastsASecond) {
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}, 10), 10);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}, 200), 10);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}, 4), 4);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 20, 200), 10);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 2, 200), 2);
+  EXPECT_DOUBLE_EQ(proving_velocity({.minimum = 30, .maximum = 100}, {}, 10), 30);
 }
 
 TEST(Motion, IsBoundedByWhatIsKnown) {

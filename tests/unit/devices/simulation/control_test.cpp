@@ -89,6 +89,20 @@ TEST_F(ControlTest, PushesAShaftThatIsNotHeld) {
   EXPECT_EQ("ok 65486", command("peek 1 0x0B"));
 }
 
+TEST_F(ControlTest, SetsThePaceOfAMotor) {
+  network.advance(t);
+  put("ykd2405pr", 1);
+  put("ykd2405pr", 2);
+  EXPECT_EQ("ok", command("pace 2 50"));
+  for (const std::uint8_t node : {1, 2}) ask({node, 6, 0, 0x27, 0, 1});  // 5000 pulses at 60 r/min
+  wait(600ms);
+  const auto position = [this](const char* node) {
+    return std::stoi(command(std::string("peek ") + node + " 0x0B").substr(3));
+  };
+  EXPECT_NEAR(position("2"), position("1") / 2, 50);
+  EXPECT_GT(position("2"), 100);
+}
+
 TEST_F(ControlTest, NamesDrivesByAddressOrPlace) {
   network.advance(t);
   put("ykd2405pr", 7);
@@ -133,7 +147,7 @@ TEST_F(ControlTest, RefusesWhatItDoesNotUnderstand) {
   network.advance(t);
   put("ykd2405pr", 1);
   for (const auto* wrong : {"", "hangup", "replug", "block 1", "block 1 maybe", "push 1", "push 1 x",
-                            "alarm 1 6", "alarm 1", "cut 1", "fault", "nonsense 1"})
+                            "pace 1 0", "pace 1", "alarm 1 6", "alarm 1", "cut 1", "fault", "nonsense 1"})
     EXPECT_THAT(command(wrong), StartsWith("error ")) << wrong;
 }
 
