@@ -23,6 +23,7 @@
 #include "devices/cia402/standstill.hpp"
 #include "devices/cia402/state_pdos.hpp"
 #include "devices/cia402/status_word.hpp"
+#include "devices/cia402/unit_objects.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
 
@@ -140,6 +141,7 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] Result<void> check_alone() const;
   /// The drive counts as the axis was planned; else misconfigured.
   Task<Result<void>> check_units();
+  Task<Result<std::optional<UnitConflict>>> unit_conflict(SdoOptions options);
   Task<Result<void>> set_emergency_id();
   Task<Result<void>> set_heartbeat();
   Task<Result<void>> set_pdos();

@@ -191,6 +191,11 @@ Task<Result<Drift>> Cia402Drive::check_drift(TransactionClass transaction_class)
     drift.limits_changed =
         drift.limits_changed || setting.key == "drive.overtravel_stop" || setting.key.starts_with("inputs");
   }
+  const auto units = co_await unit_conflict({.transaction_class = transaction_class});
+  if (!units) co_return fail(units.error());
+  if (!*units) co_return drift;
+  drift.text += (drift.text.empty() ? "" : "; ") + (*units)->message;
+  drift.scale_changed = true;
   co_return drift;
 }
 

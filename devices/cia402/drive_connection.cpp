@@ -204,9 +204,17 @@ Task<Result<void>> Cia402Drive::configure() {
 
 /// Within the canary: what a power-up may have changed is read in the power cycle that it counts for.
 Task<Result<void>> Cia402Drive::check_units() {
+  const auto conflict = co_await unit_conflict(patiently());
+  if (!conflict) co_return fail(conflict.error());
+  if (!*conflict) co_return Result<void>{};
+  co_return fail(
+      error_at(Reason::misconfigured, (*conflict)->object, (*conflict)->message, (*conflict)->remedy));
+}
+
+Task<Result<std::optional<UnitConflict>>> Cia402Drive::unit_conflict(SdoOptions options) {
   Values values;
   for (const auto object : model_->unit_objects) {
-    const auto value = co_await read_object(object, patiently());
+    const auto value = co_await read_object(object, options);
     if (value) values[object.key()] = *value;
     if (value || canopen::is_missing(value.error())) continue;  // what it does not have tells nothing
     auto error = value.error();
@@ -215,9 +223,7 @@ Task<Result<void>> Cia402Drive::check_units() {
                                  without(object));
     co_return fail(std::move(error));
   }
-  const auto conflict = find_conflict(model_->meaning.units, setup_.pulses_per_revolution, values);
-  if (!conflict) co_return Result<void>{};
-  co_return fail(error_at(Reason::misconfigured, conflict->object, conflict->message, conflict->remedy));
+  co_return find_conflict(model_->meaning.units, setup_.pulses_per_revolution, values);
 }
 
 Task<Result<void>> Cia402Drive::set_emergency_id() {

@@ -136,7 +136,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
     model_.objects.restore = cia402::MemoryCommand{object::restore_all, load};
   model_.meaning.units = conventions.units;
   model_.unit_objects = unit_objects_;
-  can_transactions = cia402::transactions_of(model_, 0);  // it has nothing that could drift
+  can_transactions = cia402::transactions_of(model_, static_cast<std::uint8_t>(unit_objects_.size()));
 }
 
 Result<std::shared_ptr<const DriveDescriptor>> specialise(

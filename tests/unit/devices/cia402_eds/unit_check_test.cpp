@@ -221,6 +221,21 @@ TEST(UnitCheck, APowerCycleIsLookedAtAnew) {
   expect_refused(bench.bring_up(), velocity_si, "its velocities count r/min", "velocity_unit: rpm");
 }
 
+/// Whoever else sets the drive while it is in use, or while it cannot be reached.
+TEST(UnitCheck, AUnitThatIsChangedLaterIsFound) {
+  UnitBench bench(with_objects({{"60A9h:00", in_pulses}}, ""), {{velocity_si, in_pulses}});
+  ASSERT_TRUE(bench.bring_up());
+  const auto look = [&] { return bench.run(bench.drive().check_drift(TransactionClass::parameters)); };
+  const auto none = look();
+  ASSERT_TRUE(none) << to_string(none.error());
+  EXPECT_EQ(none->text, "");
+  bench.answers()[velocity_si] = in_rpm;
+  const auto drift = look();
+  ASSERT_TRUE(drift) << to_string(drift.error());
+  EXPECT_THAT(drift->text, HasSubstr("its velocities count r/min (60A9h is 00B44700h)"));
+  EXPECT_TRUE(drift->scale_changed);
+}
+
 TEST(UnitCheck, WhoWritesParametersLeavesUnitsAlone) {
   UnitBench bench(
       with_objects({{"607Eh:00", 0}, {"60A8h:00", 0}, {"60A9h:00", in_pulses}, {"60AAh:00", 0}}, ""),
