@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "buses/budget.hpp"
@@ -40,6 +41,9 @@ struct LineSettings {
   Duration turnaround_max =
       std::chrono::milliseconds(20);  ///< longest time a node takes before its first byte
   BudgetPolicy budget{};
+  /// A drive of the line, 1..247. Where one answers, nobody has to wait in order to learn that the adapter
+  /// does not hear what it sends. Nothing: nobody is asked, and an echo is waited for.
+  std::optional<std::uint8_t> echo_witness{};
   [[nodiscard]] bool simulated() const { return port == "sim"; }
   [[nodiscard]] SerialSettings serial() const { return {.baud = baud, .format = format}; }
 };

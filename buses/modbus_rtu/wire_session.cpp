@@ -19,14 +19,25 @@ constexpr Duration between_looks = std::chrono::milliseconds(1);
 /// 248..255 are reserved (Modbus over serial line 2.2): no node answers, so whatever comes back is an echo.
 constexpr std::uint8_t nobody = 248;
 
-Frame make_probe() {
-  Frame probe;
-  probe.append(nobody);
-  probe.append(static_cast<std::uint8_t>(Function::read_holding_registers));
-  probe.append_word(0);
-  probe.append_word(1);
-  probe.append_crc();
-  return probe;
+/// A read, as its reply and its echo differ in shape.
+Request probe_of(const LineSettings& line) {
+  return {.node = line.echo_witness.value_or(nobody), .address = 0, .count = 1};
+}
+
+/// encode() refuses reserved nodes.
+Frame frame_of(const Request& probe) {
+  Frame frame;
+  frame.append(probe.node);
+  frame.append(static_cast<std::uint8_t>(probe.function));
+  frame.append_word(probe.address);
+  frame.append_word(probe.count);
+  frame.append_crc();
+  return frame;
+}
+
+bool is_answer(const Request& probe, std::span<const std::uint8_t> bytes) {
+  const auto kind = decode(probe, bytes).kind;
+  return kind == ReplyKind::match || kind == ReplyKind::exception;
 }
 
 }  // namespace
@@ -137,38 +148,54 @@ int WireSession::use(const SerialSettings& serial) {
   return 0;
 }
 
-/// What comes back of the request that was just sent.
-WireSession::Bytes WireSession::await_echo(std::span<std::uint8_t> buffer,
+/// What comes back of the probe that was just sent: as much as an echo has, or an answer.
+WireSession::Bytes WireSession::await_echo(std::span<std::uint8_t> buffer, const Request& probe,
                                            const std::function<bool()>& must_end) {
-  const auto until = request_end_ + echo_latency;
+  // Nothing is said into the answer of a node that was asked.
+  const auto turnaround = line_.echo_witness ? line_.turnaround_max : Duration::zero();
+  const auto may_end = request_end_ + turnaround;
+  const auto until = request_end_ + std::max(echo_latency, turnaround);
   Bytes total;
-  for (auto now = monotonic_now(); now < until && total.count < buffer.size() && !must_end();
-       now = monotonic_now()) {
+  for (auto now = monotonic_now();
+       now < until && total.count < buffer.size() && !(now >= may_end && must_end()); now = monotonic_now()) {
     const auto heard = read_until_full(buffer.subspan(total.count), std::min(until, now + between_looks));
     total.count += heard.count;
     total.native_error = heard.native_error;
     if (total.native_error != 0 || wakeup_.quit.load(std::memory_order_acquire)) break;
+    if (is_answer(probe, buffer.first(total.count))) break;
   }
   return total;
+}
+
+/// Takes the answer behind the echo off the port; where none comes, waits as long as one may take.
+int WireSession::pass_answer(const Request& probe) {
+  std::array<std::uint8_t, Frame::capacity> buffer;
+  const auto answer = std::span(buffer).first(reply_size(probe));
+  const auto until = last_byte_ + line_.turnaround_max + wire_time(serial_, answer.size()) + reply_margin;
+  return read_until_full(answer, until).native_error;
 }
 
 int WireSession::find_echo(const std::function<bool()>& must_end) {
   if (echo_known_) return 0;
   if (const int lost = use(line_.serial()); lost != 0) return lost;
-  const auto probe = make_probe();
+  const auto probe = probe_of(line_);
+  const auto frame = frame_of(probe);
   for (int attempt = 0; attempt < echo_attempts && !echo_known_; ++attempt) {
     if (const int lost = keep_silence(); lost != 0) return lost;
     silence_.finish(must_end);
     if (must_end()) return 0;
-    if (const int lost = port_.send(probe); lost != 0) return lost;
-    request_end_ = last_byte_ = monotonic_now() + wire_time(serial_, probe.size());
+    if (const int lost = port_.send(frame); lost != 0) return lost;
+    request_end_ = last_byte_ = monotonic_now() + wire_time(serial_, frame.size());
     std::array<std::uint8_t, Frame::capacity> buffer;
-    const auto heard = await_echo(std::span(buffer).first(probe.size()), must_end);
+    const auto heard = await_echo(std::span(buffer).first(frame.size()), probe, must_end);
     if (heard.native_error != 0) return heard.native_error;
-    const bool is_echo = std::ranges::equal(std::span(buffer).first(heard.count), probe.bytes());
-    if (!is_echo && must_end()) return 0;
-    echo_ = is_echo;
-    echo_known_ = echo_ || heard.count == 0;  // other bytes: somebody else was talking, ask again
+    const auto bytes = std::span(buffer).first(heard.count);
+    const bool answered = is_answer(probe, bytes);
+    echo_ = std::ranges::equal(bytes, frame.bytes());
+    if (echo_ && line_.echo_witness)
+      if (const int lost = pass_answer(probe); lost != 0) return lost;
+    if (!echo_ && !answered && must_end()) return 0;
+    echo_known_ = echo_ || answered || bytes.empty();  // other bytes: somebody else was talking, ask again
   }
   // An echo that is hidden by noise three times is not taken for one; ordinary reads would still find it.
   if (echo_)

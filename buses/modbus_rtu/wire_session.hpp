@@ -31,7 +31,8 @@ class WireSession {
   ~WireSession();
 
   /// Finds out whether the adapter hears what it sends, where that is not known. Gives up at once where
-  /// `must_end()`, which is asked each millisecond: it is then found out later.
+  /// `must_end()`, which is asked each millisecond: it is then found out later. A node that was asked
+  /// (LineSettings::echo_witness) is left its turnaround all the same.
   int find_echo(const std::function<bool()>& must_end);
   [[nodiscard]] bool uses(const SerialSettings& serial) const { return serial_known_ && serial_ == serial; }
   /// Brings the port to other serial settings; the line must be silent. 0, EINVAL (the port cannot do them)
@@ -76,7 +77,9 @@ class WireSession {
   bool take_frame(const Exchange& exchange, ExchangeResult& result);
   bool is_own_echo(const Exchange& exchange, const Frame& damaged);
   Bytes read_until_full(std::span<std::uint8_t> buffer, TimePoint until, const TimePoint* cut_from = nullptr);
-  Bytes await_echo(std::span<std::uint8_t> buffer, const std::function<bool()>& must_end);
+  Bytes await_echo(std::span<std::uint8_t> buffer, const Request& probe,
+                   const std::function<bool()>& must_end);
+  int pass_answer(const Request& probe);
   Bytes absorb();
   void settle(ExchangeResult& result);
   void end(ExchangeResult& result, ExchangeStatus status, int native_error = 0);

@@ -156,6 +156,7 @@ core::QuiesceReport quiesce(Rig& rig, Duration limit) {
   rig.stop_daemon();
   std::optional<std::vector<core::QuiesceReport>> reports;
   auto make_line = [&rig](const modbus_rtu::LineSettings& settings) {
+    EXPECT_EQ(settings.echo_witness, rig.configuration.axes.front().axis.node);
     auto made = std::make_unique<VirtualLine>(rig.world, settings);
     rig.line = made.get();
     made->network().advance(rig.world.now());

@@ -106,6 +106,72 @@ TEST(RtuWorker, AsksForAnEchoOncePerOpening) {
   EXPECT_EQ(node.probes(), 1);
 }
 
+LineSettings with_witness(const ScriptedNode& node) {
+  auto line = line_at(fast, node.path());
+  line.echo_witness = 1;
+  return line;
+}
+
+/// As `axisd --quiesce` opens a port: the wait for an echo would take 0.1 s before the first stop.
+TEST(RtuWorker, AWitnessSavesTheWaitForAnEcho) {
+  Duration least = ample;  // a busy computer may be late, but not each time
+  for (int round = 0; round < 20 && least > milliseconds(50); ++round) {
+    const ScriptedNode node(answering());
+    WorkerBench bench(with_witness(node));
+    const auto begun = monotonic_now();
+    bench.start_and_open();
+    least = std::min(least, monotonic_now() - begun);
+    EXPECT_EQ(bench.run(write_of(0x0028, 0)).reply.kind, ReplyKind::match);
+    EXPECT_EQ(node.seen(),
+              (std::vector<std::string>{hex(read_of(0, 1).frame), hex(write_of(0x0028, 0).frame)}));
+    EXPECT_EQ(node.probes(), 0);
+  }
+  EXPECT_LE(least, milliseconds(50));
+}
+
+TEST(RtuWorker, AWitnessThatRefusesTellsAsMuch) {
+  const ScriptedNode node([](ScriptedNode& self, const Bytes& request) {
+    self.say(request[1] == 3 ? framed({1, 0x83, 2}) : proper_reply(request));
+  });
+  WorkerBench bench(with_witness(node));
+  bench.start_and_open();
+  EXPECT_EQ(bench.run(write_of(0x0028, 0)).reply.kind, ReplyKind::match);
+  EXPECT_EQ(node.seen().size(), 2U);
+}
+
+/// Neither is the echo taken for its answer, nor the answer for that of the next request.
+TEST(RtuWorker, AWitnessAnswersBehindTheEcho) {
+  const ScriptedNode node(
+      [](ScriptedNode& self, const Bytes& request) {
+        if (request[1] == 3 && !self.pause(milliseconds(10))) return;
+        self.say(proper_reply(request));
+      },
+      /*echo=*/true);
+  auto line = with_witness(node);
+  line.turnaround_max = ample;
+  WorkerBench bench(line);
+  bench.start_and_open();
+  EXPECT_EQ(bench.run(write_of(0x0028, 0)).reply.kind, ReplyKind::match);
+  EXPECT_EQ(bench.run(read_of(0, 1)).reply.kind, ReplyKind::match);
+  EXPECT_EQ(node.seen().size(), 3U) << "the witness was asked once";
+}
+
+TEST(RtuWorker, OfASilentWitnessTheEchoIsLearntAsWell) {
+  for (const bool echo : {false, true}) {
+    const ScriptedNode node(
+        [](ScriptedNode& self, const Bytes& request) {
+          if (request[0] != 1) self.say(proper_reply(request));
+        },
+        echo);
+    WorkerBench bench(with_witness(node));
+    bench.start_and_open();
+    const auto stop = exchange_of(
+        {.node = 2, .function = Function::write_single_register, .address = 0x0028, .values = {0}});
+    EXPECT_EQ(bench.run(stop).reply.kind, ReplyKind::match) << echo;
+    EXPECT_EQ(node.seen().size(), 2U) << echo;
+  }
+}
+
 TEST(RtuWorker, EchoAloneIsNoReply) {
   const ScriptedNode node(silent(), /*echo=*/true);
   WorkerBench bench(line_at(fast, node.path()));
