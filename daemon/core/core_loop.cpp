@@ -14,11 +14,12 @@ constexpr int most_ready = 32;
 }  // namespace
 
 void StopLane::request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve,
-                       std::string client) {
+                       std::string client, StopReach reach) {
   for (const auto& gate : gates) gate->request_stop();
   {
     const std::lock_guard lock(mutex_);
-    requests_.push_back({.gates = std::move(gates), .serve = std::move(serve), .client = std::move(client)});
+    requests_.push_back(
+        {.gates = std::move(gates), .serve = std::move(serve), .client = std::move(client), .reach = reach});
   }
   waiting_.store(true, std::memory_order_release);
   post(core_->io(), [] {});  // wakes the loop, which looks at the lane first
@@ -27,14 +28,13 @@ void StopLane::request(std::vector<std::shared_ptr<AxisGate>> gates, std::functi
 bool StopLane::drain() {
   bool served = false;
   for (take_in(); !turns_.empty(); take_in()) {
-    const auto turn = next_turn();
-    if (turn == turns_.end()) break;
-    last_ = turn->first;
-    auto request = std::move(turn->second.requests.front());
-    turn->second.requests.pop_front();
-    const bool first = turn->second.served == 0;
-    turn->second.served += std::max<std::size_t>(1, request.gates.size());
-    serve(std::move(request));
+    auto request = next();
+    if (!request) break;
+    last_ = request->client;
+    auto& turn = turns_.at(last_);
+    const bool first = turn.served == 0;
+    turn.served += std::max<std::size_t>(1, request->gates.size());
+    serve(*std::move(request));
     if (first) core_->push([this, client = last_] { go_on(client); });
     served = true;
   }
@@ -48,16 +48,30 @@ void StopLane::take_in() {
     const std::lock_guard lock(mutex_);
     requests = std::exchange(requests_, {});
   }
-  for (auto& request : requests) turns_[request.client].requests.push_back(std::move(request));
+  for (auto& request : requests) {
+    auto& turn = turns_[request.client];
+    (request.reach == StopReach::machine ? turn.of_machine : turn.of_axes).push_back(std::move(request));
+  }
 }
 
-/// Of the clients behind the last one. end(): nobody has one that may be served now.
-StopLane::Turns::iterator StopLane::next_turn() {
-  const auto may = [](const auto& turn) {
-    return !turn.second.requests.empty() && turn.second.served < share;
+/// Nothing: nobody has one that may be served now.
+std::optional<StopLane::Request> StopLane::next() {
+  auto request = next(&Turn::of_machine);
+  return request ? std::move(request) : next(&Turn::of_axes);
+}
+
+/// Of the clients behind the last one.
+std::optional<StopLane::Request> StopLane::next(std::deque<Request> Turn::* of) {
+  const auto may = [of](const auto& turn) {
+    return !(turn.second.*of).empty() && turn.second.served < share;
   };
-  const auto behind = std::find_if(turns_.upper_bound(last_), turns_.end(), may);
-  return behind != turns_.end() ? behind : std::find_if(turns_.begin(), turns_.end(), may);
+  auto found = std::find_if(turns_.upper_bound(last_), turns_.end(), may);
+  if (found == turns_.end()) found = std::find_if(turns_.begin(), turns_.end(), may);
+  if (found == turns_.end()) return std::nullopt;
+  auto& requests = found->second.*of;
+  auto request = std::move(requests.front());
+  requests.pop_front();
+  return request;
 }
 
 void StopLane::serve(Request request) {
@@ -70,7 +84,7 @@ void StopLane::serve(Request request) {
 
 void StopLane::go_on(const std::string& client) {
   const auto turn = turns_.find(client);
-  if (turn->second.requests.empty())
+  if (turn->second.is_over())
     turns_.erase(turn);
   else
     turn->second.served = 0;

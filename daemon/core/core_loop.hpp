@@ -4,6 +4,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
@@ -21,6 +22,11 @@
 
 namespace axisd::core {
 
+enum class StopReach : std::uint8_t {
+  named,    ///< some axes
+  machine,  ///< every axis
+};
+
 /// Stops overtake everything that waits for the core thread: the lane is emptied before each handler
 /// (drain() says how far), and the sequences that serve a stop run at once to their first wait. Asking for a
 /// stop makes the axes' prepared motion unsendable at once, from the asking thread. Thread: any.
@@ -29,10 +35,11 @@ class StopLane {
   explicit StopLane(ReadyQueue& core) : core_(&core) {}
   /// `serve` stops the axes of all `gates`; none where only the core knows which.
   void request(std::vector<std::shared_ptr<AxisGate>> gates, std::function<void()> serve,
-               std::string client = {});
-  /// Serves one request of each client in turn. Who has stopped `share` axes goes on once the handlers that
-  /// wait by then have run, so that no crowd of stops keeps another's from the drives. False: there was none
-  /// to serve. Thread: core.
+               std::string client = {}, StopReach reach = StopReach::named);
+  /// Serves one request of each client in turn, those of the whole machine before all others, also before
+  /// what the same client asked for earlier: on one computer all may be one client. Who has stopped `share`
+  /// axes goes on once the handlers that wait by then have run, so that no crowd of stops keeps another's
+  /// from the drives. False: there was none to serve. Thread: core.
   bool drain();
 
   static constexpr std::size_t share = 64;
@@ -42,14 +49,17 @@ class StopLane {
     std::vector<std::shared_ptr<AxisGate>> gates;
     std::function<void()> serve;
     std::string client;
+    StopReach reach = StopReach::named;
   };
   struct Turn {
-    std::deque<Request> requests;
+    std::deque<Request> of_machine, of_axes;
     std::size_t served = 0;  ///< axes, since it began or went on
+    [[nodiscard]] bool is_over() const { return of_machine.empty() && of_axes.empty(); }
   };
   using Turns = std::map<std::string, Turn>;
   void take_in();
-  [[nodiscard]] Turns::iterator next_turn();
+  [[nodiscard]] std::optional<Request> next();
+  [[nodiscard]] std::optional<Request> next(std::deque<Request> Turn::* of);
   void serve(Request request);
   void go_on(const std::string& client);
 

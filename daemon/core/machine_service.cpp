@@ -165,7 +165,7 @@ void MachineService::stop_all(std::string client, WaitUntil until, std::function
   std::vector<std::shared_ptr<AxisGate>> gates;
   gates.reserve(table->faces.size());
   for (const auto& [name, axis] : table->faces) gates.push_back(axis->gate);
-  loop_->lane().request(std::move(gates), std::move(serve), std::move(client));
+  loop_->lane().request(std::move(gates), std::move(serve), std::move(client), StopReach::machine);
 }
 
 void MachineService::release_inhibit(std::string client, std::function<void(Result<void>)> callback) {

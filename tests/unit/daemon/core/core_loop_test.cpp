@@ -217,6 +217,69 @@ TEST(CoreLoop, AStopThatComesLaterOvertakesACrowd) {
   EXPECT_EQ(order.at(101), "operator");
 }
 
+/// On one computer all may be one client: a crowd of its stops keeps no StopAll waiting, whoever asks for it.
+TEST(CoreLoop, AStopOfTheWholeMachineGoesBeforeACrowdOfTheSameClient) {
+  CoreLoop loop;
+  Texts order;
+  const auto gate = std::make_shared<AxisGate>();
+  const auto ask = [&](const std::string& client, StopReach reach, std::function<void()> then = {}) {
+    loop.lane().request(
+        {gate},
+        [&, client, reach, then = std::move(then)] {
+          order.push_back(client + (reach == StopReach::machine ? " all" : ""));
+          if (then) then();
+        },
+        client, reach);
+  };
+  post(loop.executor(), [&] {
+    for (int i = 0; i < 10; ++i) ask("crowd", StopReach::named);
+    ask("crowd", StopReach::named, [&] {
+      ask("crowd", StopReach::machine);
+      ask("panel", StopReach::machine);
+    });
+    for (int i = 0; i < 500; ++i) ask("crowd", StopReach::named);
+    ask("panel", StopReach::named);
+    ask("operator", StopReach::machine);
+    ask("crowd", StopReach::named, [&] { loop.stop(); });
+  });
+  loop.run();
+  ASSERT_EQ(order.size(), 10U + 1 + 2 + 500 + 3);
+  EXPECT_EQ(order.at(0), "operator all");
+  const auto at = [&](const std::string& what) { return std::ranges::find(order, what) - order.begin(); };
+  EXPECT_LE(at("panel"), 2) << "in turn";
+  EXPECT_LE(at("panel all"), 14) << "behind what was served when it came";
+  EXPECT_LE(at("crowd all"), 14);
+}
+
+/// What waits is served as fast as ever, and so are the replies of the drives.
+TEST(CoreLoop, ACrowdOfStopsOfTheWholeMachineHasItsShareOnly) {
+  CoreLoop loop;
+  Texts order;
+  int left = 100;
+  post(loop.executor(), [&] {
+    for (int i = 0; i < 100; ++i) {
+      std::vector<std::shared_ptr<AxisGate>> gates(8);
+      for (auto& gate : gates) gate = std::make_shared<AxisGate>();
+      loop.lane().request(
+          std::move(gates),
+          [&] {
+            order.emplace_back("all");
+            if (--left == 0) loop.stop();
+          },
+          "crowd", StopReach::machine);
+    }
+    loop.lane().request({std::make_shared<AxisGate>()}, [&] { order.emplace_back("operator"); }, "operator");
+    post(loop.executor(), [&] { order.emplace_back("reply of a drive"); });
+  });
+  loop.run();
+  const auto at = [&](const std::string& what) {
+    return static_cast<std::size_t>(std::ranges::find(order, what) - order.begin());
+  };
+  EXPECT_EQ(at("operator"), StopLane::share / 8);
+  EXPECT_EQ(at("reply of a drive"), StopLane::share / 8 + 1);
+  EXPECT_EQ(order.size(), 102U);
+}
+
 TEST(CoreLoop, AHandlerIsNeverRunWithinAnother) {
   CoreLoop loop;
   Texts order;
