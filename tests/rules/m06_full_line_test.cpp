@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/rules/m22_group_rig.hpp"
 #include "tests/rules/shared_line.hpp"
+#include "tests/support/indexing.hpp"
 #include "tests/support/rig.hpp"
 
 namespace axisd::test {
@@ -16,77 +19,22 @@ using namespace std::chrono_literals;
 
 constexpr std::uint16_t block = 0x0020, trigger = 0x0027;
 
-/// Axes of one line that are moved to and fro, each as soon as its last move is done.
-class Indexing {
+struct WithLine {
+  WithLine(int count, int baud) : line(count, baud) {
+    for (int i = 1; i <= count; ++i) names.push_back("a" + std::to_string(i));
+  }
+  SharedLine line;
+  std::vector<std::string> names;
+};
+
+/// All axes of one line index.
+class Indexing : public WithLine, public IndexingAxes {
  public:
-  Indexing(int count, int baud) : line(count, baud), moves_(static_cast<std::size_t>(count)) {
-    EXPECT_TRUE(line.world.run_until(
-        [this] { return line.all([](const AxisSnapshot& axis) { return axis.link == LinkState::online; }); },
-        60s));
-    for (int i = 1; i <= count; ++i) end(line.submit(i, EnableRequest{}));
-    for (int i = 1; i <= count; ++i) end(line.submit(i, SetPositionRequest{.position = 0}));
+  Indexing(int count, int baud)
+      : WithLine(count, baud), IndexingAxes(line.world, line.machine(), std::move(names)) {
+    make_ready();
     line.line->forget_wire();
   }
-
-  void run(Duration duration) {
-    const auto until = line.world.now() + duration;
-    while (line.world.now() < until) {
-      for (std::size_t i = 0; i < moves_.size(); ++i) next(i);
-      line.world.run_until([this] { return std::ranges::any_of(moves_, done); }, until - line.world.now());
-    }
-  }
-
-  [[nodiscard]] int done_of(std::size_t axis) const { return moves_[axis].done; }
-  [[nodiscard]] int all_done() const {
-    int all = 0;
-    for (const auto& axis : moves_) all += axis.done;
-    return all;
-  }
-
-  SharedLine line;
-  int refused = 0;
-  std::vector<std::string> failures;
-  Duration longest_wait{};
-
- private:
-  struct Moves {
-    CommandPtr command;
-    int done = 0;
-    bool away = false;
-  };
-  static bool done(const Moves& axis) { return axis.command && axis.command->has_ended(); }
-
-  void end(const CommandPtr& command) {
-    EXPECT_TRUE(line.world.run_until([&] { return command->has_ended(); }, 20s));
-    EXPECT_EQ(command->value().state, CommandState::done) << describe(command->value());
-  }
-
-  void next(std::size_t i) {
-    auto& axis = moves_[i];
-    if (axis.command && !axis.command->has_ended()) return;
-    if (axis.command) {
-      const auto& ended = axis.command->value();
-      if (ended.started_at)
-        longest_wait = std::max<Duration>(longest_wait, *ended.started_at - ended.accepted_at);
-      if (ended.state == CommandState::done)
-        ++axis.done;
-      else
-        failures.push_back(describe(ended));
-      axis.command.reset();
-    }
-    axis.away = !axis.away;
-    const MoveAbsoluteRequest move{.position = axis.away ? 0.4 : 0.2, .with = {.acceleration_time = 20ms}};
-    const auto command =
-        line.machine().submit("a" + std::to_string(i + 1), move, {.arrived = line.world.now()});
-    if (command) {
-      axis.command = *command;
-    } else {
-      ++refused;
-      axis.away = !axis.away;
-    }
-  }
-
-  std::vector<Moves> moves_;
 };
 
 int exchanges(const Indexing& indexing, const std::function<bool(const WireEntry&)>& counts) {
