@@ -3,9 +3,13 @@
 if(AXISD_SANITIZE)
   return()
 endif()
-add_executable(bench_can EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/can_bench.cpp)
+add_executable(bench_can EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/can_bench.cpp ${CMAKE_CURRENT_LIST_DIR}/can_index.cpp)
 target_include_directories(bench_can PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(bench_can PRIVATE axisd_test_support axisd_core)
+add_executable(bench_index EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/index_main.cpp
+                                            ${CMAKE_CURRENT_LIST_DIR}/index_virtual.cpp ${CMAKE_CURRENT_LIST_DIR}/index_wire.cpp)
+target_include_directories(bench_index PRIVATE ${CMAKE_SOURCE_DIR})
+target_link_libraries(bench_index PRIVATE axisd_test_support axisd_core)
 add_executable(bench_bare_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_loop.cpp)
 add_executable(bench_bare_waits EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/bare_waits.cpp)
 add_executable(bench_modbus_loop EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/modbus_loop.cpp)
@@ -25,7 +29,7 @@ if(AXISD_GRPC)
   add_executable(bench_full_journal EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/full_journal.cpp)
   target_include_directories(bench_full_journal PRIVATE ${CMAKE_SOURCE_DIR})
   target_link_libraries(bench_full_journal PRIVATE axisd_core)
-  add_custom_target(bench_programs DEPENDS bench_can bench_bare_loop bench_bare_waits bench_modbus_loop bench_untimed_line bench_rpc_client
+  add_custom_target(bench_programs DEPENDS bench_can bench_index bench_bare_loop bench_bare_waits bench_modbus_loop bench_untimed_line bench_rpc_client
                                            bench_command_client bench_full_journal bench_bare_server bench_index_client
                                            bench_index_loop bench_sync_counter axisd axisd-sim axisctl)
   set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
@@ -33,6 +37,14 @@ if(AXISD_GRPC)
   foreach(command bring-up core)
     string(APPEND text "add_test(bench.${command} $<TARGET_FILE:bench_can> ${command} 2)\n")
   endforeach()
+  foreach(command index groups)
+    string(APPEND text "add_test(bench.${command}_on_can $<TARGET_FILE:bench_can> ${command} 3)\n")
+  endforeach()
+  string(APPEND text
+    "add_test(bench.virtual_rates $<TARGET_FILE:bench_index> rates --moves 3000 --axes 4 16 --baud 115200)\n"
+    "add_test(bench.virtual_stops $<TARGET_FILE:bench_index> stops --stops 30 --baud 115200)\n"
+    "add_test(bench.virtual_done $<TARGET_FILE:bench_index> done --moves 200 --baud 115200)\n"
+    "add_test(bench.virtual_groups $<TARGET_FILE:bench_index> groups --rounds 1 --baud 115200)\n")
   add_executable(bench_queue EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/queue_bench.cpp)
   target_include_directories(bench_queue PRIVATE ${CMAKE_SOURCE_DIR})
   target_link_libraries(bench_queue PRIVATE axisd_buses)
@@ -59,7 +71,8 @@ if(AXISD_GRPC)
     "add_test(bench.siege_kill /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/siege_bench.py ${CMAKE_BINARY_DIR} --kill 1 "
     "--only nobody --only \"rapid reset\" --only \"silent connections\" --report-only)\n"
     "set_tests_properties(bench.rtu bench.stop_all bench.index bench.rpc bench.machine bench.admission bench.siege bench.siege_kill PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
-    "set_tests_properties(bench.bring-up bench.core bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"
+    "set_tests_properties(bench.bring-up bench.core bench.index_on_can bench.groups_on_can bench.virtual_rates bench.virtual_stops bench.virtual_done "
+    "bench.virtual_groups bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"
     "set_tests_properties(bench.sync_in_guest PROPERTIES RESOURCE_LOCK guest COST 100)\n")
   file(GENERATE OUTPUT ${include_file} CONTENT "${text}")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${include_file})
