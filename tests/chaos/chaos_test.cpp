@@ -6,9 +6,9 @@ namespace axisd::chaos {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__) || __has_feature(address_sanitizer)
-constexpr std::uint64_t faulted_share = 3'000, faulted_can_share = 2'000;
+constexpr std::uint64_t faulted_share = 3'000, faulted_can_share = 2'000, faulted_index_share = 1'000;
 #else
-constexpr std::uint64_t faulted_share = 25'000, faulted_can_share = 6'000;
+constexpr std::uint64_t faulted_share = 25'000, faulted_can_share = 6'000, faulted_index_share = 8'000;
 #endif
 
 /// Tests of one kind, so that they run beside each other.
@@ -19,6 +19,7 @@ class Chaos : public ::testing::TestWithParam<int> {
   }
 };
 class ChaosCan : public Chaos {};
+class ChaosIndex : public Chaos {};
 
 /// What was judged really happened.
 void expect_often(const Outcome& outcome, int often) {
@@ -47,8 +48,16 @@ TEST_P(ChaosCan, NothingMovesTwiceLateOrByItself) {
   EXPECT_GE(outcome.by_sync, 1);
 }
 
+TEST_P(ChaosIndex, NothingMovesTwiceLateOrByItself) {
+  const auto outcome = run_episodes(PlantKind::full_line, first_seed(), faulted_index_share);
+  EXPECT_GE(outcome.faulted, faulted_index_share);
+  expect_often(outcome, static_cast<int>(faulted_index_share / 250));
+  EXPECT_GE(outcome.starts, static_cast<int>(faulted_index_share / 10));
+}
+
 INSTANTIATE_TEST_SUITE_P(Share, Chaos, ::testing::Range(0, 3));
 INSTANTIATE_TEST_SUITE_P(Share, ChaosCan, ::testing::Range(1, 2));
+INSTANTIATE_TEST_SUITE_P(Share, ChaosIndex, ::testing::Range(2, 3));
 
 }  // namespace
 }  // namespace axisd::chaos

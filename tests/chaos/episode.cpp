@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "tests/chaos/client.hpp"
 #include "tests/chaos/hands.hpp"
+#include "tests/chaos/indexer.hpp"
 #include "tests/chaos/judge.hpp"
 #include "tests/chaos/plant.hpp"
 
@@ -71,6 +73,11 @@ void settle(Plant& plant, Judge& judge) {
   judge.conclude();
 }
 
+/// Of the options of test_chaos.
+const char* suffix(PlantKind kind) {
+  return kind == PlantKind::network ? "-can" : kind == PlantKind::full_line ? "-index" : "";
+}
+
 }  // namespace
 
 void Outcome::add(const Outcome& other) {
@@ -92,18 +99,21 @@ Outcome run_episode(PlantKind kind, std::uint64_t seed) {
   {
     const Looker looker(plant, judge);
     std::vector<std::unique_ptr<Client>> clients;
-    for (const auto* name : {"anna", "bert", "cora"})
+    const bool full = kind == PlantKind::full_line;
+    for (const auto* name : full ? std::vector{"anna"} : std::vector{"anna", "bert", "cora"})
       clients.push_back(std::make_unique<Client>(plant, judge, name, seed * 10 + clients.size() + 1));
+    std::optional<Indexer> indexer;
+    if (full) indexer.emplace(plant, judge, seed * 10 + 8);
     Hands hands(plant, seed * 10 + 9);
     plant.world.run_for(faulty_time);
     hands.rest();
+    indexer.reset();
     for (const auto& client : clients) client->rest();
     settle(plant, judge);
   }
   for (const auto& violation : judge.violations()) ADD_FAILURE() << violation;
   if (!judge.violations().empty())
-    ADD_FAILURE() << fmt::format("repeat it with: test_chaos --seed{} {}",
-                                 kind == PlantKind::network ? "-can" : "", seed);
+    ADD_FAILURE() << fmt::format("repeat it with: test_chaos --seed{} {}", suffix(kind), seed);
   const auto& tally = judge.tally();
   return {.transactions = plant.on_lines().transactions,
           .faulted = plant.on_lines().faulted,

@@ -16,8 +16,9 @@ struct Outcome {
   void add(const Outcome& other);
 };
 
-/// Half a minute of several clients on a plant with faults, then the faults end and everything is stopped.
-/// Fails the test for each violation, and says how to repeat it.
+/// Half a minute of several clients on a plant with faults, then the faults end and everything is stopped. On
+/// a full line all axes index, and a client does whatever it likes beside that. Fails the test for each
+/// violation, and says how to repeat it.
 Outcome run_episode(PlantKind kind, std::uint64_t seed);
 /// Episodes of consecutive seeds until a fault has struck `faulted` transactions (with a network: of those on
 /// CAN), or one is violated.

@@ -23,12 +23,18 @@ Plant::Plant(PlantKind kind, std::uint64_t seed) : dice_(seed) {
                                     : dice_.pick(std::array{0.01, 0.03, 0.08, 0.15, 0.3});
   config::Configuration configuration;
   configuration.machine = "chaos";
-  if (kind == PlantKind::lines) {
-    add_line(configuration, "line-a", {1, 2, 3});
-    add_line(configuration, "line-b", {1, 2, 3});
-  } else {
-    add_network(configuration);
-    add_line(configuration, "line-a", {1, 3});
+  switch (kind) {
+    case PlantKind::lines:
+      add_line(configuration, "line-a", {1, 2, 3});
+      add_line(configuration, "line-b", {1, 2, 3});
+      break;
+    case PlantKind::network:
+      add_network(configuration);
+      add_line(configuration, "line-a", {1, 3});
+      break;
+    case PlantKind::full_line:
+      add_line(configuration, "line-a", {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
+      break;
   }
   core::MachineParts parts{.executor = world.executor(), .clock = &world.clock(), .instance_id = "chaos"};
   parts.make_line = [this](const modbus_rtu::LineSettings& settings) { return make_line(settings); };
@@ -62,9 +68,9 @@ void Plant::add_line(config::Configuration& configuration, const std::string& na
     add_axis(configuration, {.name = name.back() + std::string("-") + std::to_string(node),
                              .bus = name,
                              .node = node,
-                             .model = serial_models.at(node - 1U),
-                             .invert = name == "line-b" && node == 1,
-                             .limited = node != 3});
+                             .model = serial_models.at((node - 1U) % serial_models.size()),
+                             .invert = node == 4 || (name == "line-b" && node == 1),
+                             .limited = node % 3 != 0});
 }
 
 void Plant::add_network(config::Configuration& configuration) {

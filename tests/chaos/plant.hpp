@@ -19,8 +19,8 @@
 namespace axisd::chaos {
 
 /// `lines`: two RS-485 lines with three drives each, one of every model. `network`: a CAN network with two
-/// YSS-C and two standard drives, and two drives on a line beside it.
-enum class PlantKind : std::uint8_t { lines, network };
+/// YSS-C and two standard drives, and two drives on a line beside it. `full_line`: 16 drives on one line.
+enum class PlantKind : std::uint8_t { lines, network, full_line };
 
 /// How many transactions passed, and how many of them a fault struck. On CAN: SDO requests, RPDOs, NMT
 /// commands, and each SYNC that is struck.
