@@ -3,9 +3,11 @@ lean client, a loop on libmodbus that writes block and trigger apart or in one f
 same simulated drives. README.md says what is measured. Ends with 1 where a command expired, or where 1 % of the starts came
 later than axisd publishes.
 
-    index_bench.py BUILD [--axes N|N/DRIVES ...] [--baud BAUD ...] [--rounds N] [--seconds S] [--wire] [--report-only]
+    index_bench.py BUILD [--axes N|N/DRIVES ...] [--baud BAUD ...] [--lines LINES/AXES ...] [--rounds N] [--seconds S] [--wire]
+                   [--report-only]
 """
 import argparse
+import contextlib
 import dataclasses
 import mmap
 import os
@@ -55,15 +57,17 @@ class Syncs:
         return int.from_bytes(self.shared[:8], sys.byteorder)
 
 
-def look(line, case, pid, seconds, syncs=None):
-    """What was done in `seconds`, and the requests."""
+def look(lines, case, pid, seconds, syncs=None):
+    """What was done in `seconds`: the rate is that of all lines, the rest that of the first; and its requests."""
     begin, cpu, synced = time.monotonic(), cpu_seconds(pid), syncs.count() if syncs else 0
     time.sleep(seconds)
     end, cpu, synced = time.monotonic(), cpu_seconds(pid) - cpu, (syncs.count() if syncs else 0) - synced
-    requests = index_wire.requests_of(line, line.frames(begin, end))
-    found = index_wire.figures_of(requests, end - begin, case.axes)
-    moves = max(found["moves"], 1)
-    return found | {"cpu": cpu / moves * 1e3, "syncs": synced / moves}, requests
+    requests = [index_wire.requests_of(line, line.frames(begin, end)) for line in lines]
+    found = [index_wire.figures_of(each, end - begin, case.axes) for each in requests]
+    rate = sum(each["rate"] for each in found)
+    moves = max(sum(each["moves"] for each in found), 1)
+    return found[0] | {"rate": rate, "cpu": cpu / moves * 1e3, "core": cpu / (end - begin) * 100,
+                       "syncs": synced / moves}, requests[0]
 
 
 def lap(line, case):
@@ -87,16 +91,18 @@ def client_figures(text):
     return found
 
 
-def with_axisd(build, line, case, seconds):
+def with_axisd(build, lines, case, seconds):
+    """`case`: of each line."""
+    line = lines[0]
     syncs = Syncs(build, line.directory / "syncs")
-    cell = Cell(build, [line], None)
+    cell = Cell(build, lines, None)
     with cell.online(env=syncs.environment) as pid:
         subprocess.run([f"{build}/tests/bench_command_client", SERVER, "ready"], check=True)
         settle, seconds = SETTLE + lap(line, case), seconds + 2 * lap(line, case)
-        words = [SERVER, str(case.axes), str(DISTANCE), str(settle + seconds + SETTLE)]
+        words = [SERVER, str(case.axes * len(lines)), str(DISTANCE), str(settle + seconds + SETTLE)]
         with subprocess.Popen([f"{build}/tests/bench_index_client", *words], stdout=subprocess.PIPE, text=True) as client:
             time.sleep(settle)
-            found, requests = look(line, case, pid, seconds, syncs)
+            found, requests = look(lines, case, pid, seconds, syncs)
             printed = client.communicate()[0]
         if client.returncode != 0:
             sys.exit(f"index_bench.py: bench_index_client ended with {client.returncode}")
@@ -109,7 +115,7 @@ def with_loop(build, name, line, case, seconds, profile):
                else [f"{build}/tests/bench_index_loop", *common, name])
     with running(*program, *map(str, (*profile, 0, PULSES))) as process:
         time.sleep(SETTLE + lap(line, case))
-        return look(line, case, process.pid, seconds + 2 * lap(line, case))
+        return look([line], case, process.pid, seconds + 2 * lap(line, case))
 
 
 def measure(build, given, baud, case):
@@ -120,7 +126,7 @@ def measure(build, given, baud, case):
         for number in range(given.rounds):
             for name in PROGRAMS:
                 if name == "axisd":
-                    figures, requests = with_axisd(build, line, case, given.seconds)
+                    figures, requests = with_axisd(build, [line], case, given.seconds)
                     profile = index_wire.profile_of(requests) or profile
                     if profile is None:
                         sys.exit("index_bench.py: axisd started nothing")
@@ -132,6 +138,44 @@ def measure(build, given, baud, case):
                     index_wire.print_move(f"{baud} bit/s, {case}, {PROGRAMS[name]}", requests, node=1)
             print(".", end="", file=sys.stderr, flush=True)
     return found
+
+
+def measure_lines(build, given, baud, count, axes):
+    """What -> the figures of the rounds of one line, and those of `count` at once; of axisd alone."""
+    found, case = {1: {}, count: {}}, Case(axes, axes)
+    with tempfile.TemporaryDirectory() as directory, contextlib.ExitStack() as stack:
+        lines = [stack.enter_context(Line(build, directory, baud, axes, name=f"line-{index}").open()) for index in range(count)]
+        for _ in range(given.rounds):
+            for together, figures in found.items():
+                for what, figure in with_axisd(build, lines[:together], case, given.seconds)[0].items():
+                    figures.setdefault(what, []).append(figure)
+            print(".", end="", file=sys.stderr, flush=True)
+    return found
+
+
+def print_lines(build, given):
+    """True: nothing expired."""
+    rows, expired = [["baud", "lines", "axes on each", "moves/s, all lines", "of one line's", "CPU, % of a core",
+                      "CPU a move, ms", "expired"]], 0
+    for baud in given.baud:
+        for count, axes in given.lines:
+            found = measure_lines(build, given, baud, count, axes)
+            for together, figures in found.items():
+                ratios = [mine / its for mine, its in zip(figures["rate"], found[1]["rate"])]
+                rows.append([str(baud), str(together), str(axes), spread(figures["rate"], 1), spread(ratios, 2),
+                             spread(figures["core"], 1), median(figures, "cpu", 2), f"{sum(figures['expired']):.0f}"])
+                expired += sum(figures["expired"])
+    if given.lines:
+        print("\nseveral lines at once, all axes index; min / median / max of the rounds, else medians")
+        table(rows)
+    return expired == 0
+
+
+def lines_of(text):
+    count, axes = map(int, text.split("/"))
+    if count < 2:
+        raise argparse.ArgumentTypeError("LINES is 2 or more: one line is measured beside them anyway")
+    return count, axes
 
 
 def median(figures, what, digits=1):
@@ -193,6 +237,8 @@ def main():
     parser.add_argument("--axes", type=Case.of, nargs="*", help="that index; N/DRIVES: others are on the line, too",
                         default=list(map(Case.of, ("1", "2", "4", "8", "16", "30", "1/16", "4/16"))))
     parser.add_argument("--baud", type=int, nargs="*", default=[115200, 19200])
+    parser.add_argument("--lines", type=lines_of, nargs="*", default=[(4, 16)],
+                        help="LINES/AXES: so many lines at once with so many axes each, beside one of them")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=4, help="of each turn, and two laps of all axes")
     parser.add_argument("--wire", action="store_true", help="print one move of each program, frame by frame")
@@ -205,6 +251,7 @@ def main():
         print_rates(baud, cases)
         within = print_commands(baud, cases) and within
     plot(pathlib.Path(build) / "bench" / "index.svg", found)
+    within = print_lines(build, given) and within
     return 0 if within or given.report_only else 1
 
 

@@ -6,8 +6,9 @@ import statistics
 from figures import table
 from rtu_cell import silence
 
-#: What requests begin with behind the node's address; manual of the YKD2405PR, 6.1.
-KINDS = {"030003000A": "state", "0300200006": "canary", "1000200006": "block", "060027": "trigger", "1000200008": "one"}
+#: What requests begin with behind the node's address; manual of the YKD2405PR, 6.1. A reading of the state may be longer
+#: than its ten registers.
+KINDS = {"030003": "state", "0300200006": "canary", "1000200006": "block", "060027": "trigger", "1000200008": "one"}
 BLOCK = slice(14, 30)  # registers 0x0020..0x0023 in a request of function 0x10
 STARTS = ("trigger", "one")
 

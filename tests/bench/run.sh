@@ -2,8 +2,8 @@
 # Builds what the benchmarks need (preset release) and runs them; every figure stands beside a yardstick's, measured in
 # the same run. See README.md.
 #   tests/bench/run.sh [can|rtu|stop-all|index|rpc|machine|admission|siege|all]      (default: all)
-# Ends with 1 where a published bound of StopAll or of starts was exceeded, or that of the stops after a kill, or a command
-# expired on a full line.
+# Ends with 1 where a published bound of stops, StopAll or starts was exceeded, or that of the stops after a kill, or a
+# command failed on a full line or network, or an axis did not get its share of a line.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
 part=${1:-all}
@@ -17,13 +17,18 @@ wants() { [ "$part" = "$1" ] || [ "$part" = all ]; }
 deploy/install-packages.sh test
 cmake --preset release >/dev/null
 ninja -C build/release --quiet bench_programs
+status=0
 if wants can; then
   build/release/tests/bench_can bring-up 32
   build/release/tests/bench_can core 16
+  build/release/tests/bench_can index 32 || status=$?
+  build/release/tests/bench_can groups 16 || status=$?
   tests/guest/run.sh -t 400 /usr/bin/python3 -B tests/bench/can_bench.py build/release
 fi
 if wants rtu; then build/release/tests/bench_queue; fi
-status=0
+if wants index; then
+  for each in rates stops "done" groups; do build/release/tests/bench_index "$each" || status=$?; done
+fi
 for each in rtu stop-all index rpc machine admission siege; do
   if wants "$each"; then /usr/bin/python3 -B "tests/bench/${each//-/_}_bench.py" build/release || status=$?; fi
 done

@@ -59,7 +59,7 @@ if(AXISD_GRPC)
     "add_test(bench.stop_all /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/stop_all_bench.py ${CMAKE_BINARY_DIR} --nodes 4 "
     "--silent 1 3 --baud 115200 --stops 2 --report-only)\n"
     "add_test(bench.index /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/index_bench.py ${CMAKE_BINARY_DIR} --axes 2 1/3 "
-    "--baud 115200 --rounds 1 --seconds 1 --report-only)\n"
+    "--baud 115200 --lines 2/2 --rounds 1 --seconds 1 --report-only)\n"
     "add_test(bench.rpc /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rpc_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
     "--seconds 1)\n"
     "add_test(bench.machine /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/machine_bench.py ${CMAKE_BINARY_DIR} "
