@@ -138,10 +138,14 @@ long RawScript::lap() {
 
 double RawScript::rate(long moves) {
   constexpr int laps_before = 10;
+  constexpr long longest_lull = 1000;  // laps without a move
   for (int i = 0; i < laps_before; ++i) lap();
   const auto begin = world_.now();
   long started = 0;
-  while (started < moves) started += lap();
+  for (long laps = 0; started < moves; ++laps) {
+    started += lap();
+    if (laps > longest_lull * moves) throw std::runtime_error("the drives of the raw script do not move");
+  }
   return static_cast<double>(started) / std::chrono::duration<double>(world_.now() - begin).count();
 }
 
