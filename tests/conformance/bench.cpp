@@ -69,8 +69,9 @@ Shaft Bench::shaft() {
   if (std::sscanf(text.c_str(), "position=%lld moving=%d starts=%d", &pulses, &moving, &starts) != 3)
     throw Broken("shaft @1: " + text);
   const double direction = setup.variant.invert ? -1 : 1;
-  return {
-      .mm = static_cast<double>(pulses) / pulses_per_mm * direction, .moving = moving != 0, .starts = starts};
+  return {.mm = static_cast<double>(pulses) / pulses_per_mm(setup.manual) * direction,
+          .moving = moving != 0,
+          .starts = starts};
 }
 
 void Bench::set_input(const std::string& function, bool active) {
@@ -111,6 +112,14 @@ void Bench::finish(int starts) {
   const auto after = shaft();
   EXPECT_EQ(after.mm, before.mm) << "it moved by itself";
   EXPECT_EQ(after.starts, starts) << "starts of motion that the drive has executed";
+}
+
+double close_to_target(const Setup& setup) {
+  constexpr double usual_mm = 0.05, window_pulses = 10, window_turns = 0.001, noise_pulses = 3;
+  if (!setup.manual.is_a_make()) return usual_mm;
+  const auto counts = static_cast<double>(setup.manual.counts());
+  const auto pulses = std::max(window_pulses, window_turns * counts) + noise_pulses;
+  return std::max(usual_mm, pulses / pulses_per_mm(setup.manual));
 }
 
 void expect_command(const v1::Command& command, v1::CommandState state, v1::Reason cause) {

@@ -90,6 +90,11 @@ class Bench {
   std::map<std::string, std::string> terminals_;
 };
 
+/// How far a load may rest beside its target, mm: a closed loop a few pulses; the drive of a maker that has
+/// no window of its own as far as axisd takes for in position (10 pulses, or 1/1000 revolution), and noise
+/// (M10).
+double close_to_target(const Setup& setup);
+
 // Expectations. Each says what was the case instead.
 v1::Command expect_end(const Answer<v1::Command>& answer, v1::CommandState state,
                        v1::Reason cause = v1::REASON_UNSPECIFIED);

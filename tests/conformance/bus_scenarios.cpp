@@ -6,7 +6,6 @@
 #include <map>
 
 #include "tests/conformance/scenario.hpp"
-#include "tests/support/source_tree.hpp"
 
 namespace axisd::conformance {
 
@@ -245,9 +244,8 @@ std::string other_nodes(const Setup& setup) {
 
 /// Empty: the model needs none.
 std::string data_sheet_line(const Manual& manual) {
-  if (!manual.has("data_sheet")) return {};
-  return fmt::format("    drive: {{ eds: {}, velocity_unit: {} }}\n",
-                     test::in_source_tree(manual.text("data_sheet")), manual.text("velocity_unit"));
+  const auto keys = data_sheet_keys(manual);
+  return keys.empty() ? keys : fmt::format("    drive: {{ {} }}\n", keys);
 }
 
 /// Switches and, where it has outputs, two of them, as the lines of an axis.

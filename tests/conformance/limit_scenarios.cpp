@@ -31,7 +31,8 @@ std::string run_into_limits(const Setup& setup) {
     expect_refused(bench.client.jog(20 * way), v1::REASON_LIMIT_SWITCH);
     const auto there = bench.shaft().mm;
     expect_done(bench.client.move_by(-30 * way));
-    EXPECT_NEAR(bench.shaft().mm, there - (30 * way), 0.06) << "moving away has to be possible";
+    EXPECT_NEAR(bench.shaft().mm, there - (30 * way), 0.01 + close_to_target(setup))
+        << "moving away has to be possible";
     bench.finish(2);
   }
   return "yes";
@@ -54,7 +55,7 @@ std::string limits_at_standstill(const Setup& setup) {
     bench.set_input(function, false);
     bench.pass(500ms);
     expect_done(bench.client.move_by(5 * way));
-    EXPECT_NEAR(bench.shaft().mm, 50, 0.06);
+    EXPECT_NEAR(bench.shaft().mm, 50, 0.01 + close_to_target(setup));
     bench.finish(3);
   }
   return "yes";

@@ -1,6 +1,7 @@
 #include "tests/conformance/manual.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -74,6 +75,35 @@ Manual::Manual(std::string model) : model_(std::move(model)) {
   }
   for (const auto& row : read(model_ + ".abilities.csv"))
     abilities_.emplace(row.at("ability"), row.at("value"));
+}
+
+Manual Manual::of_make(std::string make, const std::map<std::string, std::optional<std::string>>& changed,
+                       std::map<std::string, std::string, std::less<>> skipped) const {
+  auto other = *this;
+  other.make_ = std::move(make);
+  other.parameters_.clear();
+  other.skipped_ = std::move(skipped);
+  for (const auto& [ability, value] : changed) {
+    other.abilities_.erase(ability);
+    if (value) other.abilities_.emplace(ability, *value);
+  }
+  return other;
+}
+
+const std::string* Manual::skipped(std::string_view scenario) const {
+  const auto found = skipped_.find(scenario);
+  return found == skipped_.end() ? nullptr : &found->second;
+}
+
+std::vector<std::string> Manual::all_skipped() const {
+  std::vector<std::string> names;
+  for (const auto& [name, why] : skipped_) names.push_back(name);
+  return names;
+}
+
+std::string Manual::data_sheet() const {
+  const std::filesystem::path path(text("data_sheet"));
+  return path.is_absolute() ? path.string() : test::in_source_tree(path.string());
 }
 
 const ManualParameter* Manual::find(std::uint32_t address) const {

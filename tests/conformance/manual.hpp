@@ -28,7 +28,19 @@ class Manual {
   /// Throws std::runtime_error: there is none for this model, or it cannot be read.
   explicit Manual(std::string model);
 
+  /// Of a drive of this model that another maker built: without a table of parameters, and with `changed`
+  /// abilities in place of its own (nothing: it has none). `skipped`: scenarios that there is nothing for,
+  /// and why.
+  [[nodiscard]] Manual of_make(std::string make,
+                               const std::map<std::string, std::optional<std::string>>& changed,
+                               std::map<std::string, std::string, std::less<>> skipped) const;
+
   [[nodiscard]] const std::string& model() const { return model_; }
+  /// The make, where the model has several.
+  [[nodiscard]] const std::string& name() const { return make_.empty() ? model_ : make_; }
+  [[nodiscard]] bool is_a_make() const { return !make_.empty(); }
+  /// Why this scenario is left out; nullptr: it is not.
+  [[nodiscard]] const std::string* skipped(std::string_view scenario) const;
   [[nodiscard]] const std::vector<ManualParameter>& parameters() const { return parameters_; }
   /// nullptr: the manual has none.
   [[nodiscard]] const ManualParameter* find(std::uint32_t address) const;
@@ -39,6 +51,11 @@ class Manual {
   [[nodiscard]] std::int64_t number(const std::string& ability) const {
     return std::stoll(text(ability), nullptr, 0);
   }
+  [[nodiscard]] std::vector<std::string> all_skipped() const;
+  /// Where the drive's data sheet lies, of a model that has one.
+  [[nodiscard]] std::string data_sheet() const;
+  /// Of a motor revolution, as the scenarios have it.
+  [[nodiscard]] std::int64_t counts() const { return has("counts") ? number("counts") : 1000; }
   [[nodiscard]] bool has(const std::string& ability) const { return abilities_.contains(ability); }
   /// The model has nothing that the scenario could be about; its abilities name such scenarios.
   [[nodiscard]] bool lacks(std::string_view scenario) const;
@@ -58,9 +75,10 @@ class Manual {
   [[nodiscard]] int highest_baud() const;
 
  private:
-  std::string model_;
+  std::string model_, make_;
   std::vector<ManualParameter> parameters_;
   std::map<std::string, std::string> abilities_;
+  std::map<std::string, std::string, std::less<>> skipped_;
 };
 
 /// All models of drive_models(), in that order.

@@ -14,10 +14,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A closed loop may rest a few pulses beside its target.
-constexpr double close = 0.05;
-
 std::string absolute_moves(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.enable();
   expect_refused(bench.client.move_to(10), v1::REASON_NOT_TRUSTED);
@@ -43,6 +41,7 @@ std::string absolute_moves(const Setup& setup) {
 }
 
 std::string relative_moves(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.ready();
   for (int i = 0; i < 6; ++i) expect_done(bench.client.move_by(100.0 / 3));
@@ -58,6 +57,7 @@ std::string relative_moves(const Setup& setup) {
 }
 
 std::string velocity_moves(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup, {.limits = false});
   bench.ready();
   int starts = 0;
@@ -82,6 +82,7 @@ std::string velocity_moves(const Setup& setup) {
 /// M16: with limits and a trusted position, an endless motion ends at the software limit, whoever is dead
 /// then.
 std::string velocity_to_the_software_limit(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.ready();
   expect_done(bench.client.move_to(350));
@@ -100,6 +101,7 @@ std::string velocity_to_the_software_limit(const Setup& setup) {
 }
 
 std::string jogging(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.ready();
   const auto jog = bench.client.jog(30, {.hold = 300ms});
@@ -121,6 +123,7 @@ std::string jogging(const Setup& setup) {
 
 /// M16: an axis that does not know where it is jogs a bounded way.
 std::string jogging_untrusted(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.enable();
   for (const double velocity : {30.0, -30.0}) {
@@ -134,6 +137,7 @@ std::string jogging_untrusted(const Setup& setup) {
 }
 
 std::string replaced_moves(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.ready();
   const auto first = bench.under_way(bench.client.move_to(300, {}, v1::WAIT_UNTIL_STARTED), 1s);
@@ -146,6 +150,7 @@ std::string replaced_moves(const Setup& setup) {
 }
 
 std::string buffered_moves(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.ready();
   const auto first = bench.client.move_to(60, {}, v1::WAIT_UNTIL_ACCEPTED);
@@ -227,7 +232,7 @@ RandomMoves move_at_random(const Setup& setup, int count) {
     least = i == 0 ? beside : std::min(least, beside);
     most = i == 0 ? beside : std::max(most, beside);
   }
-  result.drift_pulses = (most - least) * pulses_per_mm;
+  result.drift_pulses = (most - least) * pulses_per_mm(setup.manual);
   return result;
 }
 

@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-
-#include "tests/support/source_tree.hpp"
+#include <string_view>
 
 namespace axisd::conformance {
 
@@ -27,8 +26,10 @@ constexpr Reading other_readings[] = {
     {"bit13_not_enabled", "status_bit_13", "homing_error"},
 };
 
-std::vector<Wanted> inputs_of(const Recipe& recipe) {
+/// A drive that shows no inputs has its switches all the same.
+std::vector<Wanted> inputs_of(const Manual& manual, const Recipe& recipe) {
   std::vector<Wanted> inputs;
+  if (manual.is_a_make() && manual.list("inputs").empty()) return inputs;
   if (recipe.home_switch) inputs.push_back({"home"});
   if (recipe.limit_switches) {
     inputs.push_back({"positive_limit"});
@@ -59,9 +60,11 @@ std::string terminal_lines(const std::vector<std::string>& terminals, const std:
   return text;
 }
 
-std::string mechanics_of(const Variant& variant, const Recipe& recipe) {
+std::string mechanics_of(const Manual& manual, const Variant& variant, const Recipe& recipe) {
   if (!recipe.mechanics) return {};
-  const auto pulses = [&](double mm) { return std::lround(mm * pulses_per_mm) * (variant.invert ? -1 : 1); };
+  const auto pulses = [&](double mm) {
+    return std::lround(mm * pulses_per_mm(manual)) * (variant.invert ? -1 : 1);
+  };
   std::string text;
   if (recipe.home_switch)
     text += fmt::format(",home={}:{}", pulses(variant.invert ? recipe.home_at.second : recipe.home_at.first),
@@ -73,7 +76,27 @@ std::string mechanics_of(const Variant& variant, const Recipe& recipe) {
   return text;
 }
 
+/// A drive that does not show its switches leaves them by itself.
+std::string homing_keys_of(const Manual& manual, const Recipe& recipe) {
+  constexpr std::string_view backoff = "backoff: 5 mm, ";
+  auto keys = recipe.homing_keys;
+  if (!manual.list("inputs").empty()) return keys;
+  if (const auto at = keys.find(backoff); at != std::string::npos) keys.erase(at, backoff.size());
+  return keys;
+}
+
 }  // namespace
+
+std::string data_sheet_keys(const Manual& manual) {
+  if (!manual.has("data_sheet")) return {};
+  const auto& unit = manual.text("velocity_unit");
+  return "eds: " + manual.data_sheet() + (unit.empty() ? "" : ", velocity_unit: " + unit);
+}
+
+std::string data_sheet_options(const Manual& manual) {
+  if (!manual.is_a_make()) return {};
+  return fmt::format("eds={},counts={}{}", manual.data_sheet(), manual.counts(), manual.text("simulated"));
+}
 
 std::string function_of_drive(const std::string& function, bool invert) {
   if (invert && function == "positive_limit") return "negative_limit";
@@ -88,6 +111,7 @@ bool can_home_on_the_home_switch(const Manual& manual, const Variant& variant) {
 }
 
 std::string any_homing_method(const Manual& manual, const Variant& variant) {
+  if (manual.list("homing_modes").empty()) return {};
   return can_home_on_the_home_switch(manual, variant) ? "home_negative" : "negative_limit";
 }
 
@@ -100,7 +124,7 @@ std::string Variant::name() const {
 std::map<std::string, std::string> terminals_of(const Manual& manual, const Variant& variant,
                                                 const Recipe& recipe) {
   std::map<std::string, std::string> terminals;
-  const auto inputs = inputs_of(recipe);
+  const auto inputs = inputs_of(manual, recipe);
   const auto names = chosen(manual, manual.list("inputs"), inputs, variant.invert);
   for (std::size_t i = 0; i < inputs.size(); ++i) terminals[inputs[i].function] = names[i];
   return terminals;
@@ -121,15 +145,15 @@ Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& rec
   auto yaml = bus_lines(manual, recipe.baud, variant.switches.empty() ? 10ms : 40ms);
   yaml += fmt::format(
       "  axis:\n    bus: line\n    node: {}\n    model: {}\n    unit: mm\n"
-      "    scale: {{ microstep: 1000 pulses/rev, travel: 10 mm/rev, invert: {} }}\n"
+      "    scale: {{ microstep: {} pulses/rev, travel: {:g} mm/rev, invert: {} }}\n"
       "    limits: {{ {}velocity: 100 mm/s }}\n",
-      recipe.node, manual.model(), variant.invert, recipe.limits ? "position: [0, 400], " : "");
+      recipe.node, manual.model(), manual.counts(), mm_per_revolution, variant.invert,
+      recipe.limits ? "position: [0, 400], " : "");
   if (recipe.limits) yaml += "    jog_travel: 10 mm\n";
-  if (!recipe.homing.empty())
-    yaml += fmt::format("    homing: {{ method: {}, {} }}\n",
-                        recipe.homing == "any" ? any_homing_method(manual, variant) : recipe.homing,
-                        recipe.homing_keys);
-  const auto inputs = inputs_of(recipe);
+  const auto method = recipe.homing == "any" ? any_homing_method(manual, variant) : recipe.homing;
+  if (!method.empty())
+    yaml += fmt::format("    homing: {{ method: {}, {} }}\n", method, homing_keys_of(manual, recipe));
+  const auto inputs = inputs_of(manual, recipe);
   if (!inputs.empty())
     yaml += "    inputs:\n" +
             terminal_lines(chosen(manual, manual.list("inputs"), inputs, variant.invert), inputs);
@@ -137,20 +161,21 @@ Plant make_plant(const Manual& manual, const Variant& variant, const Recipe& rec
     yaml += "    outputs:\n" +
             terminal_lines(chosen(manual, manual.list("outputs"), recipe.outputs, false), recipe.outputs);
   std::string settings = recipe.settings;
-  if (manual.has("data_sheet"))
-    settings += fmt::format("{}eds: {}, velocity_unit: {}", settings.empty() ? "" : ", ",
-                            test::in_source_tree(manual.text("data_sheet")), manual.text("velocity_unit"));
+  if (const auto sheet = data_sheet_keys(manual); !sheet.empty())
+    settings += (settings.empty() ? "" : ", ") + sheet;
   for (const auto& one : other_readings)
     if (variant.switches.contains(std::string(one.switch_name)))
       settings += fmt::format("{}{}: {}", settings.empty() ? "" : ", ", one.key, one.value);
   if (!settings.empty()) yaml += fmt::format("    drive: {{ {} }}\n", settings);
   yaml += recipe.keys;
 
-  auto drive = fmt::format("node={},model={}{}", recipe.node, manual.model(), mechanics_of(variant, recipe));
+  auto drive =
+      fmt::format("node={},model={}{}", recipe.node, manual.model(), mechanics_of(manual, variant, recipe));
   for (const auto& [name, on] : variant.switches)
     drive += fmt::format(",switch.{}={}", name, on ? "on" : "off");
   if (manual.says_yes("closed_loop"))
     drive += fmt::format(",encoder.noise={},encoder.following_ms=8,encoder.quantised=on", variant.noise);
+  if (const auto sheet = data_sheet_options(manual); !sheet.empty()) drive += "," + sheet;
   if (!recipe.drive.empty()) drive += "," + recipe.drive;
   return {.yaml = std::move(yaml), .drives = {std::move(drive)}};
 }

@@ -31,10 +31,14 @@ struct Wanted {
 /// One axis of a model, as a scenario wants it. The axis is "axis", its drive the first (@1) of the bus
 /// "line".
 ///
-/// 1000 pulses/rev and 10 mm/rev: 100 pulses per mm; 0..400 mm, 100 mm/s. Relative to where the load stands
-/// at power-up, in axis direction: home switch from -52 to -50 mm, limit switches at -60 and 410 mm.
-inline constexpr double pulses_per_mm = 100, home_from = -52, home_to = -50, positive_limit_at = 410,
+/// 10 mm/rev, and 1000 pulses/rev where the drive does not have it otherwise; 0..400 mm, 100 mm/s. Relative
+/// to where the load stands at power-up, in axis direction: home switch from -52 to -50 mm, limit switches at
+/// -60 and 410 mm.
+inline constexpr double mm_per_revolution = 10, home_from = -52, home_to = -50, positive_limit_at = 410,
                         negative_limit_at = -60;
+inline double pulses_per_mm(const Manual& manual) {
+  return static_cast<double>(manual.counts()) / mm_per_revolution;
+}
 
 struct Recipe {
   int node = 1;
@@ -59,12 +63,17 @@ struct Recipe {
 /// M18: where the last approach of the home methods has a direction of its own, an inverted axis cannot
 /// mirror it.
 [[nodiscard]] bool can_home_on_the_home_switch(const Manual& manual, const Variant& variant);
-/// What `homing: any` stands for.
+/// What `homing: any` stands for; empty: the drive does not home.
 [[nodiscard]] std::string any_homing_method(const Manual& manual, const Variant& variant);
 
 /// Terminals of a recipe: function -> terminal, in the order in which they are given away.
 std::map<std::string, std::string> terminals_of(const Manual& manual, const Variant& variant,
                                                 const Recipe& recipe);
+
+/// The data sheet and the unit of velocities, as parts of drive: { ... }; empty: the model needs none.
+std::string data_sheet_keys(const Manual& manual);
+/// Likewise of --drive. A make stands alone: of a model, simulators have the sheet.
+std::string data_sheet_options(const Manual& manual);
 
 /// What a plant's YAML begins with: the bus "line", of the kind that the model is made for; `baud` as in a
 /// recipe, `sync_period` where the bus has SYNC.

@@ -141,7 +141,7 @@ Finding run_scenario(const Scenario& scenario, const Manual& manual, const Varia
       broken = error.what();
     }
   }
-  const auto where = fmt::format("{} / {} / {}", manual.model(), scenario.name, variant.name());
+  const auto where = fmt::format("{} / {} / {}", manual.name(), scenario.name, variant.name());
   for (int i = 0; i < parts.size(); ++i) {
     const auto& part = parts.GetTestPartResult(i);
     if (part.failed())

@@ -9,15 +9,18 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr double close = 0.05;
-
-/// Under way, with a ramp long enough to do something within it.
+/// Under way, with a ramp long enough to do something within it, where the drive has one of its own.
 v1::Command long_move(Bench& bench) {
-  return bench.under_way(
-      bench.client.move_to(390, {.velocity = 60, .deceleration_time = 800ms}, v1::WAIT_UNTIL_STARTED), 1s);
+  Motion with{.velocity = 60};
+  if (bench.setup.manual.has("one_ramp"))
+    with.acceleration_time = 800ms;
+  else
+    with.deceleration_time = 800ms;
+  return bench.under_way(bench.client.move_to(390, with, v1::WAIT_UNTIL_STARTED), 1s);
 }
 
 std::string halt(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.ready();
   const auto move = long_move(bench);
@@ -33,6 +36,7 @@ std::string halt(const Setup& setup) {
 }
 
 std::string stop(const Setup& setup) {
+  const double close = close_to_target(setup);
   Bench bench(setup);
   bench.ready();
   const auto move = long_move(bench);

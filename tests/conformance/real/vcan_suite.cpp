@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <iterator>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "tests/conformance/data_sheet.hpp"
 #include "tests/conformance/scenario.hpp"
 
 namespace axisd::conformance {
@@ -27,6 +30,14 @@ bool is_long(const Job& job) {
   return std::ranges::find(long_ones, job.scenario->name) != std::end(long_ones);
 }
 
+/// Drives of makers, of those data sheets that are there.
+std::vector<Manual> makes() {
+  std::vector<Manual> manuals;
+  for (const auto& file : data_sheets())
+    if (std::filesystem::exists(file)) manuals.push_back(manual_of_sheet(file));
+  return manuals;
+}
+
 std::vector<Manual> manuals_on_can() {
   std::vector<Manual> manuals;
   for (const auto& model : models())
@@ -40,7 +51,8 @@ std::vector<Job> all_jobs(const std::vector<Manual>& manuals, std::string_view n
   for (const auto& manual : manuals)
     for (const auto& subject : subjects())
       for (const auto& scenario : subject.scenarios) {
-        if (manual.lacks(scenario.name) || scenario.name.find(named) == std::string_view::npos) continue;
+        const bool left_out = manual.lacks(scenario.name) || manual.skipped(scenario.name) != nullptr;
+        if (left_out || scenario.name.find(named) == std::string_view::npos) continue;
         all.push_back({.scenario = &scenario, .manual = &manual, .variant = {}});
         if (subject.name == "motion" && !manual.has("data_sheet"))
           all.push_back({.scenario = &scenario, .manual = &manual, .variant = {.invert = true}});
@@ -70,14 +82,33 @@ std::vector<Job> sample_of_jobs(const std::vector<Manual>& manuals) {
   return sample;
 }
 
+/// Of each make some that show its units and its ramps, and one of the others in turn.
+std::vector<Job> sample_of_makes(const std::vector<Manual>& manuals) {
+  constexpr std::string_view always[] = {"absolute_moves", "velocity_moves", "halt", "quick_stop"};
+  std::vector<Job> sample;
+  std::size_t turn = 0;
+  for (const auto& manual : manuals) {
+    std::vector<Job> others;
+    for (const auto& subject : subjects())
+      for (const auto& scenario : subject.scenarios) {
+        if (manual.lacks(scenario.name) || manual.skipped(scenario.name) != nullptr) continue;
+        const Job job{.scenario = &scenario, .manual = &manual, .variant = {}};
+        const bool chosen = std::ranges::find(always, scenario.name) != std::end(always);
+        (chosen ? sample : others).push_back(job);
+      }
+    if (!others.empty()) sample.push_back(others[turn++ % others.size()]);
+  }
+  return sample;
+}
+
 bool run(const Job& job, const Programs& programs) {
   const auto begin = monotonic_now();
   const auto make_target = [&](const Plant& plant) { return make_process_target(programs, "vcan0", plant); };
   const auto finding = run_scenario(*job.scenario, *job.manual, job.variant, make_target, true);
   const auto took = std::chrono::duration<double>(monotonic_now() - begin).count();
   const bool passed = finding.failures.empty();
-  fmt::print("{} {} {} {} ({:.1f} s)\n", passed ? "passed" : "FAILED", job.manual->model(),
-             job.scenario->name, job.variant.name(), took);
+  fmt::print("{} {} {} {} ({:.1f} s)\n", passed ? "passed" : "FAILED", job.manual->name(), job.scenario->name,
+             job.variant.name(), took);
   for (const auto& failure : finding.failures) fmt::print("  {}\n", failure);
   std::fflush(stdout);
   return passed;
@@ -94,13 +125,16 @@ bool run(const std::vector<Job>& jobs, const Part& part, const Programs& program
 }  // namespace
 
 bool run_vcan_suite(const Programs& programs, std::string_view named) {
-  const auto manuals = manuals_on_can();
+  auto manuals = manuals_on_can();
+  std::ranges::move(makes(), std::back_inserter(manuals));
   return run(all_jobs(manuals, named), {}, programs);
 }
 
 bool run_vcan_sample(const Programs& programs, const Part& part) {
-  const auto manuals = manuals_on_can();
-  return run(sample_of_jobs(manuals), part, programs);
+  const auto manuals = manuals_on_can(), others = makes();
+  auto jobs = sample_of_jobs(manuals);
+  std::ranges::move(sample_of_makes(others), std::back_inserter(jobs));
+  return run(jobs, part, programs);
 }
 
 }  // namespace axisd::conformance

@@ -1,6 +1,8 @@
-// Data sheets as their makers ship them: which are taken, and why the others are not. The files are not part
-// of this project. They are read from the folder that AXISD_EDS_FOLDER names, else from ../shared/eds beside
-// the tree; what is not there is skipped by name.
+// Data sheets as their makers ship them: which are taken, and why the others are not. Few are part of this
+// project (tests/data/eds). The others are read from the folder that AXISD_EDS_FOLDER names, else from
+// ../shared/eds beside the tree; what is not there is skipped by name.
+#include "tests/support/makers_files.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +19,6 @@
 
 #include "devices/cia402_eds/eds_drive.hpp"
 #include "devices/descriptor.hpp"
-#include "tests/unit/devices/cia402_eds/makers_folder.hpp"
 
 namespace axisd::cia402_eds {
 namespace {
@@ -101,7 +102,7 @@ class MakersFile : public ::testing::TestWithParam<Row> {};
 
 TEST_P(MakersFile, IsTakenOrRefusedAsTheTableSays) {
   const auto& row = GetParam();
-  const auto path = makers_folder() / row.file;
+  const auto path = test::makers_file(row.file);
   if (!std::filesystem::exists(path))
     GTEST_SKIP() << path << " is not there; name the folder of makers' files in AXISD_EDS_FOLDER";
   const auto drive = made(path);
@@ -133,13 +134,21 @@ std::string name_of(const ::testing::TestParamInfo<Row>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(Each, MakersFile, ::testing::ValuesIn(table()), name_of);
 
+/// Other tests take what they run with from the list of those that are taken.
+TEST(MakersFiles, ThatAreTakenAreListed) {
+  std::vector<std::string_view> taken;
+  for (const auto& row : table())
+    if (row.refused_for.empty()) taken.push_back(row.file);
+  EXPECT_THAT(test::accepted_makers_files, ::testing::ElementsAreArray(taken));
+}
+
 /// Also those without a row: what is said of them is shown, so that their rows can be written.
 TEST(MakersFiles, GetAClearAnswer) {
   std::set<std::string_view> known;
   for (const auto& row : table()) known.insert(row.file);
   int seen = 0;
   for (std::error_code error;
-       const auto& entry : std::filesystem::directory_iterator(makers_folder(), error)) {
+       const auto& entry : std::filesystem::directory_iterator(test::makers_folder(), error)) {
     const auto extension = entry.path().extension();
     if (extension != ".eds" && extension != ".dcf") continue;
     SCOPED_TRACE(entry.path());
@@ -151,7 +160,7 @@ TEST(MakersFiles, GetAClearAnswer) {
                 << (drive ? "accepted" : "refused: " + to_string(drive.error())) << "\n";
   }
   if (seen == 0)
-    GTEST_SKIP() << "no file in " << makers_folder()
+    GTEST_SKIP() << "no file in " << test::makers_folder()
                  << "; name the folder of makers' files in AXISD_EDS_FOLDER";
 }
 

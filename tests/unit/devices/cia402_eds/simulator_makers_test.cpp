@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "buses/canopen/eds.hpp"
-#include "tests/unit/devices/cia402_eds/makers_folder.hpp"
+#include "tests/support/makers_files.hpp"
 #include "tests/unit/devices/cia402_eds/standard_drive_bench.hpp"
 
 namespace axisd::cia402_eds {
@@ -60,7 +60,7 @@ void PrintTo(const Row& row, std::ostream* out) { *out << row.file; }
 class SimulatedMakersDrive : public ::testing::TestWithParam<Row> {
  protected:
   void SetUp() override {
-    const auto path = makers_folder() / row().file;
+    const auto path = test::makers_file(row().file);
     if (!std::filesystem::exists(path))
       GTEST_SKIP() << path << " is not there; name the folder of makers' files in AXISD_EDS_FOLDER";
     auto sheet = canopen::load_eds(path.string());
@@ -205,7 +205,7 @@ TEST_P(SimulatedMakersDrive, FaultsAndIsReset) {
 TEST(SimulatedMakersDrives, BootWhateverTheyAre) {
   int seen = 0;
   for (std::error_code error;
-       const auto& entry : std::filesystem::directory_iterator(makers_folder(), error)) {
+       const auto& entry : std::filesystem::directory_iterator(test::makers_folder(), error)) {
     const auto extension = entry.path().extension();
     if (extension != ".eds" && extension != ".dcf") continue;
     SCOPED_TRACE(entry.path());
@@ -223,7 +223,7 @@ TEST(SimulatedMakersDrives, BootWhateverTheyAre) {
     EXPECT_FALSE(bench.drive().shaft_moving());
   }
   if (seen == 0)
-    GTEST_SKIP() << "no file in " << makers_folder()
+    GTEST_SKIP() << "no file in " << test::makers_folder()
                  << "; name the folder of makers' files in AXISD_EDS_FOLDER";
 }
 
