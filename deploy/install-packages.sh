@@ -41,7 +41,8 @@ installed=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2
   true
 mapfile -t missing < <(printf '%s\n' "${wanted[@]}" | grep -vxF -f <(printf '%s\n' "$installed") || true)
 
-# npm fetches buf and the Node.js example's libraries for the tests. Debian's npm conflicts with Node.js from elsewhere, so any npm will do.
+# npm fetches buf, the Node.js example's libraries and the CANopen library of tests/foreign. Debian's npm conflicts with
+# Node.js from elsewhere, so any npm will do.
 case "${1:-all}" in test | all) command -v npm >/dev/null || missing+=(nodejs npm) ;; esac
 
 [ "${#missing[@]}" -gt 0 ] || exit 0

@@ -23,6 +23,7 @@ deploy/install-packages.sh test
 node_packages() { (cd "$1" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error); }
 compgen -G 'node_modules/@bufbuild/buf-linux-*/bin/buf' >/dev/null || node_packages .
 [ -d api/examples/node/node_modules/@grpc/grpc-js ] || node_packages api/examples/node
+[ -d tests/foreign/node_modules/canopen ] || node_packages tests/foreign
 
 symbolizer=$(command -v llvm-symbolizer-19)
 export ASAN_OPTIONS="detect_stack_use_after_return=1:external_symbolizer_path=$symbolizer"

@@ -1,0 +1,168 @@
+"""axisd against drives that nobody of this project wrote: a CANopen library from npm with data sheets of makers, and CiA 402
+by its text (tests/foreign). What these drives do is compared with their own shafts."""
+import unittest
+
+from harness import Axis, CanScenario, error_pb, pb, wait_for
+from harness.foreign import ForeignSlave, makers_file
+
+NODE, LIMITS = 5, (-10, 60)  # revolutions; 10 mm each
+HOME_AT = 5.0                # mm: what the negative limit switch is called
+RPM = 1 / 60
+
+
+def slide(eds, counts, drive=""):
+    """A slide on a spindle, with limit switches."""
+    return Axis(NODE, "can0", model="cia402", reboot_guard="250 ms", unit="mm",
+                scale=f"{{ microstep: {counts} pulses/rev, travel: 10 mm/rev }}",
+                limits="{ position: [0, 600], velocity: 100 mm/s, acceleration_time: 150 ms }", jog_travel="10 mm",
+                homing=f"{{ method: negative_limit, velocity: 50 mm/s, search_velocity: 5 mm/s, position: {HOME_AT}, "
+                       "backoff: 5 mm, timeout: 60 s }",
+                inputs="{ NEG: negative_limit, POS: positive_limit }",
+                drive=f"{{ eds: {eds}{', ' if drive else ''}{drive} }}")
+
+
+class ForeignSlaves(CanScenario):
+    def bring_up(self, name, counts, velocity, acceleration, drive=""):
+        eds = makers_file(name)
+        if not eds.exists():
+            self.skipTest(f"{eds} is not there; name the folder of makers' files in AXISD_EDS_FOLDER")
+        machine = self.idle_cell({"slide": slide(eds, counts, drive)})
+        slave = ForeignSlave(machine.directory, "vcan0", NODE, eds, counts, velocity, acceleration, LIMITS)
+        self.addCleanup(slave.close)
+        machine.start_daemon()
+        machine.client.wait_online("slide")
+        return machine, slave
+
+    def cruising(self, slave, turns_per_second):
+        """The true speed comes within 1 % of this, and stays there; nothing is ever faster."""
+        most = abs(turns_per_second) * 1.01
+
+        def reached():
+            speed = slave.shaft["speed"]
+            self.assertLessEqual(abs(speed), most)
+            return abs(speed - turns_per_second) <= 0.01 * abs(turns_per_second)
+        wait_for(reached, f"the shaft turns at {turns_per_second} r/s")
+        self.assertTrue(reached(), slave.shaft)
+
+    def rests(self, machine, slave, starts):
+        wait_for(lambda: not slave.shaft["moving"], "the shaft rests")
+        self.assertEqual(slave.shaft["starts"], starts)
+        state = machine.client.wait_state("slide", lambda s: not s.moving, "it is known to rest")
+        self.assertEqual(slave.shaft["starts"], starts)
+        return state
+
+    def true_position(self, slave):
+        return HOME_AT + (slave.shaft["turns"] - LIMITS[0]) * 10
+
+    def homed(self, machine, slave, starts):
+        """Enabled and homed at the switch, which takes one start."""
+        client = machine.client
+        client.to_done("Enable", "slide")
+        self.assertEqual(slave.shaft["starts"], starts)
+        client.to_done("Home", "slide")
+        state = self.rests(machine, slave, starts + 1)
+        self.assertEqual(state.trust, pb.POSITION_TRUST_HOMED, state)
+        self.assertAlmostEqual(slave.shaft["turns"], LIMITS[0], delta=0.1)
+        self.assertAlmostEqual(state.position, HOME_AT, delta=0.2)
+
+    def everything(self, *drive, **keys):
+        machine, slave = self.bring_up(*drive, **keys)
+        self.assertEqual((slave.shaft["starts"], slave.shaft["state"]), (0, "disabled"))
+        self.homed(machine, slave, 0)
+        self.moves_and_stops(machine, slave)
+        self.faults(machine, slave)
+        self.restarts(machine, slave)
+
+    def moves_and_stops(self, machine, slave):
+        client = machine.client
+        move = client.motion("MoveAbsolute", "slide", position=240.0, velocity=60.0)
+        self.cruising(slave, 6)
+        self.assert_command(client.wait_ended(move), "DONE")
+        state = self.rests(machine, slave, 2)
+        self.assertAlmostEqual(self.true_position(slave), 240, delta=1)  # home is where the switch let go of it
+        self.assertAlmostEqual(state.position, 240, delta=0.1)
+        client.motion("MoveVelocity", "slide", velocity=-30.0)
+        self.cruising(slave, -3)
+        client.to_done("Halt", "slide")
+        self.rests(machine, slave, 3)
+        client.motion("MoveVelocity", "slide", velocity=30.0)
+        self.cruising(slave, 3)
+        client.to_done("Stop", "slide")
+        self.assert_state(self.rests(machine, slave, 4), "STANDSTILL")
+        for start, name in ((5, "Halt"), (6, "Stop"), (7, "QuickStop")):
+            client.motion("MoveAbsolute", "slide", position=20.0 if start == 6 else 500.0, velocity=90.0)
+            self.cruising(slave, -9 if start == 6 else 9)
+            client.to_done(name, "slide")
+            self.rests(machine, slave, start)
+        state = client.state("slide")
+        self.assertAlmostEqual(self.true_position(slave), state.position, delta=1)
+
+    def faults(self, machine, slave):
+        client = machine.client
+        if not client.state("slide").enabled:  # a quick stop may end with a released shaft
+            client.to_done("Enable", "slide")
+        before = slave.shaft["starts"]
+        move = client.motion("MoveAbsolute", "slide", position=100.0, velocity=60.0)
+        wait_for(lambda: slave.shaft["moving"], "it moves")
+        slave.hand("fault 8976")  # 2310h
+        ended = self.ended(machine, move)
+        self.assertEqual(ended.cause.reason, error_pb.REASON_ALARM, ended)
+        state = client.wait_state("slide", lambda s: s.alarm_code == 0x2310, "the alarm is shown")
+        self.assert_state(state, "ERROR_STOP")
+        self.rests(machine, slave, before + 1)
+        slave.hand("mend")
+        client.to_done("Reset", "slide")
+        state = client.state("slide")
+        self.assertEqual((state.alarm_code, slave.shaft["state"]), (0, "disabled"), state)
+        self.homed(machine, slave, before + 1)
+
+    def restarts(self, machine, slave):
+        """By another master in mid-move, and by its supply at rest: it stays as it is until a client enables it."""
+        client = machine.client
+        move = client.motion("MoveAbsolute", "slide", position=300.0, velocity=60.0)
+        wait_for(lambda: slave.shaft["moving"], "it moves")
+        self.peer().send(0x000, bytes([0x81, NODE]))
+        ended = self.ended(machine, move)
+        self.assertEqual(ended.cause.reason, error_pb.REASON_REBOOTED, ended)
+        self.new_life(machine, slave, reboots=1)
+        slave.cut()
+        self.offline(machine, "slide")
+        slave.start()
+        self.new_life(machine, slave, reboots=2)
+
+    def new_life(self, machine, slave, reboots):
+        state = machine.client.wait_state(
+            "slide", lambda s: s.drive_reboots == reboots and s.link == pb.LINK_STATE_ONLINE, "the restart is reported")
+        self.assertEqual((state.trust, state.enabled), (pb.POSITION_TRUST_UNKNOWN, False), state)
+        self.assertEqual((slave.shaft["starts"], slave.shaft["turns"]), (0, 0))
+        if state.state == pb.STATE_ERROR_STOP:
+            machine.client.to_done("Reset", "slide")
+        self.homed(machine, slave, 0)
+        machine.client.to_done("MoveRelative", "slide", distance=20.0)
+        self.rests(machine, slave, 2)
+
+    def test_maxon(self):
+        """r/min, by 60A9h and 60AAh; no 6067h."""
+        self.everything("maxon-epos4.eds", 4096, velocity=RPM, acceleration=RPM)
+
+    def test_nanotec(self):
+        """Positions in 0.1 degrees (60A8h), r/min (60A9h)."""
+        self.everything("nanotec-cl4-e-1-12.eds", 3600, velocity=RPM, acceleration=RPM)
+
+    def test_elmo(self):
+        """Counts per second."""
+        self.everything("elmo.eds", 4096, velocity=1 / 4096, acceleration=1 / 4096, drive="velocity_unit: pulses_per_second")
+
+    def test_faulhaber(self):
+        """r/min, ramps in r/s per second: nothing in the file tells it; no 603Fh."""
+        self.everything("faulhaber-605-3150-67-b.eds", 3000, velocity=RPM, acceleration=1,
+                        drive="velocity_unit: rpm, acceleration_unit: rev_per_second")
+
+    def test_trinamic(self):
+        """Of those that are part of the project: runs everywhere."""
+        self.everything("trinamic-tmcm-1636.eds", 4096, velocity=1 / 4096, acceleration=1 / 4096,
+                        drive="velocity_unit: pulses_per_second")
+
+
+if __name__ == "__main__":
+    unittest.main()
