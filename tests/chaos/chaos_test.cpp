@@ -6,9 +6,11 @@ namespace axisd::chaos {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__) || __has_feature(address_sanitizer)
-constexpr std::uint64_t faulted_share = 3'000, faulted_can_share = 2'000, faulted_index_share = 1'000;
+constexpr std::uint64_t faulted_share = 3'000, faulted_can_share = 2'000, faulted_index_share = 1'000,
+                        faulted_generic_share = 1'000;
 #else
-constexpr std::uint64_t faulted_share = 25'000, faulted_can_share = 6'000, faulted_index_share = 8'000;
+constexpr std::uint64_t faulted_share = 25'000, faulted_can_share = 6'000, faulted_index_share = 8'000,
+                        faulted_generic_share = 3'000;
 #endif
 
 /// Tests of one kind, so that they run beside each other.
@@ -20,6 +22,7 @@ class Chaos : public ::testing::TestWithParam<int> {
 };
 class ChaosCan : public Chaos {};
 class ChaosIndex : public Chaos {};
+class ChaosGeneric : public Chaos {};
 
 /// What was judged really happened.
 void expect_often(const Outcome& outcome, int often) {
@@ -55,9 +58,16 @@ TEST_P(ChaosIndex, NothingMovesTwiceLateOrByItself) {
   EXPECT_GE(outcome.starts, static_cast<int>(faulted_index_share / 10));
 }
 
+TEST_P(ChaosGeneric, NothingMovesTwiceLateOrByItself) {
+  const auto outcome = run_episodes(PlantKind::generic, first_seed(), faulted_generic_share);
+  EXPECT_GE(outcome.can_faulted, faulted_generic_share);
+  expect_often(outcome, static_cast<int>(faulted_generic_share / 250));
+}
+
 INSTANTIATE_TEST_SUITE_P(Share, Chaos, ::testing::Range(0, 3));
 INSTANTIATE_TEST_SUITE_P(Share, ChaosCan, ::testing::Range(1, 2));
 INSTANTIATE_TEST_SUITE_P(Share, ChaosIndex, ::testing::Range(2, 3));
+INSTANTIATE_TEST_SUITE_P(Share, ChaosGeneric, ::testing::Range(1, 2));
 
 }  // namespace
 }  // namespace axisd::chaos

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "tests/chaos/client.hpp"
@@ -74,8 +75,14 @@ void settle(Plant& plant, Judge& judge) {
 }
 
 /// Of the options of test_chaos.
-const char* suffix(PlantKind kind) {
-  return kind == PlantKind::network ? "-can" : kind == PlantKind::full_line ? "-index" : "";
+std::string_view suffix(PlantKind kind) {
+  switch (kind) {
+    case PlantKind::network: return "-can";
+    case PlantKind::full_line: return "-index";
+    case PlantKind::generic: return "-generic";
+    case PlantKind::lines: break;
+  }
+  return "";
 }
 
 }  // namespace
@@ -135,7 +142,8 @@ Outcome run_episode(PlantKind kind, std::uint64_t seed) {
 
 Outcome run_episodes(PlantKind kind, std::uint64_t first_seed, std::uint64_t faulted) {
   Outcome all;
-  const auto& struck = kind == PlantKind::network ? all.can_faulted : all.faulted;
+  const bool on_can = kind == PlantKind::network || kind == PlantKind::generic;
+  const auto& struck = on_can ? all.can_faulted : all.faulted;
   for (auto seed = first_seed; struck < faulted && all.violations == 0; ++seed)
     all.add(run_episode(kind, seed));
   return all;

@@ -3,6 +3,7 @@
 //   test_chaos --faulted NUMBER [SEED]   goes on until so many transactions were struck by a fault
 //   test_chaos --seed-can SEED, --faulted-can NUMBER [SEED]   the same with a CAN network; NUMBER of its own
 //   test_chaos --seed-index SEED, --faulted-index NUMBER [SEED]   the same where 16 axes of one line index
+//   test_chaos --seed-generic SEED, --faulted-generic NUMBER [SEED]   with drives made of data sheets on it
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
@@ -37,9 +38,10 @@ int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
   const std::span<char*> arguments(argv, static_cast<std::size_t>(argc));
   const std::string_view mode = argc > 2 ? arguments[1] : "";
-  const auto kind = mode.ends_with("-can")     ? PlantKind::network
-                    : mode.ends_with("-index") ? PlantKind::full_line
-                                               : PlantKind::lines;
+  const auto kind = mode.ends_with("-can")       ? PlantKind::network
+                    : mode.ends_with("-index")   ? PlantKind::full_line
+                    : mode.ends_with("-generic") ? PlantKind::generic
+                                                 : PlantKind::lines;
   if (mode.starts_with("--seed")) return report(axisd::chaos::run_episode(kind, std::stoull(arguments[2])));
   spdlog::set_level(spdlog::level::off);
   if (mode.starts_with("--faulted"))

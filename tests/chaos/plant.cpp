@@ -15,6 +15,11 @@ namespace {
 
 constexpr std::uint32_t bitrate = 1'000'000;
 constexpr std::array<const char*, 3> serial_models{"ykd2405pr", "ssd2608pr", "ess42-r"};
+constexpr std::string_view standard = "config/examples/standard-drive.eds";
+constexpr std::string_view two_of_each[] = {"", "", standard, standard};
+constexpr std::string_view makes[] = {"", standard, "tests/data/eds/trinamic-tmcm-1636.eds",
+                                      "tests/data/eds/ros2-canopen-fake-slave.eds",
+                                      "tests/data/eds/trinamic-tmcm-1636.eds"};
 
 }  // namespace
 
@@ -29,11 +34,15 @@ Plant::Plant(PlantKind kind, std::uint64_t seed) : dice_(seed) {
       add_line(configuration, "line-b", {1, 2, 3});
       break;
     case PlantKind::network:
-      add_network(configuration);
+      add_network(configuration, two_of_each);
       add_line(configuration, "line-a", {1, 3});
       break;
     case PlantKind::full_line:
       add_line(configuration, "line-a", {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
+      break;
+    case PlantKind::generic:
+      add_network(configuration, makes);
+      add_line(configuration, "line-a", {2});
       break;
   }
   core::MachineParts parts{.executor = world.executor(), .clock = &world.clock(), .instance_id = "chaos"};
@@ -73,17 +82,21 @@ void Plant::add_line(config::Configuration& configuration, const std::string& na
                              .limited = node % 3 != 0});
 }
 
-void Plant::add_network(config::Configuration& configuration) {
+void Plant::add_network(config::Configuration& configuration, std::span<const std::string_view> sheets) {
   network_ = std::make_unique<can::Network>(world.clock(), bitrate);
   nodes_ = std::make_unique<simulation::NetworkNodes>(world.clock(), *network_);
   configuration.networks.push_back({.name = "can0", .interface = "sim", .sync_period = 10ms});
-  for (const std::uint8_t node : {1, 2, 3, 4})
+  for (std::uint8_t node = 1; const auto sheet : sheets) {
     add_axis(configuration, {.name = "c-" + std::to_string(node),
                              .bus = "can0",
                              .node = node,
-                             .model = node <= 2 ? "yss-c" : "cia402",
-                             .invert = node == 2 || node == 4,
+                             .model = sheet.empty() ? "yss-c" : "cia402",
+                             .sheet = std::string(sheet),
+                             .habits = sheets.size() == std::size(makes) && !sheet.empty(),
+                             .invert = node % 2 == 0,
                              .limited = node != 2});
+    ++node;
+  }
 }
 
 void Plant::add_axis(config::Configuration& configuration, Station station) {

@@ -6,7 +6,9 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/core/machine_core.hpp"
@@ -20,7 +22,9 @@ namespace axisd::chaos {
 
 /// `lines`: two RS-485 lines with three drives each, one of every model. `network`: a CAN network with two
 /// YSS-C and two standard drives, and two drives on a line beside it. `full_line`: 16 drives on one line.
-enum class PlantKind : std::uint8_t { lines, network, full_line };
+/// `generic`: a CAN network with a YSS-C and four drives that only their data sheets describe, each of another
+/// make and with habits of its own, and a drive on a line.
+enum class PlantKind : std::uint8_t { lines, network, full_line, generic };
 
 /// How many transactions passed, and how many of them a fault struck. On CAN: SDO requests, RPDOs, NMT
 /// commands, and each SYNC that is struck.
@@ -59,7 +63,8 @@ class Plant {
  private:
   void add_line(config::Configuration& configuration, const std::string& name,
                 const std::vector<std::uint8_t>& nodes);
-  void add_network(config::Configuration& configuration);
+  /// `sheets`: of the drives, from the first node on; empty: a YSS-C.
+  void add_network(config::Configuration& configuration, std::span<const std::string_view> sheets);
   void add_axis(config::Configuration& configuration, Station station);
   void add_drive(Station& station);
   std::unique_ptr<modbus_rtu::Line> make_line(const modbus_rtu::LineSettings& settings);

@@ -1,10 +1,12 @@
 #include "tests/chaos/station.hpp"
 
 #include <array>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <utility>
 
+#include "buses/canopen/eds.hpp"
 #include "devices/descriptor.hpp"
 #include "tests/support/source_tree.hpp"
 
@@ -59,21 +61,40 @@ void assign_inputs(const Station& station, AxisSettings& axis) {
   }
 }
 
-/// Its data sheet is read once.
-void describe(AxisSettings& axis) {
-  static const auto settings =
-      std::map<std::string, SettingValue>{{"eds", test::in_source_tree("config/examples/standard-drive.eds")},
-                                          {"velocity_unit", std::string("pulses_per_second")},
-                                          {"ramps", std::string("rate")},
-                                          {"loop_mode", std::string("closed")}};
-  static const auto made = [] {
-    const auto* model = find_drive_model("cia402");
-    auto special = model->specialise(*model, settings);
-    if (!special) throw std::runtime_error(to_string(special.error()));
-    return *special;
-  }();
-  axis.model_settings = settings;
-  axis.own_descriptor = made;
+/// A data sheet, which is read once.
+struct Described {
+  std::map<std::string, SettingValue> settings;
+  std::shared_ptr<const DriveDescriptor> descriptor;
+  std::shared_ptr<const canopen::Eds> eds;
+};
+const Described& described(const std::string& sheet) {
+  static std::map<std::string, Described> all;
+  auto& one = all[sheet];
+  if (one.descriptor) return one;
+  const auto path = test::in_source_tree(sheet);
+  one.settings = {{"eds", path},
+                  {"velocity_unit", std::string("pulses_per_second")},
+                  {"ramps", std::string("rate")},
+                  {"loop_mode", std::string("closed")}};
+  const auto* model = find_drive_model("cia402");
+  const auto special = model->specialise(*model, one.settings);
+  if (!special) throw std::runtime_error(to_string(special.error()));
+  auto eds = canopen::load_eds(path);
+  if (!eds) throw std::runtime_error(to_string(eds.error()));
+  one.eds = std::make_shared<const canopen::Eds>(std::move(*eds));
+  one.descriptor = *special;
+  return one;
+}
+
+/// What CiA 402 leaves to the maker, and neither the judge's slack nor its limits depend on.
+void give_habits(simulation::SimulatedNodeSettings& settings, Dice& dice) {
+  for (const auto* name :
+       {"halt_release_drops", "halt_release_keeps_velocity_at_0", "set_point_in_halt_refused",
+        "homing_attained_forgotten", "homing_goes_on_without_start_bit", "homing_pauses", "acknowledges_late",
+        "acknowledgement_ends_with_motion", "set_points_change_at_once", "error_code_kept",
+        "velocity_wavers_at_rest", "segmented_uploads"})
+    settings.switches[name] = dice.chance(0.3);
+  settings.switches[dice.chance(0.5) ? "homing_attained_early" : "homing_attained_late"] = dice.chance(0.5);
 }
 
 }  // namespace
@@ -100,7 +121,10 @@ AxisSettings make_axis(Station& station, Dice& dice) {
                                  .backoff = 5,
                                  .timeout = 30s};
   axis.jog_travel = 10;
-  if (station.model == "cia402") describe(axis);
+  if (!station.sheet.empty()) {
+    axis.model_settings = described(station.sheet).settings;
+    axis.own_descriptor = described(station.sheet).descriptor;
+  }
   station.wired = choose_wired(station, dice);
   assign_inputs(station, axis);
   station.track = {.pulses_per_unit = station.invert ? -pulses_per_mm : pulses_per_mm,
@@ -124,6 +148,11 @@ simulation::SimulatedNodeSettings make_drive(const Station& station, Dice& dice)
                         .following = dice.up_to(5ms),
                         .quantised = dice.chance(0.5),
                         .compliance = dice.pick(6)};
+  if (station.habits) {
+    settings.sheet = described(station.sheet).eds;
+    settings.encoder.noise = 1 + dice.pick(largest_noise);  // always some
+    give_habits(settings, dice);
+  }
   if (station.model == "cia402") return settings;
   settings.switches["abrupt_stop_slips"] = dice.chance(0.3);
   if (station.closed_loop()) settings.switches["position_is_commanded"] = dice.chance(0.2);

@@ -23,6 +23,9 @@ struct Station {
   std::string bus;
   std::uint8_t node = 0;
   std::string model;
+  std::string sheet{};  ///< of model cia402: its data sheet, from the root of the tree
+  /// Its drive is made of the data sheet, and does by the dice what CiA 402 leaves to its maker.
+  bool habits = false;
   bool invert = false;
   bool limited = true;           ///< it has position limits: velocity runs as a move to them
   Wired wired = Wired::nothing;  ///< to X3
