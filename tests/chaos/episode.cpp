@@ -77,10 +77,14 @@ void settle(Plant& plant, Judge& judge) {
 /// Of the options of test_chaos.
 std::string_view suffix(PlantKind kind) {
   switch (kind) {
-    case PlantKind::network: return "-can";
-    case PlantKind::full_line: return "-index";
-    case PlantKind::generic: return "-generic";
-    case PlantKind::lines: break;
+    case PlantKind::network:
+      return "-can";
+    case PlantKind::full_line:
+      return "-index";
+    case PlantKind::generic:
+      return "-generic";
+    case PlantKind::lines:
+      break;
   }
   return "";
 }

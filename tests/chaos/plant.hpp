@@ -22,8 +22,8 @@ namespace axisd::chaos {
 
 /// `lines`: two RS-485 lines with three drives each, one of every model. `network`: a CAN network with two
 /// YSS-C and two standard drives, and two drives on a line beside it. `full_line`: 16 drives on one line.
-/// `generic`: a CAN network with a YSS-C and four drives that only their data sheets describe, each of another
-/// make and with habits of its own, and a drive on a line.
+/// `generic`: a CAN network with a YSS-C and four drives that only their data sheets describe, each of
+/// another make and with habits of its own, and a drive on a line.
 enum class PlantKind : std::uint8_t { lines, network, full_line, generic };
 
 /// How many transactions passed, and how many of them a fault struck. On CAN: SDO requests, RPDOs, NMT
