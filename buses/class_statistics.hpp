@@ -16,6 +16,14 @@ struct Drops {
       unsupported = 0;          ///< the port cannot do the serial settings
 };
 
+/// What became of those that went out.
+struct Ends {
+  std::uint64_t answered = 0, refused = 0,  ///< by the node: an exception, an abort
+      no_reply = 0,                         ///< in time; also where a stop cut the wait
+      damaged = 0,                          ///< the reply was no sound one
+      failed = 0;                           ///< the port
+};
+
 /// What became of the transactions of one class: exchanges on a line, SDO transfers on a CAN network.
 struct ClassStatistics {
   std::uint64_t sent = 0;   ///< those that went out, with or without a reply
@@ -26,6 +34,7 @@ struct ClassStatistics {
   LatencyHistogram queueing;
   /// From there to the end of the reply, or of the wait for it.
   LatencyHistogram exchange;
+  Ends ends;
   Drops drops;
 };
 

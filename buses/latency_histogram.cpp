@@ -26,6 +26,7 @@ void LatencyHistogram::add(Duration latency) {
   const auto bucket = std::ranges::lower_bound(bounds, latency);
   ++counts_.at(static_cast<std::size_t>(bucket - bounds.begin()));
   longest_ = std::max(longest_, latency);
+  sum_ += latency;
 }
 
 }  // namespace axisd

@@ -19,10 +19,12 @@ class LatencyHistogram {
   void add(Duration latency);
   [[nodiscard]] const std::array<std::uint64_t, bucket_count>& counts() const { return counts_; }
   [[nodiscard]] Duration longest() const { return longest_; }
+  /// Of all together.
+  [[nodiscard]] Duration sum() const { return sum_; }
 
  private:
   std::array<std::uint64_t, bucket_count> counts_{};
-  Duration longest_{};
+  Duration longest_{}, sum_{};
 };
 
 }  // namespace axisd

@@ -208,10 +208,21 @@ void SdoClient::count_begin(const Active& active) {
   counted.queueing.add(active.first_sent - active.request->asked_at);
 }
 
-void SdoClient::count_end(const Active& active, TimePoint at) {
+void SdoClient::count_end(const Active& active, TimePoint at, const Error* error) {
   if (active.probe || !active.any_sent()) return;
-  classes_.at(std::to_underlying(active.request->options.transaction_class))
-      .exchange.add(at - active.first_sent);
+  auto& counted = classes_.at(std::to_underlying(active.request->options.transaction_class));
+  counted.exchange.add(at - active.first_sent);
+  auto& ends = counted.ends;
+  if (error == nullptr)
+    ++ends.answered;
+  else if (error->outcome == Outcome::refused)
+    ++ends.refused;
+  else if (error->reason == Reason::no_reply || error->reason == Reason::superseded)
+    ++(error->where.native_code ? ends.damaged : ends.no_reply);
+  else if (error->reason == Reason::out_of_range)  // more than was asked for
+    ++ends.damaged;
+  else
+    ++ends.failed;
 }
 
 bool SdoClient::answers_twice(std::uint8_t node) const {

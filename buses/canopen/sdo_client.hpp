@@ -122,7 +122,8 @@ class SdoClient {
   [[nodiscard]] std::size_t waiting(TransactionClass transaction_class) const;
   void count_drop(const Request& request, Reason why);
   void count_begin(const Active& active);
-  void count_end(const Active& active, TimePoint at);
+  /// `error`: nullptr: it was answered.
+  void count_end(const Active& active, TimePoint at, const Error* error);
   void end_queued(Node& node, const std::function<std::optional<Error>(const Request&)>& why);
   void arm(Node& node);
 

@@ -192,7 +192,7 @@ void SdoClient::fail_active(Node& node, Error error, bool may_retry) {
                                 to_string(node.active->transfer.object()), error.message);
     error.outcome = Outcome::not_sent;
   } else if (may_retry && --node.active->request->attempts > 0) {
-    count_end(*node.active, clock_->now());
+    count_end(*node.active, clock_->now(), &error);
     auto request = std::move(node.active->request);
     request->perhaps_done |= error.outcome == Outcome::unknown;
     request->asked_at = clock_->now();
@@ -204,7 +204,7 @@ void SdoClient::fail_active(Node& node, Error error, bool may_retry) {
 }
 
 void SdoClient::finish(Node& node, Result<SdoAnswer> result) {
-  count_end(*node.active, result ? result->answered_at : clock_->now());
+  count_end(*node.active, result ? result->answered_at : clock_->now(), result ? nullptr : &result.error());
   auto request = std::move(node.active->request);
   node.active.reset();
   complete(node, std::move(request), std::move(result));

@@ -39,10 +39,32 @@ void LineStatistics::drop(Drops& drops, const ExchangeResult& result) {
   }
 }
 
+void LineStatistics::count(Ends& ends, const ExchangeResult& result) {
+  switch (result.status) {
+    case ExchangeStatus::replied:
+      ++(result.reply.kind == ReplyKind::exception ? ends.refused : ends.answered);
+      return;
+    case ExchangeStatus::timeout:
+    case ExchangeStatus::cut:
+      ++ends.no_reply;
+      return;
+    case ExchangeStatus::corrupt:
+      ++ends.damaged;
+      return;
+    case ExchangeStatus::io_error:
+      ++ends.failed;
+      return;
+    case ExchangeStatus::not_sent:
+    case ExchangeStatus::unsupported:
+      return;
+  }
+}
+
 void LineStatistics::sent(const Transaction& transaction, const ExchangeResult& result) {
   const auto& exchange = transaction.exchange;
   auto& of_class = classes_.at(std::to_underlying(transaction.transaction_class));
   ++of_class.sent;
+  count(of_class.ends, result);
   of_class.queueing.add(result.request_begin - std::max(transaction.queued_at, transaction.released_at));
   of_class.exchange.add(result.reply_end - result.request_begin);
   const auto begin = result.request_begin - silence(exchange.serial.value_or(serial_));

@@ -65,6 +65,7 @@ class LineStatistics {
     friend bool operator==(const Asked&, const Asked&) = default;
   };
   static void drop(Drops& drops, const ExchangeResult& result);
+  static void count(Ends& ends, const ExchangeResult& result);
   void sent(const Transaction& transaction, const ExchangeResult& result);
   void count(NodeStatistics& node, const ExchangeResult& result);
 

@@ -42,6 +42,13 @@ LineStatistics RtuBus::statistics() const {
   return copy;
 }
 
+StatisticsByClass RtuBus::classes() const {
+  auto copy = statistics_.classes();
+  for (std::size_t i = 0; i < copy.size(); ++i)
+    copy.at(i).waiting = waiting(static_cast<TransactionClass>(i));
+  return copy;
+}
+
 /// Of a round, too, all but the first.
 std::size_t RtuBus::waiting(TransactionClass transaction_class) const {
   const auto in_round = round_.size() > 1 && transaction_class == TransactionClass::idle_state;

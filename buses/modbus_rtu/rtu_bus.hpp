@@ -83,6 +83,9 @@ class RtuBus final : public Bus {
   /// With how many wait now.
   [[nodiscard]] LineStatistics statistics() const;
   [[nodiscard]] BusCounters counters() const { return statistics_.counters(); }
+  /// With how many wait now.
+  [[nodiscard]] StatisticsByClass classes() const;
+  [[nodiscard]] const BusLoad& load() const { return statistics_.load(); }
   /// When the last stop frame to `node` had gone out, answered or not: its last byte. nullopt: there was
   /// none.
   [[nodiscard]] std::optional<TimePoint> stop_sent_at(std::uint8_t node) const;

@@ -32,6 +32,7 @@ TEST(LatencyHistogram, CountsEachLatencyInTheBucketWhoseBoundItDoesNotExceed) {
   EXPECT_EQ(counts.back(), 1U);
   EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), 0U), 5U);
   EXPECT_EQ(histogram.longest(), 1h);
+  EXPECT_EQ(histogram.sum(), 1h + 1ns + 2 * LatencyHistogram::bound(0) + LatencyHistogram::bound(40));
 }
 
 }  // namespace

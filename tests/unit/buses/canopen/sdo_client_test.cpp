@@ -54,6 +54,21 @@ TEST(SdoClient, AnAbortNamesItsPlaceAndItsCause) {
   EXPECT_EQ(net.master->sdo().counters().aborted_by_node, 1U);
 }
 
+TEST(SdoClient, CountsHowTransfersEndByClass) {
+  Network net;
+  net.servers[1].objects = {{status, {0x0237, 2}}};
+  net.upload("read", 1, status);
+  net.upload("unknown object", 1, name);
+  net.upload("silent", 2, status, {.attempts = 1});
+  net.world.run_for(1s);
+  const auto counted = net.master->sdo().classes().at(std::to_underlying(TransactionClass::parameters));
+  EXPECT_EQ(counted.ends.answered, 1U);
+  EXPECT_EQ(counted.ends.refused, 1U);
+  EXPECT_EQ(counted.ends.no_reply, 1U);
+  EXPECT_EQ(counted.ends.damaged + counted.ends.failed, 0U);
+  EXPECT_EQ(counted.sent, 3U);
+}
+
 TEST(SdoClient, ATimeoutIsFollowedByAnAbortAndADownloadIsNotRepeated) {
   Network net;
   net.download("write", 1, control, {0x1F, 0});

@@ -69,6 +69,10 @@ TEST(LineStatistics, CountsTimeoutsRepeatsAndExceptions) {
   EXPECT_EQ(counters.timeouts, silent.timeouts);
   EXPECT_EQ(counters.transactions, 1U);
   EXPECT_EQ(counters.exceptions, 1U);
+  const auto& ends = parameters(statistics).ends;
+  EXPECT_EQ(ends.no_reply, silent.timeouts);
+  EXPECT_EQ(ends.refused, 1U);
+  EXPECT_EQ(ends.answered + ends.refused + ends.no_reply, parameters(statistics).sent);
 }
 
 TEST(LineStatistics, RepeatIsTheSameRequestAfterOneInVain) {
