@@ -70,6 +70,7 @@ std::unique_ptr<Axis> MachineCore::make_axis(const AxisSettings& settings, AxisF
                       .inhibited = &inhibited_,
                       .state_unaccepted = state_gate_.refusal(),
                       .holds = holds_.of(settings.name),
+                      .stop_delays = &stop_delays_[settings.bus],
                       .published = parts_.published,
                       .event = [this](const std::string& axis,
                                       EventContent content) { on_event(axis, std::move(content)); }},

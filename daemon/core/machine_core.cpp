@@ -396,6 +396,11 @@ std::vector<BusBudgetReport> MachineCore::budgets() const {
   return reports;
 }
 
+StopDelays MachineCore::stop_delays(std::string_view bus) const {
+  const auto found = stop_delays_.find(bus);
+  return found == stop_delays_.end() ? StopDelays{} : found->second;
+}
+
 bool MachineCore::buses_reported() const {
   return std::ranges::all_of(
       buses_, [](const auto* bus) { return bus->port().open || bus->port().error.has_value(); });

@@ -79,6 +79,7 @@ class MachineCore {
   [[nodiscard]] const std::vector<std::unique_ptr<Device>>& devices() const { return devices_; }
   [[nodiscard]] CommandBook& book() { return book_; }
   [[nodiscard]] EventLog& events() { return events_; }
+  [[nodiscard]] const EventLog& events() const { return events_; }
   [[nodiscard]] const CommandLog& commands() const { return commands_; }
   [[nodiscard]] LeaseKeeper& leases() { return leases_; }
   [[nodiscard]] GroupKeeper& groups() { return groups_; }
@@ -114,6 +115,10 @@ class MachineCore {
   void reload(Reload reload, ReloadDone done);
 
   [[nodiscard]] std::vector<BusStatus> bus_status() const;
+  /// Of a bus, since the start.
+  [[nodiscard]] StopDelays stop_delays(std::string_view bus) const;
+  /// The command journal cannot be written, and motion is refused for it.
+  [[nodiscard]] bool journal_fails() const { return book_.trouble().has_value(); }
   /// What sees the frames of a bus. nullptr if there is none of that name.
   [[nodiscard]] const BusRecorder* find_recorder(std::string_view bus) const;
   [[nodiscard]] FlightRecorder& flight_recorder() { return flight_recorder_; }
@@ -184,6 +189,8 @@ class MachineCore {
   std::map<int, Clock::Timer> latch_waits_;  ///< of StopAlls whose latch is not known to be durable yet
   std::shared_ptr<int> alive_ = std::make_shared<int>();  ///< the disk may answer when this is gone
   boost::atomic_shared_ptr<const std::string> inhibited_by_;
+  std::map<std::string, StopDelays, std::less<>>
+      stop_delays_;  ///< by bus; before the axes, which count there
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> lines_;
   std::vector<std::unique_ptr<canopen::CanopenBus>> networks_;
   std::vector<std::unique_ptr<LinkCycler>> cyclers_;  ///< one per network

@@ -28,6 +28,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
       stopped_(env_.executor, *env_.clock),
+      observed_(env_.stop_delays),
       speed_watch_(static_cast<double>(settings_.scale.pulses_per_revolution)) {
   if (env_.persistence != nullptr) {
     const auto& axes = env_.persistence->current().axes;

@@ -9,6 +9,7 @@
 #include "buses/clock.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/command_book.hpp"
+#include "devices/axis/stop_delays.hpp"
 #include "devices/axis/stop_holds.hpp"
 #include "devices/event.hpp"
 #include "devices/lease/lease_table.hpp"
@@ -26,8 +27,9 @@ struct AxisEnvironment {
   const bool* inhibited = nullptr;  ///< StopAll is latched
   /// Motion is refused with it; nothing in it: the state is accepted.
   const std::optional<Error>* state_unaccepted = nullptr;
-  const StopHolds* holds = nullptr;  ///< of this axis; they outlive it
-  std::function<void()> published;   ///< after each new snapshot
+  const StopHolds* holds = nullptr;   ///< of this axis; they outlive it
+  StopDelays* stop_delays = nullptr;  ///< of its bus, where its stops are counted; may be null
+  std::function<void()> published;    ///< after each new snapshot
   std::function<void(const std::string& axis, EventContent)> event{};
 };
 

@@ -22,9 +22,10 @@ void ObservedTimes::stop_requested(TimePoint arrived, bool all) {
 
 std::optional<ObservedTimes::Late> ObservedTimes::stop_sent(TimePoint end, bool answered) {
   if (!stop_ || end < stop_->arrived || stop_->answered || (stop_->sent && !answered)) return std::nullopt;
-  stop_->sent = true;
+  const bool first = !std::exchange(stop_->sent, true);
   stop_->answered = answered;
   const auto seen = end - stop_->arrived;
+  if (first && delays_ != nullptr) delays_->of(stop_->all).frame.add(seen);
   auto& longest = stop_->all ? values_.stop_frame_all : values_.stop_frame;
   longest = std::max(longest, seen);
   if (!answered || seen <= expected_stop_) return std::nullopt;
@@ -35,6 +36,7 @@ void ObservedTimes::standstill_confirmed(TimePoint at) {
   if (!stop_) return;
   auto& longest = stop_->all ? values_.standstill_all : values_.standstill;
   longest = std::max(longest, at - stop_->arrived);
+  if (delays_ != nullptr) delays_->of(stop_->all).standstill.add(at - stop_->arrived);
   stop_.reset();
 }
 

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "devices/axis/stop_delays.hpp"
 #include "devices/budget.hpp"
 #include "devices/drive.hpp"
 
@@ -10,6 +11,9 @@ namespace axisd {
 /// Notes the longest times of one axis, from the times of the frames themselves. Pure. Thread: core.
 class ObservedTimes {
  public:
+  /// `delays`: where stops are counted, too; may be null.
+  explicit ObservedTimes(StopDelays* delays = nullptr) : delays_(delays) {}
+
   /// A reading by the poll loop. `busy`: the axis has something to do, and is polled fast.
   void on_sample(const DriveSample& sample, bool busy);
   /// The next reading does not follow the last one: something else had the node, or it was away.
@@ -40,6 +44,7 @@ class ObservedTimes {
     TimePoint arrived;
     bool all = false, sent = false, answered = false;
   };
+  StopDelays* delays_;
   std::optional<Last> last_;
   std::optional<Stop> stop_;
   Duration expected_stop_ = Duration::max();

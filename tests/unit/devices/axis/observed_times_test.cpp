@@ -27,6 +27,23 @@ TEST(ObservedTimes, KeepsTheLongestOfEachKindOfStop) {
   EXPECT_EQ(times.values().standstill_all, 120ms);
 }
 
+TEST(ObservedTimes, CountsEachStopOnceWhereTheBusCountsThem) {
+  StopDelays delays;
+  ObservedTimes one(&delays), other(&delays);
+  stopped(one, 3ms);
+  stopped(other, 5ms);
+  stopped(other, 20ms, true);
+  one.stop_requested(asked, false);
+  one.stop_sent(asked + 7ms, false);
+  one.stop_sent(asked + 30ms, true);  // its repetition
+  one.stop_failed();
+  EXPECT_EQ(delays.some.frame.sum(), 15ms);
+  EXPECT_EQ(delays.some.frame.longest(), 7ms);
+  EXPECT_EQ(delays.some.standstill.sum(), 208ms);
+  EXPECT_EQ(delays.all.frame.sum(), 20ms);
+  EXPECT_EQ(delays.all.standstill.sum(), 120ms);
+}
+
 TEST(ObservedTimes, TellsOnceWhatTookLongerThanPromised) {
   ObservedTimes times;
   times.expect_stop_within(6ms);
