@@ -212,9 +212,19 @@ Result<void> JournalFile::write(const std::vector<Pending>& batch) {
   // Nothing new: the time is over, or the journal is closed.
   const bool due = sync_by_ && (batch.empty() || monotonic_now() >= *sync_by_);
   if (!due && !asks_for(Durable::at_once)) return {};
+  const auto begun = monotonic_now();
   if (auto synced = disk_->sync(); !synced) return synced;
+  {
+    const std::lock_guard lock(mutex_);
+    sync_times_.add(monotonic_now() - begun);
+  }
   all_is_synced();
   return {};
+}
+
+LatencyHistogram JournalFile::sync_times() const {
+  const std::lock_guard lock(mutex_);
+  return sync_times_;
 }
 
 Result<void> JournalFile::append(const std::vector<Pending>& batch) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "buses/clock.hpp"
+#include "buses/latency_histogram.hpp"
 #include "buses/task.hpp"
 #include "daemon/store/id_files.hpp"
 #include "daemon/store/journal_disk.hpp"
@@ -61,6 +62,8 @@ class JournalFile final : public CommandJournal, public StateWitness {
   Result<void> note(StateLine line) override;
   [[nodiscard]] std::uint64_t durable_line() const override { return durable_line_; }
   [[nodiscard]] std::uint64_t durable_fact() const override { return durable_fact_; }
+  /// How long the disk took to make its lines durable, each time since the start. Thread: any.
+  [[nodiscard]] LatencyHistogram sync_times() const;
 
  private:
   /// When the line is on the disk, where a crash of the computer leaves it. A crash of the daemon alone loses
@@ -106,7 +109,8 @@ class JournalFile final : public CommandJournal, public StateWitness {
   bool broken_ = false;               ///< the last write failed: what the file ends with is not known
   std::optional<TimePoint> sync_by_;  ///< something was written that is durable `soon`
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
+  LatencyHistogram sync_times_;  // guarded by mutex_
   std::condition_variable wake_;
   std::vector<Pending> pending_;  // guarded by mutex_
   bool closing_ = false;          // guarded by mutex_
