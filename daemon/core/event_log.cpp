@@ -31,6 +31,7 @@ std::vector<FairLane> lanes(std::index_sequence<Kind...> /*kinds*/) {
 EventLog::EventLog() : lanes_(lanes(std::make_index_sequence<std::variant_size_v<EventContent>>())) {}
 
 void EventLog::record(WallTime at, std::string axis, EventContent content) {
+  tallies_.add(axis, content);
   {
     const std::lock_guard lock(mutex_);
     const auto sequence = ++newest_;

@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "daemon/core/fair_lane.hpp"
+#include "daemon/core/tallies.hpp"
 #include "devices/event.hpp"
 
 namespace axisd::core {
 
 /// The newest events in memory: so many of each kind, and of one kind fairly between axes, or between clients
-/// where it is they who cause them. Thread: record() and on_event() core, the rest any.
+/// where it is they who cause them. Thread: record(), on_event() and tallies() core, the rest any.
 class EventLog final : public EventSource {
  public:
   /// Of terminal edges, changes of state and commands.
@@ -24,12 +25,15 @@ class EventLog final : public EventSource {
   void record(WallTime at, std::string axis, EventContent content);
   [[nodiscard]] Batch events_after(std::uint64_t cursor, std::size_t most) const override;
   void on_event(std::function<void()> notify) override { notify_ = std::move(notify); }
+  /// Of all events since the start. Thread: core.
+  [[nodiscard]] const Tallies& tallies() const { return tallies_; }
 
  private:
   mutable std::mutex mutex_;  ///< held for copies of a bounded batch only
   std::map<std::uint64_t, Event> events_;
   std::vector<FairLane> lanes_;  ///< by kind
   std::uint64_t newest_ = 0;
+  Tallies tallies_;  ///< of the core
   std::function<void()> notify_;
 };
 
