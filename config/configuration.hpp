@@ -37,12 +37,19 @@ struct ServerLimits {
   Duration stalled_reader = std::chrono::seconds(2);
 };
 
+/// `metrics:` of the server: figures for Prometheus, over HTTP, plain and for everybody who can connect.
+struct MetricsSettings {
+  std::string listen;   ///< HOST:PORT; empty: there are none
+  bool remote = false;  ///< other machines may connect
+};
+
 struct ServerSettings {
   std::string listen =
       "localhost:7443";     ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
   std::string stop_listen;  ///< of the stop lane, as listen; empty: next to it
   std::optional<TlsSettings> tls;
   bool reflection = false;  ///< gRPC's, for tools that read the contract from the server
+  MetricsSettings metrics;
   ServerLimits limits;
 };
 

@@ -230,6 +230,8 @@ Section section_of(const ServerSettings& server) {
   fields.add("listen", server.listen);
   fields.add("stop_listen", server.stop_listen);
   fields.add("reflection", server.reflection);
+  fields.add("metrics.listen", server.metrics.listen);
+  fields.add("metrics.remote", server.metrics.remote);
   fields.add("limits.calls", server.limits.calls);
   fields.add("limits.streams", server.limits.streams);
   fields.add("limits.connections", server.limits.connections);

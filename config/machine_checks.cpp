@@ -44,10 +44,25 @@ void check_address(std::string_view key, std::string_view listen, const Configur
   }
 }
 
+void check_metrics(const MetricsSettings& metrics, Diagnostics& diagnostics, const Places& places) {
+  if (!places.usable("server.metrics.listen") || metrics.listen.empty()) return;
+  const std::string_view listen = metrics.listen;
+  const auto colon = listen.rfind(':');
+  const auto port = listen.substr(colon + 1);
+  if (const auto number = parse_decimal(port); !number || number->value > 65535)
+    diagnostics.add(places.mark("server.metrics.listen"),
+                    fmt::format("port {} is out of range", quoted(port)), "write a port between 0 and 65535");
+  if (!is_loopback(listen.substr(0, colon)) && !metrics.remote && places.usable("server.metrics.remote"))
+    diagnostics.add(places.mark("server.metrics.listen"),
+                    fmt::format("everybody on the network could read the metrics at {}", quoted(listen)),
+                    "listen on localhost, or say server.metrics.remote: true if that is meant");
+}
+
 void check_server(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   const auto& server = configuration.server;
   check_address("server.listen", server.listen, configuration, diagnostics, places);
   check_address("server.stop_listen", server.stop_listen, configuration, diagnostics, places);
+  check_metrics(server.metrics, diagnostics, places);
   if (!server.stop_listen.empty() && server.stop_listen == server.listen)
     diagnostics.add(places.mark("server.stop_listen"),
                     fmt::format("{} is server.listen, too", quoted(server.listen)),

@@ -93,6 +93,26 @@ constexpr KeySpec limit_keys[] = {
      .apply = [](Target& t, const Value& v) { t.configuration->server.limits.stalled_reader = v.duration; }},
 };
 
+constexpr KeySpec metrics_keys[] = {
+    {.key = "listen",
+     .kind = Kind::text,
+     .required = true,
+     .description =
+         "HOST:PORT. Only loopback addresses, unless `remote` is true. Port 0: the system chooses.",
+     .example = "localhost:9000",
+     .pattern = "(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9._-]+):[0-9]{1,5}",
+     .pattern_hint = "write HOST:PORT or [IPV6]:PORT",
+     .apply = [](Target& t, const Value& v) { t.configuration->server.metrics.listen = v.text; }},
+    {.key = "remote",
+     .kind = Kind::boolean,
+     .description =
+         "Other computers may connect: everybody who can reach the address reads the names and the "
+         "state of all axes. Nothing can be commanded there.",
+     .example = "true",
+     .default_value = "false",
+     .apply = [](Target& t, const Value& v) { t.configuration->server.metrics.remote = v.boolean; }},
+};
+
 constexpr KeySpec server_keys[] = {
     {.key = "listen",
      .kind = Kind::text,
@@ -126,6 +146,11 @@ constexpr KeySpec server_keys[] = {
      .example = "true",
      .default_value = "false",
      .apply = [](Target& t, const Value& v) { t.configuration->server.reflection = v.boolean; }},
+    {.key = "metrics",
+     .kind = Kind::section,
+     .description =
+         "Figures for Prometheus at http://HOST:PORT/metrics. Without this section there are none.",
+     .children = metrics_keys},
     {.key = "limits",
      .kind = Kind::section,
      .description = "What clients may take of the daemon; refusals name the key.",
