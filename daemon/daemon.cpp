@@ -32,6 +32,7 @@
 #include "daemon/core/quiesce.hpp"
 #include "daemon/descriptors.hpp"
 #include "daemon/logging.hpp"
+#include "daemon/metering.hpp"
 #include "daemon/ports.hpp"
 #include "daemon/store/flight_files.hpp"
 #include "daemon/store/kept_state.hpp"
@@ -270,7 +271,14 @@ int serve(const Options& options, const config::Configuration& configuration, co
   serving.configuration = &served;
   server::Server server(service, std::move(serving));
   server::StopLane stop_lane(service, stop_lane_options(configuration.server));
+  Metering metering({.loop = loop,
+                     .machine = machine,
+                     .service = service,
+                     .journal = (*state)->journal(),
+                     .settings = configuration.server,
+                     .budgets = budgets});
   machine.start();
+  metering.start();
   const CoreThread core_thread(loop);
 
   int status = exit_status::failed;
@@ -278,6 +286,8 @@ int serve(const Options& options, const config::Configuration& configuration, co
     status = give_up(stops.error());
   } else if (const auto port = server.start(); !port) {
     status = give_up(port.error());
+  } else if (const auto metrics = metering.listen(); !metrics) {
+    status = give_up(metrics.error());
   } else {
     stop_lane.serve();
     wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },

@@ -24,6 +24,7 @@ OURS = {
     "api/examples": ["axisd/v1/"],
     "daemon/store": ["buses/", "devices/", "daemon/store/"],
     "daemon/core": ["buses/", "devices/", "config/", "daemon/core/", "daemon/store/"],
+    "daemon/metrics": ["buses/", "devices/", "api/server/", "daemon/core/", "daemon/metrics/"],
     "daemon/sim": ["buses/", "devices/", "config/", "daemon/sim/"],
     "daemon": ["buses/", "devices/", "config/", "api/server/", "api/tls/", "api/cell/", "daemon/", "axisd/v1/"],
 }
@@ -33,6 +34,7 @@ THIRD_PARTY = {
     "modbus": ["buses/modbus_rtu"],
     "linux/can": ["buses/can"],
     "boost/asio": ["buses", "daemon"],
+    "boost/beast": ["daemon/metrics"],
     "yaml-cpp": ["config"],
     "grpc": ["api/server", "api/cell", "api/axisctl", "daemon/*"],
     "grpcpp": ["api/server", "api/cell", "api/axisctl", "api/examples", "daemon/*"],
