@@ -13,8 +13,9 @@ build=(
   python3 python3-protobuf
 )
 run=(libabsl20220623 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
+# prometheus starts a server of its own where there is an init: systemctl disable --now prometheus.
 test=(
-  can-utils clang-format-19 clang-tidy-19 fish groff-base iproute2 libclang-rt-19-dev mypy openssl procps python3-can
+  can-utils clang-format-19 clang-tidy-19 fish groff-base iproute2 libclang-rt-19-dev mypy openssl procps prometheus python3-can
   python3-grpcio python3-jsonschema python3-pymodbus python3-serial python3-serial-asyncio
   python3-setuptools python3-venv python3-wheel python3-yaml shellcheck systemd user-mode-linux zsh
 )

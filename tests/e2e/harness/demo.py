@@ -17,7 +17,7 @@ EXAMPLE = ROOT / "config" / "examples" / "demo.yaml"
 class Demo:
     """Runs from its construction to close(), which is a scenario's cleanup."""
 
-    def __init__(self):
+    def __init__(self, metrics=False):
         self.directory = pathlib.Path(tempfile.mkdtemp(prefix="axdemo-"))
         self.server = f"unix:{self.directory}/axisd.sock"
         # A computer busy with tests is late; nothing else differs from the example.
@@ -25,6 +25,8 @@ class Demo:
         text = re.sub(r"(?m)^    model: (?!yss-c).*$", lambda line: line[0] + patience, EXAMPLE.read_text())
         text = text.replace("turnaround_max: 40 ms", "turnaround_max: 200 ms")
         text = text.replace("sync_period: 10 ms }", "sync_period: 10 ms, sdo_timeout: 500 ms }")
+        if metrics:
+            text = text.replace("\nserver:\n", "\nserver:\n  metrics: { listen: 127.0.0.1:0 }\n")
         config = self.directory / "demo.yaml"
         config.write_text(text)
         self.daemon = Program("axisd", [AXISD, "--config", str(config), "--state-directory",
