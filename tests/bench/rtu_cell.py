@@ -9,6 +9,7 @@ import time
 from figures import running
 
 SERVER = "127.0.0.1:7444"
+METRICS = "127.0.0.1:9464"
 REQUEST, REPLY = 8, 25  # bytes of a status read
 BITS = 10  # of a character, 8N1
 
@@ -86,14 +87,16 @@ class Client:
 class Cell:
     """axisd with an axis for each drive of some lines."""
 
-    def __init__(self, build, lines, poll, calls=256):
-        """`poll`: the refresh period of each axis, None: the default; `calls`: that one client may have waiting."""
-        self.build, self.lines, self.poll, self.calls = build, lines, poll, calls
+    def __init__(self, build, lines, poll, calls=256, metrics=False):
+        """`poll`: the refresh period of each axis, None: the default; `calls`: that one client may have waiting;
+        `metrics`: serves them at METRICS."""
+        self.build, self.lines, self.poll, self.calls, self.metrics = build, lines, poll, calls, metrics
 
     def configuration(self):
+        metrics = f", metrics: {{ listen: {METRICS} }}" if self.metrics else ""
         text = f"""machine: bench
 state_directory: {self.lines[0].directory}/state
-server: {{ listen: {SERVER}, limits: {{ calls: {self.calls} }} }}
+server: {{ listen: {SERVER}, limits: {{ calls: {self.calls} }}{metrics} }}
 buses:
 """
         for index, line in enumerate(self.lines):
