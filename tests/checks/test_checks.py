@@ -60,6 +60,7 @@ BAD_INCLUDES = {  # path -> (text, what the finding says)
     "api/axisctl/b.cpp": ('#include "api/server/status.hpp"', "may include only"),
     "api/other/c.cpp": ('#include "buses/clock.hpp"', "no include rule"),
     "daemon/core/a.cpp": ('#include "api/server/server.hpp"', "may include only"),
+    "daemon/core/beast.cpp": ("#include <boost/beast/http.hpp>", "boost/beast belongs to"),
     "daemon/core/b.cpp": ("#include <google/protobuf/message.h>", "google belongs to"),
     "daemon/store/c.cpp": ('#include "config/configuration.hpp"', "may include only"),
     "daemon/d.cpp": ('#include "tests/support/rig.hpp"', "may include only"),
