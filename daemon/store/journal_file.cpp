@@ -103,6 +103,11 @@ JournalFile::~JournalFile() {
   thread_.join();
 }
 
+std::optional<Error> JournalFile::trouble() const {
+  if (*trouble_ || !options_.other_trouble) return *trouble_;
+  return options_.other_trouble();
+}
+
 void JournalFile::accepted(const Command& command, std::string digest) {
   enqueue({.line = AcceptedLine{.command = command, .digest = std::move(digest)}});
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -37,6 +38,8 @@ struct JournalOptions {
   std::uint64_t last_number = 0;  ///< its lines have higher ones
   /// What need not be durable at once shares a sync with all that comes in this time.
   Duration sync_within = std::chrono::milliseconds(250);
+  /// Why nothing new may be started although the journal can be written; empty: nothing else keeps it.
+  std::function<std::optional<Error>()> other_trouble{};
 };
 
 /// The command journal in a file, written by a thread of its own: what is told while the disk is busy goes
@@ -52,8 +55,10 @@ class JournalFile final : public CommandJournal, public StateWitness {
   /// Writes what is still pending. Callbacks are posted, which no longer run if the core has ended.
   ~JournalFile() override;
 
+  /// Before it is taken.
+  [[nodiscard]] const JournalContent& loaded() const { return loaded_; }
   [[nodiscard]] JournalContent take_loaded() override { return std::move(loaded_); }
-  [[nodiscard]] std::optional<Error> trouble() const override { return *trouble_; }
+  [[nodiscard]] std::optional<Error> trouble() const override;
   void accepted(const Command& command, std::string digest) override;
   void attached(const std::string& command, RequestKey request, Callback done) override;
   void sending(const Command& command, SendingNote note, Callback done) override;

@@ -52,6 +52,7 @@ struct Command {
   std::string axis;
   std::string request_id;
   std::string client;
+  std::uint64_t lease_token = 0;  ///< that it was asked for under; not over a restart
   CommandKind kind = CommandKind::stop;
   MotionValues asked{}, granted{};
   CommandState state = CommandState::accepted;

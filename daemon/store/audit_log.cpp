@@ -1,0 +1,185 @@
+#include "daemon/store/audit_log.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <unordered_map>
+#include <utility>
+#include <variant>
+
+#include "daemon/store/thread.hpp"
+
+namespace axisd::store {
+namespace {
+
+/// A disk that failed is tried again so often.
+constexpr auto retry = std::chrono::seconds(1);
+/// Written together.
+constexpr std::size_t most_at_once = 256;
+
+AuditEntry now(AuditContent content) {
+  return {.at = std::chrono::system_clock::now(),
+          .uptime = monotonic_now().time_since_epoch(),
+          .content = std::move(content)};
+}
+
+}  // namespace
+
+std::vector<RecoveredCommand> recovered(const JournalContent& content) {
+  std::vector<RecoveredCommand> commands;
+  commands.reserve(content.commands.size());
+  for (const auto& journalled : content.commands)
+    commands.push_back({.command = journalled.command, .sent = journalled.sent});
+  return commands;
+}
+
+AuditLog::AuditLog(AuditOptions options)
+    : options_(std::move(options)), files_(options_.directory, options_.bounds) {
+  thread_ = start_thread([this] { run(); });
+}
+
+AuditLog::~AuditLog() {
+  {
+    const std::scoped_lock lock(mutex_);
+    closing_ = true;
+  }
+  wake_.notify_one();
+  thread_.join();
+}
+
+void AuditLog::add(AuditEntry entry) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (waiting_count_ >= options_.most_waiting) {
+      ++left_out_;
+      return;
+    }
+    ++waiting_count_;
+    added_.push_back(std::move(entry));
+  }
+  wake_.notify_one();
+}
+
+std::optional<Error> AuditLog::trouble() const {
+  const std::scoped_lock lock(mutex_);
+  if (trouble_ || left_out_ == 0) return trouble_;
+  return Error{.reason = Reason::storage,
+               .message = "the disk takes the records of the audit too slowly",
+               .remedy = "check the disk of the state directory"};
+}
+
+void AuditLog::run() {
+  tell(open());
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    const auto something = [this] { return closing_ || !added_.empty(); };
+    if (trouble_)
+      wake_.wait_for(lock, retry, [this] { return closing_; });
+    else if (sync_by_)
+      wake_.wait_for(lock, *sync_by_ - monotonic_now(), something);
+    else
+      wake_.wait(lock, something);
+    const bool last = closing_;
+    std::ranges::move(std::exchange(added_, {}), std::back_inserter(waiting_));
+    lock.unlock();
+    tell(open_ ? write() : open());
+    lock.lock();
+    if (last && (added_.empty() || trouble_)) break;
+  }
+  if (sync_by_) (void)files_.sync();
+}
+
+/// What an earlier run of the daemon could not write any more goes first.
+Result<void> AuditLog::open() {
+  if (auto opened = files_.open(); !opened) return opened;
+  std::unordered_map<std::string, bool> told;  // true: its end, too
+  if (!options_.earlier.empty()) {
+    const auto shown = files_.show_newest([&](std::string_view line) {
+      if (auto command = options_.format.command_of(line)) told[command->id] |= command->ended;
+    });
+    if (!shown) return shown;
+  }
+  const auto missing = [&told](const RecoveredCommand& earlier) {
+    const auto found = told.find(earlier.command.id);
+    return found == told.end() || (ended(earlier.command.state) && !found->second);
+  };
+  std::vector<AuditEntry> first;
+  for (auto& earlier : options_.earlier)
+    if (missing(earlier)) first.push_back(now(std::move(earlier)));
+  options_.earlier = {};
+  {
+    const std::scoped_lock lock(mutex_);
+    waiting_count_ += first.size();
+  }
+  waiting_.insert(waiting_.begin(), std::make_move_iterator(first.begin()),
+                  std::make_move_iterator(first.end()));
+  newest_ = files_.newest();
+  open_ = true;
+  return write();
+}
+
+Result<void> AuditLog::write() {
+  for (;;) {
+    if (text_.empty()) encode_some();
+    if (text_.empty()) return sync_if_due();
+    if (auto written = files_.append(text_, lines_); !written) return written;
+    newest_ = files_.newest();
+    text_.clear();
+    lines_ = 0;
+    if (!sync_by_) sync_by_ = monotonic_now() + options_.sync_within;
+    if (auto synced = sync_if_due(); !synced) return synced;
+  }
+}
+
+Result<void> AuditLog::sync_if_due() {
+  if (!sync_by_ || monotonic_now() < *sync_by_) return {};
+  if (auto synced = files_.sync(); !synced) return synced;
+  sync_by_.reset();
+  return {};
+}
+
+void AuditLog::encode_some() {
+  std::uint64_t left_out = 0;
+  const auto count = std::min(waiting_.size(), most_at_once);
+  for (std::size_t i = 0; i < count; ++i) {
+    encode(waiting_.front());
+    waiting_.pop_front();
+  }
+  {
+    const std::scoped_lock lock(mutex_);
+    waiting_count_ -= count;
+    if (waiting_.empty() && added_.empty()) left_out = std::exchange(left_out_, 0);
+  }
+  if (left_out > 0) encode(now(AuditGap{.left_out = left_out}));
+}
+
+void AuditLog::encode(const AuditEntry& entry) {
+  if (const auto* event = std::get_if<Event>(&entry.content))
+    if (const auto* reloaded = std::get_if<ConfigurationReloaded>(&event->content))
+      options_.revision = reloaded->revision;
+  ++lines_;
+  text_ += options_.format.encode({.number = files_.newest() + lines_,
+                                   .instance_id = options_.instance_id,
+                                   .revision = options_.revision},
+                                  entry);
+  text_ += '\n';
+}
+
+void AuditLog::tell(const Result<void>& written) {
+  const auto message = written ? std::string() : to_string(written.error());
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto before = trouble_ ? to_string(*trouble_) : std::string();
+    trouble_.reset();
+    if (!written) trouble_ = written.error();
+    if (message == before) return;
+  }
+  if (message.empty())
+    spdlog::info("the audit can be written again");
+  else
+    spdlog::error("the audit: {}; motion is refused until it can be written", message);
+}
+
+}  // namespace axisd::store
