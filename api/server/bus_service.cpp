@@ -1,12 +1,14 @@
 #include "api/server/bus_service.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "api/budget/convert.hpp"
+#include "api/server/audit_calls.hpp"
 #include "api/server/bus_convert.hpp"
 #include "api/server/bus_validate.hpp"
 #include "api/server/convert.hpp"
@@ -82,11 +84,14 @@ BusServiceImpl::Reactor* BusServiceImpl::WriteDevice(Context* context, const v1:
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
-    buses.write_device(request->device(), request->register_(), request->value(),
-                       reply_with_value<double>(
-                           call, [response](double written) { response->set_value(written); },
-                           fmt::format("{}: {} {} = {}", client, request->device(), request->register_(),
-                                       request->value())));
+    const auto text = fmt::format("{} {} = {}", request->device(), request->register_(), request->value());
+    auto reply = reply_with_value<double>(
+        call, [response](double written) { response->set_value(written); },
+        fmt::format("{}: {}", client, text));
+    buses.write_device(
+        request->device(), request->register_(), request->value(),
+        audited<double>(services_, {.rpc = "BusService.WriteDevice", .client = client, .text = text},
+                        std::move(reply)));
   });
 }
 
@@ -98,16 +103,21 @@ BusServiceImpl::Reactor* BusServiceImpl::transact_object(Context* context, const
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
-    std::string what;
-    if (!transfer->bytes.empty())
-      what = fmt::format("{}: writes {} bytes to object {:06X}h of {} node {}", client,
-                         transfer->bytes.size(), transfer->object, transfer->bus, transfer->node);
-    auto reply = [response, reads = request->has_read_object(),
-                  type = request->read_object().type()](const Bytes& bytes) {
+    auto fill = [response, reads = request->has_read_object(),
+                 type = request->read_object().type()](const Bytes& bytes) {
       if (reads) to_proto(bytes, type, *response);
     };
-    services_.machine.bus_access().transact_object(
-        *std::move(transfer), reply_with_value<Bytes>(call, std::move(reply), std::move(what)));
+    auto& buses = services_.machine.bus_access();
+    if (transfer->bytes.empty())
+      return buses.transact_object(*std::move(transfer), reply_with_value<Bytes>(call, std::move(fill)));
+    const auto text =
+        fmt::format("writes {:02x} to object {:06X}h of {} node {}", fmt::join(transfer->bytes, " "),
+                    transfer->object, transfer->bus, transfer->node);
+    auto reply = reply_with_value<Bytes>(call, std::move(fill), fmt::format("{}: {}", client, text));
+    buses.transact_object(
+        *std::move(transfer),
+        audited<Bytes>(services_, {.rpc = "BusService.Transact", .client = client, .text = text},
+                       std::move(reply)));
   });
 }
 
@@ -120,18 +130,19 @@ BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::Tr
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
+    auto fill = [response](const Words& words) {
+      for (const auto word : words) response->add_values(word);
+    };
+    auto& buses = services_.machine.bus_access();
     const auto& values = transaction->values;
-    std::string what;
-    if (!values.empty())
-      what = fmt::format("{}: writes {} registers from {} of {} node {}", client, values.size(),
-                         transaction->address, transaction->bus, transaction->node);
-    services_.machine.bus_access().transact(*std::move(transaction), reply_with_value<Words>(
-                                                                         call,
-                                                                         [response](const Words& words) {
-                                                                           for (const auto word : words)
-                                                                             response->add_values(word);
-                                                                         },
-                                                                         std::move(what)));
+    if (values.empty())
+      return buses.transact(*std::move(transaction), reply_with_value<Words>(call, std::move(fill)));
+    const auto text = fmt::format("writes {} to registers from {} of {} node {}", fmt::join(values, " "),
+                                  transaction->address, transaction->bus, transaction->node);
+    auto reply = reply_with_value<Words>(call, std::move(fill), fmt::format("{}: {}", client, text));
+    buses.transact(*std::move(transaction),
+                   audited<Words>(services_, {.rpc = "BusService.Transact", .client = client, .text = text},
+                                  std::move(reply)));
   });
 }
 

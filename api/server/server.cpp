@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "api/server/accept_loop.hpp"
+#include "api/server/audit_service.hpp"
 #include "api/server/axis_service.hpp"
 #include "api/server/bus_service.hpp"
 #include "api/server/command_service.hpp"
@@ -89,7 +90,11 @@ struct Server::Parts {
         admission(options.limits),
         hub(std::make_shared<WatchHub>(machine, reply, options.stalled_reader_limit)),
         events(std::make_shared<EventHub>(reply)),
-        services{machine, reply, calls, guard, admission, *hub, *events, options.configuration},
+        services{machine,       reply,
+                 calls,         guard,
+                 admission,     *hub,
+                 *events,       options.configuration,
+                 options.audit, options.audit_sink},
         axis(services),
         command(services),
         system(services),
@@ -97,7 +102,8 @@ struct Server::Parts {
         drive(services),
         event(services),
         lease(services),
-        group(services) {}
+        group(services),
+        audit(services) {}
 
   std::shared_ptr<ReplyThread> reply;
   std::shared_ptr<OpenCalls> calls;
@@ -114,6 +120,7 @@ struct Server::Parts {
   EventServiceImpl event;
   LeaseServiceImpl lease;
   GroupServiceImpl group;
+  AuditServiceImpl audit;
   std::unique_ptr<AcceptLoop::Acceptor> tcp_acceptor, unix_acceptor;
   std::unique_ptr<grpc::Server> server;
   AcceptLoop accept;
@@ -152,9 +159,9 @@ Result<int> Server::start() {
   grpc::ServerBuilder builder;
   limit_transport(builder);
   builder.SetOption(std::make_unique<ReflectionOption>(options_.reflection));
-  for (grpc::Service* service :
-       std::initializer_list<grpc::Service*>{&parts_->axis, &parts_->command, &parts_->system, &parts_->bus,
-                                             &parts_->drive, &parts_->event, &parts_->lease, &parts_->group})
+  for (grpc::Service* service : std::initializer_list<grpc::Service*>{
+           &parts_->axis, &parts_->command, &parts_->system, &parts_->bus, &parts_->drive, &parts_->event,
+           &parts_->lease, &parts_->group, &parts_->audit})
     builder.RegisterService(service);
   constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
   parts_->tcp_acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
@@ -182,7 +189,8 @@ Result<int> Server::start() {
   for (const auto* name : {v1::AxisService::service_full_name(), v1::CommandService::service_full_name(),
                            v1::SystemService::service_full_name(), v1::BusService::service_full_name(),
                            v1::DriveService::service_full_name(), v1::EventService::service_full_name(),
-                           v1::LeaseService::service_full_name(), v1::GroupService::service_full_name()})
+                           v1::LeaseService::service_full_name(), v1::GroupService::service_full_name(),
+                           v1::AuditService::service_full_name()})
     health->SetServingStatus(name, true);
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,

@@ -11,6 +11,7 @@
 #include "api/server/tls.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
+#include "devices/audit.hpp"
 #include "devices/configuration_access.hpp"
 #include "devices/machine.hpp"
 
@@ -29,6 +30,10 @@ struct ServerOptions {
   Duration stalled_reader_limit = std::chrono::seconds(2);
   /// What GetConfig, CheckConfig and ReloadConfig ask; outlives the server. nullptr: they are refused.
   ConfigurationAccess* configuration = nullptr;
+  /// What ListAudit asks; outlives the server. nullptr: it is refused.
+  AuditAccess* audit = nullptr;
+  /// Is told of changes that are no commands; outlives the machine. nullptr: nobody is.
+  AuditSink* audit_sink = nullptr;
 };
 
 /// Serves one machine. start() and shutdown() on one thread, which is not one of gRPC's.

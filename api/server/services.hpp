@@ -7,6 +7,7 @@
 #include "api/server/open_calls.hpp"
 #include "api/server/reply_thread.hpp"
 #include "api/server/stall_guard.hpp"
+#include "devices/audit.hpp"
 #include "devices/configuration_access.hpp"
 #include "devices/machine.hpp"
 
@@ -26,6 +27,8 @@ struct Services {
   WatchHub& hub;
   EventHub& events;
   ConfigurationAccess* configuration;  ///< nullptr: there is none to show
+  AuditAccess* audit;                  ///< likewise
+  AuditSink* audit_sink;               ///< nullptr: nothing is kept
 };
 
 }  // namespace axisd::server

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "api/server/lane/stop_lane.hpp"
+#include "axisd/v1/audit_service.grpc.pb.h"
 #include "axisd/v1/bounds.pb.h"
 #include "axisd/v1/bus_service.grpc.pb.h"
 #include "axisd/v1/command_service.grpc.pb.h"
@@ -49,8 +50,8 @@ std::vector<const MethodDescriptor*> methods_of(const std::string& name) {
 
 std::vector<const MethodDescriptor*> all_methods() {
   std::vector<const MethodDescriptor*> all;
-  for (const auto* name : {"AxisService", "BusService", "CommandService", "DriveService", "EventService",
-                           "GroupService", "LeaseService", "SystemService"})
+  for (const auto* name : {"AuditService", "AxisService", "BusService", "CommandService", "DriveService",
+                           "EventService", "GroupService", "LeaseService", "SystemService"})
     std::ranges::copy(methods_of(name), std::back_inserter(all));
   return all;
 }

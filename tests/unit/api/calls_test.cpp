@@ -388,7 +388,7 @@ TEST_F(Calls, HealthAndReflectionAreServed) {
             "\x08\x01");
   const auto services = generic_call(channel_, reflection_path, list_services).text;
   for (const auto* name : {"AxisService", "CommandService", "SystemService", "BusService", "DriveService",
-                           "EventService", "LeaseService", "GroupService"})
+                           "EventService", "LeaseService", "GroupService", "AuditService"})
     EXPECT_THAT(services, HasSubstr(std::string("axisd.v1.") + name));
 }
 
