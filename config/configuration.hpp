@@ -79,11 +79,18 @@ struct FlightRecorderSettings {
   int files = 20;    ///< kept in the state directory; the oldest go
 };
 
+/// `audit:` who asked for what, kept in the state directory.
+struct AuditSettings {
+  int files = 16;        ///< at most; the oldest go
+  int file_size = 8192;  ///< KiB, about
+};
+
 struct Configuration {
   std::string machine;
   std::string state_directory = "/var/lib/axisd";  ///< where the daemon keeps its persistent state
   ServerSettings server;
   FlightRecorderSettings flight_recorder;
+  AuditSettings audit;
   LeaseSettings leases;                            ///< `control:` and `leases:`
   std::vector<modbus_rtu::LineSettings> lines;     ///< `buses:` of the kind modbus_rtu
   std::vector<canopen::NetworkSettings> networks;  ///< of the kind canopen

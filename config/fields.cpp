@@ -280,6 +280,10 @@ std::vector<Section> sections(const Configuration& configuration) {
   recorder.add("memory", configuration.flight_recorder.memory);
   recorder.add("files", configuration.flight_recorder.files);
   all.push_back(recorder.take());
+  Fields audit("audit", {});
+  audit.add("files", configuration.audit.files);
+  audit.add("file_size", configuration.audit.file_size);
+  all.push_back(audit.take());
   const auto& leased = configuration.leases;
   all.push_back(single("control", leased.required ? "leased" : "open"));
   Fields leases("leases", {});

@@ -178,6 +178,26 @@ constexpr KeySpec flight_recorder_keys[] = {
                  const Value& v) { t.configuration->flight_recorder.files = static_cast<int>(v.integer); }},
 };
 
+constexpr KeySpec audit_keys[] = {
+    {.key = "files",
+     .kind = Kind::integer,
+     .description = "Files of the audit that are kept in the state directory; the oldest are removed.",
+     .example = "64",
+     .default_value = "16",
+     .minimum = 2,
+     .maximum = 10000,
+     .apply = [](Target& t, const Value& v) { t.configuration->audit.files = static_cast<int>(v.integer); }},
+    {.key = "file_size",
+     .kind = Kind::integer,
+     .description = "KiB that each of them comes to; a command takes about 1.5.",
+     .example = "1024",
+     .default_value = "8192",
+     .minimum = 256,
+     .maximum = 65536,
+     .apply = [](Target& t,
+                 const Value& v) { t.configuration->audit.file_size = static_cast<int>(v.integer); }},
+};
+
 constexpr std::string_view controls[] = {"open", "leased"};
 
 constexpr KeySpec lease_keys[] = {
@@ -253,6 +273,10 @@ std::span<const KeySpec> schema() {
        .kind = Kind::section,
        .description = "The newest frames of each bus, written to a file after a fault.",
        .children = flight_recorder_keys},
+      {.key = "audit",
+       .kind = Kind::section,
+       .description = "Who asked for what, and what became of it, in files of the state directory.",
+       .children = audit_keys},
       {.key = "control",
        .kind = Kind::choice,
        .description =

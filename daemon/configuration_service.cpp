@@ -25,10 +25,6 @@ constexpr std::size_t most_looks = 8;
 /// Spent on one of them; the others wait meanwhile.
 constexpr auto longest_look = std::chrono::seconds(2);
 
-std::string revision_of(std::string_view yaml) {
-  return fmt::format("{:08x}-{}", store::crc32(yaml), yaml.size());
-}
-
 std::vector<ConfigurationFinding> findings_of(std::vector<config::Diagnostic> diagnostics) {
   std::vector<ConfigurationFinding> findings;
   findings.reserve(diagnostics.size());
@@ -76,6 +72,10 @@ Error closing() {
 }
 
 }  // namespace
+
+std::string revision_of(std::string_view yaml) {
+  return fmt::format("{:08x}-{}", store::crc32(yaml), yaml.size());
+}
 
 ConfigurationService::ConfigurationService(Parts parts)
     : parts_(std::move(parts)),

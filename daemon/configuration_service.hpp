@@ -5,6 +5,7 @@
 #include <functional>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "config/configuration.hpp"
@@ -13,6 +14,9 @@
 #include "devices/configuration_access.hpp"
 
 namespace axisd {
+
+/// Of the text of a configuration: equal texts have equal ones.
+[[nodiscard]] std::string revision_of(std::string_view yaml);
 
 /// The file that the daemon serves, and the loader that judges others like it. Reloads are made one at a time
 /// on a thread of its own, because they read files and wait for the machine; what only looks at files has

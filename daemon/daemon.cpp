@@ -17,6 +17,7 @@
 #include <random>
 #include <thread>
 
+#include "api/server/audit_convert.hpp"
 #include "api/server/door_check.hpp"
 #include "api/server/lane/stop_lane.hpp"
 #include "api/server/server.hpp"
@@ -25,6 +26,7 @@
 #include "config/file_warnings.hpp"
 #include "config/position_warnings.hpp"
 #include "config/start_warnings.hpp"
+#include "daemon/audit_reader.hpp"
 #include "daemon/configuration_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
@@ -34,6 +36,7 @@
 #include "daemon/logging.hpp"
 #include "daemon/metering.hpp"
 #include "daemon/ports.hpp"
+#include "daemon/store/audit_log.hpp"
 #include "daemon/store/flight_files.hpp"
 #include "daemon/store/kept_state.hpp"
 #include "devices/simulation/control_socket.hpp"
@@ -158,11 +161,54 @@ void log_budget(const BusBudgetReport& budget) {
   for (const auto& warning : config::warnings(budget)) spdlog::warn("{}", warning);
 }
 
+/// `audit`: null as long as there is none yet.
 Result<std::unique_ptr<store::KeptState>> open_state(const config::Configuration& configuration,
-                                                     core::CoreLoop& loop) {
+                                                     core::CoreLoop& loop,
+                                                     const std::unique_ptr<store::AuditLog>& audit) {
   const IdLimits limits{.total = static_cast<std::size_t>(configuration.server.limits.request_ids)};
-  return store::KeptState::open(configuration.state_directory, std::chrono::system_clock::now(),
-                                loop.executor(), {.bounds = {.most = limits.total + limits.reserve()}});
+  return store::KeptState::open(
+      configuration.state_directory, std::chrono::system_clock::now(), loop.executor(),
+      {.bounds = {.most = limits.total + limits.reserve()},
+       .other_trouble = [&audit]() { return audit ? audit->trouble() : std::nullopt; }});
+}
+
+std::filesystem::path audit_directory(const config::Configuration& configuration) {
+  return std::filesystem::path(configuration.state_directory) / "audit";
+}
+
+/// What of the journal no record tells of is recovered first: whatever reached a wire is in the journal.
+std::unique_ptr<store::AuditLog> open_audit(const config::Configuration& configuration,
+                                            store::KeptState& state, const std::string& instance_id,
+                                            std::string revision) {
+  const auto encode = [](const store::AuditHead& head, const AuditEntry& entry) {
+    v1::AuditRecord record;
+    server::to_proto(entry, record);
+    record.set_number(head.number);
+    record.set_instance_id(head.instance_id);
+    record.set_revision(head.revision);
+    return server::audit_line(record);
+  };
+  const auto command_of = [](std::string_view line) -> std::optional<store::AuditFormat::Told> {
+    auto told = server::told_command(line);
+    if (!told) return std::nullopt;
+    return store::AuditFormat::Told{.id = std::move(told->id), .ended = told->ended};
+  };
+  const auto& keys = configuration.audit;
+  return std::make_unique<store::AuditLog>(
+      store::AuditOptions{.directory = audit_directory(configuration),
+                          .bounds = {.files = static_cast<std::size_t>(keys.files),
+                                     .file_bytes = static_cast<std::uint64_t>(keys.file_size) * 1024},
+                          .format = {.encode = encode, .command_of = command_of},
+                          .instance_id = instance_id,
+                          .revision = std::move(revision),
+                          .earlier = store::recovered(state.journal().loaded())});
+}
+
+void record_run(store::AuditLog& audit, store::KeptState& state, DaemonRun::What what) {
+  audit.add({.at = std::chrono::system_clock::now(),
+             .uptime = monotonic_now().time_since_epoch(),
+             .content = DaemonRun{
+                 .what = what, .version = AXISD_VERSION, .start_count = state.state().loaded().start_count}});
 }
 
 /// What cannot be served as it is asked for would fail at the next start, too.
@@ -213,7 +259,8 @@ int serve(const Options& options, const config::Configuration& configuration, co
   raise_descriptor_limit();
   if (auto enough = check_descriptor_limit(configuration); !enough) return give_up(enough.error());
   core::CoreLoop loop;
-  auto state = open_state(configuration, loop);
+  std::unique_ptr<store::AuditLog> audit;  // after the state, which locks the directory
+  auto state = open_state(configuration, loop, audit);
   if (!state) return give_up(state.error());
   core::FrameObserver wire_log;
   if (!options.wire_log.empty()) {
@@ -233,12 +280,16 @@ int serve(const Options& options, const config::Configuration& configuration, co
   for (const auto& warning : config::start_warnings(configuration)) spdlog::warn("{}", warning);
   for (const auto& warning : config::file_warnings(configuration)) spdlog::warn("{}", warning);
   const auto instance_id = make_instance_id((*state)->state().loaded().start_count);
+  audit = open_audit(configuration, **state, instance_id, revision_of(yaml));
+  record_run(*audit, **state, DaemonRun::What::began);
+  AuditReader audit_reader(audit_directory(configuration), *audit);
   core::MachineService* published_to = nullptr;
   core::MachineCore machine(
       {.executor = loop.executor(),
        .clock = &loop.clock(),
        .persistence = &(*state)->state(),
        .journal = &(*state)->journal(),
+       .audit = audit.get(),
        .instance_id = instance_id,
        .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
        .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
@@ -269,6 +320,8 @@ int serve(const Options& options, const config::Configuration& configuration, co
                                    }});
   auto serving = server_options(configuration.server);
   serving.configuration = &served;
+  serving.audit = &audit_reader;
+  serving.audit_sink = audit.get();
   server::Server server(service, std::move(serving));
   server::StopLane stop_lane(service, stop_lane_options(configuration.server));
   Metering metering({.loop = loop,
@@ -322,6 +375,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
     spdlog::critical("sequences did not end; leaving at once");
     logging.leave_at_once(exit_status::failed);
   }
+  record_run(*audit, **state, DaemonRun::What::ended);
   return status;
 }
 

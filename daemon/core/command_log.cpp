@@ -5,14 +5,20 @@
 
 namespace axisd::core {
 
+void CommandLog::tell(const Command& now) {
+  tell_(now.axis, CommandChange{.command = std::make_shared<const Command>(now)});
+}
+
 void CommandLog::add(const CommandPtr& command) {
-  const auto tell = [this](const Command& now) {
-    tell_(now.axis, CommandChange{.command = std::make_shared<const Command>(now)});
-  };
   commands_.erase(lane_.add(command->value().client, ++last_));
   commands_.emplace_hint(commands_.end(), last_, command);
   tell(command->value());
-  command->observe(alive_, [tell](const Command& now) {
+  follow(command);
+}
+
+void CommandLog::follow(const CommandPtr& command) {
+  if (command->has_ended()) return tell(command->value());
+  command->observe(alive_, [this](const Command& now) {
     if (ended(now.state)) tell(now);
   });
 }

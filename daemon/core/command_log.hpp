@@ -22,10 +22,14 @@ class CommandLog {
 
   /// A command was accepted: tells of that, and of its end.
   void add(const CommandPtr& command);
+  /// Tells of the end of a command of an earlier run of the daemon, which may have come already.
+  void follow(const CommandPtr& command);
   /// As they stand now, newest first, at most `most`; of one axis unless that is empty.
   [[nodiscard]] std::vector<Command> newest(const std::string& axis, std::size_t most) const;
 
  private:
+  void tell(const Command& now);
+
   Tell tell_;
   FairLane lane_{capacity};
   std::uint64_t last_ = 0;

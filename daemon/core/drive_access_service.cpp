@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "buses/signal.hpp"
@@ -26,6 +28,21 @@ Task<> answer(DriveOperations operations, std::shared_ptr<void> /*in_use*/,
 template <class T>
 Task<Result<T>> refused(Error error) {
   co_return fail(std::move(error));
+}
+
+std::optional<std::int64_t> value_of(const std::vector<ParameterValue>& values, std::uint32_t address) {
+  const auto found = std::ranges::find(values, address, &ParameterValue::address);
+  return found == values.end() ? std::nullopt : std::optional(found->value);
+}
+
+std::string text_of(const SerialChange& change) {
+  std::string text = "changes";
+  if (change.node) text += fmt::format(" the address to {}", *change.node);
+  if (change.baud) text += fmt::format("{} the rate to {} bit/s", change.node ? "," : "", *change.baud);
+  if (change.format)
+    text +=
+        fmt::format("{} the format to {}", change.node || change.baud ? "," : "", to_string(*change.format));
+  return text;
 }
 
 }  // namespace
@@ -102,29 +119,44 @@ void DriveAccessService::read_parameters(std::string axis, std::vector<std::uint
 
 void DriveAccessService::write_parameters(std::string axis, std::vector<ParameterValue> values,
                                           Requester requester, ValuesCallback callback) {
-  audit(requester.client, axis, fmt::format("writes {} parameters", values.size()));
+  auto call = begin("WriteParameters", axis, requester, fmt::format("writes {} parameters", values.size()));
+  for (const auto& value : values)
+    call->parameters.push_back({.address = value.address, .asked = value.value});
+  const auto before = std::make_shared<std::vector<ParameterValue>>();
+  auto told = [call, before, callback = audited<std::vector<ParameterValue>>(call, std::move(callback))](
+                  Result<std::vector<ParameterValue>> result) {
+    for (auto& parameter : call->parameters) {
+      parameter.before = value_of(*before, parameter.address);
+      if (result) parameter.after = value_of(*result, parameter.address);
+    }
+    callback(std::move(result));
+  };
   run_leased<std::vector<ParameterValue>>(
       std::move(axis), std::move(requester),
-      [values = std::move(values)](const DriveOperations& drive) { return drive.write_parameters(values); },
-      std::move(callback), "write parameters");
+      [values = std::move(values), before, machine = machine_](const DriveOperations& drive) {
+        return drive.write_parameters(values, machine->audit().kept() ? before.get() : nullptr);
+      },
+      std::move(told), "write parameters");
 }
 
 void DriveAccessService::save_parameters(std::string axis, Requester requester,
                                          std::function<void(Result<void>)> callback) {
-  audit(requester.client, axis, "saves all parameters to the EEPROM");
+  auto told = audited<void>(begin("SaveParameters", axis, requester, "saves all parameters to the EEPROM"),
+                            std::move(callback));
   run_at_rest<void>(
       std::move(axis), std::move(requester),
-      [](const DriveOperations& drive) { return drive.save_parameters(); }, std::move(callback),
+      [](const DriveOperations& drive) { return drive.save_parameters(); }, std::move(told),
       "save parameters");
 }
 
 void DriveAccessService::restore_factory(std::string axis, Requester requester,
                                          std::function<void(Result<std::string>)> callback) {
-  audit(requester.client, axis, "restores the factory settings");
+  auto told = audited<std::string>(begin("RestoreFactory", axis, requester, "restores the factory settings"),
+                                   std::move(callback));
   auto restore = [this, axis](const DriveOperations& drive) {
     return drive.restore_factory(others_on_bus(*machine_->find(axis)));
   };
-  run_at_rest<std::string>(std::move(axis), std::move(requester), std::move(restore), std::move(callback),
+  run_at_rest<std::string>(std::move(axis), std::move(requester), std::move(restore), std::move(told),
                            "restore factory settings");
 }
 
@@ -136,21 +168,30 @@ void DriveAccessService::read_segments(std::string axis, SegmentsCallback callba
 
 void DriveAccessService::write_segments(std::string axis, SegmentSettings segments, Requester requester,
                                         SegmentsCallback callback) {
-  audit(requester.client, axis, "writes the segment table");
+  auto told = audited<SegmentSettings>(begin("WriteSegments", axis, requester, "writes the segment table"),
+                                       std::move(callback));
   run_leased<SegmentSettings>(
       std::move(axis), std::move(requester),
       [segments = std::move(segments)](const DriveOperations& drive) {
         return drive.write_segments(segments);
       },
-      std::move(callback), "write segments");
+      std::move(told), "write segments");
 }
 
 std::shared_ptr<void> DriveAccessService::change_serial(std::string axis, SerialChange change,
                                                         Requester requester, SerialCallback callback) {
-  audit(requester.client, axis, "changes address or serial settings");
   auto token = std::make_shared<int>(0);
+  auto call = begin(change.node ? "Readdress" : "SetSerial", axis, requester, text_of(change));
+  post(executor_, [this, call] { machine_->audit().call(*call); });
+  // What is written counts; whether the drive is found there later, and whether somebody still waits for
+  // that, is another thing.
+  auto told = [this, call, callback = std::move(callback),
+               alive = std::weak_ptr<void>(token)](Result<SerialProgress> progress) {
+    if (call->phase == AuditedCall::Phase::asked) end(*call, progress ? nullptr : &progress.error());
+    if (const auto held = alive.lock()) callback(std::move(progress));
+  };
   post(executor_, [this, axis = std::move(axis), requester = std::move(requester), change,
-                   callback = std::move(callback), alive = std::weak_ptr<void>(token)]() mutable {
+                   callback = SerialCallback(std::move(told)), alive = std::weak_ptr<void>(token)]() mutable {
     auto* found = machine_->find(axis);
     if (found == nullptr) return callback(fail(no_such_axis(axis, machine_->table()->axes)));
     auto use = found->use();
@@ -164,10 +205,7 @@ std::shared_ptr<void> DriveAccessService::change_serial(std::string axis, Serial
 
 Task<> DriveAccessService::run_serial_change(Axis& axis, std::shared_ptr<void> /*in_use*/,
                                              Requester requester, SerialChange change,
-                                             std::weak_ptr<void> alive, SerialCallback callback) {
-  const auto tell = [&](Result<SerialProgress> progress) {
-    if (const auto held = alive.lock()) callback(std::move(progress));
-  };
+                                             std::weak_ptr<void> alive, SerialCallback tell) {
   if (const auto allowed = axis.check_lease(requester); !allowed) co_return tell(fail(allowed.error()));
   if (const auto possible = check_serial(axis, change); !possible) co_return tell(fail(possible.error()));
   const auto written = co_await DriveOperations(axis).change_serial(change, others_on_bus(axis));
@@ -246,9 +284,36 @@ std::vector<std::uint8_t> DriveAccessService::others_on_bus(const Axis& axis) co
   return nodes;
 }
 
-void DriveAccessService::audit(const std::string& client, const std::string& axis,
-                               std::string_view what) const {
-  spdlog::warn("{}: {} {}", axis, client, what);
+std::shared_ptr<AuditedCall> DriveAccessService::begin(std::string_view rpc, const std::string& axis,
+                                                       const Requester& requester, std::string text) {
+  spdlog::warn("{}: {} {}", axis, requester.client, text);
+  return std::make_shared<AuditedCall>(AuditedCall{.rpc = fmt::format("DriveService.{}", rpc),
+                                                   .client = requester.client,
+                                                   .axis = axis,
+                                                   .lease_token = requester.lease_token,
+                                                   .text = std::move(text)});
+}
+
+template <class T>
+std::function<void(Result<T>)> DriveAccessService::audited(std::shared_ptr<AuditedCall> call,
+                                                           std::function<void(Result<T>)> callback) {
+  post(executor_, [this, call] {
+    if (const auto* axis = machine_->find(call->axis))
+      for (auto& parameter : call->parameters)
+        if (const auto* known = find_parameter(axis->descriptor().parameters, parameter.address))
+          parameter.name = known->name;
+    machine_->audit().call(*call);
+  });
+  return [this, call, callback = std::move(callback)](Result<T> result) {
+    end(*call, result ? nullptr : &result.error());
+    callback(std::move(result));
+  };
+}
+
+void DriveAccessService::end(AuditedCall& call, const Error* error) {
+  call.phase = error == nullptr ? AuditedCall::Phase::done : AuditedCall::Phase::failed;
+  if (error != nullptr) call.error = *error;
+  machine_->audit().call(call);
 }
 
 }  // namespace axisd::core

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "buses/task.hpp"
@@ -54,7 +55,7 @@ class DriveAccessService final : public DriveAccess {
   void run(std::string axis, std::function<Task<Result<T>>(const DriveOperations&)> operation,
            std::function<void(Result<T>)> callback, const char* name);
   Task<> run_serial_change(Axis& axis, std::shared_ptr<void> in_use, Requester requester, SerialChange change,
-                           std::weak_ptr<void> alive, SerialCallback callback);
+                           std::weak_ptr<void> alive, SerialCallback tell);
   [[nodiscard]] Result<void> check_serial(const Axis& axis, const SerialChange& change) const;
   /// A search for the drive where it will be after its power cycle.
   [[nodiscard]] std::unique_ptr<NodeScan> look_for(const Axis& axis, const SerialChange& change,
@@ -64,7 +65,16 @@ class DriveAccessService final : public DriveAccess {
   /// A drive that saves may be silent for seconds, and its line with it.
   [[nodiscard]] Result<void> check_bus_rests(const Axis& axis) const;
   [[nodiscard]] std::vector<std::uint8_t> others_on_bus(const Axis& axis) const;
-  void audit(const std::string& client, const std::string& axis, std::string_view what) const;
+  /// A call that changes something goes to the log; the audit is told by audited().
+  [[nodiscard]] static std::shared_ptr<AuditedCall> begin(std::string_view rpc, const std::string& axis,
+                                                          const Requester& requester, std::string text);
+  /// Tells the audit of the call before anything else is done for it, and once more when it has ended; then
+  /// calls back. What the call knows by then is told, too. Thread: any; the call is the core's from now on.
+  template <class T>
+  [[nodiscard]] std::function<void(Result<T>)> audited(std::shared_ptr<AuditedCall> call,
+                                                       std::function<void(Result<T>)> callback);
+  /// `error`: why it failed; nullptr: it did not.
+  void end(AuditedCall& call, const Error* error);
 
   Executor executor_;
   Clock* clock_;

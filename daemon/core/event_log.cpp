@@ -32,13 +32,14 @@ EventLog::EventLog() : lanes_(lanes(std::make_index_sequence<std::variant_size_v
 
 void EventLog::record(WallTime at, std::string axis, EventContent content) {
   tallies_.add(axis, content);
+  // Nobody but this thread writes newest_.
+  Event event{.sequence = newest_ + 1, .at = at, .axis = std::move(axis), .content = std::move(content)};
+  if (kept_) kept_(event);
   {
     const std::lock_guard lock(mutex_);
-    const auto sequence = ++newest_;
-    events_.erase(lanes_[content.index()].add(owner_of(axis, content), sequence));
-    events_.emplace_hint(
-        events_.end(), sequence,
-        Event{.sequence = sequence, .at = at, .axis = std::move(axis), .content = std::move(content)});
+    newest_ = event.sequence;
+    events_.erase(lanes_[event.content.index()].add(owner_of(event.axis, event.content), newest_));
+    events_.emplace_hint(events_.end(), newest_, std::move(event));
   }
   if (notify_) notify_();
 }

@@ -13,7 +13,7 @@
 namespace axisd::core {
 
 /// The newest events in memory: so many of each kind, and of one kind fairly between axes, or between clients
-/// where it is they who cause them. Thread: record(), on_event() and tallies() core, the rest any.
+/// where it is they who cause them. Thread: record(), keep(), on_event() and tallies() core, the rest any.
 class EventLog final : public EventSource {
  public:
   /// Of terminal edges, changes of state and commands.
@@ -23,6 +23,8 @@ class EventLog final : public EventSource {
 
   EventLog();
   void record(WallTime at, std::string axis, EventContent content);
+  /// Told of each event before any reader sees it. Set once, before the first.
+  void keep(std::function<void(const Event&)> kept) { kept_ = std::move(kept); }
   [[nodiscard]] Batch events_after(std::uint64_t cursor, std::size_t most) const override;
   void on_event(std::function<void()> notify) override { notify_ = std::move(notify); }
   /// Of all events since the start. Thread: core.
@@ -34,6 +36,7 @@ class EventLog final : public EventSource {
   std::vector<FairLane> lanes_;  ///< by kind
   std::uint64_t newest_ = 0;
   Tallies tallies_;  ///< of the core
+  std::function<void(const Event&)> kept_;
   std::function<void()> notify_;
 };
 

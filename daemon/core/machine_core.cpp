@@ -49,6 +49,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
       recorder_memory_(static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024),
       book_(*parts_.clock, parts_.instance_id, parts_.journal,
             {.total = static_cast<std::size_t>(configuration.server.limits.request_ids)}),
+      audit_(*parts_.clock, parts_.audit),
       commands_([this](const std::string& axis, EventContent content) {
         events_.record(parts_.clock->wall(parts_.clock->now()), axis, std::move(content));
       }),
@@ -83,6 +84,7 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
                .axes = [this] { return table()->axes; },
                .launch = [this](Task<> task, const char* name) { launch(std::move(task), name); }},
               configuration.groups) {
+  events_.keep([this](const Event& event) { audit_.event(event); });
   book_.on_open([this](const CommandPtr& command) { commands_.add(command); });
   if (parts_.persistence != nullptr) {
     const auto& inhibit = parts_.persistence->loaded().inhibit;
@@ -143,6 +145,7 @@ void MachineCore::tell_inhibit(InhibitChange::What what, const std::string& by) 
 void MachineCore::start() {
   state_gate_.start();
   if (inhibited_) tell_inhibit(InhibitChange::What::stands, *inhibited_by());
+  for (const auto& command : book_.take_interrupted()) commands_.follow(command);
   expect_stops();
   for (std::size_t i = 0; i < lines_.size(); ++i) lines_[i]->start(recorders_[i]->exchange_observer());
   for (const auto& network : networks_) network->start();
@@ -218,7 +221,7 @@ Axis* MachineCore::find(std::string_view axis) const {
 Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& action,
                                        const CommandOptions& options) {
   auto* found = find(axis);
-  if (found == nullptr) return fail(no_such_axis(axis, table()->axes));
+  if (found == nullptr) return no_axis(axis, action, options);
   const auto* stop = std::get_if<StopRequest>(&action);
   if (stop != nullptr && stop->hold) return submit_held(axis, *stop, options, {});
   return execute(*found, action, options);
@@ -228,14 +231,23 @@ Result<CommandPtr> MachineCore::execute(Axis& axis, const Action& action, const 
   const auto* stop = std::get_if<StopRequest>(&action);
   if (const auto leaving = leaving_.find(axis.settings().name); leaving != leaving_.end() && stop != nullptr)
     return hold_stop(leaving->second, axis.settings().name, *stop, options);
-  return axis.submit(action, options);
+  auto command = axis.submit(action, options);
+  if (!command) audit_.refused(axis.settings().name, action, options, command.error());
+  return command;
+}
+
+Result<CommandPtr> MachineCore::no_axis(const std::string& axis, const Action& action,
+                                        const CommandOptions& options) {
+  auto error = no_such_axis(axis, table()->axes);
+  audit_.refused(axis, action, options, error);
+  return fail(std::move(error));
 }
 
 /// The hold first, so that the axis never shows, nor accepts, anything between the stop and it.
 Result<CommandPtr> MachineCore::submit_held(const std::string& axis, const StopRequest& request,
                                             const CommandOptions& options, std::function<void()> settled) {
   auto* found = find(axis);
-  if (found == nullptr) return fail(no_such_axis(axis, table()->axes));
+  if (found == nullptr) return no_axis(axis, request, options);
   holds_.add(axis, {.holder = options.client, .request_id = options.request_id}, options.arrived,
              std::move(settled));
   return execute(*found, request, options);

@@ -11,6 +11,7 @@
 #include "buses/canopen/canopen_bus.hpp"
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "config/configuration.hpp"
+#include "daemon/core/audit_trail.hpp"
 #include "daemon/core/bus_recorder.hpp"
 #include "daemon/core/command_log.hpp"
 #include "daemon/core/event_log.hpp"
@@ -36,6 +37,7 @@ struct MachineParts {
   Clock* clock = nullptr;
   Persistence* persistence = nullptr;  ///< may be null: nothing is kept
   CommandJournal* journal = nullptr;   ///< may be null: repeats are not known over a restart
+  AuditSink* audit = nullptr;          ///< may be null: there is no audit
   std::string instance_id;
   std::function<std::unique_ptr<modbus_rtu::Line>(const modbus_rtu::LineSettings&)> make_line;
   /// May be empty where the configuration has no CAN network.
@@ -81,6 +83,7 @@ class MachineCore {
   [[nodiscard]] EventLog& events() { return events_; }
   [[nodiscard]] const EventLog& events() const { return events_; }
   [[nodiscard]] const CommandLog& commands() const { return commands_; }
+  [[nodiscard]] AuditTrail& audit() { return audit_; }
   [[nodiscard]] LeaseKeeper& leases() { return leases_; }
   [[nodiscard]] GroupKeeper& groups() { return groups_; }
 
@@ -164,6 +167,7 @@ class MachineCore {
                        const CommandOptions& options);
 
   Result<CommandPtr> execute(Axis& axis, const Action& action, const CommandOptions& options);
+  Result<CommandPtr> no_axis(const std::string& axis, const Action& action, const CommandOptions& options);
   void expect_stops();
   Task<> watch(canopen::CanopenBus& network);
   Task<> watch_port(Bus& bus);
@@ -177,6 +181,7 @@ class MachineCore {
   MachineParts parts_;
   const std::size_t recorder_memory_;  ///< bytes, of each bus
   CommandBook book_;
+  AuditTrail audit_;
   EventLog events_;
   CommandLog commands_;
   std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before these, which tell them

@@ -24,8 +24,8 @@ constexpr auto look_at_motion = std::chrono::milliseconds(20);
 
 /// What a running daemon cannot change; these keys are read at its start.
 bool needs_restart(const ConfigurationChange& change) {
-  static constexpr std::string_view fixed[] = {"machine", "state_directory", "server", "flight_recorder",
-                                               "buses"};
+  static constexpr std::string_view fixed[] = {"machine",         "state_directory", "server",
+                                               "flight_recorder", "audit",           "buses"};
   return std::ranges::find(fixed, change.section) != std::ranges::end(fixed);
 }
 

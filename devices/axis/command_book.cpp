@@ -77,6 +77,7 @@ void CommandBook::restore(JournalContent content) {
     for (const auto& request : journalled.attached) enter(record, request, heard_of);
     if (record->has_ended()) continue;
     follow(entry);
+    interrupted_.push_back(record);
     if (journalled.sent || !noted_before_start(value.kind)) {
       const bool last = last_sent[value.axis] == &journalled && !content.doubtful_until;
       unsettled_[value.axis].push_back({.command = record, .note = journalled.note, .tellable = last});
@@ -156,6 +157,7 @@ CommandPtr CommandBook::open(const std::string& axis, const Action& action, cons
                   .axis = axis,
                   .request_id = options.request_id,
                   .client = options.client,
+                  .lease_token = options.lease_token,
                   .kind = kind_of(action),
                   .asked = asked_by(action),
                   .accepted_at = clock_->wall(options.arrived == TimePoint{} ? now : options.arrived)};

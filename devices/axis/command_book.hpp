@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "buses/clock.hpp"
@@ -57,6 +58,9 @@ class CommandBook {
   /// Why nothing new can be started at present: the journal cannot be written.
   [[nodiscard]] std::optional<Error> trouble() const;
 
+  /// Commands that an earlier run of the daemon had not ended: some have ended since. Once: it is handed
+  /// over.
+  [[nodiscard]] std::vector<CommandPtr> take_interrupted() { return std::exchange(interrupted_, {}); }
   /// What has to be settled for the axis, in order of acceptance. Once: it is handed over.
   [[nodiscard]] std::vector<Unsettled> take_unsettled(const std::string& axis);
   /// Why the axis was in ErrorStop when an earlier run ended: what became of a command was not known. Once.
@@ -116,6 +120,7 @@ class CommandBook {
   std::string looked_at_;               ///< the client whose ids were looked through last
   std::deque<EntryPtr> unnamed_;        ///< without a request_id, by Entry::queued
   std::unordered_map<std::string, EntryPtr> by_id_;
+  std::vector<CommandPtr> interrupted_;
   std::map<std::string, std::vector<Unsettled>> unsettled_;
   std::map<std::string, Error> unknown_outcomes_;
   std::function<void(const CommandPtr&)> opened_;

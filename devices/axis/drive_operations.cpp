@@ -77,11 +77,18 @@ Result<void> DriveOperations::check_write(const ParameterValue& value) const {
 }
 
 Task<Result<std::vector<ParameterValue>>> DriveOperations::write_parameters(
-    std::vector<ParameterValue> values) const {
+    std::vector<ParameterValue> values, std::vector<ParameterValue>* before) const {
   for (const auto& value : values)
     if (auto allowed = check_write(value); !allowed) co_return fail(allowed.error());
   const auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
+  if (before != nullptr) {
+    std::vector<std::uint32_t> addresses;
+    for (const auto& value : values) addresses.push_back(value.address);
+    auto read = co_await axis_->drive().read_parameters(std::move(addresses));
+    if (!read) co_return fail(read.error());
+    *before = *std::move(read);
+  }
   co_return co_await axis_->drive().write_parameters(std::move(values));
 }
 

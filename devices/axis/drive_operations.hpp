@@ -19,7 +19,9 @@ class DriveOperations {
 
   [[nodiscard]] DriveInfo info() const;
   Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t> addresses) const;
-  Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values) const;
+  /// `before` (may be null; outlives it): what the drive held, which is read first.
+  Task<Result<std::vector<ParameterValue>>> write_parameters(
+      std::vector<ParameterValue> values, std::vector<ParameterValue>* before = nullptr) const;
   Task<Result<SegmentSettings>> read_segments() const;
   Task<Result<SegmentSettings>> write_segments(SegmentSettings segments) const;
   Task<Result<void>> save_parameters() const;

@@ -41,6 +41,7 @@ class MachineOnALine : public testing::Test {
         MachineParts{.executor = world_.executor(),
                      .clock = &world_.clock(),
                      .persistence = &store_,
+                     .audit = audit_,
                      .instance_id = "t",
                      .make_line =
                          [this](const modbus_rtu::LineSettings& settings) {
@@ -59,6 +60,7 @@ class MachineOnALine : public testing::Test {
 
   test::VirtualWorld world_;
   test::FakePersistence store_;
+  AuditSink* audit_ = nullptr;  ///< set it before start_with(), and let it outlive the machine
   config::Configuration configuration_;
   test::VirtualLine* line_ = nullptr;
   std::unique_ptr<MachineCore> machine_;
