@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "api/axisctl/audit_text.hpp"
 #include "api/axisctl/event_text.hpp"
 
 namespace axisd::axisctl {
@@ -122,7 +123,8 @@ void complete_value(const CLI::App& command, const CLI::Option& option,
   for (const auto& choice : choices_of(option)) place.words.push_back({choice, ""});
   const auto name = name_of_value(option);
   if (name == "KIND,...") {
-    for (const auto& kind : event_kinds()) place.words.push_back({kind, ""});
+    for (const auto& kind : command.get_name() == "audit" ? audit_kinds() : event_kinds())
+      place.words.push_back({kind, ""});
     if (const auto comma = place.typed.rfind(','); comma != std::string::npos) {
       place.before += place.typed.substr(0, comma + 1);
       place.typed.erase(0, comma + 1);

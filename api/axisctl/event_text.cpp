@@ -108,7 +108,15 @@ std::string text_of(const v1::InhibitChange& change) {
   }
 }
 
-std::string content(const v1::Event& event) {
+std::string kind_name(v1::EventKind kind) {
+  auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
+  std::ranges::replace(name, ' ', '-');
+  return name;
+}
+
+}  // namespace
+
+std::string content_text(const v1::Event& event) {
   switch (event.content_case()) {
     case v1::Event::kTerminalEdge:
       return text_of(event.terminal_edge());
@@ -140,14 +148,6 @@ std::string content(const v1::Event& event) {
   return "an event that this axisctl does not know";
 }
 
-std::string kind_name(v1::EventKind kind) {
-  auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
-  std::ranges::replace(name, ' ', '-');
-  return name;
-}
-
-}  // namespace
-
 std::string text_of(const v1::ConfigChange& change) {
   auto text = change.name().empty() ? change.section() : change.section() + "." + change.name();
   text += " " + lower_word(v1::ConfigChangeKind_Name(change.kind()), "CONFIG_CHANGE_KIND_");
@@ -159,7 +159,7 @@ std::string event_line(const v1::Event& event) {
   // Milliseconds: no bus is quicker.
   const auto at = TimeUtil::MillisecondsToTimestamp(TimeUtil::TimestampToMilliseconds(event.at()));
   return fmt::format("{}  {}  {}  {}", TimeUtil::ToString(at), event.sequence(),
-                     event.axis().empty() ? "-" : event.axis(), content(event));
+                     event.axis().empty() ? "-" : event.axis(), content_text(event));
 }
 
 std::vector<std::string> event_kinds() {

@@ -11,6 +11,8 @@ namespace axisd::axisctl {
 
 /// "2026-01-02T03:04:05.678Z  12  feeder  X0 home on (within 20 ms)".
 std::string event_line(const v1::Event& event);
+/// "X0 home on (within 20 ms)".
+std::string content_text(const v1::Event& event);
 /// "axes.feeder changed (limits.velocity)".
 std::string text_of(const v1::ConfigChange& change);
 /// "terminal-edge", "configuration-reloaded" ..., or their first words, of which "configuration" is the

@@ -154,6 +154,7 @@ std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   add_bus_commands(*app, invocation);
   add_trace_command(*app, invocation);
   add_event_commands(*app, invocation);
+  add_audit_commands(*app, invocation);
   add_system_commands(*app, invocation);
   add_explain_command(*app, invocation);
   add_config_commands(*app, invocation);

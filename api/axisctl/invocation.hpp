@@ -46,6 +46,7 @@ void add_bus_commands(CLI::App& app, Invocation& invocation);      ///< bus scan
 void add_trace_command(CLI::App& app, Invocation& invocation);     ///< trace
 void add_budget_command(CLI::App& app, Invocation& invocation);    ///< budget
 void add_event_commands(CLI::App& app, Invocation& invocation);    ///< events
+void add_audit_commands(CLI::App& app, Invocation& invocation);    ///< audit, report
 void add_system_commands(CLI::App& app, Invocation& invocation);   ///< buses, info
 void add_explain_command(CLI::App& app, Invocation& invocation);   ///< explain
 void add_config_commands(CLI::App& app, Invocation& invocation);   ///< config show|check
