@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import datetime
 import os
 import pathlib
 from collections.abc import AsyncGenerator, Iterable
@@ -13,6 +14,7 @@ import grpc
 import grpc.aio
 from google.protobuf.field_mask_pb2 import FieldMask
 
+from .audit import AuditRecord
 from .axis import Axis
 from .budget import BusBudget
 from .calls import Seconds, done, duration, names
@@ -27,8 +29,8 @@ from .reasons import Reason
 from .stop_lane import StopCalls, StopLane, stop_lane_of
 from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, Tick
-from .v1 import (axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2, bus_service_pb2_grpc, command_service_pb2,
-                 command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
+from .v1 import (audit_service_pb2, audit_service_pb2_grpc, axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2,
+                 bus_service_pb2_grpc, command_service_pb2, command_service_pb2_grpc, drive_service_pb2_grpc, event_service_pb2, event_service_pb2_grpc,
                  group_service_pb2_grpc, lease_service_pb2, lease_service_pb2_grpc, system_service_pb2,
                  system_service_pb2_grpc, types_pb2)
 
@@ -97,6 +99,7 @@ class Machine:
         self._commands = command_service_pb2_grpc.CommandServiceStub(ordinary)
         self._buses = bus_service_pb2_grpc.BusServiceStub(ordinary)
         self._drives = drive_service_pb2_grpc.DriveServiceStub(ordinary)
+        self._audit = audit_service_pb2_grpc.AuditServiceStub(ordinary)
         self._events = event_service_pb2_grpc.EventServiceStub(ordinary)
         self._leases = lease_service_pb2_grpc.LeaseServiceStub(ordinary)
         self._groups = group_service_pb2_grpc.GroupServiceStub(ordinary)
@@ -342,6 +345,23 @@ class Machine:
                 for event in batch.events:
                     yield Event.of(event, batch.instance_id, lost)
                     lost = 0
+
+    async def audit(self, axes: Iterable[str] = (), *, clients: Iterable[str] = (), kinds: Iterable[str] = (),
+                    since: datetime.datetime | None = None, after: int = 0) -> AsyncGenerator[AuditRecord, None]:
+        """What is kept of who asked for what, over restarts of the daemon, up to the newest record; oldest first. `kinds`:
+        as AuditRecord.kind. `since`: a time with its zone. `after`: number of the last record that was seen, to go on."""
+        request = audit_service_pb2.ListAuditRequest(
+            axes=names(axes), clients=names(clients), after_number=after, limit=500,
+            kinds=[audit_service_pb2.AuditKind.Value(f"AUDIT_KIND_{kind.upper()}") for kind in kinds])
+        if since is not None:
+            request.since.FromDatetime(since)
+        while True:
+            page = await self._call(self._audit.ListAudit, request, "audit")
+            for record in page.records:
+                yield AuditRecord.of(record)
+            request.after_number = page.cursor
+            if page.cursor >= page.newest:
+                return
 
     async def info(self) -> Info:
         return Info.of(await self._call(self._system.GetInfo, system_service_pb2.GetInfoRequest(), ""))

@@ -9,7 +9,7 @@ from client import package
 from .programs import LIMIT, wait_for
 
 package.load()
-from axisd.v1 import (axis_service_pb2 as axis_pb, axis_service_pb2_grpc, bus_service_pb2 as bus_pb,  # noqa: E402
+from axisd.v1 import (audit_service_pb2 as audit_pb, audit_service_pb2_grpc, axis_service_pb2 as axis_pb, axis_service_pb2_grpc, bus_service_pb2 as bus_pb,  # noqa: E402
                       bus_service_pb2_grpc, command_service_pb2 as command_pb, command_service_pb2_grpc,
                       drive_service_pb2 as drive_pb, drive_service_pb2_grpc, error_pb2 as error_pb,
                       event_service_pb2 as event_pb, event_service_pb2_grpc, group_service_pb2 as group_pb,
@@ -17,7 +17,7 @@ from axisd.v1 import (axis_service_pb2 as axis_pb, axis_service_pb2_grpc, bus_se
                       lease_service_pb2_grpc, system_service_pb2 as system_pb, system_service_pb2_grpc,
                       types_pb2 as pb)
 
-__all__ = ["Client", "CallFailed", "axis_pb", "bus_pb", "command_pb", "drive_pb", "error_pb", "event_pb", "group_pb", "lease_pb",
+__all__ = ["Client", "CallFailed", "audit_pb", "axis_pb", "bus_pb", "command_pb", "drive_pb", "error_pb", "event_pb", "group_pb", "lease_pb",
            "pb", "system_pb"]
 
 ACCEPTED, STARTED, DONE = pb.WAIT_UNTIL_ACCEPTED, pb.WAIT_UNTIL_STARTED, pb.WAIT_UNTIL_DONE
@@ -62,6 +62,7 @@ class Client:
         """Connects (anew): a connection of old would end the first call to a restarted daemon."""
         self.channel = (grpc.secure_channel(self._target, self._credentials, self._options) if self._credentials
                         else grpc.insecure_channel(self._target, self._options))
+        self.audit = audit_service_pb2_grpc.AuditServiceStub(self.channel)
         self.axis = axis_service_pb2_grpc.AxisServiceStub(self.channel)
         self.command = command_service_pb2_grpc.CommandServiceStub(self.channel)
         self.bus = bus_service_pb2_grpc.BusServiceStub(self.channel)

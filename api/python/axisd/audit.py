@@ -1,0 +1,44 @@
+"""Who asked the machine for what, and what became of it."""
+from __future__ import annotations
+
+import dataclasses
+import datetime
+
+from .types import Command, ErrorDetail, _optional_error, _optional_time
+from .v1 import audit_service_pb2
+
+
+@dataclasses.dataclass(frozen=True)
+class AuditRecord:
+    """`kind`: "command", "refusal", "call", "fault", "lease", "stop_hold", "inhibit", "configuration", "state", "daemon" or
+    "gap". `command`: of a command that was accepted, has ended or was refused (then without an id). `recovered`: the
+    command journal told of it after the daemon was killed. `error`: why it was refused, or failed. The rest is in `raw`."""
+    number: int
+    at: datetime.datetime | None
+    kind: str
+    client: str
+    axis: str
+    rpc: str
+    request_id: str
+    command: Command | None
+    recovered: bool
+    error: ErrorDetail | None
+    raw: audit_service_pb2.AuditRecord = dataclasses.field(repr=False, compare=False)
+
+    @classmethod
+    def of(cls, raw: audit_service_pb2.AuditRecord) -> AuditRecord:
+        known = audit_service_pb2.AuditKind.DESCRIPTOR.values_by_number.get(raw.kind)
+        content = raw.WhichOneof("content")
+        command = None
+        if content == "recovered":
+            command = Command.of(raw.recovered.command)
+        elif content == "refused":
+            command = Command.of(raw.refused.command)
+        elif content == "event" and raw.event.HasField("command_change"):
+            command = Command.of(raw.event.command_change.command)
+        error = _optional_error(raw.call, "error") if content == "call" else command.cause if command else None
+        if content == "event" and raw.event.HasField("axis_fault"):
+            error = _optional_error(raw.event.axis_fault, "cause")
+        return cls(raw.number, _optional_time(raw, "at"),
+                   known.name.removeprefix("AUDIT_KIND_").lower() if known else str(raw.kind), raw.client, raw.axis, raw.rpc,
+                   raw.request_id, command, content == "recovered", error, raw)
