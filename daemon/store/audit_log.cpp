@@ -25,6 +25,24 @@ AuditEntry now(AuditContent content) {
           .content = std::move(content)};
 }
 
+/// Commands that lines tell of; true: of their end, too.
+using Told = std::unordered_map<std::string, bool>;
+
+/// Of commands in order of acceptance those that lines should tell of and do not. What was never told comes
+/// behind all that was; what comes before and is not among the lines any more, was, in files that are gone.
+std::vector<RecoveredCommand> missing(std::vector<RecoveredCommand> earlier, const Told& told) {
+  std::vector<RecoveredCommand> found;
+  const auto is_told = [&told](const RecoveredCommand& each) { return told.contains(each.command.id); };
+  const auto untold = std::find_if(earlier.rbegin(), earlier.rend(), is_told).base();
+  for (auto each = earlier.begin(); each != untold; ++each) {
+    const auto known = told.find(each->command.id);
+    if (known != told.end() && !known->second && ended(each->command.state))
+      found.push_back(std::move(*each));
+  }
+  std::move(untold, earlier.end(), std::back_inserter(found));
+  return found;
+}
+
 }  // namespace
 
 std::vector<RecoveredCommand> recovered(const JournalContent& content) {
@@ -94,21 +112,16 @@ void AuditLog::run() {
 /// What an earlier run of the daemon could not write any more goes first.
 Result<void> AuditLog::open() {
   if (auto opened = files_.open(); !opened) return opened;
-  std::unordered_map<std::string, bool> told;  // true: its end, too
+  Told told;
   if (!options_.earlier.empty()) {
     const auto shown = files_.show_newest([&](std::string_view line) {
       if (auto command = options_.format.command_of(line)) told[command->id] |= command->ended;
     });
     if (!shown) return shown;
   }
-  const auto missing = [&told](const RecoveredCommand& earlier) {
-    const auto found = told.find(earlier.command.id);
-    return found == told.end() || (ended(earlier.command.state) && !found->second);
-  };
   std::vector<AuditEntry> first;
-  for (auto& earlier : options_.earlier)
-    if (missing(earlier)) first.push_back(now(std::move(earlier)));
-  options_.earlier = {};
+  for (auto& earlier : missing(std::exchange(options_.earlier, {}), told))
+    first.push_back(now(std::move(earlier)));
   {
     const std::scoped_lock lock(mutex_);
     waiting_count_ += first.size();

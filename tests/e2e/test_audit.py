@@ -1,5 +1,5 @@
 """Who asked for what stays known: over restarts, after kill -9 at any moment, beside a full disk. AXISD_KILLS: how often the
-daemon is killed (10)."""
+daemon is killed (8)."""
 import asyncio
 import json
 import os
@@ -14,7 +14,7 @@ from harness import DONE, CallFailed, Scenario, pb, wait_for
 from harness.client import audit_pb, drive_pb
 import axisd  # noqa: E402  (made by the harness)
 
-KILLS = int(os.environ.get("AXISD_KILLS", "10"))
+KILLS = int(os.environ.get("AXISD_KILLS", "8"))
 
 
 class AuditScenario(Scenario):
@@ -35,14 +35,14 @@ class AuditScenario(Scenario):
     def files(self, machine):
         return sorted((pathlib.Path(machine.state_directory) / "audit").iterdir())
 
-    def ready_again(self, machine):
+    def ready_again(self, machine, axis):
         machine.start_daemon()
-        machine.client.wait_online("feeder")
-        machine.client.wait_state("feeder", lambda s: s.state in (pb.STATE_DISABLED, pb.STATE_STANDSTILL, pb.STATE_ERROR_STOP),
-                                  "it rests")
-        if machine.client.state("feeder").state == pb.STATE_ERROR_STOP:
-            machine.client.to_done("Reset", "feeder")
-        machine.client.to_done("Enable", "feeder")
+        machine.client.wait_online(axis)
+        state = machine.client.wait_state(axis, lambda s: s.state in (pb.STATE_DISABLED, pb.STATE_STANDSTILL,
+                                                                      pb.STATE_ERROR_STOP), "it rests")
+        if state.state == pb.STATE_ERROR_STOP:
+            machine.client.to_done("Reset", axis)
+        machine.client.to_done("Enable", axis)
 
 
 class Audit(AuditScenario):
@@ -115,25 +115,25 @@ class Audit(AuditScenario):
 
 class Killed(AuditScenario):
     def test_what_reached_a_wire_has_its_record(self):
-        machine = self.ready_feeder()
+        machine = self.ready_spinner()
         chance, reached = random.Random(27), []
 
         def move(request_id):
             try:
-                machine.client.motion("MoveRelative", "feeder", wait=DONE, distance=0.5, request_id=request_id)
+                machine.client.motion("MoveRelative", "spinner", wait=DONE, distance=0.5, request_id=request_id)
             except CallFailed:
                 pass  # the daemon was killed
         for number in range(KILLS):
             starts, request_id = machine.sim.shaft().starts, f"kill-{number}"
             caller = threading.Thread(target=move, args=(request_id,))
             caller.start()
-            time.sleep(chance.uniform(0, 0.25))
+            time.sleep(chance.uniform(0, 0.5))
             machine.daemon.kill()
             caller.join()
             machine.sim.wait_rest()
             if machine.sim.shaft().starts > starts:
                 reached.append(request_id)
-            self.ready_again(machine)
+            self.ready_again(machine, "spinner")
         records = self.audit(machine, kinds=["command"])
         told = {r.request_id for r in records}
         ended = {r.request_id for r in records if r.command.state.ended}
@@ -152,7 +152,7 @@ class Killed(AuditScenario):
         machine.sim.wait_moving()
         machine.daemon.kill()
         file.write_text(before)
-        self.ready_again(machine)
+        self.ready_again(machine, "feeder")
         recovered = [r for r in self.audit(machine, kinds=["command"]) if r.recovered]
         self.assertEqual([r.request_id for r in recovered][-2:], ["done", "cut"])
         self.assertEqual(recovered[-2].command.state, axisd.CommandState.DONE)

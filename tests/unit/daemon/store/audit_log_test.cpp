@@ -105,8 +105,9 @@ TEST_F(AuditLogTest, WhatTheJournalKnowsAndNoRecordTellsComesFirst) {
     log->add(call("command half accepted"));
   }
   const std::vector<RecoveredCommand> known = {
-      earlier("both", CommandState::done, true), earlier("half", CommandState::done, true),
-      earlier("lost", CommandState::accepted, true), earlier("never", CommandState::accepted, false)};
+      earlier("in a file that is gone", CommandState::done, true), earlier("both", CommandState::done, true),
+      earlier("half", CommandState::done, true), earlier("lost", CommandState::accepted, true),
+      earlier("never", CommandState::accepted, false)};
   {
     auto log = open(known);
     log->add(call("begins"));
