@@ -36,6 +36,7 @@
 #include "daemon/logging.hpp"
 #include "daemon/metering.hpp"
 #include "daemon/ports.hpp"
+#include "daemon/state_copier.hpp"
 #include "daemon/store/audit_log.hpp"
 #include "daemon/store/flight_files.hpp"
 #include "daemon/store/kept_state.hpp"
@@ -283,6 +284,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
   audit = open_audit(configuration, **state, instance_id, revision_of(yaml));
   record_run(*audit, **state, DaemonRun::What::began);
   AuditReader audit_reader(audit_directory(configuration), *audit);
+  StateCopier state_copier(configuration.state_directory);
   core::MachineService* published_to = nullptr;
   core::MachineCore machine(
       {.executor = loop.executor(),
@@ -322,6 +324,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
   serving.configuration = &served;
   serving.audit = &audit_reader;
   serving.audit_sink = audit.get();
+  serving.state_copies = &state_copier;
   server::Server server(service, std::move(serving));
   server::StopLane stop_lane(service, stop_lane_options(configuration.server));
   Metering metering({.loop = loop,

@@ -4,6 +4,7 @@
 #include "config/configuration.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/options.hpp"
+#include "daemon/state_copier.hpp"
 
 int main(int argc, char** argv) {
   const auto options = axisd::parse_options(argc, argv);
@@ -23,5 +24,7 @@ int main(int argc, char** argv) {
               << configuration.lines.size() + configuration.networks.size() << " buses)\n";
     return 0;
   }
+  if (options.restore_state)
+    return axisd::restore_state(*options.restore_state, configuration.state_directory);
   return axisd::run_daemon(options, configuration, loaded.text);
 }

@@ -21,6 +21,10 @@ Options parse_options(int argc, char** argv) {
   app.add_flag("--check", options.check, "check the configuration, print every error and warning, and exit");
   app.add_flag("--schema", options.schema, "print the JSON Schema of the configuration, and exit");
   app.add_option("--quiesce", options.quiesce, "stop every drive of this configuration, report, and exit");
+  app.add_option(
+      "--restore-state", options.restore_state,
+      "put a backup (axisctl state backup) in the place of what the state directory holds, while no "
+      "axisd uses it, and exit");
   app.add_option("--state-directory", options.state_directory,
                  "overrides state_directory of the configuration");
   app.add_option("--listen", options.listen, "overrides server: { listen } of the configuration");

@@ -9,6 +9,7 @@ struct Options {
   std::string config = "/etc/axisd/axisd.yaml";
   bool check = false;                                ///< load, report, exit
   bool schema = false;                               ///< print the JSON Schema, exit
+  std::optional<std::string> restore_state;          ///< backup that is restored; then exit
   std::optional<std::string> quiesce;                ///< configuration whose axes are stopped; then exit
   std::string state_directory;                       ///< overrides the configuration's
   std::string listen;                                ///< likewise

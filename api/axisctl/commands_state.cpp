@@ -1,11 +1,17 @@
 // list, state, watch: what the axes do; and what the daemon keeps of them.
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstdio>
 #include <memory>
 #include <optional>
+#include <string>
+#include <system_error>
 
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/follow.hpp"
@@ -86,6 +92,29 @@ void accept_state(Invocation& invocation) {
                  : "every axis needs a new command to move; home where positions count");
 }
 
+/// Whole or not at all, and for nobody else to read: it names clients.
+void write_backup(const std::string& path, const std::string& text) {
+  const auto unfinished = path + ".new";
+  const int file = ::open(unfinished.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  const bool written = file >= 0 &&
+                       ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       ::fsync(file) == 0;
+  const bool closed = file >= 0 && ::close(file) == 0;
+  if (!written || !closed || ::rename(unfinished.c_str(), path.c_str()) != 0)
+    throw Failure(ExitCode::usage,
+                  fmt::format("{}: cannot be written: {}", path, std::generic_category().message(errno)));
+}
+
+void back_up_state(Invocation& invocation, const std::string& path) {
+  const auto response = invocation.client().call(&v1::SystemService::Stub::BackUpState,
+                                                 v1::BackUpStateRequest(), std::string_view());
+  write_backup(path, response.state());
+  if (invocation.json) return print_line(json(response));
+  print_line(fmt::format(
+      "{}: generation {}; to restore it: stop axisd, 'axisd --restore-state {}' as its user, start it", path,
+      response.generation(), path));
+}
+
 struct WatchArguments {
   std::vector<std::string> axes, fields;
   std::string period = "200ms";
@@ -123,15 +152,24 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
   auto* state_command = app.add_subcommand(
       "state", "Everything known about an axis; without one: what the daemon keeps over restarts");
   const auto axis = std::make_shared<std::string>();
-  state_command->add_option("AXIS", *axis, "Name of the axis (of one called 'accept': -- accept)");
+  state_command->add_option("AXIS", *axis,
+                            "Name of the axis (of one called 'accept' or 'backup': -- accept)");
   auto* accept_command = state_command->add_subcommand(
       "accept", "Take what the daemon remembers as it is: look at the machine first. Motion waits no longer");
   accept_command->callback([&invocation, axis] {
     if (!axis->empty()) throw CLI::ValidationError("accept", "of the whole machine: it takes no axis");
     accept_state(invocation);
   });
-  state_command->callback([&invocation, accept_command, axis] {
-    if (accept_command->parsed()) return;
+  auto* backup_command =
+      state_command->add_subcommand("backup", "Copy what the daemon remembers to a file, while it runs");
+  const auto path = std::make_shared<std::string>();
+  backup_command->add_option("FILE", *path, "The copy; one that is there is replaced")->required();
+  backup_command->callback([&invocation, axis, path] {
+    if (!axis->empty()) throw CLI::ValidationError("backup", "of the whole machine: it takes no axis");
+    back_up_state(invocation, *path);
+  });
+  state_command->callback([&invocation, accept_command, backup_command, axis] {
+    if (accept_command->parsed() || backup_command->parsed()) return;
     if (axis->empty()) return kept_state(invocation);
     const auto state = invocation.state(*axis);
     print(invocation.json ? json(state) + "\n" : state_details(state, use_colour()));

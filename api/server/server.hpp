@@ -14,6 +14,7 @@
 #include "devices/audit.hpp"
 #include "devices/configuration_access.hpp"
 #include "devices/machine.hpp"
+#include "devices/state_copy.hpp"
 
 namespace axisd::server {
 
@@ -34,6 +35,8 @@ struct ServerOptions {
   AuditAccess* audit = nullptr;
   /// Is told of changes that are no commands; outlives the machine. nullptr: nobody is.
   AuditSink* audit_sink = nullptr;
+  /// What BackUpState asks; outlives the server. nullptr: it is refused.
+  StateCopies* state_copies = nullptr;
 };
 
 /// Serves one machine. start() and shutdown() on one thread, which is not one of gRPC's.

@@ -10,6 +10,7 @@
 #include "devices/audit.hpp"
 #include "devices/configuration_access.hpp"
 #include "devices/machine.hpp"
+#include "devices/state_copy.hpp"
 
 namespace axisd::server {
 
@@ -29,6 +30,7 @@ struct Services {
   ConfigurationAccess* configuration;  ///< nullptr: there is none to show
   AuditAccess* audit;                  ///< likewise
   AuditSink* audit_sink;               ///< nullptr: nothing is kept
+  StateCopies* state_copies;           ///< nullptr: there are none
 };
 
 }  // namespace axisd::server

@@ -56,10 +56,11 @@ void to_proto(const KeptStateReport& from, v1::GetStateResponse& to) {
 }  // namespace
 
 SystemServiceImpl::SystemServiceImpl(const Services& services) : services_(services) {
-  begin_within_bounds(
-      &SystemServiceImpl::GetInfo, &SystemServiceImpl::StopAll, &SystemServiceImpl::ReleaseStopAll,
-      &SystemServiceImpl::GetState, &SystemServiceImpl::AcceptState, &SystemServiceImpl::Explain,
-      &SystemServiceImpl::GetConfig, &SystemServiceImpl::CheckConfig, &SystemServiceImpl::ReloadConfig);
+  begin_within_bounds(&SystemServiceImpl::GetInfo, &SystemServiceImpl::StopAll,
+                      &SystemServiceImpl::ReleaseStopAll, &SystemServiceImpl::GetState,
+                      &SystemServiceImpl::AcceptState, &SystemServiceImpl::BackUpState,
+                      &SystemServiceImpl::Explain, &SystemServiceImpl::GetConfig,
+                      &SystemServiceImpl::CheckConfig, &SystemServiceImpl::ReloadConfig);
 }
 
 grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1::GetInfoRequest*,
@@ -129,6 +130,27 @@ grpc::ServerUnaryReactor* SystemServiceImpl::AcceptState(Context* context, const
                                            server::to_proto(conviction, *response->add_accepted());
                                        }));
       });
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::BackUpState(Context* context, const v1::BackUpStateRequest*,
+                                                         v1::BackUpStateResponse* response) {
+  const auto client = client_of(*context);
+  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  if (services_.state_copies == nullptr)
+    return answer(context, to_status({.reason = Reason::not_supported,
+                                      .message = "this server keeps no state",
+                                      .remedy = "ask the daemon itself"}));
+  return PendingCall::start(services_, context, *std::move(ticket),
+                            [&](const std::shared_ptr<PendingCall>& call) {
+                              services_.state_copies->copy_state(reply_with_value<StateCopy>(
+                                  call,
+                                  [response](const StateCopy& copy) {
+                                    response->set_state(copy.text);
+                                    response->set_generation(copy.generation);
+                                  },
+                                  fmt::format("{}: backs up the state", client)));
+                            });
 }
 
 grpc::ServerUnaryReactor* SystemServiceImpl::Explain(Context* context, const v1::ExplainRequest* request,

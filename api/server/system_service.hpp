@@ -22,6 +22,8 @@ class SystemServiceImpl final : public BoundedService<v1::SystemService::Callbac
                                      v1::GetStateResponse* response) override;
   grpc::ServerUnaryReactor* AcceptState(Context* context, const v1::AcceptStateRequest* request,
                                         v1::AcceptStateResponse* response) override;
+  grpc::ServerUnaryReactor* BackUpState(Context* context, const v1::BackUpStateRequest* request,
+                                        v1::BackUpStateResponse* response) override;
   grpc::ServerUnaryReactor* Explain(Context* context, const v1::ExplainRequest* request,
                                     v1::ExplainResponse* response) override;
   grpc::ServerUnaryReactor* GetConfig(Context* context, const v1::GetConfigRequest* request,

@@ -7,7 +7,7 @@ import resource
 import shutil
 import unittest
 
-from harness import Scenario, pb
+from harness import AXISD, Scenario, pb, run
 from harness.client import error_pb, event_pb, system_pb
 
 
@@ -128,6 +128,38 @@ class KeptState(Scenario):
         self.assertTrue(machine.client.info().inhibited)
         # The other two files agree, and may be old copies: a request that they do not know may have been executed.
         self.refused("UNAVAILABLE", "STORAGE", machine.client.motion, "MoveRelative", "feeder", distance=1.0)
+
+    def test_a_backup_comes_back_as_an_old_state(self):
+        machine = self.ready_feeder()
+        move = self.move_under_way(machine)
+        backup = machine.path("backup")
+        done = machine.axisctl("state", "backup", backup)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("--restore-state", done.stdout)
+        self.assertEqual(os.stat(backup).st_mode & 0o777, 0o600)
+        self.assert_command(machine.client.wait_ended(move), "DONE")
+        machine.client.to_done("MoveRelative", "feeder", distance=5.0, request_id="behind it")
+
+        def restore():
+            return run([AXISD, "--config", machine.config, "--restore-state", backup], limit=60)
+        refused = restore()
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("is used by another axisd", refused.stderr)
+        machine.daemon.terminate()
+        starts = machine.sim.shaft().starts
+        restored = restore()
+        self.assertEqual((restored.returncode, restored.stderr), (0, ""))
+        self.assertIn("axisctl state accept", restored.stdout)
+        self.restart(machine)
+        self.assert_waits(machine, "journal.v1")
+        self.assertEqual(machine.axisctl("state", "accept").returncode, 0)
+        self.assertEqual(machine.axisctl("release-stop", "--all").returncode, 0)
+        # What was moved after the backup does not move again: nobody knows what it was.
+        machine.client.to_done("Enable", "feeder")
+        detail = self.refused("UNAVAILABLE", "STORAGE", machine.client.motion, "MoveRelative", "feeder",
+                              distance=5.0, request_id="behind it")
+        self.assertEqual(detail.outcome, error_pb.OUTCOME_UNKNOWN)
+        self.assertEqual(machine.sim.shaft().starts, starts)
 
     def test_stop_all_on_a_full_disk_says_so(self):
         machine = self.ready_feeder()
