@@ -35,8 +35,12 @@ void GroupAccessService::move(GroupMoveRequest request, CommandOptions options, 
                            callback = std::move(callback)]() mutable {
     if (closing_)
       return callback(fail(Reason::cancelled, "the daemon is shutting down", "repeat it when it is back"));
+    const auto first = request.targets.empty() ? std::string() : request.targets.front().axis;
     const auto run = machine_->groups().move(std::move(request), options);
-    if (!run) return callback(fail(run.error()));
+    if (!run) {
+      machine_->audit().refused(first, GroupMemberRequest{}, options, run.error());
+      return callback(fail(run.error()));
+    }
     (*run)->observe([executor = loop_->executor(), until, callback](const GroupRun& now) {
       if (!reached(now.state(), until)) return false;
       // From a handler of its own: whoever hears of it finds the axes' states published.

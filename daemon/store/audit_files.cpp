@@ -190,8 +190,14 @@ Result<void> AuditFiles::sync() {
   return failed("write", directory_ / name_of(firsts_.back()), errno);
 }
 
-Result<void> AuditFiles::show_newest(const std::function<void(std::string_view line)>& visit) const {
-  const auto begin = firsts_.size() > 2 ? std::prev(firsts_.end(), 2) : firsts_.begin();
+Result<void> AuditFiles::show_newest(std::uint64_t bytes,
+                                     const std::function<void(std::string_view line)>& visit) const {
+  auto begin = firsts_.end();
+  for (std::uint64_t seen = 0; begin != firsts_.begin() && seen < bytes;) {
+    std::error_code error;  // what cannot be read is told below
+    const auto size = fs::file_size(directory_ / name_of(*--begin), error);
+    seen += error ? 0 : size;
+  }
   for (auto first = begin; first != firsts_.end(); ++first) {
     const auto path = directory_ / name_of(*first);
     const auto file = open_regular(path, O_RDONLY);

@@ -38,8 +38,10 @@ class AuditFiles {
   /// Makes durable what was appended. Errors: storage.
   [[nodiscard]] Result<void> sync();
 
-  /// Shows the lines of the newest file and the one before, the oldest first.
-  [[nodiscard]] Result<void> show_newest(const std::function<void(std::string_view line)>& visit) const;
+  /// Shows the lines of the newest files, the oldest first: of so many that `bytes` of them are among these,
+  /// if there are.
+  [[nodiscard]] Result<void> show_newest(std::uint64_t bytes,
+                                         const std::function<void(std::string_view line)>& visit) const;
 
  private:
   [[nodiscard]] Result<void> use_newest(std::uint64_t first);

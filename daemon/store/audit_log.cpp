@@ -18,6 +18,8 @@ namespace {
 constexpr auto retry = std::chrono::seconds(1);
 /// Written together.
 constexpr std::size_t most_at_once = 256;
+/// Bytes in which the last command that was told is looked for.
+constexpr std::uint64_t looked_at = 16U << 20U;
 
 AuditEntry now(AuditContent content) {
   return {.at = std::chrono::system_clock::now(),
@@ -68,6 +70,7 @@ AuditLog::~AuditLog() {
 }
 
 void AuditLog::add(AuditEntry entry) {
+  bool alone = false;
   {
     const std::scoped_lock lock(mutex_);
     if (waiting_count_ >= options_.most_waiting) {
@@ -75,9 +78,10 @@ void AuditLog::add(AuditEntry entry) {
       return;
     }
     ++waiting_count_;
+    alone = added_.empty();
     added_.push_back(std::move(entry));
   }
-  wake_.notify_one();
+  if (alone) wake_.notify_one();  // else the thread was woken before, and has not come yet
 }
 
 std::optional<Error> AuditLog::trouble() const {
@@ -114,7 +118,7 @@ Result<void> AuditLog::open() {
   if (auto opened = files_.open(); !opened) return opened;
   Told told;
   if (!options_.earlier.empty()) {
-    const auto shown = files_.show_newest([&](std::string_view line) {
+    const auto shown = files_.show_newest(looked_at, [&](std::string_view line) {
       if (auto command = options_.format.command_of(line)) told[command->id] |= command->ended;
     });
     if (!shown) return shown;
