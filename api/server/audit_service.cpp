@@ -83,7 +83,7 @@ grpc::ServerUnaryReactor* AuditServiceImpl::ListAudit(grpc::CallbackServerContex
         services_.audit->look(
             request->after_number(), *from,
             [gathering](std::string_view line) { return gathering->take(line); },
-            [gathering, reply = std::move(reply)](Result<AuditSeen> seen) {
+            [gathering, reply = std::move(reply)](const Result<AuditSeen>& seen) {
               reply(seen ? Result<Page>(gathering->finish(*seen)) : Result<Page>(fail(seen.error())));
             });
       });

@@ -295,7 +295,7 @@ std::shared_ptr<AuditedCall> DriveAccessService::begin(std::string_view rpc, con
 }
 
 template <class T>
-std::function<void(Result<T>)> DriveAccessService::audited(std::shared_ptr<AuditedCall> call,
+std::function<void(Result<T>)> DriveAccessService::audited(const std::shared_ptr<AuditedCall>& call,
                                                            std::function<void(Result<T>)> callback) {
   post(executor_, [this, call] {
     if (const auto* axis = machine_->find(call->axis))

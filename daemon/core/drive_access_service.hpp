@@ -71,7 +71,7 @@ class DriveAccessService final : public DriveAccess {
   /// Tells the audit of the call before anything else is done for it, and once more when it has ended; then
   /// calls back. What the call knows by then is told, too. Thread: any; the call is the core's from now on.
   template <class T>
-  [[nodiscard]] std::function<void(Result<T>)> audited(std::shared_ptr<AuditedCall> call,
+  [[nodiscard]] std::function<void(Result<T>)> audited(const std::shared_ptr<AuditedCall>& call,
                                                        std::function<void(Result<T>)> callback);
   /// `error`: why it failed; nullptr: it did not.
   void end(AuditedCall& call, const Error* error);
