@@ -1,6 +1,9 @@
 // Commands over restarts of the daemon: nothing moves twice, and nothing is said that is not so.
 #include <gmock/gmock.h>
 
+#include <variant>
+#include <vector>
+
 #include "tests/rules/operate.hpp"
 #include "tests/support/rig.hpp"
 
@@ -87,6 +90,23 @@ TEST(Restart, AMoveThatADeadDaemonBeganHappensOnceAtMost) {
 TEST(Restart, AlsoWhereItEndsOrBeginsAtTheCountOfAPowerUp) {
   kill_at_each_moment({.distance = -20}, 20, milliseconds(0), milliseconds(30), milliseconds(1));
   kill_at_each_moment({.distance = -20}, 20, milliseconds(30), milliseconds(1200), milliseconds(97));
+}
+
+TEST(Restart, TheEndOfWhatADeadDaemonBeganIsAnEvent) {
+  Rig rig(with_journal());
+  rig.ready();
+  const MoveRelativeRequest move{.distance = 8};
+  (void)rig.submit(move, request("r1"));
+  rig.run(milliseconds(300));
+  rig.kill_daemon();
+  rig.start_daemon();
+  const auto command = repeat(rig, move, "r1");
+  std::vector<Command> told;
+  for (const auto& event : rig.machine->events().events_after(0, 1'000).events)
+    if (const auto* change = std::get_if<CommandChange>(&event.content)) told.push_back(*change->command);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].id, command.id);
+  EXPECT_EQ(told[0].state, command.state);
 }
 
 TEST(Restart, WhatWasDoneIsToldAndNotDoneAgain) {
