@@ -46,8 +46,9 @@ std::string_view to_string(Reason reason) {
                                                                  "internal",
                                                                  "reloading",
                                                                  "eeprom_budget",
-                                                                 "state_unaccepted"});
-  static_assert(names.size() == std::to_underlying(Reason::state_unaccepted) + 1U);
+                                                                 "state_unaccepted",
+                                                                 "access_denied"});
+  static_assert(names.size() == std::to_underlying(Reason::access_denied) + 1U);
   return names.at(std::to_underlying(reason));
 }
 

@@ -51,6 +51,7 @@ enum class Reason : std::uint8_t {
   reloading,            ///< The configuration of the axis is being reloaded. Repeat it in a moment.
   eeprom_budget,        ///< It would wear the drive's EEPROM beyond `limits.eeprom_saves_per_day`.
   state_unaccepted,     ///< Files of the state are not what they were. Look at the machine, then accept it.
+  access_denied,        ///< The client lacks the role that this needs.
 };
 
 std::string_view to_string(Reason reason);

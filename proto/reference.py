@@ -3,8 +3,8 @@
     reference.py DESCRIPTORS PAGE [--check]
 
 DESCRIPTORS: protoc --include_source_info --include_imports --descriptor_set_out=DESCRIPTORS axisd/v1/*.proto
---check: an error if anything is not described, or a field of a request has no bound (bounds.proto). What speaks for
-itself needs no comment: a request or response (its RPC says it), the zero of an enum, a field whose type is one of ours
+--check: an error if anything is not described, a field of a request has no bound (bounds.proto), or a call no role
+(access.proto). What speaks for itself needs no comment: a request or response (its RPC says it), the zero of an enum, a field whose type is one of ours
 (that is described), and the names in OBVIOUS.
 """
 import argparse
@@ -53,6 +53,13 @@ class Bounds:
 
 
 @dataclasses.dataclass
+class Access:
+    """Who may make a call (access.proto). "": it does not say."""
+    role: str = ""
+    anywhere: bool = False
+
+
+@dataclasses.dataclass
 class Row:
     """A field or a value."""
     name: str
@@ -61,6 +68,7 @@ class Row:
     text: str
     choice: str = ""  # the oneof that it is part of
     bounds: Bounds = dataclasses.field(default_factory=Bounds)
+    needs: str = ""  # the role that a request with it needs
 
 
 @dataclasses.dataclass
@@ -79,6 +87,7 @@ class Method:
     response: str
     streams: bool
     text: str
+    access: Access
 
 
 @dataclasses.dataclass
@@ -98,8 +107,8 @@ class File:
 class Reader:
     """One file of the descriptor set."""
 
-    def __init__(self, file, bounds):
-        self._bounds = bounds
+    def __init__(self, file, options):
+        self._options = options
         self._comments = {tuple(place.path): place.leading_comments for place in file.source_code_info.location}
         self.file = File(file.name, [], [])
         for index, service in enumerate(file.service):
@@ -114,7 +123,8 @@ class Reader:
 
     def _service(self, service, path):
         methods = [Method(method.name, method.input_type, method.output_type, method.server_streaming,
-                          self._text((*path, SERVICE_METHOD, index))) for index, method in enumerate(service.method)]
+                          self._text((*path, SERVICE_METHOD, index)), self._options.access(method))
+                   for index, method in enumerate(service.method)]
         return Service(service.name, self._text(path), methods)
 
     def _message(self, message, path, outer):
@@ -125,7 +135,8 @@ class Reader:
             if field.HasField("oneof_index") and not field.proto3_optional:
                 choice = message.oneof_decl[field.oneof_index].name
             rows.append(Row(field.name, label + (field.type_name or SCALARS[field.type]), field.number,
-                            self._text((*path, MESSAGE_FIELD, index)), choice, self._bounds(field)))
+                            self._text((*path, MESSAGE_FIELD, index)), choice, self._options.bounds(field),
+                            self._options.needs(field)))
         self.file.types.append(Type(outer + message.name, "message", self._text(path), rows))
         for index, nested in enumerate(message.nested_type):
             self._message(nested, (*path, MESSAGE_NESTED, index), f"{outer}{message.name}.")
@@ -138,29 +149,46 @@ class Reader:
         self.file.types.append(Type(outer + enum.name, "enum", self._text(path), rows))
 
 
-def bounds_reader(files):
-    """What gives the Bounds of a field. The option is known from `files` alone, not from generated code."""
-    pool = descriptor_pool.DescriptorPool()
-    for file in files:
-        pool.Add(file)
-    try:
-        extension = pool.FindExtensionByName("axisd.v1.bounds")
-    except KeyError:
-        return lambda field: Bounds()
-    types = message_factory.MessageFactory(pool).GetMessages([file.name for file in files])
-    options_of = types["google.protobuf.FieldOptions"]
+class Options:
+    """The options of fields and calls. They are known from the files alone, not from generated code."""
 
-    def bounds(field):
-        found = options_of.FromString(field.options.SerializeToString()).Extensions[extension]
-        return Bounds(found.max_items, found.max_bytes, found.tolerated)
-    return bounds
+    def __init__(self, files):
+        self._pool = descriptor_pool.DescriptorPool()
+        for file in files:
+            self._pool.Add(file)
+        self._types = message_factory.MessageFactory(self._pool).GetMessages([file.name for file in files])
+
+    def _value(self, one, kind, name):
+        """An option of axisd.v1; None: there is no such option, or it is not said."""
+        try:
+            extension = self._pool.FindExtensionByName(f"axisd.v1.{name}")
+        except KeyError:
+            return None
+        found = self._types[f"google.protobuf.{kind}"].FromString(one.options.SerializeToString())
+        return found.Extensions[extension] if found.HasExtension(extension) else None
+
+    def _role(self, number):
+        name = self._pool.FindEnumTypeByName("axisd.v1.Role").values_by_number[number].name
+        return "" if number == 0 else name.removeprefix("ROLE_").lower()
+
+    def bounds(self, field):
+        found = self._value(field, "FieldOptions", "bounds")
+        return Bounds() if found is None else Bounds(found.max_items, found.max_bytes, found.tolerated)
+
+    def needs(self, field):
+        found = self._value(field, "FieldOptions", "needs")
+        return "" if found is None else self._role(found)
+
+    def access(self, method):
+        found = self._value(method, "MethodOptions", "access")
+        return Access() if found is None else Access(self._role(found.role), found.anywhere)
 
 
 def read(descriptors):
     """The files of axisd.v1, in the order of their names."""
     files = descriptor_pb2.FileDescriptorSet.FromString(descriptors).file
-    bounds = bounds_reader(files)
-    return [Reader(file, bounds).file for file in sorted(files, key=lambda file: file.name)
+    options = Options(files)
+    return [Reader(file, options).file for file in sorted(files, key=lambda file: file.name)
             if file.package == "axisd.v1"]
 
 
@@ -229,6 +257,26 @@ def unbounded(files):
                 waiting.append(base)
 
 
+def without_role(files):
+    """Every call of which nothing is said who may make it."""
+    for file in files:
+        for service in file.services:
+            yield from (f"{service.name}.{method.name}" for method in service.methods if not method.access.role)
+
+
+def access_text(method, request):
+    """What the page says about who may make a call."""
+    role = method.access.role
+    if not role:
+        return ""
+    if role == "none":
+        return "Needs no role."
+    if method.access.anywhere:
+        return f"Needs the role {role} on the machine or on any axis."
+    on_axes = any(row.name in ("axis", "axes", "group") for row in request.rows)
+    return f"Needs the role {role}{' on each axis that it names' if on_axes else ''}."
+
+
 class Page:
     """The page as it grows."""
 
@@ -268,6 +316,8 @@ class Page:
             bounds = bounds_text(row)
             if bounds and not one.name.endswith("Request"):
                 bounds = f"In requests: {bounds[0].lower()}{bounds[1:]}"
+            if row.needs:
+                bounds = f"{bounds} With it, the call needs the role {row.needs}.".strip()
             bounds = f' <span class="bounds">{bounds}</span>' if bounds else ""
             lines.append(f'<tr id="{one.name}.{row.name}"><td class=name>{row.name}</td>{type_cell}'
                          f"<td class=number>{row.number}</td><td>{self.prose(text_of(row, one.kind))}{bounds}</td></tr>")
@@ -279,6 +329,7 @@ class Page:
         self.parts.append(
             f'<section class=method><h3 id="{service.name}.{method.name}">{method.name}</h3>'
             f"<p>{self.prose(method.text)}</p>"
+            f'<p class="access">{access_text(method, self.types[request])}</p>'
             f'<h4 id="{request}">{request}</h4>{self.table(self.types[request])}'
             f'<h4 id="{response}">{stream}{response}</h4>{self.table(self.types[response])}</section>')
 
@@ -330,7 +381,7 @@ h4 {{ margin: 1em 0 0.3em; font-weight: normal; color: var(--dim); font-family: 
 table {{ border-collapse: collapse; width: 100%; }}
 td {{ border-top: 1px solid var(--line); padding: 0.25em 0.8em 0.25em 0; vertical-align: top; }}
 .name, .type, .number, code {{ font-family: ui-monospace, monospace; font-size: 13px; }}
-.number, .choice, .bounds, .empty {{ color: var(--dim); }}
+.number, .choice, .bounds, .access, .empty {{ color: var(--dim); }}
 .name, .type {{ overflow-wrap: anywhere; min-width: 9em; }}
 :target {{ background: #fd06; }}
 @media (max-width: 50em) {{ body {{ display: block; }} nav {{ display: none; }} main {{ padding: 0 1em; }} }}
@@ -354,7 +405,7 @@ def main():
     parser = argparse.ArgumentParser(description="Writes the reference documentation of the API.")
     parser.add_argument("descriptors", type=pathlib.Path)
     parser.add_argument("page", type=pathlib.Path)
-    parser.add_argument("--check", action="store_true", help="an error if anything is not described or bounded")
+    parser.add_argument("--check", action="store_true", help="an error if anything is not described or bounded, or has no role")
     arguments = parser.parse_args()
     files = read(arguments.descriptors.read_bytes())
     arguments.page.write_text(page(files), encoding="utf-8")
@@ -364,7 +415,10 @@ def main():
     open_ended = list(unbounded(files)) if arguments.check else []
     for name in open_ended:
         print(f"reference.py: {name} is missing in its bounds", file=sys.stderr)
-    return 1 if silent or open_ended else 0
+    open_to_all = list(without_role(files)) if arguments.check else []
+    for name in open_to_all:
+        print(f"reference.py: {name} has no role", file=sys.stderr)
+    return 1 if silent or open_ended or open_to_all else 0
 
 
 if __name__ == "__main__":

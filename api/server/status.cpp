@@ -83,6 +83,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::expired:
       return grpc::StatusCode::DEADLINE_EXCEEDED;
     case Reason::lease_required:
+    case Reason::access_denied:
       return grpc::StatusCode::PERMISSION_DENIED;
     case Reason::request_id_conflict:
       return grpc::StatusCode::ALREADY_EXISTS;

@@ -1,5 +1,5 @@
 """proto/reference.py: the whole contract is on its page, with a comment for everything; what has none is found, and what
-a request may carry without bound."""
+a request may carry without bound, and calls that do not say who may make them."""
 
 import re
 import shutil
@@ -91,6 +91,9 @@ class Contract(unittest.TestCase):
     def test_every_request_is_bounded(self):
         self.assertEqual(list(reference.unbounded(reference.read(descriptors(PROTO)))), [])
 
+    def test_every_call_says_who_may_make_it(self):
+        self.assertEqual(list(reference.without_role(reference.read(descriptors(PROTO)))), [])
+
     def test_everything_is_on_the_page(self):
         page = reference.page(reference.read(descriptors(PROTO)))
         shown = set(re.findall(r'id="([^"]+)"', page))
@@ -109,10 +112,34 @@ class Contract(unittest.TestCase):
                 scope.pop()
             elif element := re.match(r"rpc (\w+)\(|(?:[\w.]+ )*([\w]+) = \d+(?: \[.*\])?;", line):
                 wanted.add(".".join([*filter(None, scope), element[1] or element[2]]))
+                if line.endswith("{"):  # with options
+                    scope.append("")
         self.assertGreater(len(wanted), 600)
         self.assertEqual(wanted - shown, set())
         links = set(re.findall(r'href="#([^"]+)"', page))
         self.assertEqual(links - shown, set(), "links that lead nowhere")
+
+
+GUARDED = '''syntax = "proto3";
+package axisd.v1;
+import "axisd/v1/access.proto";
+
+service PlaceService {
+  rpc GetPlace(GetPlaceRequest) returns (GetPlaceResponse) {
+    option (access).role = ROLE_VIEWER;
+  }
+  rpc KeepPlace(KeepPlaceRequest) returns (KeepPlaceResponse) {
+    option (access) = {role: ROLE_OPERATOR, anywhere: true};
+  }
+}
+message GetPlaceRequest {
+  string axis = 1;
+  bool all = 2 [(needs) = ROLE_MAINTAINER];
+}
+message GetPlaceResponse {}
+message KeepPlaceRequest {}
+message KeepPlaceResponse {}
+'''
 
 
 class Small(unittest.TestCase):
@@ -121,7 +148,8 @@ class Small(unittest.TestCase):
             path = Path(folder) / "axisd" / "v1" / "place.proto"
             path.parent.mkdir(parents=True)
             path.write_text(text)
-            shutil.copy(PROTO / "axisd" / "v1" / "bounds.proto", path.parent)
+            for name in ("access.proto", "bounds.proto"):
+                shutil.copy(PROTO / "axisd" / "v1" / name, path.parent)
             return reference.read(descriptors(Path(folder)))
 
     def test_the_page(self):
@@ -159,6 +187,20 @@ class Small(unittest.TestCase):
                             ("max_bytes: 12, ", "GetPlaceRequest.names: max_bytes"),
                             (" [(bounds).max_bytes = 7]", "Cell.data: max_bytes")):
             self.assertEqual(list(reference.unbounded(self.read(BOUNDED.replace(bound, "")))), [name])
+
+
+    def test_roles_are_on_the_page(self):
+        page = reference.page(self.read(GUARDED))
+        for part in ("Needs the role viewer on each axis that it names.",
+                     "Needs the role operator on the machine or on any axis.",
+                     "With it, the call needs the role maintainer."):
+            self.assertIn(part, page)
+
+    def test_each_missing_role_is_found(self):
+        self.assertEqual(list(reference.without_role(self.read(GUARDED))), [])
+        for option, name in (("    option (access).role = ROLE_VIEWER;\n", "PlaceService.GetPlace"),
+                             ("role: ROLE_OPERATOR, ", "PlaceService.KeepPlace")):
+            self.assertEqual(list(reference.without_role(self.read(GUARDED.replace(option, "")))), [name])
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ class Reason(enum.StrEnum):
     RELOADING = "reloading"
     EEPROM_BUDGET = "eeprom_budget"
     STATE_UNACCEPTED = "state_unaccepted"
+    ACCESS_DENIED = "access_denied"
 
 
 class Outcome(enum.StrEnum):
