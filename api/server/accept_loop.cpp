@@ -135,10 +135,7 @@ bool AcceptLoop::accept_one(const Entry& entry) {
     const int on = 1;
     setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   }
-  Acceptor::NewConnectionParameters parameters;
-  parameters.listener_fd = entry.socket.fd.get();
-  parameters.fd = connection.release();
-  entry.acceptor->HandleNewConnection(&parameters);
+  entry.hand_over(std::move(connection));
   return true;
 }
 

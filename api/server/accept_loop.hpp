@@ -1,9 +1,8 @@
 // The daemon's own accept loop.
 #pragma once
 
-#include <grpcpp/server_builder.h>
-
 #include <atomic>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -21,10 +20,11 @@ namespace axisd::server {
 /// getting anything for it (PeerBudgets). gRPC 1.51 bounds none of that (CVE-2023-44487).
 class AcceptLoop {
  public:
-  using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
+  /// Gives a connection to gRPC. Thread: the loop's.
+  using HandOver = std::function<void(FileDescriptor connection)>;
   struct Entry {
     ListeningSocket socket;
-    Acceptor* acceptor = nullptr;  ///< outlives the loop
+    HandOver hand_over;
   };
 
   AcceptLoop() = default;

@@ -44,6 +44,7 @@ class Admission {
     }
     ~Ticket() { release(); }
     void release();
+    [[nodiscard]] const std::string& client() const { return client_; }
 
    private:
     friend class Admission;

@@ -7,7 +7,6 @@
 
 #include "api/server/audit_convert.hpp"
 #include "api/server/convert.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/value_reply.hpp"
@@ -54,12 +53,11 @@ class Gathering {
 
 }  // namespace
 
-AuditServiceImpl::AuditServiceImpl(const Services& services) : services_(services) {
+AuditServiceImpl::AuditServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&AuditServiceImpl::ListAudit);
 }
 
-grpc::ServerUnaryReactor* AuditServiceImpl::ListAudit(grpc::CallbackServerContext* context,
-                                                      const v1::ListAuditRequest* request,
+grpc::ServerUnaryReactor* AuditServiceImpl::ListAudit(Context* context, const v1::ListAuditRequest* request,
                                                       v1::ListAuditResponse* response) {
   if (request->limit() > most_records)
     return answer(context, to_status({.reason = Reason::out_of_range,

@@ -30,7 +30,7 @@ grpc::ServerUnaryReactor* refuse(grpc::CallbackServerContext* context, const std
 
 }  // namespace
 
-AxisServiceImpl::AxisServiceImpl(const Services& services) : services_(services) {
+AxisServiceImpl::AxisServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&AxisServiceImpl::ListAxes, &AxisServiceImpl::GetAxis, &AxisServiceImpl::Enable,
                       &AxisServiceImpl::Disable, &AxisServiceImpl::Home, &AxisServiceImpl::MoveAbsolute,
                       &AxisServiceImpl::MoveRelative, &AxisServiceImpl::MoveVelocity, &AxisServiceImpl::Jog,
@@ -103,8 +103,8 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* AxisServiceImpl::WatchAxes(Context* 
     return new RefusedStream<grpc::ByteBuffer>(to_status({.reason = Reason::invalid_argument,
                                                           .message = "the request is not a WatchAxesRequest",
                                                           .remedy = "use the published proto files"}));
-  if (const auto within = check_bounds(parsed); !within)
-    return new RefusedStream<grpc::ByteBuffer>(to_status(within.error()));
+  if (const auto may = admit(*context, parsed); !may)
+    return new RefusedStream<grpc::ByteBuffer>(to_status(may.error()));
   auto axes = watched_axes(parsed, services_.machine);
   if (!axes) return new RefusedStream<grpc::ByteBuffer>(to_status(axes.error()));
   const auto period = watch_period(parsed);

@@ -10,28 +10,40 @@
 
 namespace axisd::server {
 
-/// A generated service whose calls begin only with requests that are within their bounds. Whoever derives
-/// from it hands all of its calls to begin_within_bounds() once, in its constructor. Thread: gRPC.
+/// A generated service whose calls begin only with requests that are within their bounds, and that their
+/// clients may make. Whoever derives from it hands all of its calls to begin_within_bounds() once, in its
+/// constructor. Thread: gRPC.
 template <class Service>
 class BoundedService : public Service {
  protected:
-  /// In any order. A call that answers in raw bytes is not among them: it has to check what it parses.
+  using Context = grpc::CallbackServerContext;
+
+  explicit BoundedService(const Services& services) : callers_(services.callers) {}
+
+  /// Whose the call is: of its commands, holds, leases and quotas, and in the log.
+  [[nodiscard]] std::string client_of(const Context& context) const { return callers_.of(context).name; }
+
+  /// What stands before each call.
+  [[nodiscard]] Result<void> admit(const Context& context, const google::protobuf::Message& request) const {
+    if (auto within = check_bounds(request); !within) return within;
+    return callers_.admit(context, request);
+  }
+
+  /// In any order. A call that answers in raw bytes is not among them: it has to admit() what it parses.
   template <class... Calls>
   void begin_within_bounds(Calls... calls) {
     (begin(calls), ...);
   }
 
  private:
-  using Context = grpc::CallbackServerContext;
-
   template <class Impl, class Request, class Response>
   void begin(grpc::ServerUnaryReactor* (Impl::*call)(Context*, const Request*, Response*)) {
     this->MarkMethodCallback(index_of<Request>(),
                              new grpc::internal::CallbackUnaryHandler<Request, Response>(
                                  [this, call](Context* context, const Request* request,
                                               Response* response) -> grpc::ServerUnaryReactor* {
-                                   if (const auto within = check_bounds(*request); !within)
-                                     return answer(context, to_status(within.error()));
+                                   if (const auto may = admit(*context, *request); !may)
+                                     return answer(context, to_status(may.error()));
                                    return (static_cast<Impl*>(this)->*call)(context, request, response);
                                  }));
   }
@@ -42,8 +54,8 @@ class BoundedService : public Service {
         index_of<Request>(),
         new grpc::internal::CallbackServerStreamingHandler<Request, Response>(
             [this, call](Context* context, const Request* request) -> grpc::ServerWriteReactor<Response>* {
-              if (const auto within = check_bounds(*request); !within)
-                return new RefusedStream<Response>(to_status(within.error()));
+              if (const auto may = admit(*context, *request); !may)
+                return new RefusedStream<Response>(to_status(may.error()));
               return (static_cast<Impl*>(this)->*call)(context, request);
             }));
   }
@@ -57,6 +69,8 @@ class BoundedService : public Service {
       if (service->method(i)->input_type() == type) return i;
     return -1;
   }
+
+  const Callers& callers_;
 };
 
 }  // namespace axisd::server

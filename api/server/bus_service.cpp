@@ -12,7 +12,6 @@
 #include "api/server/bus_convert.hpp"
 #include "api/server/bus_validate.hpp"
 #include "api/server/convert.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/progress_stream.hpp"
 #include "api/server/status.hpp"
@@ -26,7 +25,7 @@ using Call = std::shared_ptr<PendingCall>;
 using Words = std::vector<std::uint16_t>;
 using Bytes = std::vector<std::uint8_t>;
 
-BusServiceImpl::BusServiceImpl(const Services& services) : services_(services) {
+BusServiceImpl::BusServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&BusServiceImpl::ListBuses, &BusServiceImpl::GetBudget, &BusServiceImpl::ListDevices,
                       &BusServiceImpl::WriteDevice, &BusServiceImpl::Transact, &BusServiceImpl::Scan,
                       &BusServiceImpl::GetBusStatistics, &BusServiceImpl::WatchBusStatistics,

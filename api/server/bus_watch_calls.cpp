@@ -6,7 +6,6 @@
 #include "api/server/bus_service.hpp"
 #include "api/server/bus_watch_convert.hpp"
 #include "api/server/paced_stream.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/validate.hpp"

@@ -9,7 +9,6 @@
 
 #include "api/server/command_stream.hpp"
 #include "api/server/convert.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
@@ -23,7 +22,8 @@ constexpr std::size_t usual_commands = 20, most_commands = 500;
 
 }  // namespace
 
-CommandServiceImpl::CommandServiceImpl(const Services& services) : services_(services) {
+CommandServiceImpl::CommandServiceImpl(const Services& services)
+    : BoundedService(services), services_(services) {
   begin_within_bounds(&CommandServiceImpl::ListCommands, &CommandServiceImpl::GetCommand,
                       &CommandServiceImpl::WatchCommand, &CommandServiceImpl::CancelCommand);
 }

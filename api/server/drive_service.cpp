@@ -7,7 +7,6 @@
 
 #include "api/server/drive_convert.hpp"
 #include "api/server/drive_validate.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/progress_stream.hpp"
 #include "api/server/status.hpp"
@@ -22,19 +21,19 @@ using Call = std::shared_ptr<PendingCall>;
 using Values = std::vector<ParameterValue>;
 
 /// How a change is logged, by whom and of what.
-std::string entry(const grpc::CallbackServerContext& context, std::string_view axis, std::string_view what) {
-  return fmt::format("{}: {} {}", client_of(context), axis, what);
+std::string entry(std::string_view client, std::string_view axis, std::string_view what) {
+  return fmt::format("{}: {} {}", client, axis, what);
 }
 
 /// Who asks for a change, and under which lease.
 template <class Request>
-Requester requester(const grpc::CallbackServerContext& context, const Request& request) {
-  return {.client = client_of(context), .lease_token = request.lease_token()};
+Requester requester(std::string client, const Request& request) {
+  return {.client = std::move(client), .lease_token = request.lease_token()};
 }
 
 }  // namespace
 
-DriveServiceImpl::DriveServiceImpl(const Services& services) : services_(services) {
+DriveServiceImpl::DriveServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&DriveServiceImpl::GetDrive, &DriveServiceImpl::ListParameters,
                       &DriveServiceImpl::ReadParameters, &DriveServiceImpl::WriteParameters,
                       &DriveServiceImpl::SaveParameters, &DriveServiceImpl::RestoreFactory,
@@ -104,10 +103,10 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteParameters(Context* context,
   const auto values = parameters_to_write(*request, *drive);
   if (!values) return refuse(context, "write_parameters", values.error());
   return begin(context, [&](const Call& call) {
-    std::string what = entry(*context, request->axis(), "write_parameters");
+    std::string what = entry(client_of(*context), request->axis(), "write_parameters");
     for (const auto& value : request->values()) what += fmt::format(" {}={}", value.name(), value.value());
     services_.machine.drive_access().write_parameters(
-        request->axis(), *values, requester(*context, *request),
+        request->axis(), *values, requester(client_of(*context), *request),
         reply_with_value<Values>(
             call,
             [response, model = drive->model](const Values& read_back) {
@@ -127,8 +126,8 @@ DriveServiceImpl::Reactor* DriveServiceImpl::SaveParameters(Context* context,
     return refuse(context, "save_parameters", confirmed.error());
   return begin(context, [&](const Call& call) {
     services_.machine.drive_access().save_parameters(
-        axis, requester(*context, *request),
-        reply_with_value<void>(call, [] {}, entry(*context, axis, "save_parameters")));
+        axis, requester(client_of(*context), *request),
+        reply_with_value<void>(call, [] {}, entry(client_of(*context), axis, "save_parameters")));
   });
 }
 
@@ -142,10 +141,10 @@ DriveServiceImpl::Reactor* DriveServiceImpl::RestoreFactory(Context* context,
     return refuse(context, "restore_factory", confirmed.error());
   return begin(context, [&](const Call& call) {
     services_.machine.drive_access().restore_factory(
-        axis, requester(*context, *request),
+        axis, requester(client_of(*context), *request),
         reply_with_value<std::string>(
             call, [response](const std::string& text) { response->set_after_power_cycle(text); },
-            entry(*context, axis, "restore_factory")));
+            entry(client_of(*context), axis, "restore_factory")));
   });
 }
 
@@ -176,13 +175,14 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteSegments(Context* context,
   const auto segments = segments_to_write(request->segments(), *drive);
   if (!segments) return refuse(context, "write_segments", segments.error());
   return begin(context, [&](const Call& call) {
-    services_.machine.drive_access().write_segments(request->axis(), *segments, requester(*context, *request),
-                                                    reply_with_value<SegmentSettings>(
-                                                        call,
-                                                        [response](const SegmentSettings& read_back) {
-                                                          to_proto(read_back, *response->mutable_segments());
-                                                        },
-                                                        entry(*context, request->axis(), "write_segments")));
+    services_.machine.drive_access().write_segments(
+        request->axis(), *segments, requester(client_of(*context), *request),
+        reply_with_value<SegmentSettings>(
+            call,
+            [response](const SegmentSettings& read_back) {
+              to_proto(read_back, *response->mutable_segments());
+            },
+            entry(client_of(*context), request->axis(), "write_segments")));
   });
 }
 
@@ -210,7 +210,7 @@ grpc::ServerWriteReactor<Response>* DriveServiceImpl::change_serial(Context* con
       services_, context, *std::move(ticket),
       [&](typename Stream::Callback callback) {
         return services_.machine.drive_access().change_serial(
-            request.axis(), *change, requester(*context, request), std::move(callback));
+            request.axis(), *change, requester(client_of(*context), request), std::move(callback));
       },
       [last](const SerialProgress& from, Response& to) {
         to.set_phase(to_proto(from.phase));

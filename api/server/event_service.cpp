@@ -4,12 +4,11 @@
 
 #include "api/server/event_hub.hpp"
 #include "api/server/event_validate.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/status.hpp"
 
 namespace axisd::server {
 
-EventServiceImpl::EventServiceImpl(const Services& services) : services_(services) {
+EventServiceImpl::EventServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&EventServiceImpl::WatchEvents);
 }
 

@@ -20,7 +20,7 @@
 
 namespace axisd::server {
 
-GroupServiceImpl::GroupServiceImpl(const Services& services) : services_(services) {
+GroupServiceImpl::GroupServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&GroupServiceImpl::ListGroups, &GroupServiceImpl::MoveGroup,
                       &GroupServiceImpl::GetGroupMove, &GroupServiceImpl::GroupHalt,
                       &GroupServiceImpl::GroupStop, &GroupServiceImpl::GroupReleaseStop);

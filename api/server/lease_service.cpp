@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "api/server/convert.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
@@ -71,7 +70,7 @@ Result<LeaseRequest> lease_request(const v1::AcquireLeaseRequest& from, std::str
 
 }  // namespace
 
-LeaseServiceImpl::LeaseServiceImpl(const Services& services) : services_(services) {
+LeaseServiceImpl::LeaseServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&LeaseServiceImpl::AcquireLease, &LeaseServiceImpl::RenewLease,
                       &LeaseServiceImpl::ReleaseLease, &LeaseServiceImpl::ListLeases);
 }

@@ -1,42 +1,9 @@
 #include "api/server/peer.hpp"
 
-#include <fmt/format.h>
-#include <grpc/grpc_security_constants.h>
-
 #include <algorithm>
 #include <string_view>
 
-#include "devices/axis/known_ids.hpp"
-
 namespace axisd::server {
-namespace {
-
-constexpr std::size_t longest_identity = 128;
-
-}  // namespace
-
-std::string printable_identity(std::string_view name) {
-  std::string result(name.substr(0, longest_identity));
-  std::ranges::replace_if(result, [](char c) { return c < ' ' || c > '~'; }, '?');
-  return result;
-}
-
-std::string unnamed_identity(std::string_view pem) { return fmt::format("unnamed:{:016x}", hash_of(pem)); }
-
-std::string client_of(const grpc::CallbackServerContext& context) {
-  const auto auth = context.auth_context();
-  if (auth && auth->IsPeerAuthenticated()) {
-    for (const auto* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME}) {
-      const auto values = auth->FindPropertyValues(property);
-      if (!values.empty() && !values.front().empty())
-        return printable_identity({values.front().data(), values.front().size()});
-    }
-    const auto whole = auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-    return unnamed_identity(whole.empty() ? ""
-                                          : std::string_view(whole.front().data(), whole.front().size()));
-  }
-  return "local:" + peer_host(context.peer());
-}
 
 std::optional<Duration> patience_of(const grpc::CallbackServerContext& context) {
   const auto deadline = context.raw_deadline();

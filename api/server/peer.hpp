@@ -1,28 +1,14 @@
-// Who calls.
+// What gRPC tells of a caller.
 #pragma once
 
 #include <grpcpp/server_context.h>
 
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "buses/clock.hpp"
 
 namespace axisd::server {
-
-/// The client's identity: the common name (else the first alternative name, else a hash) of its verified
-/// certificate; without TLS, "local:" and the host part of its address. Never the port: request ids must stay
-/// valid over a reconnection.
-[[nodiscard]] std::string client_of(const grpc::CallbackServerContext& context);
-
-/// An identity as it may appear in the log and in Command.client: of a bounded length, without anything by
-/// which a certificate could forge a line there.
-[[nodiscard]] std::string printable_identity(std::string_view name);
-
-/// Of a verified certificate without any name; `pem`: that certificate. Not its address, of which a client
-/// may have many: what one may take of the daemon is counted by this (M32).
-[[nodiscard]] std::string unnamed_identity(std::string_view pem);
 
 /// How long the caller waits for the answer, from this call on, by the clock of its deadline; nothing: for
 /// ever. Not above a day.

@@ -9,7 +9,6 @@
 #include <optional>
 #include <utility>
 
-#include "api/server/peer.hpp"
 #include "api/server/services.hpp"
 #include "api/server/stall_guard.hpp"
 #include "buses/limited_log.hpp"
@@ -60,7 +59,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Response>,
   [[nodiscard]] bool closing() const final { return closing_; }
   void cancel() final {
     if (finished_) return;
-    log_limited(spdlog::level::warn, client_of(*context_), "streams",
+    log_limited(spdlog::level::warn, ticket_.client(), "streams",
                 fmt::format("{} stopped reading its stream: cancelled", context_->peer()));
     context_->TryCancel();
   }

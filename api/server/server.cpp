@@ -7,6 +7,7 @@
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/impl/server_builder_option.h>
 #include <grpcpp/resource_quota.h>
+#include <grpcpp/server_posix.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -88,6 +89,7 @@ struct Server::Parts {
         calls(std::make_shared<OpenCalls>()),
         guard(std::make_shared<StallGuard>(options.stalled_reader_limit)),
         admission(options.limits),
+        callers(machine, options.access),
         hub(std::make_shared<WatchHub>(machine, reply, options.stalled_reader_limit)),
         events(std::make_shared<EventHub>(reply)),
         services{machine,
@@ -95,6 +97,7 @@ struct Server::Parts {
                  calls,
                  guard,
                  admission,
+                 callers,
                  *hub,
                  *events,
                  options.configuration,
@@ -115,6 +118,7 @@ struct Server::Parts {
   std::shared_ptr<OpenCalls> calls;
   std::shared_ptr<StallGuard> guard;
   Admission admission;
+  Callers callers;
   std::shared_ptr<WatchHub> hub;
   std::shared_ptr<EventHub> events;
   Services services;
@@ -127,10 +131,26 @@ struct Server::Parts {
   LeaseServiceImpl lease;
   GroupServiceImpl group;
   AuditServiceImpl audit;
-  std::unique_ptr<AcceptLoop::Acceptor> tcp_acceptor, unix_acceptor;
+  /// Of TCP. A unix socket is given to gRPC by its number, which then is the name of the connection.
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
   AcceptLoop accept;
   bool serving = false;
+
+  void take_local(FileDescriptor connection) {
+    callers.enter(connection.get());
+    grpc::AddInsecureChannelFromFd(server.get(), connection.release());
+  }
+  AcceptLoop::HandOver way_in(const ListeningSocket& socket) {
+    if (!socket.unix_path.empty())
+      return [this](FileDescriptor connection) { take_local(std::move(connection)); };
+    return [this, listener = socket.fd.get()](FileDescriptor connection) {
+      grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+      parameters.listener_fd = listener;
+      parameters.fd = connection.release();
+      acceptor->HandleNewConnection(&parameters);
+    };
+  }
 };
 
 Server::Server(Machine& machine, ServerOptions options)
@@ -152,6 +172,9 @@ Result<int> Server::start() {
     auto tls = tls_credentials(*options_.tls);
     if (!tls) return fail(std::move(tls).error());
     tcp_credentials = *std::move(tls);
+    const auto contents = tls::read(*options_.tls);
+    if (!contents) return fail(contents.error());
+    parts_->callers.trust(contents->client_ca);
   }
   std::vector<ListeningSocket> sockets;
   for (const auto& address : options_.listen) {
@@ -170,9 +193,7 @@ Result<int> Server::start() {
            &parts_->lease, &parts_->group, &parts_->audit})
     builder.RegisterService(service);
   constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
-  parts_->tcp_acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
-  parts_->unix_acceptor =
-      builder.experimental().AddExternalConnectionAcceptor(from_fd, grpc::InsecureServerCredentials());
+  parts_->acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
   parts_->server = builder.BuildAndStart();
   if (!parts_->server)
     return fail(Reason::internal, "gRPC refuses to start", "see the log; GRPC_VERBOSITY=debug tells more");
@@ -185,8 +206,8 @@ Result<int> Server::start() {
   std::vector<AcceptLoop::Entry> entries;
   for (auto& socket : sockets) {
     if (port == 0) port = socket.port;
-    auto* acceptor = socket.unix_path.empty() ? parts_->tcp_acceptor.get() : parts_->unix_acceptor.get();
-    entries.push_back({.socket = std::move(socket), .acceptor = acceptor});
+    entries.push_back({.socket = std::move(socket), .hand_over = {}});
+    entries.back().hand_over = parts_->way_in(entries.back().socket);
   }
   if (auto accepting = parts_->accept.start(std::move(entries), options_.peers); !accepting)
     return fail(std::move(accepting).error());
@@ -220,10 +241,7 @@ void Server::shutdown(Duration deadline) {
 FileDescriptor Server::connect_inside() {
   auto [ours, theirs] = connected_pair();
   if (ours.get() < 0) return {};
-  AcceptLoop::Acceptor::NewConnectionParameters parameters;
-  parameters.listener_fd = -1;
-  parameters.fd = theirs.release();
-  parts_->unix_acceptor->HandleNewConnection(&parameters);
+  parts_->take_local(std::move(theirs));
   return std::move(ours);
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "api/server/access.hpp"
 #include "api/server/admission.hpp"
 #include "api/server/peer_budgets.hpp"
 #include "api/server/tls.hpp"
@@ -29,6 +30,8 @@ struct ServerOptions {
   PeerBudgets::Limits peers{};
   /// A stream whose reader has not read for so long is cancelled.
   Duration stalled_reader_limit = std::chrono::seconds(2);
+  /// Who may do what. nullptr: everybody everything.
+  std::shared_ptr<const AccessControl> access{};
   /// What GetConfig, CheckConfig and ReloadConfig ask; outlives the server. nullptr: they are refused.
   ConfigurationAccess* configuration = nullptr;
   /// What ListAudit asks; outlives the server. nullptr: it is refused.

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "api/server/admission.hpp"
+#include "api/server/callers.hpp"
 #include "api/server/open_calls.hpp"
 #include "api/server/reply_thread.hpp"
 #include "api/server/stall_guard.hpp"
@@ -25,6 +26,7 @@ struct Services {
   std::shared_ptr<OpenCalls> calls;
   std::shared_ptr<StallGuard> guard;
   Admission& admission;
+  Callers& callers;
   WatchHub& hub;
   EventHub& events;
   ConfigurationAccess* configuration;  ///< nullptr: there is none to show

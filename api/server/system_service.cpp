@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "api/server/convert.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
@@ -53,9 +52,42 @@ void to_proto(const KeptStateReport& from, v1::GetStateResponse& to) {
   to.set_start_count(from.start_count);
 }
 
+v1::Role to_proto(Role role) {
+  switch (role) {
+    case Role::none:
+      return v1::ROLE_NONE;
+    case Role::viewer:
+      return v1::ROLE_VIEWER;
+    case Role::operator_:
+      return v1::ROLE_OPERATOR;
+    case Role::maintainer:
+      return v1::ROLE_MAINTAINER;
+  }
+  return v1::ROLE_UNSPECIFIED;
+}
+
+void say_who(const Callers& callers, const grpc::CallbackServerContext& context, v1::GetInfoResponse& to) {
+  const auto caller = callers.of(context);
+  const auto access = callers.access();
+  const auto role = role_of(access.get(), caller);
+  to.set_client(caller.name);
+  to.set_identity(caller.identity);
+  to.set_program(callers.peer_of(context).program);
+  to.set_role(to_proto(role));
+  if (!access) return;
+  for (const auto& [axis, roles] : access->axes) {
+    const auto here = role_of(access.get(), caller, axis);
+    if (here == role) continue;
+    auto& entry = *to.add_axis_roles();
+    entry.set_axis(axis);
+    entry.set_role(to_proto(here));
+  }
+}
+
 }  // namespace
 
-SystemServiceImpl::SystemServiceImpl(const Services& services) : services_(services) {
+SystemServiceImpl::SystemServiceImpl(const Services& services)
+    : BoundedService(services), services_(services) {
   begin_within_bounds(&SystemServiceImpl::GetInfo, &SystemServiceImpl::StopAll,
                       &SystemServiceImpl::ReleaseStopAll, &SystemServiceImpl::GetState,
                       &SystemServiceImpl::AcceptState, &SystemServiceImpl::BackUpState,
@@ -72,6 +104,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1:
   response->set_inhibited(info.inhibited);
   response->set_inhibited_by(info.inhibited_by);
   response->set_state_unaccepted(info.state_unaccepted);
+  say_who(services_.callers, *context, *response);
   return answer(context, grpc::Status::OK);
 }
 

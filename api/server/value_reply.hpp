@@ -18,7 +18,7 @@
 namespace axisd::server {
 
 /// The callback that ends `call`: with the value, given to `fill` on the reply thread while the response
-/// exists, or with the error's status. `what` ("local:unix: feeder save_parameters", first who asked) is
+/// exists, or with the error's status. `what` ("unix:anna: feeder save_parameters", first who asked) is
 /// logged with the outcome, also if the client has left; empty: nothing is logged.
 template <class Value, class Fill>
 [[nodiscard]] std::function<void(Result<Value>)> reply_with_value(ReplyPtr call, Fill fill,

@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "api/server/peer.hpp"
 #include "axisd/v1/axis_service.pb.h"
 #include "buses/limited_log.hpp"
 
@@ -58,7 +57,7 @@ void WatchStream::cancel_if_stalled(TimePoint now, Duration limit) {
   if (finished_ || cancelled_ || idle()) return;
   if (now - write_began_ <= (closing_with_ ? milliseconds(100) : limit)) return;
   cancelled_ = true;
-  log_limited(spdlog::level::warn, client_of(*context_), "streams",
+  log_limited(spdlog::level::warn, ticket_.client(), "streams",
               fmt::format("{} stopped reading its axis stream: cancelled after {} batches, {} dropped",
                           context_->peer(), tick_, dropped_));
   context_->TryCancel();  // fails the pending write, which ends the stream

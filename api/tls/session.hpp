@@ -45,9 +45,6 @@ class Session {
 
   /// The handshake is over, and the peer's certificate is good.
   [[nodiscard]] bool established() const;
-  /// The common name of the peer's certificate, else its first alternative name (DNS, URI, mail, address);
-  /// empty: it has neither. May hold any bytes. Precondition: established().
-  [[nodiscard]] std::string name() const;
   /// The peer's certificate in PEM format. Precondition: established().
   [[nodiscard]] std::string certificate() const;
 

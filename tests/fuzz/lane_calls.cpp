@@ -16,7 +16,7 @@ void run(Input input) {
   calls.start({.stream = 1,
                .path = std::string(path < paths.size() ? paths[path] : "/axisd.v1.AxisService/Home"),
                .message = std::string(text(input.rest()))},
-              "fuzz", [](StopCalls::Make make) { (void)make(); });
+              {.name = "fuzz"}, [](StopCalls::Make make) { (void)make(); });
 }
 
 }  // namespace axisd::fuzz

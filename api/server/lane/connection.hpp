@@ -25,12 +25,10 @@ class Connection {
   [[nodiscard]] bool wants_to_write() const { return !out_.empty(); }
   /// The peer is who its certificate says, or needs none.
   [[nodiscard]] bool identified() const { return !tls_ || tls_->established(); }
-  /// tls::Session::name(); nothing: there is no TLS. Precondition: identified().
-  [[nodiscard]] std::optional<std::string> name() const {
-    return tls_ ? std::optional(tls_->name()) : std::nullopt;
+  /// tls::Session::certificate(); nothing: there is no TLS. Precondition: identified().
+  [[nodiscard]] std::optional<std::string> certificate() const {
+    return tls_ ? std::optional(tls_->certificate()) : std::nullopt;
   }
-  /// tls::Session::certificate(). Precondition: as of name(), with TLS.
-  [[nodiscard]] std::string certificate() const { return tls_->certificate(); }
   [[nodiscard]] int waiting() const { return http_.waiting(); }
 
   /// The socket is readable. False: the connection is over.

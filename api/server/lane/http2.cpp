@@ -104,6 +104,7 @@ struct SessionOptions {
 struct Http2::Stream {
   std::string path, body;
   std::optional<Duration> patience;
+  Claim claim;
   std::size_t headers = 0;
   bool is_grpc = false, compressed = false;
   bool handed_out = false;  ///< to on_call_, and not answered yet
@@ -151,6 +152,10 @@ struct Http2::Callbacks {
       stream->patience = timeout_of(text);
     } else if (key == "grpc-encoding") {
       stream->compressed = text != "identity";
+    } else if (key == user_key) {
+      stream->claim.user = text;
+    } else if (key == role_key) {
+      stream->claim.role = text;
     }
     return 0;
   }
@@ -264,7 +269,8 @@ void Http2::complete(std::int32_t id, Stream& stream) {
   on_call_({.stream = id,
             .path = stream.path,
             .message = std::exchange(stream.body, {}).substr(prefix),
-            .patience = stream.patience});
+            .patience = stream.patience,
+            .claim = std::move(stream.claim)});
 }
 
 void Http2::answer(std::int32_t id, Answer answer) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "api/server/access.hpp"
 #include "buses/clock.hpp"
 
 struct nghttp2_session;
@@ -34,6 +35,7 @@ class Http2 {
     std::string path;  ///< "/axisd.v1.StopService/Stop"
     std::string message;
     std::optional<Duration> patience;  ///< grpc-timeout
+    Claim claim;                       ///< of whom it is made for
   };
   /// Called inside receive(), where answer() may be called as well.
   using OnCall = std::function<void(Call call)>;

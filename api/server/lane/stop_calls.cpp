@@ -21,7 +21,9 @@ struct Context {
   Admission& admission;
   Allowance& suggestions;
   const Http2::Call& call;
-  const std::string& client;
+  const AccessSettings* access;
+  const Peer& peer;
+  std::string client;  ///< whom the call is for
   StopCalls::Done done;
 };
 
@@ -70,6 +72,12 @@ std::optional<Request> parsed(const Context& context) {
   }
   if (const auto within = check_bounds(request); !within) {
     refuse(context.done, within.error());
+    return std::nullopt;
+  }
+  const auto groups =
+      context.access == nullptr ? std::vector<GroupSettings>() : context.machine.group_access().groups();
+  if (const auto may = admitted(context.access, context.peer, context.call.claim, request, groups); !may) {
+    refuse(context.done, may.error());
     return std::nullopt;
   }
   return request;
@@ -143,17 +151,25 @@ bool Allowance::take(TimePoint now) {
   return true;
 }
 
-void StopCalls::start(const Http2::Call& call, const std::string& client, Done done) {
+StopCalls::StopCalls(Machine& machine, std::shared_ptr<const AccessControl> access)
+    : machine_(machine),
+      access_(access ? std::move(access) : std::make_shared<const AccessControl>()),
+      admission_({}) {}
+
+void StopCalls::start(const Http2::Call& call, const Peer& peer, Done done) {
   const auto* found = std::ranges::find(table, call.path, &Entry::path);
   if (found == std::end(table))
     return refuse(done, {.reason = Reason::not_supported,
                          .message = "this port takes stops, and what renews a jog or a lease",
                          .remedy = "ask for everything else at the main port"});
+  const auto access = access_->settings();
   found->handler({.machine = machine_,
                   .admission = admission_,
                   .suggestions = suggestions_,
                   .call = call,
-                  .client = client,
+                  .access = access.get(),
+                  .peer = peer,
+                  .client = admitted_caller(access.get(), peer, call.claim).name,
                   .done = std::move(done)});
 }
 

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "api/server/access.hpp"
 #include "api/server/admission.hpp"
 #include "api/server/lane/http2.hpp"
 #include "buses/clock.hpp"
@@ -34,20 +36,21 @@ class StopCalls {
   /// Takes it over, once per call. Thread: any; meant for the core.
   using Done = std::function<void(Make make)>;
 
-  /// `machine` outlives this.
-  explicit StopCalls(Machine& machine) : machine_(machine), admission_({}) {}
+  /// `machine` outlives this. `access`: nullptr: everybody may do everything.
+  explicit StopCalls(Machine& machine, std::shared_ptr<const AccessControl> access = {});
   /// For an axis that there is not the one that was probably meant is looked for: among hundreds that takes
   /// longer than a stop. In all, at once and in a second.
   static constexpr double suggestions = 20;
 
   /// Begins a call; refusals come through `done`, too. Thread: the lane's.
-  void start(const Http2::Call& call, const std::string& client, Done done);
+  void start(const Http2::Call& call, const Peer& peer, Done done);
 
   /// "/axisd.v1.StopService/Stop" and so on, all that are taken.
   [[nodiscard]] static std::vector<std::string_view> paths();
 
  private:
   Machine& machine_;
+  const std::shared_ptr<const AccessControl> access_;
   Admission admission_;
   Allowance suggestions_{suggestions};
 };

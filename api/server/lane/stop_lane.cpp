@@ -20,9 +20,11 @@
 #include "api/server/lane/connection.hpp"
 #include "api/server/lane/stop_calls.hpp"
 #include "api/server/listen.hpp"
+#include "api/server/local_peer.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/peer_socket.hpp"
 #include "api/server/status.hpp"
+#include "api/tls/identity.hpp"
 
 namespace axisd::server {
 
@@ -48,6 +50,8 @@ std::string text_of(const sockaddr_storage& address, socklen_t size) {
   return address.ss_family == AF_INET6 ? fmt::format("ipv6:[{}]:0", host) : fmt::format("ipv4:{}:0", host);
 }
 
+Peer peer_called(const std::string& host) { return {.name = "local:" + host}; }
+
 }  // namespace
 
 std::string stop_lane_of(const std::string& listen) {
@@ -59,13 +63,17 @@ std::string stop_lane_of(const std::string& listen) {
 
 class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
  public:
-  Loop(Machine& machine, Places::Limits limits) : calls_(machine), places_(limits) {
+  Loop(Machine& machine, const StopLaneOptions& options)
+      : calls_(machine, options.access), places_(options.limits) {
     if (wake_.get() < 0) throw std::bad_alloc();
   }
 
-  void open(std::vector<ListeningSocket> sockets, std::shared_ptr<const tls::Acceptor> acceptor) {
+  /// `identities`: with an acceptor.
+  void open(std::vector<ListeningSocket> sockets, std::shared_ptr<const tls::Acceptor> acceptor,
+            std::unique_ptr<const tls::Identities> identities) {
     sockets_ = std::move(sockets);
     acceptor_ = std::move(acceptor);
+    identities_ = std::move(identities);
   }
 
   void run();
@@ -84,8 +92,9 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
 
  private:
   using Id = Places::Id;
-  struct Peer {
-    std::string host, client;  ///< client: once it is identified
+  struct Client {
+    std::string host;
+    std::optional<Peer> peer;  ///< once it is identified
     std::unique_ptr<Connection> connection;
   };
   struct Done {
@@ -97,10 +106,10 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   bool serve_once();
   void accept_from(const ListeningSocket& socket);
   void let_in_from_inside();
-  void enter(FileDescriptor socket, const std::string& host, bool encrypted);
+  void enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& host);
   void serve(Id id);
   void begin(Id id, const lane::Http2::Call& call);
-  void identify(Id id, Peer& peer);
+  void identify(Id id, Client& client);
   void close(std::optional<Id> id);
   void post(Done done);
   void answer_what_is_done();
@@ -110,7 +119,8 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   Places places_;
   std::vector<ListeningSocket> sockets_;
   std::shared_ptr<const tls::Acceptor> acceptor_;
-  std::map<Id, Peer> peers_;
+  std::unique_ptr<const tls::Identities> identities_;
+  std::map<Id, Client> clients_;
   Id last_ = 0;
   std::uint64_t turned_away_ = 0;
   TimePoint full_until_{};  ///< nobody is let in: the system has no descriptors
@@ -128,7 +138,7 @@ void StopLane::Loop::run() {
       if (!serve_once()) break;
     } catch (const std::exception& error) {  // no memory: nobody keeps any here
       spdlog::critical("stop lane: {}; all of its connections are closed", error.what());
-      peers_.clear();
+      clients_.clear();
       places_.clear();
     }
   }
@@ -146,10 +156,10 @@ bool StopLane::Loop::serve_once() {
     polled.push_back({.fd = full ? -1 : socket.fd.get(), .events = POLLIN, .revents = 0});
   const auto first = polled.size();
   std::vector<Id> ids;
-  ids.reserve(peers_.size());
-  for (const auto& [id, peer] : peers_) {
-    const short events = peer.connection->wants_to_write() ? POLLIN | POLLOUT : POLLIN;
-    polled.push_back({.fd = peer.connection->fd(), .events = events, .revents = 0});
+  ids.reserve(clients_.size());
+  for (const auto& [id, client] : clients_) {
+    const short events = client.connection->wants_to_write() ? POLLIN | POLLOUT : POLLIN;
+    polled.push_back({.fd = client.connection->fd(), .events = events, .revents = 0});
     ids.push_back(id);
   }
   const auto until =
@@ -168,8 +178,8 @@ bool StopLane::Loop::serve_once() {
   // Whoever is known goes before strangers, whose handshakes cost a thousand times as much as a stop.
   for (std::size_t i = 0; i < ids.size(); ++i) {
     if (polled[first + i].revents == 0) continue;
-    const auto peer = peers_.find(ids[i]);  // it may have ended with its answer
-    if (peer != peers_.end()) (peer->second.client.empty() ? strangers : known).push_back(ids[i]);
+    const auto client = clients_.find(ids[i]);  // it may have ended with its answer
+    if (client != clients_.end()) (client->second.peer ? known : strangers).push_back(ids[i]);
   }
   for (const auto id : known) serve(id);
   for (const auto id : strangers) serve(id);
@@ -198,7 +208,12 @@ void StopLane::Loop::accept_from(const ListeningSocket& socket) {
       setsockopt(connection.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
       setsockopt(connection.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, &patience_ms, sizeof patience_ms);
     }
-    enter(std::move(connection), peer_host(text_of(address, size)), socket.unix_path.empty());
+    const auto host = peer_host(text_of(address, size));
+    const bool local = !socket.unix_path.empty();
+    auto peer = local       ? std::optional(local_peer(connection.get()))
+                : acceptor_ ? std::nullopt
+                            : std::optional(peer_called(host));
+    enter(std::move(connection), std::move(peer), host);
   }
 }
 
@@ -208,51 +223,47 @@ void StopLane::Loop::let_in_from_inside() {
     const std::lock_guard lock(mutex_);
     joining.swap(joining_);
   }
-  for (auto& socket : joining) enter(std::move(socket), "daemon", false);
+  for (auto& socket : joining) enter(std::move(socket), peer_called("daemon"), "daemon");
 }
 
-void StopLane::Loop::enter(FileDescriptor socket, const std::string& host, bool encrypted) {
+/// `peer`: nothing: whom its certificate names.
+void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& host) {
   const auto id = ++last_;
   const auto now = monotonic_now();
   auto network = address_of_peer(socket.get());
-  auto acceptor = encrypted ? acceptor_ : nullptr;
-  const bool anonymous = acceptor == nullptr;
-  auto& peer = peers_[id];
-  peer.host = host;
-  peer.connection = std::make_unique<Connection>(
+  auto acceptor = peer ? nullptr : acceptor_;
+  auto& client = clients_[id];
+  client.host = host;
+  client.peer = std::move(peer);
+  client.connection = std::make_unique<Connection>(
       std::move(socket), std::move(acceptor), [this, id](const lane::Http2::Call& call) { begin(id, call); },
       now);
   close(places_.enter(id, {.address = host, .network = std::move(network)}, now));
-  if (anonymous) identify(id, peer);
+  if (client.peer) close(places_.identify(id, client.peer->name, true, now));
 }
 
-/// Precondition: the connection is identified.
-void StopLane::Loop::identify(Id id, Peer& peer) {
-  const auto name = peer.connection->name();
-  if (!name)
-    peer.client = "local:" + peer.host;
-  else
-    peer.client =
-        name->empty() ? unnamed_identity(peer.connection->certificate()) : printable_identity(*name);
-  close(places_.identify(id, peer.client, !name, monotonic_now()));
+/// Precondition: the connection is identified, by a certificate.
+void StopLane::Loop::identify(Id id, Client& client) {
+  client.peer = Peer{.name = identities_->of(client.connection->certificate().value_or(""))};
+  close(places_.identify(id, client.peer->name, false, monotonic_now()));
 }
 
 void StopLane::Loop::serve(Id id) {
-  const auto found = peers_.find(id);
-  if (found == peers_.end()) return;  // it made room
-  auto& peer = found->second;
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;  // it made room
+  auto& client = found->second;
   const auto now = monotonic_now();
-  if (!peer.connection->read(now)) return close(id);
-  if (peer.client.empty() && peer.connection->identified()) identify(id, peer);
-  places_.used(id, now, peer.connection->waiting());
+  if (!client.connection->read(now)) return close(id);
+  if (!client.peer && client.connection->identified()) identify(id, client);
+  places_.used(id, now, client.connection->waiting());
 }
 
 void StopLane::Loop::begin(Id id, const lane::Http2::Call& call) {
-  auto& peer = peers_.at(id);
+  auto& client = clients_.at(id);
   // Bytes of the first request may come with the last ones of the handshake.
-  if (peer.client.empty()) identify(id, peer);
+  if (!client.peer) identify(id, client);
   places_.asked(id);
-  calls_.start(call, peer.client, [loop = weak_from_this(), id, stream = call.stream](StopCalls::Make make) {
+  calls_.start(call, *client.peer, [loop = weak_from_this(), id, stream = call.stream](StopCalls::Make make) {
     if (const auto alive = loop.lock()) alive->post({.id = id, .stream = stream, .make = std::move(make)});
   });
 }
@@ -273,8 +284,8 @@ void StopLane::Loop::answer_what_is_done() {
   }
   for (auto& each : done) {
     auto answer = each.make();  // also logs, whether or not the client is still there
-    const auto found = peers_.find(each.id);
-    if (found == peers_.end()) continue;
+    const auto found = clients_.find(each.id);
+    if (found == clients_.end()) continue;
     auto& connection = *found->second.connection;
     connection.answer(each.stream, std::move(answer));
     if (!connection.write()) {
@@ -287,23 +298,23 @@ void StopLane::Loop::answer_what_is_done() {
 
 void StopLane::Loop::close(std::optional<Id> id) {
   if (!id) return;
-  const auto found = peers_.find(*id);
-  if (found == peers_.end()) return;
-  if (found->second.client.empty())
+  const auto found = clients_.find(*id);
+  if (found == clients_.end()) return;
+  if (!found->second.peer)
     if (const auto count = ++turned_away_; std::has_single_bit(count))
       spdlog::info("stop lane: {} connections ended before anybody was identified on them, the last from {}",
                    count, found->second.host);
   places_.leave(*id);
-  peers_.erase(found);
+  clients_.erase(found);
 }
 
 void StopLane::Loop::say_goodbye() {
   answer_what_is_done();
-  for (auto& [id, peer] : peers_) {
-    peer.connection->go_away();
-    (void)peer.connection->write();
+  for (auto& [id, client] : clients_) {
+    client.connection->go_away();
+    (void)client.connection->write();
   }
-  peers_.clear();
+  clients_.clear();
   sockets_.clear();
 }
 
@@ -314,18 +325,20 @@ StopLane::~StopLane() { stop(); }
 
 Result<int> StopLane::listen() {
   std::shared_ptr<const tls::Acceptor> acceptor;
+  std::unique_ptr<const tls::Identities> identities;
   if (options_.tls) {
     const auto contents = tls::read(*options_.tls);
     if (!contents) return fail(contents.error());
     auto made = tls::Acceptor::make(*contents);
     if (!made) return fail(std::move(made).error());
     acceptor = *std::move(made);
+    identities = std::make_unique<const tls::Identities>(contents->client_ca);
   }
   auto sockets = listen_on(options_.listen, options_.tls.has_value());
   if (!sockets) return fail(std::move(sockets).error());
   const int port = sockets->front().port;
-  loop_ = std::make_shared<Loop>(machine_, options_.limits);
-  loop_->open(*std::move(sockets), std::move(acceptor));
+  loop_ = std::make_shared<Loop>(machine_, options_);
+  loop_->open(*std::move(sockets), std::move(acceptor), std::move(identities));
   spdlog::info("stops are taken on {} as well", port == 0 ? options_.listen : fmt::format("port {}", port));
   return port;
 }

@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "api/server/access.hpp"
 #include "api/server/lane/places.hpp"
 #include "api/server/tls.hpp"
 #include "buses/file_descriptor.hpp"
@@ -18,6 +19,8 @@ struct StopLaneOptions {
   std::string listen;  ///< "HOST:PORT", "[IPV6]:PORT" or "unix:PATH"
   std::optional<TlsFiles> tls{};
   lane::Places::Limits limits{};
+  /// As of ServerOptions: the same for both.
+  std::shared_ptr<const AccessControl> access{};
 };
 
 /// Where the stop lane of a server is, unless it is told: the next port, or the path with ".stop" behind it;

@@ -61,7 +61,7 @@ TEST_F(Calls, EveryMotionReachesTheMachineAndReturnsItsCommand) {
   EXPECT_TRUE(call(&Stub::Enable).ok());
   EXPECT_EQ(command_.kind(), v1::COMMAND_KIND_ENABLE);
   EXPECT_EQ(command_.id(), "c-1");
-  EXPECT_EQ(command_.client(), "local:unix");
+  EXPECT_EQ(command_.client(), own_name());
   EXPECT_TRUE(call(&Stub::Disable).ok());
   EXPECT_EQ(command_.kind(), v1::COMMAND_KIND_DISABLE);
   EXPECT_TRUE(call(&Stub::Home).ok());
@@ -93,7 +93,7 @@ TEST_F(Calls, EveryMotionReachesTheMachineAndReturnsItsCommand) {
   release.set_axis("feeder");
   v1::ReleaseStopResponse released;
   EXPECT_TRUE(axes_->ReleaseStop(&context, release, &released).ok());
-  EXPECT_THAT(machine_.log(), ElementsAre("release_stop feeder by local:unix as  whose 0 token 0"));
+  EXPECT_THAT(machine_.log(), ElementsAre("release_stop feeder by " + own_name() + " as  whose 0 token 0"));
   EXPECT_EQ(released.command().id(), "c-1");
   ASSERT_EQ(released.holds_size(), 1);
   EXPECT_EQ(released.holds(0).request_id(), "r-1");
@@ -236,7 +236,8 @@ TEST_F(Calls, SystemAndBuses) {
   EXPECT_FALSE(stopped.has_not_durable());
   v1::ReleaseStopAllResponse released;
   EXPECT_TRUE(system->ReleaseStopAll(&c3, {}, &released).ok());
-  EXPECT_THAT(machine_.log(), ElementsAre("stop_all local:unix done", "release_inhibit local:unix"));
+  EXPECT_THAT(machine_.log(),
+              ElementsAre("stop_all " + own_name() + " done", "release_inhibit " + own_name()));
   v1::ListBusesResponse buses;
   EXPECT_TRUE(v1::BusService::NewStub(channel_)->ListBuses(&c4, {}, &buses).ok());
   ASSERT_EQ(buses.buses_size(), 2);
@@ -292,8 +293,8 @@ TEST_F(Calls, StateIsToldAndAccepted) {
   EXPECT_TRUE(system->StopAll(&c4, {}, &stopped).ok());
   EXPECT_EQ(stopped.not_durable().reason(), v1::REASON_STORAGE);
   EXPECT_EQ(stopped.not_durable().message(), "full");
-  EXPECT_THAT(machine_.log(),
-              ElementsAre("kept_state", "accept_state local:unix", "stop_all local:unix accepted"));
+  EXPECT_THAT(machine_.log(), ElementsAre("kept_state", "accept_state " + own_name(),
+                                          "stop_all " + own_name() + " accepted"));
 }
 
 TEST_F(Calls, BudgetsOfAllBusesOrOfOne) {

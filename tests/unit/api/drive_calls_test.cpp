@@ -83,7 +83,7 @@ TEST_F(DriveCalls, ParametersAreReadAndWrittenByName) {
   ASSERT_TRUE(call(*drives_, &Drives::WriteParameters, write, written).ok());
   EXPECT_EQ(written.values(0).value(), 5);
   EXPECT_THAT(machine_.drives().log(), ElementsAre("read_parameters feeder 0x12 0x10",
-                                                   "write_parameters feeder by local:unix 0x10=5"));
+                                                   "write_parameters feeder by " + own_name() + " 0x10=5"));
 }
 
 TEST_F(DriveCalls, BadBatchesReachNothing) {
@@ -135,8 +135,8 @@ TEST_F(DriveCalls, MemoryNeedsTheNameAgain) {
   EXPECT_TRUE(call(*drives_, &Drives::SaveParameters, save, saved).ok());
   EXPECT_TRUE(call(*drives_, &Drives::RestoreFactory, restore, restored).ok());
   EXPECT_EQ(restored.after_power_cycle(), "node by its switches, 9600 8N1");
-  EXPECT_THAT(machine_.drives().log(),
-              ElementsAre("save_parameters feeder by local:unix", "restore_factory feeder by local:unix"));
+  EXPECT_THAT(machine_.drives().log(), ElementsAre("save_parameters feeder by " + own_name(),
+                                                   "restore_factory feeder by " + own_name()));
 }
 
 TEST_F(DriveCalls, SegmentsAreReplacedAsAWhole) {
@@ -155,9 +155,9 @@ TEST_F(DriveCalls, SegmentsAreReplacedAsAWhole) {
   *write.mutable_segments() = table.segments();
   ASSERT_TRUE(call(*drives_, &Drives::WriteSegments, write, written).ok());
   EXPECT_EQ(written.segments().positions(0).target(), -5);
-  EXPECT_THAT(
-      machine_.drives().log(),
-      ElementsAre("read_segments feeder", "write_segments feeder by local:unix absolute 2:-5:10:100"));
+  EXPECT_THAT(machine_.drives().log(),
+              ElementsAre("read_segments feeder",
+                          "write_segments feeder by " + own_name() + " absolute 2:-5:10:100"));
 }
 
 TEST_F(DriveCalls, DevicesAndSingleExchanges) {

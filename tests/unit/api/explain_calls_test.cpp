@@ -67,15 +67,16 @@ TEST_F(ExplainCalls, EachCommandIsAskedAboutUnderItsLease) {
   ask([&] { request_.mutable_jog()->set_velocity(0); });
   ask([&] { request_.mutable_reset(); });
   ask([&] { request_.mutable_set_position()->set_position(0); });
-  EXPECT_THAT(
-      machine_.log(),
-      ElementsAre(
-          "explain feeder motion by local:unix token 7", "explain feeder enable by local:unix token 7",
-          "explain feeder disable by local:unix token 0", "explain feeder home by local:unix token 9",
-          "explain feeder move_absolute by local:unix token 7",
-          "explain feeder move_relative by local:unix token 7",
-          "explain feeder move_velocity by local:unix token 7", "explain feeder jog by local:unix token 7",
-          "explain feeder reset by local:unix token 7", "explain feeder set_position by local:unix token 7"));
+  EXPECT_THAT(machine_.log(), ElementsAre("explain feeder motion by " + own_name() + " token 7",
+                                          "explain feeder enable by " + own_name() + " token 7",
+                                          "explain feeder disable by " + own_name() + " token 0",
+                                          "explain feeder home by " + own_name() + " token 9",
+                                          "explain feeder move_absolute by " + own_name() + " token 7",
+                                          "explain feeder move_relative by " + own_name() + " token 7",
+                                          "explain feeder move_velocity by " + own_name() + " token 7",
+                                          "explain feeder jog by " + own_name() + " token 7",
+                                          "explain feeder reset by " + own_name() + " token 7",
+                                          "explain feeder set_position by " + own_name() + " token 7"));
 }
 
 TEST_F(ExplainCalls, WhatTheCommandItselfWouldBeRefusedForHereIsRefusedHere) {

@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// "local:unix", "local:unix under 7".
+/// "unix:anna", "unix:anna under 7".
 std::string text_of(const Requester& requester) {
   return requester.lease_token == 0 ? requester.client
                                     : fmt::format("{} under {}", requester.client, requester.lease_token);

@@ -51,7 +51,7 @@ class FakeMachine final : public Machine {
 
   [[nodiscard]] std::vector<Submitted> submitted() const;
   [[nodiscard]] std::vector<std::string> log()
-      const;  ///< other calls: "release_stop feeder", "stop_all local:unix" ...
+      const;  ///< other calls: "release_stop feeder", "stop_all unix:anna" ...
   [[nodiscard]] std::size_t held() const;
   [[nodiscard]] std::size_t watchers() const;
 

@@ -46,9 +46,9 @@ TEST_F(GroupCalls, MoveCarriesEverythingBothWays) {
   request_.mutable_max_arrival_error()->set_nanos(3'000'000);
   request_.mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE);
   ASSERT_TRUE(move().ok());
-  EXPECT_THAT(
-      machine_.groups().log(),
-      ElementsAre("move gantry feeder=0 turntable+=-5 together true within 3 by local:unix as r-1 until 2"));
+  EXPECT_THAT(machine_.groups().log(),
+              ElementsAre("move gantry feeder=0 turntable+=-5 together true within 3 by " + own_name() +
+                          " as r-1 until 2"));
   const auto& got = response_.move();
   EXPECT_EQ(got.id(), "g-1");
   EXPECT_EQ(got.group(), "gantry");
@@ -110,7 +110,7 @@ TEST_F(GroupCalls, StopsTellOfEachNameAndNeverFailForOne) {
   v1::GroupStopResponse response;
   ASSERT_TRUE(groups_->GroupStop(&context, request, &response).ok());
   EXPECT_THAT(machine_.groups().log(),
-              ElementsAre("stop gantry feeder+nobody kind 2 hold true as r-1 by local:unix until 2"));
+              ElementsAre("stop gantry feeder+nobody kind 2 hold true as r-1 by " + own_name() + " until 2"));
   ASSERT_EQ(response.results_size(), 2);
   EXPECT_EQ(response.results(0).command().axis(), "feeder");
   EXPECT_EQ(response.results(1).error().reason(), v1::REASON_UNKNOWN_AXIS);
@@ -132,7 +132,8 @@ TEST_F(GroupCalls, AStopIsNeverRefusedForItsRequestId) {
   request.set_request_id("two words");
   v1::GroupStopResponse response;
   ASSERT_TRUE(groups_->GroupStop(&context, request, &response).ok());
-  EXPECT_THAT(machine_.groups().log(), ElementsAre("stop  feeder kind 2 hold true by local:unix until 0"));
+  EXPECT_THAT(machine_.groups().log(),
+              ElementsAre("stop  feeder kind 2 hold true by " + own_name() + " until 0"));
 }
 
 TEST_F(GroupCalls, ReleasesTellOfEachName) {
@@ -144,7 +145,7 @@ TEST_F(GroupCalls, ReleasesTellOfEachName) {
   v1::GroupReleaseStopResponse response;
   ASSERT_TRUE(groups_->GroupReleaseStop(&context, request, &response).ok());
   EXPECT_THAT(machine_.groups().log(),
-              ElementsAre("release  feeder+nobody by local:unix as r-1 whose 0 token 0"));
+              ElementsAre("release  feeder+nobody by " + own_name() + " as r-1 whose 0 token 0"));
   ASSERT_EQ(response.results_size(), 2);
   ASSERT_EQ(response.results(0).holds_size(), 1);
   EXPECT_EQ(response.results(0).holds(0).holder(), "hmi");

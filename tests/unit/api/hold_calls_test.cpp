@@ -28,9 +28,9 @@ TEST_F(HoldCalls, AReleaseSaysWhoseHoldsAreToEnd) {
                 r.set_everybody(true);
                 r.set_lease_token(9);
               }).ok());
-  EXPECT_THAT(machine_.log(), ElementsAre("release_stop feeder by local:unix as r-1 whose 0 token 0",
-                                          "release_stop feeder by local:unix as  whose 1 token 0",
-                                          "release_stop feeder by local:unix as  whose 2 token 9"));
+  EXPECT_THAT(machine_.log(), ElementsAre("release_stop feeder by " + own_name() + " as r-1 whose 0 token 0",
+                                          "release_stop feeder by " + own_name() + " as  whose 1 token 0",
+                                          "release_stop feeder by " + own_name() + " as  whose 2 token 9"));
   for (const auto& status : {release([](auto& r) {
                                r.set_request_id("r-1");
                                r.set_everybody(true);

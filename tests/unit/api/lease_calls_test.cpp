@@ -35,10 +35,10 @@ TEST_F(LeaseCalls, AcquireCarriesEverythingAndGivesTheToken) {
   request_.set_take(true);
   request_.set_request_id("r-1");
   ASSERT_TRUE(acquire().ok());
-  EXPECT_THAT(machine_.leases().log(),
-              ElementsAre("acquire feeder+turntable by local:unix as 'panel 2' ttl 3000 take true id 'r-1'"));
+  EXPECT_THAT(machine_.leases().log(), ElementsAre("acquire feeder+turntable by " + own_name() +
+                                                   " as 'panel 2' ttl 3000 take true id 'r-1'"));
   EXPECT_EQ(granted_.lease_token(), 7U);
-  EXPECT_EQ(granted_.lease().client(), "local:unix");
+  EXPECT_EQ(granted_.lease().client(), own_name());
   EXPECT_EQ(granted_.lease().label(), "panel 2");
   EXPECT_THAT(granted_.lease().axes(), ElementsAre("feeder", "turntable"));
   EXPECT_EQ(granted_.lease().ttl().seconds(), 2);
@@ -96,8 +96,8 @@ TEST_F(LeaseCalls, RenewReleaseAndListAreTheHolders) {
   v1::ReleaseLeaseResponse released;
   Call third;
   ASSERT_TRUE(leases_->ReleaseLease(&third, release, &released).ok());
-  EXPECT_EQ(machine_.leases().log().at(1), "renew by local:unix under 7");
-  EXPECT_EQ(machine_.leases().log().at(2), "release by local:unix under 7");
+  EXPECT_EQ(machine_.leases().log().at(1), "renew by " + own_name() + " under 7");
+  EXPECT_EQ(machine_.leases().log().at(2), "release by " + own_name() + " under 7");
 }
 
 TEST_F(LeaseCalls, TheMachinesRefusalIsTheCalls) {

@@ -141,8 +141,8 @@ TEST_F(ProgressStreams, ReaddressEndsWithWhatWasAskedFor) {
   EXPECT_EQ(response.phase(), v1::SERIAL_PHASE_VERIFIED);
   EXPECT_TRUE(reader->Finish().ok());
   EXPECT_THAT(machine_.drives().log(),
-              ElementsAre("change_serial feeder by local:unix node 7 baud 0 verify 0",
-                          "change_serial feeder by local:unix node 7 baud 0 verify 60"));
+              ElementsAre("change_serial feeder by " + own_name() + " node 7 baud 0 verify 0",
+                          "change_serial feeder by " + own_name() + " node 7 baud 0 verify 60"));
 }
 
 TEST_F(ProgressStreams, ShutdownEndsThem) {

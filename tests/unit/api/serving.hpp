@@ -10,6 +10,8 @@
 #include <memory>
 #include <string>
 
+#include "api/server/listen.hpp"
+#include "api/server/local_peer.hpp"
 #include "api/server/server.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/error.pb.h"
@@ -35,6 +37,12 @@ class TemporaryDirectory {
  private:
   std::filesystem::path path_;
 };
+
+/// Who a client in this process is, on a unix socket.
+inline const std::string& own_name() {
+  static const auto name = server::local_peer(server::connected_pair().first.get()).name;
+  return name;
+}
 
 /// Looks again until `condition` holds; false if it never does.
 inline bool eventually(const std::function<bool()>& condition) {

@@ -189,7 +189,7 @@ TEST_F(WatchCalls, FlightRecordsAreListedReadAndWritten) {
   ASSERT_TRUE(stub()->WriteFlightRecord(&context, request, &response).ok());
   EXPECT_EQ(response.name(), "line-a-2.wire");
   EXPECT_THAT(machine_.watch().log(), ElementsAre("flight_records", "flight_record line-a-1.wire",
-                                                  "write_flight_record line-a local:unix"));
+                                                  "write_flight_record line-a " + own_name()));
 }
 
 }  // namespace

@@ -1,0 +1,50 @@
+// Who calls, whom for, and whether they may.
+#pragma once
+
+#include <google/protobuf/message.h>
+#include <grpcpp/server_context.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+
+#include "api/server/access.hpp"
+#include "api/tls/identity.hpp"
+#include "devices/machine.hpp"
+
+namespace axisd::server {
+
+/// Looked at before every call of the main address. A peer is known by its certificate, by the user at the
+/// other end of its unix socket, else as "local:" and the host part of its address. Never by its port:
+/// request ids must stay valid over a reconnection. Thread: any.
+class Callers {
+ public:
+  /// `machine` outlives this. `access`: nullptr: everybody may do everything.
+  Callers(Machine& machine, std::shared_ptr<const AccessControl> access);
+
+  /// Names peers by certificates of these authorities (PEM). Before the first call.
+  void trust(const std::string& client_ca) { identities_ = std::make_unique<tls::Identities>(client_ca); }
+  /// Notes who is at the other end of a unix socket. gRPC is given the socket after that, by its number,
+  /// which is free for another one only when the last call on it is gone.
+  void enter(int connection);
+
+  /// Whether the call may be made. Errors: access_denied, invalid_argument (metadata).
+  [[nodiscard]] Result<void> admit(const grpc::CallbackServerContext& context,
+                                   const google::protobuf::Message& request) const;
+  /// Whom a call is for that was admitted.
+  [[nodiscard]] Caller of(const grpc::CallbackServerContext& context) const;
+  /// Who made its connection.
+  [[nodiscard]] Peer peer_of(const grpc::CallbackServerContext& context) const;
+  /// nullptr: there is none.
+  [[nodiscard]] std::shared_ptr<const AccessSettings> access() const { return access_->settings(); }
+
+ private:
+  Machine& machine_;
+  const std::shared_ptr<const AccessControl> access_;
+  std::unique_ptr<tls::Identities> identities_;
+  mutable std::mutex mutex_;
+  std::unordered_map<std::string, Peer> local_;  ///< under mutex_; by what gRPC calls the connection
+};
+
+}  // namespace axisd::server

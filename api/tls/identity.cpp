@@ -1,0 +1,121 @@
+#include "api/tls/identity.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <openssl/err.h>
+#include <openssl/sha.h>
+#include <openssl/x509v3.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "api/tls/pem.hpp"
+
+namespace axisd::tls {
+namespace {
+
+constexpr std::size_t longest_name = 128, longest_beginning = 96;
+constexpr std::size_t most_known = 1024;
+
+std::string text_of(const ASN1_STRING* from) {
+  unsigned char* utf8 = nullptr;
+  const int length = from == nullptr ? -1 : ASN1_STRING_to_UTF8(&utf8, from);
+  std::string text = length > 0 ? std::string(reinterpret_cast<const char*>(utf8), length) : std::string();
+  OPENSSL_free(utf8);
+  return text;
+}
+
+std::string common_name(const X509* certificate) {
+  const auto* subject = X509_get_subject_name(certificate);
+  const int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
+  return at < 0 ? std::string() : text_of(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
+}
+
+std::string address_of(const ASN1_OCTET_STRING* from) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const bool v4 = ASN1_STRING_length(from) == 4;
+  if (!v4 && ASN1_STRING_length(from) != 16) return {};
+  const auto* bytes = ASN1_STRING_get0_data(from);
+  return inet_ntop(v4 ? AF_INET : AF_INET6, bytes, text.data(), text.size()) != nullptr ? text.data() : "";
+}
+
+std::string first_alternative(const X509* certificate) {
+  using Names = std::unique_ptr<GENERAL_NAMES, Release<GENERAL_NAMES, GENERAL_NAMES_free>>;
+  const Names names(
+      static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(certificate, NID_subject_alt_name, nullptr, nullptr)));
+  for (int i = 0; names && i < sk_GENERAL_NAME_num(names.get()); ++i) {
+    const auto* name = sk_GENERAL_NAME_value(names.get(), i);
+    // One member of the union has the strings of all three kinds.
+    if (name->type == GEN_DNS || name->type == GEN_URI || name->type == GEN_EMAIL)
+      if (auto text = text_of(name->d.ia5); !text.empty()) return text;
+    if (name->type == GEN_IPADD) return address_of(name->d.iPAddress);
+  }
+  return {};
+}
+
+std::string encoded(const X509_NAME* name) {
+  unsigned char* der = nullptr;
+  const int length = i2d_X509_NAME(name, &der);
+  std::string bytes = length > 0 ? std::string(reinterpret_cast<const char*>(der), length) : std::string();
+  OPENSSL_free(der);
+  return bytes;
+}
+
+/// 16 digits of a SHA-256: nobody finds another text with the same ones.
+std::string hash_of(std::string_view text) {
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
+  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest.data());
+  std::string digits;
+  for (std::size_t i = 0; i < 8; ++i) digits += fmt::format("{:02x}", digest.at(i));
+  return digits;
+}
+
+/// Can stand for its client as it is: nothing else that is named here or by the server looks like it.
+bool is_plain(std::string_view name) {
+  const bool printable = std::ranges::all_of(name, [](char c) { return c >= ' ' && c < '~'; });
+  const bool taken = name.starts_with("local:") || name.starts_with("unix:") ||
+                     name.starts_with("unnamed:") || name.contains(" via ");
+  return printable && !taken && name.size() <= longest_name;
+}
+
+std::string beginning_of(std::string_view name) {
+  std::string text(name.substr(0, longest_beginning));
+  std::ranges::replace_if(text, [](char c) { return c <= ' ' || c >= '~'; }, '?');
+  return text;
+}
+
+}  // namespace
+
+Identities::Identities(const std::string& client_ca) {
+  if (const auto all = certificates("client_ca", client_ca); all)
+    first_authority_ = encoded(X509_get_subject_name(all->front().get()));
+}
+
+std::string Identities::of(const std::string& pem) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = known_.find(pem); found != known_.end()) return found->second;
+  }
+  auto name = read(pem);
+  const std::lock_guard lock(mutex_);
+  if (known_.size() >= most_known) known_.clear();
+  known_.emplace(pem, name);
+  return name;
+}
+
+std::string Identities::read(const std::string& pem) const {
+  const auto all = certificates("the client's certificate", pem);
+  if (!all) return "unnamed:" + hash_of(pem);
+  const auto* certificate = all->front().get();
+  auto name = common_name(certificate);
+  if (name.empty()) name = first_alternative(certificate);
+  ERR_clear_error();
+  if (name.empty()) return "unnamed:" + hash_of(pem);
+  const auto issuer = encoded(X509_get_issuer_name(certificate));
+  if (issuer == first_authority_ && is_plain(name)) return name;
+  // The issuer's encoding says how long it is: no two pairs make the same text.
+  return fmt::format("{}~{}", beginning_of(name), hash_of(issuer + name));
+}
+
+}  // namespace axisd::tls

@@ -1,0 +1,36 @@
+// Who may do what, as `access:` of the configuration says it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+
+namespace axisd {
+
+/// What a client may do, each including those before it.
+enum class Role : std::uint8_t {
+  none,        ///< what needs no role: to stop, and to ask who one is
+  viewer,      ///< to read
+  operator_,   ///< to move
+  maintainer,  ///< to change drives and configuration, and to release what others hold
+};
+
+[[nodiscard]] constexpr std::string_view to_string(Role role) {
+  constexpr std::string_view names[] = {"none", "viewer", "operator", "maintainer"};
+  return names[static_cast<std::size_t>(role)];
+}
+
+/// By the name of a client, as its certificate or its unix socket proves it.
+using Roles = std::map<std::string, Role, std::less<>>;
+
+/// Whom these name has no role, but for what is said here.
+struct AccessSettings {
+  Roles roles;  ///< on the machine, and on each axis that `axes` says nothing of
+  std::map<std::string, Roles, std::less<>> axes;  ///< on one axis, in place of those above
+  Roles delegates;  ///< who may speak for others, and the most that these may do
+
+  bool operator==(const AccessSettings&) const = default;
+};
+
+}  // namespace axisd

@@ -1,0 +1,74 @@
+// No two clients have one name.
+#include "api/tls/identity.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "tests/unit/api/certificates.hpp"
+#include "tests/unit/api/serving.hpp"
+
+namespace axisd::testing {
+namespace {
+
+using ::testing::MatchesRegex;
+
+class Identity : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    certificates_.make_ca("ca");
+    certificates_.make_ca("second");
+  }
+  [[nodiscard]] std::string read(const std::string& name) const {
+    std::ifstream file(directory_ / (name + ".crt"));
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  std::string named(const std::string& file, const std::string& subject, const std::string& extensions = "",
+                    const std::string& ca = "ca") {
+    certificates_.make_pair(file, ca, subject, extensions);
+    return tls::Identities(read("ca") + read("second")).of(read(file));
+  }
+  TemporaryDirectory directory_;
+  Certificates certificates_{directory_};
+};
+
+TEST_F(Identity, IsTheCommonNameElseTheFirstAlternative) {
+  EXPECT_EQ(named("one", "/CN=operator"), "operator");
+  EXPECT_EQ(named("two", "/O=press", "subjectAltName=URI:spiffe://cell/press\n"), "spiffe://cell/press");
+  EXPECT_THAT(named("three", "/O=press"), MatchesRegex("unnamed:[0-9a-f]{16}"));
+}
+
+TEST_F(Identity, OfASecondAuthorityIsAnother) {
+  EXPECT_EQ(named("one", "/CN=operator"), "operator");
+  EXPECT_THAT(named("two", "/CN=operator", "", "second"), MatchesRegex("operator~[0-9a-f]{16}"));
+}
+
+TEST_F(Identity, TellsLettersApartThatItCannotShow) {
+  const auto one = named("one", "/CN=J\xC3\xBCrg"), two = named("two", "/CN=J\xC3\xB6rg");
+  EXPECT_THAT(one, MatchesRegex("J[?]+rg~[0-9a-f]{16}"));
+  EXPECT_THAT(two, MatchesRegex("J[?]+rg~[0-9a-f]{16}"));
+  EXPECT_NE(one, two);
+}
+
+TEST_F(Identity, TellsLongNamesApart) {
+  const auto uri = "subjectAltName=URI:https://press/" + std::string(130, 'a');
+  const auto one = named("one", "/O=press", uri + "1\n"), two = named("two", "/O=press", uri + "2\n");
+  EXPECT_NE(one, two);
+  EXPECT_LE(one.size(), 128U);
+}
+
+TEST_F(Identity, LooksLikeNobodyElses) {
+  EXPECT_THAT(named("one", "/CN=local:localhost"), MatchesRegex("local:localhost~[0-9a-f]{16}"));
+  EXPECT_THAT(named("two", "/CN=unix:root"), MatchesRegex("unix:root~[0-9a-f]{16}"));
+  EXPECT_THAT(named("three", "'/CN=shift-a via web'"), MatchesRegex("shift-a[?]via[?]web~[0-9a-f]{16}"));
+}
+
+TEST(LocalPeer, IsTheUserAndTheProgram) {
+  const auto peer = server::local_peer(server::connected_pair().first.get());
+  EXPECT_THAT(peer.name, MatchesRegex("unix:[A-Za-z0-9._+-]+"));
+  EXPECT_THAT(peer.program, MatchesRegex("[A-Za-z0-9._+-]+"));
+}
+
+}  // namespace
+}  // namespace axisd::testing
