@@ -13,6 +13,7 @@
 #include "buses/canopen/settings.hpp"
 #include "buses/error.hpp"
 #include "buses/modbus_rtu/settings.hpp"
+#include "devices/access.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/generic/settings.hpp"
 #include "devices/group/group.hpp"
@@ -43,11 +44,18 @@ struct MetricsSettings {
   bool remote = false;  ///< other machines may connect
 };
 
+/// Who may connect without TLS.
+enum class Plaintext : std::uint8_t {
+  loopback,      ///< every program of this computer
+  unix_sockets,  ///< whom the permissions of a unix socket let in, and who is known as a user
+};
+
 struct ServerSettings {
   std::string listen =
       "localhost:7443";     ///< HOST:PORT or unix:PATH; without TLS only loopback and unix sockets
   std::string stop_listen;  ///< of the stop lane, as listen; empty: next to it
   std::optional<TlsSettings> tls;
+  Plaintext plaintext = Plaintext::loopback;
   bool reflection = false;  ///< gRPC's, for tools that read the contract from the server
   MetricsSettings metrics;
   ServerLimits limits;
@@ -89,6 +97,7 @@ struct Configuration {
   std::string machine;
   std::string state_directory = "/var/lib/axisd";  ///< where the daemon keeps its persistent state
   ServerSettings server;
+  std::optional<AccessSettings> access;  ///< nothing: everybody may do everything
   FlightRecorderSettings flight_recorder;
   AuditSettings audit;
   LeaseSettings leases;                            ///< `control:` and `leases:`

@@ -229,6 +229,7 @@ Section section_of(const ServerSettings& server) {
   Fields fields("server", {});
   fields.add("listen", server.listen);
   fields.add("stop_listen", server.stop_listen);
+  fields.add("plaintext", server.plaintext);
   fields.add("reflection", server.reflection);
   fields.add("metrics.listen", server.metrics.listen);
   fields.add("metrics.remote", server.metrics.remote);
@@ -241,6 +242,21 @@ Section section_of(const ServerSettings& server) {
   fields.add("tls.certificate", server.tls->certificate);
   fields.add("tls.key", server.tls->key);
   fields.add("tls.client_ca", server.tls->client_ca);
+  return fields.take();
+}
+
+std::string to_text(const Roles& roles) {
+  std::string text;
+  for (const auto& [client, role] : roles) text += fmt::format("{}: {}\n", client, axisd::to_string(role));
+  return text;
+}
+
+Section section_of(const AccessSettings& access) {
+  Fields fields("access", {});
+  fields.add("roles", to_text(access.roles));
+  fields.add("delegates", to_text(access.delegates));
+  for (const auto& [axis, roles] : access.axes)
+    fields.add(fmt::format("axes.{}.roles", axis), to_text(roles));
   return fields.take();
 }
 
@@ -276,6 +292,7 @@ std::vector<Section> sections(const Configuration& configuration) {
   std::vector<Section> all{single("machine", configuration.machine),
                            single("state_directory", configuration.state_directory),
                            section_of(configuration.server)};
+  if (configuration.access) all.push_back(section_of(*configuration.access));
   Fields recorder("flight_recorder", {});
   recorder.add("memory", configuration.flight_recorder.memory);
   recorder.add("files", configuration.flight_recorder.files);

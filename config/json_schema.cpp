@@ -70,9 +70,17 @@ std::string parts(std::string_view list) {
   return array(items);
 }
 
+/// "{ anna: operator }" as JSON.
+std::string one_role(std::string_view section) {
+  const auto entry = section.substr(2, section.size() - 4);
+  const auto colon = entry.rfind(": ");
+  return Object().text(entry.substr(0, colon), entry.substr(colon + 2)).json();
+}
+
 /// What YAML makes of it: numbers and booleans as such, lists as they are written, the rest as text.
 std::string as_written(const KeySpec& spec, std::string_view text) {
   if (spec.kind == Kind::register_address) return std::to_string(std::stol(std::string(text), nullptr, 0));
+  if (spec.kind == Kind::roles) return one_role(text);
   if ((spec.kind == Kind::parts || spec.kind == Kind::names) && text.starts_with('[')) return parts(text);
   const bool bare = spec.kind == Kind::integer || spec.kind == Kind::number || spec.kind == Kind::boolean ||
                     spec.kind == Kind::parts || spec.kind == Kind::position_range ||
@@ -187,6 +195,10 @@ Object type_of(const KeySpec& spec) {
           .raw("items", Object().text("type", "string").text("pattern", whole(spec.pattern)).json())
           .raw("minItems", "2")
           .raw("uniqueItems", "true");
+    case Kind::roles:
+      return result.text("type", "object")
+          .raw("propertyNames", Object().text("pattern", whole(spec.pattern)).json())
+          .raw("additionalProperties", Object().raw("enum", strings(spec.choices)).json());
     case Kind::parts:
       return parts_of(spec.choices);
     case Kind::duration:

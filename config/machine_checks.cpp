@@ -36,11 +36,17 @@ void check_address(std::string_view key, std::string_view listen, const Configur
     diagnostics.add(mark, fmt::format("port {} is out of range", quoted(port)),
                     "write a port between 0 and 65535");
   }
-  if (!is_loopback(host) && !configuration.server.tls && !places.given("server.tls")) {
+  if (configuration.server.tls || places.given("server.tls")) return;
+  if (!is_loopback(host)) {
     diagnostics.add(
         mark,
         fmt::format("without tls, {} would let anybody on the network move this machine", quoted(listen)),
         "add server.tls, or listen on localhost or unix:/PATH");
+  } else if (configuration.server.plaintext == Plaintext::unix_sockets) {
+    diagnostics.add(
+        mark,
+        fmt::format("without tls, {} is for plaintext, which server.plaintext forbids there", quoted(listen)),
+        "add server.tls, or listen on unix:/PATH");
   }
 }
 
@@ -285,6 +291,17 @@ void check_groups(const Configuration& configuration, Diagnostics& diagnostics, 
   }
 }
 
+void check_access(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
+  if (!configuration.access) return;
+  std::vector<std::string_view> names;
+  for (const auto& entry : configuration.axes) names.emplace_back(entry.axis.name);
+  for (const auto& group : configuration.groups) names.emplace_back(group.name);
+  for (const auto& [name, roles] : configuration.access->axes)
+    if (std::ranges::find(names, name) == names.end())
+      diagnostics.add(places.mark(fmt::format("access.axes.{}", name)),
+                      fmt::format("there is no axis and no group {}", quoted(name)), suggest(name, names));
+}
+
 }  // namespace
 
 void check_tls_files(const Configuration& configuration, const TlsCheck& check, Diagnostics& diagnostics,
@@ -299,6 +316,7 @@ void check_machine(const Configuration& configuration, Diagnostics& diagnostics,
   check_server(configuration, diagnostics, places);
   check_leases(configuration.leases, diagnostics, places);
   check_groups(configuration, diagnostics, places);
+  check_access(configuration, diagnostics, places);
   check_ports(all, diagnostics, places);
   check_bus_names(configuration, all, diagnostics, places);
   check_kinds(configuration, all, diagnostics, places);

@@ -114,6 +114,8 @@ std::string form(const KeySpec& spec) {
       return alternatives(spec.choices);
     case Kind::names:
       return "list of names";
+    case Kind::roles:
+      return fmt::format("names of clients, each with its role: {}", alternatives(spec.choices));
     case Kind::parts:
       return fmt::format("true, false, or a list of {}", fmt::join(spec.choices, ", "));
     case Kind::duration:

@@ -112,6 +112,7 @@ constexpr KeySpec metrics_keys[] = {
      .default_value = "false",
      .apply = [](Target& t, const Value& v) { t.configuration->server.metrics.remote = v.boolean; }},
 };
+constexpr std::string_view plaintexts[] = {"loopback", "unix"};
 
 constexpr KeySpec server_keys[] = {
     {.key = "listen",
@@ -138,6 +139,19 @@ constexpr KeySpec server_keys[] = {
      .description = "Mutual TLS; required where the daemon can be reached from other machines.",
      .children = tls_keys,
      .apply = [](Target& t, const Value&) { t.configuration->server.tls.emplace(); }},
+    {.key = "plaintext",
+     .kind = Kind::choice,
+     .description =
+         "Where TLS may be left out. loopback: on loopback addresses and unix sockets; unix: on unix sockets "
+         "only, whose clients are known by their user.",
+     .example = "unix",
+     .default_value = "loopback",
+     .choices = plaintexts,
+     .apply =
+         [](Target& t, const Value& v) {
+           t.configuration->server.plaintext =
+               v.text == "unix" ? Plaintext::unix_sockets : Plaintext::loopback;
+         }},
     {.key = "reflection",
      .kind = Kind::boolean,
      .description =
@@ -269,6 +283,13 @@ std::span<const KeySpec> schema() {
        .kind = Kind::section,
        .description = "Where the gRPC API is served.",
        .children = server_keys},
+      {.key = "access",
+       .kind = Kind::section,
+       .description = "Who may do what. Without this section everybody may do everything; with it, clients "
+                      "that it does not "
+                      "name can stop and nothing else.",
+       .children = access_schema(),
+       .apply = [](Target& t, const Value&) { t.configuration->access.emplace(); }},
       {.key = "flight_recorder",
        .kind = Kind::section,
        .description = "The newest frames of each bus, written to a file after a fault.",

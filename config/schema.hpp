@@ -28,6 +28,7 @@ enum class Kind : std::uint8_t {
   boolean,
   choice,          ///< one of `choices`
   names,           ///< a list of at least two names, each once
+  roles,           ///< for each of some clients, whose names match `pattern`, one of `choices`
   parts,           ///< true (all `choices`), false (none), or a list of some of them
   duration,        ///< "150 ms"; minimum..maximum in ms
   motor_speed,     ///< "5 r/min"; whole numbers
@@ -45,7 +46,8 @@ struct Value {
   std::int64_t integer =
       0;  ///< integer, register_address, motor_speed (r/min), microstep; of a numbered section
   bool boolean = false;
-  std::vector<std::string> items = {};          ///< parts, names
+  std::vector<std::string> items = {};  ///< parts, names
+  Roles roles = {};
   double number = 0;                            ///< number, position, velocity; first of a position_range
   double second = 0;                            ///< of a position_range
   std::int64_t numerator = 0, denominator = 1;  ///< ratio, travel
@@ -64,6 +66,7 @@ struct Target {
   VelocitySegment* velocity_segment = nullptr;
   DeviceSettings* device = nullptr;
   GroupSettings* group = nullptr;
+  std::string access_axis = {};  ///< or group
   ValueSettings* device_value = nullptr;
   std::string object = {};  ///< of `drive: { objects: ... }`: its settings begin with this
 };
@@ -81,7 +84,7 @@ struct KeySpec {
       {};  ///< as written in YAML; empty if there is none or the description says it
   std::optional<double> minimum = std::nullopt, maximum = std::nullopt;
   std::span<const std::string_view> choices = {};
-  std::string_view pattern = {};       ///< of a text: ECMAScript regular expression, whole text
+  std::string_view pattern = {};       ///< of a text, names, roles: ECMAScript regular expression, whole text
   std::string_view pattern_hint = {};  ///< what to say when it does not match
   std::span<const KeySpec> children = {};
   /// Stores a value; of a section: prepares it; of named and numbered ones: prepares each, by its `text` or
@@ -91,6 +94,8 @@ struct KeySpec {
 
 /// The keys of the file's top level.
 std::span<const KeySpec> schema();
+/// The keys of `access`.
+std::span<const KeySpec> access_schema();
 /// The keys of one bus.
 std::span<const KeySpec> bus_schema();
 /// The keys of one axis, in the order in which they are read: unit and model come before what depends on

@@ -214,6 +214,31 @@ Parsed parse_names(const KeySpec& spec, const Node& node) {
   return result;
 }
 
+Parsed parse_roles(const KeySpec& spec, const Node& node) {
+  const auto how = fmt::format("write names and roles, such as {}", spec.example);
+  if (node.kind != Node::Kind::section)
+    return wrong(node, fmt::format("'{}' must be a section of names, not {}", spec.key, kind_name(node)),
+                 how);
+  Value result;
+  for (const auto& [name, role] : node.entries) {
+    if (!matches(name->text, spec.pattern))
+      return wrong(*name, fmt::format("{} is no name of a client", quoted(name->text)),
+                   std::string(spec.pattern_hint));
+    const auto known =
+        role->kind == Node::Kind::scalar && std::ranges::find(spec.choices, role->text) != spec.choices.end();
+    if (!known)
+      return wrong(
+          *role,
+          fmt::format("{} is no role",
+                      role->kind == Node::Kind::scalar ? quoted(role->text) : std::string(kind_name(*role))),
+          suggest(role->text, spec.choices));
+    const auto level = static_cast<Role>(choice_index(spec.choices, role->text) + 1);  // below them is none
+    if (!result.roles.emplace(name->text, level).second)
+      return wrong(*name, fmt::format("'{}' names {} twice", spec.key, quoted(name->text)), "once is enough");
+  }
+  return result;
+}
+
 Parsed parse_parts(const KeySpec& spec, const Node& node) {
   const auto how = fmt::format("write true, false or a list, such as {}", spec.example);
   if (node.kind == Node::Kind::scalar && node.plain && node.text == "false") return Value{};
@@ -267,6 +292,7 @@ bool matches(std::string_view text, std::string_view pattern) {
 std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& node, std::string_view unit) {
   if (spec.kind == Kind::position_range) return parse_position_range(spec, node, unit);
   if (spec.kind == Kind::names) return parse_names(spec, node);
+  if (spec.kind == Kind::roles) return parse_roles(spec, node);
   if (spec.kind == Kind::parts) return parse_parts(spec, node);
   if (node.kind != Node::Kind::scalar) {
     return wrong(node, fmt::format("'{}' must be a single value, not {}", spec.key, kind_name(node)),
@@ -302,6 +328,7 @@ std::expected<Value, ValueError> parse_value(const KeySpec& spec, const Node& no
       return parse_in_axis_unit(spec, node, unit);
     case Kind::position_range:
     case Kind::names:
+    case Kind::roles:
     case Kind::parts:
     case Kind::section:
     case Kind::named_sections:
