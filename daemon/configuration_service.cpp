@@ -189,6 +189,7 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
 
 void ConfigurationService::adopt(config::Configuration configuration, const std::string& yaml) {
   parts_.configuration = std::move(configuration);
+  if (parts_.adopted) parts_.adopted(parts_.configuration);
   if (revision_of(yaml) == served()->revision) return;
   auto next = served_from(parts_.path, yaml, std::chrono::system_clock::now());
   {

@@ -36,6 +36,8 @@ class ConfigurationService final : public ConfigurationAccess {
     std::filesystem::path last_good;
     /// Makes the machine follow, or only asks whether it could. Calls back once, as core::ReloadDone.
     std::function<void(core::Reload reload, bool dry_run, core::ReloadDone done)> apply;
+    /// Told of what is served from now on, once the machine has followed. On the reloading thread.
+    std::function<void(const config::Configuration& configuration)> adopted;
   };
   explicit ConfigurationService(Parts parts);
   /// As close().

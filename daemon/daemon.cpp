@@ -17,6 +17,7 @@
 #include <random>
 #include <thread>
 
+#include "api/server/access.hpp"
 #include "api/server/audit_convert.hpp"
 #include "api/server/door_check.hpp"
 #include "api/server/lane/stop_lane.hpp"
@@ -139,6 +140,11 @@ std::optional<server::TlsFiles> tls_files(const config::ServerSettings& settings
   return server::TlsFiles{.certificate = settings.tls->certificate,
                           .key = settings.tls->key,
                           .client_ca = settings.tls->client_ca};
+}
+
+std::optional<AccessSettings> access_of(const config::Configuration& configuration) {
+  if (!configuration.access) return std::nullopt;
+  return server::expanded(*configuration.access, configuration.groups);
 }
 
 server::StopLaneOptions stop_lane_options(const config::ServerSettings& settings) {
@@ -309,6 +315,7 @@ int serve(const Options& options, const config::Configuration& configuration, co
   malloc_trim(0);  // a full journal was read in many pieces: what they leave between each other goes back
   core::MachineService service(loop, machine, configuration.machine, instance_id);
   published_to = &service;
+  const auto access = std::make_shared<server::AccessControl>(access_of(configuration));
   ConfigurationService served({.path = options.config,
                                .yaml = yaml,
                                .configuration = configuration,
@@ -319,14 +326,18 @@ int serve(const Options& options, const config::Configuration& configuration, co
                                .apply =
                                    [&service](core::Reload reload, bool dry_run, core::ReloadDone done) {
                                      service.reload(std::move(reload), dry_run, std::move(done));
-                                   }});
+                                   },
+                               .adopted = [access](const auto& next) { access->replace(access_of(next)); }});
   auto serving = server_options(configuration.server);
   serving.configuration = &served;
   serving.audit = &audit_reader;
   serving.audit_sink = audit.get();
   serving.state_copies = &state_copier;
+  serving.access = access;
   server::Server server(service, std::move(serving));
-  server::StopLane stop_lane(service, stop_lane_options(configuration.server));
+  auto stopping = stop_lane_options(configuration.server);
+  stopping.access = access;
+  server::StopLane stop_lane(service, std::move(stopping));
   Metering metering({.loop = loop,
                      .machine = machine,
                      .service = service,
@@ -392,7 +403,15 @@ config::LoadResult load_configuration(const Options& options) {
   auto loaded = config::load_file(options.config, {}, check_tls);
   if (!loaded.configuration) return loaded;
   if (!options.state_directory.empty()) loaded.configuration->state_directory = options.state_directory;
-  if (!options.listen.empty()) loaded.configuration->server.listen = options.listen;
+  auto& server = loaded.configuration->server;
+  if (!options.listen.empty()) server.listen = options.listen;
+  if (server.plaintext == config::Plaintext::unix_sockets && !server.tls &&
+      !server.listen.starts_with("unix:")) {
+    loaded.diagnostics.push_back({.file = options.config,
+                                  .message = "without tls, --listen " + server.listen + " is for plaintext",
+                                  .suggestion = "server.plaintext permits unix:/PATH only"});
+    loaded.configuration.reset();
+  }
   return loaded;
 }
 
