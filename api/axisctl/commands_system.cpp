@@ -1,4 +1,4 @@
-// buses, info: the machine as a whole.
+// buses, info, whoami: the machine as a whole.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -12,9 +12,30 @@
 namespace axisd::axisctl {
 namespace {
 
+v1::GetInfoResponse ask(Invocation& invocation) {
+  return invocation.client().call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(),
+                                  std::string_view());
+}
+
+/// "operator; viewer on feeder".
+std::string roles_of(const v1::GetInfoResponse& response) {
+  const auto name = [](v1::Role role) { return lower_word(v1::Role_Name(role), "ROLE_"); };
+  if (response.client().empty()) return "not known: this daemon does not tell";
+  auto text = name(response.role());
+  for (const auto& each : response.axis_roles())
+    text += fmt::format("; {} on {}", name(each.role()), each.axis());
+  return text;
+}
+
+void who_am_i(Invocation& invocation) {
+  const auto response = ask(invocation);
+  if (invocation.json) return print_line(json(response));
+  print(fmt::format("client:     {}\nidentity:   {}\nrole:       {}\n", response.client(),
+                    response.identity(), roles_of(response)));
+}
+
 void info(Invocation& invocation) {
-  const auto response =
-      invocation.client().call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(), std::string_view());
+  const auto response = ask(invocation);
   if (invocation.json) return print_line(json(response));
   const bool waits = !response.state_unaccepted().empty();
   std::string held = response.inhibited()
@@ -27,9 +48,10 @@ void info(Invocation& invocation) {
                         held.empty() ? "" : "; ", response.state_unaccepted());
   }
   print(fmt::format(
-      "machine:    {}\naxisd:      {}\naxisctl:    {}\nserver:     {}\ninstance:   {}\nmotion:     {}\n",
+      "machine:    {}\naxisd:      {}\naxisctl:    {}\nserver:     {}\ninstance:   {}\nyou:        {}, "
+      "{}\nmotion:     {}\n",
       response.machine(), response.version(), AXISD_VERSION, invocation.connection.server,
-      response.instance_id(),
+      response.instance_id(), response.client(), roles_of(response),
       coloured(held, response.inhibited() || waits ? Colour::yellow : Colour::none, use_colour())));
 }
 
@@ -39,8 +61,10 @@ void add_system_commands(CLI::App& app, Invocation& invocation) {
   app.add_subcommand("buses", "The buses and what went over them")->callback([&invocation] {
     list_buses(invocation);
   });
-  app.add_subcommand("info", "Machine, versions, whether motion is permitted")->callback([&invocation] {
-    info(invocation);
+  app.add_subcommand("info", "Machine, versions, who you are, whether motion is permitted")
+      ->callback([&invocation] { info(invocation); });
+  app.add_subcommand("whoami", "Who the daemon takes you for, and what you may do")->callback([&invocation] {
+    who_am_i(invocation);
   });
 }
 

@@ -357,7 +357,9 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         self.note("GetInfo", request, context)
         return system_pb.GetInfoResponse(machine="press-1", version="0.1.0", instance_id=self.instance_id,
                                          inhibited=self.inhibited, inhibited_by="test" if self.inhibited else "",
-                                         state_unaccepted="; ".join(each.text for each in self.convictions))
+                                         state_unaccepted="; ".join(each.text for each in self.convictions),
+                                         client="anna via web", identity="unix:anna", role="ROLE_OPERATOR",
+                                         axis_roles=[{"axis": "feeder", "role": "ROLE_VIEWER"}])
 
     async def StopAll(self, request, context):
         self.note("StopAll", request, context)

@@ -102,6 +102,12 @@ class Reading(AxisctlTest):
     def test_info(self):
         self.assertRegex(self.ok("info"), r"machine: +press-1\n(.*\n)*motion: +permitted")
         self.assertEqual(self.json("info")[0]["instance_id"], "fake")
+        self.assertRegex(self.ok("info"), r"you: +anna via web, operator; viewer on feeder\n")
+
+    def test_who_am_i(self):
+        self.assertEqual(self.ok("whoami"), "client:     anna via web\nidentity:   unix:anna\n"
+                                            "role:       operator; viewer on feeder\n")
+        self.assertEqual(self.json("whoami")[0]["role"], "ROLE_OPERATOR")
 
 
 class Motion(AxisctlTest):

@@ -164,7 +164,10 @@ class WholeMachine(ClientTest):
         self.assertEqual((network.network.link, network.network.sdo_timeouts, network.network.foreign_nodes),
                          (axisd.NetworkLink.ERROR_PASSIVE, 7, (22, 23)))
         self.assertEqual(network.network.link_helper_error.remedy, "enable axisd-link.socket")
-        self.assertEqual((await self.machine.info()).machine, "press-1")
+        info = await self.machine.info()
+        self.assertEqual(info.machine, "press-1")
+        self.assertEqual((info.client, info.identity, info.role, info.axis_roles),
+                         ("anna via web", "unix:anna", axisd.Role.OPERATOR, {"feeder": axisd.Role.VIEWER}))
 
     async def test_budgets(self):
         budget, = await self.machine.budgets()

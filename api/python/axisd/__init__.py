@@ -25,7 +25,7 @@ from .reasons import Outcome, Reason
 from .traffic import (BusStatistics, ClassStatistics, FlightRecord, Latency, NodeStatistics, Quarantine, TracedFrame,
                       UnknownOutcomes)
 from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail, Info, Link, MotionCause, MotionValues,
-                    Network, NetworkLink, Obstacle, PermittedRange, State, StopResult, Terminal, Tick, Trust)
+                    Network, NetworkLink, Obstacle, PermittedRange, Role, State, StopResult, Terminal, Tick, Trust)
 
 __all__ = [
     "Alarm", "AllStopped", "ArgumentError", "AuditRecord", "Axis", "AxisBudget", "AxisFault", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
@@ -35,7 +35,7 @@ __all__ = [
     "GroupMove", "Info", "InhibitChange", "Jog", "KeptFile", "KeptState", "KeptStateChange", "Latency", "Lease",
     "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle", "Outcome",
-    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Reload", "ScanProgress", "Segments",
+    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Reload", "Role", "ScanProgress", "Segments",
     "SerialProgress", "State", "StateChange", "StopBudget", "StopError", "StopHold", "StopHoldChange", "StopResult", "Terminal", "TerminalCapability",
     "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",
 ]

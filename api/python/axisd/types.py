@@ -12,7 +12,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from .holds import StopHold
 from .reasons import Outcome, Reason
-from .v1 import axis_service_pb2, bus_service_pb2, error_pb2, group_service_pb2, system_service_pb2, types_pb2
+from .v1 import access_pb2, axis_service_pb2, bus_service_pb2, error_pb2, group_service_pb2, system_service_pb2, types_pb2
 
 
 class State(enum.Enum):
@@ -290,6 +290,23 @@ class Tick:
         return cls(raw.instance_id, raw.tick, raw.dropped, {state.axis: AxisState.of(state) for state in raw.axes})
 
 
+class Role(enum.Enum):
+    """What a client may do, each including those before it."""
+    UNSPECIFIED = "unspecified"
+    NONE = "none"
+    """To stop, and nothing else."""
+    VIEWER = "viewer"
+    """To read."""
+    OPERATOR = "operator"
+    """To move."""
+    MAINTAINER = "maintainer"
+    """To change drives and configuration, and to release what others hold."""
+
+
+def _role(number: int) -> Role:
+    return _member(Role, access_pb2.Role.DESCRIPTOR, "ROLE_", number)
+
+
 @dataclasses.dataclass(frozen=True)
 class Info:
     machine: str
@@ -299,11 +316,19 @@ class Info:
     inhibited_by: str
     state_unaccepted: str = ""
     """Why motion waits until Machine.accept_state(); empty: it does not."""
+    client: str = ""
+    """Who is asking: the client of its commands, holds and leases."""
+    identity: str = ""
+    """The name by which `access:` of the configuration knows the client."""
+    role: Role = Role.UNSPECIFIED
+    """What the client may do on the machine, and on each axis that is not in `axis_roles`."""
+    axis_roles: dict[str, Role] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def of(cls, raw: system_service_pb2.GetInfoResponse) -> Info:
         return cls(raw.machine, raw.version, raw.instance_id, raw.inhibited, raw.inhibited_by,
-                   raw.state_unaccepted)
+                   raw.state_unaccepted, raw.client, raw.identity, _role(raw.role),
+                   {each.axis: _role(each.role) for each in raw.axis_roles})
 
 
 @dataclasses.dataclass(frozen=True)
