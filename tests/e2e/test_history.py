@@ -2,7 +2,7 @@
 import asyncio
 import unittest
 
-from harness import DONE, Scenario, error_pb, pb
+from harness import DONE, OWN_NAME, Scenario, error_pb, pb
 from harness.client import event_pb
 import axisd  # noqa: E402  (made by the harness)
 
@@ -27,7 +27,7 @@ class History(Scenario):
         newest, all_of_them = asyncio.run(commands())
         self.assertEqual([command.id for command in newest[:2]], [stop.id, move.id])
         self.assertEqual((newest[1].state, newest[1].cause.reason), (axisd.CommandState.ABORTED, axisd.Reason.SUPERSEDED))
-        self.assertEqual((newest[2].request_id, newest[2].asked.position, newest[2].client), ("r-1", 12.5, "local:unix"))
+        self.assertEqual((newest[2].request_id, newest[2].asked.position, newest[2].client), ("r-1", 12.5, OWN_NAME))
         self.assertEqual(len(all_of_them), 5)
         self.assertEqual(all_of_them[-1].kind, "enable")
 
@@ -35,7 +35,7 @@ class History(Scenario):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         lines = done.stdout.splitlines()
         self.assertEqual(len(lines), 3)
-        self.assertRegex(lines[1], rf"feeder +Stop +Done +.*local:unix +{stop.id}")
+        self.assertRegex(lines[1], rf"feeder +Stop +Done +.*{OWN_NAME} +{stop.id}")
         self.assertRegex(lines[2], rf"feeder +MoveAbsolute +300 +Aborted +.*{move.id} +.*{stop.id}")
         self.assertEqual(machine.axisctl("command", "list", "feedr").returncode, 4)
 
@@ -46,7 +46,7 @@ class History(Scenario):
                                      ("STOP", "DONE")])
         told = machine.axisctl("events", "--kind", "command").stdout
         self.assertIn(stop.id, told)
-        self.assertIn("by local:unix", told)
+        self.assertIn(f"by {OWN_NAME}", told)
 
     def test_renewals_of_a_jog_are_neither_events_nor_lines_of_the_log(self):
         machine = self.ready_feeder()

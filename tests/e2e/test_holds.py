@@ -5,7 +5,7 @@ import re
 import unittest
 
 from certificates import Certificates
-from harness import Scenario, axis_pb, feeder, wait_for
+from harness import OWN_NAME, Scenario, axis_pb, feeder, wait_for
 from harness.client import event_pb
 import axisd  # noqa: E402  (made by the harness)
 
@@ -42,7 +42,7 @@ class Holds(Scenario):
             await asyncio.gather(first.stop(hold=True), second.stop(hold=True))
             state = await first.state()
             self.assertIs(state.state, axisd.State.STOPPING)
-            self.assertEqual([hold.holder for hold in state.holds], ["local:unix"] * 2)
+            self.assertEqual([hold.holder for hold in state.holds], [OWN_NAME] * 2)
             self.assertTrue(all(hold.durable for hold in state.holds))
             left = await first.release_stop()
             self.assertEqual(len(left), 1)
@@ -118,7 +118,7 @@ class Holds(Scenario):
         self.assertEqual([state.axis for state in client.states()], ["feeder"])
         pathlib.Path(machine.config).write_text(whole)
         self.assertEqual(machine.axisctl("config", "reload").returncode, 0)
-        self.assertEqual([hold.holder for hold in client.wait_online("pusher").holds], ["local:unix"])
+        self.assertEqual([hold.holder for hold in client.wait_online("pusher").holds], [OWN_NAME])
         self.refused("FAILED_PRECONDITION", "STOPPING", client.motion, "Enable", "pusher")
         self.assertEqual(machine.axisctl("release-stop", "pusher").returncode, 0)
         client.to_done("Enable", "pusher")
@@ -129,16 +129,16 @@ class Holds(Scenario):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("axisctl release-stop feeder", done.stdout)
         self.assertEqual(machine.axisctl("group", "stop", "--axis", "feeder", "--hold", "--request-id", "door").returncode, 0)
-        self.assertIn("local:unix (request door)", machine.axisctl("state", "feeder").stdout)
-        self.assertIn("still held by local:unix (request door)", machine.axisctl("release-stop", "feeder").stdout)
+        self.assertIn(f"{OWN_NAME} (request door)", machine.axisctl("state", "feeder").stdout)
+        self.assertIn(f"still held by {OWN_NAME} (request door)", machine.axisctl("release-stop", "feeder").stdout)
         nobody = machine.axisctl("release-stop", "feeder")
         self.assertEqual(nobody.returncode, 4, nobody)
-        self.assertIn("it is held by local:unix (request door)", nobody.stderr)
+        self.assertIn(f"it is held by {OWN_NAME} (request door)", nobody.stderr)
         done = machine.axisctl("group", "release-stop", "--axis", "feeder", "--request-id", "door")
         self.assertEqual(done.returncode, 0, done)
         self.assertIn("feeder: released; a new command can move it", done.stdout)
         machine.client.to_done("MoveAbsolute", "feeder", position=1.0)
-        self.assertIn("hold of local:unix (request door) released by local:unix",
+        self.assertIn(f"hold of {OWN_NAME} (request door) released by {OWN_NAME}",
                       machine.axisctl("events", "--kind", "stop").stdout)
 
 

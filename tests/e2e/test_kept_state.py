@@ -7,7 +7,7 @@ import resource
 import shutil
 import unittest
 
-from harness import AXISD, Scenario, pb, run
+from harness import AXISD, OWN_NAME, Scenario, pb, run
 from harness.client import error_pb, event_pb, system_pb
 
 
@@ -81,7 +81,7 @@ class KeptState(Scenario):
         self.assertEqual(accepted.returncode, 0, accepted.stderr)
         self.assertIn("accepted: state.v1 was rolled back", accepted.stdout)
         waited, told = self.events(machine)
-        self.assertEqual((waited.accepted_by, told.accepted_by), ("", "local:unix"))
+        self.assertEqual((waited.accepted_by, told.accepted_by), ("", OWN_NAME))
         self.assertEqual(machine.client.info().state_unaccepted, "")
         starts = machine.sim.shaft().starts
         machine.client.to_done("Enable", "feeder")

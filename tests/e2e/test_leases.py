@@ -4,7 +4,7 @@ import signal
 import sys
 import unittest
 
-from harness import START, STOP, Program, Scenario, bus_pb, error_pb, lease_pb, pb, wait_for
+from harness import OWN_NAME, START, STOP, Program, Scenario, bus_pb, error_pb, lease_pb, pb, wait_for
 from harness.programs import AXISCTL, AXISD_SIM
 from lease_holder import TTL
 
@@ -52,11 +52,11 @@ class Leases(Scenario):
         self.assertEqual(holder.wait(), 0, holder.log())
         late = holder.output().splitlines()[-1]
         self.assertTrue(late.startswith("refused ABORTED REASON_LEASE_LOST"), late)
-        self.assertIn("leased by local:unix (second) for another", late)
+        self.assertIn(f"leased by {OWN_NAME} (second) for another", late)
         self.assertEqual(len(machine.wire.writes(START)), starts)
         self.assertEqual(machine.sim.shaft().position, 10000)
-        self.assertEqual(self.lease_events(machine), ["leased by local:unix (e2e)", "lease of local:unix (e2e) expired",
-                                                      "leased by local:unix (second)"])
+        self.assertEqual(self.lease_events(machine), [f"leased by {OWN_NAME} (e2e)", f"lease of {OWN_NAME} (e2e) expired",
+                                                      f"leased by {OWN_NAME} (second)"])
 
     def test_axisctl_holds_a_lease_while_a_program_runs(self):
         machine = self.ready_feeder()
@@ -65,7 +65,7 @@ class Leases(Scenario):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(machine.sim.shaft().position, 60000)
         self.assertEqual(machine.axisctl("lease", "list").stdout, "no leases\n")
-        self.assertEqual(self.lease_events(machine), ["leased by local:unix", "lease released by local:unix"])
+        self.assertEqual(self.lease_events(machine), [f"leased by {OWN_NAME}", f"lease released by {OWN_NAME}"])
 
     def test_stops_need_no_lease(self):
         machine = self.ready_feeder()

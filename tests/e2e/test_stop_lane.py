@@ -6,7 +6,7 @@ import unittest
 
 import grpc
 
-from harness import AXISCTL, DONE, STOP, CallFailed, Client, Scenario, axis_pb, pb, run, system_pb
+from harness import AXISCTL, DONE, OWN_NAME, STOP, CallFailed, Client, Scenario, axis_pb, pb, run, system_pb
 
 import axisd  # noqa: E402  (made by the harness)
 from axisd.v1 import stop_service_pb2_grpc  # noqa: E402
@@ -35,7 +35,7 @@ class StopLane(Scenario):
             response = machine.client.call(method, request(axis="spinner", options={"wait_until": DONE}))
             self.assert_command(response.command, "DONE")
             self.stands(machine)
-        self.assertEqual(response.command.client, "local:unix")
+        self.assertEqual(response.command.client, OWN_NAME)
         self.turning(machine)
         machine.client.call(lane.StopAll, system_pb.StopAllRequest(wait_until=DONE))
         self.stands(machine)

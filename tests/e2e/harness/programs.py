@@ -1,6 +1,7 @@
 """The programs under test as processes, and waiting for what they do."""
 import os
 import pathlib
+import pwd
 import signal
 import subprocess
 import time
@@ -9,6 +10,9 @@ AXISD = os.environ["AXISD"]  # these are set by CTest
 AXISD_SIM = os.environ["AXISD_SIM"]
 AXISCTL = os.environ["AXISCTL"]
 AXISD_LINK = os.environ.get("AXISD_LINK", "")  # only where there is SocketCAN
+
+#: Who clients are that come by a unix socket.
+OWN_NAME = f"unix:{pwd.getpwuid(os.getuid()).pw_name}"
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 LIMIT = 60.0  # s; for one condition. Generous: nothing is judged by it, it only ends what would hang.
