@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "api/server/lane/stop_calls.hpp"
+#include "api/server/lane/stop_lane.hpp"
 #include "axisd/v1/access.pb.h"
 #include "axisd/v1/bus_service.pb.h"
 #include "axisd/v1/command_service.pb.h"
@@ -16,7 +17,7 @@
 #include "axisd/v1/event_service.pb.h"
 #include "axisd/v1/group_service.pb.h"
 #include "axisd/v1/lease_service.pb.h"
-#include "axisd/v1/stop_service.pb.h"
+#include "axisd/v1/stop_service.grpc.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
 #include "tests/unit/api/serving.hpp"
 
@@ -341,6 +342,24 @@ TEST_F(AccessLane, AsksTheSameTable) {
   settings_.delegates["anna"] = Role::operator_;
   EXPECT_EQ(call("Disable", disable, {.user = "shift-a"}), grpc::StatusCode::OK);
   EXPECT_EQ(machine_.submitted().back().options.client, "shift-a via anna");
+}
+
+TEST_F(AccessLane, ReadsTheMetadata) {
+  settings_.delegates["local:localhost"] = Role::operator_;
+  server::StopLane lane(machine_,
+                        {.listen = "127.0.0.1:0", .access = std::make_shared<AccessControl>(settings_)});
+  const auto port = lane.listen();
+  ASSERT_TRUE(port) << to_string(port.error());
+  lane.serve();
+  Call context;
+  context.AddMetadata("axisd-user", "shift-a");
+  v1::DisableRequest request;
+  request.set_axis("feeder");
+  v1::DisableResponse response;
+  const auto stub = v1::StopService::NewStub(connect("127.0.0.1:" + std::to_string(*port)));
+  const auto status = stub->Disable(&context, request, &response);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.command().client(), "shift-a via local:localhost");
 }
 
 }  // namespace
