@@ -2,8 +2,8 @@
 # Builds what the benchmarks need (preset release) and runs them; every figure stands beside a yardstick's, measured in
 # the same run. See README.md.
 #   tests/bench/run.sh [can|rtu|stop-all|index|rpc|machine|admission|siege|all]      (default: all)
-# Ends with 1 where a published bound of stops, StopAll or starts was exceeded, or that of the stops after a kill, or a
-# command failed on a full line or network, or an axis did not get its share of a line.
+# Ends with 1 where a published bound of stops, StopAll or starts was exceeded, or one of those under siege or after a
+# kill, or a command failed on a full line or network, or an axis did not get its share of a line.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
 part=${1:-all}
