@@ -161,7 +161,8 @@ void handle(Machine& machine, const v1::CancelCommandRequest& request, const std
   if (const auto valid = check_command_id(request.id()); !valid)
     return refuse(reply, client, "cancel", valid.error());
   machine.cancel_command(
-      request.id(), reply_with_command(reply, response->mutable_command(), client, request.id(), "cancel"));
+      request.id(), client,
+      reply_with_command(reply, response->mutable_command(), client, request.id(), "cancel"));
 }
 
 }  // namespace axisd::server

@@ -20,6 +20,7 @@ void StopLane::request(std::vector<std::shared_ptr<AxisGate>> gates, std::functi
     const std::lock_guard lock(mutex_);
     requests_.push_back(
         {.gates = std::move(gates), .serve = std::move(serve), .client = std::move(client), .reach = reach});
+    unserved_[requests_.back().client] += requests_.back().axes();
   }
   waiting_.store(true, std::memory_order_release);
   post(core_->io(), [] {});  // wakes the loop, which looks at the lane first
@@ -33,7 +34,7 @@ bool StopLane::drain() {
     last_ = request->client;
     auto& turn = turns_.at(last_);
     const bool first = turn.served == 0;
-    turn.served += std::max<std::size_t>(1, request->gates.size());
+    turn.served += request->axes();
     serve(*std::move(request));
     if (first) core_->push([this, client = last_] { go_on(client); });
     served = true;
@@ -76,10 +77,22 @@ std::optional<StopLane::Request> StopLane::next(std::deque<Request> Turn::* of) 
 
 void StopLane::serve(Request request) {
   core_->run_first(request.serve);
+  {
+    const std::lock_guard lock(mutex_);
+    const auto unserved = unserved_.find(request.client);
+    unserved->second -= request.axes();
+    if (unserved->second == 0) unserved_.erase(unserved);
+  }
   // A sequence that was waiting already is resumed by a handler, which comes before this one.
   core_->push([gates = std::move(request.gates)] {
     for (const auto& gate : gates) gate->stop_passed_on();
   });
+}
+
+std::size_t StopLane::waiting(const std::string& client) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = unserved_.find(client);
+  return found == unserved_.end() ? 0 : found->second;
 }
 
 void StopLane::go_on(const std::string& client) {

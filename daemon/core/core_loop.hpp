@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -41,6 +42,8 @@ class StopLane {
   /// axes goes on once the handlers that wait by then have run, so that no crowd of stops keeps another's
   /// from the drives. False: there was none to serve. Thread: core.
   bool drain();
+  /// Axes of a client's requests that have not been served yet; a request of no axis counts as one.
+  [[nodiscard]] std::size_t waiting(const std::string& client) const;
 
   static constexpr std::size_t share = 64;
 
@@ -50,6 +53,7 @@ class StopLane {
     std::function<void()> serve;
     std::string client;
     StopReach reach = StopReach::named;
+    [[nodiscard]] std::size_t axes() const { return std::max<std::size_t>(1, gates.size()); }
   };
   struct Turn {
     std::deque<Request> of_machine, of_axes;
@@ -67,8 +71,9 @@ class StopLane {
   std::atomic<bool> waiting_{false};
   Turns turns_;       ///< of the core
   std::string last_;  ///< of the core: who was served last
-  std::mutex mutex_;
-  std::vector<Request> requests_;
+  mutable std::mutex mutex_;
+  std::vector<Request> requests_;                ///< under mutex_
+  std::map<std::string, std::size_t> unserved_;  ///< under mutex_: axes of each client
 };
 
 /// The core thread's loop.

@@ -217,16 +217,18 @@ std::shared_ptr<void> MachineService::watch_command(std::string id, CommandCallb
 }
 
 /// Halts an axis, which only the core knows.
-void MachineService::cancel_command(std::string id, CommandCallback callback) {
+void MachineService::cancel_command(std::string id, std::string client, CommandCallback callback) {
   loop_->lane().request(
-      {}, [this, id = std::move(id), arrived = now(), callback = std::move(callback)]() mutable {
+      {},
+      [this, id = std::move(id), arrived = now(), callback = std::move(callback)]() mutable {
         const auto command = machine_->book().find(id);
         if (!command) return callback(unknown_command(id));
         auto* axis = machine_->find(command->value().axis);
         // Of an axis that the configuration no longer has: it has ended.
         answer(axis == nullptr ? command : axis->cancel(command, arrived), WaitUntil::accepted,
                std::move(callback));
-      });
+      },
+      std::move(client));
 }
 
 void MachineService::buses(std::function<void(std::vector<BusStatus>)> callback) {

@@ -33,6 +33,9 @@ class MachineService final : public Machine {
                     std::function<void(Result<StopReleased>)> callback) override;
   void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
+  [[nodiscard]] std::size_t stops_waiting(const std::string& client) const override {
+    return loop_->lane().waiting(client);
+  }
   void kept_state(std::function<void(KeptStateReport)> callback) override;
   void accept_state(std::string client,
                     std::function<void(Result<std::vector<Conviction>>)> callback) override;
@@ -40,7 +43,7 @@ class MachineService final : public Machine {
                      std::function<void(std::vector<Command>)> callback) override;
   void get_command(std::string id, CommandCallback callback) override;
   std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
-  void cancel_command(std::string id, CommandCallback callback) override;
+  void cancel_command(std::string id, std::string client, CommandCallback callback) override;
   void buses(std::function<void(std::vector<BusStatus>)> callback) override;
   void budgets(std::function<void(std::vector<BusBudgetReport>)> callback) override;
   [[nodiscard]] DriveAccess& drive_access() override { return drive_access_; }

@@ -272,9 +272,13 @@ class CountedMachine final : public Machine {
   Token watch_command(std::string id, CommandCallback callback) override {
     return inner_->watch_command(std::move(id), std::move(callback));
   }
-  void cancel_command(std::string id, CommandCallback callback) override {
-    ledger_->enter(
-        [=, this](const auto& ticket) { inner_->cancel_command(id, ledger_->answer(ticket, callback)); });
+  void cancel_command(std::string id, std::string client, CommandCallback callback) override {
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->cancel_command(id, client, ledger_->answer(ticket, callback));
+    });
+  }
+  [[nodiscard]] std::size_t stops_waiting(const std::string& client) const override {
+    return inner_->stops_waiting(client);
   }
   void buses(std::function<void(std::vector<BusStatus>)> callback) override {
     ledger_->enter([=, this](const auto& ticket) { inner_->buses(ledger_->answer(ticket, callback)); });

@@ -12,6 +12,8 @@ namespace {
 
 /// Of what waits for a peer that does not read.
 constexpr std::size_t most_unsent = std::size_t{256} * 1024;
+/// Read at once: it may hold some 60 calls, which whoever comes next waits for.
+constexpr std::size_t most_read = 4096;
 
 }  // namespace
 
@@ -22,7 +24,7 @@ Connection::Connection(FileDescriptor socket, std::shared_ptr<const tls::Accepto
 }
 
 bool Connection::read(TimePoint now) {
-  std::array<char, 16'384> piece;
+  std::array<char, most_read> piece;
   const auto count = recv(socket_.get(), piece.data(), piece.size(), MSG_DONTWAIT);
   if (count < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
   if (count == 0) return false;

@@ -30,6 +30,7 @@ class Connection {
     return tls_ ? std::optional(tls_->certificate()) : std::nullopt;
   }
   [[nodiscard]] int waiting() const { return http_.waiting(); }
+  [[nodiscard]] double effort_left(TimePoint now) const { return http_.effort_left(now); }
 
   /// The socket is readable. False: the connection is over.
   [[nodiscard]] bool read(TimePoint now);

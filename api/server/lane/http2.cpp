@@ -234,9 +234,13 @@ Http2::Http2(OnCall on_call, TimePoint now) : on_call_(std::move(on_call)), refi
 
 Http2::~Http2() = default;
 
-bool Http2::receive(std::string_view bytes, TimePoint now) {
+double Http2::effort_left(TimePoint now) const {
   const auto passed = std::chrono::duration<double>(now - refilled_).count();
-  effort_ = std::min(effort_at_once, effort_ + std::max(0.0, passed) * effort_per_second);
+  return std::min(effort_at_once, effort_ + std::max(0.0, passed) * effort_per_second);
+}
+
+bool Http2::receive(std::string_view bytes, TimePoint now) {
+  effort_ = effort_left(now);
   refilled_ = now;
   // In pieces, so that one call cannot spend many times what there is.
   constexpr std::size_t piece = 1024;

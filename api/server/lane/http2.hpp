@@ -64,8 +64,11 @@ class Http2 {
   void go_away();
   /// What has to go to the peer next; about `most` bytes. Empty: nothing at present.
   [[nodiscard]] std::string take_output(std::size_t most = std::size_t{64} * 1024);
-  /// Calls that were handed out and have not been answered.
+  /// Calls that were handed out and have not been answered, but for those that the peer took back: what they
+  /// asked for is done all the same, and whom to answer is forgotten at once.
   [[nodiscard]] int waiting() const { return waiting_; }
+  /// Of the effort that may be spent at once.
+  [[nodiscard]] double effort_left(TimePoint now) const;
 
  private:
   struct Stream;

@@ -15,6 +15,7 @@
 #include <exception>
 #include <map>
 #include <mutex>
+#include <tuple>
 #include <utility>
 
 #include "api/server/lane/connection.hpp"
@@ -37,6 +38,8 @@ namespace {
 constexpr Duration longest_sleep = std::chrono::seconds(1);
 /// Until it is tried again to let somebody in, when the system has no descriptors.
 constexpr Duration when_full = std::chrono::milliseconds(100);
+/// Until it is looked again whether a client may be read from that had too many stops waiting.
+constexpr Duration when_crowded = std::chrono::milliseconds(5);
 /// Accepted at once, before those who are there are served again.
 constexpr int most_accepted = 32;
 
@@ -64,7 +67,7 @@ std::string stop_lane_of(const std::string& listen) {
 class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
  public:
   Loop(Machine& machine, const StopLaneOptions& options)
-      : calls_(machine, options.access), places_(options.limits) {
+      : machine_(&machine), calls_(machine, options.access), places_(options.limits) {
     if (wake_.get() < 0) throw std::bad_alloc();
   }
 
@@ -104,6 +107,8 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   };
 
   bool serve_once();
+  [[nodiscard]] bool is_crowded(const Client& client) const;
+  void serve_in_turn(std::vector<Id> ids);
   void accept_from(const ListeningSocket& socket);
   void let_in_from_inside();
   void enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& host);
@@ -115,6 +120,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   void answer_what_is_done();
   void say_goodbye();
 
+  Machine* machine_;
   StopCalls calls_;
   Places places_;
   std::vector<ListeningSocket> sockets_;
@@ -148,7 +154,7 @@ void StopLane::Loop::run() {
 /// False: nothing can be waited for any more. Clients then find nobody here, and go to the main address.
 bool StopLane::Loop::serve_once() {
   std::vector<pollfd> polled;
-  std::vector<Id> known, strangers;
+  std::vector<Id> ready;
   progress_.store(monotonic_now(), std::memory_order_relaxed);
   const bool full = monotonic_now() < full_until_;
   polled.push_back({.fd = wake_.get(), .events = POLLIN, .revents = 0});
@@ -157,13 +163,20 @@ bool StopLane::Loop::serve_once() {
   const auto first = polled.size();
   std::vector<Id> ids;
   ids.reserve(clients_.size());
+  bool crowded = false;
   for (const auto& [id, client] : clients_) {
-    const short events = client.connection->wants_to_write() ? POLLIN | POLLOUT : POLLIN;
-    polled.push_back({.fd = client.connection->fd(), .events = events, .revents = 0});
+    const bool waits = is_crowded(client), writes = client.connection->wants_to_write();
+    crowded = crowded || waits;
+    const int events = (waits ? 0 : POLLIN) | (writes ? POLLOUT : 0);
+    // With a negative descriptor poll does not tell of a hang-up either, which would be there each time.
+    polled.push_back({.fd = events == 0 ? -1 : client.connection->fd(),
+                      .events = static_cast<short>(events),
+                      .revents = 0});
     ids.push_back(id);
   }
   const auto until =
-      std::min<Duration>(full ? when_full : longest_sleep, places_.next_due() - monotonic_now());
+      std::min<Duration>({full ? when_full : longest_sleep, crowded ? when_crowded : longest_sleep,
+                          places_.next_due() - monotonic_now()});
   const auto patience = std::chrono::ceil<std::chrono::milliseconds>(std::max(until, Duration{}));
   if (poll(polled.data(), polled.size(), static_cast<int>(patience.count())) < 0 && errno != EINTR) {
     spdlog::critical("stop lane: poll: {}", std::generic_category().message(errno));
@@ -175,18 +188,30 @@ bool StopLane::Loop::serve_once() {
   }
   let_in_from_inside();
   answer_what_is_done();
-  // Whoever is known goes before strangers, whose handshakes cost a thousand times as much as a stop.
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (polled[first + i].revents == 0) continue;
-    const auto client = clients_.find(ids[i]);  // it may have ended with its answer
-    if (client != clients_.end()) (client->second.peer ? known : strangers).push_back(ids[i]);
-  }
-  for (const auto id : known) serve(id);
-  for (const auto id : strangers) serve(id);
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if (polled[first + i].revents != 0 && clients_.contains(ids[i]))  // it may have ended with its answer
+      ready.push_back(ids[i]);
+  serve_in_turn(std::move(ready));
   for (std::size_t i = 0; i < sockets_.size(); ++i)
     if (polled[i + 1].revents != 0) accept_from(sockets_[i]);
   close(places_.overdue(monotonic_now()));
   return true;
+}
+
+/// The core has not got round to what it asked for.
+bool StopLane::Loop::is_crowded(const Client& client) const {
+  return client.peer && machine_->stops_waiting(client.peer->name) > most_unserved;
+}
+
+/// Whoever is known goes before strangers, whose handshakes cost a thousand times as much as a stop; of those
+/// who are known whoever asked for least.
+void StopLane::Loop::serve_in_turn(std::vector<Id> ids) {
+  const auto now = monotonic_now();
+  std::ranges::sort(ids, {}, [&](Id id) {
+    const auto& client = clients_.at(id);
+    return std::tuple(!client.peer, -client.connection->effort_left(now), id);
+  });
+  for (const auto id : ids) serve(id);
 }
 
 void StopLane::Loop::accept_from(const ListeningSocket& socket) {
@@ -253,7 +278,7 @@ void StopLane::Loop::serve(Id id) {
   if (found == clients_.end()) return;  // it made room
   auto& client = found->second;
   const auto now = monotonic_now();
-  if (!client.connection->read(now)) return close(id);
+  if (!(is_crowded(client) ? client.connection->write() : client.connection->read(now))) return close(id);
   if (!client.peer && client.connection->identified()) identify(id, client);
   places_.used(id, now, client.connection->waiting());
 }

@@ -28,9 +28,14 @@ struct StopLaneOptions {
 [[nodiscard]] std::string stop_lane_of(const std::string& listen);
 
 /// A gRPC server for the calls of lane::StopCalls alone, on one thread, which is none of gRPC's and shares
-/// neither memory nor connections with it. listen(), serve() and stop() on one thread.
+/// neither memory nor connections with it. Each call that has come whole is begun, whether or not its client
+/// still waits. Whoever has asked for more stops than the core has got round to is read from again when it
+/// has; of several the one that asked for least goes first. listen(), serve() and stop() on one thread.
 class StopLane {
  public:
+  /// Stops of axes that a client may have waiting for the core: some 0.1 s of its time.
+  static constexpr std::size_t most_unserved = 4096;
+
   /// `machine` outlives stop().
   StopLane(Machine& machine, StopLaneOptions options);
   ~StopLane();

@@ -230,8 +230,19 @@ std::shared_ptr<void> FakeMachine::watch_command(std::string id, CommandCallback
   return watcher;
 }
 
-void FakeMachine::cancel_command(std::string id, CommandCallback callback) {
-  note("cancel_command " + id);
+void FakeMachine::let_stops_wait(const std::string& client, std::size_t axes) {
+  const std::lock_guard lock(mutex_);
+  stops_waiting_[client] = axes;
+}
+
+std::size_t FakeMachine::stops_waiting(const std::string& client) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = stops_waiting_.find(client);
+  return found == stops_waiting_.end() ? 0 : found->second;
+}
+
+void FakeMachine::cancel_command(std::string id, std::string client, CommandCallback callback) {
+  note(fmt::format("cancel_command {} by {}", id, client));
   answer(callback, result_of("feeder", CommandKind::home));
 }
 

@@ -39,6 +39,8 @@ class FakeMachine final : public Machine {
   /// A change of command "c-1" for those who watch it.
   void change(const Command& command);
   void set_now(TimePoint now) { now_ = now; }
+  /// So many of its stops wait for the core.
+  void let_stops_wait(const std::string& client, std::size_t axes);
   std::optional<Error> latch_trouble{};  ///< that StopAll answers with; set before it is called
   KeptStateReport state_report{};        ///< likewise
 
@@ -69,11 +71,12 @@ class FakeMachine final : public Machine {
   void accept_state(std::string client,
                     std::function<void(Result<std::vector<Conviction>>)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
+  [[nodiscard]] std::size_t stops_waiting(const std::string& client) const override;
   void list_commands(std::string axis, std::size_t most,
                      std::function<void(std::vector<Command>)> callback) override;
   void get_command(std::string id, CommandCallback callback) override;
   std::shared_ptr<void> watch_command(std::string id, CommandCallback callback) override;
-  void cancel_command(std::string id, CommandCallback callback) override;
+  void cancel_command(std::string id, std::string client, CommandCallback callback) override;
   void buses(std::function<void(std::vector<BusStatus>)> callback) override;
   void budgets(std::function<void(std::vector<BusBudgetReport>)> callback) override;
   [[nodiscard]] DriveAccess& drive_access() override { return drives_; }
@@ -101,6 +104,7 @@ class FakeMachine final : public Machine {
   std::optional<Error> refusal_;
   std::vector<Submitted> submitted_;
   std::vector<std::string> log_;
+  std::map<std::string, std::size_t> stops_waiting_;
   std::vector<std::weak_ptr<CommandCallback>> watchers_;
   std::function<void()> notify_ = [] {};
   std::atomic<TimePoint> now_{TimePoint(std::chrono::hours(1))};

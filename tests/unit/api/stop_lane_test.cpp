@@ -3,6 +3,7 @@
 
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
+#include <grpcpp/create_channel_posix.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -179,6 +180,29 @@ TEST_F(Lane, ALateAnswerFindsNobodyAndHarmsNothing) {
   lane_->stop();
   caller.join();
   machine_.let_go();
+}
+
+/// None of its stops is dropped, and nobody else waits for them.
+TEST_F(Lane, WhoeverHasTooManyStopsWaitingIsReadFromLater) {
+  serve();
+  auto stub = client();
+  EXPECT_TRUE(stop(*stub).first.ok());
+  machine_.let_stops_wait("local:localhost", server::StopLane::most_unserved + 1);
+  {
+    Call context(200ms);
+    v1::StopRequest request;
+    request.set_axis("feeder");
+    v1::StopResponse response;
+    EXPECT_EQ(stub->Stop(&context, request, &response).error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  }
+  EXPECT_EQ(machine_.submitted().size(), 1U);
+  auto other =
+      v1::StopService::NewStub(grpc::CreateInsecureChannelFromFd("axisd", lane_->connect_inside().release()));
+  EXPECT_TRUE(stop(*other).first.ok());
+  EXPECT_EQ(machine_.submitted().size(), 2U);
+  machine_.let_stops_wait("local:localhost", server::StopLane::most_unserved);
+  EXPECT_TRUE(eventually([&] { return machine_.submitted().size() == 3; })) << "though nobody waits for it";
+  EXPECT_TRUE(stop(*stub).first.ok());
 }
 
 TEST_F(Lane, SilentConnectionsKeepNobodyOut) {

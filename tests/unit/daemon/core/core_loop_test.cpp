@@ -251,6 +251,23 @@ TEST(CoreLoop, AStopOfTheWholeMachineGoesBeforeACrowdOfTheSameClient) {
   EXPECT_LE(at("crowd all"), 14);
 }
 
+TEST(CoreLoop, StopsThatWaitAreCountedForEachClientUntilTheyAreServed) {
+  CoreLoop loop;
+  const auto gate = std::make_shared<AxisGate>();
+  auto& lane = loop.lane();
+  std::vector<std::size_t> seen;
+  lane.request({gate, gate, gate}, [&] { seen.push_back(lane.waiting("crowd")); }, "crowd");
+  lane.request({gate}, [] {}, "crowd", StopReach::machine);
+  lane.request({}, [] {}, "panel");
+  EXPECT_EQ(lane.waiting("crowd"), 4U);
+  EXPECT_EQ(lane.waiting("panel"), 1U);
+  EXPECT_EQ(lane.waiting("nobody"), 0U);
+  post(loop.executor(), [&] { loop.stop(); });
+  loop.run();
+  EXPECT_EQ(seen, std::vector<std::size_t>{3}) << "that of the whole machine has been served";
+  EXPECT_EQ(lane.waiting("crowd") + lane.waiting("panel"), 0U);
+}
+
 /// What waits is served as fast as ever, and so are the replies of the drives.
 TEST(CoreLoop, ACrowdOfStopsOfTheWholeMachineHasItsShareOnly) {
   CoreLoop loop;

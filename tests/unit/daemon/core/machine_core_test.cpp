@@ -72,7 +72,9 @@ TEST_F(ThreeAxes, ACancelledCommandHaltsBeforeHandlersThatAreReady) {
   std::vector<CommandState> seen_by_ready;
   post(loop.executor(), [&] {
     post(loop.executor(), [&] { seen_by_ready.push_back((*run)->value().state); });
-    std::thread([&] { service.cancel_command((*run)->value().id, [](const Result<Command>&) {}); }).join();
+    std::thread([&] {
+      service.cancel_command((*run)->value().id, "c", [](const Result<Command>&) {});
+    }).join();
     post(loop.executor(), [&] { loop.stop(); });
   });
   loop.run();
