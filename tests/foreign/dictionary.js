@@ -87,6 +87,11 @@ function dictionaryOf(path, node) {
       }
     }
   }
+  // Who it is stands at the head of some files alone.
+  const head = file.get('deviceinfo') || {}, identity = eds.getEntry(0x1018);
+  for (const [sub, key] of [[1, 'vendornumber'], [2, 'productnumber'], [3, 'revisionnumber']])
+    if (identity && identity[sub] && identity[sub].value === 0)
+      identity[sub].value = wrap(number(head[key], node) || 0, identity[sub].dataType);
   eds.addSdoServerParameter(0, 0x580 + node, 0x600 + node);
   return eds;
 }

@@ -31,9 +31,9 @@ function send({ id: identifier, data }) {
 function applyPdos() {
   if (device.nmt.state !== OPERATIONAL) return;
   const { pdo } = device;
-  pdo.stop();
-  pdo.syncTpdo = {};
   try {
+    pdo.stop();
+    pdo.syncTpdo = {};  // it forgets those only that are still what they were
     pdo.start();
   } catch (error) {
     process.stderr.write(`PDOs: ${error.message}\n`);
