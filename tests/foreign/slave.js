@@ -96,6 +96,6 @@ function hand(line) {
 
 boot();
 read();
-setInterval(advance, 5);
+setInterval(advance, 20);
 net.createServer((client) => client.on('data', (line) => client.end(`${hand(line.toString().trim())}\n`)))
   .listen(control, () => process.stdout.write('ready\n'));

@@ -2,7 +2,7 @@
 by its text (tests/foreign). What these drives do is compared with their own shafts."""
 import unittest
 
-from harness import Axis, CanScenario, error_pb, pb, wait_for
+from harness import Axis, CanScenario, error_pb, pb
 from harness.foreign import ForeignSlave, makers_file
 
 NODE, LIMITS = 5, (-2, 60)  # revolutions; 10 mm each
@@ -37,15 +37,14 @@ class ForeignSlaves(CanScenario):
         """The true speed comes within 1 % of this, and stays there; nothing is ever faster."""
         most = abs(turns_per_second) * 1.01
 
-        def reached():
-            speed = slave.shaft["speed"]
-            self.assertLessEqual(abs(speed), most)
-            return abs(speed - turns_per_second) <= 0.01 * abs(turns_per_second)
-        wait_for(reached, f"the shaft turns at {turns_per_second} r/s")
-        self.assertTrue(reached(), slave.shaft)
+        def reached(shaft):
+            self.assertLessEqual(abs(shaft["speed"]), most)
+            return abs(shaft["speed"] - turns_per_second) <= 0.01 * abs(turns_per_second)
+        slave.wait(reached, f"the shaft turns at {turns_per_second} r/s")
+        self.assertTrue(reached(slave.shaft), slave.shaft)
 
     def rests(self, machine, slave, starts):
-        wait_for(lambda: not slave.shaft["moving"], "the shaft rests")
+        slave.wait(lambda shaft: not shaft["moving"], "the shaft rests")
         self.assertEqual(slave.shaft["starts"], starts)
         state = machine.client.wait_state("slide", lambda s: not s.moving, "it is known to rest")
         self.assertEqual(slave.shaft["starts"], starts)
@@ -103,7 +102,7 @@ class ForeignSlaves(CanScenario):
             client.to_done("Enable", "slide")
         before = slave.shaft["starts"]
         move = client.motion("MoveAbsolute", "slide", position=100.0, velocity=60.0)
-        wait_for(lambda: slave.shaft["moving"], "it moves")
+        slave.wait(lambda shaft: shaft["moving"], "it moves")
         slave.hand("fault 8976")  # 2310h
         ended = self.ended(machine, move)
         self.assertEqual(ended.cause.reason, error_pb.REASON_ALARM, ended)
@@ -121,7 +120,7 @@ class ForeignSlaves(CanScenario):
         """By another master in mid-move, and by its supply at rest: it stays as it is until a client enables it."""
         client = machine.client
         move = client.motion("MoveAbsolute", "slide", position=300.0, velocity=60.0)
-        wait_for(lambda: slave.shaft["moving"], "it moves")
+        slave.wait(lambda shaft: shaft["moving"], "it moves")
         self.peer().send(0x000, bytes([0x81, NODE]))
         self.ended(machine, move)
         self.new_life(machine, slave, reboots=1)

@@ -4,6 +4,7 @@ import os
 import pathlib
 import socket
 import sys
+import time
 
 from .programs import ROOT, Program, wait_for
 
@@ -57,6 +58,15 @@ class ForeignSlave:
     @property
     def shaft(self):
         return self.hand("shaft")
+
+    def wait(self, condition, what):
+        """Until the shaft fulfils the condition; returns it. Not asked as often as it could be: in a guest each question
+        costs more than what is asked about."""
+        def fulfilled():
+            time.sleep(0.03)
+            shaft = self.shaft
+            return shaft if condition(shaft) else None
+        return wait_for(fulfilled, what)
 
     def close(self):
         self.cut()
