@@ -102,6 +102,7 @@ Task<> Axis::run_disable(ActivityPtr activity) {
   }
   if (sample && !sample->enabled) {
     finish(*activity, [](CommandRecord& command) { command.done(); });
+    release_as_owed();  // this was it
     co_return;
   }
   const auto cause =

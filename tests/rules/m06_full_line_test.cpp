@@ -65,8 +65,9 @@ TEST_P(FullLine, NoChainIsTriedTwiceAndNoCommandExpires) {
   const auto per_move = static_cast<double>(indexing.line.line->wire().size()) / indexing.all_done();
   fmt::print("{} axes at {} bit/s: {:.1f} moves a second, {:.2f} exchanges a move\n", axes, baud,
              indexing.all_done() / 20.0, per_move);
-  // The reading at the target, which is the proof for the next start, too; block and trigger.
-  EXPECT_LE(per_move, baud == 115200 ? 3.6 : 4.5);
+  // The reading at the target, which is the proof for the next start, too; block and trigger. Who has the
+  // line alone is asked once more before: nobody else needs the line.
+  EXPECT_LE(per_move, axes == 1 ? 4.1 : baud == 115200 ? 3.3 : 4.3);
   const auto budgets = indexing.line.machine().budgets();
   EXPECT_LE(indexing.longest_wait, budgets.front().predicted.load.at(static_cast<std::size_t>(axes)).start);
 }

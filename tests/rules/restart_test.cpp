@@ -97,7 +97,7 @@ TEST(Restart, TheEndOfWhatADeadDaemonBeganIsAnEvent) {
   rig.ready();
   const MoveRelativeRequest move{.distance = 8};
   (void)rig.submit(move, request("r1"));
-  rig.run(milliseconds(300));
+  rig.run(milliseconds(100));
   rig.kill_daemon();
   rig.start_daemon();
   const auto command = repeat(rig, move, "r1");

@@ -10,6 +10,7 @@ import yaml
 LOADER_ONLY = {
     "baud_of_model",
     "budget",
+    "canopen_answers",
     "canopen_models",
     "device_nodes",
     "device_same_address",
@@ -24,6 +25,7 @@ LOADER_ONLY = {
     "limits_beyond_counter",
     "listen_port",
     "merge_key",
+    "metrics",
     "model_on_wrong_bus",
     "missing_travel",
     "misspelt_unit",
@@ -41,6 +43,7 @@ LOADER_ONLY = {
     "segment_values",
     "segments_mode",
     "simulate_on_real_bus",
+    "simulate_power_on_can",
     "simulate_units",
     "simulate_without_effect",
     "start_above_velocity",

@@ -50,7 +50,7 @@ TEST(Planner, CountsOfPulsesAreFinerTheMoreARevolutionHas) {
   const CoarseDrive pulses({.rpm = 60'000, .of_pulse = true});  // 60 r/min with 1000
   EXPECT_DOUBLE_EQ(pulses.granted_rpm(119), 60);
   const CoarseDrive single({.rpm = 60, .of_pulse = true});
-  EXPECT_DOUBLE_EQ(single.granted_rpm(119), 119);
+  EXPECT_DOUBLE_EQ(single.granted_rpm(119), 118.98);
 }
 
 /// At 240 in place of 299 r/min, on the ramp of 299 r/min in 500 ms.
