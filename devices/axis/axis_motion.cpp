@@ -347,8 +347,8 @@ void Axis::end_unsent(Activity& activity, Error cause) {
   finish(activity, [&](CommandRecord& command) { aborted ? command.abort(cause) : command.error(cause); });
 }
 
-/// What became of a start. True: it was executed. A trigger without a reply is never sent again: the drive is
-/// read back until it shows what it did (M8).
+/// What became of a start. True: it was executed. A trigger of which the reply does not say so is never sent
+/// again: the drive is read back until it shows what it did (M8).
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
   if (!current(*activity)) co_return false;
   if (result || result.error().outcome == Outcome::unknown) activity->waits_for = StartWait::begun;
@@ -407,8 +407,9 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   }
   ++unknown_starts_.not_executed;
   cause.outcome = Outcome::not_executed;
-  cause.message = fmt::format("{}: the start frame got no reply, and the drive did not move: {}",
-                              settings_.name, cause.message);
+  cause.message =
+      fmt::format("{}: the start frame {}, and the drive did not move: {}", settings_.name,
+                  cause.reason == Reason::refused ? "was refused" : "got no reply", cause.message);
   tell_part(*activity, cause);
   fail_with_stop(*activity, std::move(cause));
   co_return false;

@@ -258,11 +258,14 @@ Task<Result<void>> YakoRtuDrive::start_in_one_frame(MotionBlock block, Trigger t
     co_return Result<void>{};
   }
   auto error = written.error();
-  // Refused for one register, the others may have been taken.
-  if (error.outcome == Outcome::unknown || error.outcome == Outcome::refused) expected_.push_back(block);
+  const bool refused = error.outcome == Outcome::refused;
+  if (refused || error.outcome == Outcome::unknown) expected_.push_back(block);
   error.where.object = trigger.address;
-  if (error.outcome == Outcome::refused)
+  if (refused) {
+    // Refused for one register, the others may have been taken, the trigger among them.
+    error.outcome = Outcome::unknown;
     error.remedy = "if the drive takes no start in one frame, remove drive.start_in_one_frame";
+  }
   co_return failed(std::move(error));
 }
 

@@ -73,17 +73,18 @@ Fail SimulatedDrive::write_many(std::span<const std::uint8_t> frame, std::vector
   const auto first = word(frame, 2), count = word(frame, 4);
   if (behaviour_.limit_block_writes && count > 16) return Fail::count;
   const auto value = [&](unsigned i) { return word(frame, 7 + std::size_t{2} * i); };
-  auto fail = Fail::none;
-  unsigned good = 0;
   const auto is_start_among_others = [&](unsigned i) { return count > 1 && first + i == reg::start; };
-  while (good < count && fail == Fail::none) {
-    fail = memory_.check_write(first + good, value(good));
-    if (is_start_among_others(good) && behaviour_.one_frame_start_refused) fail = Fail::access;
-    if (fail == Fail::none) ++good;
-  }
-  if (fail != Fail::none && !behaviour_.partial_block_write) return fail;
-  for (unsigned i = 0; i < good; ++i) {
-    if (is_start_among_others(i) && !behaviour_.one_frame_start) continue;
+  const auto check = [&](unsigned i) {
+    const bool refused = is_start_among_others(i) && behaviour_.one_frame_start_refused;
+    return refused ? Fail::access : memory_.check_write(first + i, value(i));
+  };
+  auto fail = Fail::none;
+  for (unsigned i = 0; i < count && fail == Fail::none; ++i) fail = check(i);
+  if (fail != Fail::none && !behaviour_.partial_block_write && !behaviour_.bad_register_skipped) return fail;
+  for (unsigned i = 0; i < count; ++i) {
+    const bool bad = check(i) != Fail::none;
+    if (bad && !behaviour_.bad_register_skipped) break;
+    if (bad || (is_start_among_others(i) && !behaviour_.one_frame_start)) continue;
     const auto refused = execute(static_cast<std::uint16_t>(first + i), value(i));
     if (refused != Fail::none) return refused;
   }

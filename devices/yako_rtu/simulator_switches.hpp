@@ -16,7 +16,8 @@ struct Behaviour {
   bool enabled_at_power_up, eeprom_switch_saves_itself, pv_speeds_always_saved;
   bool position_clear_in_motion, position_clear_late, abrupt_stop_slips, free_stop_releases, alarm_releases;
   bool stop_ignored_in_homing, stop_ignored_in_pt_pv, stop_uses_new_deceleration, stop_terminal_only_edge;
-  bool partial_block_write, limit_block_writes, crc_error_answered, function_error_code_1;
+  bool partial_block_write, bad_register_skipped;
+  bool limit_block_writes, crc_error_answered, function_error_code_1;
   bool pv_latched, speed_terminal_is_level, configuration_makes_edges, filter_home_and_limits;
   bool homed_stays_during_homing, homing_accepts_active_switch, homing_same_edge, homing_never_gives_up,
       homing_pauses, zero_before_compensation, back_off_at_homing_speed, homing_mode_1_other_approach,

@@ -116,6 +116,36 @@ TEST(M06, ADriveThatTakesNoStartInOneFrameDoesNotMove) {
     }
 }
 
+/// Not said either: with one register refused, the trigger behind it may be taken all the same.
+TEST(M08, ARefusedStartInOneFrameIsReadBackToo) {
+  both_directions(one_frame(), [](const RigOptions& base) {
+    for (const bool skipped : {false, true}) {
+      SCOPED_TRACE(skipped);
+      auto options = base;
+      options.switches = {{"bad_register_skipped", skipped}};
+      // What stands there cannot be written back.
+      options.before_start = [](simulation::SimulatedRtuNode& drive, VirtualWorld&) {
+        drive.poke(terminal_move_mode, 2);
+      };
+      Rig rig(options);
+      rig.ready();
+      rig.line->forget_wire();
+      const auto moved = rig.complete(MoveRelativeRequest{.distance = 30});
+      EXPECT_EQ(moved.state, skipped ? CommandState::done : CommandState::error) << describe(moved);
+      if (!skipped) {
+        ASSERT_TRUE(moved.cause);
+        EXPECT_EQ(moved.cause->reason, Reason::refused) << describe(moved);
+        EXPECT_EQ(moved.cause->outcome, Outcome::not_executed) << describe(moved);
+      }
+      rig.run(1s);
+      EXPECT_EQ(starts_on_the_wire(rig), 1) << "never sent again";
+      EXPECT_EQ(rig.drive->starts(), skipped ? 1 : 0);
+      EXPECT_NEAR(rig.load_mm(), skipped ? 30 : 0, 1e-9);
+      EXPECT_EQ(rig.state()->reboots, 0);
+    }
+  });
+}
+
 /// The gate forbids the frame as it forbids a trigger: with the stop, and when the canary has grown too old.
 TEST(M14, AStopComesBeforeAStartInOneFrame) {
   Rig rig(one_frame());

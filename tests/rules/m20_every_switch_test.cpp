@@ -29,6 +29,7 @@ struct Silent {
   bool closed_loop_only = false;  ///< it shows on the model without an encoder
 };
 constexpr Silent silent[] = {
+    {"bad_register_skipped", "no block has a bad value"},
     {"commands_readable", "no command register is read"},
     {"configuration_makes_edges", "no terminal starts motion"},
     {"crc_error_answered", "all frames arrive whole"},

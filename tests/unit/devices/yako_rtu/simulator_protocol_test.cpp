@@ -99,6 +99,11 @@ TEST(SimulatorProtocol, WritesNoneOfABlockWithABadValueUnlessTheSwitchSaysSo) {
   EXPECT_EQ(7, partial.write_block(reg::start_speed, {7, 5000, 50}));
   EXPECT_EQ(7, partial.reg(reg::start_speed));
   EXPECT_EQ(100, partial.reg(reg::deceleration_time));
+  Bench skipping{with_switch("bad_register_skipped")};
+  EXPECT_EQ(7, skipping.write_block(reg::start_speed, {7, 5000, 50}));
+  EXPECT_EQ(7, skipping.reg(reg::start_speed));
+  EXPECT_EQ(100, skipping.reg(reg::acceleration_time));
+  EXPECT_EQ(50, skipping.reg(reg::deceleration_time));
 }
 
 TEST(SimulatorProtocol, LimitsBlockWritesOnlyBySwitch) {
