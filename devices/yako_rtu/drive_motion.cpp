@@ -238,9 +238,15 @@ Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<Hom
   co_return Result<void>{};
 }
 
+/// Not where a terminal may start what 0x0026 decides: somebody else may have changed that since it was read,
+/// and it would be written back.
 bool YakoRtuDrive::may_start_in_one_frame() const {
   const auto setting = setup_.model_settings.find("start_in_one_frame");
-  return setting != setup_.model_settings.end() && setting->second == SettingValue(true);
+  if (setting == setup_.model_settings.end() || setting->second != SettingValue(true)) return false;
+  return std::ranges::none_of(setup_.inputs, [this](const TerminalSettings& input) {
+    const auto* function = find_function(model_->descriptor->input_functions, input.function);
+    return function != nullptr && function->starts_motion;
+  });
 }
 
 /// Whatever becomes of the frame is what becomes of the trigger: the error names that, and where it may have

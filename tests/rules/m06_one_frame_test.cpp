@@ -176,5 +176,27 @@ TEST(M06, WhatATerminalMayMoveIsLoadedFirst) {
   EXPECT_EQ(rig.writes_of(trigger), 1);
 }
 
+/// A velocity has no way to look at, but 0x0026 is the terminal's all the same.
+TEST(M06, AVelocityOfWhatATerminalMayMoveIsLoadedFirst) {
+  auto options = one_frame();
+  options.limits = false;
+  options.switches = {{"enabled_at_power_up", false}};
+  options.adjust = [adjust = options.adjust](AxisSettings& axis) {
+    adjust(axis);
+    axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+  };
+  Rig rig(options);
+  rig.ready();
+  rig.write_behind(terminal_move_mode, 1);
+  rig.line->forget_wire();
+  const auto run = rig.submit(MoveVelocityRequest{.velocity = 10});
+  rig.run(300ms);
+  EXPECT_EQ(run->value().state, CommandState::active);
+  EXPECT_EQ(starts_on_the_wire(rig), 0);
+  EXPECT_EQ(rig.writes_of(trigger), 1);
+  EXPECT_EQ(rig.drive->peek(terminal_move_mode), 1);
+  EXPECT_EQ(rig.complete(StopRequest{}).state, CommandState::done);
+}
+
 }  // namespace
 }  // namespace axisd::test
