@@ -8,6 +8,15 @@
 
 namespace axisd::canopen {
 
+namespace {
+
+constexpr bool begins_download(const can::Frame& frame) {
+  constexpr unsigned command_bits = 0xE0, download = 0x20;
+  return frame.size >= 4 && (frame.data[0] & command_bits) == download;
+}
+
+}  // namespace
+
 std::optional<ForeignCommand> parse_foreign_command(const can::Frame& frame) {
   const auto [service, node, number] = classify(frame.id);
   if (frame.rtr || frame.extended) return std::nullopt;
@@ -17,12 +26,10 @@ std::optional<ForeignCommand> parse_foreign_command(const can::Frame& frame) {
   }
   if (service == Service::rpdo)
     return ForeignCommand{.node = node, .what = fmt::format("sends RPDO {}", number)};
-  if (service != Service::sdo_request || frame.size < 4) return std::nullopt;
-  constexpr unsigned command_bits = 0xE0, download = 0x20;
+  if (service != Service::sdo_request || !begins_download(frame)) return std::nullopt;
   constexpr Object control_word{0x6040, 0}, target_velocity{0x60FF, 0};
   const Object object{static_cast<std::uint16_t>(frame.data[1] | frame.data[2] << 8U), frame.data[3]};
-  if ((frame.data[0] & command_bits) != download || (object != control_word && object != target_velocity))
-    return std::nullopt;
+  if (object != control_word && object != target_velocity) return std::nullopt;
   return ForeignCommand{.node = node, .what = fmt::format("writes {} by SDO", to_string(object))};
 }
 
@@ -151,6 +158,8 @@ void Master::on_frame(const can::ReceivedFrame& received) {
     case Service::sdo_request:
     case Service::rpdo:
       ++counters_.foreign_node;  // own frames do not come here: another master
+      if (service == Service::rpdo || (service == Service::sdo_request && begins_download(frame)))
+        ++traffic_.at(node).foreign_writes;
       if (const auto command = parse_foreign_command(frame); command && handlers_.on_foreign_command)
         handlers_.on_foreign_command(*command);
       return;

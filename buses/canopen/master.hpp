@@ -46,6 +46,8 @@ struct NodeTraffic {
   std::uint64_t tpdos = 0;  ///< received, by the identifiers of the predefined set
   std::uint64_t rpdos = 0;  ///< sent, likewise
   std::uint64_t heartbeats_lost = 0, boots = 0;
+  /// SDO downloads and RPDOs of another master that were begun.
+  std::uint64_t foreign_writes = 0;
 };
 
 /// Thread: core. Adopts nodes as they are: starting it sends nothing (M25).

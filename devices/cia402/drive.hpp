@@ -335,6 +335,8 @@ class Cia402Drive final : public Drive {
   /// What another master told this node, and when: the first of what comes in a row, and the last time.
   std::string foreign_command_;
   TimePoint foreign_at_ = TimePoint::min();
+  /// NodeTraffic::foreign_writes when all of the block was asked for last.
+  std::uint64_t foreign_at_block_ = 0;
 
   // Starts in common with others.
   std::optional<std::uint32_t> start_pdo_{};  ///< takes the control word at the next SYNC

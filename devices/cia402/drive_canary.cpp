@@ -102,6 +102,7 @@ Task<Result<MotionBlock>> Cia402Drive::read_block(SdoOptions options) {
 Task<Result<TimePoint>> Cia402Drive::read_canary(SdoOptions options) {
   if (rebooted_) co_return fail(lost_memory());
   const auto asked = clock_->now();
+  const auto foreign = bus_->master().traffic(node_.id()).foreign_writes;
   const auto block = co_await read_block(std::move(options));
   if (!block) co_return fail(block.error());
   if (rebooted_) co_return fail(lost_memory());
@@ -113,6 +114,7 @@ Task<Result<TimePoint>> Cia402Drive::read_canary(SdoOptions options) {
   }
   expected_ = {*block};
   expected_marks_.clear();
+  foreign_at_block_ = foreign;
   co_return asked;
 }
 
@@ -134,10 +136,12 @@ std::vector<MotionObject> Cia402Drive::telling_objects(const MotionBlock& block)
 
 /// The last look before a trigger. A node that is heard would have told of a restart (boot-up message): what
 /// tells the block from that after a power-up is enough then, so that slow answers fit into reboot_guard.
-/// Else all of it is read. The time: before the first of it was asked for.
+/// Else, and where another master has written to the node since it was read, all of it is read. The time:
+/// before the first of it was asked for.
 Task<Result<TimePoint>> Cia402Drive::prove_block(SdoOptions options) {
   const auto asked = clock_->now();
-  if (!alive(asked) || expected_.size() != 1) co_return co_await read_canary(std::move(options));
+  const bool alone = bus_->master().traffic(node_.id()).foreign_writes == foreign_at_block_;
+  if (!alive(asked) || expected_.size() != 1 || !alone) co_return co_await read_canary(std::move(options));
   const auto block = expected_.front();
   const auto losses = bus_->losses();
   for (const auto& [field, object] : telling_objects(block)) {

@@ -81,6 +81,21 @@ TEST(M24GroupStart, SlowAnswersPermitIt) {
   expect_started_once(bench, 2000);
 }
 
+/// M25: what waits for the others of its group may be written by another master meanwhile.
+TEST(M24GroupStart, WhatAnotherMasterHasWrittenIsNotStarted) {
+  GroupBench bench;
+  bench.ready();
+  ASSERT_TRUE(bench.prepare(2000));
+  bench.put(0x600U + 16, {0x23, 0x81, 0x60, 0, 0xE8, 0x03, 0, 0});  // 6081h
+  bench.run(2ms);
+  ASSERT_EQ(bench.members[0].node->peek(0x608100), 1000U);
+  const auto started = bench.start();
+  ASSERT_FALSE(started);
+  EXPECT_NE(started.error().outcome, Outcome::unknown) << to_string(started.error());
+  bench.run(1s);
+  for (auto& member : bench.members) EXPECT_EQ(member.node->starts(), 0);
+}
+
 /// Each way in which a drive may differ from CiA 301: known before anything is started by it.
 TEST(M24GroupStart, WhereAnRpdoIsNotAsItMustBeThereIsNone) {
   for (const auto* name :
