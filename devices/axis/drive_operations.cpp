@@ -124,6 +124,9 @@ Task<Result<void>> DriveOperations::save_parameters() const {
   const auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
   const auto saved = co_await axis_->drive().save_parameters();
+  const bool unknown = !saved && saved.error().outcome == Outcome::unknown;
+  if (unknown && !axis_->drive().continuity_mark())
+    axis_->reconfigure("whether the drive was restarted as it saved is not known", true);
   axis_->memory_marked();
   co_return saved;
 }

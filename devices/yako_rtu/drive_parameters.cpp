@@ -135,7 +135,10 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
   MotionBlock neutral = fresh_neutral_block();
   neutral[3] = 0;
   neutral = distinct(neutral);
-  if (const auto written = co_await replace_canary(neutral); !written) co_return written;
+  if (auto written = co_await replace_canary(neutral); !written) {
+    if (written.error().outcome == Outcome::unknown) written.error().outcome = Outcome::not_executed;
+    co_return written;
+  }
   const auto saved = co_await node_.write(reg::parameter_setting, 2, eeprom());
   const bool executed = saved || saved.error().outcome == Outcome::unknown;
   proven_at_.reset();
@@ -146,10 +149,14 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
         })));
     // Saved, this block would no longer tell a power-up (M7): whatever comes now, it is no proof any more.
     note_power_up_block(neutral);
+  }
+  if (saved) {
     const auto fresh = distinct(fresh_neutral_block());
     for (int attempt = 0; attempt < canary_attempts; ++attempt)
       if (co_await write_canary(fresh, parameters())) break;
     std::erase(expected_, neutral);
+  } else if (executed) {
+    expected_.clear();  // since the request it may have been restarted, and come up with what it saved
   }
   if (!saved) co_return failed(saved.error());
   co_return co_await check_continuity(TransactionClass::parameters);

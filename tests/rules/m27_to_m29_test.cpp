@@ -106,6 +106,32 @@ TEST(M27, ASavedBlockIsNoProofWhateverGetsLost) {
     }
 }
 
+/// What comes up after it holds the block that was saved: nothing tells it from the drive that saved it.
+TEST(M27, ARestartInPlaceOfTheReplyToTheSavingIsNotHidden) {
+  for (const auto* model : {"ess42-r", "ssd2608pr"}) {
+    SCOPED_TRACE(model);
+    Rig rig({.model = model, .adjust = [](AxisSettings& axis) {
+               axis.homing->method = HomingMethod::negative_limit;
+               axis.model_settings["released_position"] = std::string("counted");
+             }});
+    rig.ready();
+    EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 30}).state, CommandState::done);
+    EXPECT_EQ(rig.complete(DisableRequest{}).state, CommandState::done);
+    ASSERT_NE(rig.state()->trust, PositionTrust::unknown);
+    rig.fault({.kind = simulation::FaultKind::reboot_after,
+               .function = 0x06,
+               .register_address = save_or_restore,
+               .delay = 10ms});
+    const auto saved = save(rig);
+    ASSERT_FALSE(saved);
+    EXPECT_EQ(saved.error().outcome, Outcome::unknown) << to_string(saved.error());
+    rig.reconnect();
+    rig.run(2s);
+    EXPECT_EQ(rig.state()->link, LinkState::online);
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+  }
+}
+
 TEST(M7, ARestartIsSeenWhileTheConfigurationIsAppliedAgain) {
   // Drift first, then a power cycle before it was applied again: configure() must not overwrite the evidence.
   Rig rig({.switches = {{"enabled_at_power_up", false}},
