@@ -133,6 +133,7 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] Result<void> check_control_mode() const;
   void note_proof(TimePoint asked_at);
   [[nodiscard]] std::optional<TimePoint> fresh_proof() const;
+  [[nodiscard]] bool is_started_by_terminals() const;
   [[nodiscard]] bool may_start_in_one_frame() const;
   Task<Result<void>> start(MotionBlock block, std::optional<HomingBlock> homing, Trigger trigger,
                            MotionGuard guard);

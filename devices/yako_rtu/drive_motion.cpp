@@ -110,10 +110,17 @@ bool YakoRtuDrive::recognise_canary(std::span<const std::uint16_t> registers) {
   return true;
 }
 
+bool YakoRtuDrive::is_started_by_terminals() const {
+  return std::ranges::any_of(setup_.inputs, [this](const TerminalSettings& input) {
+    const auto* function = find_function(model_->descriptor->input_functions, input.function);
+    return function != nullptr && function->starts_motion;
+  });
+}
+
 /// Where it rests just where the block in its memory sent it, too: a released shaft may have been turned off
-/// 0 by hand since a restart, but hardly to there.
+/// 0 by hand since a restart, but hardly to there. A terminal may well have sent it there again.
 bool YakoRtuDrive::rules_out_restart(const DriveSample& sample) const {
-  if (expected_.size() != 1 || !Drive::rules_out_restart(sample)) return false;
+  if (expected_.size() != 1 || is_started_by_terminals() || !Drive::rules_out_restart(sample)) return false;
   return std::abs(target_of(expected_.front()) - sample.position_pulses) <= position_window();
 }
 
@@ -242,11 +249,8 @@ Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<Hom
 /// and it would be written back.
 bool YakoRtuDrive::may_start_in_one_frame() const {
   const auto setting = setup_.model_settings.find("start_in_one_frame");
-  if (setting == setup_.model_settings.end() || setting->second != SettingValue(true)) return false;
-  return std::ranges::none_of(setup_.inputs, [this](const TerminalSettings& input) {
-    const auto* function = find_function(model_->descriptor->input_functions, input.function);
-    return function != nullptr && function->starts_motion;
-  });
+  const bool wanted = setting != setup_.model_settings.end() && setting->second == SettingValue(true);
+  return wanted && !is_started_by_terminals();
 }
 
 /// Whatever becomes of the frame is what becomes of the trigger: the error names that, and where it may have

@@ -126,6 +126,25 @@ TEST(M06, ARestAnywhereElseIsNoProof) {
   EXPECT_EQ(canaries_of_start(rig, 5), 1);
 }
 
+/// It may have sent a drive there that was restarted: Done rests on the canary, as the next start does.
+TEST(M06, WhereATerminalMayMoveARestIsNoProof) {
+  for (const bool by_terminal : {false, true}) {
+    SCOPED_TRACE(by_terminal);
+    Rig rig({.switches = {{"enabled_at_power_up", false}}, .adjust = [by_terminal](AxisSettings& axis) {
+               if (by_terminal) axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+             }});
+    rig.ready();
+    rig.line->forget_wire();
+    const auto move = rig.complete(MoveAbsoluteRequest{.position = 10});
+    EXPECT_EQ(move.state, CommandState::done) << describe(move);
+    const auto& wire = rig.line->wire();
+    const auto started = std::ranges::find_if(
+        wire, [](const WireEntry& one) { return one.is_write() && one.address() == trigger; });
+    ASSERT_NE(started, wire.end());
+    EXPECT_EQ(std::count_if(started, wire.end(), is_canary), by_terminal ? 1 : 0);
+  }
+}
+
 /// It would be the next canary, and hide a restart meanwhile.
 TEST(M06, ABlockThatHadToWaitIsNotWrittenOnAnOlderProof) {
   both_directions({}, [](const RigOptions& base) {
