@@ -148,7 +148,10 @@ Task<Result<void>> Cia402Drive::save_parameters() {
   // What is saved now stands there after the next power-up: nothing that moves or enables (M27).
   if (const auto quiet = co_await quieten(); !quiet) co_return quiet;
   const auto neutral = distinct(fresh_neutral_block());
-  if (const auto written = co_await write_canary(neutral, parameters()); !written) co_return written;
+  if (auto written = co_await write_canary(neutral, parameters()); !written) {
+    if (written.error().outcome == Outcome::unknown) written.error().outcome = Outcome::not_executed;
+    co_return written;
+  }
   const auto saved =
       co_await write_object(model_->objects.save->object, model_->objects.save->value, 0, eeprom());
   if (saved || saved.error().outcome == Outcome::unknown) {
