@@ -5,12 +5,13 @@ import json
 import os
 import pathlib
 import random
+import re
 import resource
 import threading
 import time
 import unittest
 
-from harness import DONE, CallFailed, Scenario, pb, wait_for
+from harness import DONE, OWN_NAME, CallFailed, Scenario, pb, wait_for
 from harness.client import audit_pb, drive_pb
 import axisd  # noqa: E402  (made by the harness)
 
@@ -55,7 +56,7 @@ class Audit(AuditScenario):
         self.assertEqual([r.number for r in records], list(range(1, len(records) + 1)))
         self.assertEqual((records[0].kind, records[0].raw.run.kind), ("daemon", audit_pb.DAEMON_RUN_KIND_BEGAN))
         accepted, ended = [r for r in records if r.command and r.command.id == move.id]
-        self.assertEqual((accepted.client, accepted.rpc, accepted.request_id), ("local:unix", "AxisService.MoveRelative", "r-1"))
+        self.assertEqual((accepted.client, accepted.rpc, accepted.request_id), (OWN_NAME, "AxisService.MoveRelative", "r-1"))
         self.assertEqual((accepted.command.state, ended.command.state), (axisd.CommandState.ACCEPTED, axisd.CommandState.DONE))
         self.assertEqual(accepted.command.asked.distance, 5.0)
         self.assertTrue(ended.command.granted.velocity)
@@ -85,7 +86,7 @@ class Audit(AuditScenario):
             axis="spinner", values=[{"name": "homing_time", "value": before + 50}]))
         records = self.wait_audit(machine, lambda found: len([r for r in found if r.kind == "call"]) == 2, "it is told")
         asked, done = [r for r in records if r.kind == "call"]
-        self.assertEqual((asked.client, asked.axis, asked.rpc), ("local:unix", "spinner", "DriveService.WriteParameters"))
+        self.assertEqual((asked.client, asked.axis, asked.rpc), (OWN_NAME, "spinner", "DriveService.WriteParameters"))
         (written,) = done.raw.call.parameters
         self.assertEqual((written.name, written.asked, written.before, written.after),
                          ("homing_time", before + 50, before, before + 50))
@@ -101,7 +102,7 @@ class Audit(AuditScenario):
         shown = machine.axisctl("audit", "feeder", "--kind", "command", "--since", "10min")
         self.assertEqual((shown.returncode, shown.stderr), (0, ""))
         self.assertEqual(shown.stdout.count(move.id), 2)
-        self.assertRegex(shown.stdout, r"feeder  local:unix  .*MoveRelative  Done")
+        self.assertRegex(shown.stdout, rf"feeder  {re.escape(OWN_NAME)}  .*MoveRelative  Done")
         self.assertEqual(len(machine.axisctl("audit", "--last", "3").stdout.splitlines()), 3)
         self.assertEqual(machine.axisctl("audit", "--kind", "noise").returncode, 2)
         self.assertEqual(json.loads(machine.axisctl("--json", "audit", "--last", "1").stdout)["kind"], "AUDIT_KIND_COMMAND")

@@ -11,6 +11,7 @@
 #include "api/server/lane/stop_calls.hpp"
 #include "api/server/lane/stop_lane.hpp"
 #include "axisd/v1/access.pb.h"
+#include "axisd/v1/audit_service.pb.h"
 #include "axisd/v1/bus_service.pb.h"
 #include "axisd/v1/command_service.pb.h"
 #include "axisd/v1/drive_service.pb.h"
@@ -41,7 +42,8 @@ std::vector<const MethodDescriptor*> calls() {
   for (const auto* request : {v1::StopRequest::descriptor(), v1::TransactRequest::descriptor(),
                               v1::GetCommandRequest::descriptor(), v1::GetDriveRequest::descriptor(),
                               v1::WatchEventsRequest::descriptor(), v1::MoveGroupRequest::descriptor(),
-                              v1::RenewLeaseRequest::descriptor(), v1::GetInfoRequest::descriptor()})
+                              v1::RenewLeaseRequest::descriptor(), v1::GetInfoRequest::descriptor(),
+                              v1::ListAuditRequest::descriptor()})
     for (int i = 0; i < request->file()->service(0)->method_count(); ++i)
       all.push_back(request->file()->service(0)->method(i));
   return all;

@@ -333,7 +333,7 @@ TEST_F(Calls, CommandsAsResources) {
   cancel.set_id("c-1");
   v1::CancelCommandResponse cancelled;
   EXPECT_TRUE(commands->CancelCommand(&c3, cancel, &cancelled).ok());
-  EXPECT_THAT(machine_.log(), ElementsAre("get_command c-1", "cancel_command c-1 by local:unix"));
+  EXPECT_THAT(machine_.log(), ElementsAre("get_command c-1", "cancel_command c-1 by " + own_name()));
   machine_.refuse_with(Error{.reason = Reason::unknown_command});
   const auto status = commands->GetCommand(&c4, get, &got);
   EXPECT_EQ(detail_of(status).reason(), v1::REASON_UNKNOWN_COMMAND);
