@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -23,6 +25,23 @@ enum class Role : std::uint8_t {
 
 /// By the name of a client, as its certificate or its unix socket proves it.
 using Roles = std::map<std::string, Role, std::less<>>;
+
+/// Between the name of a person and that of the delegate who speaks for them: "anna via web.press-1". No
+/// identity has it in it.
+inline constexpr std::string_view via = " via ";
+
+/// Of a client's name that which its connection proves: of whom a delegate speaks for, the delegate.
+[[nodiscard]] constexpr std::string_view identity_of(std::string_view client) {
+  const auto found = client.find(via);
+  return found == std::string_view::npos ? client : client.substr(found + via.size());
+}
+
+/// Where a call comes from, beside whom it is for. The audit tells it, and nothing is decided by it.
+struct CallOrigin {
+  std::string peer;            ///< "ipv4:10.0.0.5:51234", "unix:axisctl"; empty: not known
+  std::optional<Role> role{};  ///< of the client, on what the call names; nothing: there are no roles
+};
+using CallOriginPtr = std::shared_ptr<const CallOrigin>;
 
 /// Whom these name has no role, but for what is said here.
 struct AccessSettings {

@@ -112,9 +112,10 @@ class Machine {
   /// known whether the latch is durable, or that takes longer than a second.
   virtual void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) = 0;
   virtual void release_inhibit(std::string client, std::function<void(Result<void>)> callback) = 0;
-  /// How many axes this client has asked to stop that the core has not begun to stop yet, each as often as it
-  /// was asked for. None of these is ever dropped: whoever takes stops in can take in less of such a client.
-  [[nodiscard]] virtual std::size_t stops_waiting(const std::string& client) const = 0;
+  /// How many axes this identity, and whom it speaks for, have asked to stop that the core has not begun to
+  /// stop yet, each as often as it was asked for. None of these is ever dropped: whoever takes stops in can
+  /// take in less of such a client.
+  [[nodiscard]] virtual std::size_t stops_waiting(const std::string& identity) const = 0;
 
   virtual void kept_state(std::function<void(KeptStateReport)> callback) = 0;
   /// A person has looked at the convictions: motion waits for them no longer, once that is durable. Calls

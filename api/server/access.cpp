@@ -125,7 +125,7 @@ Result<Caller> caller_of(const AccessSettings* access, const Peer& peer, const C
                     fmt::format("give 1 to {} printable ASCII characters without spaces", longest_user));
   const auto asked = claim.role ? role_named(*claim.role) : found->second;
   if (!asked) return unusable(role_key, "is no role", "give viewer, operator or maintainer");
-  return Caller{.name = fmt::format("{} via {}", *claim.user, peer.name),
+  return Caller{.name = fmt::format("{}{}{}", *claim.user, via, peer.name),
                 .identity = peer.name,
                 .lent = std::min(*asked, found->second)};
 }

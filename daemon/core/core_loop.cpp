@@ -4,6 +4,8 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
+#include "devices/access.hpp"
+
 namespace axisd::core {
 namespace {
 
@@ -20,7 +22,7 @@ void StopLane::request(std::vector<std::shared_ptr<AxisGate>> gates, std::functi
     const std::lock_guard lock(mutex_);
     requests_.push_back(
         {.gates = std::move(gates), .serve = std::move(serve), .client = std::move(client), .reach = reach});
-    unserved_[requests_.back().client] += requests_.back().axes();
+    unserved_[std::string(identity_of(requests_.back().client))] += requests_.back().axes();
   }
   waiting_.store(true, std::memory_order_release);
   post(core_->io(), [] {});  // wakes the loop, which looks at the lane first
@@ -79,7 +81,7 @@ void StopLane::serve(Request request) {
   core_->run_first(request.serve);
   {
     const std::lock_guard lock(mutex_);
-    const auto unserved = unserved_.find(request.client);
+    const auto unserved = unserved_.find(identity_of(request.client));
     unserved->second -= request.axes();
     if (unserved->second == 0) unserved_.erase(unserved);
   }
@@ -89,9 +91,9 @@ void StopLane::serve(Request request) {
   });
 }
 
-std::size_t StopLane::waiting(const std::string& client) const {
+std::size_t StopLane::waiting(std::string_view identity) const {
   const std::lock_guard lock(mutex_);
-  const auto found = unserved_.find(client);
+  const auto found = unserved_.find(identity);
   return found == unserved_.end() ? 0 : found->second;
 }
 

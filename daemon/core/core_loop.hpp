@@ -13,6 +13,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "buses/asio_clock.hpp"
@@ -42,8 +43,9 @@ class StopLane {
   /// axes goes on once the handlers that wait by then have run, so that no crowd of stops keeps another's
   /// from the drives. False: there was none to serve. Thread: core.
   bool drain();
-  /// Axes of a client's requests that have not been served yet; a request of no axis counts as one.
-  [[nodiscard]] std::size_t waiting(const std::string& client) const;
+  /// Axes of the requests of an identity, also of all whom it speaks for, that have not been served yet; a
+  /// request of no axis counts as one.
+  [[nodiscard]] std::size_t waiting(std::string_view identity) const;
 
   static constexpr std::size_t share = 64;
 
@@ -72,8 +74,8 @@ class StopLane {
   Turns turns_;       ///< of the core
   std::string last_;  ///< of the core: who was served last
   mutable std::mutex mutex_;
-  std::vector<Request> requests_;                ///< under mutex_
-  std::map<std::string, std::size_t> unserved_;  ///< under mutex_: axes of each client
+  std::vector<Request> requests_;                             ///< under mutex_
+  std::map<std::string, std::size_t, std::less<>> unserved_;  ///< under mutex_: axes of each identity
 };
 
 /// The core thread's loop.

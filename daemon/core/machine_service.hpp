@@ -33,8 +33,8 @@ class MachineService final : public Machine {
                     std::function<void(Result<StopReleased>)> callback) override;
   void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
-  [[nodiscard]] std::size_t stops_waiting(const std::string& client) const override {
-    return loop_->lane().waiting(client);
+  [[nodiscard]] std::size_t stops_waiting(const std::string& identity) const override {
+    return loop_->lane().waiting(identity);
   }
   void kept_state(std::function<void(KeptStateReport)> callback) override;
   void accept_state(std::string client,

@@ -277,8 +277,8 @@ class CountedMachine final : public Machine {
       inner_->cancel_command(id, client, ledger_->answer(ticket, callback));
     });
   }
-  [[nodiscard]] std::size_t stops_waiting(const std::string& client) const override {
-    return inner_->stops_waiting(client);
+  [[nodiscard]] std::size_t stops_waiting(const std::string& identity) const override {
+    return inner_->stops_waiting(identity);
   }
   void buses(std::function<void(std::vector<BusStatus>)> callback) override {
     ledger_->enter([=, this](const auto& ticket) { inner_->buses(ledger_->answer(ticket, callback)); });

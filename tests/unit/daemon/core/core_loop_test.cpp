@@ -268,6 +268,20 @@ TEST(CoreLoop, StopsThatWaitAreCountedForEachClientUntilTheyAreServed) {
   EXPECT_EQ(lane.waiting("crowd") + lane.waiting("panel"), 0U);
 }
 
+/// A delegate does not have more of them waiting by naming more people.
+TEST(CoreLoop, StopsThatWaitCountForWhoMakesTheConnection) {
+  CoreLoop loop;
+  auto& lane = loop.lane();
+  lane.request({}, [] {}, "anna via web");
+  lane.request({}, [] {}, "bert via web");
+  lane.request({}, [] {}, "web");
+  EXPECT_EQ(lane.waiting("web"), 3U);
+  EXPECT_EQ(lane.waiting("anna via web"), 0U);
+  post(loop.executor(), [&] { loop.stop(); });
+  loop.run();
+  EXPECT_EQ(lane.waiting("web"), 0U);
+}
+
 /// What waits is served as fast as ever, and so are the replies of the drives.
 TEST(CoreLoop, ACrowdOfStopsOfTheWholeMachineHasItsShareOnly) {
   CoreLoop loop;
