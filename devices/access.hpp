@@ -38,7 +38,7 @@ inline constexpr std::string_view via = " via ";
 
 /// Where a call comes from, beside whom it is for. The audit tells it, and nothing is decided by it.
 struct CallOrigin {
-  std::string peer;            ///< "ipv4:10.0.0.5:51234", "unix:axisctl"; empty: not known
+  std::string peer{};          ///< "ipv4:10.0.0.5:51234", "unix:axisctl"; empty: not known
   std::optional<Role> role{};  ///< of the client, on what the call names; nothing: there are no roles
 };
 using CallOriginPtr = std::shared_ptr<const CallOrigin>;

@@ -12,6 +12,7 @@
 
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
+#include "devices/access.hpp"
 #include "devices/axis/command.hpp"
 #include "devices/event.hpp"
 
@@ -40,12 +41,23 @@ struct AuditedCall {
   std::string text{};  ///< what it asks for, or what came of it, for people
   std::vector<AuditedParameter> parameters{};
   std::optional<Error> error{};
+  CallOriginPtr origin{};  ///< nullptr: not known
+};
+
+/// A call that was refused because its client lacks the role, or speaks for somebody else and may not.
+struct DeniedCall {
+  std::string rpc;  ///< "AxisService.Enable"
+  std::string client;
+  std::string axis{};  ///< that it names; empty: none, or several
+  Error error;
+  std::uint64_t left_out = 0;  ///< as of RefusedCommand
+  CallOriginPtr origin{};
 };
 
 /// A command that was not accepted.
 struct RefusedCommand {
   Command command;             ///< without an id; its cause says why
-  std::uint64_t left_out = 0;  ///< refusals of this client before it that are not told: there were too many
+  std::uint64_t left_out = 0;  ///< of its identity before it that are not told: there were too many
 };
 
 /// A command of an earlier run of the daemon, as the command journal has it.
@@ -67,7 +79,8 @@ struct AuditGap {
   std::uint64_t left_out = 0;
 };
 
-using AuditContent = std::variant<Event, AuditedCall, RefusedCommand, RecoveredCommand, DaemonRun, AuditGap>;
+using AuditContent =
+    std::variant<Event, AuditedCall, RefusedCommand, DeniedCall, RecoveredCommand, DaemonRun, AuditGap>;
 
 struct AuditEntry {
   WallTime at{};

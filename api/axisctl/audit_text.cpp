@@ -5,6 +5,7 @@
 #include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 
 #include "api/axisctl/error.hpp"
@@ -23,12 +24,18 @@ std::string target_text(const v1::MotionValues& asked) {
   return asked.has_velocity() ? fmt::format(" {:g}/s", asked.velocity()) : "";
 }
 
+std::string left_out_text(std::uint64_t left_out) {
+  return left_out == 0 ? "" : fmt::format(" ({} more before it have no record)", left_out);
+}
+
 std::string text_of(const v1::RefusedCommand& refused) {
   const auto& command = refused.command();
-  auto text = fmt::format("refused: {}{}: {}", command_kind(command), target_text(command.asked()),
-                          describe(command.cause(), command.axis()));
-  if (refused.left_out() > 0) text += fmt::format(" ({} more before it have no record)", refused.left_out());
-  return text;
+  return fmt::format("refused: {}{}: {}{}", command_kind(command), target_text(command.asked()),
+                     describe(command.cause(), command.axis()), left_out_text(refused.left_out()));
+}
+
+std::string text_of(const v1::DeniedCall& denied) {
+  return fmt::format("refused: {}{}", describe(denied.error()), left_out_text(denied.left_out()));
 }
 
 std::string text_of(const v1::AuditedParameter& parameter) {
@@ -73,6 +80,8 @@ std::string content_text(const v1::AuditRecord& record) {
       return text_of(record.refused());
     case v1::AuditRecord::kCall:
       return text_of(record.call());
+    case v1::AuditRecord::kDenied:
+      return text_of(record.denied());
     case v1::AuditRecord::kRecovered:
       return text_of(record.recovered());
     case v1::AuditRecord::kRun:

@@ -130,6 +130,11 @@ Result<Caller> caller_of(const AccessSettings* access, const Peer& peer, const C
                 .lent = std::min(*asked, found->second)};
 }
 
+std::string rpc_of(const Message& request) {
+  const auto* call = call_with(*request.GetDescriptor());
+  return call == nullptr ? std::string() : fmt::format("{}.{}", call->service()->name(), call->name());
+}
+
 Demand demand_of(const Message& request) {
   Demand demand;
   if (const auto* call = call_with(*request.GetDescriptor())) {
@@ -205,6 +210,18 @@ Result<Caller> admitted(const AccessSettings* access, const Peer& peer, const Cl
 Caller admitted_caller(const AccessSettings* access, const Peer& peer, const Claim& claim) {
   auto caller = caller_of(access, peer, claim);
   return caller ? *std::move(caller) : Caller{.name = peer.name, .identity = peer.name};
+}
+
+CallOriginPtr origin_of(const AccessSettings* access, const Peer& peer, const Caller& caller,
+                        const Message& request, std::span<const GroupSettings> groups) {
+  CallOrigin origin{.peer = peer.address};
+  if (access != nullptr) {
+    const auto axes = axes_of(demand_of(request).names, groups);
+    auto role = axes.empty() ? role_of(access, caller) : Role::maintainer;
+    for (const auto& axis : axes) role = std::min(role, role_of(access, caller, axis));
+    origin.role = role;
+  }
+  return std::make_shared<const CallOrigin>(std::move(origin));
 }
 
 void AccessControl::replace(std::optional<AccessSettings> settings) {

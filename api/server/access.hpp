@@ -22,6 +22,7 @@ namespace axisd::server {
 struct Peer {
   std::string name;       ///< "shift-a", "unix:anna": by which `access:` knows it
   std::string program{};  ///< of a unix socket, as the program calls itself: shown, and nothing else
+  std::string address{};  ///< "ipv4:10.0.0.5:51234", "unix:axisctl": shown, and nothing else
 };
 
 /// What the metadata of a call says of whom it is made for. Unset: nothing.
@@ -36,6 +37,7 @@ struct Caller {
   std::string name;            ///< "shift-a", or "anna via web.press-1"
   std::string identity;        ///< of the peer
   std::optional<Role> lent{};  ///< of whom a delegate speaks for: what they may do, on every axis
+  CallOriginPtr origin{};      ///< nullptr: it was not asked for
 };
 
 /// What a call asks for (proto/axisd/v1/access.proto).
@@ -49,6 +51,9 @@ struct Demand {
 /// Whom the call is for. `access`: nullptr: the configuration has none, and nobody speaks for others.
 /// Errors: access_denied (the peer is no delegate), invalid_argument (the metadata is not usable).
 [[nodiscard]] Result<Caller> caller_of(const AccessSettings* access, const Peer& peer, const Claim& claim);
+
+/// "AxisService.Enable". Precondition: as of demand_of().
+[[nodiscard]] std::string rpc_of(const google::protobuf::Message& request);
 
 /// What the request's call asks for, from the descriptors. Precondition: `request` is one of a call's.
 [[nodiscard]] Demand demand_of(const google::protobuf::Message& request);
@@ -77,6 +82,11 @@ struct Demand {
                                       std::span<const GroupSettings> groups);
 /// Whom a call is for that was admitted.
 [[nodiscard]] Caller admitted_caller(const AccessSettings* access, const Peer& peer, const Claim& claim);
+
+/// Where a request of this caller comes from, with the role that the caller has: the least on what it names.
+[[nodiscard]] CallOriginPtr origin_of(const AccessSettings* access, const Peer& peer, const Caller& caller,
+                                      const google::protobuf::Message& request,
+                                      std::span<const GroupSettings> groups);
 
 /// The table that is in force: all doors of the daemon look at the same one. Thread: any.
 class AccessControl {

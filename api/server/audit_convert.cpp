@@ -28,12 +28,19 @@ std::string rpc_of(CommandKind kind) {
   return fmt::format("{}.{}", kind == CommandKind::move_group ? "GroupService" : "AxisService", name);
 }
 
+void fill_origin(const CallOriginPtr& origin, v1::AuditRecord& to) {
+  if (!origin) return;
+  to.set_peer(origin->peer);
+  if (origin->role) to.set_role(std::string(to_string(*origin->role)));
+}
+
 void fill_head(const Command& command, v1::AuditRecord& to) {
   to.set_client(command.client);
   to.set_axis(command.axis);
   to.set_rpc(rpc_of(command.kind));
   to.set_request_id(command.request_id);
   to.set_lease_token(command.lease_token);
+  fill_origin(command.origin, to);
 }
 
 /// Who it was that did it, and of what kind the record is.
@@ -86,6 +93,15 @@ struct Fill {
     to_proto(refused.command, *to.mutable_refused()->mutable_command());
     to.mutable_refused()->set_left_out(refused.left_out);
   }
+  void operator()(const DeniedCall& denied) const {
+    to.set_kind(v1::AUDIT_KIND_REFUSAL);
+    to.set_client(denied.client);
+    to.set_axis(denied.axis);
+    to.set_rpc(denied.rpc);
+    fill_origin(denied.origin, to);
+    to_proto(denied.error, *to.mutable_denied()->mutable_error());
+    to.mutable_denied()->set_left_out(denied.left_out);
+  }
   void operator()(const RecoveredCommand& recovered) const {
     to.set_kind(v1::AUDIT_KIND_COMMAND);
     fill_head(recovered.command, to);
@@ -98,6 +114,7 @@ struct Fill {
     to.set_axis(call.axis);
     to.set_rpc(call.rpc);
     to.set_lease_token(call.lease_token);
+    fill_origin(call.origin, to);
     auto& entry = *to.mutable_call();
     entry.set_phase(static_cast<v1::AuditedCallPhase>(std::to_underlying(call.phase) + 1));
     entry.set_text(call.text);

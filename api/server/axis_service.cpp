@@ -41,7 +41,8 @@ AxisServiceImpl::AxisServiceImpl(const Services& services) : BoundedService(serv
 template <class Request>
 AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request& request,
                                                 v1::Command* command) {
-  const auto client = client_of(*context);
+  const auto caller = who_asks(*context, request);
+  const auto& client = caller.name;
   const auto& what = Request::descriptor()->name();
   if (auto axis = find_axis(services_.machine, request.axis()); !axis)
     return refuse(context, client, what, axis.error());
@@ -49,6 +50,7 @@ AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request&
   if (!action) return refuse(context, client, what, action.error());
   auto submission = motion_options(request.options(), client, services_.machine);
   if (!submission) return refuse(context, client, what, submission.error());
+  submission->options.origin = caller.origin;
   if (const auto patience = patience_of(*context))
     submission->options.call_deadline = services_.machine.now() + *patience;
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
@@ -61,7 +63,7 @@ template <class Request, class Response>
 AxisServiceImpl::Reactor* AxisServiceImpl::stop(Context* context, const Request& request,
                                                 Response* response) {
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    handle(services_.machine, request, client_of(*context), call, response);
+    handle(services_.machine, request, who_asks(*context, request), call, response);
   });
 }
 

@@ -22,9 +22,13 @@ class BoundedService : public Service {
 
   /// Whose the call is: of its commands, holds, leases and quotas, and in the log.
   [[nodiscard]] std::string client_of(const Context& context) const { return callers_.of(context).name; }
+  /// The same with where it comes from, which the audit tells of what it changes.
+  [[nodiscard]] Caller who_asks(const Context& context, const google::protobuf::Message& request) const {
+    return callers_.of(context, request);
+  }
 
   /// What stands before each call.
-  [[nodiscard]] Result<void> admit(const Context& context, const google::protobuf::Message& request) const {
+  [[nodiscard]] Result<void> admit(const Context& context, const google::protobuf::Message& request) {
     if (auto within = check_bounds(request); !within) return within;
     return callers_.admit(context, request);
   }
@@ -70,7 +74,7 @@ class BoundedService : public Service {
     return -1;
   }
 
-  const Callers& callers_;
+  Callers& callers_;
 };
 
 }  // namespace axisd::server

@@ -79,7 +79,8 @@ BusServiceImpl::Reactor* BusServiceImpl::WriteDevice(Context* context, const v1:
   auto& buses = services_.machine.bus_access();
   if (auto valid = check_device_write(*request, buses); !valid)
     return answer(context, to_status(valid.error()));
-  const auto client = client_of(*context);
+  const auto caller = who_asks(*context, *request);
+  const auto& client = caller.name;
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
@@ -89,8 +90,10 @@ BusServiceImpl::Reactor* BusServiceImpl::WriteDevice(Context* context, const v1:
         fmt::format("{}: {}", client, text));
     buses.write_device(
         request->device(), request->register_(), request->value(),
-        audited<double>(services_, {.rpc = "BusService.WriteDevice", .client = client, .text = text},
-                        std::move(reply)));
+        audited<double>(
+            services_,
+            {.rpc = "BusService.WriteDevice", .client = client, .text = text, .origin = caller.origin},
+            std::move(reply)));
   });
 }
 
@@ -98,7 +101,8 @@ BusServiceImpl::Reactor* BusServiceImpl::transact_object(Context* context, const
                                                          v1::TransactResponse* response) {
   auto transfer = to_object_request(*request);
   if (!transfer) return answer(context, to_status(transfer.error()));
-  const auto client = client_of(*context);
+  const auto caller = who_asks(*context, *request);
+  const auto& client = caller.name;
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
@@ -115,8 +119,10 @@ BusServiceImpl::Reactor* BusServiceImpl::transact_object(Context* context, const
     auto reply = reply_with_value<Bytes>(call, std::move(fill), fmt::format("{}: {}", client, text));
     buses.transact_object(
         *std::move(transfer),
-        audited<Bytes>(services_, {.rpc = "BusService.Transact", .client = client, .text = text},
-                       std::move(reply)));
+        audited<Bytes>(
+            services_,
+            {.rpc = "BusService.Transact", .client = client, .text = text, .origin = caller.origin},
+            std::move(reply)));
   });
 }
 
@@ -125,7 +131,8 @@ BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::Tr
   if (names_object(*request)) return transact_object(context, request, response);
   auto transaction = to_transact(*request);
   if (!transaction) return answer(context, to_status(transaction.error()));
-  const auto client = client_of(*context);
+  const auto caller = who_asks(*context, *request);
+  const auto& client = caller.name;
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
@@ -140,7 +147,11 @@ BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::Tr
                                   transaction->address, transaction->bus, transaction->node);
     auto reply = reply_with_value<Words>(call, std::move(fill), fmt::format("{}: {}", client, text));
     buses.transact(*std::move(transaction),
-                   audited<Words>(services_, {.rpc = "BusService.Transact", .client = client, .text = text},
+                   audited<Words>(services_,
+                                  {.rpc = "BusService.Transact",
+                                   .client = client,
+                                   .text = text,
+                                   .origin = caller.origin},
                                   std::move(reply)));
   });
 }

@@ -4,11 +4,9 @@
 #include <grpc/grpc_security_constants.h>
 
 #include <utility>
-#include <vector>
 
 #include "api/server/local_peer.hpp"
 #include "api/server/peer.hpp"
-#include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
@@ -29,8 +27,10 @@ Claim claim_of(const grpc::CallbackServerContext& context) {
 
 }  // namespace
 
-Callers::Callers(Machine& machine, std::shared_ptr<const AccessControl> access)
-    : machine_(machine), access_(access ? std::move(access) : std::make_shared<const AccessControl>()) {}
+Callers::Callers(Machine& machine, std::shared_ptr<const AccessControl> access, AuditSink* audit)
+    : machine_(machine),
+      access_(access ? std::move(access) : std::make_shared<const AccessControl>()),
+      refusals_(machine, audit) {}
 
 void Callers::enter(int connection) {
   auto peer = local_peer(connection);
@@ -42,34 +42,49 @@ Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
   const auto auth = context.auth_context();
   if (auth && auth->IsPeerAuthenticated()) {
     const auto pem = auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-    return {.name = identities_->of(pem.empty() ? std::string()
-                                                : std::string(pem.front().data(), pem.front().size()))};
+    auto name = identities_->of(pem.empty() ? std::string()
+                                            : std::string(pem.front().data(), pem.front().size()));
+    return {.name = std::move(name), .address = context.peer()};
   }
   const auto connection = context.peer();
   if (connection.starts_with(given)) {
     const std::lock_guard lock(mutex_);
     if (const auto found = local_.find(connection); found != local_.end()) return found->second;
   }
-  return {.name = "local:" + peer_host(connection)};
+  return {.name = "local:" + peer_host(connection), .address = connection};
 }
 
 Result<void> Callers::admit(const grpc::CallbackServerContext& context,
-                            const google::protobuf::Message& request) const {
+                            const google::protobuf::Message& request) {
   const auto access = access_->settings();
   const auto claim = claim_of(context);
   if (!access && !claim.user && !claim.role) return {};
   const auto peer = peer_of(context);
-  const auto groups = access ? machine_.group_access().groups() : std::vector<GroupSettings>();
-  const auto caller = admitted(access.get(), peer, claim, request, groups);
-  if (caller) return {};
-  log_limited(spdlog::level::info, peer.name, "refused calls",
-              fmt::format("{} refused: {}", request.GetDescriptor()->name(), to_string(caller.error())));
-  return fail(caller.error());
+  const auto groups = groups_for(access.get());
+  const auto admission = admitted(access.get(), peer, claim, request, groups);
+  if (admission) return {};
+  auto caller = admitted_caller(access.get(), peer, claim);
+  caller.origin = origin_of(access.get(), peer, caller, request, groups);
+  refusals_.tell(caller, request, admission.error());
+  return fail(admission.error());
+}
+
+std::vector<GroupSettings> Callers::groups_for(const AccessSettings* access) const {
+  return access == nullptr ? std::vector<GroupSettings>() : machine_.group_access().groups();
 }
 
 Caller Callers::of(const grpc::CallbackServerContext& context) const {
   const auto access = access_->settings();
   return admitted_caller(access.get(), peer_of(context), claim_of(context));
+}
+
+Caller Callers::of(const grpc::CallbackServerContext& context,
+                   const google::protobuf::Message& request) const {
+  const auto access = access_->settings();
+  const auto peer = peer_of(context);
+  auto caller = admitted_caller(access.get(), peer, claim_of(context));
+  caller.origin = origin_of(access.get(), peer, caller, request, groups_for(access.get()));
+  return caller;
 }
 
 }  // namespace axisd::server

@@ -8,8 +8,10 @@
 #include <mutex>
 #include <string>
 #include <unordered_map>
+#include <vector>
 
 #include "api/server/access.hpp"
+#include "api/server/refusals.hpp"
 #include "api/tls/identity.hpp"
 #include "devices/machine.hpp"
 
@@ -20,8 +22,8 @@ namespace axisd::server {
 /// request ids must stay valid over a reconnection. Thread: any.
 class Callers {
  public:
-  /// `machine` outlives this. `access`: nullptr: everybody may do everything.
-  Callers(Machine& machine, std::shared_ptr<const AccessControl> access);
+  /// `machine` outlives this. `access`: nullptr: everybody may do everything. `audit`: as of Refusals.
+  Callers(Machine& machine, std::shared_ptr<const AccessControl> access, AuditSink* audit);
 
   /// Names peers by certificates of these authorities (PEM). Before the first call.
   void trust(const std::string& client_ca) { identities_ = std::make_unique<tls::Identities>(client_ca); }
@@ -31,17 +33,23 @@ class Callers {
 
   /// Whether the call may be made. Errors: access_denied, invalid_argument (metadata).
   [[nodiscard]] Result<void> admit(const grpc::CallbackServerContext& context,
-                                   const google::protobuf::Message& request) const;
+                                   const google::protobuf::Message& request);
   /// Whom a call is for that was admitted.
   [[nodiscard]] Caller of(const grpc::CallbackServerContext& context) const;
+  /// The same with its origin.
+  [[nodiscard]] Caller of(const grpc::CallbackServerContext& context,
+                          const google::protobuf::Message& request) const;
   /// Who made its connection.
   [[nodiscard]] Peer peer_of(const grpc::CallbackServerContext& context) const;
   /// nullptr: there is none.
   [[nodiscard]] std::shared_ptr<const AccessSettings> access() const { return access_->settings(); }
 
  private:
+  [[nodiscard]] std::vector<GroupSettings> groups_for(const AccessSettings* access) const;
+
   Machine& machine_;
   const std::shared_ptr<const AccessControl> access_;
+  Refusals refusals_;
   std::unique_ptr<tls::Identities> identities_;
   mutable std::mutex mutex_;
   std::unordered_map<std::string, Peer> local_;  ///< under mutex_; by what gRPC calls the connection

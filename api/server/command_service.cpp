@@ -90,7 +90,7 @@ grpc::ServerUnaryReactor* CommandServiceImpl::CancelCommand(Context* context,
                                                             const v1::CancelCommandRequest* request,
                                                             v1::CancelCommandResponse* response) {
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    handle(services_.machine, *request, client_of(*context), call, response);
+    handle(services_.machine, *request, who_asks(*context, *request), call, response);
   });
 }
 

@@ -27,8 +27,10 @@ std::string entry(std::string_view client, std::string_view axis, std::string_vi
 
 /// Who asks for a change, and under which lease.
 template <class Request>
-Requester requester(std::string client, const Request& request) {
-  return {.client = std::move(client), .lease_token = request.lease_token()};
+Requester requester(Caller caller, const Request& request) {
+  return {.client = std::move(caller.name),
+          .lease_token = request.lease_token(),
+          .origin = std::move(caller.origin)};
 }
 
 }  // namespace
@@ -106,7 +108,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteParameters(Context* context,
     std::string what = entry(client_of(*context), request->axis(), "write_parameters");
     for (const auto& value : request->values()) what += fmt::format(" {}={}", value.name(), value.value());
     services_.machine.drive_access().write_parameters(
-        request->axis(), *values, requester(client_of(*context), *request),
+        request->axis(), *values, requester(who_asks(*context, *request), *request),
         reply_with_value<Values>(
             call,
             [response, model = drive->model](const Values& read_back) {
@@ -126,7 +128,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::SaveParameters(Context* context,
     return refuse(context, "save_parameters", confirmed.error());
   return begin(context, [&](const Call& call) {
     services_.machine.drive_access().save_parameters(
-        axis, requester(client_of(*context), *request),
+        axis, requester(who_asks(*context, *request), *request),
         reply_with_value<void>(call, [] {}, entry(client_of(*context), axis, "save_parameters")));
   });
 }
@@ -141,7 +143,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::RestoreFactory(Context* context,
     return refuse(context, "restore_factory", confirmed.error());
   return begin(context, [&](const Call& call) {
     services_.machine.drive_access().restore_factory(
-        axis, requester(client_of(*context), *request),
+        axis, requester(who_asks(*context, *request), *request),
         reply_with_value<std::string>(
             call, [response](const std::string& text) { response->set_after_power_cycle(text); },
             entry(client_of(*context), axis, "restore_factory")));
@@ -176,7 +178,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteSegments(Context* context,
   if (!segments) return refuse(context, "write_segments", segments.error());
   return begin(context, [&](const Call& call) {
     services_.machine.drive_access().write_segments(
-        request->axis(), *segments, requester(client_of(*context), *request),
+        request->axis(), *segments, requester(who_asks(*context, *request), *request),
         reply_with_value<SegmentSettings>(
             call,
             [response](const SegmentSettings& read_back) {
@@ -210,7 +212,7 @@ grpc::ServerWriteReactor<Response>* DriveServiceImpl::change_serial(Context* con
       services_, context, *std::move(ticket),
       [&](typename Stream::Callback callback) {
         return services_.machine.drive_access().change_serial(
-            request.axis(), *change, requester(client_of(*context), request), std::move(callback));
+            request.axis(), *change, requester(who_asks(*context, request), request), std::move(callback));
       },
       [last](const SerialProgress& from, Response& to) {
         to.set_phase(to_proto(from.phase));

@@ -35,11 +35,13 @@ GroupServiceImpl::Reactor* GroupServiceImpl::ListGroups(Context* context, const 
 
 GroupServiceImpl::Reactor* GroupServiceImpl::MoveGroup(Context* context, const v1::MoveGroupRequest* request,
                                                        v1::MoveGroupResponse* response) {
-  const auto client = client_of(*context);
+  const auto caller = who_asks(*context, *request);
+  const auto& client = caller.name;
   auto wanted = to_request(*request);
   if (!wanted) return answer(context, to_status(wanted.error()));
   auto submission = motion_options(request->options(), client, services_.machine);
   if (!submission) return answer(context, to_status(submission.error()));
+  submission->options.origin = caller.origin;
   if (const auto patience = patience_of(*context))
     submission->options.call_deadline = services_.machine.now() + *patience;
   auto ticket = services_.admission.admit(client, Admission::Kind::call);
@@ -72,14 +74,14 @@ GroupServiceImpl::Reactor* GroupServiceImpl::GetGroupMove(Context* context,
 GroupServiceImpl::Reactor* GroupServiceImpl::GroupHalt(Context* context, const v1::GroupHaltRequest* request,
                                                        v1::GroupHaltResponse* response) {
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    handle(services_.machine, *request, client_of(*context), call, response);
+    handle(services_.machine, *request, who_asks(*context, *request), call, response);
   });
 }
 
 GroupServiceImpl::Reactor* GroupServiceImpl::GroupStop(Context* context, const v1::GroupStopRequest* request,
                                                        v1::GroupStopResponse* response) {
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    handle(services_.machine, *request, client_of(*context), call, response);
+    handle(services_.machine, *request, who_asks(*context, *request), call, response);
   });
 }
 

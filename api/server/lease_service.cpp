@@ -104,7 +104,7 @@ LeaseServiceImpl::Reactor* LeaseServiceImpl::RenewLease(Context* context,
                                                         const v1::RenewLeaseRequest* request,
                                                         v1::RenewLeaseResponse* response) {
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    handle(services_.machine, *request, client_of(*context), call, response);
+    handle(services_.machine, *request, who_asks(*context, *request), call, response);
   });
 }
 

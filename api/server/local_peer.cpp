@@ -11,6 +11,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace axisd::server {
 namespace {
@@ -52,7 +53,11 @@ Peer local_peer(int connection) {
   ucred who{};
   socklen_t size = sizeof who;
   if (getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &who, &size) != 0) return {.name = "unix:unknown"};
-  return {.name = "unix:" + user_name(who.uid), .program = program_name(who.pid)};
+  auto program = program_name(who.pid);
+  auto address = "unix:" + program;
+  return {.name = "unix:" + user_name(who.uid),
+          .program = std::move(program),
+          .address = std::move(address)};
 }
 
 }  // namespace axisd::server

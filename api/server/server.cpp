@@ -89,7 +89,7 @@ struct Server::Parts {
         calls(std::make_shared<OpenCalls>()),
         guard(std::make_shared<StallGuard>(options.stalled_reader_limit)),
         admission(options.limits),
-        callers(machine, options.access),
+        callers(machine, options.access, options.audit_sink),
         hub(std::make_shared<WatchHub>(machine, reply, options.stalled_reader_limit)),
         events(std::make_shared<EventHub>(reply)),
         services{machine,

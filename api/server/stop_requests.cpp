@@ -28,9 +28,10 @@ void refuse(const ReplyPtr& reply, const std::string& client, std::string_view w
 }
 
 template <class Request, class Response>
-void stop_axis(Machine& machine, const Request& request, const std::string& client, const ReplyPtr& reply,
+void stop_axis(Machine& machine, const Request& request, const Caller& caller, const ReplyPtr& reply,
                Response* response) {
   const auto& name = Request::descriptor()->name();
+  const auto& client = caller.name;
   if (auto axis = find_axis(machine, request.axis()); !axis) return refuse(reply, client, name, axis.error());
   auto action = to_action(request);
   if (!action) return refuse(reply, client, name, action.error());
@@ -41,6 +42,7 @@ void stop_axis(Machine& machine, const Request& request, const std::string& clie
         if (const auto now = machine.snapshot(axis)) to_proto(now->holds, *response->mutable_holds());
       };
   auto submission = stop_options(request.options(), client);
+  submission.options.origin = caller.origin;
   const auto what = to_string(kind_of(*action));
   machine.submit(request.axis(), *std::move(action), std::move(submission.options), submission.until,
                  reply_with_command(reply, response->mutable_command(), client, request.axis(), what,
@@ -48,10 +50,13 @@ void stop_axis(Machine& machine, const Request& request, const std::string& clie
 }
 
 template <class Request, class Response>
-void stop_group(Machine& machine, const Request& request, StopKind kind, const std::string& client,
+void stop_group(Machine& machine, const Request& request, StopKind kind, const Caller& caller,
                 const ReplyPtr& reply, Response* response) {
-  GroupStopRequest wanted{
-      .group = request.group(), .axes = {request.axes().begin(), request.axes().end()}, .kind = kind};
+  const auto& client = caller.name;
+  GroupStopRequest wanted{.group = request.group(),
+                          .axes = {request.axes().begin(), request.axes().end()},
+                          .kind = kind,
+                          .origin = caller.origin};
   if constexpr (requires { request.hold(); }) {
     wanted.hold = request.hold();
     wanted.request_id = hold_id(request.request_id());
@@ -101,34 +106,35 @@ void to_proto(const Results& results, const std::vector<std::string>& axes, v1::
 
 }  // namespace
 
-void handle(Machine& machine, const v1::HaltRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::HaltRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::HaltResponse* response) {
-  stop_axis(machine, request, client, reply, response);
+  stop_axis(machine, request, caller, reply, response);
 }
-void handle(Machine& machine, const v1::StopRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::StopRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::StopResponse* response) {
-  stop_axis(machine, request, client, reply, response);
+  stop_axis(machine, request, caller, reply, response);
 }
-void handle(Machine& machine, const v1::QuickStopRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::QuickStopRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::QuickStopResponse* response) {
-  stop_axis(machine, request, client, reply, response);
+  stop_axis(machine, request, caller, reply, response);
 }
-void handle(Machine& machine, const v1::DisableRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::DisableRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::DisableResponse* response) {
-  stop_axis(machine, request, client, reply, response);
+  stop_axis(machine, request, caller, reply, response);
 }
-void handle(Machine& machine, const v1::GroupHaltRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::GroupHaltRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::GroupHaltResponse* response) {
-  stop_group(machine, request, StopKind::halt, client, reply, response);
+  stop_group(machine, request, StopKind::halt, caller, reply, response);
 }
-void handle(Machine& machine, const v1::GroupStopRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::GroupStopRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::GroupStopResponse* response) {
-  stop_group(machine, request, StopKind::stop, client, reply, response);
+  stop_group(machine, request, StopKind::stop, caller, reply, response);
 }
 
-void handle(Machine& machine, const v1::StopAllRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::StopAllRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::StopAllResponse* response) {
   auto axes = machine.axis_names();
+  const auto& client = caller.name;
   machine.stop_all(client, stop_all_wait(request.wait_until()),
                    [reply, response, client, axes = std::move(axes)](AllStopped stopped) {
                      const auto shared = std::make_shared<const AllStopped>(std::move(stopped));
@@ -148,21 +154,21 @@ void handle(Machine& machine, const v1::StopAllRequest& request, const std::stri
                    });
 }
 
-void handle(Machine& machine, const v1::RenewLeaseRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::RenewLeaseRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::RenewLeaseResponse* response) {
-  machine.lease_access().renew({.client = client, .lease_token = request.lease_token()},
+  machine.lease_access().renew({.client = caller.name, .lease_token = request.lease_token()},
                                reply_with_value<Lease>(reply, [response, &machine](const Lease& lease) {
                                  to_proto(lease, machine, *response->mutable_lease());
                                }));
 }
 
-void handle(Machine& machine, const v1::CancelCommandRequest& request, const std::string& client,
+void handle(Machine& machine, const v1::CancelCommandRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::CancelCommandResponse* response) {
   if (const auto valid = check_command_id(request.id()); !valid)
-    return refuse(reply, client, "cancel", valid.error());
+    return refuse(reply, caller.name, "cancel", valid.error());
   machine.cancel_command(
-      request.id(), client,
-      reply_with_command(reply, response->mutable_command(), client, request.id(), "cancel"));
+      request.id(), caller.name,
+      reply_with_command(reply, response->mutable_command(), caller.name, request.id(), "cancel"));
 }
 
 }  // namespace axisd::server

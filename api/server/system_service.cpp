@@ -111,7 +111,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1:
 grpc::ServerUnaryReactor* SystemServiceImpl::StopAll(Context* context, const v1::StopAllRequest* request,
                                                      v1::StopAllResponse* response) {
   return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
-    handle(services_.machine, *request, client_of(*context), call, response);
+    handle(services_.machine, *request, who_asks(*context, *request), call, response);
   });
 }
 

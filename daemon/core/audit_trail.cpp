@@ -1,6 +1,5 @@
 #include "daemon/core/audit_trail.hpp"
 
-#include <chrono>
 #include <utility>
 #include <variant>
 
@@ -8,8 +7,6 @@
 
 namespace axisd::core {
 namespace {
-
-constexpr std::size_t most_clients = 1'000;
 
 struct IsAudited {
   bool operator()(const CommandChange&) const { return true; }
@@ -38,31 +35,11 @@ void AuditTrail::event(const Event& event) {
   if (kept() && std::visit(IsAudited{}, event.content)) add(event);
 }
 
-AuditTrail::Minute& AuditTrail::minute_of(const std::string& client) {
-  const auto now = clock_->now();
-  if (minutes_.size() >= most_clients && !minutes_.contains(client))
-    std::erase_if(minutes_, [&](const auto& other) {
-      return other.second.left_out == 0 && now - other.second.begin >= std::chrono::minutes(1);
-    });
-  // Beyond that they share one.
-  auto& minute =
-      minutes_[minutes_.size() < most_clients || minutes_.contains(client) ? client : std::string()];
-  if (minute.told == 0 || now - minute.begin >= std::chrono::minutes(1)) {
-    minute.begin = now;
-    minute.told = 0;
-  }
-  return minute;
-}
-
 void AuditTrail::refused(const std::string& axis, const Action& action, const CommandOptions& options,
                          Error cause) {
   if (!kept()) return;
-  auto& minute = minute_of(options.client);
-  if (minute.told == refusals_a_minute) {
-    ++minute.left_out;
-    return;
-  }
-  ++minute.told;
+  const auto left_out = ration_.take(options.client, clock_->now());
+  if (!left_out) return;
   const auto arrived = options.arrived == TimePoint{} ? clock_->now() : options.arrived;
   add(RefusedCommand{.command = {.id = {},
                                  .axis = axis,
@@ -73,8 +50,9 @@ void AuditTrail::refused(const std::string& axis, const Action& action, const Co
                                  .asked = asked_by(action),
                                  .state = CommandState::aborted,
                                  .cause = std::move(cause),
-                                 .accepted_at = clock_->wall(arrived)},
-                     .left_out = std::exchange(minute.left_out, 0)});
+                                 .accepted_at = clock_->wall(arrived),
+                                 .origin = options.origin},
+                     .left_out = *left_out});
 }
 
 void AuditTrail::call(AuditedCall call) {

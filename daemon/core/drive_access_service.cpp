@@ -291,7 +291,8 @@ std::shared_ptr<AuditedCall> DriveAccessService::begin(std::string_view rpc, con
                                                    .client = requester.client,
                                                    .axis = axis,
                                                    .lease_token = requester.lease_token,
-                                                   .text = std::move(text)});
+                                                   .text = std::move(text),
+                                                   .origin = requester.origin});
 }
 
 template <class T>

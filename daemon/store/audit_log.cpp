@@ -104,8 +104,9 @@ void AuditLog::run() {
     else
       wake_.wait(lock, something);
     const bool last = closing_;
-    std::ranges::move(std::exchange(added_, {}), std::back_inserter(waiting_));
+    auto added = std::exchange(added_, {});
     lock.unlock();
+    std::ranges::move(added, std::back_inserter(waiting_));
     tell(open_ ? write() : open());
     lock.lock();
     if (last && (added_.empty() || trouble_)) break;

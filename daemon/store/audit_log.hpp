@@ -91,7 +91,7 @@ class AuditLog final : public AuditSink {
   std::optional<TimePoint> sync_by_;
 
   std::atomic<std::uint64_t> newest_ = 0;
-  mutable std::mutex mutex_;  ///< held for moves only
+  mutable std::mutex mutex_;  ///< held for a move only: the core waits for it
   std::condition_variable wake_;
   std::deque<AuditEntry> added_;   // guarded by mutex_
   std::size_t waiting_count_ = 0;  // guarded by mutex_: added_ and waiting_

@@ -10,6 +10,7 @@
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
 #include "buses/gate.hpp"
+#include "devices/access.hpp"
 #include "devices/axis/settings.hpp"
 
 namespace axisd {
@@ -59,6 +60,7 @@ struct Command {
   std::optional<Error> cause{};  ///< why it was aborted, failed or is unknown
   WallTime accepted_at{};        ///< when the request arrived at the server
   std::optional<WallTime> started_at{}, ended_at{};
+  CallOriginPtr origin{};  ///< nullptr: not known; not over a restart
 };
 
 /// Nothing that a client asks for may be sent later than this after its request.
@@ -79,6 +81,7 @@ struct CommandOptions {
   /// not at all (M31). How the call ends changes nothing.
   TimePoint call_deadline = TimePoint::max();
   BufferMode buffer_mode = BufferMode::aborting;
+  CallOriginPtr origin{};  ///< nullptr: not known
 };
 
 // What a client can ask of an axis. Velocities and positions are in user units; NaN and infinity are refused.

@@ -160,7 +160,8 @@ CommandPtr CommandBook::open(const std::string& axis, const Action& action, cons
                   .lease_token = options.lease_token,
                   .kind = kind_of(action),
                   .asked = asked_by(action),
-                  .accepted_at = clock_->wall(options.arrived == TimePoint{} ? now : options.arrived)};
+                  .accepted_at = clock_->wall(options.arrived == TimePoint{} ? now : options.arrived),
+                  .origin = options.origin};
   const auto entry = enter(
       std::make_shared<CommandRecord>(std::move(command), *clock_),
       {.client = options.client, .request_id = options.request_id, .digest = digest(axis, action)}, now);

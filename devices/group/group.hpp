@@ -71,6 +71,7 @@ struct GroupStopRequest {
   StopKind kind = StopKind::stop;  ///< halt or stop
   bool hold = false;
   std::string request_id{};  ///< by which it is held; may be empty
+  CallOriginPtr origin{};    ///< nullptr: not known
 };
 
 /// What is to be released: groups by name, axes, or both.

@@ -9,6 +9,7 @@
 
 #include "buses/clock.hpp"
 #include "buses/error.hpp"
+#include "devices/access.hpp"
 
 namespace axisd {
 
@@ -37,6 +38,7 @@ struct Lease {
 struct Requester {
   std::string client;
   std::uint64_t lease_token = 0;  ///< 0: under none
+  CallOriginPtr origin{};         ///< nullptr: not known
 };
 
 struct LeaseRequest {

@@ -12,11 +12,14 @@ from .v1 import audit_service_pb2
 class AuditRecord:
     """`kind`: "command", "refusal", "call", "fault", "lease", "stop_hold", "inhibit", "configuration", "state", "daemon" or
     "gap". `command`: of a command that was accepted, has ended or was refused (then without an id). `recovered`: the
-    command journal told of it after the daemon was killed. `error`: why it was refused, or failed. The rest is in `raw`."""
+    command journal told of it after the daemon was killed. `error`: why it was refused, or failed. `peer`, `role`: where the
+    client called from, and what it might do there; empty: not known. The rest is in `raw`."""
     number: int
     at: datetime.datetime | None
     kind: str
     client: str
+    peer: str
+    role: str
     axis: str
     rpc: str
     request_id: str
@@ -36,9 +39,11 @@ class AuditRecord:
             command = Command.of(raw.refused.command)
         elif content == "event" and raw.event.HasField("command_change"):
             command = Command.of(raw.event.command_change.command)
-        error = _optional_error(raw.call, "error") if content == "call" else command.cause if command else None
+        error = command.cause if command else None
+        if content in ("call", "denied"):
+            error = _optional_error(getattr(raw, content), "error")
         if content == "event" and raw.event.HasField("axis_fault"):
             error = _optional_error(raw.event.axis_fault, "cause")
         return cls(raw.number, _optional_time(raw, "at"),
-                   known.name.removeprefix("AUDIT_KIND_").lower() if known else str(raw.kind), raw.client, raw.axis, raw.rpc,
-                   raw.request_id, command, content == "recovered", error, raw)
+                   known.name.removeprefix("AUDIT_KIND_").lower() if known else str(raw.kind), raw.client, raw.peer,
+                   raw.role, raw.axis, raw.rpc, raw.request_id, command, content == "recovered", error, raw)

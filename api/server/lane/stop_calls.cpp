@@ -23,7 +23,8 @@ struct Context {
   const Http2::Call& call;
   const AccessSettings* access;
   const Peer& peer;
-  std::string client;  ///< whom the call is for
+  Refusals& refusals;
+  Caller caller;  ///< whom the call is for
   StopCalls::Done done;
 };
 
@@ -62,7 +63,7 @@ void refuse(const StopCalls::Done& done, const Error& error) {
 }
 
 template <class Request>
-std::optional<Request> parsed(const Context& context) {
+std::optional<Request> parsed(Context& context) {
   Request request;
   if (!request.ParseFromString(context.call.message)) {
     refuse(context.done, {.reason = Reason::invalid_argument,
@@ -76,7 +77,9 @@ std::optional<Request> parsed(const Context& context) {
   }
   const auto groups =
       context.access == nullptr ? std::vector<GroupSettings>() : context.machine.group_access().groups();
+  context.caller.origin = origin_of(context.access, context.peer, context.caller, request, groups);
   if (const auto may = admitted(context.access, context.peer, context.call.claim, request, groups); !may) {
+    context.refusals.tell(context.caller, request, may.error());
     refuse(context.done, may.error());
     return std::nullopt;
   }
@@ -97,7 +100,7 @@ void take(Context context) {
   if constexpr (requires { request->axis(); })
     if (!known_or_suggested(context, request->axis())) return;
   const auto reply = std::make_shared<LaneReply<Response>>(std::move(context.done), Admission::Ticket());
-  handle(context.machine, *request, context.client, reply, reply->response());
+  handle(context.machine, *request, context.caller, reply, reply->response());
 }
 
 /// A jog and what renews it come by one way, in the order in which they were sent; so does the halt after it.
@@ -108,17 +111,19 @@ void jog(Context context) {
     return refuse(context.done, axis.error());
   auto action = to_action(*request);
   if (!action) return refuse(context.done, action.error());
-  auto submission = motion_options(request->options(), context.client, context.machine);
+  const auto& client = context.caller.name;
+  auto submission = motion_options(request->options(), client, context.machine);
   if (!submission) return refuse(context.done, submission.error());
+  submission->options.origin = context.caller.origin;
   if (context.call.patience)
     submission->options.call_deadline = context.machine.now() + *context.call.patience;
-  auto ticket = context.admission.admit(context.client, Admission::Kind::call);
+  auto ticket = context.admission.admit(client, Admission::Kind::call);
   if (!ticket) return refuse(context.done, ticket.error());
   const auto reply =
       std::make_shared<LaneReply<v1::JogResponse>>(std::move(context.done), *std::move(ticket));
   context.machine.submit(
       request->axis(), *std::move(action), std::move(submission->options), submission->until,
-      reply_with_command(reply, reply->response()->mutable_command(), context.client, request->axis(),
+      reply_with_command(reply, reply->response()->mutable_command(), client, request->axis(),
                          to_string(CommandKind::jog), {}, context.machine.wall(context.machine.now())));
 }
 
@@ -151,9 +156,10 @@ bool Allowance::take(TimePoint now) {
   return true;
 }
 
-StopCalls::StopCalls(Machine& machine, std::shared_ptr<const AccessControl> access)
+StopCalls::StopCalls(Machine& machine, std::shared_ptr<const AccessControl> access, AuditSink* audit)
     : machine_(machine),
       access_(access ? std::move(access) : std::make_shared<const AccessControl>()),
+      refusals_(machine, audit),
       admission_({}) {}
 
 void StopCalls::start(const Http2::Call& call, const Peer& peer, Done done) {
@@ -169,7 +175,8 @@ void StopCalls::start(const Http2::Call& call, const Peer& peer, Done done) {
                   .call = call,
                   .access = access.get(),
                   .peer = peer,
-                  .client = admitted_caller(access.get(), peer, call.claim).name,
+                  .refusals = refusals_,
+                  .caller = admitted_caller(access.get(), peer, call.claim),
                   .done = std::move(done)});
 }
 

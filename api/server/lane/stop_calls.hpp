@@ -10,6 +10,7 @@
 #include "api/server/access.hpp"
 #include "api/server/admission.hpp"
 #include "api/server/lane/http2.hpp"
+#include "api/server/refusals.hpp"
 #include "buses/clock.hpp"
 #include "devices/machine.hpp"
 
@@ -36,8 +37,9 @@ class StopCalls {
   /// Takes it over, once per call. Thread: any; meant for the core.
   using Done = std::function<void(Make make)>;
 
-  /// `machine` outlives this. `access`: nullptr: everybody may do everything.
-  explicit StopCalls(Machine& machine, std::shared_ptr<const AccessControl> access = {});
+  /// `machine` outlives this. `access`: nullptr: everybody may do everything. `audit`: as of Refusals.
+  explicit StopCalls(Machine& machine, std::shared_ptr<const AccessControl> access = {},
+                     AuditSink* audit = nullptr);
   /// For an axis that there is not the one that was probably meant is looked for: among hundreds that takes
   /// longer than a stop. In all, at once and in a second.
   static constexpr double suggestions = 20;
@@ -51,6 +53,7 @@ class StopCalls {
  private:
   Machine& machine_;
   const std::shared_ptr<const AccessControl> access_;
+  Refusals refusals_;
   Admission admission_;
   Allowance suggestions_{suggestions};
 };

@@ -43,17 +43,20 @@ constexpr Duration when_crowded = std::chrono::milliseconds(5);
 /// Accepted at once, before those who are there are served again.
 constexpr int most_accepted = 32;
 
-/// As gRPC writes it, for peer_host().
+/// As gRPC writes it.
 std::string text_of(const sockaddr_storage& address, socklen_t size) {
-  char host[NI_MAXHOST]{};
+  char host[NI_MAXHOST]{}, port[NI_MAXSERV]{};
   if (address.ss_family == AF_UNIX) return "unix:";
-  if (getnameinfo(reinterpret_cast<const sockaddr*>(&address), size, host, sizeof host, nullptr, 0,
-                  NI_NUMERICHOST) != 0)
+  if (getnameinfo(reinterpret_cast<const sockaddr*>(&address), size, host, sizeof host, port, sizeof port,
+                  NI_NUMERICHOST | NI_NUMERICSERV) != 0)
     return "ipv4:unknown:0";
-  return address.ss_family == AF_INET6 ? fmt::format("ipv6:[{}]:0", host) : fmt::format("ipv4:{}:0", host);
+  return address.ss_family == AF_INET6 ? fmt::format("ipv6:[{}]:{}", host, port)
+                                       : fmt::format("ipv4:{}:{}", host, port);
 }
 
-Peer peer_called(const std::string& host) { return {.name = "local:" + host}; }
+Peer peer_called(const std::string& host, const std::string& address) {
+  return {.name = "local:" + host, .address = address};
+}
 
 }  // namespace
 
@@ -67,7 +70,7 @@ std::string stop_lane_of(const std::string& listen) {
 class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
  public:
   Loop(Machine& machine, const StopLaneOptions& options)
-      : machine_(&machine), calls_(machine, options.access), places_(options.limits) {
+      : machine_(&machine), calls_(machine, options.access, options.audit_sink), places_(options.limits) {
     if (wake_.get() < 0) throw std::bad_alloc();
   }
 
@@ -96,7 +99,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
  private:
   using Id = Places::Id;
   struct Client {
-    std::string host;
+    std::string host, address;
     std::optional<Peer> peer;  ///< once it is identified
     std::unique_ptr<Connection> connection;
   };
@@ -111,7 +114,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   void serve_in_turn(std::vector<Id> ids);
   void accept_from(const ListeningSocket& socket);
   void let_in_from_inside();
-  void enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& host);
+  void enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& address);
   void serve(Id id);
   void begin(Id id, const lane::Http2::Call& call);
   void identify(Id id, Client& client);
@@ -233,12 +236,12 @@ void StopLane::Loop::accept_from(const ListeningSocket& socket) {
       setsockopt(connection.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
       setsockopt(connection.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, &patience_ms, sizeof patience_ms);
     }
-    const auto host = peer_host(text_of(address, size));
+    const auto from = text_of(address, size);
     const bool local = !socket.unix_path.empty();
     auto peer = local       ? std::optional(local_peer(connection.get()))
                 : acceptor_ ? std::nullopt
-                            : std::optional(peer_called(host));
-    enter(std::move(connection), std::move(peer), host);
+                            : std::optional(peer_called(peer_host(from), from));
+    enter(std::move(connection), std::move(peer), from);
   }
 }
 
@@ -248,28 +251,30 @@ void StopLane::Loop::let_in_from_inside() {
     const std::lock_guard lock(mutex_);
     joining.swap(joining_);
   }
-  for (auto& socket : joining) enter(std::move(socket), peer_called("daemon"), "daemon");
+  for (auto& socket : joining) enter(std::move(socket), peer_called("daemon", "daemon"), "daemon");
 }
 
 /// `peer`: nothing: whom its certificate names.
-void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& host) {
+void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& address) {
   const auto id = ++last_;
   const auto now = monotonic_now();
   auto network = address_of_peer(socket.get());
   auto acceptor = peer ? nullptr : acceptor_;
   auto& client = clients_[id];
-  client.host = host;
+  client.host = peer_host(address);
+  client.address = address;
   client.peer = std::move(peer);
   client.connection = std::make_unique<Connection>(
       std::move(socket), std::move(acceptor), [this, id](const lane::Http2::Call& call) { begin(id, call); },
       now);
-  close(places_.enter(id, {.address = host, .network = std::move(network)}, now));
+  close(places_.enter(id, {.address = client.host, .network = std::move(network)}, now));
   if (client.peer) close(places_.identify(id, client.peer->name, true, now));
 }
 
 /// Precondition: the connection is identified, by a certificate.
 void StopLane::Loop::identify(Id id, Client& client) {
-  client.peer = Peer{.name = identities_->of(client.connection->certificate().value_or(""))};
+  client.peer = Peer{.name = identities_->of(client.connection->certificate().value_or("")),
+                     .address = client.address};
   close(places_.identify(id, client.peer->name, false, monotonic_now()));
 }
 

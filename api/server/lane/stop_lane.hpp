@@ -11,6 +11,7 @@
 #include "api/server/lane/places.hpp"
 #include "api/server/tls.hpp"
 #include "buses/file_descriptor.hpp"
+#include "devices/audit.hpp"
 #include "devices/machine.hpp"
 
 namespace axisd::server {
@@ -19,8 +20,9 @@ struct StopLaneOptions {
   std::string listen;  ///< "HOST:PORT", "[IPV6]:PORT" or "unix:PATH"
   std::optional<TlsFiles> tls{};
   lane::Places::Limits limits{};
-  /// As of ServerOptions: the same for both.
+  // As of ServerOptions: the same for both.
   std::shared_ptr<const AccessControl> access{};
+  AuditSink* audit_sink = nullptr;
 };
 
 /// Where the stop lane of a server is, unless it is told: the next port, or the path with ".stop" behind it;

@@ -5,7 +5,9 @@
 
 #include <future>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "api/server/lane/stop_calls.hpp"
@@ -33,7 +35,10 @@ using server::admitted;
 using server::Caller;
 using server::demand_of;
 using server::Peer;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+using ::testing::StartsWith;
 
 const Peer anna{.name = "anna"};
 
@@ -217,12 +222,30 @@ TEST(Access, ADelegateSpeaksForOthersAndGivesNoMoreThanItHas) {
       << "a stop is taken as one's own";
 }
 
+/// What the audit is told of calls that are denied.
+class Told final : public AuditSink {
+ public:
+  void add(AuditEntry entry) override {
+    const std::lock_guard lock(mutex_);
+    if (const auto* denied = std::get_if<DeniedCall>(&entry.content)) denied_.push_back(*denied);
+  }
+  std::vector<DeniedCall> denied() const {
+    const std::lock_guard lock(mutex_);
+    return denied_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<DeniedCall> denied_;
+};
+
 class AccessCalls : public Serving {
  protected:
   void serve_with(AccessSettings settings) {
     control_ = std::make_shared<AccessControl>(std::move(settings));
     server::ServerOptions options;
     options.access = control_;
+    options.audit_sink = &told_;
     serve(std::move(options));
   }
   grpc::Status enable(std::vector<std::pair<std::string, std::string>> metadata = {}) {
@@ -257,6 +280,7 @@ class AccessCalls : public Serving {
         v1::SystemService::NewStub(channel_)->GetInfo(&context, v1::GetInfoRequest(), &response).ok());
     return response;
   }
+  Told told_;
   std::shared_ptr<AccessControl> control_;
   int requests_ = 0;
   std::string client_;
@@ -311,12 +335,43 @@ TEST_F(AccessCalls, WithoutSettingsNobodySpeaksForOthers) {
   EXPECT_EQ(info().role(), v1::ROLE_MAINTAINER);
 }
 
+TEST_F(AccessCalls, WhatIsDeniedIsToldWithWhoAndFromWhere) {
+  serve_with({.roles = {{own_name(), Role::viewer}}, .delegates = {{own_name(), Role::viewer}}});
+  EXPECT_FALSE(enable().ok());
+  EXPECT_FALSE(enable({{"axisd-user", "shift-a"}}).ok());
+  EXPECT_TRUE(get().ok());
+  const auto denied = told_.denied();
+  ASSERT_EQ(denied.size(), 2U);
+  EXPECT_EQ(denied[0].rpc, "AxisService.Enable");
+  EXPECT_EQ(denied[0].client, own_name());
+  EXPECT_EQ(denied[0].axis, "feeder");
+  EXPECT_EQ(denied[0].error.reason, Reason::access_denied);
+  ASSERT_TRUE(denied[0].origin);
+  EXPECT_EQ(denied[0].origin->role, Role::viewer);
+  EXPECT_THAT(denied[0].origin->peer, StartsWith("unix:"));
+  EXPECT_EQ(denied[1].client, "shift-a via " + own_name());
+  for (int i = 0; i < 100; ++i) (void)enable({{"axisd-user", "p" + std::to_string(i)}});
+  EXPECT_EQ(told_.denied().size(), AuditRation::a_minute) << "of one identity in a minute";
+}
+
+TEST_F(AccessCalls, WhatIsAcceptedSaysWithWhichRole) {
+  serve_with({.roles = {{own_name(), Role::viewer}}, .axes = {{"feeder", {{own_name(), Role::operator_}}}}});
+  EXPECT_TRUE(enable().ok());
+  EXPECT_TRUE(stop().ok());
+  const auto submitted = machine_.submitted();
+  ASSERT_EQ(submitted.size(), 2U);
+  for (const auto& each : submitted) {
+    ASSERT_TRUE(each.options.origin);
+    EXPECT_EQ(each.options.origin->role, Role::operator_) << "on what it names";
+  }
+}
+
 class AccessLane : public ::testing::Test {
  protected:
   /// The code of the answer.
   int call(const std::string& name, const Message& request, server::Claim claim = {}) {
     std::promise<int> code;
-    server::lane::StopCalls calls(machine_, std::make_shared<AccessControl>(settings_));
+    server::lane::StopCalls calls(machine_, std::make_shared<AccessControl>(settings_), &told_);
     calls.start({.stream = 1,
                  .path = "/axisd.v1.StopService/" + name,
                  .message = request.SerializeAsString(),
@@ -326,6 +381,7 @@ class AccessLane : public ::testing::Test {
   }
   FakeMachine machine_;
   AccessSettings settings_;
+  Told told_;
 };
 
 TEST_F(AccessLane, AsksTheSameTable) {
@@ -343,7 +399,14 @@ TEST_F(AccessLane, AsksTheSameTable) {
   EXPECT_EQ(call("Disable", disable, {.user = "shift-a"}), grpc::StatusCode::PERMISSION_DENIED);
   settings_.delegates["anna"] = Role::operator_;
   EXPECT_EQ(call("Disable", disable, {.user = "shift-a"}), grpc::StatusCode::OK);
-  EXPECT_EQ(machine_.submitted().back().options.client, "shift-a via anna");
+  const auto options = machine_.submitted().back().options;
+  EXPECT_EQ(options.client, "shift-a via anna");
+  ASSERT_TRUE(options.origin);
+  EXPECT_EQ(options.origin->role, Role::operator_);
+  std::vector<std::string> denied;
+  for (const auto& each : told_.denied()) denied.push_back(each.rpc);
+  EXPECT_THAT(denied,
+              ElementsAre("AxisService.Disable", "LeaseService.RenewLease", "AxisService.Disable"));
 }
 
 TEST_F(AccessLane, ReadsTheMetadata) {
@@ -362,6 +425,10 @@ TEST_F(AccessLane, ReadsTheMetadata) {
   const auto status = stub->Disable(&context, request, &response);
   EXPECT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(response.command().client(), "shift-a via local:localhost");
+  ASSERT_EQ(machine_.submitted().size(), 1U);
+  const auto options = machine_.submitted().front().options;
+  ASSERT_TRUE(options.origin);
+  EXPECT_THAT(options.origin->peer, MatchesRegex("ipv4:127[.]0[.]0[.]1:[0-9]+"));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -18,6 +19,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
 
 Command command(CommandState state = CommandState::accepted) {
   Command result{.id = "i-1",
@@ -100,6 +102,33 @@ TEST(AuditLines, WhatWasWritten) {
   ASSERT_EQ(record->call().parameters_size(), 1);
   EXPECT_EQ(record->call().parameters(0).before(), 8);
   EXPECT_EQ(record->call().parameters(0).after(), 12);
+}
+
+TEST(AuditLines, WhereItWasAskedForAndWithWhichRole) {
+  auto moved = command();
+  moved.origin = std::make_shared<const CallOrigin>(
+      CallOrigin{.peer = "ipv4:10.0.0.5:51234", .role = Role::operator_});
+  const auto record = server::audit_record(line_of({.content = RefusedCommand{.command = moved}}));
+  ASSERT_TRUE(record);
+  EXPECT_EQ(record->peer(), "ipv4:10.0.0.5:51234");
+  EXPECT_EQ(record->role(), "operator");
+}
+
+TEST(AuditLines, ACallThatItsClientMayNotMake) {
+  const auto line = line_of({.content = DeniedCall{.rpc = "AxisService.Enable",
+                                                   .client = "anna via web",
+                                                   .axis = "feeder",
+                                                   .error = {.reason = Reason::access_denied},
+                                                   .left_out = 3}});
+  EXPECT_FALSE(server::told_command(line));
+  const auto record = server::audit_record(line);
+  ASSERT_TRUE(record);
+  EXPECT_EQ(record->kind(), v1::AUDIT_KIND_REFUSAL);
+  EXPECT_EQ(record->client(), "anna via web");
+  EXPECT_EQ(record->rpc(), "AxisService.Enable");
+  EXPECT_EQ(record->role(), "") << "not known";
+  EXPECT_EQ(record->denied().error().reason(), v1::REASON_ACCESS_DENIED);
+  EXPECT_EQ(record->denied().left_out(), 3U);
 }
 
 TEST(AuditLines, WhoDidWhatToStopAllAndLeases) {
@@ -214,6 +243,8 @@ TEST_F(AuditCalls, AWrittenRegisterIsToldBeforeAndBehind) {
   EXPECT_EQ(told.records(0).call().phase(), v1::AUDITED_CALL_PHASE_ASKED);
   EXPECT_EQ(told.records(1).call().phase(), v1::AUDITED_CALL_PHASE_DONE);
   EXPECT_EQ(told.records(1).client(), own_name());
+  EXPECT_THAT(told.records(1).peer(), StartsWith("unix:"));
+  EXPECT_EQ(told.records(1).role(), "") << "there are no roles";
   EXPECT_EQ(told.records(1).rpc(), "BusService.Transact");
   EXPECT_THAT(told.records(1).call().text(), HasSubstr("line-a node 9"));
 }

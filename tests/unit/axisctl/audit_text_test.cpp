@@ -38,6 +38,14 @@ TEST(AuditText, ARefusalWithItsCause) {
   EXPECT_THAT(audit_line(refused), EndsWith("(3 more before it have no record)"));
 }
 
+TEST(AuditText, ACallThatItsClientMayNotMake) {
+  auto denied = record();
+  denied.mutable_denied()->mutable_error()->set_message("Enable needs the role operator on feeder");
+  denied.mutable_denied()->set_left_out(2);
+  EXPECT_EQ(audit_line(denied),
+            lead + "refused: Enable needs the role operator on feeder (2 more before it have no record)");
+}
+
 TEST(AuditText, AParameterWithWhatItWas) {
   auto written = record();
   auto& call = *written.mutable_call();

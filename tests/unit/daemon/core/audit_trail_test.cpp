@@ -43,8 +43,7 @@ class Audited : public Kept, public MachineOnALine {  // in this order: it outli
     start_with({1});
   }
   void complete(const Action& action, const std::string& request_id) {
-    const auto command =
-        machine_->submit("a1", action, {.client = "hmi", .request_id = request_id, .lease_token = 0});
+    const auto command = machine_->submit("a1", action, {.client = "hmi", .request_id = request_id});
     ASSERT_TRUE(command) << to_string(command.error());
     ASSERT_TRUE(world_.run_until([&] { return (*command)->has_ended(); }, 60s));
   }
@@ -52,10 +51,13 @@ class Audited : public Kept, public MachineOnALine {  // in this order: it outli
 
 TEST_F(Audited, ACommandIsToldBeforeAnythingIsSentForItAndWhenItHasEnded) {
   const auto seen = commands().size();
-  const auto command = machine_->submit("a1", EnableRequest{}, {.client = "hmi", .request_id = "r1"});
+  const auto origin = std::make_shared<const CallOrigin>(CallOrigin{.role = Role::operator_});
+  const auto command = machine_->submit("a1", EnableRequest{},
+                                        {.client = "hmi", .request_id = "r1", .origin = origin});
   ASSERT_TRUE(command);
   ASSERT_THAT(commands(), SizeIs(seen + 1)) << "before the core did anything else";
   EXPECT_EQ(commands().back().client, "hmi");
+  EXPECT_EQ(commands().back().origin, origin);
   EXPECT_EQ(commands().back().state, CommandState::accepted);
   ASSERT_TRUE(world_.run_until([&] { return (*command)->has_ended(); }, 60s));
   EXPECT_THAT(commands(), SizeIs(seen + 2));
@@ -70,13 +72,18 @@ TEST_F(Audited, AStopIsToldToo) {
 
 TEST_F(Audited, ARefusalIsToldWithItsCause) {
   const auto refused =
-      machine_->submit("a1", MoveAbsoluteRequest{.position = 5}, {.client = "hmi", .request_id = "r1"});
+      machine_->submit("a1", MoveAbsoluteRequest{.position = 5},
+                       {.client = "hmi",
+                        .request_id = "r1",
+                        .origin = std::make_shared<const CallOrigin>(CallOrigin{.peer = "ipv4:10.0.0.5:51234"})});
   ASSERT_FALSE(refused);
   const auto told = all<RefusedCommand>();
   ASSERT_THAT(told, SizeIs(1));
   EXPECT_EQ(told[0].command.kind, CommandKind::move_absolute);
   EXPECT_EQ(told[0].command.asked.position, 5);
   EXPECT_EQ(told[0].command.request_id, "r1");
+  ASSERT_TRUE(told[0].command.origin);
+  EXPECT_EQ(told[0].command.origin->peer, "ipv4:10.0.0.5:51234");
   ASSERT_TRUE(told[0].command.cause);
   EXPECT_EQ(told[0].command.cause->reason, refused.error().reason);
 }
@@ -89,10 +96,10 @@ TEST_F(Audited, ManyRefusalsOfOneClientAreCounted) {
   };
   for (int i = 0; i < 100; ++i) ask("loud");
   ask("calm");
-  EXPECT_THAT(all<RefusedCommand>(), SizeIs(AuditTrail::refusals_a_minute + 1));
+  EXPECT_THAT(all<RefusedCommand>(), SizeIs(AuditRation::a_minute + 1));
   world_.run_for(61s);
   ask("loud");
-  EXPECT_EQ(all<RefusedCommand>().back().left_out, 100 - AuditTrail::refusals_a_minute);
+  EXPECT_EQ(all<RefusedCommand>().back().left_out, 100 - AuditRation::a_minute);
   ask("loud");
   EXPECT_EQ(all<RefusedCommand>().back().left_out, 0U);
 }
