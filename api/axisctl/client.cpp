@@ -4,12 +4,17 @@
 #include <grpc/support/log.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
+#include <grpcpp/support/client_interceptor.h>
 
 #include <array>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <memory>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "api/axisctl/address.hpp"
 
@@ -61,6 +66,52 @@ grpc::ChannelArguments arguments() {
   return arguments;
 }
 
+using Metadata = std::multimap<std::string, std::string>;
+
+/// Adds its metadata to each call.
+class Speaker final : public grpc::experimental::Interceptor {
+ public:
+  explicit Speaker(Metadata metadata) : metadata_(std::move(metadata)) {}
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    constexpr auto begins = grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA;
+    if (methods->QueryInterceptionHookPoint(begins))
+      methods->GetSendInitialMetadata()->insert(metadata_.begin(), metadata_.end());
+    methods->Proceed();
+  }
+
+ private:
+  const Metadata metadata_;
+};
+
+class Speakers final : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit Speakers(Metadata metadata) : metadata_(std::move(metadata)) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
+    return new Speaker(metadata_);
+  }
+
+ private:
+  const Metadata metadata_;
+};
+
+/// Of USER or USER:ROLE, as docs/access.md says.
+Metadata metadata_for(const std::string& person) {
+  const auto colon = person.rfind(':');
+  Metadata metadata{{"axisd-user", person.substr(0, colon)}};
+  if (colon != std::string::npos) metadata.emplace("axisd-role", person.substr(colon + 1));
+  return metadata;
+}
+
+std::shared_ptr<grpc::Channel> channel_to(const std::string& address,
+                                          const std::shared_ptr<grpc::ChannelCredentials>& trusted,
+                                          const std::string& person) {
+  if (person.empty()) return grpc::CreateCustomChannel(address, trusted, arguments());
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> speakers;
+  speakers.push_back(std::make_unique<Speakers>(metadata_for(person)));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, trusted, arguments(),
+                                                                 std::move(speakers));
+}
+
 }  // namespace
 
 Client::Client(Connection connection) : connection_(std::move(connection)) {
@@ -69,11 +120,12 @@ Client::Client(Connection connection) : connection_(std::move(connection)) {
   // Errors are one line on standard error; gRPC's own log would add to it. GRPC_VERBOSITY brings it back.
   if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
   const auto trusted = credentials(connection_);
-  channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
-  stop_channel_ = grpc::CreateCustomChannel(connection_.server, trusted, arguments());
+  const auto& person = connection_.speaks_for;
+  channel_ = channel_to(connection_.server, trusted, person);
+  stop_channel_ = channel_to(connection_.server, trusted, person);
   const auto lane =
       connection_.stop_server.empty() ? stop_lane_of(connection_.server) : connection_.stop_server;
-  if (!lane.empty()) lane_channel_ = grpc::CreateCustomChannel(lane, trusted, arguments());
+  if (!lane.empty()) lane_channel_ = channel_to(lane, trusted, person);
 }
 
 bool Client::lane_is_reachable() const {

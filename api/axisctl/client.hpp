@@ -22,6 +22,7 @@ struct Connection {
   std::string stop_server;                ///< of the stop lane; empty: where stop_lane_of() says
   std::string tls_ca;                     ///< PEM file; TLS is used if it is set
   std::string tls_certificate, tls_key;   ///< PEM files of the client, both or none
+  std::string speaks_for;                 ///< USER or USER:ROLE, of a delegate; empty: for itself
   std::chrono::nanoseconds timeout = std::chrono::seconds(10);
 };
 

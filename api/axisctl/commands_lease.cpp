@@ -115,8 +115,9 @@ void hold(Invocation& invocation, const Arguments& arguments) {
   bool lost = false;
   int status = 0;
   try {
-    child.start(arguments.command,
-                {{"AXISD_LEASE", std::to_string(token)}, {"AXISD_SERVER", invocation.connection.server}});
+    child.start(arguments.command, {{"AXISD_LEASE", std::to_string(token)},
+                                    {"AXISD_SERVER", invocation.connection.server},
+                                    {"AXISD_AS", invocation.connection.speaks_for}});
     status = hold_while(invocation, child, token, ttl_of(response.lease()), lost);
   } catch (...) {
     // Should the release fail, too, the lease ends by itself; what came first is to be told.

@@ -119,6 +119,7 @@ class Script {
     add("--tls-ca", connection.tls_ca);
     add("--tls-cert", connection.tls_certificate);
     add("--tls-key", connection.tls_key);
+    add("--as", connection.speaks_for);
     if (invocation_.json) words.emplace_back("--json");
     return words;
   }

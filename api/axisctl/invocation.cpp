@@ -31,7 +31,7 @@ Exit status:
   4    the daemon refused
   130  interrupted while waiting
 
-Environment: AXISD_SERVER, AXISD_STOP_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_LEASE, NO_COLOR.)";
+Environment: AXISD_SERVER, AXISD_STOP_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_AS, AXISD_LEASE, NO_COLOR.)";
 
 void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_option("--server", invocation.connection.server,
@@ -55,6 +55,10 @@ void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_option("--tls-key", invocation.connection.tls_key, "Its private key")
       ->envname("AXISD_TLS_KEY")
       ->type_name("FILE");
+  app.add_option("--as", invocation.connection.speaks_for,
+                 "Speak for somebody else, as a delegate may (access: delegates): the calls are theirs")
+      ->envname("AXISD_AS")
+      ->type_name("USER[:ROLE]");
   app.add_option("--timeout", invocation.timeout, "How long the daemon may take to answer")
       ->type_name("TIME")
       ->capture_default_str();

@@ -109,6 +109,11 @@ class Reading(AxisctlTest):
                                             "role:       operator; viewer on feeder\n")
         self.assertEqual(self.json("whoami")[0]["role"], "ROLE_OPERATOR")
 
+    def test_whom_it_speaks_for(self):
+        self.assertIn("client:     bert via web\n", self.ok("--as", "bert", "whoami"))
+        self.assertEqual(self.ok("--as", "bert:maintainer", "whoami").splitlines()[::2],
+                         ["client:     bert via web", "role:       maintainer; viewer on feeder"])
+
 
 class Motion(AxisctlTest):
     def test_move_prints_id_state_and_what_was_granted_differently(self):

@@ -169,6 +169,14 @@ class WholeMachine(ClientTest):
         self.assertEqual((info.client, info.identity, info.role, info.axis_roles),
                          ("anna via web", "unix:anna", axisd.Role.OPERATOR, {"feeder": axisd.Role.VIEWER}))
 
+    async def test_whom_it_speaks_for(self):
+        async with axisd.connect(self.machine.server, speak_for="bert", role="viewer") as other:
+            info = await other.info()
+            self.assertEqual((info.client, info.role), ("bert via web", axisd.Role.VIEWER))
+            await other.axis("feeder").stop()
+        with self.assertRaises(ValueError):
+            axisd.connect("localhost:1", role="viewer")
+
     async def test_budgets(self):
         budget, = await self.machine.budgets()
         self.assertEqual((budget.bus, budget.utilisation, budget.excess), ("line-a", (0.25,), ("too late",)))

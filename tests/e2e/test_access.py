@@ -7,6 +7,7 @@ import grpc
 
 from certificates import Certificates
 from harness import AXISCTL, LIMIT, OWN_NAME, CallFailed, Client, Scenario, axis_pb, feeder, run, system_pb, wait_for
+from harness.client import audit_pb
 from axisd.v1.access_pb2 import Role  # noqa: E402  (made by the harness)
 
 ROLES = "roles: { shift-a: operator, panel: viewer, service: maintainer }, delegates: { web.press-1: operator }"
@@ -48,8 +49,14 @@ class Roles(Scenario):
     def test_each_may_do_what_its_role_says(self):
         shift, panel, service, guest = (self.connect(name) for name in ("shift-a", "panel", "service", "guest"))
         panel.wait_online("feeder")
+        refusals = audit_pb.ListAuditRequest(kinds=[audit_pb.AUDIT_KIND_REFUSAL])
         self.assertEqual(self.denied(panel.motion, "Enable", "feeder"),
                          "Enable needs the role operator on feeder; panel has viewer")
+        (denied,) = wait_for(lambda: panel.call(panel.audit.ListAudit, refusals).records, "the refusal is told")
+        self.assertEqual((denied.client, denied.role, denied.axis, denied.rpc),
+                         ("panel", "viewer", "feeder", "AxisService.Enable"))
+        self.assertRegex(denied.peer, r"^ipv4:127\.0\.0\.1:\d+$")
+        self.denied(guest.call, guest.audit.ListAudit, refusals)
         self.assertEqual(self.denied(guest.state, "feeder"), "GetAxis needs the role viewer on feeder; guest has none")
         self.assertEqual(shift.to_done("Enable", "feeder").client, "shift-a")
         reload = system_pb.ReloadConfigRequest(dry_run=True)

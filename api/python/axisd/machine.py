@@ -59,34 +59,41 @@ _LONGEST_PAUSE = 0.5
 
 def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = None,
             tls_certificate: str | pathlib.Path | None = None, tls_key: str | pathlib.Path | None = None,
-            timeout: float = 10.0, stop_server: str | None = None) -> Machine:
+            timeout: float = 10.0, stop_server: str | None = None, speak_for: str | None = None,
+            role: str | None = None) -> Machine:
     """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
     localhost:7443. Connects with the first call. `timeout` limits how long the daemon may take to answer, not how long
     a motion may take. Stops are repeated until then while the daemon cannot be reached. `stop_server`: its stop lane;
-    without it that of $AXISD_STOP_SERVER, else next to `server`."""
+    without it that of $AXISD_STOP_SERVER, else next to `server`. `speak_for`: of a delegate: the person whom
+    all calls are made for; `role`: what they may do ("viewer", "operator", "maintainer"), at most what the delegate may."""
     if server is None:
         server = os.environ.get("AXISD_SERVER", "localhost:7443")
     if stop_server is None:
         stop_server = os.environ.get("AXISD_STOP_SERVER")
-    return Machine(server, tls_ca, tls_certificate, tls_key, timeout, stop_server)
+    return Machine(server, tls_ca, tls_certificate, tls_key, timeout, stop_server, speak_for, role)
 
 
 class Machine:
     """One daemon. Made by connect()."""
 
     def __init__(self, server: str, tls_ca: str | pathlib.Path | None, tls_certificate: str | pathlib.Path | None,
-                 tls_key: str | pathlib.Path | None, timeout: float, stop_server: str | None = None) -> None:
+                 tls_key: str | pathlib.Path | None, timeout: float, stop_server: str | None = None,
+                 speak_for: str | None = None, role: str | None = None) -> None:
         def read(path: str | pathlib.Path | None) -> bytes | None:
             return pathlib.Path(path).read_bytes() if path is not None else None
 
         if tls_ca is None and (tls_certificate is not None or tls_key is not None):
             raise ValueError("tls_certificate and tls_key need tls_ca")
+        if role is not None and speak_for is None:
+            raise ValueError("role needs speak_for: one's own is the daemon's to say")
         self.server = server
         self.stop_server = stop_server
         self.timeout = timeout
         self._credentials = None
         if tls_ca is not None:
             self._credentials = grpc.ssl_channel_credentials(read(tls_ca), read(tls_key), read(tls_certificate))
+        claim = {"axisd-user": speak_for, "axisd-role": role}
+        self._metadata = tuple((key, value) for key, value in claim.items() if value is not None)
         self._channels: list[grpc.aio.Channel] = []
         self._holds = Holds()
 
@@ -121,7 +128,7 @@ class Machine:
                     limit: float | None = None) -> Any:
         """One call; waiting for a motion has no time limit, keep-alive notices a daemon that is gone."""
         try:
-            return await method(request, timeout=None if wait else limit or self.timeout)
+            return await method(request, timeout=None if wait else limit or self.timeout, metadata=self._metadata)
         except grpc.aio.AioRpcError as error:
             options = getattr(request, "options", None)
             request_id = options.request_id if options is not None else ""
@@ -150,7 +157,7 @@ class Machine:
             pause = min(2 * pause, _LONGEST_PAUSE)
 
     async def _stream(self, method: Any, request: Any, subject: str) -> AsyncGenerator[Any, None]:
-        call = method(request)
+        call = method(request, metadata=self._metadata)
         try:
             async for message in call:
                 yield message

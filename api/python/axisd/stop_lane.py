@@ -52,15 +52,17 @@ class StopLane:
         # What may have been lost is asked for again, but for Disable: it lets go of the load.
         repeatable = name != "Disable"
 
-        async def either(request: Any, timeout: float | None = None) -> Any:
+        async def either(request: Any, timeout: float | None = None,
+                         metadata: tuple[tuple[str, str], ...] = ()) -> Any:
             self._deaf = not await self._is_reachable()
             if not self._deaf:
                 try:  # half of the time is left for the main address
-                    return await lane(request, timeout=timeout / 2 if timeout and repeatable else timeout)
+                    return await lane(request, timeout=timeout / 2 if timeout and repeatable else timeout,
+                                      metadata=metadata)
                 except grpc.aio.AioRpcError as error:
                     if not _is_for_the_main_address(error, repeatable):
                         raise
-            return await main(request, timeout=timeout)
+            return await main(request, timeout=timeout, metadata=metadata)
 
         return either
 
