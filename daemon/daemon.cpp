@@ -8,39 +8,31 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <fstream>
+#include <functional>
 #include <future>
-#include <iostream>
-#include <random>
+#include <memory>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "api/server/access.hpp"
-#include "api/server/audit_convert.hpp"
 #include "api/server/door_check.hpp"
 #include "api/server/lane/stop_lane.hpp"
 #include "api/server/server.hpp"
 #include "api/tls/pem_files.hpp"
-#include "config/budget.hpp"
-#include "config/file_warnings.hpp"
-#include "config/position_warnings.hpp"
-#include "config/start_warnings.hpp"
+#include "daemon/audit_opening.hpp"
 #include "daemon/audit_reader.hpp"
 #include "daemon/configuration_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
-#include "daemon/core/quiesce.hpp"
 #include "daemon/descriptors.hpp"
-#include "daemon/logging.hpp"
+#include "daemon/ground.hpp"
 #include "daemon/metering.hpp"
-#include "daemon/ports.hpp"
 #include "daemon/state_copier.hpp"
-#include "daemon/store/audit_log.hpp"
-#include "daemon/store/flight_files.hpp"
-#include "daemon/store/kept_state.hpp"
 #include "devices/simulation/control_socket.hpp"
 
 namespace axisd {
@@ -52,24 +44,12 @@ constexpr auto stop_patience = std::chrono::seconds(10);
 constexpr auto close_patience = std::chrono::seconds(3);
 /// The loops come round at least every second; this is a stall.
 constexpr auto stalled_after = std::chrono::seconds(3);
-constexpr auto quiesce_limit = std::chrono::seconds(4);
-
-/// Copy of the last configuration that was served, for --quiesce when the file itself was broken meanwhile.
-std::filesystem::path last_good(const std::string& state_directory) {
-  return std::filesystem::path(state_directory) / "last-good.yaml";
-}
 
 sigset_t ending_signals() {
   sigset_t set;
   sigemptyset(&set);
   for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, number);
   return set;
-}
-
-/// Starts of the daemon are counted durably, so ids never repeat; the random part tells two state directories
-/// apart, and two runs from copies of the same one.
-std::string make_instance_id(std::uint64_t start_count) {
-  return fmt::format("{:x}{:08x}", start_count, std::random_device{}());
 }
 
 /// Runs `function` on the core thread and waits for its result.
@@ -147,77 +127,6 @@ std::optional<AccessSettings> access_of(const config::Configuration& configurati
   return server::expanded(*configuration.access, configuration.groups);
 }
 
-server::StopLaneOptions stop_lane_options(const config::ServerSettings& settings) {
-  return {
-      .listen = settings.stop_listen.empty() ? server::stop_lane_of(settings.listen) : settings.stop_listen,
-      .tls = tls_files(settings)};
-}
-
-server::ServerOptions server_options(const config::ServerSettings& settings) {
-  const auto& limits = settings.limits;
-  return {.listen = {settings.listen},
-          .tls = tls_files(settings),
-          .reflection = settings.reflection,
-          .limits = {.calls = limits.calls, .streams = limits.streams},
-          .peers = {.connections = limits.connections},
-          .stalled_reader_limit = limits.stalled_reader};
-}
-
-void log_budget(const BusBudgetReport& budget) {
-  spdlog::info("budget of {}", config::summary(budget));
-  for (const auto& warning : config::warnings(budget)) spdlog::warn("{}", warning);
-}
-
-/// `audit`: null as long as there is none yet.
-Result<std::unique_ptr<store::KeptState>> open_state(const config::Configuration& configuration,
-                                                     core::CoreLoop& loop,
-                                                     const std::unique_ptr<store::AuditLog>& audit) {
-  const IdLimits limits{.total = static_cast<std::size_t>(configuration.server.limits.request_ids)};
-  return store::KeptState::open(
-      configuration.state_directory, std::chrono::system_clock::now(), loop.executor(),
-      {.bounds = {.most = limits.total + limits.reserve()},
-       .other_trouble = [&audit]() { return audit ? audit->trouble() : std::nullopt; }});
-}
-
-std::filesystem::path audit_directory(const config::Configuration& configuration) {
-  return std::filesystem::path(configuration.state_directory) / "audit";
-}
-
-/// What of the journal no record tells of is recovered first: whatever reached a wire is in the journal.
-std::unique_ptr<store::AuditLog> open_audit(const config::Configuration& configuration,
-                                            store::KeptState& state, const std::string& instance_id,
-                                            std::string revision) {
-  const auto encode = [](const store::AuditHead& head, const AuditEntry& entry) {
-    v1::AuditRecord record;
-    server::to_proto(entry, record);
-    record.set_number(head.number);
-    record.set_instance_id(head.instance_id);
-    record.set_revision(head.revision);
-    return server::audit_line(record);
-  };
-  const auto command_of = [](std::string_view line) -> std::optional<store::AuditFormat::Told> {
-    auto told = server::told_command(line);
-    if (!told) return std::nullopt;
-    return store::AuditFormat::Told{.id = std::move(told->id), .ended = told->ended};
-  };
-  const auto& keys = configuration.audit;
-  return std::make_unique<store::AuditLog>(
-      store::AuditOptions{.directory = audit_directory(configuration),
-                          .bounds = {.files = static_cast<std::size_t>(keys.files),
-                                     .file_bytes = static_cast<std::uint64_t>(keys.file_size) * 1024},
-                          .format = {.encode = encode, .command_of = command_of},
-                          .instance_id = instance_id,
-                          .revision = std::move(revision),
-                          .earlier = store::recovered(state.journal().loaded())});
-}
-
-void record_run(store::AuditLog& audit, store::KeptState& state, DaemonRun::What what) {
-  audit.add({.at = std::chrono::system_clock::now(),
-             .uptime = monotonic_now().time_since_epoch(),
-             .content = DaemonRun{
-                 .what = what, .version = AXISD_VERSION, .start_count = state.state().loaded().start_count}});
-}
-
 /// What cannot be served as it is asked for would fail at the next start, too.
 int give_up(const Error& error) {
   spdlog::critical("{}", to_string(error));
@@ -249,7 +158,6 @@ class CoreThread {
           pthread_setname_np(pthread_self(), "axisd-core");
           loop.run();
         }) {}
-  CoreThread(const CoreThread&) = delete;
   ~CoreThread() {
     loop_->stop();
     thread_.join();
@@ -260,140 +168,197 @@ class CoreThread {
   std::thread thread_;
 };
 
+/// `published`: told whenever any snapshot was. `ground` outlives the machine.
+core::MachineParts machine_parts(Ground& ground, std::function<void()> published) {
+  return {.executor = ground.loop.executor(),
+          .clock = &ground.loop.clock(),
+          .persistence = &ground.state->state(),
+          .journal = &ground.state->journal(),
+          .audit = ground.audit.get(),
+          .instance_id = ground.instance_id,
+          .make_line = [&ports = *ground.ports](const auto& line) { return ports.make_line(line); },
+          .make_port = [&ports = *ground.ports](const auto& network) { return ports.make_port(network); },
+          .link_helper = ground.ports->link_helper(),
+          .observer = std::move(ground.wire_log),
+          .flight_records = ground.flight_files.get(),
+          .budgets = ground.budgets,
+          .reconfigure_simulation = [&ports = *ground.ports](
+                                        const auto& next,
+                                        const auto& changes) { ports.reconfigure(next, changes); },
+          .published = std::move(published)};
+}
+
+ConfigurationService::Parts served_parts(const Options& options, const config::Configuration& configuration,
+                                         const std::string& yaml, core::MachineService& service,
+                                         const std::shared_ptr<server::AccessControl>& access) {
+  return {.path = options.config,
+          .yaml = yaml,
+          .configuration = configuration,
+          .since = std::chrono::system_clock::now(),
+          .load = [&options] { return load_configuration(options); },
+          .check_tls = check_tls,
+          .last_good = last_good(configuration.state_directory),
+          .apply =
+              [&service](core::Reload reload, bool dry_run, core::ReloadDone done) {
+                service.reload(std::move(reload), dry_run, std::move(done));
+              },
+          .adopted = [access](const auto& next) { access->replace(access_of(next)); }};
+}
+
+/// The machine, and all that is asked of it by others, torn down in reverse. Thread: first.
+class Doors {
+ public:
+  /// All of them outlive this.
+  Doors(Ground& ground, const Options& options, const config::Configuration& configuration,
+        const std::string& yaml)
+      : ground_(ground),
+        configuration_(configuration),
+        audit_reader_(audit_directory(configuration), *ground.audit),
+        state_copier_(configuration.state_directory),
+        machine_(machine_parts(ground, [this] { published(); }), configuration),
+        service_(ground.loop, machine_, configuration.machine, ground.instance_id),
+        access_(std::make_shared<server::AccessControl>(access_of(configuration))),
+        served_(served_parts(options, configuration, yaml, service_, access_)),
+        server_(service_, server_options()),
+        stop_lane_(service_, stop_lane_options()),
+        metering_({.loop = ground.loop,
+                   .machine = machine_,
+                   .service = service_,
+                   .journal = ground.state->journal(),
+                   .settings = configuration.server,
+                   .budgets = ground.budgets}) {
+    published_to_ = &service_;
+  }
+
+  /// Before the core runs.
+  void start() {
+    machine_.start();
+    metering_.start();
+  }
+  [[nodiscard]] Result<int> open();
+  [[nodiscard]] int serve(int port);
+  [[nodiscard]] bool close();
+
+ private:
+  void published() {
+    if (published_to_ != nullptr) published_to_->published();
+  }
+  [[nodiscard]] server::ServerOptions server_options();
+  [[nodiscard]] server::StopLaneOptions stop_lane_options();
+
+  Ground& ground_;
+  const config::Configuration& configuration_;
+  AuditReader audit_reader_;
+  StateCopier state_copier_;
+  core::MachineService* published_to_ = nullptr;
+  core::MachineCore machine_;
+  core::MachineService service_;
+  const std::shared_ptr<server::AccessControl> access_;
+  ConfigurationService served_;
+  server::Server server_;
+  server::StopLane stop_lane_;
+  Metering metering_;
+};
+
+server::ServerOptions Doors::server_options() {
+  const auto& settings = configuration_.server;
+  const auto& limits = settings.limits;
+  return {.listen = {settings.listen},
+          .tls = tls_files(settings),
+          .reflection = settings.reflection,
+          .limits = {.calls = limits.calls, .streams = limits.streams},
+          .peers = {.connections = limits.connections},
+          .stalled_reader_limit = limits.stalled_reader,
+          .access = access_,
+          .configuration = &served_,
+          .audit = &audit_reader_,
+          .audit_sink = ground_.audit.get(),
+          .state_copies = &state_copier_};
+}
+
+server::StopLaneOptions Doors::stop_lane_options() {
+  const auto& settings = configuration_.server;
+  return {
+      .listen = settings.stop_listen.empty() ? server::stop_lane_of(settings.listen) : settings.stop_listen,
+      .tls = tls_files(settings),
+      .access = access_,
+      .audit_sink = ground_.audit.get()};
+}
+
+/// All addresses. The port of the main one; 0: it is a unix socket. Errors: those of each listen().
+Result<int> Doors::open() {
+  if (const auto stops = stop_lane_.listen(); !stops) return fail(stops.error());
+  const auto port = server_.start();
+  if (!port) return fail(port.error());
+  if (const auto metrics = metering_.listen(); !metrics) return fail(metrics.error());
+  return *port;
+}
+
+/// Until a signal asks for the end, and the axes rest. `port`: as of open(), which comes before; while the
+/// core runs. Exit status.
+int Doors::serve(int port) {
+  stop_lane_.serve();
+  wait_until([this] { return ask_core(ground_.loop, [this] { return machine_.buses_reported(); }); },
+             std::chrono::seconds(1));
+  served_.keep_copy();
+  server::DoorCheck doors([this] { return server_.connect_inside(); },
+                          [this] { return stop_lane_.connect_inside(); });
+  doors.ask();  // its connections are there before anybody else's
+  spdlog::info("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration_.machine,
+               port == 0 ? configuration_.server.listen : fmt::format("port {}", port),
+               configuration_.axes.size());
+  const auto sim_socket = open_simulation(*ground_.ports, configuration_, ground_.instance_id);
+  sd_notify(0, "READY=1");
+  const int number = supervise(ground_.loop, machine_, stop_lane_, doors, served_);
+  spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");
+  sd_notify(0, "STOPPING=1");
+  service_.close();
+  const bool rests = stop_axes(ground_.loop, machine_);
+  if (!rests) spdlog::error("not every axis has confirmed its standstill; run axisd --quiesce");
+  return rests ? exit_status::in_order : exit_status::failed;
+}
+
+/// Whether or not they were opened; while the core runs. False: sequences of the machine did not end.
+bool Doors::close() {
+  server_.shutdown();
+  stop_lane_.stop();
+  ask_core(ground_.loop, [this] {
+    published_to_ = nullptr;
+    machine_.close();
+    return true;
+  });
+  served_.close();  // after that, which ends a reload that waits
+  return wait_until([this] { return ask_core(ground_.loop, [this] { return machine_.closed(); }); },
+                    close_patience);
+}
+
 /// From the first thread to the last: all that were started have ended when it returns. Exit status.
 int serve(const Options& options, const config::Configuration& configuration, const std::string& yaml,
           Logging& logging) {
   raise_descriptor_limit();
   if (auto enough = check_descriptor_limit(configuration); !enough) return give_up(enough.error());
-  core::CoreLoop loop;
-  std::unique_ptr<store::AuditLog> audit;  // after the state, which locks the directory
-  auto state = open_state(configuration, loop, audit);
-  if (!state) return give_up(state.error());
-  core::FrameObserver wire_log;
-  if (!options.wire_log.empty()) {
-    auto opened = logging.open_wire_log(options.wire_log);
-    if (!opened) return give_up(opened.error());
-    wire_log = std::move(*opened);
-  }
-  store::FlightFiles flight_files(std::filesystem::path(configuration.state_directory) / "flight",
-                                  static_cast<std::size_t>(configuration.flight_recorder.files),
-                                  loop.executor());
-  auto ports = Ports::open(loop, configuration, options.link_helper);
-  if (!ports) return give_up(ports.error());
-
-  const auto budgets = config::budgets(configuration);
-  for (const auto& budget : budgets) log_budget(budget);
-  for (const auto& warning : config::position_warnings(configuration)) spdlog::warn("{}", warning);
-  for (const auto& warning : config::start_warnings(configuration)) spdlog::warn("{}", warning);
-  for (const auto& warning : config::file_warnings(configuration)) spdlog::warn("{}", warning);
-  const auto instance_id = make_instance_id((*state)->state().loaded().start_count);
-  audit = open_audit(configuration, **state, instance_id, revision_of(yaml));
-  record_run(*audit, **state, DaemonRun::What::began);
-  AuditReader audit_reader(audit_directory(configuration), *audit);
-  StateCopier state_copier(configuration.state_directory);
-  core::MachineService* published_to = nullptr;
-  core::MachineCore machine(
-      {.executor = loop.executor(),
-       .clock = &loop.clock(),
-       .persistence = &(*state)->state(),
-       .journal = &(*state)->journal(),
-       .audit = audit.get(),
-       .instance_id = instance_id,
-       .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
-       .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
-       .link_helper = (*ports)->link_helper(),
-       .observer = std::move(wire_log),
-       .flight_records = &flight_files,
-       .budgets = budgets,
-       .reconfigure_simulation = [&](const auto& next,
-                                     const auto& changes) { (*ports)->reconfigure(next, changes); },
-       .published =
-           [&published_to] {
-             if (published_to != nullptr) published_to->published();
-           }},
-      configuration);
+  Ground ground;
+  if (const auto ready = prepare(ground, options, configuration, yaml, logging); !ready)
+    return give_up(ready.error());
+  Doors doors(ground, options, configuration, yaml);
   malloc_trim(0);  // a full journal was read in many pieces: what they leave between each other goes back
-  core::MachineService service(loop, machine, configuration.machine, instance_id);
-  published_to = &service;
-  const auto access = std::make_shared<server::AccessControl>(access_of(configuration));
-  ConfigurationService served({.path = options.config,
-                               .yaml = yaml,
-                               .configuration = configuration,
-                               .since = std::chrono::system_clock::now(),
-                               .load = [&options] { return load_configuration(options); },
-                               .check_tls = check_tls,
-                               .last_good = last_good(configuration.state_directory),
-                               .apply =
-                                   [&service](core::Reload reload, bool dry_run, core::ReloadDone done) {
-                                     service.reload(std::move(reload), dry_run, std::move(done));
-                                   },
-                               .adopted = [access](const auto& next) { access->replace(access_of(next)); }});
-  auto serving = server_options(configuration.server);
-  serving.configuration = &served;
-  serving.audit = &audit_reader;
-  serving.audit_sink = audit.get();
-  serving.state_copies = &state_copier;
-  serving.access = access;
-  server::Server server(service, std::move(serving));
-  auto stopping = stop_lane_options(configuration.server);
-  stopping.access = access;
-  server::StopLane stop_lane(service, std::move(stopping));
-  Metering metering({.loop = loop,
-                     .machine = machine,
-                     .service = service,
-                     .journal = (*state)->journal(),
-                     .settings = configuration.server,
-                     .budgets = budgets});
-  machine.start();
-  metering.start();
-  const CoreThread core_thread(loop);
-
-  int status = exit_status::failed;
-  if (const auto stops = stop_lane.listen(); !stops) {
-    status = give_up(stops.error());
-  } else if (const auto port = server.start(); !port) {
-    status = give_up(port.error());
-  } else if (const auto metrics = metering.listen(); !metrics) {
-    status = give_up(metrics.error());
-  } else {
-    stop_lane.serve();
-    wait_until([&] { return ask_core(loop, [&] { return machine.buses_reported(); }); },
-               std::chrono::seconds(1));
-    served.keep_copy();
-    server::DoorCheck doors([&server] { return server.connect_inside(); },
-                            [&stop_lane] { return stop_lane.connect_inside(); });
-    doors.ask();  // its connections are there before anybody else's
-    spdlog::info("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration.machine,
-                 *port == 0 ? configuration.server.listen : fmt::format("port {}", *port),
-                 configuration.axes.size());
-    const auto sim_socket = open_simulation(**ports, configuration, instance_id);
-    sd_notify(0, "READY=1");
-    const int number = supervise(loop, machine, stop_lane, doors, served);
-    spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");
-    sd_notify(0, "STOPPING=1");
-    service.close();
-    const bool rests = stop_axes(loop, machine);
-    if (!rests) spdlog::error("not every axis has confirmed its standstill; run axisd --quiesce");
-    status = rests ? exit_status::in_order : exit_status::failed;
-  }
-
-  server.shutdown();
-  stop_lane.stop();
-  ask_core(loop, [&] {
-    published_to = nullptr;
-    machine.close();
-    return true;
-  });
-  served.close();  // after that, which ends a reload that waits
-  if (!wait_until([&] { return ask_core(loop, [&] { return machine.closed(); }); }, close_patience)) {
+  doors.start();
+  const CoreThread core_thread(ground.loop);
+  const auto port = doors.open();
+  const int status = port ? doors.serve(*port) : give_up(port.error());
+  if (!doors.close()) {
     spdlog::critical("sequences did not end; leaving at once");
     logging.leave_at_once(exit_status::failed);
   }
-  record_run(*audit, **state, DaemonRun::What::ended);
+  record_run(*ground.audit, *ground.state, DaemonRun::What::ended);
   return status;
 }
 
 }  // namespace
+
+std::filesystem::path last_good(const std::string& state_directory) {
+  return std::filesystem::path(state_directory) / "last-good.yaml";
+}
 
 std::vector<std::pair<std::string_view, Error>> check_tls(const config::TlsSettings& tls) {
   return tls::check({.certificate = tls.certificate, .key = tls.key, .client_ca = tls.client_ca});
@@ -430,70 +395,6 @@ int run_daemon(const Options& options, const config::Configuration& configuratio
   }
   spdlog::info("ended with status {}", status);
   return status;
-}
-
-namespace {
-
-/// As run_quiesce(). Throws where the system has no more of something.
-int quiesce(const Options& options) {
-  auto loaded = config::load_file(*options.quiesce);
-  if (!loaded.configuration) {
-    for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
-    const auto directory =
-        options.state_directory.empty() ? config::Configuration{}.state_directory : options.state_directory;
-    std::cerr << "axisd: using the last configuration that was served: " << last_good(directory).string()
-              << '\n';
-    loaded = config::load_file(last_good(directory).string(), *options.quiesce);
-  }
-  if (!loaded.configuration) {
-    std::cerr << "axisd: no usable configuration: nothing was stopped\n";
-    return exit_status::configuration;
-  }
-  spdlog::set_level(spdlog::level::off);
-  const auto& configuration = *loaded.configuration;
-  core::CoreLoop loop;
-  auto ports = Ports::open(loop, configuration, options.link_helper);
-  if (!ports) {
-    std::cerr << "axisd: " << to_string(ports.error()) << '\n';
-    return exit_status::failed;
-  }
-  std::vector<core::QuiesceReport> reports;
-  core::QuiesceParts parts{.executor = loop.executor(),
-                           .clock = &loop.clock(),
-                           .make_line = [&](const auto& line) { return (*ports)->make_line(line); },
-                           .make_port = [&](const auto& network) { return (*ports)->make_port(network); },
-                           .link_helper = (*ports)->link_helper()};
-  std::exception_ptr failure;
-  auto all = [](core::CoreLoop& core, core::QuiesceParts of, const config::Configuration& machine,
-                std::vector<core::QuiesceReport>& out, std::exception_ptr& thrown) -> Task<> {
-    try {
-      out = co_await core::quiesce(std::move(of), machine, quiesce_limit);
-    } catch (...) {
-      thrown = std::current_exception();
-    }
-    core.stop();
-  };
-  spawn(loop.executor(), all(loop, std::move(parts), configuration, reports, failure), "quiesce");
-  loop.run();
-  if (failure) std::rethrow_exception(failure);
-  bool confirmed = true;
-  for (const auto& report : reports) {
-    std::cout << report.axis << ": " << report.detail << '\n';
-    confirmed = confirmed && report.confirmed;
-  }
-  return confirmed ? exit_status::in_order : exit_status::failed;
-}
-
-}  // namespace
-
-int run_quiesce(const Options& options) {
-  raise_descriptor_limit();
-  try {
-    return quiesce(options);
-  } catch (const std::exception& error) {  // no memory, no descriptors, no more threads
-    std::cerr << "axisd: " << error.what() << ": nothing can be said of the axes\n";
-    return exit_status::failed;
-  }
 }
 
 }  // namespace axisd

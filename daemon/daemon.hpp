@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -19,6 +20,9 @@ inline constexpr int failed = 1;
 inline constexpr int configuration =
     2;  ///< or command line, certificates, limits of the process: trying again is pointless
 }  // namespace exit_status
+
+/// Copy of the last configuration that was served, for --quiesce when the file itself was broken meanwhile.
+std::filesystem::path last_good(const std::string& state_directory);
 
 /// A config::TlsCheck: the files as the service's user sees them.
 std::vector<std::pair<std::string_view, Error>> check_tls(const config::TlsSettings& tls);
