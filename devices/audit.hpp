@@ -74,9 +74,11 @@ struct DaemonRun {
   std::uint64_t start_count = 0;
 };
 
-/// So many entries were left out, as the disk could not be written.
+/// So many entries were left out, as the disk could not be written; or so many stops of one client, as it
+/// asked for too many.
 struct AuditGap {
   std::uint64_t left_out = 0;
+  std::string client{};  ///< empty: it was the disk
 };
 
 using AuditContent =

@@ -9,7 +9,7 @@ namespace axisd {
 
 std::optional<std::uint64_t> AuditRation::take(std::string_view client, TimePoint now) {
   auto& minute = minute_of(identity_of(client), now);
-  if (minute.told == a_minute) {
+  if (minute.told == a_minute_) {
     ++minute.left_out;
     return std::nullopt;
   }

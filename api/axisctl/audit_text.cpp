@@ -87,7 +87,9 @@ std::string content_text(const v1::AuditRecord& record) {
     case v1::AuditRecord::kRun:
       return text_of(record.run());
     case v1::AuditRecord::kGap:
-      return fmt::format("{} records are missing: the disk did not take them", record.gap().left_out());
+      return fmt::format("{} {}", record.gap().left_out(),
+                         record.client().empty() ? "records are missing: the disk did not take them"
+                                                 : "more stops before have no record: there were too many");
     case v1::AuditRecord::CONTENT_NOT_SET:
       break;
   }

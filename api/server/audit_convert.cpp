@@ -137,6 +137,7 @@ struct Fill {
   }
   void operator()(const AuditGap& gap) const {
     to.set_kind(v1::AUDIT_KIND_GAP);
+    to.set_client(gap.client);
     to.mutable_gap()->set_left_out(gap.left_out);
   }
 };

@@ -23,7 +23,7 @@ class Refusals {
   const Machine* machine_;
   AuditSink* sink_;
   std::mutex mutex_;
-  AuditRation ration_;  ///< under mutex_
+  AuditRation ration_{AuditRation::refusals};  ///< under mutex_
 };
 
 }  // namespace axisd::server

@@ -24,6 +24,26 @@ struct IsAudited {
   bool operator()(const FlightRecordWritten&) const { return false; }
 };
 
+/// Who stopped or held something, or ceased to hold it; nullptr: it is something else.
+struct WhoStops {
+  const std::string* operator()(const CommandChange& change) const {
+    const auto kind = change.command->kind;
+    const bool stop =
+        kind == CommandKind::halt || kind == CommandKind::stop || kind == CommandKind::quick_stop;
+    return stop ? &change.command->client : nullptr;
+  }
+  const std::string* operator()(const StopHoldChange& change) const {
+    return change.by.empty() ? &change.hold.holder : &change.by;
+  }
+  const std::string* operator()(const InhibitChange& change) const {
+    return change.what == InhibitChange::What::latched ? &change.by : nullptr;
+  }
+  template <class Other>
+  const std::string* operator()(const Other&) const {
+    return nullptr;
+  }
+};
+
 }  // namespace
 
 void AuditTrail::add(AuditContent content) {
@@ -32,13 +52,25 @@ void AuditTrail::add(AuditContent content) {
 }
 
 void AuditTrail::event(const Event& event) {
-  if (kept() && std::visit(IsAudited{}, event.content)) add(event);
+  if (kept() && std::visit(IsAudited{}, event.content) && is_within_ration(event)) add(event);
+}
+
+bool AuditTrail::is_within_ration(const Event& event) {
+  const auto* change = std::get_if<CommandChange>(&event.content);
+  if (change != nullptr && ended(change->command->state)) return untold_.erase(change->command->id) == 0;
+  const auto* who = std::visit(WhoStops{}, event.content);
+  if (who == nullptr) return true;
+  const auto left_out = stops_.take(*who, clock_->now());
+  if (left_out.value_or(0) > 0)
+    add(AuditGap{.left_out = *left_out, .client = std::string(identity_of(*who))});
+  if (!left_out && change != nullptr) untold_.insert(change->command->id);
+  return left_out.has_value();
 }
 
 void AuditTrail::refused(const std::string& axis, const Action& action, const CommandOptions& options,
                          Error cause) {
   if (!kept()) return;
-  const auto left_out = ration_.take(options.client, clock_->now());
+  const auto left_out = refusals_.take(options.client, clock_->now());
   if (!left_out) return;
   const auto arrived = options.arrived == TimePoint{} ? clock_->now() : options.arrived;
   add(RefusedCommand{.command = {.id = {},

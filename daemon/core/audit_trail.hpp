@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "buses/clock.hpp"
@@ -15,17 +16,20 @@ class AuditTrail {
   AuditTrail(Clock& clock, AuditSink* sink) : clock_(&clock), sink_(sink) {}
 
   [[nodiscard]] bool kept() const { return sink_ != nullptr; }
-  /// Commands, faults, and what somebody did to leases, holds, StopAll, the configuration and the state.
+  /// Commands, faults, and what somebody did to leases, holds, StopAll, the configuration and the state. Of
+  /// stops, which are refused to nobody, each identity has a ration.
   void event(const Event& event);
   void refused(const std::string& axis, const Action& action, const CommandOptions& options, Error cause);
   void call(AuditedCall call);
 
  private:
   void add(AuditContent content);
+  [[nodiscard]] bool is_within_ration(const Event& event);
 
   Clock* clock_;
   AuditSink* sink_;
-  AuditRation ration_;  ///< of refusals
+  AuditRation refusals_{AuditRation::refusals}, stops_{AuditRation::stops};
+  std::set<std::string> untold_;  ///< ids of stops that have not ended
 };
 
 }  // namespace axisd::core

@@ -72,6 +72,8 @@ TEST(AuditText, TheDaemonAndWhatIsMissing) {
   EXPECT_THAT(audit_line(run), EndsWith("  12  -  -  axisd 1.0 began (start 7)"));
   run.mutable_gap()->set_left_out(9);
   EXPECT_THAT(audit_line(run), HasSubstr("9 records are missing"));
+  run.set_client("hmi-1");
+  EXPECT_THAT(audit_line(run), HasSubstr("hmi-1  9 more stops before have no record"));
 }
 
 TEST(AuditText, KindsByName) {

@@ -17,8 +17,8 @@ class Ration : public testing::Test {
     for (int i = 0; i < count; ++i) result += ration_.take(client, now_) ? 1 : 0;
     return result;
   }
-  static constexpr int most = static_cast<int>(AuditRation::a_minute);
-  AuditRation ration_;
+  static constexpr int most = static_cast<int>(AuditRation::refusals);
+  AuditRation ration_{AuditRation::refusals};
   TimePoint now_{1h};
 };
 

@@ -96,12 +96,37 @@ TEST_F(Audited, ManyRefusalsOfOneClientAreCounted) {
   };
   for (int i = 0; i < 100; ++i) ask("loud");
   ask("calm");
-  EXPECT_THAT(all<RefusedCommand>(), SizeIs(AuditRation::a_minute + 1));
+  EXPECT_THAT(all<RefusedCommand>(), SizeIs(AuditRation::refusals + 1));
   world_.run_for(61s);
   ask("loud");
-  EXPECT_EQ(all<RefusedCommand>().back().left_out, 100 - AuditRation::a_minute);
+  EXPECT_EQ(all<RefusedCommand>().back().left_out, 100 - AuditRation::refusals);
   ask("loud");
   EXPECT_EQ(all<RefusedCommand>().back().left_out, 0U);
+}
+
+/// Nobody needs a role to stop: a crowd of stops writes nobody else out of the files either.
+TEST_F(Audited, ManyStopsOfOneIdentityAreCounted) {
+  AuditTrail trail(world_.clock(), this);
+  int number = 0;
+  const auto stop = [&](const std::string& client) {
+    Command command{.id = "s-" + std::to_string(++number), .client = client, .kind = CommandKind::stop};
+    for (const auto state : {CommandState::accepted, CommandState::done}) {
+      command.state = state;
+      trail.event({.content = CommandChange{.command = std::make_shared<const Command>(command)}});
+    }
+  };
+  const auto before = entries.size();
+  for (std::uint64_t i = 0; i < AuditRation::stops + 10; ++i) stop("loud");
+  stop("p1 via loud");
+  stop("calm");
+  EXPECT_EQ(entries.size() - before, 2 * (AuditRation::stops + 1)) << "each with its end";
+  world_.run_for(61s);
+  EXPECT_THAT(all<AuditGap>(), IsEmpty());
+  stop("loud");
+  const auto gaps = all<AuditGap>();
+  ASSERT_THAT(gaps, SizeIs(1));
+  EXPECT_EQ(gaps[0].left_out, 11U);
+  EXPECT_EQ(gaps[0].client, "loud");
 }
 
 TEST_F(Audited, WhatAnAxisDoesByItselfIsNotKept) {
