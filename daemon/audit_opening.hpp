@@ -14,7 +14,8 @@ namespace axisd {
 [[nodiscard]] std::filesystem::path audit_directory(const config::Configuration& configuration);
 
 /// What of the journal no record tells of is recovered first: whatever reached a wire is in the journal.
-/// `revision`: of the configuration. Precondition: `state` locks the directory, and its journal was not taken.
+/// `revision`: of the configuration. Precondition: `state` locks the directory, and its journal was not
+/// taken.
 [[nodiscard]] std::unique_ptr<store::AuditLog> open_audit(const config::Configuration& configuration,
                                                           store::KeptState& state,
                                                           const std::string& instance_id,

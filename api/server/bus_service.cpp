@@ -146,13 +146,12 @@ BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::Tr
     const auto text = fmt::format("writes {} to registers from {} of {} node {}", fmt::join(values, " "),
                                   transaction->address, transaction->bus, transaction->node);
     auto reply = reply_with_value<Words>(call, std::move(fill), fmt::format("{}: {}", client, text));
-    buses.transact(*std::move(transaction),
-                   audited<Words>(services_,
-                                  {.rpc = "BusService.Transact",
-                                   .client = client,
-                                   .text = text,
-                                   .origin = caller.origin},
-                                  std::move(reply)));
+    buses.transact(
+        *std::move(transaction),
+        audited<Words>(
+            services_,
+            {.rpc = "BusService.Transact", .client = client, .text = text, .origin = caller.origin},
+            std::move(reply)));
   });
 }
 

@@ -42,8 +42,8 @@ Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
   const auto auth = context.auth_context();
   if (auth && auth->IsPeerAuthenticated()) {
     const auto pem = auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-    auto name = identities_->of(pem.empty() ? std::string()
-                                            : std::string(pem.front().data(), pem.front().size()));
+    auto name =
+        identities_->of(pem.empty() ? std::string() : std::string(pem.front().data(), pem.front().size()));
     return {.name = std::move(name), .address = context.peer()};
   }
   const auto connection = context.peer();

@@ -55,9 +55,7 @@ Peer local_peer(int connection) {
   if (getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &who, &size) != 0) return {.name = "unix:unknown"};
   auto program = program_name(who.pid);
   auto address = "unix:" + program;
-  return {.name = "unix:" + user_name(who.uid),
-          .program = std::move(program),
-          .address = std::move(address)};
+  return {.name = "unix:" + user_name(who.uid), .program = std::move(program), .address = std::move(address)};
 }
 
 }  // namespace axisd::server

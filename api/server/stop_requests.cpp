@@ -106,20 +106,20 @@ void to_proto(const Results& results, const std::vector<std::string>& axes, v1::
 
 }  // namespace
 
-void handle(Machine& machine, const v1::HaltRequest& request, const Caller& caller,
-            const ReplyPtr& reply, v1::HaltResponse* response) {
+void handle(Machine& machine, const v1::HaltRequest& request, const Caller& caller, const ReplyPtr& reply,
+            v1::HaltResponse* response) {
   stop_axis(machine, request, caller, reply, response);
 }
-void handle(Machine& machine, const v1::StopRequest& request, const Caller& caller,
-            const ReplyPtr& reply, v1::StopResponse* response) {
+void handle(Machine& machine, const v1::StopRequest& request, const Caller& caller, const ReplyPtr& reply,
+            v1::StopResponse* response) {
   stop_axis(machine, request, caller, reply, response);
 }
 void handle(Machine& machine, const v1::QuickStopRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::QuickStopResponse* response) {
   stop_axis(machine, request, caller, reply, response);
 }
-void handle(Machine& machine, const v1::DisableRequest& request, const Caller& caller,
-            const ReplyPtr& reply, v1::DisableResponse* response) {
+void handle(Machine& machine, const v1::DisableRequest& request, const Caller& caller, const ReplyPtr& reply,
+            v1::DisableResponse* response) {
   stop_axis(machine, request, caller, reply, response);
 }
 void handle(Machine& machine, const v1::GroupHaltRequest& request, const Caller& caller,
@@ -131,8 +131,8 @@ void handle(Machine& machine, const v1::GroupStopRequest& request, const Caller&
   stop_group(machine, request, StopKind::stop, caller, reply, response);
 }
 
-void handle(Machine& machine, const v1::StopAllRequest& request, const Caller& caller,
-            const ReplyPtr& reply, v1::StopAllResponse* response) {
+void handle(Machine& machine, const v1::StopAllRequest& request, const Caller& caller, const ReplyPtr& reply,
+            v1::StopAllResponse* response) {
   auto axes = machine.axis_names();
   const auto& client = caller.name;
   machine.stop_all(client, stop_all_wait(request.wait_until()),

@@ -100,10 +100,8 @@ void GroupAccessService::stop(GroupStopRequest request, std::string client, Wait
     gathering->missing = axes.size() * (request.hold ? 2 : 1);
     std::vector<Result<CommandPtr>> commands;
     const StopRequest stop{.kind = request.kind, .hold = request.hold};
-    const CommandOptions options{.client = client,
-                                 .request_id = request.request_id,
-                                 .arrived = arrived,
-                                 .origin = request.origin};
+    const CommandOptions options{
+        .client = client, .request_id = request.request_id, .arrived = arrived, .origin = request.origin};
     for (const auto& axis : axes) {
       gathering->results.push_back({.axis = axis, .command = fail(Reason::internal, "no answer")});
       commands.push_back(

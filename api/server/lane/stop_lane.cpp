@@ -273,8 +273,8 @@ void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, cons
 
 /// Precondition: the connection is identified, by a certificate.
 void StopLane::Loop::identify(Id id, Client& client) {
-  client.peer = Peer{.name = identities_->of(client.connection->certificate().value_or("")),
-                     .address = client.address};
+  client.peer =
+      Peer{.name = identities_->of(client.connection->certificate().value_or("")), .address = client.address};
   close(places_.identify(id, client.peer->name, false, monotonic_now()));
 }
 

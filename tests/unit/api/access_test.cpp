@@ -44,11 +44,11 @@ const Peer anna{.name = "anna"};
 
 std::vector<const MethodDescriptor*> calls() {
   std::vector<const MethodDescriptor*> all;
-  for (const auto* request : {v1::StopRequest::descriptor(), v1::TransactRequest::descriptor(),
-                              v1::GetCommandRequest::descriptor(), v1::GetDriveRequest::descriptor(),
-                              v1::WatchEventsRequest::descriptor(), v1::MoveGroupRequest::descriptor(),
-                              v1::RenewLeaseRequest::descriptor(), v1::GetInfoRequest::descriptor(),
-                              v1::ListAuditRequest::descriptor()})
+  for (const auto* request :
+       {v1::StopRequest::descriptor(), v1::TransactRequest::descriptor(), v1::GetCommandRequest::descriptor(),
+        v1::GetDriveRequest::descriptor(), v1::WatchEventsRequest::descriptor(),
+        v1::MoveGroupRequest::descriptor(), v1::RenewLeaseRequest::descriptor(),
+        v1::GetInfoRequest::descriptor(), v1::ListAuditRequest::descriptor()})
     for (int i = 0; i < request->file()->service(0)->method_count(); ++i)
       all.push_back(request->file()->service(0)->method(i));
   return all;
@@ -405,8 +405,7 @@ TEST_F(AccessLane, AsksTheSameTable) {
   EXPECT_EQ(options.origin->role, Role::operator_);
   std::vector<std::string> denied;
   for (const auto& each : told_.denied()) denied.push_back(each.rpc);
-  EXPECT_THAT(denied,
-              ElementsAre("AxisService.Disable", "LeaseService.RenewLease", "AxisService.Disable"));
+  EXPECT_THAT(denied, ElementsAre("AxisService.Disable", "LeaseService.RenewLease", "AxisService.Disable"));
 }
 
 TEST_F(AccessLane, ReadsTheMetadata) {

@@ -106,8 +106,8 @@ TEST(AuditLines, WhatWasWritten) {
 
 TEST(AuditLines, WhereItWasAskedForAndWithWhichRole) {
   auto moved = command();
-  moved.origin = std::make_shared<const CallOrigin>(
-      CallOrigin{.peer = "ipv4:10.0.0.5:51234", .role = Role::operator_});
+  moved.origin =
+      std::make_shared<const CallOrigin>(CallOrigin{.peer = "ipv4:10.0.0.5:51234", .role = Role::operator_});
   const auto record = server::audit_record(line_of({.content = RefusedCommand{.command = moved}}));
   ASSERT_TRUE(record);
   EXPECT_EQ(record->peer(), "ipv4:10.0.0.5:51234");

@@ -52,8 +52,8 @@ class Audited : public Kept, public MachineOnALine {  // in this order: it outli
 TEST_F(Audited, ACommandIsToldBeforeAnythingIsSentForItAndWhenItHasEnded) {
   const auto seen = commands().size();
   const auto origin = std::make_shared<const CallOrigin>(CallOrigin{.role = Role::operator_});
-  const auto command = machine_->submit("a1", EnableRequest{},
-                                        {.client = "hmi", .request_id = "r1", .origin = origin});
+  const auto command =
+      machine_->submit("a1", EnableRequest{}, {.client = "hmi", .request_id = "r1", .origin = origin});
   ASSERT_TRUE(command);
   ASSERT_THAT(commands(), SizeIs(seen + 1)) << "before the core did anything else";
   EXPECT_EQ(commands().back().client, "hmi");
@@ -71,11 +71,11 @@ TEST_F(Audited, AStopIsToldToo) {
 }
 
 TEST_F(Audited, ARefusalIsToldWithItsCause) {
-  const auto refused =
-      machine_->submit("a1", MoveAbsoluteRequest{.position = 5},
-                       {.client = "hmi",
-                        .request_id = "r1",
-                        .origin = std::make_shared<const CallOrigin>(CallOrigin{.peer = "ipv4:10.0.0.5:51234"})});
+  const auto refused = machine_->submit(
+      "a1", MoveAbsoluteRequest{.position = 5},
+      {.client = "hmi",
+       .request_id = "r1",
+       .origin = std::make_shared<const CallOrigin>(CallOrigin{.peer = "ipv4:10.0.0.5:51234"})});
   ASSERT_FALSE(refused);
   const auto told = all<RefusedCommand>();
   ASSERT_THAT(told, SizeIs(1));
