@@ -109,8 +109,8 @@ class Machine {
   virtual void release_stop(std::string axis, HoldRelease release,
                             std::function<void(Result<StopReleased>)> callback) = 0;
   /// Stops all axes and latches the inhibit (M14). Calls back with the stop command of each axis, once it is
-  /// known whether the latch is durable, or that takes longer than a second.
-  virtual void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) = 0;
+  /// known whether the latch is durable, or that takes longer than a second. The lease is not looked at.
+  virtual void stop_all(Requester requester, WaitUntil until, std::function<void(AllStopped)> callback) = 0;
   virtual void release_inhibit(std::string client, std::function<void(Result<void>)> callback) = 0;
   /// How many axes this identity, and whom it speaks for, have asked to stop that the core has not begun to
   /// stop yet, each as often as it was asked for. None of these is ever dropped: whoever takes stops in can

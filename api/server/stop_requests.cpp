@@ -135,7 +135,7 @@ void handle(Machine& machine, const v1::StopAllRequest& request, const Caller& c
             v1::StopAllResponse* response) {
   auto axes = machine.axis_names();
   const auto& client = caller.name;
-  machine.stop_all(client, stop_all_wait(request.wait_until()),
+  machine.stop_all({.client = client, .origin = caller.origin}, stop_all_wait(request.wait_until()),
                    [reply, response, client, axes = std::move(axes)](AllStopped stopped) {
                      const auto shared = std::make_shared<const AllStopped>(std::move(stopped));
                      reply->complete(

@@ -300,7 +300,8 @@ void MachineCore::save_latch(const std::string& client, std::function<void(std::
 }
 
 std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client, TimePoint arrived,
-                                                      std::function<void(std::optional<Error>)> latched) {
+                                                      std::function<void(std::optional<Error>)> latched,
+                                                      const CallOriginPtr& origin) {
   ++latches_;
   set_inhibit(true, client);
   save_latch(client, std::move(latched));
@@ -316,7 +317,7 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
   std::vector<Result<CommandPtr>> results(axes_.size(), fail(Reason::internal, "not stopped"));
   for (const auto& [urgency, i] : order)
     results[i] = submit(axes_[i]->settings().name, StopRequest{.kind = StopKind::stop, .all = true},
-                        {.client = client, .arrived = arrived});
+                        {.client = client, .arrived = arrived, .origin = origin});
   // After the stops: nobody's look at the events or the log may hold them up.
   tell_inhibit(InhibitChange::What::latched, client);
   log_limited(spdlog::level::warn, "StopAll by " + client, "stops",

@@ -99,7 +99,8 @@ class MachineCore {
   /// `arrived`: as of CommandOptions. `latched` (may be empty) is called once: when the latch is durable, or
   /// with why it is not, or not yet after StopHoldKeeper::longest_wait.
   std::vector<Result<CommandPtr>> stop_all(const std::string& client, TimePoint arrived = {},
-                                           std::function<void(std::optional<Error>)> latched = {});
+                                           std::function<void(std::optional<Error>)> latched = {},
+                                           const CallOriginPtr& origin = {});
   /// Ends the inhibit once that is durable.
   void release_inhibit(const std::string& client, std::function<void(Result<void>)> done);
   /// Who latched the inhibit, or nullptr. Thread: any.

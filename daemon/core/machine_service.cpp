@@ -135,7 +135,8 @@ void MachineService::release_stop(std::string axis, HoldRelease release,
 }
 
 /// The stops wait for nothing; their answer does for the disk.
-void MachineService::stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) {
+void MachineService::stop_all(Requester requester, WaitUntil until,
+                              std::function<void(AllStopped)> callback) {
   struct Gathering {
     AllStopped answer{};
     std::size_t missing = 1;  ///< the latch, and each stop
@@ -144,14 +145,17 @@ void MachineService::stop_all(std::string client, WaitUntil until, std::function
       if (--missing == 0) callback(std::move(answer));
     }
   };
-  auto serve = [this, client, arrived = now(), until, callback = std::move(callback)]() mutable {
+  auto client = requester.client;
+  auto serve = [this, requester = std::move(requester), arrived = now(), until,
+                callback = std::move(callback)]() mutable {
     auto gathering = std::make_shared<Gathering>();
     gathering->callback = std::move(callback);
     ++gathering->missing;  // until all are counted
-    const auto commands = machine_->stop_all(client, arrived, [gathering](std::optional<Error> error) {
+    const auto latched = [gathering](std::optional<Error> error) {
       gathering->answer.not_durable = std::move(error);
       gathering->one_more();
-    });
+    };
+    const auto commands = machine_->stop_all(requester.client, arrived, latched, requester.origin);
     gathering->answer.stops.assign(commands.size(), fail(Reason::internal, "no answer"));
     gathering->missing += commands.size();
     for (std::size_t i = 0; i < commands.size(); ++i)

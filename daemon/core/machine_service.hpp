@@ -31,7 +31,7 @@ class MachineService final : public Machine {
                std::function<void(Result<std::vector<Obstacle>>)> callback) override;
   void release_stop(std::string axis, HoldRelease release,
                     std::function<void(Result<StopReleased>)> callback) override;
-  void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override;
+  void stop_all(Requester requester, WaitUntil until, std::function<void(AllStopped)> callback) override;
   void release_inhibit(std::string client, std::function<void(Result<void>)> callback) override;
   [[nodiscard]] std::size_t stops_waiting(const std::string& identity) const override {
     return loop_->lane().waiting(identity);

@@ -241,9 +241,9 @@ class CountedMachine final : public Machine {
       inner_->release_stop(axis, release, ledger_->answer(ticket, callback));
     });
   }
-  void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override {
+  void stop_all(Requester requester, WaitUntil until, std::function<void(AllStopped)> callback) override {
     ledger_->enter([=, this](const auto& ticket) {
-      inner_->stop_all(client, until, ledger_->answer(ticket, callback));
+      inner_->stop_all(requester, until, ledger_->answer(ticket, callback));
     });
   }
   void kept_state(std::function<void(KeptStateReport)> callback) override {

@@ -192,7 +192,8 @@ TEST_F(RealRig, StopAllInhibitsUntilReleased) {
   ASSERT_EQ(submit("axis-1", EnableRequest{})->state, CommandState::done);
   ASSERT_TRUE(submit("axis-1", MoveVelocityRequest{.velocity = 50}, WaitUntil::started));
   std::promise<AllStopped> stopped;
-  service_->stop_all("rig", WaitUntil::done, [&](AllStopped all) { stopped.set_value(std::move(all)); });
+  service_->stop_all({.client = "rig"}, WaitUntil::done,
+                     [&](AllStopped all) { stopped.set_value(std::move(all)); });
   const auto answer = stopped.get_future().get();
   for (const auto& result : answer.stops) {
     ASSERT_TRUE(result) << to_string(result.error());

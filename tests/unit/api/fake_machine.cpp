@@ -180,8 +180,8 @@ void FakeMachine::release_stop(std::string axis, HoldRelease release,
   post([callback = std::move(callback), released = std::move(released)] { callback(released); });
 }
 
-void FakeMachine::stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) {
-  note("stop_all " + client + (until == WaitUntil::done ? " done" : " accepted"));
+void FakeMachine::stop_all(Requester requester, WaitUntil until, std::function<void(AllStopped)> callback) {
+  note("stop_all " + requester.client + (until == WaitUntil::done ? " done" : " accepted"));
   AllStopped answer{
       .stops = {result_of("feeder", CommandKind::stop), fail(Reason::not_confirmed, "still moving")},
       .not_durable = latch_trouble};

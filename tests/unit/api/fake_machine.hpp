@@ -66,7 +66,7 @@ class FakeMachine final : public Machine {
                std::function<void(Result<std::vector<Obstacle>>)> callback) override;
   void release_stop(std::string axis, HoldRelease release,
                     std::function<void(Result<StopReleased>)> callback) override;
-  void stop_all(std::string client, WaitUntil until, std::function<void(AllStopped)> callback) override;
+  void stop_all(Requester requester, WaitUntil until, std::function<void(AllStopped)> callback) override;
   void kept_state(std::function<void(KeptStateReport)> callback) override;
   void accept_state(std::string client,
                     std::function<void(Result<std::vector<Conviction>>)> callback) override;

@@ -135,7 +135,9 @@ TEST_F(Audited, WhatAnAxisDoesByItselfIsNotKept) {
 }
 
 TEST_F(Audited, StopAllAndItsRelease) {
-  (void)machine_->stop_all("panel");
+  const auto origin = std::make_shared<const CallOrigin>(CallOrigin{.peer = "unix:hmi"});
+  (void)machine_->stop_all("panel", {}, {}, origin);
+  EXPECT_EQ(commands().back().origin, origin);
   world_.run_for(1s);
   machine_->release_inhibit("hmi", [](const Result<void>&) {});
   world_.run_for(1s);
