@@ -14,10 +14,10 @@ namespace axisd::metrics {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
-class MetricsTest : public testing::Test {
+class MetricsTest : public ::testing::Test {
  protected:
   MetricsTest() {
     core::BusReading bus;
@@ -82,7 +82,7 @@ TEST_F(MetricsTest, WhoeverComesSoonerGetsTheTextOfBefore) {
   const auto first = metrics_.scrape(Format::text);
   pass(Metrics::renewed_after - 1ms);
   EXPECT_EQ(metrics_.scrape(Format::text), first);
-  EXPECT_THAT(scrape(Format::openmetrics), testing::EndsWith("# EOF\n"));
+  EXPECT_THAT(scrape(Format::openmetrics), ::testing::EndsWith("# EOF\n"));
   pass(1ms);
   EXPECT_NE(metrics_.scrape(Format::text), first);
   EXPECT_THAT(scrape(), HasSubstr("axisd_metrics_scrapes_total 4\n"));
