@@ -171,7 +171,7 @@ TEST_F(BusWatchTest, ATraceHasEveryFrameOnceAndInOrder) {
   Traced of_device;
   const auto token = trace({.bus = "line-a"}, all);
   const auto filtered = trace({.bus = "line-a", .node = 9}, of_device);
-  world_.run_for(25ms);
+  world_.run_for(40ms);
   EXPECT_EQ(of_device.batches, 1) << "told at once that it has begun";
   line_->forget_wire();
   all = {};

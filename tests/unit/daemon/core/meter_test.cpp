@@ -9,10 +9,14 @@ using namespace std::chrono_literals;
 
 class Metered : public MachineOnALine {
  protected:
-  Metered() : MachineOnALine("metered", {1, 2, 3}) { start_with({1, 2, 3}, 3); }
+  Metered() : MachineOnALine("metered", {1, 2, 3}) {}
+  MachineCore& started() {
+    start_with({1, 2, 3}, 3);
+    return *machine_;
+  }
 
   Duration longest_ = 0ms;  ///< of the core's handlers since it was last asked
-  Meter meter_{world_.clock(), *machine_, [this] { return std::exchange(longest_, 0ms); }};
+  Meter meter_{world_.clock(), started(), [this] { return std::exchange(longest_, 0ms); }};
 };
 
 TEST_F(Metered, ReadsOnceASecondWhoeverLooks) {
