@@ -90,8 +90,11 @@ class Roles(Scenario):
                                           metadata=[(f"axisd-{key}", value) for key, value in names.items()]).command
             except grpc.RpcError as error:
                 raise CallFailed(error) from None
-        self.assertEqual(enable(web, user="anna").client, "anna via web.press-1")
-        self.assertNotEqual(enable(web, user="anna").id, enable(web, user="bert").id, "each has its own request ids")
+        first = enable(web, user="anna")
+        self.assertEqual(first.client, "anna via web.press-1")
+        shift.wait_ended(first)
+        self.assertEqual(enable(web, user="anna").id, first.id)
+        self.assertNotEqual(enable(web, user="bert").id, first.id, "each has its own request ids")
         self.assertIn("bert via web.press-1 has viewer", self.denied(enable, web, user="bert", role="viewer"))
         self.assertIn("may not speak for others", self.denied(enable, shift, user="anna"))
 

@@ -87,7 +87,7 @@ class Metrics(Scenario):
 
         def ask(number):
             with self.assertRaises(CallFailed):
-                machine.client.call(machine.client.axis.Stop, axis_pb.StopRequest(axis=f"nobody-{number}"))
+                machine.client.call(machine.client.axis.Stop, axis_pb.StopRequest(axis=f"stranger-{number}"))
 
         with concurrent.futures.ThreadPoolExecutor(8) as threads:
             list(threads.map(ask, range(1000)))
@@ -96,7 +96,7 @@ class Metrics(Scenario):
         after = scrape(url)
         self.assertGreater(after.value("axisd_metrics_scrapes_total"), begun)
         self.assertEqual(set(after.samples), before)
-        self.assertNotIn("nobody", fetch(url))
+        self.assertNotIn("stranger", fetch(url))
 
     def test_a_flood_of_scrapes_keeps_no_stop(self):
         machine, url = self.metered_spinner()
