@@ -39,7 +39,7 @@ class Table {
  public:
   Table() {
     for (const std::string_view service :
-         {"axis", "bus", "command", "drive", "event", "group", "lease", "system"}) {
+         {"audit", "axis", "bus", "command", "drive", "event", "group", "lease", "system"}) {
       const auto* file =
           DescriptorPool::generated_pool()->FindFileByName(fmt::format("axisd/v1/{}_service.proto", service));
       if (file == nullptr) continue;
