@@ -3,7 +3,7 @@
 #   tests/run.sh quick    preset dev
 #   tests/run.sh all      the same tests under AddressSanitizer + UBSan (preset asan), those without gRPC, whose library
 #                         is not instrumented, under ThreadSanitizer (preset tsan), clang-tidy on changed files, and
-#                         in preset release, as it is fast, the whole conformance suite, the slow rules and
+#                         in preset release, as it is fast, all rules, the whole conformance suite and
 #                         100,000 faulted transactions (asan runs a sample of each), the scenarios on SocketCAN, whose
 #                         guests are too small for AddressSanitizer, and that the benchmarks run.
 #                         Default.
@@ -11,9 +11,9 @@ set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 
 case "${1:-all}" in
-  quick) presets=(dev) whole=() slow=() selection=(--label-exclude slow) ;;
+  quick) presets=(dev) whole=() selection=(--label-exclude slow) ;;
   all)
-    presets=(asan tsan) whole=(test_conformance test_chaos can_scenarios bench_programs) slow=(test_rules) selection=()
+    presets=(asan tsan) whole=(test_rules test_conformance test_chaos can_scenarios bench_programs) selection=()
     ;;
   *) echo "usage: tests/run.sh [quick|all]" >&2; exit 2 ;;
 esac
@@ -45,7 +45,7 @@ build() {  # PRESET [TARGET ...]
   echo "== $preset: $((SECONDS - begun)) s"
 }
 for preset in "${presets[@]}"; do build "$preset"; done
-[ "${#whole[@]}" -eq 0 ] || build release "${whole[@]}" "${slow[@]}"
+[ "${#whole[@]}" -eq 0 ] || build release "${whole[@]}"
 
 # One run over all presets: one pool of jobs, one summary. What could not be built fails in it, too. One job more than
 # there are processors: many tests wait most of their time.
@@ -53,7 +53,6 @@ mkdir -p build/all
 {
   for preset in "${presets[@]}"; do printf 'subdirs("%s")\n' "$PWD/build/$preset"; done
   for target in "${whole[@]}"; do printf 'include("%s")\n' "$PWD/build/release/tests/$target"*_include.cmake; done
-  for target in "${slow[@]}"; do printf 'include("%s")\n' "$PWD/build/release/tests/${target}[2]_include.cmake"; done
 } >build/all/CTestTestfile.cmake
 [ "${#failed[@]}" -eq 0 ] || printf 'run.sh: FAILED: %s\n' "${failed[@]}"
 status=0
