@@ -138,7 +138,7 @@ class KeptState(Scenario):
         self.assertIn("--restore-state", done.stdout)
         self.assertEqual(os.stat(backup).st_mode & 0o777, 0o600)
         self.assert_command(machine.client.wait_ended(move), "DONE")
-        machine.client.to_done("MoveRelative", "feeder", distance=5.0, request_id="behind it")
+        machine.client.to_done("MoveRelative", "feeder", distance=5.0, request_id="behind-it")
 
         def restore():
             return run([AXISD, "--config", machine.config, "--restore-state", backup], limit=60)
@@ -157,7 +157,7 @@ class KeptState(Scenario):
         # What was moved after the backup does not move again: nobody knows what it was.
         machine.client.to_done("Enable", "feeder")
         detail = self.refused("UNAVAILABLE", "STORAGE", machine.client.motion, "MoveRelative", "feeder",
-                              distance=5.0, request_id="behind it")
+                              distance=5.0, request_id="behind-it")
         self.assertEqual(detail.outcome, error_pb.OUTCOME_UNKNOWN)
         self.assertEqual(machine.sim.shaft().starts, starts)
 
