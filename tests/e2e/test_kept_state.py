@@ -155,7 +155,6 @@ class KeptState(Scenario):
         self.assertEqual(machine.axisctl("state", "accept").returncode, 0)
         self.assertEqual(machine.axisctl("release-stop", "--all").returncode, 0)
         # What was moved after the backup does not move again: nobody knows what it was.
-        machine.client.to_done("Enable", "feeder")
         detail = self.refused("UNAVAILABLE", "STORAGE", machine.client.motion, "MoveRelative", "feeder",
                               distance=5.0, request_id="behind-it")
         self.assertEqual(detail.outcome, error_pb.OUTCOME_UNKNOWN)
