@@ -82,25 +82,6 @@ std::vector<Job> sample_of_jobs(const std::vector<Manual>& manuals) {
   return sample;
 }
 
-/// Of each make some that show its units and its ramps, and one of the others in turn.
-std::vector<Job> sample_of_makes(const std::vector<Manual>& manuals) {
-  constexpr std::string_view always[] = {"absolute_moves", "velocity_moves", "halt", "quick_stop"};
-  std::vector<Job> sample;
-  std::size_t turn = 0;
-  for (const auto& manual : manuals) {
-    std::vector<Job> others;
-    for (const auto& subject : subjects())
-      for (const auto& scenario : subject.scenarios) {
-        if (manual.lacks(scenario.name) || manual.skipped(scenario.name) != nullptr) continue;
-        const Job job{.scenario = &scenario, .manual = &manual, .variant = {}};
-        const bool chosen = std::ranges::find(always, scenario.name) != std::end(always);
-        (chosen ? sample : others).push_back(job);
-      }
-    if (!others.empty()) sample.push_back(others[turn++ % others.size()]);
-  }
-  return sample;
-}
-
 bool run(const Job& job, const Programs& programs) {
   const auto begin = monotonic_now();
   const auto make_target = [&](const Plant& plant) { return make_process_target(programs, "vcan0", plant); };
@@ -131,10 +112,8 @@ bool run_vcan_suite(const Programs& programs, std::string_view named) {
 }
 
 bool run_vcan_sample(const Programs& programs, const Part& part) {
-  const auto manuals = manuals_on_can(), others = makes();
-  auto jobs = sample_of_jobs(manuals);
-  std::ranges::move(sample_of_makes(others), std::back_inserter(jobs));
-  return run(jobs, part, programs);
+  const auto manuals = manuals_on_can();
+  return run(sample_of_jobs(manuals), part, programs);
 }
 
 }  // namespace axisd::conformance
