@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import unittest
+from unittest import mock
 
 from support import AXISCTL, LIMIT, AxisctlTest, PythonTest, environment
 import fake_server
@@ -112,6 +113,12 @@ class Python(PythonTest):
             with self.assertRaises(axisd.LeaseLostError):
                 async with machine.lease("feeder", ttl=3):
                     await server.stop(0)
+                    await asyncio.sleep(LIMIT)
+
+    async def test_renewals_that_cannot_be_sent_end_the_block(self):
+        with self.assertRaisesRegex(axisd.LeaseLostError, "the lease was not renewed: no such method"):
+            async with self.machine.lease("feeder", ttl=0.3):
+                with mock.patch.object(self.machine, "_call", side_effect=AttributeError("no such method")):
                     await asyncio.sleep(LIMIT)
 
     async def test_the_blocks_own_errors_and_cancellations_stay(self):

@@ -33,11 +33,8 @@ class Drive:
         return await self._machine._call(getattr(self._machine._drives, name), request, self.axis)
 
     async def _memory_call(self, name: str, request: Any) -> Any:
-        method = getattr(self._machine._drives, name)
-
-        def patient(message: Any, timeout: float | None = None) -> Any:
-            return method(message, timeout=max(timeout or 0.0, _MEMORY_TIME))
-        return await self._machine._call(patient, request, self.axis)
+        return await self._machine._call(getattr(self._machine._drives, name), request, self.axis,
+                                         limit=max(self._machine.timeout, _MEMORY_TIME))
 
     async def info(self) -> DriveInfo:
         """Model, limits, terminals with their functions, alarms."""

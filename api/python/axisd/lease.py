@@ -82,6 +82,15 @@ class Lease:
             raise LeaseLostError(str(self._lost)) from error
 
     async def _renew(self, expires: float, ttl: float) -> None:
+        """Ends the block when the lease is lost; whatever ends the renewals loses it."""
+        try:
+            self._lost = await self._renew_until_lost(expires, ttl)
+        except Exception as error:
+            self._lost = LeaseLostError(f"the lease was not renewed: {error}")
+        assert self._block is not None
+        self._block.cancel()
+
+    async def _renew_until_lost(self, expires: float, ttl: float) -> AxisdError:
         # Three renewals per time to live: two may be late or lost.
         loop = asyncio.get_running_loop()
         request = lease_service_pb2.RenewLeaseRequest(lease_token=self.token)
@@ -90,18 +99,11 @@ class Lease:
             await asyncio.sleep(min(ttl / 3, max(expires - loop.time(), 0)))
             asked = loop.time()
             try:
-                await self._machine._call(self._brief(ttl / 3), request, "")
+                await self._machine._call(self._machine._stops.RenewLease, request, "",
+                                          limit=min(self._machine.timeout, ttl / 3))
                 expires = asked + ttl
             except UnreachableError as unreachable:
                 failure = unreachable
             except RefusedError as refused:
-                failure = refused
-                break
-        assert self._block is not None
-        self._lost = failure or LeaseLostError("the lease was not renewed in time: this program was held up")
-        self._block.cancel()
-
-    def _brief(self, limit: float) -> Any:
-        async def renew(request: Any, timeout: float | None = None) -> Any:
-            return await self._machine._stops.RenewLease(request, timeout=min(timeout or limit, limit))
-        return renew
+                return refused
+        return failure or LeaseLostError("the lease was not renewed in time: this program was held up")
