@@ -13,6 +13,8 @@
 #include <string_view>
 #include <utility>
 
+#include "api/server/user_names.hpp"
+
 namespace axisd::server {
 namespace {
 
@@ -28,13 +30,18 @@ bool is_name(std::string_view text) {
          std::ranges::all_of(text, is_of_a_name);
 }
 
-std::string user_name(uid_t user) {
+std::string look_up(uid_t user) {
   const File users(std::fopen("/etc/passwd", "re"));
   passwd entry{}, *found = nullptr;
   std::array<char, 4096> text{};
   while (users && fgetpwent_r(users.get(), &entry, text.data(), text.size(), &found) == 0)
     if (entry.pw_uid == user) return is_name(entry.pw_name) ? entry.pw_name : fmt::format("{}", user);
   return fmt::format("{}", user);
+}
+
+std::string user_name(uid_t user) {
+  static UserNames names(look_up);
+  return names.of(user, monotonic_now());
 }
 
 std::string program_name(pid_t process) {

@@ -3,9 +3,14 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <cstddef>
 #include <fstream>
 #include <iterator>
+#include <string>
+#include <vector>
 
+#include "api/server/user_names.hpp"
 #include "tests/unit/api/certificates.hpp"
 #include "tests/unit/api/serving.hpp"
 
@@ -68,6 +73,36 @@ TEST(LocalPeer, IsTheUserAndTheProgram) {
   const auto peer = server::local_peer(server::connected_pair().first.get());
   EXPECT_THAT(peer.name, MatchesRegex("unix:[A-Za-z0-9._+-]+"));
   EXPECT_THAT(peer.program, MatchesRegex("[A-Za-z0-9._+-]+"));
+}
+
+TEST(UserNames, AreLookedUpOnceInAWhile) {
+  std::vector<uid_t> looked_up;
+  server::UserNames names([&looked_up](uid_t user) {
+    looked_up.push_back(user);
+    return std::to_string(looked_up.size());
+  });
+  const auto begin = TimePoint{} + std::chrono::hours(1);
+  EXPECT_EQ(names.of(1000, begin), "1");
+  EXPECT_EQ(names.of(1000, begin + server::UserNames::longest - Duration(1)), "1");
+  EXPECT_EQ(names.of(1001, begin), "2");
+  EXPECT_EQ(names.of(1000, begin + server::UserNames::longest), "3");
+  EXPECT_THAT(looked_up, ::testing::ElementsAre(1000, 1001, 1000));
+}
+
+TEST(UserNames, OfTooManyTheOldestIsForgotten) {
+  std::size_t looked_up = 0;
+  server::UserNames names([&looked_up](uid_t user) {
+    ++looked_up;
+    return std::to_string(user);
+  });
+  const auto begin = TimePoint{} + std::chrono::hours(1);
+  for (uid_t user = 0; user <= server::UserNames::most; ++user)
+    (void)names.of(user, begin + std::chrono::microseconds(user));
+  const auto end = begin + std::chrono::seconds(1);
+  EXPECT_EQ(names.of(1, end), "1");
+  EXPECT_EQ(looked_up, server::UserNames::most + 1);
+  EXPECT_EQ(names.of(0, end), "0");
+  EXPECT_EQ(looked_up, server::UserNames::most + 2);
 }
 
 }  // namespace
