@@ -15,6 +15,8 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/store/disk.hpp"
+
 namespace axisd::store {
 namespace {
 
@@ -25,14 +27,6 @@ constexpr std::string_view prefix = "audit-", suffix = ".jsonl";
 constexpr std::size_t longest_line = std::size_t{1} << 20U;
 
 std::string name_of(std::uint64_t first) { return fmt::format("{}{:012}{}", prefix, first, suffix); }
-
-std::unexpected<Error> failed(std::string_view what, const fs::path& path, int error) {
-  return fail({.reason = Reason::storage,
-               .message = fmt::format("cannot {} {}: {}", what, path.string(),
-                                      std::generic_category().message(error)),
-               .remedy = "free space on the disk, and check it and the directory's permissions",
-               .where = {.native_code = static_cast<std::uint32_t>(error)}});
-}
 
 std::optional<std::uint64_t> first_of(std::string_view name) {
   if (!name.starts_with(prefix) || !name.ends_with(suffix)) return std::nullopt;
@@ -51,7 +45,7 @@ Result<std::vector<std::uint64_t>> find_files(const fs::path& directory) {
   if (!fs::exists(directory, error)) return firsts;
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error))
     if (const auto first = first_of(entry->path().filename().string())) firsts.push_back(*first);
-  if (error) return failed("read", directory, error.value());
+  if (error) return disk_failed("read", directory, error.value());
   std::ranges::sort(firsts);
   return firsts;
 }
@@ -104,17 +98,6 @@ std::expected<Lines, int> for_each_line(int file, const std::function<bool(std::
   return lines;
 }
 
-std::expected<void, int> write_all(int file, std::string_view text) {
-  while (!text.empty()) {
-    const auto put = ::write(file, text.data(), text.size());
-    if (put >= 0)
-      text.remove_prefix(static_cast<std::size_t>(put));
-    else if (errno != EINTR)
-      return std::unexpected(errno);
-  }
-  return {};
-}
-
 }  // namespace
 
 AuditFiles::AuditFiles(fs::path directory, AuditBounds bounds)
@@ -123,9 +106,9 @@ AuditFiles::AuditFiles(fs::path directory, AuditBounds bounds)
 Result<void> AuditFiles::open() {
   std::error_code error;
   fs::create_directories(directory_, error);
-  if (error) return failed("create", directory_, error.value());
+  if (error) return disk_failed("create", directory_, error.value());
   folder_ = FileDescriptor(::open(directory_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder_.get() < 0) return failed("open", directory_, errno);
+  if (folder_.get() < 0) return disk_failed("open", directory_, errno);
   auto found = find_files(directory_);
   if (!found) return fail(found.error());
   firsts_ = *std::move(found);
@@ -137,10 +120,10 @@ Result<void> AuditFiles::open() {
 Result<void> AuditFiles::use_newest(std::uint64_t first) {
   const auto path = directory_ / name_of(first);
   auto file = open_regular(path, O_RDWR | O_APPEND);
-  if (file.get() < 0) return failed("open", path, errno);
+  if (file.get() < 0) return disk_failed("open", path, errno);
   const auto lines = for_each_line(file.get(), [](std::string_view) { return true; });
-  if (!lines) return failed("read", path, lines.error());
-  if (ftruncate(file.get(), static_cast<off_t>(lines->bytes)) != 0) return failed("write", path, errno);
+  if (!lines) return disk_failed("read", path, lines.error());
+  if (ftruncate(file.get(), static_cast<off_t>(lines->bytes)) != 0) return disk_failed("write", path, errno);
   file_ = std::move(file);
   size_ = lines->bytes;
   newest_ = first - 1 + lines->whole;
@@ -150,10 +133,10 @@ Result<void> AuditFiles::use_newest(std::uint64_t first) {
 Result<void> AuditFiles::append(std::string_view lines, std::uint64_t count) {
   if (file_.get() < 0 || size_ >= bounds_.file_bytes)
     if (auto begun = begin_file(); !begun) return begun;
-  if (const auto written = write_all(file_.get(), lines); !written) {
+  if (const int error = write_all(file_.get(), lines); error != 0) {
     // Half a line is nobody's record. Should this fail, too, the lines go into another file.
     if (ftruncate(file_.get(), static_cast<off_t>(size_)) != 0) file_ = {};
-    return failed("write", directory_ / name_of(firsts_.back()), written.error());
+    return disk_failed("write", directory_ / name_of(firsts_.back()), error);
   }
   size_ += lines.size();
   newest_ += count;
@@ -169,8 +152,8 @@ Result<void> AuditFiles::begin_file() {
   FileDescriptor file(openat(folder_.get(), name_of(first).c_str(),
                              O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC,
                              S_IRUSR | S_IWUSR | S_IRGRP));
-  if (file.get() < 0) return failed("create", path, errno);
-  if (fsync(folder_.get()) != 0) return failed("write", directory_, errno);
+  if (file.get() < 0) return disk_failed("create", path, errno);
+  if (fsync(folder_.get()) != 0) return disk_failed("write", directory_, errno);
   file_ = std::move(file);
   size_ = 0;
   if (firsts_.empty() || firsts_.back() != first) firsts_.push_back(first);
@@ -187,7 +170,7 @@ void AuditFiles::remove_oldest() {
 
 Result<void> AuditFiles::sync() {
   if (file_.get() < 0 || fdatasync(file_.get()) == 0) return {};
-  return failed("write", directory_ / name_of(firsts_.back()), errno);
+  return disk_failed("write", directory_ / name_of(firsts_.back()), errno);
 }
 
 Result<void> AuditFiles::show_newest(std::uint64_t bytes,
@@ -201,12 +184,12 @@ Result<void> AuditFiles::show_newest(std::uint64_t bytes,
   for (auto first = begin; first != firsts_.end(); ++first) {
     const auto path = directory_ / name_of(*first);
     const auto file = open_regular(path, O_RDONLY);
-    if (file.get() < 0) return failed("open", path, errno);
+    if (file.get() < 0) return disk_failed("open", path, errno);
     const auto shown = for_each_line(file.get(), [&visit](std::string_view line) {
       visit(line);
       return true;
     });
-    if (!shown) return failed("read", path, shown.error());
+    if (!shown) return disk_failed("read", path, shown.error());
   }
   return {};
 }
@@ -226,7 +209,7 @@ Result<AuditSeen> look_at_audit(const fs::path& directory, std::uint64_t after, 
     const auto file = open_regular(path, O_RDONLY);
     if (file.get() < 0) {
       if (errno == ENOENT) continue;  // it was the oldest
-      return failed("open", path, errno);
+      return disk_failed("open", path, errno);
     }
     if (next != found->end() && written_at(file.get()) < since) {
       seen.cursor = *next - 1;
@@ -243,7 +226,7 @@ Result<AuditSeen> look_at_audit(const fs::path& directory, std::uint64_t after, 
       enough = !visit(line) || most == 0;
       return !enough;
     });
-    if (!shown) return failed("read", path, shown.error());
+    if (!shown) return disk_failed("read", path, shown.error());
   }
   return seen;
 }

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <system_error>
 #include <utility>
 
+#include "daemon/store/disk.hpp"
 #include "daemon/store/thread.hpp"
 
 namespace axisd::store {
@@ -22,13 +24,6 @@ constexpr std::size_t head_size = 1024;
 bool plausible(std::string_view name) {
   return name.ends_with(suffix) && name.find('/') == std::string_view::npos && !name.starts_with('.');
 }
-
-std::unexpected<Error> failed(std::string_view what, const fs::path& path, const std::error_code& error) {
-  return fail(Reason::storage, fmt::format("cannot {} {}: {}", what, path.string(), error.message()),
-              "check the disk and the directory's permissions");
-}
-
-std::error_code last_error() { return {errno, std::generic_category()}; }
 
 WallTime written_at(const fs::directory_entry& entry) {
   std::error_code ignored;  // it was removed meanwhile
@@ -93,15 +88,15 @@ void FlightFiles::read(std::string name, std::function<void(Result<std::string>)
 Result<void> FlightFiles::save(const std::string& name, const std::string& text) const {
   std::error_code error;
   fs::create_directories(directory_, error);
-  if (error) return failed("create", directory_, error);
+  if (error) return disk_failed("create", directory_, error.value());
   const auto path = directory_ / name;
   const auto unfinished = directory_ / ("." + name);
   std::ofstream file(unfinished, std::ios::binary | std::ios::trunc);
   file << text;
   file.close();
-  if (!file) return failed("write", unfinished, last_error());
+  if (!file) return disk_failed("write", unfinished, errno);
   fs::rename(unfinished, path, error);
-  if (error) return failed("write", path, error);
+  if (error) return disk_failed("write", path, error.value());
   remove_oldest();
   return {};
 }
@@ -130,7 +125,7 @@ Result<std::vector<FlightRecord>> FlightFiles::found() const {
     describe(head, record);
     if (!gone) records.push_back(std::move(record));
   }
-  if (error) return failed("read", directory_, error);
+  if (error) return disk_failed("read", directory_, error.value());
   std::ranges::sort(records, {},
                     [](const FlightRecord& record) { return std::pair(record.written_at, record.name); });
   return records;
@@ -144,7 +139,7 @@ Result<std::string> FlightFiles::load(const std::string& name) const {
                 "list them: axisctl bus records");
   std::ifstream file(path, std::ios::binary);
   std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  if (!file) return failed("read", path, last_error());
+  if (!file) return disk_failed("read", path, errno);
   return text;
 }
 

@@ -12,6 +12,8 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/store/disk.hpp"
+
 namespace axisd::store {
 namespace {
 
@@ -37,10 +39,11 @@ class FileDisk final : public JournalDisk {
 
   Result<void> append(std::string_view text) override {
     const auto before = lseek(file_.get(), 0, SEEK_END);
-    auto written = write_all(file_.get(), newest, text);
+    const int error = write_all(file_.get(), text);
+    if (error == 0) return {};
     // Half a line would be taken for damage. Should this fail, too, it is.
-    if (!written && before >= 0) (void)!ftruncate(file_.get(), before);
-    return written;
+    if (before >= 0) (void)!ftruncate(file_.get(), before);
+    return failed("write", newest, error);
   }
 
   Result<void> sync() override {
@@ -52,7 +55,7 @@ class FileDisk final : public JournalDisk {
     const int at = directory_.get();
     FileDescriptor file(create_anew(at, unfinished, O_APPEND));
     if (file.get() < 0) return failed("create", unfinished, errno);
-    if (auto written = write_all(file.get(), unfinished, text); !written) return written;
+    if (const int error = write_all(file.get(), text); error != 0) return failed("write", unfinished, error);
     if (fsync(file.get()) != 0) return failed("write", unfinished, errno);
     if (renameat(at, unfinished, at, newest) != 0) return failed("replace", newest, errno);
     if (fsync(at) != 0) return failed("write", ".", errno);
@@ -79,7 +82,7 @@ class FileDisk final : public JournalDisk {
     const auto begin = static_cast<off_t>(offset);
     if (ftruncate(file.get(), begin) != 0 || lseek(file.get(), begin, SEEK_SET) != begin)
       return failed("write", name, errno);
-    if (auto written = write_all(file.get(), name.c_str(), bytes); !written) return written;
+    if (const int error = write_all(file.get(), bytes); error != 0) return failed("write", name, error);
     if (fdatasync(file.get()) != 0) return failed("write", name, errno);
     // Of a new one the name has to be durable, too.
     if (offset == 0 && fsync(at) != 0) return failed("write", ".", errno);
@@ -108,21 +111,7 @@ class FileDisk final : public JournalDisk {
 
  private:
   [[nodiscard]] std::unexpected<Error> failed(std::string_view what, std::string_view name, int error) const {
-    return fail({.reason = Reason::storage,
-                 .message = fmt::format("cannot {} {}: {}", what, (path_ / name).string(),
-                                        std::generic_category().message(error)),
-                 .remedy = "free space on the disk, and check it and the directory's permissions",
-                 .where = {.native_code = static_cast<std::uint32_t>(error)}});
-  }
-  [[nodiscard]] Result<void> write_all(int file, const char* name, std::string_view text) const {
-    while (!text.empty()) {
-      const auto put = ::write(file, text.data(), text.size());
-      if (put >= 0)
-        text.remove_prefix(static_cast<std::size_t>(put));
-      else if (errno != EINTR)
-        return failed("write", name, errno);
-    }
-    return {};
+    return disk_failed(what, path_ / name, error);
   }
 
   std::filesystem::path path_;

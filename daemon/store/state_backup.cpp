@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <optional>
-#include <system_error>
 #include <utility>
 
 #include "buses/file_descriptor.hpp"
+#include "daemon/store/disk.hpp"
 #include "daemon/store/found_file.hpp"
 #include "daemon/store/journal_model.hpp"
 #include "daemon/store/state_directory.hpp"
@@ -22,14 +22,6 @@ constexpr auto newest = "state.v1";
 constexpr auto journal = "journal.v1";
 constexpr std::size_t largest_state = 16U << 20U;
 constexpr std::size_t largest_journal = std::size_t{256} << 20U;
-
-std::unexpected<Error> failed(std::string_view what, const std::filesystem::path& path, int error) {
-  return fail({.reason = Reason::storage,
-               .message = fmt::format("cannot {} {}: {}", what, path.string(),
-                                      std::generic_category().message(error)),
-               .remedy = "check the disk and the directory's permissions",
-               .where = {.native_code = static_cast<std::uint32_t>(error)}});
-}
 
 Result<Generation> decode_backup(std::string_view text) {
   if (newer_format(text))
@@ -63,9 +55,9 @@ void keep_counts(const StoredState& present, StoredState& restored) {
 Result<std::string> back_up_state(const std::filesystem::path& directory) {
   const auto path = directory / newest;
   const FileDescriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder.get() < 0) return failed("open", directory, errno);
+  if (folder.get() < 0) return disk_failed("open", directory, errno);
   auto found = find_file(folder.get(), newest, largest_state);
-  if (found.kind == FoundFile::Kind::unreadable) return failed("read", path, found.error);
+  if (found.kind == FoundFile::Kind::unreadable) return disk_failed("read", path, found.error);
   if (!found.regular())
     return fail(Reason::storage,
                 fmt::format("{} is {}", path.string(), found.what.empty() ? "missing" : found.what),
@@ -92,7 +84,7 @@ Result<Generation> restore_state(const std::filesystem::path& directory, std::st
     keep_counts(present->state, restored->state);
   }
   const FileDescriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder.get() < 0) return failed("open", directory, errno);
+  if (folder.get() < 0) return disk_failed("open", directory, errno);
   const auto found = find_file(folder.get(), journal, largest_journal);
   if (found.regular()) {
     const auto known = load_journal(found.text);
@@ -100,7 +92,7 @@ Result<Generation> restore_state(const std::filesystem::path& directory, std::st
   }
   // First: without it each of the files that are left is convicted.
   if (const int error = move_aside(folder.get(), journal); error != 0)
-    return failed("move aside", directory / journal, error);
+    return disk_failed("move aside", directory / journal, error);
   auto& mark = restored->journal;
   if (mark.pair.empty()) mark.pair = "restored";
   mark.line = std::max<std::uint64_t>(mark.line, 1);  // it had a journal, which is not there

@@ -11,6 +11,8 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/store/disk.hpp"
+
 namespace axisd::store {
 namespace {
 
@@ -25,8 +27,7 @@ std::string text_of(int error) { return std::generic_category().message(error); 
 }  // namespace
 
 std::unexpected<Error> StateDirectory::failed(std::string_view what, std::string_view name, int error) const {
-  return fail(Reason::storage, fmt::format("cannot {} {}: {}", what, (path_ / name).string(), text_of(error)),
-              "check the disk and the directory's permissions");
+  return disk_failed(what, path_ / name, error);
 }
 
 Result<StateDirectory> StateDirectory::open(const std::filesystem::path& path) {
@@ -61,13 +62,7 @@ Result<StateDirectory::Found> StateDirectory::find() const {
 Result<void> StateDirectory::write(const char* name, std::string_view text) const {
   FileDescriptor file(create_anew(directory_.get(), name, 0));
   if (file.get() < 0) return failed("create", name, errno);
-  while (!text.empty()) {
-    const auto put = ::write(file.get(), text.data(), text.size());
-    if (put >= 0)
-      text.remove_prefix(static_cast<std::size_t>(put));
-    else if (errno != EINTR)
-      return failed("write", name, errno);
-  }
+  if (const int error = write_all(file.get(), text); error != 0) return failed("write", name, error);
   if (fsync(file.get()) != 0) return failed("write", name, errno);
   if (const int error = file.close(); error != 0) return failed("write", name, error);
   return {};
