@@ -38,7 +38,7 @@ void tell(const config::Configuration& configuration, const std::vector<BusBudge
   for (const auto& warning : config::file_warnings(configuration)) spdlog::warn("{}", warning);
 }
 
-/// `audit`: null as long as there is none yet; looked at while the core runs.
+/// `audit`: null as long as there is none yet; looked at while the core and the server run, by any thread.
 Result<std::unique_ptr<store::KeptState>> open_state(const config::Configuration& configuration,
                                                      core::CoreLoop& loop,
                                                      const std::unique_ptr<store::AuditLog>& audit) {

@@ -1,9 +1,13 @@
 // buses, info, whoami: the machine as a whole.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
 
 #include "api/axisctl/bus_commands.hpp"
+#include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -34,25 +38,30 @@ void who_am_i(Invocation& invocation) {
                     response.identity(), roles_of(response)));
 }
 
+/// What keeps all axes from moving, and what ends it; empty: nothing does.
+std::string what_holds(const v1::GetInfoResponse& response) {
+  std::vector<std::string> held;
+  if (response.inhibited())
+    held.push_back(fmt::format("all axes stopped{}{}; 'axisctl release-stop --all' ends it",
+                               response.inhibited_by().empty() ? "" : " by ", response.inhibited_by()));
+  if (!response.state_unaccepted().empty())
+    held.push_back(fmt::format("waits until the state is accepted ('axisctl state accept'): {}",
+                               response.state_unaccepted()));
+  if (response.has_storage_error())
+    held.push_back("nothing new is started: " + describe(response.storage_error()));
+  return fmt::format("{}", fmt::join(held, "; "));
+}
+
 void info(Invocation& invocation) {
   const auto response = ask(invocation);
   if (invocation.json) return print_line(json(response));
-  const bool waits = !response.state_unaccepted().empty();
-  std::string held = response.inhibited()
-                         ? fmt::format("all axes stopped{}{}; 'axisctl release-stop --all' ends it",
-                                       response.inhibited_by().empty() ? "" : " by ", response.inhibited_by())
-                         : "permitted";
-  if (waits) {
-    if (!response.inhibited()) held.clear();
-    held += fmt::format("{}waits until the state is accepted ('axisctl state accept'): {}",
-                        held.empty() ? "" : "; ", response.state_unaccepted());
-  }
+  const auto held = what_holds(response);
   print(fmt::format(
       "machine:    {}\naxisd:      {}\naxisctl:    {}\nserver:     {}\ninstance:   {}\nyou:        {}, "
       "{}\nmotion:     {}\n",
       response.machine(), response.version(), AXISD_VERSION, invocation.connection.server,
       response.instance_id(), response.client(), roles_of(response),
-      coloured(held, response.inhibited() || waits ? Colour::yellow : Colour::none, use_colour())));
+      held.empty() ? "permitted" : coloured(held, Colour::yellow, use_colour())));
 }
 
 }  // namespace

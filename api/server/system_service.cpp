@@ -104,6 +104,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1:
   response->set_inhibited(info.inhibited);
   response->set_inhibited_by(info.inhibited_by);
   response->set_state_unaccepted(info.state_unaccepted);
+  if (info.storage_error) server::to_proto(*info.storage_error, *response->mutable_storage_error());
   say_who(services_.callers, *context, *response);
   return answer(context, grpc::Status::OK);
 }

@@ -121,8 +121,8 @@ class MachineCore {
   [[nodiscard]] std::vector<BusStatus> bus_status() const;
   /// Of a bus, since the start.
   [[nodiscard]] StopDelays stop_delays(std::string_view bus) const;
-  /// The command journal cannot be written, and motion is refused for it.
-  [[nodiscard]] bool journal_fails() const { return book_.trouble().has_value(); }
+  /// Why nothing new is started: the command journal or the audit cannot be written. Thread: any.
+  [[nodiscard]] std::optional<Error> storage_error() const { return book_.trouble(); }
   /// What sees the frames of a bus. nullptr if there is none of that name.
   [[nodiscard]] const BusRecorder* find_recorder(std::string_view bus) const;
   [[nodiscard]] FlightRecorder& flight_recorder() { return flight_recorder_; }

@@ -55,6 +55,7 @@ MachineInfo MachineService::info() const {
     info.inhibited_by = *by;
   }
   if (const auto why = machine_->state_gate().unaccepted()) info.state_unaccepted = *why;
+  info.storage_error = machine_->storage_error();
   return info;
 }
 

@@ -21,7 +21,7 @@ void Meter::read() {
   for (auto& status : machine_->bus_status()) reading->buses.push_back(read_bus(std::move(status)));
   reading->tallies = machine_->events().tallies();
   reading->longest_handler = std::ranges::max(handlers_);
-  reading->journal_fails = machine_->journal_fails();
+  reading->journal_fails = machine_->storage_error().has_value();
   latest_.store(std::move(reading));
 }
 

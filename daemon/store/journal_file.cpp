@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <boost/smart_ptr/make_shared.hpp>
 #include <chrono>
 #include <fstream>
 #include <random>
@@ -104,8 +105,8 @@ JournalFile::~JournalFile() {
 }
 
 std::optional<Error> JournalFile::trouble() const {
-  if (*trouble_ || !options_.other_trouble) return *trouble_;
-  return options_.other_trouble();
+  if (const auto own = trouble_->load()) return *own;
+  return options_.other_trouble ? options_.other_trouble() : std::nullopt;
 }
 
 void JournalFile::accepted(const Command& command, std::string digest) {
@@ -268,7 +269,8 @@ Result<void> JournalFile::rewrite() {
 }
 
 void JournalFile::tell(const std::optional<Error>& trouble) {
-  post(core_, [state = trouble_, trouble] { *state = trouble; });
+  const auto told = trouble ? boost::make_shared<const Error>(*trouble) : nullptr;
+  post(core_, [state = trouble_, told] { state->store(told); });
 }
 
 }  // namespace axisd::store

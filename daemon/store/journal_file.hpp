@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <boost/smart_ptr/atomic_shared_ptr.hpp>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -39,6 +40,7 @@ struct JournalOptions {
   /// What need not be durable at once shares a sync with all that comes in this time.
   Duration sync_within = std::chrono::milliseconds(250);
   /// Why nothing new may be started although the journal can be written; empty: nothing else keeps it.
+  /// Called by any thread.
   std::function<std::optional<Error>()> other_trouble{};
 };
 
@@ -101,8 +103,9 @@ class JournalFile final : public CommandJournal, public StateWitness {
   Executor core_;
   const JournalOptions options_;
   JournalContent loaded_;
-  /// Of the core, which alone reads and writes it; outlives this with the handlers that were posted.
-  std::shared_ptr<std::optional<Error>> trouble_ = std::make_shared<std::optional<Error>>();
+  /// Written by the core, in its turn with the callbacks; outlives this with the handlers that were posted.
+  std::shared_ptr<boost::atomic_shared_ptr<const Error>> trouble_ =
+      std::make_shared<boost::atomic_shared_ptr<const Error>>();
 
   // Of the writing thread, once it runs.
   std::unique_ptr<JournalDisk> disk_;

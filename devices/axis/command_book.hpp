@@ -55,7 +55,7 @@ class CommandBook {
   /// The command's start is about to be sent: not before `done` came without an error (`storage`).
   void sending(const CommandPtr& command, SendingNote note, CommandJournal::Callback done);
 
-  /// Why nothing new can be started at present: the journal cannot be written.
+  /// Why nothing new can be started at present: the journal cannot be written. Thread: any.
   [[nodiscard]] std::optional<Error> trouble() const;
 
   /// Commands that an earlier run of the daemon had not ended: some have ended since. Once: it is handed

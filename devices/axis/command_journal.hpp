@@ -71,7 +71,7 @@ class CommandJournal {
 
   /// What was kept when the daemon started. Once: it is handed over.
   [[nodiscard]] virtual JournalContent take_loaded() = 0;
-  /// Why nothing can be written at present; nothing: all is well.
+  /// Why nothing can be written at present; nothing: all is well. Thread: any.
   [[nodiscard]] virtual std::optional<Error> trouble() const = 0;
 
   virtual void accepted(const Command& command, std::string digest) = 0;

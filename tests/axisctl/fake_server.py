@@ -359,6 +359,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         return system_pb.GetInfoResponse(machine="press-1", version="0.1.0", instance_id=self.instance_id,
                                          inhibited=self.inhibited, inhibited_by="test" if self.inhibited else "",
                                          state_unaccepted="; ".join(each.text for each in self.convictions),
+                                         storage_error=self.storage_error,
                                          client=f"{claim.get('axisd-user', 'anna')} via web", identity="unix:anna",
                                          role=f"ROLE_{claim.get('axisd-role', 'operator').upper()}",
                                          axis_roles=[{"axis": "feeder", "role": "ROLE_VIEWER"}])

@@ -13,6 +13,7 @@ class FakeState:
         self.kept_files = [pb.KeptFileState(name="state.v1", generation=12, expected=40),
                            pb.KeptFileState(name="journal.v1", generation=120)]
         self.latch_trouble = None  # that StopAll answers with
+        self.storage_error = None  # that GetInfo answers with
 
     def convict(self):
         conviction = types_pb2.StateConviction(file="state.v1", fault=types_pb2.STATE_FAULT_ROLLED_BACK, found=12,

@@ -68,11 +68,22 @@ class Axisctl(AxisctlTest):
         self.assertEqual(json.loads(done.stdout)["not_durable"]["reason"], "REASON_STORAGE")
 
 
+    def test_motion_is_not_permitted_while_the_disk_is_full(self):
+        self.server.machine.storage_error = FULL
+        full = "nothing new is started: the latch would not outlive a restart; free space on the disk"
+        self.assertIn(f"motion:     {full}\n", self.ok("info"))
+        self.server.machine.convict()
+        self.assertIn(f": {TEXT}; {full}\n", self.ok("info"))
+
+
 class Python(PythonTest):
     async def test_what_is_wrong_until_it_is_accepted(self):
         self.assertTrue((await self.machine.state()).accepted)
         self.assertEqual(await self.machine.accept_state(), [])
-        self.assertEqual((await self.machine.info()).state_unaccepted, "")
+        info = await self.machine.info()
+        self.assertEqual((info.state_unaccepted, info.storage_error), ("", None))
+        self.fake.storage_error = FULL
+        self.assertEqual((await self.machine.info()).storage_error.remedy, "free space on the disk")
         self.fake.convict()
         state = await self.machine.state()
         self.assertFalse(state.accepted)

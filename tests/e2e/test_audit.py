@@ -180,8 +180,10 @@ class FullDisk(AuditScenario):
                 return failure
             return None
         self.assertEqual(wait_for(refused, "motion is refused").reason, "REASON_STORAGE")
+        self.assertIn("nothing new is started: cannot write ", machine.axisctl("info").stdout)
         machine.client.to_done("Halt", "feeder")
         self.limit(machine, resource.RLIM_INFINITY)
+        wait_for(lambda: "motion:     permitted" in machine.axisctl("info").stdout, "motion is permitted again")
         records = self.wait_audit(machine, lambda found: any(r.rpc == "AxisService.Halt" and r.command.state.ended
                                                              for r in found), "the halt is told")
         self.assertEqual(len([r for r in records if r.command and r.command.id == stop.id]), 2)

@@ -323,12 +323,14 @@ class Info:
     role: Role = Role.UNSPECIFIED
     """What the client may do on the machine, and on each axis that is not in `axis_roles`."""
     axis_roles: dict[str, Role] = dataclasses.field(default_factory=dict)
+    storage_error: ErrorDetail | None = None
+    """Why nothing new is started: the daemon cannot write to its disk. Stops are executed."""
 
     @classmethod
     def of(cls, raw: system_service_pb2.GetInfoResponse) -> Info:
         return cls(raw.machine, raw.version, raw.instance_id, raw.inhibited, raw.inhibited_by,
                    raw.state_unaccepted, raw.client, raw.identity, _role(raw.role),
-                   {each.axis: _role(each.role) for each in raw.axis_roles})
+                   {each.axis: _role(each.role) for each in raw.axis_roles}, _optional_error(raw, "storage_error"))
 
 
 @dataclasses.dataclass(frozen=True)

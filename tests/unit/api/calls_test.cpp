@@ -225,6 +225,7 @@ TEST_F(Calls, SystemAndBuses) {
   EXPECT_TRUE(system->GetInfo(&c1, {}, &info).ok());
   EXPECT_EQ(info.machine() + info.version() + info.instance_id() + info.inhibited_by(), "press-10.1i-1hmi");
   EXPECT_TRUE(info.inhibited());
+  EXPECT_FALSE(info.has_storage_error());
   v1::StopAllRequest all;
   all.set_wait_until(v1::WAIT_UNTIL_DONE);
   v1::StopAllResponse stopped;
@@ -269,6 +270,7 @@ TEST_F(Calls, StateIsToldAndAccepted) {
                                             .since = WallTime(std::chrono::seconds(7))}},
                            .start_count = 65'544};
   machine_.latch_trouble = Error{.reason = Reason::storage, .message = "full", .remedy = "free space"};
+  machine_.storage_error = machine_.latch_trouble;
   serve();
   const auto system = v1::SystemService::NewStub(channel_);
   grpc::ClientContext c1, c2, c3, c4;
@@ -289,6 +291,7 @@ TEST_F(Calls, StateIsToldAndAccepted) {
   v1::GetInfoResponse info;
   EXPECT_TRUE(system->GetInfo(&c3, {}, &info).ok());
   EXPECT_EQ(info.state_unaccepted(), state.convictions(0).text());
+  EXPECT_EQ(info.storage_error().message(), "full");
   v1::StopAllResponse stopped;
   EXPECT_TRUE(system->StopAll(&c4, {}, &stopped).ok());
   EXPECT_EQ(stopped.not_durable().reason(), v1::REASON_STORAGE);

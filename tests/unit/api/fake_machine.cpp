@@ -127,7 +127,8 @@ MachineInfo FakeMachine::info() const {
           .instance_id = "i-1",
           .inhibited = true,
           .inhibited_by = "hmi",
-          .state_unaccepted = state_report.convictions.empty() ? "" : to_string(state_report.convictions)};
+          .state_unaccepted = state_report.convictions.empty() ? "" : to_string(state_report.convictions),
+          .storage_error = storage_error};
 }
 
 Result<Command> FakeMachine::result_of(std::string axis, CommandKind kind) {

@@ -43,6 +43,7 @@ class FakeMachine final : public Machine {
   void let_stops_wait(const std::string& client, std::size_t axes);
   std::optional<Error> latch_trouble{};  ///< that StopAll answers with; set before it is called
   KeptStateReport state_report{};        ///< likewise
+  std::optional<Error> storage_error{};  ///< likewise
 
   FakeDrives& drives() { return drives_; }
   FakeBuses& nodes() { return buses_; }
