@@ -37,6 +37,7 @@ struct AuditedCall {
   std::string rpc;  ///< "DriveService.WriteParameters"
   std::string client;
   std::string axis{};  ///< empty: it concerns a bus
+  std::string bus{};   ///< empty: it concerns an axis
   std::uint64_t lease_token = 0;
   std::string text{};  ///< what it asks for, or what came of it, for people
   std::vector<AuditedParameter> parameters{};
@@ -48,7 +49,8 @@ struct AuditedCall {
 struct DeniedCall {
   std::string rpc;  ///< "AxisService.Enable"
   std::string client;
-  std::string axis{};  ///< that it names; empty: none, or several
+  std::string axis{};          ///< that it names; empty: none, or several
+  std::string group{}, bus{};  ///< likewise; empty: none
   Error error;
   std::uint64_t left_out = 0;  ///< as of RefusedCommand
   CallOriginPtr origin{};
@@ -57,6 +59,7 @@ struct DeniedCall {
 /// A command that was not accepted.
 struct RefusedCommand {
   Command command;             ///< without an id; its cause says why
+  std::string group{};         ///< that was to move; empty: it is of an axis
   std::uint64_t left_out = 0;  ///< of its identity before it that are not told: there were too many
 };
 

@@ -96,6 +96,13 @@ std::string content_text(const v1::AuditRecord& record) {
   return "a record that this axisctl does not know";
 }
 
+/// What it concerns: an axis, a group, a bus, or the machine.
+std::string target_of(const v1::AuditRecord& record) {
+  if (!record.axis().empty() && record.group().empty()) return record.axis();
+  if (!record.group().empty()) return "group " + record.group();
+  return record.bus().empty() ? "-" : "bus " + record.bus();
+}
+
 std::string kind_name(v1::AuditKind kind) {
   auto name = lower_word(v1::AuditKind_Name(kind), "AUDIT_KIND_");
   std::ranges::replace(name, ' ', '-');
@@ -106,9 +113,8 @@ std::string kind_name(v1::AuditKind kind) {
 
 std::string audit_line(const v1::AuditRecord& record) {
   const auto at = TimeUtil::MillisecondsToTimestamp(TimeUtil::TimestampToMilliseconds(record.at()));
-  const auto shown = [](const std::string& text) { return text.empty() ? std::string("-") : text; };
-  return fmt::format("{}  {}  {}  {}  {}", TimeUtil::ToString(at), record.number(), shown(record.axis()),
-                     shown(record.client()), content_text(record));
+  return fmt::format("{}  {}  {}  {}  {}", TimeUtil::ToString(at), record.number(), target_of(record),
+                     record.client().empty() ? "-" : record.client(), content_text(record));
 }
 
 std::vector<std::string> audit_kinds() {

@@ -116,7 +116,8 @@ void add_audit(CLI::App& app, Invocation& invocation) {
       "Who asked for what and what became of it: commands, refusals, changes of parameters, faults, "
       "leases, held stops, StopAll, configurations, over restarts of the daemon");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("AXIS", arguments->axes, "Names of axes; none: all, and what concerns the machine");
+  command->add_option("AXIS", arguments->axes,
+                      "Names of axes and groups; none: all, and what concerns a bus or the machine");
   command
       ->add_option(
           "--kind", arguments->kinds,

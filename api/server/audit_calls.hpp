@@ -1,4 +1,4 @@
-// Calls that change something and are no commands, as the audit is told of them.
+// How the audit is told of calls: of those that change something and are no commands, twice.
 #pragma once
 
 #include <functional>
@@ -10,10 +10,10 @@
 namespace axisd::server {
 
 /// `sink` may be null.
-inline void record(const Machine& machine, AuditSink* sink, const AuditedCall& call) {
+inline void record(const Machine& machine, AuditSink* sink, AuditContent content) {
   if (sink == nullptr) return;
   const auto now = machine.now();
-  sink->add({.at = machine.wall(now), .uptime = now.time_since_epoch(), .content = call});
+  sink->add({.at = machine.wall(now), .uptime = now.time_since_epoch(), .content = std::move(content)});
 }
 
 /// Tells the audit of `call` now, before anything is sent for it, and again when it has ended; then calls

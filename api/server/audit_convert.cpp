@@ -90,6 +90,7 @@ struct Fill {
   void operator()(const RefusedCommand& refused) const {
     to.set_kind(v1::AUDIT_KIND_REFUSAL);
     fill_head(refused.command, to);
+    to.set_group(refused.group);
     to_proto(refused.command, *to.mutable_refused()->mutable_command());
     to.mutable_refused()->set_left_out(refused.left_out);
   }
@@ -97,6 +98,8 @@ struct Fill {
     to.set_kind(v1::AUDIT_KIND_REFUSAL);
     to.set_client(denied.client);
     to.set_axis(denied.axis);
+    to.set_group(denied.group);
+    to.set_bus(denied.bus);
     to.set_rpc(denied.rpc);
     fill_origin(denied.origin, to);
     to_proto(denied.error, *to.mutable_denied()->mutable_error());
@@ -112,6 +115,7 @@ struct Fill {
     to.set_kind(v1::AUDIT_KIND_CALL);
     to.set_client(call.client);
     to.set_axis(call.axis);
+    to.set_bus(call.bus);
     to.set_rpc(call.rpc);
     to.set_lease_token(call.lease_token);
     fill_origin(call.origin, to);
@@ -185,7 +189,8 @@ bool AuditFilter::passes(const v1::AuditRecord& record) const {
   const auto among = [](const auto& wanted, const auto& value) {
     return wanted.empty() || std::find(wanted.begin(), wanted.end(), value) != wanted.end();
   };
-  return among(request_.axes(), record.axis()) && among(request_.clients(), record.client()) &&
+  const bool of_group = !record.group().empty() && among(request_.axes(), record.group());
+  return (of_group || among(request_.axes(), record.axis())) && among(request_.clients(), record.client()) &&
          among(request_.kinds(), static_cast<int>(record.kind())) &&
          (!request_.has_since() || record.at() >= request_.since());
 }

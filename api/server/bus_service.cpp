@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -24,6 +27,17 @@ namespace axisd::server {
 using Call = std::shared_ptr<PendingCall>;
 using Words = std::vector<std::uint16_t>;
 using Bytes = std::vector<std::uint8_t>;
+
+namespace {
+
+/// Empty: there is no such device.
+std::string bus_of(std::string_view device, const BusAccess& buses) {
+  const auto devices = buses.devices();
+  const auto found = std::ranges::find(devices, device, [](const auto& each) { return each->name; });
+  return found == devices.end() ? std::string() : (*found)->bus;
+}
+
+}  // namespace
 
 BusServiceImpl::BusServiceImpl(const Services& services) : BoundedService(services), services_(services) {
   begin_within_bounds(&BusServiceImpl::ListBuses, &BusServiceImpl::GetBudget, &BusServiceImpl::ListDevices,
@@ -88,12 +102,14 @@ BusServiceImpl::Reactor* BusServiceImpl::WriteDevice(Context* context, const v1:
     auto reply = reply_with_value<double>(
         call, [response](double written) { response->set_value(written); },
         fmt::format("{}: {}", client, text));
-    buses.write_device(
-        request->device(), request->register_(), request->value(),
-        audited<double>(
-            services_,
-            {.rpc = "BusService.WriteDevice", .client = client, .text = text, .origin = caller.origin},
-            std::move(reply)));
+    buses.write_device(request->device(), request->register_(), request->value(),
+                       audited<double>(services_,
+                                       {.rpc = "BusService.WriteDevice",
+                                        .client = client,
+                                        .bus = bus_of(request->device(), buses),
+                                        .text = text,
+                                        .origin = caller.origin},
+                                       std::move(reply)));
   });
 }
 
@@ -117,12 +133,13 @@ BusServiceImpl::Reactor* BusServiceImpl::transact_object(Context* context, const
         fmt::format("writes {:02x} to object {:06X}h of {} node {}", fmt::join(transfer->bytes, " "),
                     transfer->object, transfer->bus, transfer->node);
     auto reply = reply_with_value<Bytes>(call, std::move(fill), fmt::format("{}: {}", client, text));
-    buses.transact_object(
-        *std::move(transfer),
-        audited<Bytes>(
-            services_,
-            {.rpc = "BusService.Transact", .client = client, .text = text, .origin = caller.origin},
-            std::move(reply)));
+    buses.transact_object(*std::move(transfer), audited<Bytes>(services_,
+                                                               {.rpc = "BusService.Transact",
+                                                                .client = client,
+                                                                .bus = request->bus(),
+                                                                .text = text,
+                                                                .origin = caller.origin},
+                                                               std::move(reply)));
   });
 }
 
@@ -146,12 +163,13 @@ BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::Tr
     const auto text = fmt::format("writes {} to registers from {} of {} node {}", fmt::join(values, " "),
                                   transaction->address, transaction->bus, transaction->node);
     auto reply = reply_with_value<Words>(call, std::move(fill), fmt::format("{}: {}", client, text));
-    buses.transact(
-        *std::move(transaction),
-        audited<Words>(
-            services_,
-            {.rpc = "BusService.Transact", .client = client, .text = text, .origin = caller.origin},
-            std::move(reply)));
+    buses.transact(*std::move(transaction), audited<Words>(services_,
+                                                           {.rpc = "BusService.Transact",
+                                                            .client = client,
+                                                            .bus = request->bus(),
+                                                            .text = text,
+                                                            .origin = caller.origin},
+                                                           std::move(reply)));
   });
 }
 

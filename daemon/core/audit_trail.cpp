@@ -68,7 +68,7 @@ bool AuditTrail::is_within_ration(const Event& event) {
 }
 
 void AuditTrail::refused(const std::string& axis, const Action& action, const CommandOptions& options,
-                         Error cause) {
+                         Error cause, std::string group) {
   if (!kept()) return;
   const auto left_out = refusals_.take(options.client, clock_->now());
   if (!left_out) return;
@@ -84,6 +84,7 @@ void AuditTrail::refused(const std::string& axis, const Action& action, const Co
                                  .cause = std::move(cause),
                                  .accepted_at = clock_->wall(arrived),
                                  .origin = options.origin},
+                     .group = std::move(group),
                      .left_out = *left_out});
 }
 

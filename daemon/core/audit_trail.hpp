@@ -19,7 +19,9 @@ class AuditTrail {
   /// Commands, faults, and what somebody did to leases, holds, StopAll, the configuration and the state. Of
   /// stops, which are refused to nobody, each identity has a ration.
   void event(const Event& event);
-  void refused(const std::string& axis, const Action& action, const CommandOptions& options, Error cause);
+  /// `group`: that it names; empty: none.
+  void refused(const std::string& axis, const Action& action, const CommandOptions& options, Error cause,
+               std::string group = {});
   void call(AuditedCall call);
 
  private:

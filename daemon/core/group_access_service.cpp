@@ -36,9 +36,10 @@ void GroupAccessService::move(GroupMoveRequest request, CommandOptions options, 
     if (closing_)
       return callback(fail(Reason::cancelled, "the daemon is shutting down", "repeat it when it is back"));
     const auto first = request.targets.empty() ? std::string() : request.targets.front().axis;
+    const auto group = request.group;
     const auto run = machine_->groups().move(std::move(request), options);
     if (!run) {
-      machine_->audit().refused(first, GroupMemberRequest{}, options, run.error());
+      machine_->audit().refused(first, GroupMemberRequest{}, options, run.error(), group);
       return callback(fail(run.error()));
     }
     (*run)->observe([executor = loop_->executor(), until, callback](const GroupRun& now) {

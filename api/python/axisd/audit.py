@@ -13,7 +13,8 @@ class AuditRecord:
     """`kind`: "command", "refusal", "call", "fault", "lease", "stop_hold", "inhibit", "configuration", "state", "daemon" or
     "gap". `command`: of a command that was accepted, has ended or was refused (then without an id). `recovered`: the
     command journal told of it after the daemon was killed. `error`: why it was refused, or failed. `peer`, `role`: where the
-    client called from, and what it might do there; empty: not known. The rest is in `raw`."""
+    client called from, and what it might do there; empty: not known. `axis`, `group`, `bus`: what it concerns; all empty: the
+    machine. The rest is in `raw`."""
     number: int
     at: datetime.datetime | None
     kind: str
@@ -21,6 +22,8 @@ class AuditRecord:
     peer: str
     role: str
     axis: str
+    group: str
+    bus: str
     rpc: str
     request_id: str
     command: Command | None
@@ -46,4 +49,5 @@ class AuditRecord:
             error = _optional_error(raw.event.axis_fault, "cause")
         return cls(raw.number, _optional_time(raw, "at"),
                    known.name.removeprefix("AUDIT_KIND_").lower() if known else str(raw.kind), raw.client, raw.peer,
-                   raw.role, raw.axis, raw.rpc, raw.request_id, command, content == "recovered", error, raw)
+                   raw.role, raw.axis, raw.group, raw.bus, raw.rpc, raw.request_id, command, content == "recovered", error,
+                   raw)

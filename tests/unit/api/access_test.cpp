@@ -14,11 +14,11 @@
 #include "api/server/lane/stop_lane.hpp"
 #include "axisd/v1/access.pb.h"
 #include "axisd/v1/audit_service.pb.h"
-#include "axisd/v1/bus_service.pb.h"
+#include "axisd/v1/bus_service.grpc.pb.h"
 #include "axisd/v1/command_service.pb.h"
 #include "axisd/v1/drive_service.pb.h"
 #include "axisd/v1/event_service.pb.h"
-#include "axisd/v1/group_service.pb.h"
+#include "axisd/v1/group_service.grpc.pb.h"
 #include "axisd/v1/lease_service.pb.h"
 #include "axisd/v1/stop_service.grpc.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
@@ -352,6 +352,25 @@ TEST_F(AccessCalls, WhatIsDeniedIsToldWithWhoAndFromWhere) {
   EXPECT_EQ(denied[1].client, "shift-a via " + own_name());
   for (int i = 0; i < 100; ++i) (void)enable({{"axisd-user", "p" + std::to_string(i)}});
   EXPECT_EQ(told_.denied().size(), AuditRation::refusals) << "of one identity in a minute";
+}
+
+TEST_F(AccessCalls, WhatIsDeniedNamesItsGroupOrBus) {
+  serve_with({.roles = {{own_name(), Role::viewer}}});
+  Call c1, c2;
+  v1::MoveGroupRequest move;
+  move.set_group("portal");
+  v1::MoveGroupResponse moved;
+  EXPECT_FALSE(v1::GroupService::NewStub(channel_)->MoveGroup(&c1, move, &moved).ok());
+  v1::TransactRequest write;
+  write.set_bus("line-a");
+  write.mutable_write()->add_values(5);
+  v1::TransactResponse written;
+  EXPECT_FALSE(v1::BusService::NewStub(channel_)->Transact(&c2, write, &written).ok());
+  const auto denied = told_.denied();
+  ASSERT_EQ(denied.size(), 2U);
+  EXPECT_EQ(denied[0].group, "portal");
+  EXPECT_EQ(denied[0].axis, "");
+  EXPECT_EQ(denied[1].bus, "line-a");
 }
 
 TEST_F(AccessCalls, WhatIsAcceptedSaysWithWhichRole) {

@@ -114,6 +114,21 @@ TEST(AuditLines, WhereItWasAskedForAndWithWhichRole) {
   EXPECT_EQ(record->role(), "operator");
 }
 
+TEST(AuditLines, WhichGroupAndWhichBusItConcerns) {
+  const auto refused =
+      server::audit_record(line_of({.content = RefusedCommand{.command = command(), .group = "portal"}}));
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->group(), "portal");
+  v1::ListAuditRequest request;
+  request.add_axes("portal");
+  EXPECT_TRUE(server::AuditFilter(request).passes(*refused));
+  const auto called = server::audit_record(
+      line_of({.content = AuditedCall{.rpc = "BusService.Transact", .client = "hmi-1", .bus = "line-a"}}));
+  ASSERT_TRUE(called);
+  EXPECT_EQ(called->bus(), "line-a");
+  EXPECT_FALSE(server::AuditFilter(request).passes(*called));
+}
+
 TEST(AuditLines, ACallThatItsClientMayNotMake) {
   const auto line = line_of({.content = DeniedCall{.rpc = "AxisService.Enable",
                                                    .client = "anna via web",
@@ -243,6 +258,7 @@ TEST_F(AuditCalls, AWrittenRegisterIsToldBeforeAndBehind) {
   EXPECT_EQ(told.records(0).call().phase(), v1::AUDITED_CALL_PHASE_ASKED);
   EXPECT_EQ(told.records(1).call().phase(), v1::AUDITED_CALL_PHASE_DONE);
   EXPECT_EQ(told.records(1).client(), own_name());
+  EXPECT_EQ(told.records(1).bus(), "line-a");
   EXPECT_THAT(told.records(1).peer(), StartsWith("unix:"));
   EXPECT_EQ(told.records(1).role(), "") << "there are no roles";
   EXPECT_EQ(told.records(1).rpc(), "BusService.Transact");

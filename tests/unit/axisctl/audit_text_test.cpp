@@ -62,6 +62,20 @@ TEST(AuditText, AParameterWithWhatItWas) {
   EXPECT_EQ(audit_line(written), lead + "done: writes 2 parameters: filter 8 -> 12, 0x0110 = -5");
 }
 
+TEST(AuditText, WhatItConcerns) {
+  auto refused = record();
+  refused.mutable_refused()->mutable_command()->set_axis("feeder");
+  refused.set_group("portal");
+  EXPECT_THAT(audit_line(refused), HasSubstr("  12  group portal  hmi-1  refused: "));
+  auto written = record();
+  written.clear_axis();
+  written.set_bus("line-a");
+  written.mutable_call()->set_text("writes 1 to registers from 3 of line-a node 7");
+  EXPECT_THAT(audit_line(written), HasSubstr("  12  bus line-a  hmi-1  "));
+  written.clear_bus();
+  EXPECT_THAT(audit_line(written), HasSubstr("  12  -  hmi-1  "));
+}
+
 TEST(AuditText, TheDaemonAndWhatIsMissing) {
   auto run = record();
   run.clear_axis();
