@@ -1,13 +1,10 @@
 // list, state, watch: what the axes do; and what the daemon keeps of them.
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,6 +18,7 @@
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/state_view.hpp"
 #include "api/axisctl/terminal.hpp"
+#include "api/axisctl/whole_file.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
 
@@ -92,23 +90,13 @@ void accept_state(Invocation& invocation) {
                  : "every axis needs a new command to move; home where positions count");
 }
 
-/// Whole or not at all, and for nobody else to read: it names clients.
-void write_backup(const std::string& path, const std::string& text) {
-  const auto unfinished = path + ".new";
-  const int file = ::open(unfinished.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  const bool written = file >= 0 &&
-                       ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       ::fsync(file) == 0;
-  const bool closed = file >= 0 && ::close(file) == 0;
-  if (!written || !closed || ::rename(unfinished.c_str(), path.c_str()) != 0)
-    throw Failure(ExitCode::usage,
-                  fmt::format("{}: cannot be written: {}", path, std::generic_category().message(errno)));
-}
-
 void back_up_state(Invocation& invocation, const std::string& path) {
   const auto response = invocation.client().call(&v1::SystemService::Stub::BackUpState,
                                                  v1::BackUpStateRequest(), std::string_view());
-  write_backup(path, response.state());
+  // For nobody else to read: it names clients.
+  if (const int error = write_whole_file(path, response.state(), S_IRUSR | S_IWUSR); error != 0)
+    throw Failure(ExitCode::usage,
+                  fmt::format("{}: cannot be written: {}", path, std::generic_category().message(error)));
   if (invocation.json) return print_line(json(response));
   print_line(fmt::format(
       "{}: generation {}; to restore it: stop axisd, 'axisd --restore-state {}' as its user, start it", path,

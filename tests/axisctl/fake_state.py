@@ -33,6 +33,12 @@ class FakeState:
         self.note("GetState", request, context)
         return pb.GetStateResponse(files=self.kept_files, convictions=self.convictions, start_count=65544)
 
+    async def BackUpState(self, request, context):
+        self.note("BackUpState", request, context)
+        if self.storage_error:
+            await refuse(context, grpc.StatusCode.UNAVAILABLE, self.storage_error)
+        return pb.BackUpStateResponse(state="axisd-state 2\n", generation=12)
+
     async def AcceptState(self, request, context):
         self.note("AcceptState", request, context)
         accepted, self.convictions = self.convictions, []

@@ -1,5 +1,8 @@
 """What the daemon remembers, and its acceptance: axisctl state and Machine.state() against the fake daemon."""
 import json
+import os
+import pathlib
+import tempfile
 import unittest
 
 from fake_state import TEXT
@@ -67,6 +70,17 @@ class Axisctl(AxisctlTest):
         done = self.run_axisctl("--json", "stop", "--all")
         self.assertEqual(json.loads(done.stdout)["not_durable"]["reason"], "REASON_STORAGE")
 
+
+    def test_a_backup_that_fails_leaves_the_one_before_and_nothing_else(self):
+        with tempfile.TemporaryDirectory() as directory:
+            path = pathlib.Path(directory) / "backup"
+            self.assertIn("generation 12", self.ok("state", "backup", str(path)))
+            self.server.machine.storage_error = FULL
+            self.assertIn("free space", self.fails(4, "state", "backup", str(path)))
+            self.server.machine.storage_error = None
+            self.assertIn("cannot be written: Is a directory", self.fails(2, "state", "backup", directory))
+            self.assertEqual((path.read_text(), os.listdir(directory)), ("axisd-state 2\n", ["backup"]))
+            self.assertEqual(list(path.parent.parent.glob(f"{path.parent.name}.*")), [])
 
     def test_motion_is_not_permitted_while_the_disk_is_full(self):
         self.server.machine.storage_error = FULL

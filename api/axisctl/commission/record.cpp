@@ -8,12 +8,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <filesystem>
 #include <system_error>
 
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/whole_file.hpp"
 
 namespace axisd::axisctl::commission {
 namespace {
@@ -53,20 +53,9 @@ std::string steps_with(const Record& record, Verdict verdict) {
   return text;
 }
 
-Failure cannot_write(const std::string& path) {
+Failure cannot_write(const std::string& path, int error) {
   return {ExitCode::usage,
-          fmt::format("--record: cannot write '{}': {}", path, std::generic_category().message(errno))};
-}
-
-/// All of it, and on the disk.
-bool write_all(int file, std::string_view text) {
-  while (!text.empty()) {
-    const auto written = ::write(file, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return ::fsync(file) == 0;
+          fmt::format("--record: cannot write '{}': {}", path, std::generic_category().message(error))};
 }
 
 }  // namespace
@@ -137,19 +126,13 @@ std::string record_text(const Record& record, bool one_line) {
 RecordFile::RecordFile(std::string path) : path_(std::move(path)) {
   // A record is evidence: an earlier one is not replaced. Made at once, because afterwards it is too late.
   const int file = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-  if (file < 0) throw cannot_write(path_);
+  if (file < 0) throw cannot_write(path_, errno);
   ::close(file);
 }
 
 void RecordFile::write(const Record& record) const {
-  const auto beside = path_ + ".part";
-  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) throw cannot_write(beside);
-  const bool whole = write_all(file, record_text(record, false));
-  const int why = errno;
-  ::close(file);
-  errno = why;
-  if (!whole || std::rename(beside.c_str(), path_.c_str()) != 0) throw cannot_write(path_);
+  if (const int error = write_whole_file(path_, record_text(record, false), 0644); error != 0)
+    throw cannot_write(path_, error);
 }
 
 }  // namespace axisd::axisctl::commission
