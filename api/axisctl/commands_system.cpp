@@ -36,6 +36,14 @@ void who_am_i(Invocation& invocation) {
   if (invocation.json) return print_line(json(response));
   print(fmt::format("client:     {}\nidentity:   {}\nrole:       {}\n", response.client(),
                     response.identity(), roles_of(response)));
+  const auto& spoken_for = invocation.connection.speaks_for;
+  // Of whom a delegate speaks for the client is "anna via web".
+  if (!spoken_for.empty() && response.client() == response.identity())
+    print_line(
+        coloured(fmt::format("--as {} is not heeded: {} may not speak for others, or what it says is not "
+                             "usable; access: delegates of the configuration says who may",
+                             spoken_for, response.identity()),
+                 Colour::yellow, use_colour()));
 }
 
 /// What keeps all axes from moving, and what ends it; empty: nothing does.

@@ -37,6 +37,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         FakeLeases.__init__(self)
         FakeState.__init__(self)
         self.inhibited = False
+        self.heeds_delegates = True
         self.instance_id = "fake"
         self.calls = []
         self.losing = {}
@@ -360,7 +361,8 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
                                          inhibited=self.inhibited, inhibited_by="test" if self.inhibited else "",
                                          state_unaccepted="; ".join(each.text for each in self.convictions),
                                          storage_error=self.storage_error,
-                                         client=f"{claim.get('axisd-user', 'anna')} via web", identity="unix:anna",
+                                         client=f"{claim.get('axisd-user', 'anna')} via web" if self.heeds_delegates
+                                         else "unix:anna", identity="unix:anna",
                                          role=f"ROLE_{claim.get('axisd-role', 'operator').upper()}",
                                          axis_roles=[{"axis": "feeder", "role": "ROLE_VIEWER"}])
 

@@ -113,6 +113,9 @@ class Reading(AxisctlTest):
         self.assertIn("client:     bert via web\n", self.ok("--as", "bert", "whoami"))
         self.assertEqual(self.ok("--as", "bert:maintainer", "whoami").splitlines()[::2],
                          ["client:     bert via web", "role:       maintainer; viewer on feeder"])
+        self.server.machine.heeds_delegates = False
+        self.assertIn("--as bert is not heeded: unix:anna may not speak for others", self.ok("--as", "bert", "whoami"))
+        self.assertNotIn("not heeded", self.ok("whoami"))
 
 
 class Motion(AxisctlTest):
