@@ -46,12 +46,12 @@ std::uint64_t before_last(Client& client, std::uint64_t count) {
 }
 
 void set_since(v1::ListAuditRequest& request, const std::string& since) {
-  const bool number = std::ranges::all_of(since, [](char c) { return c >= '0' && c <= '9'; });
   if (since.empty()) return;
-  if (number)
-    request.set_after_number(static_cast<std::uint64_t>(parse_integer(since, "--since")));
+  const auto when = parse_since(since, "--since");
+  if (when.number)
+    request.set_after_number(*when.number);
   else
-    set_ahead(*request.mutable_since(), -parse_duration(since, "--since"));
+    set_ahead(*request.mutable_since(), -when.ago);
 }
 
 /// Gives all records to `take`, page by page, up to the newest. Where the next look goes on is in `request`.
@@ -75,10 +75,16 @@ void audit(Invocation& invocation, const Arguments& arguments) {
   set_since(request, arguments.since);
   auto& client = invocation.client();
   if (arguments.last > 0) request.set_after_number(before_last(client, arguments.last));
-  const auto show = [&invocation](const v1::AuditRecord& record) {
+  bool any = false;
+  const auto show = [&invocation, &any](const v1::AuditRecord& record) {
+    any = true;
     print_line(invocation.json ? json(record) : audit_line(record));
   };
-  if (!arguments.follow) return read(client, request, show);
+  if (!arguments.follow) {
+    read(client, request, show);
+    if (!any && !invocation.json) print_line("the audit has no such record");
+    return;
+  }
   const Interrupt interrupt([] {});
   do read(client, request, show);
   while (!interrupt.wait_for(look_again));

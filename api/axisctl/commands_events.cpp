@@ -3,7 +3,6 @@
 #include <google/protobuf/util/time_util.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <memory>
 
 #include "api/axisctl/duration.hpp"
@@ -25,10 +24,6 @@ struct Arguments {
   bool follow = false;
 };
 
-bool is_number(const std::string& text) {
-  return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
-}
-
 /// The request, and the time before which events are not shown.
 struct Query {
   v1::WatchEventsRequest request;
@@ -42,14 +37,18 @@ Query query_of(Invocation& invocation, const Arguments& arguments) {
   query.request.set_after_sequence(0);
   if (arguments.since == "now") {
     query.request.clear_after_sequence();
-  } else if (is_number(arguments.since)) {
+    return query;
+  }
+  if (arguments.since.empty()) return query;
+  const auto when = parse_since(arguments.since, "--since");
+  if (when.number) {
     query.request.set_instance_id(
         invocation.client()
             .call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(), std::string_view())
             .instance_id());
-    query.request.set_after_sequence(static_cast<std::uint64_t>(parse_integer(arguments.since, "--since")));
-  } else if (!arguments.since.empty()) {
-    set_ahead(query.from, -parse_duration(arguments.since, "--since"));
+    query.request.set_after_sequence(*when.number);
+  } else {
+    set_ahead(query.from, -when.ago);
   }
   return query;
 }

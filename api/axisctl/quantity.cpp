@@ -45,6 +45,18 @@ std::chrono::nanoseconds parse_duration(std::string_view text, std::string_view 
   return *duration;
 }
 
+Since parse_since(std::string_view text, std::string_view what) {
+  std::uint64_t number = 0;
+  const auto* end = text.data() + text.size();
+  if (const auto read = std::from_chars(text.data(), end, number); read.ec == std::errc{} && read.ptr == end)
+    return {.number = number};
+  if (const auto ago = config::parse_duration(text)) return {.number = std::nullopt, .ago = *ago};
+  throw Failure(ExitCode::usage,
+                fmt::format("{}: {} is neither a number nor a time; write 120 for what comes behind it, or "
+                            "500ms, 90s or 10min for what is younger",
+                            what, config::quoted(text)));
+}
+
 std::int64_t parse_integer(std::string_view text, std::string_view what) {
   std::string_view digits = text;
   const bool negative = digits.starts_with('-');

@@ -272,7 +272,7 @@ class Events(AxisctlTest):
         self.assertEqual(self.ok("events", "--since", "10min"), "")
         self.assertEqual(self.ok("events", "--since", "now"), "")
         self.assertIn("permitted: terminal, state", self.fails(2, "events", "--kind", "noise"))
-        self.fails(2, "events", "--since", "yesterday")
+        self.assertIn("'yesterday' is neither a number nor a time", self.fails(2, "events", "--since", "yesterday"))
         self.assertEqual([event["sequence"] for event in self.json("events", "feeder")], ["1", "2"])
 
     def test_follow_until_ctrl_c(self):

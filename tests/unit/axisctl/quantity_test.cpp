@@ -53,6 +53,19 @@ TEST(Quantity, WhatMeasuresSomethingElseIsRefusedWithTheUnitsThatFit) {
     EXPECT_THAT(refusal([&] { parse_value(text, "mm", "position"); }), HasSubstr("write it in mm")) << text;
 }
 
+TEST(Quantity, SinceANumberOrForSoLong) {
+  EXPECT_EQ(parse_since("120", "--since").number, 120U);
+  EXPECT_EQ(parse_since("0", "--since").number, 0U);
+  EXPECT_FALSE(parse_since("10min", "--since").number);
+  EXPECT_EQ(parse_since("10min", "--since").ago, 10min);
+  EXPECT_EQ(
+      refusal([] { (void)parse_since("foo", "--since"); }),
+      "--since: 'foo' is neither a number nor a time; write 120 for what comes behind it, or 500ms, 90s "
+      "or 10min for what is younger");
+  for (const char* text : {"", "-5", "-5s", "12h", "1e3", "99999999999999999999"})
+    EXPECT_THAT(refusal([&] { (void)parse_since(text, "--since"); }), StartsWith("--since: ")) << text;
+}
+
 TEST(Quantity, OnlyFiniteNumbers) {
   for (const char* text : {"", "mm", "nan", "inf", "-inf", "1e999", "1,5", "0x10", "--5"})
     EXPECT_THAT(refusal([&] { parse_value(text, "mm", "position"); }), StartsWith("position: ")) << text;
