@@ -8,6 +8,7 @@
 
 #include "buses/budget_can.hpp"
 #include "buses/budget_rtu.hpp"
+#include "config/access_warnings.hpp"
 #include "config/checks.hpp"
 #include "config/file_warnings.hpp"
 #include "config/position_warnings.hpp"
@@ -165,11 +166,16 @@ std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports) {
   return lines;
 }
 
+std::vector<std::string> other_warnings(const Configuration& configuration) {
+  std::vector<std::string> lines;
+  for (const auto look : {position_warnings, start_warnings, file_warnings, access_warnings})
+    std::ranges::move(look(configuration), std::back_inserter(lines));
+  return lines;
+}
+
 std::vector<std::string> warnings(const Configuration& configuration) {
   auto lines = warnings(budgets(configuration));
-  std::ranges::move(position_warnings(configuration), std::back_inserter(lines));
-  std::ranges::move(start_warnings(configuration), std::back_inserter(lines));
-  std::ranges::move(file_warnings(configuration), std::back_inserter(lines));
+  std::ranges::move(other_warnings(configuration), std::back_inserter(lines));
   return lines;
 }
 

@@ -21,8 +21,10 @@ std::string summary(const BusBudgetReport& report);
 std::vector<std::string> warnings(const BusBudgetReport& report);
 /// The same of all of them.
 std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports);
-/// The same of all buses, position_warnings(), start_warnings() and file_warnings(). Precondition: that of
-/// budgets().
+/// All that is to be known of a good configuration and is none of its budgets: positions, starts, files and
+/// roles. Precondition: the loader found no error in it.
+std::vector<std::string> other_warnings(const Configuration& configuration);
+/// The same of all buses, and other_warnings(). Precondition: that of budgets().
 std::vector<std::string> warnings(const Configuration& configuration);
 
 }  // namespace axisd::config

@@ -10,9 +10,6 @@
 #include <utility>
 
 #include "config/budget.hpp"
-#include "config/file_warnings.hpp"
-#include "config/position_warnings.hpp"
-#include "config/start_warnings.hpp"
 #include "daemon/audit_opening.hpp"
 #include "daemon/configuration_service.hpp"
 #include "devices/axis/id_limits.hpp"
@@ -33,9 +30,7 @@ void tell(const config::Configuration& configuration, const std::vector<BusBudge
     spdlog::info("budget of {}", config::summary(budget));
     for (const auto& warning : config::warnings(budget)) spdlog::warn("{}", warning);
   }
-  for (const auto& warning : config::position_warnings(configuration)) spdlog::warn("{}", warning);
-  for (const auto& warning : config::start_warnings(configuration)) spdlog::warn("{}", warning);
-  for (const auto& warning : config::file_warnings(configuration)) spdlog::warn("{}", warning);
+  for (const auto& warning : config::other_warnings(configuration)) spdlog::warn("{}", warning);
 }
 
 /// `audit`: null as long as there is none yet; looked at while the core and the server run, by any thread.
