@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "buses/port_number.hpp"
 #include "config/checks.hpp"
-#include "config/quantity.hpp"
 #include "config/text.hpp"
 #include "devices/descriptor.hpp"
 
@@ -26,16 +26,19 @@ bool is_loopback(std::string_view host) {
   return host == "localhost" || host == "[::1]" || dotted;
 }
 
+void check_port(std::string_view port, Mark mark, Diagnostics& diagnostics) {
+  if (port_number(port)) return;
+  diagnostics.add(mark, fmt::format("port {} is out of range", quoted(port)),
+                  "write a port between 0 and 65535");
+}
+
 void check_address(std::string_view key, std::string_view listen, const Configuration& configuration,
                    Diagnostics& diagnostics, const Places& places) {
   if (!places.usable(key) || listen.empty() || listen.starts_with("unix:")) return;
   const auto colon = listen.rfind(':');
   const auto host = listen.substr(0, colon), port = listen.substr(colon + 1);
   const auto mark = places.mark(key);
-  if (const auto number = parse_decimal(port); !number || number->value > 65535) {
-    diagnostics.add(mark, fmt::format("port {} is out of range", quoted(port)),
-                    "write a port between 0 and 65535");
-  }
+  check_port(port, mark, diagnostics);
   if (configuration.server.tls || places.given("server.tls")) return;
   if (!is_loopback(host)) {
     diagnostics.add(
@@ -55,9 +58,7 @@ void check_metrics(const MetricsSettings& metrics, Diagnostics& diagnostics, con
   const std::string_view listen = metrics.listen;
   const auto colon = listen.rfind(':');
   const auto port = listen.substr(colon + 1);
-  if (const auto number = parse_decimal(port); !number || number->value > 65535)
-    diagnostics.add(places.mark("server.metrics.listen"),
-                    fmt::format("port {} is out of range", quoted(port)), "write a port between 0 and 65535");
+  check_port(port, places.mark("server.metrics.listen"), diagnostics);
   if (!is_loopback(listen.substr(0, colon)) && !metrics.remote && places.usable("server.metrics.remote"))
     diagnostics.add(places.mark("server.metrics.listen"),
                     fmt::format("everybody on the network could read the metrics at {}", quoted(listen)),

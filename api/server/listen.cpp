@@ -9,12 +9,13 @@
 #include <sys/un.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <memory>
 #include <string_view>
 #include <system_error>
 #include <utility>
+
+#include "buses/port_number.hpp"
 
 namespace axisd::server {
 namespace {
@@ -45,10 +46,7 @@ Result<HostPort> split(const std::string& address) {
   const auto colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0) return wrong();
   HostPort result{.host = address.substr(0, colon), .port = address.substr(colon + 1)};
-  unsigned port = 0;
-  const auto* end = result.port.data() + result.port.size();
-  const auto parsed = std::from_chars(result.port.data(), end, port);
-  if (parsed.ec != std::errc{} || parsed.ptr != end || port > 65535) return wrong();
+  if (!port_number(result.port)) return wrong();
   if (result.host.starts_with('[') && result.host.ends_with(']'))
     result.host = result.host.substr(1, result.host.size() - 2);
   else if (result.host.contains(':'))
