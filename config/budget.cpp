@@ -8,6 +8,7 @@
 
 #include "buses/budget_can.hpp"
 #include "buses/budget_rtu.hpp"
+#include "buses/seconds.hpp"
 #include "config/access_warnings.hpp"
 #include "config/checks.hpp"
 #include "config/file_warnings.hpp"
@@ -65,8 +66,7 @@ canopen::NetworkDemand demand_of(const canopen::NetworkSettings& network,
 /// At full speed until the stop frame is out, then along the ramp.
 double way_of(const AxisSettings& axis, Duration deceleration, const StopBudget& stop) {
   if (stop.last_frame == Duration::max()) return std::numeric_limits<double>::infinity();
-  const auto seconds = [](Duration time) { return std::chrono::duration<double>(time).count(); };
-  return axis.limits.velocity * (seconds(stop.last_frame) + seconds(deceleration) / 2);
+  return axis.limits.velocity * (in_seconds(stop.last_frame) + in_seconds(deceleration) / 2);
 }
 
 std::vector<AxisBudgetReport> axis_reports(const BusBudget& budget, const Configuration& configuration) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "api/server/convert.hpp"
+#include "buses/seconds.hpp"
 #include "devices/nearest.hpp"
 
 namespace axisd::server {
@@ -25,8 +26,6 @@ constexpr Duration longest_time =
     1h;  // of a ramp; the drives take milliseconds, this only keeps sums in range
 constexpr Duration default_period = 100ms, shortest_period = 10ms, longest_period = 60s;
 constexpr Duration default_statistics_period = 1s;
-
-double in_seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 std::unexpected<Error> outside(std::string_view field, Duration minimum, Duration maximum) {
   return fail({.reason = Reason::out_of_range,

@@ -9,6 +9,8 @@
 #include <limits>
 #include <utility>
 
+#include "buses/seconds.hpp"
+
 namespace axisd::metrics {
 namespace {
 
@@ -51,7 +53,7 @@ std::string_view content_type(Format format) {
 
 double in_seconds(Duration duration) {
   if (duration == Duration::max()) return std::numeric_limits<double>::infinity();
-  return std::chrono::duration<double>(duration).count();
+  return axisd::in_seconds(duration);
 }
 
 Labels Labels::with(std::string_view name, std::string_view value) const {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "buses/seconds.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/chain.hpp"
 
@@ -192,7 +193,7 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
       // travel.
       const auto step = tracker_.counter() - previous;
       previous = tracker_.counter();
-      const auto seconds = std::chrono::duration<double>(sample.measured_at - previous_asked).count();
+      const auto seconds = in_seconds(sample.measured_at - previous_asked);
       previous_asked = sample.asked_at;
       if (std::abs(static_cast<double>(step)) > static_cast<double>(near) + (1.1 * fastest * seconds))
         origin += step;

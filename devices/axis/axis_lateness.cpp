@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "buses/seconds.hpp"
 #include "devices/axis/axis.hpp"
 
 namespace axisd {
@@ -37,8 +38,6 @@ std::string_view to_string(StartWait wait) {
       return "for its line";
   }
 }
-
-double in_seconds(Duration time) { return std::chrono::duration<double>(time).count(); }
 
 }  // namespace
 

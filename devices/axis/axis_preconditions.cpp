@@ -5,14 +5,13 @@
 #include <cmath>
 #include <utility>
 
+#include "buses/seconds.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/power_wait.hpp"
 
 namespace axisd {
 
 namespace {
-
-double seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 /// A drive that takes no enable, or does not start or ends what it started, while one of these is active.
 constexpr std::string_view holding_functions[] = {"stop", "quick_stop", "motor_free"};
@@ -90,8 +89,8 @@ void Axis::look_at_link(Obstacles& found) const {
         Reason::no_reply,
         fmt::format(
             "node {} is in quarantine for {:.1f} s, {} requests in vain; it is asked again in {:.1f} s",
-            settings_.node, seconds(now - held->since), held->probes,
-            seconds(std::max(held->next - now, Duration::zero()))),
+            settings_.node, in_seconds(now - held->since), held->probes,
+            in_seconds(std::max(held->next - now, Duration::zero()))),
         fmt::format("check its power, address and serial settings; look who answers: axisctl bus scan {}",
                     settings_.bus)));
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "buses/seconds.hpp"
 #include "devices/axis/segments.hpp"
 
 namespace axisd {
@@ -229,12 +230,11 @@ Result<std::optional<HomingProfile>> Planner::homing() const {
 
 Duration move_duration(double pulses, double start_speed, double speed, Duration acceleration_time,
                        Duration deceleration_time) {
-  const auto seconds = [](Duration time) { return std::chrono::duration<double>(time).count(); };
   const auto to_duration = [](double time) {
     return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(time));
   };
   if (pulses <= 0 || speed <= 0) return Duration{0};
-  const auto ramps = seconds(acceleration_time) + seconds(deceleration_time);
+  const auto ramps = in_seconds(acceleration_time) + in_seconds(deceleration_time);
   const auto mean = (start_speed + speed) / 2;
   const auto in_ramps = mean * ramps;
   if (in_ramps <= pulses) return to_duration(ramps + (pulses - in_ramps) / speed);

@@ -3,20 +3,19 @@
 #include <cmath>
 #include <utility>
 
+#include "buses/seconds.hpp"
 #include "devices/axis/planner.hpp"
 
 namespace axisd {
 
 namespace {
 
-double seconds(Duration time) { return std::chrono::duration<double>(time).count(); }
-
 Duration distance_in_time(Duration one, Duration other) { return one > other ? one - other : other - one; }
 
 /// Both ramps fit into the way: the duration is exact then.
 bool reaches_speed(const Plan& plan, double pulses, double pulses_per_second_of_rpm) {
   const auto mean = (plan.start_rpm + plan.velocity_rpm) * pulses_per_second_of_rpm / 2;
-  return mean * (seconds(plan.acceleration_time) + seconds(plan.deceleration_time)) <= pulses;
+  return mean * (in_seconds(plan.acceleration_time) + in_seconds(plan.deceleration_time)) <= pulses;
 }
 
 }  // namespace
@@ -31,7 +30,7 @@ Plan Planner::at_speed(Plan plan, int rpm) const {
 
 /// Whole r/min are coarse at low speeds; longer ramps fill what is left.
 Plan Planner::lengthened(Plan plan, std::int64_t pulses, Duration wanted) const {
-  const auto missing = seconds(wanted - duration(plan, pulses));
+  const auto missing = in_seconds(wanted - duration(plan, pulses));
   const auto speed_won = plan.velocity_rpm - plan.start_rpm;
   if (missing <= 0 || speed_won <= 0) return plan;
   // A ramp runs at the mean of both speeds in place of the full one.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "buses/seconds.hpp"
+
 namespace axisd {
 
 namespace {
@@ -22,8 +24,6 @@ constexpr double confirmation = 1.0 / 4;
 /// So long after a motion the shaft may still be coming to where it was told to stop.
 constexpr Duration settles = milliseconds(500);
 
-double seconds(Duration time) { return std::chrono::duration<double>(time).count(); }
-
 /// Right also where the counter has wrapped between the two.
 double way(std::int32_t from, std::int32_t to) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) - static_cast<std::uint32_t>(from));
@@ -31,7 +31,9 @@ double way(std::int32_t from, std::int32_t to) {
 
 }  // namespace
 
-double SpeedWatch::possible(Duration time) const { return factor * fastest_ * std::max(0.0, seconds(time)); }
+double SpeedWatch::possible(Duration time) const {
+  return factor * fastest_ * std::max(0.0, in_seconds(time));
+}
 
 double SpeedWatch::margin() const { return revolution_ * wavers + fastest_ * staleness_s; }
 
@@ -99,7 +101,7 @@ bool SpeedWatch::arrive(const Reading& reading) {
 
 bool SpeedWatch::find(double gone, Duration time) {
   state_ = State::too_fast;
-  seen_ = gone / std::max(seconds(time), 1e-3);
+  seen_ = gone / std::max(in_seconds(time), 1e-3);
   return true;
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "buses/seconds.hpp"
+
 namespace axisd {
 
 namespace {
@@ -14,10 +16,8 @@ constexpr std::size_t ended_remembered = 256;
 /// Of a token: the rest is the epoch. Clients that count in doubles keep both exact for 2^21 starts.
 constexpr int counter_bits = 32;
 
-double seconds(Duration duration) { return std::chrono::duration<double>(duration).count(); }
-
 std::string until(const Lease& lease, TimePoint now) {
-  return fmt::format("leased by {} for another {:.1f} s", lease.holder(), seconds(lease.expires - now));
+  return fmt::format("leased by {} for another {:.1f} s", lease.holder(), in_seconds(lease.expires - now));
 }
 
 }  // namespace
@@ -30,10 +30,10 @@ Result<Duration> LeaseTable::ttl_of(const LeaseRequest& request) const {
   if (ttl >= settings_.shortest_ttl && ttl <= settings_.longest_ttl) return ttl;
   return fail(
       Error{.reason = Reason::out_of_range,
-            .message = fmt::format("ttl of {:.6g} s is out of range", seconds(ttl)),
+            .message = fmt::format("ttl of {:.6g} s is out of range", in_seconds(ttl)),
             .remedy = "give a duration in the permitted range, or change leases: in the configuration",
-            .permitted = Range{.minimum = seconds(settings_.shortest_ttl),
-                               .maximum = seconds(settings_.longest_ttl),
+            .permitted = Range{.minimum = in_seconds(settings_.shortest_ttl),
+                               .maximum = in_seconds(settings_.longest_ttl),
                                .unit = "s"}});
 }
 
@@ -167,7 +167,7 @@ Error LeaseTable::lost(std::uint64_t token, std::string_view axis, TimePoint now
   const auto known =
       std::ranges::find(ended_, token, [](const EndedLease& over) { return over.lease.token; });
   if (known != ended_.end()) {
-    const auto ago = seconds(now - known->at);
+    const auto ago = in_seconds(now - known->at);
     if (known->end == LeaseEnd::released) text = fmt::format("the lease was released {:.1f} s ago", ago);
     if (known->end == LeaseEnd::expired) text = fmt::format("the lease expired {:.1f} s ago", ago);
     if (known->end == LeaseEnd::taken) text = fmt::format("{} took the lease {:.1f} s ago", known->by, ago);
