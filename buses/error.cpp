@@ -48,7 +48,7 @@ std::string_view to_string(Reason reason) {
                                                                  "eeprom_budget",
                                                                  "state_unaccepted",
                                                                  "access_denied"});
-  static_assert(names.size() == std::to_underlying(Reason::access_denied) + 1U);
+  static_assert(names.size() == std::to_underlying(last_reason) + 1U);
   return names.at(std::to_underlying(reason));
 }
 

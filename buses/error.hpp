@@ -53,6 +53,8 @@ enum class Reason : std::uint8_t {
   state_unaccepted,     ///< Files of the state are not what they were. Look at the machine, then accept it.
   access_denied,        ///< The client lacks the role that this needs.
 };
+/// The last one of the list, for whoever goes through all of it.
+inline constexpr Reason last_reason = Reason::access_denied;
 
 std::string_view to_string(Reason reason);
 

@@ -18,7 +18,7 @@ template <class Proto, class Domain>
 Proto one_further(Domain value) {
   return static_cast<Proto>(std::to_underlying(value) + 1);
 }
-static_assert(std::to_underlying(Reason::access_denied) + 1 == v1::Reason_MAX);
+static_assert(std::to_underlying(last_reason) + 1 == v1::Reason_MAX);
 static_assert(std::to_underlying(Outcome::unknown) + 1 == v1::Outcome_MAX);
 static_assert(std::to_underlying(AxisState::error_stop) + 1 == v1::State_MAX);
 static_assert(std::to_underlying(LinkState::online) + 1 == v1::LinkState_MAX);

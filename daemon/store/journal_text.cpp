@@ -59,7 +59,7 @@ class Reader : public LineReader {
   bool reason(Reason& value) {
     std::string text;
     if (!word(text)) return false;
-    for (int i = 0; i <= static_cast<int>(Reason::access_denied); ++i) {
+    for (int i = 0; i <= static_cast<int>(last_reason); ++i) {
       value = static_cast<Reason>(i);
       if (to_string(value) == text) return true;
     }

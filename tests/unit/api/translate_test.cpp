@@ -40,7 +40,7 @@ void expect_same_names(Domain last, const std::string& prefix, auto name_of) {
 }
 
 TEST(Convert, EveryEnumValueHasItsNamesakeInTheContract) {
-  expect_same_names(Reason::access_denied, "REASON_", [](auto v) { return v1::Reason_Name(v); });
+  expect_same_names(last_reason, "REASON_", [](auto v) { return v1::Reason_Name(v); });
   expect_same_names(AxisState::error_stop, "STATE_", [](auto v) { return v1::State_Name(v); });
   expect_same_names(LinkState::online, "LINK_STATE_", [](auto v) { return v1::LinkState_Name(v); });
   expect_same_names(PositionTrust::restored, "POSITION_TRUST_",
@@ -189,7 +189,7 @@ TEST(Convert, RefusesMalformedTimes) {
 }
 
 TEST(Status, EveryReasonHasACodeAndKeepsItsDetails) {
-  for (int i = 0; i <= int{std::to_underlying(Reason::access_denied)}; ++i) {
+  for (int i = 0; i <= int{std::to_underlying(last_reason)}; ++i) {
     const auto reason = static_cast<Reason>(i);
     const auto status =
         to_status({.reason = reason, .message = "what", .remedy = "do", .where = {.bus = "line-a"}});
