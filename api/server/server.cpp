@@ -11,6 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "api/server/accept_loop.hpp"
@@ -137,6 +138,23 @@ struct Server::Parts {
   AcceptLoop accept;
   bool serving = false;
 
+  struct Served {
+    const char* name;
+    grpc::Service* service;
+  };
+  /// All services of ours, in the order of the contract.
+  std::array<Served, 9> served() {
+    return {{{v1::AxisService::service_full_name(), &axis},
+             {v1::CommandService::service_full_name(), &command},
+             {v1::SystemService::service_full_name(), &system},
+             {v1::BusService::service_full_name(), &bus},
+             {v1::DriveService::service_full_name(), &drive},
+             {v1::EventService::service_full_name(), &event},
+             {v1::LeaseService::service_full_name(), &lease},
+             {v1::GroupService::service_full_name(), &group},
+             {v1::AuditService::service_full_name(), &audit}}};
+  }
+
   void take_local(FileDescriptor connection) {
     callers.enter(connection.get());
     grpc::AddInsecureChannelFromFd(server.get(), connection.release());
@@ -188,10 +206,7 @@ Result<int> Server::start() {
   grpc::ServerBuilder builder;
   limit_transport(builder);
   builder.SetOption(std::make_unique<ReflectionOption>(options_.reflection));
-  for (grpc::Service* service : std::initializer_list<grpc::Service*>{
-           &parts_->axis, &parts_->command, &parts_->system, &parts_->bus, &parts_->drive, &parts_->event,
-           &parts_->lease, &parts_->group, &parts_->audit})
-    builder.RegisterService(service);
+  for (const auto& each : parts_->served()) builder.RegisterService(each.service);
   constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
   parts_->acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
   parts_->server = builder.BuildAndStart();
@@ -213,12 +228,7 @@ Result<int> Server::start() {
     return fail(std::move(accepting).error());
   auto* health = parts_->server->GetHealthCheckService();
   health->SetServingStatus(true);
-  for (const auto* name : {v1::AxisService::service_full_name(), v1::CommandService::service_full_name(),
-                           v1::SystemService::service_full_name(), v1::BusService::service_full_name(),
-                           v1::DriveService::service_full_name(), v1::EventService::service_full_name(),
-                           v1::LeaseService::service_full_name(), v1::GroupService::service_full_name(),
-                           v1::AuditService::service_full_name()})
-    health->SetServingStatus(name, true);
+  for (const auto& each : parts_->served()) health->SetServingStatus(each.name, true);
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,
                  options_.tls && !address.starts_with("unix:") ? "mutual TLS" : "plaintext, local");
@@ -243,6 +253,12 @@ FileDescriptor Server::connect_inside() {
   if (ours.get() < 0) return {};
   parts_->take_local(std::move(theirs));
   return std::move(ours);
+}
+
+std::vector<std::string> Server::services() const {
+  std::vector<std::string> names;
+  for (const auto& each : parts_->served()) names.emplace_back(each.name);
+  return names;
 }
 
 std::uint64_t Server::batches_serialised() const { return parts_->hub->batches_serialised(); }

@@ -65,6 +65,9 @@ class Server {
   /// open (get() < 0): out of descriptors. Precondition: start() returned a port. Thread: any.
   [[nodiscard]] FileDescriptor connect_inside();
 
+  /// Full names of the services of ours that it serves. Thread: any.
+  [[nodiscard]] std::vector<std::string> services() const;
+
   /// Batches of axis states serialised since the start. Thread: any.
   [[nodiscard]] std::uint64_t batches_serialised() const;
 

@@ -5,10 +5,8 @@
 #include <google/protobuf/descriptor.h>
 #include <grpcpp/generic/generic_stub.h>
 
-#include <algorithm>
 #include <functional>
 #include <future>
-#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,28 +31,9 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::MethodDescriptor;
-using google::protobuf::ServiceDescriptor;
 using server::check_bounds;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-const ServiceDescriptor* service(const std::string& name) {
-  return google::protobuf::DescriptorPool::generated_pool()->FindServiceByName("axisd.v1." + name);
-}
-
-std::vector<const MethodDescriptor*> methods_of(const std::string& name) {
-  std::vector<const MethodDescriptor*> all;
-  for (int i = 0; i < service(name)->method_count(); ++i) all.push_back(service(name)->method(i));
-  return all;
-}
-
-std::vector<const MethodDescriptor*> all_methods() {
-  std::vector<const MethodDescriptor*> all;
-  for (const auto* name : {"AuditService", "AxisService", "BusService", "CommandService", "DriveService",
-                           "EventService", "GroupService", "LeaseService", "SystemService"})
-    std::ranges::copy(methods_of(name), std::back_inserter(all));
-  return all;
-}
 
 std::unique_ptr<Message> request_of(const MethodDescriptor& method) {
   return std::unique_ptr<Message>(
@@ -134,7 +113,7 @@ class Filling {
 
 TEST(Bounds, EachOfEachRequestHolds) {
   int seen = 0;
-  for (const auto* method : all_methods()) {
+  for (const auto* method : served_calls()) {
     SCOPED_TRACE(method->full_name());
     const auto request = request_of(*method);
     Filling(*request, 0, [](const Message& full, const std::string& where) {
@@ -230,7 +209,7 @@ class BoundedCalls : public Serving {
 
 TEST_F(BoundedCalls, EveryCallRefusesWhatIsTooMuch) {
   serve();
-  for (const auto* method : all_methods()) expect_refusals(*method, channel_);
+  for (const auto* method : served_calls()) expect_refusals(*method, channel_);
 }
 
 TEST_F(BoundedCalls, SoDoesTheStopLane) {
@@ -241,7 +220,7 @@ TEST_F(BoundedCalls, SoDoesTheStopLane) {
   ASSERT_TRUE(port) << to_string(port.error());
   lane.serve();
   const auto channel = connect("127.0.0.1:" + std::to_string(*port));
-  for (const auto* method : methods_of("StopService")) expect_refusals(*method, channel);
+  for (const auto* method : calls_of(v1::StopService::service_full_name())) expect_refusals(*method, channel);
 }
 
 }  // namespace

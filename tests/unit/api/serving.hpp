@@ -1,14 +1,18 @@
 // A fake machine behind a real server on a unix socket, and clients for it.
 #pragma once
 
+#include <google/protobuf/descriptor.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "api/server/listen.hpp"
 #include "api/server/local_peer.hpp"
@@ -69,6 +73,24 @@ struct Call : grpc::ClientContext {
     set_deadline(std::chrono::system_clock::now() + timeout);
   }
 };
+
+/// All calls of a service of ours, by its full name.
+inline std::vector<const google::protobuf::MethodDescriptor*> calls_of(const std::string& service) {
+  std::vector<const google::protobuf::MethodDescriptor*> all;
+  const auto* found = google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(service);
+  EXPECT_NE(found, nullptr) << service;
+  for (int i = 0; found != nullptr && i < found->method_count(); ++i) all.push_back(found->method(i));
+  return all;
+}
+
+/// All calls of the main address.
+inline std::vector<const google::protobuf::MethodDescriptor*> served_calls() {
+  FakeMachine machine;
+  std::vector<const google::protobuf::MethodDescriptor*> all;
+  for (const auto& service : server::Server(machine, {}).services())
+    std::ranges::copy(calls_of(service), std::back_inserter(all));
+  return all;
+}
 
 /// The typed detail of a failed call.
 inline v1::ErrorDetail detail_of(const grpc::Status& status) {
