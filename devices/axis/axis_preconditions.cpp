@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "buses/seconds.hpp"
@@ -15,6 +16,13 @@ namespace {
 
 /// A drive that takes no enable, or does not start or ends what it started, while one of these is active.
 constexpr std::string_view holding_functions[] = {"stop", "quick_stop", "motor_free"};
+
+/// What went wrong, without where it was and what to do: both stand beside it.
+std::string bare_text(const Error& why, const std::string& axis) {
+  auto text = why.message.empty() ? std::string(to_string(why.reason)) : why.message;
+  if (const auto lead = axis + ": "; text.starts_with(lead)) text.erase(0, lead.size());
+  return why.where.object ? fmt::format("{}: {}", object_text(*why.where.object), text) : text;
+}
 
 }  // namespace
 
@@ -75,8 +83,14 @@ void Axis::look_at_link(Obstacles& found) const {
     found.block(std::move(cause));
   }
   if (link_ != LinkState::offline) return;
-  found.block(error(Reason::offline, link_error_ ? "offline: " + to_string(*link_error_) : "offline",
-                    "check power and wiring; it is retried by itself"));
+  auto silent = error(Reason::offline, "offline", "check power and wiring");
+  if (link_error_) {
+    silent.message += ": " + bare_text(*link_error_, settings_.name);
+    // Whoever saw it knows best what to do: one remedy, not two.
+    if (!link_error_->remedy.empty()) silent.remedy = link_error_->remedy;
+  }
+  silent.remedy += "; it is retried by itself";
+  found.block(std::move(silent));
   if (const auto& port = env_.bus->port(); !port.open) {
     auto cause = port.error.value_or(Error{
         .reason = Reason::bus_down, .message = "the port is not open", .where = {.bus = settings_.bus}});

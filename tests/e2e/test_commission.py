@@ -165,7 +165,7 @@ class Commission(CommissionScenario):
         step = person.step("identity")
         self.assertEqual(step["verdict"], "VERDICT_FAILED")
         self.assertIn("offline", step["reason"])
-        self.assertIn("check power and wiring", step["remedy"])
+        self.assertIn("check power", step["remedy"])
         self.assert_verdicts(person, switch_X0="NOT_DONE", power_on="NOT_DONE", jog_positive="NOT_DONE")
 
     def test_a_machine_that_is_stopped_says_what_to_do(self):

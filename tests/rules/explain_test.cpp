@@ -10,6 +10,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 const Action move = MoveAbsoluteRequest{.position = 10};
 const Action step = MoveRelativeRequest{.distance = 5};
@@ -183,6 +184,9 @@ TEST(Explain, ACommandThatEndsAsUnknownLeavesAResetThatReadsBack) {
   ASSERT_EQ(lost->value().state, CommandState::unknown);
   EXPECT_THAT(rig.reasons(move), ElementsAre("fault", "offline", "no_reply", "(stopping)"))
       << "a stop is owed";
+  EXPECT_THAT(rig.text(move, Reason::offline),
+              AllOf(HasSubstr("feeder: offline: "), HasSubstr("check power, wiring, address and baud rate"),
+                    Not(HasSubstr("check power and wiring")), HasSubstr("it is retried by itself")));
   rig.line->network().set_connected(true);
   rig.reconnect();
   rig.run(3s);
