@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "devices/axis/axis.hpp"
 
@@ -19,6 +20,11 @@ double fastest_of(const Activity& activity, const AxisSettings& settings, const 
   for (const auto velocity : {settings.homing->velocity, settings.homing->search_velocity})
     fastest = std::max(fastest, std::abs(scale.velocity_to_rpm(velocity)));
   return fastest;
+}
+
+bool has_velocity_unit(const DriveDescriptor& drive) {
+  return std::ranges::find(drive.settings, std::string_view("velocity_unit"), &SettingSpec::key) !=
+         drive.settings.end();
 }
 
 /// "60 r/min (10 mm/s)".
@@ -60,8 +66,10 @@ bool Axis::watch_speed(SpeedWatch::Event event) {
             fmt::format("the shaft turned at {} or more, but was told to turn at {} at most; most likely the "
                         "units of the axis are not those of the drive",
                         text_of(speed_watch_.seen(), scale_), text_of(speed_watch_.fastest(), scale_)),
-            "compare pulses_per_revolution (scale: microstep), the drive's own gear and drive: velocity_unit "
-            "with the drive; then reset the axis, try slowly, and home it"));
+            fmt::format(
+                "compare pulses_per_revolution (scale: microstep){} with the drive; then reset the axis, "
+                "try slowly, and home it",
+                has_velocity_unit(descriptor()) ? ", the drive's own gear and drive: velocity_unit" : "")));
   return true;
 }
 

@@ -9,6 +9,7 @@
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
+#include "config/models.hpp"
 
 namespace axisd::axisctl::commission {
 namespace {
@@ -80,6 +81,7 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
   seen.tolerance = room * share_of_distance;
   seen.invert = settings_ && settings_->invert;
   seen.measured = after.position_source() == v1::POSITION_SOURCE_ENCODER;
+  seen.described_by_file = config::is_described_by_file(record_.model());
   add_figure(step, "asked", distance, unit);
   add_figure(step, "travelled", seen.travelled, unit);
   add_figure(step, "velocity", seen.command.granted().velocity(), unit + "/s");
@@ -106,8 +108,11 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
 }
 
 Judgement Procedure::prove_speed(const v1::AxisState& start, const Run& run, double distance, Step& step) {
-  SpeedObservation move{
-      .axis = axis_.name(), .command = run.command, .distance = distance, .samples = {start}};
+  SpeedObservation move{.axis = axis_.name(),
+                        .command = run.command,
+                        .distance = distance,
+                        .described_by_file = config::is_described_by_file(record_.model()),
+                        .samples = {start}};
   for (auto sample : run.samples) {
     sample.set_position(unwrapped(sample.position(), move.samples.back().position(), settings_));
     move.samples.push_back(std::move(sample));

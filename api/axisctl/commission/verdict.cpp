@@ -61,13 +61,16 @@ std::string time_range(const SpeedFigures& figures) {
   return least == most ? least : fmt::format("{} to {}", least, most);
 }
 
-/// Where an axis is not as fast as it was told to be.
-std::string compare_units(const std::string& axis) {
-  return fmt::format(
-      "compare axes.{0}.scale (microstep: pulses per revolution; gear), axes.{0}.drive.velocity_unit and the "
-      "ramps with the drive and its unit objects (6091h, 6093h to 6097h, 60A9h, 60AAh); reload the "
-      "configuration, and try again",
-      axis);
+/// Where an axis is not as fast as it was told to be: by the keys that its model has.
+std::string compare_units(const std::string& axis, bool described_by_file) {
+  const auto scale = fmt::format("compare axes.{}.scale (microstep: pulses per revolution; gear)", axis);
+  const auto with = described_by_file
+                        ? fmt::format(
+                              ", axes.{}.drive.velocity_unit and the ramps with the drive and its unit "
+                              "objects (6091h, 6093h to 6097h, 60A9h, 60AAh)",
+                              axis)
+                        : std::string(" with the drive");
+  return fmt::format("{}{}; reload the configuration, and try again", scale, with);
 }
 
 bool done(const v1::Command& command) { return command.state() == v1::COMMAND_STATE_DONE; }
@@ -115,7 +118,7 @@ Judgement wrong_polarity(const ExpectedInput& expected) {
 Judgement judge_motion(const JogObservation& jog, const std::string& unit) {
   if (!done(jog.command))
     return failed(end_of(jog.command), jog.command.cause().reason() == v1::REASON_TOOK_TOO_LONG
-                                           ? compare_units(jog.axis)
+                                           ? compare_units(jog.axis, jog.described_by_file)
                                            : fmt::format("axisctl explain {}", jog.axis));
   if (std::abs(jog.travelled - jog.distance) > jog.tolerance)
     return failed(
@@ -188,7 +191,8 @@ SpeedJudgement judge_speed(const SpeedObservation& move, const std::string& unit
     auto reason =
         fmt::format("it was in the middle {} of its way for {}, and {}: it is too {}",
                     with_unit(figures.way, unit), time_range(figures), told, slow ? "slow" : "fast");
-    return {.proof = SPEED_PROOF_WRONG, .judgement = failed(std::move(reason), compare_units(move.axis))};
+    return {.proof = SPEED_PROOF_WRONG,
+            .judgement = failed(std::move(reason), compare_units(move.axis, move.described_by_file))};
   }
   if (figures.most == 0 || figures.most - figures.least + tolerance > figures.told / 2)
     return {.proof = SPEED_PROOF_UNSPECIFIED,

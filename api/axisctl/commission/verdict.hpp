@@ -40,8 +40,9 @@ struct JogObservation {
   double distance = 0;  ///< asked, signed
   double travelled = 0;
   double tolerance = 0;
-  bool invert = false;    ///< as configured
-  bool measured = false;  ///< `travelled` is an encoder's
+  bool invert = false;             ///< as configured
+  bool measured = false;           ///< `travelled` is an encoder's
+  bool described_by_file = false;  ///< as of SpeedObservation
   Seen seen = Seen::as_told;
 };
 /// Of the move itself, before the operator is asked.
@@ -55,6 +56,7 @@ struct SpeedObservation {
   std::string axis;
   v1::Command command;
   double distance = 0;
+  bool described_by_file = false;  ///< the drive: by a data sheet, with units of its own
   std::vector<v1::AxisState> samples;
 };
 /// How long the shaft was in the middle of its way, from a tenth of it to nine tenths, s: there neither
