@@ -1,5 +1,8 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "api/axisctl/commission/verdict.hpp"
 
 namespace axisd::axisctl::commission {
@@ -159,6 +162,61 @@ TEST(JudgeSpeed, TellsBothFiguresAndTheKeysOfAWrongSpeed) {
                 HasSubstr("axes.feeder.scale (microstep: pulses per revolution; gear)"));
     EXPECT_THAT(judged.judgement.remedy, Not(HasSubstr("velocity_unit"))) << "it has no such key";
   }
+}
+
+/// Long ramps: 3 s from rest to 5 mm/s, and 0.5 s to rest, as granted. These are what the shaft does.
+SpeedObservation rounded_move(double acceleration_time, double deceleration_time) {
+  auto move = measured_move(1);
+  move.samples.clear();
+  move.distance = 20;
+  move.described_by_file = true;
+  auto& granted = *move.command.mutable_granted();
+  granted.mutable_acceleration_time()->set_seconds(3);
+  granted.mutable_acceleration_time()->set_nanos(0);
+  granted.mutable_deceleration_time()->set_nanos(500'000'000);
+  const double up = 5 * acceleration_time / 2;
+  const double down = 5 * deceleration_time / 2;
+  const double steady = acceleration_time + (20 - up - down) / 5;
+  const auto way = [&](double time) {
+    if (time < acceleration_time) return up * time * time / (acceleration_time * acceleration_time);
+    if (time < steady) return up + (5 * (time - acceleration_time));
+    const double left = std::max(0.0, steady + deceleration_time - time) / deceleration_time;
+    return 20 - (down * left * left);
+  };
+  for (int at = 0; at < 8000; at += 20) {
+    v1::AxisState state;
+    state.mutable_measured_at()->set_seconds(1000 + at / 1000);
+    state.mutable_measured_at()->set_nanos(at % 1000 * 1'000'000);
+    state.set_position(way(at / 1000.0));
+    move.samples.push_back(state);
+  }
+  return move;
+}
+
+TEST(JudgeSpeed, AllowsForAccelerationsOfFewCounts) {
+  // 1.9 counts are sent as 1, 0.5 as 1; a brake of 1.1 counts as 2.
+  for (const auto& [up, down] : {std::pair(3 * 1.9, 0.5), std::pair(1.5, 0.5), std::pair(3 * 1.9, 0.275)}) {
+    auto move = rounded_move(up, down);
+    EXPECT_EQ(judge_speed(move, "mm").proof, SPEED_PROOF_PROVEN) << up << " s and " << down << " s";
+    const auto figures = measure_speed(move);
+    EXPECT_LE(figures.told_least, figures.most);
+    EXPECT_GE(figures.told_most, figures.least);
+    EXPECT_LE(figures.told_least, figures.told);
+    EXPECT_GE(figures.told_most, figures.told);
+  }
+  // Ramps in ms are sent as they are granted.
+  auto exact = rounded_move(3 * 1.9, 0.5);
+  exact.described_by_file = false;
+  EXPECT_EQ(judge_speed(exact, "mm").proof, SPEED_PROOF_WRONG);
+  EXPECT_EQ(measure_speed(exact).told_most, measure_speed(exact).told);
+}
+
+TEST(JudgeSpeed, ARoundedRampHidesNoWrongVelocity) {
+  auto move = rounded_move(3, 0.5);
+  move.command.mutable_granted()->set_velocity(10);
+  EXPECT_EQ(judge_speed(move, "mm").proof, SPEED_PROOF_WRONG) << "half as fast as told";
+  move.command.mutable_granted()->set_velocity(2.5);
+  EXPECT_EQ(judge_speed(move, "mm").proof, SPEED_PROOF_WRONG) << "twice as fast";
 }
 
 TEST(JudgeSpeed, AllowsForSamplesThatAreFarApart) {
