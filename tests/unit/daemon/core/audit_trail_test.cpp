@@ -88,6 +88,15 @@ TEST_F(Audited, ARefusalIsToldWithItsCause) {
   EXPECT_EQ(told[0].command.cause->reason, refused.error().reason);
 }
 
+TEST_F(Audited, ARefusedGroupIsNamed) {
+  AuditTrail(world_.clock(), this)
+      .refused("a1", GroupMemberRequest{}, {.client = "hmi"}, {.reason = Reason::offline}, "portal");
+  const auto told = all<RefusedCommand>();
+  ASSERT_THAT(told, SizeIs(1));
+  EXPECT_EQ(told[0].group, "portal");
+  EXPECT_EQ(told[0].command.axis, "a1");
+}
+
 /// One client does not write the others out of the files (M32).
 TEST_F(Audited, ManyRefusalsOfOneClientAreCounted) {
   const auto ask = [this](const std::string& client) {
