@@ -218,9 +218,10 @@ void AxisChecks::check_times() {
   check_time("limits.acceleration_time", axis_.limits.acceleration_time, capabilities.minimum_time_ms);
   if (!capabilities.own_deceleration && given("limits.deceleration_time"))
     add("limits.deceleration_time",
-        fmt::format("'deceleration_time' has no effect: this drive of model {} brakes as it accelerates",
-                    axis_.model),
-        "leave it out; acceleration_time is for both");
+        fmt::format("'deceleration_time' has no effect: this drive of model {} {}", axis_.model,
+                    capabilities.fixed_deceleration > 0 ? "has a deceleration that cannot be set"
+                                                        : "brakes as it accelerates"),
+        capabilities.fixed_deceleration > 0 ? "leave it out" : "leave it out; acceleration_time is for both");
   check_time("limits.deceleration_time", axis_.limits.deceleration_time.value_or(Duration::zero()),
              capabilities.minimum_time_ms);
   if (axis_.homing) {

@@ -15,6 +15,7 @@
 #include "config/position_warnings.hpp"
 #include "config/quantity.hpp"
 #include "config/start_warnings.hpp"
+#include "devices/axis/planner.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/generic/value.hpp"
 
@@ -69,13 +70,21 @@ double way_of(const AxisSettings& axis, Duration deceleration, const StopBudget&
   return axis.limits.velocity * (in_seconds(stop.last_frame) + in_seconds(deceleration) / 2);
 }
 
+/// From its highest velocity, where a motion asks for no other ramp.
+Duration deceleration_of(const AxisSettings& axis) {
+  const Scale scale(axis.scale);
+  const auto& limits = axis.limits;
+  return Planner(axis, *descriptor_of(axis), scale)
+      .braking_time(limits.velocity, limits.deceleration_time.value_or(limits.acceleration_time));
+}
+
 std::vector<AxisBudgetReport> axis_reports(const BusBudget& budget, const Configuration& configuration) {
   std::vector<AxisBudgetReport> reports;
   for (const auto& predicted : budget.axes) {
     const auto entry = std::ranges::find_if(
         configuration.axes, [&](const AxisEntry& one) { return one.axis.name == predicted.axis; });
     const auto& axis = entry->axis;
-    const auto deceleration = axis.limits.deceleration_time.value_or(axis.limits.acceleration_time);
+    const auto deceleration = deceleration_of(axis);
     reports.push_back({.predicted = predicted,
                        .deceleration = deceleration,
                        .unit = axis.scale.unit,

@@ -112,9 +112,9 @@ struct CanIdentification {
   [[nodiscard]] constexpr std::uint16_t profile() const { return static_cast<std::uint16_t>(device_type); }
 };
 
-/// What a drive's velocities are whole numbers of.
+/// What a drive's velocities are whole numbers of, or its ramps: what they win of a velocity in a second.
 struct VelocityCount {
-  double rpm = 0;         ///< r/min of one; 0: each whole r/min can be sent
+  double rpm = 0;         ///< r/min of one; 0: each whole r/min can be sent, and ramps are sent as times
   bool of_pulse = false;  ///< where a revolution has one pulse: it is that much less with more
 };
 
@@ -124,6 +124,11 @@ struct Capabilities {
   int minimum_rpm = 1, maximum_rpm = 3000;
   std::int64_t maximum_pulse_rate_hz = 200'000;  ///< M11
   VelocityCount velocity_count{};                ///< motions are rounded down to it
+  /// Of ramps that are sent as rates: a start is rounded down to it, what brakes up; at least one is sent.
+  VelocityCount acceleration_count{};
+  /// The ramp that the drive brakes with whatever it is told, in acceleration_count, or ms where ramps are
+  /// times; 0: it brakes as it is told.
+  std::int64_t fixed_deceleration = 0;
   int minimum_start_rpm = 2, maximum_start_rpm = 300;
   int minimum_time_ms = 0, maximum_time_ms = 2000;
   int minimum_homing_rpm = 5, maximum_homing_rpm = 3000, minimum_search_rpm = 5, maximum_search_rpm = 300;

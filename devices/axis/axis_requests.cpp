@@ -126,7 +126,8 @@ Result<CommandPtr> Axis::accept(const HomeRequest& request, const CommandOptions
   plan.granted.velocity = settings_.homing->velocity;
   plan.granted.search_velocity = settings_.homing->search_velocity;
   plan.granted.acceleration_time = settings_.homing->acceleration_time;
-  plan.deceleration_time = settings_.homing->acceleration_time;
+  plan.deceleration_time =
+      planner_.braking_time(settings_.homing->velocity, settings_.homing->acceleration_time);
   const auto activity = begin(request, options, AxisState::homing, std::move(plan));
   launch(run_home(activity), "home");
   return activity->command;

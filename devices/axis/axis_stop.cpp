@@ -67,7 +67,8 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
 /// of the motion before it in force.
 void Axis::leave_running(const Activity& activity) {
   if (!activity.may_run) return;
-  last_deceleration_ = activity.plan.deceleration_time;
+  const auto& plan = activity.plan;
+  last_deceleration_ = std::max(plan.deceleration_time, plan.granted.deceleration_time.value_or(Duration{}));
   left_running_ = left_running_ || activity.state != AxisState::standstill;
 }
 

@@ -20,6 +20,10 @@ Error out_of_range(std::string message, double minimum, double maximum, std::str
           .permitted = Range{.minimum = minimum, .maximum = maximum, .unit = std::move(unit)}};
 }
 
+Duration duration_of(double seconds) {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+}
+
 int milliseconds_of(Duration time) {
   return static_cast<int>(std::chrono::duration_cast<milliseconds>(time).count());
 }
@@ -53,13 +57,67 @@ double Planner::minimum_velocity() const {
       scale_->velocity_to_units(std::max(capabilities_->minimum_rpm, capabilities_->minimum_start_rpm)));
 }
 
+double Planner::size_of(const VelocityCount& count) const {
+  return count.rpm / (count.of_pulse ? static_cast<double>(settings_->scale.pulses_per_revolution) : 1);
+}
+
 double Planner::sent_rpm(int rpm) const {
-  const auto& count = capabilities_->velocity_count;
-  const auto step =
-      count.rpm / (count.of_pulse ? static_cast<double>(settings_->scale.pulses_per_revolution) : 1);
+  const auto step = size_of(capabilities_->velocity_count);
   if (step <= 0) return rpm;
   const auto sent = std::floor((rpm / step) + 1e-6) * step;
   return sent > rpm * (1 - 1e-9) ? rpm : sent;
+}
+
+Planner::Ramps Planner::sent_ramps(int rpm, const Ramps& told) const {
+  const auto sent = sent_rpm(rpm);
+  const auto fixed = capabilities_->fixed_deceleration;
+  const auto step = size_of(capabilities_->acceleration_count);
+  if (step <= 0) {
+    // A drive whose velocities are coarse is slower than planned, and there the sooner.
+    const auto shortened = [share = sent / std::max(rpm, 1)](Duration ramp) {
+      return std::chrono::duration_cast<Duration>(share *
+                                                  std::chrono::duration<double, Duration::period>(ramp));
+    };
+    return {.acceleration = shortened(told.acceleration),
+            .deceleration = fixed > 0 ? milliseconds(fixed) : shortened(told.deceleration)};
+  }
+  constexpr double exact = 1e-12;  // what a number that is whole may be off by here
+  const auto counts_of = [&](Duration time) {
+    return rpm / (in_seconds(std::max<Duration>(time, milliseconds(1))) * step);
+  };
+  const auto rounded_down = [](double counts) { return std::floor(counts * (1 + exact)); };
+  const auto rounded_up = [](double counts) { return std::ceil(counts * (1 - exact)); };
+  const auto takes = [&](double counts) { return duration_of(sent / (std::max(counts, 1.0) * step)); };
+  // One ramp for both is that of a brake.
+  const bool two_ramps = capabilities_->own_deceleration;
+  const auto start = counts_of(told.acceleration);
+  const auto brake =
+      fixed > 0 ? static_cast<double>(fixed) : rounded_up(two_ramps ? counts_of(told.deceleration) : start);
+  return {.acceleration = takes(two_ramps ? rounded_down(start) : rounded_up(start)),
+          .deceleration = takes(brake)};
+}
+
+Planner::Ramps Planner::sent_ramps(const Plan& plan) const {
+  return sent_ramps(std::abs(plan.velocity_rpm),
+                    {.acceleration = plan.acceleration_time, .deceleration = plan.deceleration_time});
+}
+
+Plan Planner::granting(Plan plan) const {
+  const auto in_ms = [](Duration time) {
+    return std::max<Duration>(std::chrono::round<milliseconds>(time), milliseconds(1));
+  };
+  const auto [acceleration, deceleration] = sent_ramps(plan);
+  const bool counted = capabilities_->acceleration_count.rpm > 0;
+  plan.granted.velocity = std::abs(scale_->velocity_to_units(sent_rpm(plan.velocity_rpm)));
+  plan.granted.acceleration_time = counted ? in_ms(acceleration) : plan.acceleration_time;
+  plan.granted.deceleration_time =
+      counted || capabilities_->fixed_deceleration > 0 ? in_ms(deceleration) : plan.deceleration_time;
+  return plan;
+}
+
+Duration Planner::braking_time(double velocity, Duration told) const {
+  const auto rpm = static_cast<int>(std::ceil(std::abs(scale_->velocity_to_rpm(velocity)) - 1e-6));
+  return std::max(told, sent_ramps(rpm, {.acceleration = told, .deceleration = told}).deceleration);
 }
 
 Planner::Ramps Planner::ramps(const MotionValues& asked) const {
@@ -95,9 +153,10 @@ void Planner::check_profile(double velocity, const MotionValues& asked, Obstacle
   if (asked.deceleration_time && *asked.deceleration_time != deceleration)
     found.block(
         {.reason = Reason::not_supported,
-         .message = fmt::format("deceleration time of {} ms beside an acceleration time of {} ms: the "
-                                "drive brakes as it accelerates",
-                                milliseconds_of(*asked.deceleration_time), milliseconds_of(acceleration)),
+         .message = fmt::format("deceleration time of {} ms beside an acceleration time of {} ms: {}",
+                                milliseconds_of(*asked.deceleration_time), milliseconds_of(acceleration),
+                                capabilities_->fixed_deceleration > 0 ? "the drive's deceleration is fixed"
+                                                                      : "the drive brakes as it accelerates"),
          .remedy = "leave the deceleration time out"});
   check_ramp(acceleration, "acceleration time", found);
   check_ramp(deceleration, "deceleration time", found);
@@ -119,10 +178,7 @@ Result<Plan> Planner::profile(double velocity, const MotionValues& asked) const 
                               capabilities_->minimum_start_rpm, capabilities_->maximum_start_rpm);
   plan.acceleration_time = whole_ms(acceleration);
   plan.deceleration_time = whole_ms(deceleration);
-  plan.granted.velocity = std::abs(scale_->velocity_to_units(sent_rpm(plan.velocity_rpm)));
-  plan.granted.acceleration_time = plan.acceleration_time;
-  plan.granted.deceleration_time = plan.deceleration_time;
-  return plan;
+  return granting(std::move(plan));
 }
 
 Result<void> Planner::check_soft_limits(double target, double from) const {
@@ -181,20 +237,18 @@ Plan Planner::aimed(Plan plan, const PositionTracker::Target& target, const Posi
 
 Duration Planner::duration(const Plan& plan, std::int64_t pulses) const {
   const auto per_second = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
-  // A drive whose counts are coarse is slower than planned, and there the sooner: its ramps are as planned.
-  const auto sent = sent_rpm(plan.velocity_rpm);
-  const auto shortened = [share = sent / std::max(plan.velocity_rpm, 1)](Duration ramp) {
-    return std::chrono::duration_cast<Duration>(share *
-                                                std::chrono::duration<double, Duration::period>(ramp));
-  };
-  return move_duration(std::abs(static_cast<double>(pulses)), plan.start_rpm * per_second, sent * per_second,
-                       shortened(plan.acceleration_time), shortened(plan.deceleration_time));
+  const auto [acceleration, deceleration] = sent_ramps(plan);
+  return move_duration(std::abs(static_cast<double>(pulses)), plan.start_rpm * per_second,
+                       sent_rpm(plan.velocity_rpm) * per_second, acceleration, deceleration);
 }
 
 Duration Planner::soonest(const Plan& plan, std::int64_t pulses) const {
   const auto per_second = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
+  // One that is said to be fixed may follow what is told all the same.
+  const auto [acceleration, deceleration] = sent_ramps(plan);
   return soonest_duration(std::abs(static_cast<double>(pulses)), plan.start_rpm * per_second,
-                          plan.velocity_rpm * per_second, plan.acceleration_time, plan.deceleration_time);
+                          plan.velocity_rpm * per_second, std::min(acceleration, plan.acceleration_time),
+                          std::min(deceleration, plan.deceleration_time));
 }
 
 Result<std::optional<HomingProfile>> Planner::homing() const {
@@ -230,16 +284,13 @@ Result<std::optional<HomingProfile>> Planner::homing() const {
 
 Duration move_duration(double pulses, double start_speed, double speed, Duration acceleration_time,
                        Duration deceleration_time) {
-  const auto to_duration = [](double time) {
-    return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(time));
-  };
   if (pulses <= 0 || speed <= 0) return Duration{0};
   const auto ramps = in_seconds(acceleration_time) + in_seconds(deceleration_time);
   const auto mean = (start_speed + speed) / 2;
   const auto in_ramps = mean * ramps;
-  if (in_ramps <= pulses) return to_duration(ramps + (pulses - in_ramps) / speed);
+  if (in_ramps <= pulses) return duration_of(ramps + (pulses - in_ramps) / speed);
   // Too short to reach the speed: the ramps meet earlier. Bounded from above by the start speed all the way.
-  return to_duration(std::min(ramps * std::sqrt(pulses / in_ramps) * 2, pulses / std::max(start_speed, 1.0)));
+  return duration_of(std::min(ramps * std::sqrt(pulses / in_ramps) * 2, pulses / std::max(start_speed, 1.0)));
 }
 
 Duration soonest_duration(double pulses, double start_speed, double speed, Duration acceleration_time,

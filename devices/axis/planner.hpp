@@ -65,6 +65,9 @@ class Planner {
   [[nodiscard]] std::int64_t longest_move() const;
   /// The drive takes this as a target without its counter being zeroed first.
   [[nodiscard]] bool reachable(std::int64_t counter) const;
+  /// How long braking from `velocity` (user units per second) takes where a ramp of `told` is sent; never
+  /// less than that.
+  [[nodiscard]] Duration braking_time(double velocity, Duration told) const;
   /// Homing in drive direction and drive units; nullopt without `homing:`. Errors: out_of_range.
   [[nodiscard]] Result<std::optional<HomingProfile>> homing() const;
 
@@ -73,8 +76,17 @@ class Planner {
     Duration acceleration, deceleration;
   };
   [[nodiscard]] Ramps ramps(const MotionValues& asked) const;
+  /// r/min of one count.
+  [[nodiscard]] double size_of(const VelocityCount& count) const;
   /// What comes of so many r/min in the drive's own counts: never faster.
   [[nodiscard]] double sent_rpm(int rpm) const;
+  /// What comes of ramps up to `rpm` in the drive's own counts: how long they take to what is sent of it.
+  [[nodiscard]] Ramps sent_ramps(int rpm, const Ramps& told) const;
+  [[nodiscard]] Ramps sent_ramps(const Plan& plan) const;
+  /// With what will be sent as what is granted.
+  [[nodiscard]] Plan granting(Plan plan) const;
+  /// Both ramps fit into the way: the duration is exact then.
+  [[nodiscard]] bool reaches_speed(const Plan& plan, std::int64_t pulses) const;
   void check_ramp(Duration time, const char* name, Obstacles& found) const;
   [[nodiscard]] Plan at_speed(Plan plan, int rpm) const;
   [[nodiscard]] Plan lengthened(Plan plan, std::int64_t pulses, Duration wanted) const;

@@ -12,20 +12,25 @@ namespace {
 
 Duration distance_in_time(Duration one, Duration other) { return one > other ? one - other : other - one; }
 
-/// Both ramps fit into the way: the duration is exact then.
-bool reaches_speed(const Plan& plan, double pulses, double pulses_per_second_of_rpm) {
-  const auto mean = (plan.start_rpm + plan.velocity_rpm) * pulses_per_second_of_rpm / 2;
-  return mean * (in_seconds(plan.acceleration_time) + in_seconds(plan.deceleration_time)) <= pulses;
-}
-
 }  // namespace
+
+bool Planner::reaches_speed(const Plan& plan, std::int64_t pulses) const {
+  const auto per_rpm = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
+  const auto way_of = [&](double rpm, const Ramps& ramps) {
+    return (plan.start_rpm + rpm) * per_rpm / 2 *
+           (in_seconds(ramps.acceleration) + in_seconds(ramps.deceleration));
+  };
+  const Ramps told{.acceleration = plan.acceleration_time, .deceleration = plan.deceleration_time};
+  const auto longest =
+      std::max(way_of(plan.velocity_rpm, told), way_of(sent_rpm(plan.velocity_rpm), sent_ramps(plan)));
+  return longest <= static_cast<double>(std::abs(pulses));
+}
 
 Plan Planner::at_speed(Plan plan, int rpm) const {
   plan.velocity_rpm = rpm;
   plan.start_rpm = std::clamp(std::min(settings_->limits.start_speed_rpm, rpm),
                               capabilities_->minimum_start_rpm, capabilities_->maximum_start_rpm);
-  plan.granted.velocity = std::abs(scale_->velocity_to_units(sent_rpm(rpm)));
-  return plan;
+  return granting(std::move(plan));
 }
 
 /// Whole r/min are coarse at low speeds; longer ramps fill what is left.
@@ -37,27 +42,25 @@ Plan Planner::lengthened(Plan plan, std::int64_t pulses, Duration wanted) const 
   const auto longer = milliseconds(std::lround(missing * 2 * plan.velocity_rpm / speed_won * 1000));
   const auto longest = milliseconds(capabilities_->maximum_time_ms);
   auto candidate = plan;
-  candidate.acceleration_time = std::min<Duration>(plan.acceleration_time + longer / 2, longest);
+  const bool brakes_as_told = capabilities_->fixed_deceleration == 0;
+  candidate.acceleration_time =
+      std::min<Duration>(plan.acceleration_time + (brakes_as_told ? longer / 2 : longer), longest);
   const auto rest =
       longer - std::chrono::duration_cast<milliseconds>(candidate.acceleration_time - plan.acceleration_time);
   candidate.deceleration_time = capabilities_->own_deceleration
                                     ? std::min<Duration>(plan.deceleration_time + rest, longest)
                                     : candidate.acceleration_time;
-  candidate.granted.acceleration_time = candidate.acceleration_time;
-  candidate.granted.deceleration_time = candidate.deceleration_time;
-  const auto per_rpm = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
-  return reaches_speed(candidate, static_cast<double>(std::abs(pulses)), per_rpm) ? candidate : plan;
+  candidate = granting(std::move(candidate));
+  return reaches_speed(candidate, pulses) ? candidate : plan;
 }
 
 Plan Planner::stretched(Plan plan, std::int64_t pulses, Duration wanted) const {
   if (pulses == 0) return plan;
   const int lowest =
       std::min(plan.velocity_rpm, std::max(capabilities_->minimum_rpm, capabilities_->minimum_start_rpm));
-  const auto per_rpm = static_cast<double>(settings_->scale.pulses_per_revolution) / 60.0;
   const auto fits = [&](int rpm) {
     const auto slower = at_speed(plan, rpm);
-    return !reaches_speed(slower, static_cast<double>(std::abs(pulses)), per_rpm) ||
-           duration(slower, pulses) <= wanted;
+    return !reaches_speed(slower, pulses) || duration(slower, pulses) <= wanted;
   };
   // The lowest speed that is not too late, and the one below it.
   int low = lowest, high = plan.velocity_rpm;
@@ -68,16 +71,14 @@ Plan Planner::stretched(Plan plan, std::int64_t pulses, Duration wanted) const {
     else
       low = middle + 1;
   }
-  while (low > lowest && !reaches_speed(at_speed(plan, low), static_cast<double>(std::abs(pulses)), per_rpm))
-    --low;
+  while (low > lowest && !reaches_speed(at_speed(plan, low), pulses)) --low;
   auto best = lengthened(at_speed(plan, low), pulses, wanted);
   for (const int rpm : {low - 1, low + 1}) {
     if (rpm < lowest || rpm > plan.velocity_rpm) continue;
     auto other = lengthened(at_speed(plan, rpm), pulses, wanted);
     const bool nearer =
         distance_in_time(duration(other, pulses), wanted) < distance_in_time(duration(best, pulses), wanted);
-    if (nearer && reaches_speed(other, static_cast<double>(std::abs(pulses)), per_rpm))
-      best = std::move(other);
+    if (nearer && reaches_speed(other, pulses)) best = std::move(other);
   }
   best.predicted = duration(best, pulses);
   return best;

@@ -68,6 +68,13 @@ void limit_velocities(Capabilities& all, std::int64_t most_counts, cia402::Rate 
   all.maximum_homing_rpm = all.maximum_search_rpm = all.maximum_rpm;
 }
 
+/// By the file, of a drive that shows its deceleration and does not let it be written; 0: it has none.
+std::int64_t fixed_deceleration_of(const Eds& eds) {
+  const auto* entry = eds.find(cia402::object::deceleration);
+  if (entry == nullptr || canopen::writable(entry->access) || !entry->known()) return 0;
+  return std::max<std::int64_t>(0, entry->known()->value);
+}
+
 /// In the units that axisd plans in: r/min, pulses per second, ms.
 Capabilities capabilities_of(const Capabilities& base, std::span<const ParameterSpec> rows,
                              const Conventions& conventions) {
@@ -88,6 +95,10 @@ Capabilities capabilities_of(const Capabilities& base, std::span<const Parameter
     all.minimum_time_ms = as_int(ramp->minimum);
     all.maximum_time_ms = std::min(all.maximum_time_ms, as_int(ramp->maximum));
     all.minimum_homing_time_ms = all.minimum_time_ms;
+  } else {
+    const auto unit = conventions.units.acceleration;
+    all.acceleration_count = {.rpm = cia402::rpm_of_count(unit),
+                              .of_pulse = unit.angle == cia402::Angle::pulse};
   }
   all.closed_loop = conventions.closed_loop;
   all.position_source = conventions.closed_loop ? PositionSource::encoder : PositionSource::commanded;
@@ -115,6 +126,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   capabilities.homing = !homing_codes_.empty();
   capabilities.homing_ramp = eds.find(cia402::object::homing_acceleration) != nullptr;
   capabilities.own_deceleration = can_write(eds, cia402::object::deceleration);
+  capabilities.fixed_deceleration = fixed_deceleration_of(eds);
   const bool has_inputs = eds.find(object::inputs_value) != nullptr;
   if (!has_inputs) inputs = {};
   specialise = nullptr;

@@ -1,4 +1,4 @@
-// M12 on a CiA 402 drive without 6084h: it brakes as it accelerates.
+// M12 on a CiA 402 drive without 6084h, which brakes as it accelerates, or with one that is only read.
 #include <gtest/gtest.h>
 
 #include "tests/rules/model_rig.hpp"
@@ -35,6 +35,38 @@ TEST(M12, WithoutADecelerationOfItsOwnTheDriveBrakesAsItAccelerates) {
     EXPECT_FALSE(rig.moving());
   }
   EXPECT_EQ(rig.drive->peek(0x608400), untouched) << "it was never written";
+}
+
+/// 6084h = 5000: from 100 mm/s it brakes for 2 s, whatever it is told.
+TEST(M12, ADecelerationThatCannotBeSetIsInPredictionsAndBounds) {
+  ModelRig rig({.model = "cia402",
+                .limits = false,
+                .drive_keys = "objects: { 6084h: { access: ro, default: 5000 } }"});
+  rig.drive->poke(0x608400, 5000);
+  const auto done = [&rig](const Action& action) {
+    auto command = rig.complete(action);
+    EXPECT_EQ(command.state, CommandState::done) << describe(command);
+    return command;
+  };
+  done(EnableRequest{});
+  done(SetPositionRequest{.position = 0});
+  for (const double distance : {300.0, 5.0, -280.0}) {
+    const auto move = done(MoveRelativeRequest{.distance = distance, .with = {.acceleration_time = 150ms}});
+    EXPECT_EQ(move.granted.acceleration_time, std::optional<Duration>(150ms));
+    EXPECT_EQ(move.granted.deceleration_time, std::optional<Duration>(2s));
+  }
+  const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1, .with = {.deceleration_time = 1s}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::not_supported) << to_string(refused.error());
+  for (const Action& action :
+       {Action(MoveRelativeRequest{.distance = 400}), Action(MoveVelocityRequest{.velocity = -100})}) {
+    ASSERT_TRUE(rig.try_submit(action));
+    rig.run(1s);
+    EXPECT_TRUE(rig.moving());
+    EXPECT_EQ(done(StopRequest{}).granted.deceleration_time, std::optional<Duration>(2s));
+    EXPECT_FALSE(rig.moving());
+  }
+  EXPECT_EQ(rig.drive->peek(0x608400), 5000U) << "it was never written";
 }
 
 }  // namespace

@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <set>
 #include <sstream>
 
+#include "devices/axis/planner.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/objects.hpp"
 #include "devices/cia402_eds/eds_checks.hpp"
@@ -192,6 +194,53 @@ TEST(EdsDrive, BrakesAsItAcceleratesWithoutADeceleration) {
   const auto both = drive_of(example());
   EXPECT_TRUE(both.capabilities.own_deceleration);
   EXPECT_EQ(cia402::encode(both.model(), 1000, profile), (cia402::MotionBlock{5, 1000, 10'000, 10'000, 0}));
+}
+
+TEST(EdsDrive, ADecelerationThatIsOnlyReadIsWhatItBrakesWith) {
+  auto read_only = example();
+  read_only.replace(read_only.find("AccessType=rww", read_only.find("\n[6084]")), 14, "AccessType=ro");
+  EXPECT_EQ(drive_of(read_only).capabilities.fixed_deceleration, 100'000) << "its default";
+  EXPECT_EQ(drive_of(without(example(), "6084")).capabilities.fixed_deceleration, 0);
+  EXPECT_EQ(drive_of(example()).capabilities.fixed_deceleration, 0) << "it is written";
+}
+
+TEST(EdsDrive, RampsAreCountsOfTheirUnit) {
+  const auto count = [](cia402::Units units) {
+    return drive_of(example(), {.units = units}).capabilities.acceleration_count;
+  };
+  using cia402::Ramps;
+  EXPECT_DOUBLE_EQ(count({.ramps = Ramps::rates, .acceleration = *cia402::unit_named("rev_per_second")}).rpm,
+                   60);
+  const auto pulses = count({.ramps = Ramps::rates, .acceleration = cia402::pulses_per_second});
+  EXPECT_DOUBLE_EQ(pulses.rpm, 60);
+  EXPECT_TRUE(pulses.of_pulse);
+  EXPECT_DOUBLE_EQ(count({.ramps = Ramps::times}).rpm, 0);
+}
+
+/// What the planner takes for sent is what is encoded.
+TEST(EdsDrive, IsPredictedByTheRampsThatAreSent) {
+  const auto drive = drive_of(example(), {.units = {.velocity = *cia402::unit_named("rev_per_second"),
+                                                    .ramps = cia402::Ramps::rates,
+                                                    .acceleration = *cia402::unit_named("rev_per_second")}});
+  AxisSettings settings;
+  settings.scale = {.pulses_per_revolution = 1000, .unit = "rev"};
+  settings.limits.velocity = 20;
+  settings.limits.start_speed_rpm = 0;
+  const Scale scale(settings.scale);
+  const Planner planner(settings, drive, scale);
+  for (const int rpm : {300, 333, 600, 1199})
+    for (const auto time : {1ms, 7ms, 99ms, 667ms, 1000ms, 30'000ms}) {
+      const auto plan = planner.profile(rpm / 60.0, {.acceleration_time = time}).value();
+      const auto block = cia402::encode(drive.model(), 1000,
+                                        MoveProfile{.velocity_rpm = plan.velocity_rpm,
+                                                    .acceleration_time = plan.acceleration_time,
+                                                    .deceleration_time = plan.deceleration_time});
+      const auto speed = static_cast<double>(block[cia402::speed]);
+      const auto takes = [speed](std::int32_t counts) { return std::max(1.0, 1000 * speed / counts); };
+      const auto in_ms = [](Duration granted) { return static_cast<double>(granted / 1ms); };
+      EXPECT_NEAR(in_ms(*plan.granted.acceleration_time), takes(block[cia402::acceleration]), 0.51) << rpm;
+      EXPECT_NEAR(in_ms(*plan.granted.deceleration_time), takes(block[cia402::deceleration]), 0.51) << rpm;
+    }
 }
 
 TEST(EdsDrive, NeedsWhatTheDriverUses) {
