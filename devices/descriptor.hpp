@@ -137,6 +137,8 @@ struct Capabilities {
   /// Of targets and distances of single motions, as the drive counts them.
   std::int32_t minimum_target_pulses = std::numeric_limits<std::int32_t>::min();
   std::int32_t maximum_target_pulses = std::numeric_limits<std::int32_t>::max();
+  bool velocity_mode = true;              ///< else jogs and velocity moves are refused
+  std::string_view velocity_mode_lack{};  ///< why it has none: what is missing
   bool homing = true;
   bool homing_ramp = true;       ///< homing has an acceleration time of its own
   bool own_deceleration = true;  ///< motions have a deceleration time of their own; else both ramps are alike

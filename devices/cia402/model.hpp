@@ -8,6 +8,7 @@
 
 #include "buses/canopen/object.hpp"
 #include "buses/canopen/remote_node.hpp"
+#include "devices/cia402/objects.hpp"
 #include "devices/cia402/units.hpp"
 #include "devices/descriptor.hpp"
 
@@ -100,6 +101,9 @@ struct Model {
   /// Those of unit_objects() that the drive has: they are compared with `meaning` before it is configured.
   std::span<const canopen::Object> unit_objects{};
   std::optional<Addressing> addressing{};  ///< nothing: only the drive's switches or tools can
+  /// Mode in which nothing goes on that a halt interrupted, and nothing begins (M23): profile velocity with
+  /// 60FFh = 0. A drive without that mode: homing, without bit 4 of the control word, else none.
+  OperationMode neutral_mode = OperationMode::profile_velocity;
   /// The manual prints an EMCY identifier that is another service's: 1014h is set to 80h + node first (M24).
   bool sets_emergency_id = true;
 };
