@@ -310,6 +310,8 @@ class Axis {
   void look_at_motion(const CommandOptions& options, Obstacles& found) const;
   void look_at_direction(bool positive, Obstacles& found) const;
   void look_at_target(const PositionTracker::Target& target, Obstacles& found) const;
+  /// Jogs and velocity moves are refused on a drive without velocity mode. Errors: not_supported.
+  [[nodiscard]] Result<void> check_velocity_mode() const;
   void look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const;
   void look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const;
   void look_at_present_motion(Obstacles& found) const;

@@ -68,6 +68,7 @@ Result<Plan> Axis::plan_behind(const Action& action, const PositionTracker& from
   if (const auto* request = std::get_if<MoveVelocityRequest>(&action)) {
     if (request->hold)
       return fail(error(Reason::not_supported, "a hold begins at once, so it cannot wait", "leave out hold"));
+    if (auto possible = check_velocity_mode(); !possible) return fail(possible.error());
     auto plan = planner_.profile(request->velocity, request->with);
     if (plan) plan->granted.velocity = std::copysign(*plan->granted.velocity, request->velocity);
     return plan;

@@ -208,6 +208,7 @@ void Axis::look_at_what_forbids_some(Obstacles& found) const {
     found.note(not_trusted("the position is unknown: absolute moves are refused, and limits cannot be kept"));
   for (const bool positive : {true, false})
     if (limit_active(positive)) found.note(direction_blocked(positive));
+  if (auto possible = check_velocity_mode(); !possible) found.note(possible.error());
 }
 
 Error Axis::not_trusted(std::string message) const {
@@ -221,7 +222,9 @@ Error Axis::not_trusted(std::string message) const {
 Error Axis::direction_blocked(bool positive) const {
   return error(Reason::limit_switch,
                fmt::format("the {} limit switch is active", positive ? "positive" : "negative"),
-               "move away from it: " + shell("jog", positive ? "-VELOCITY" : "VELOCITY"));
+               "move away from it: " +
+                   (check_velocity_mode() ? shell("jog", positive ? "-VELOCITY" : "VELOCITY")
+                                          : shell("move", positive ? "--relative -WAY" : "--relative WAY")));
 }
 
 void Axis::look_at_direction(bool positive, Obstacles& found) const {
@@ -347,7 +350,17 @@ void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& opt
   look_at_line(found);
 }
 
+Result<void> Axis::check_velocity_mode() const {
+  const auto& capabilities = descriptor_->capabilities;
+  if (capabilities.velocity_mode) return {};
+  return fail(error(
+      Reason::not_supported,
+      fmt::format("the drive can neither jog nor run at a velocity: {}", capabilities.velocity_mode_lack),
+      "give it positions: " + shell("move", "--relative WAY")));
+}
+
 void Axis::look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const {
+  found.block_on(check_velocity_mode());
   planner_.check_profile(velocity, with, found);
   if (!std::isfinite(velocity) || velocity == 0) return;
   look_at_direction(velocity > 0, found);

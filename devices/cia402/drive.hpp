@@ -225,6 +225,11 @@ class Cia402Drive final : public Drive {
   /// `limit`: until the drive shows it.
   Task<Result<void>> change_mode(OperationMode mode, SdoOptions options,
                                  Duration limit = std::chrono::milliseconds(500));
+  [[nodiscard]] bool has_velocity_mode() const { return model_->descriptor->capabilities.velocity_mode; }
+  /// 60FFh; 0 where the drive has no velocity mode, and nothing that would follow it.
+  Task<Result<std::int64_t>> read_target_velocity(SdoOptions options);
+  Task<Result<void>> clear_target_velocity(SdoOptions options);
+  Task<Result<void>> enter_neutral_mode(SdoOptions options);
   Task<Result<void>> neutralise(State state, SdoOptions options);
   Task<Result<void>> make_ready(State state, OperationMode mode, SdoOptions options);
   Task<Result<void>> leave_halt(State state, OperationMode mode, std::optional<std::int64_t> position,

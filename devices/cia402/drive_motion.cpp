@@ -35,6 +35,9 @@ Task<Result<void>> Cia402Drive::start_move(MoveProfile profile, MotionGuard guar
 }
 
 Task<Result<void>> Cia402Drive::start_velocity(VelocityProfile profile, MotionGuard guard) {
+  if (!has_velocity_mode())
+    co_return fail(error_at(Reason::not_supported, object::target_velocity,
+                            "the drive has no profile velocity mode", "move to positions"));
   if (expected_.empty())
     co_return fail(
         error_at(Reason::configuring, object::target_position, "the drive is not configured yet", "wait"));

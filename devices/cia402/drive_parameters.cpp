@@ -127,11 +127,10 @@ Task<Result<void>> Cia402Drive::write_segments(DriveSegments /*segments*/) {
 
 Task<Result<void>> Cia402Drive::quieten() {
   // A terminal that starts a motion (position, velocity) would run with what stands here.
-  const auto velocity = co_await read_object(object::target_velocity, parameters());
+  const auto velocity = co_await read_target_velocity(parameters());
   if (!velocity) co_return fail(velocity.error());
   if (*velocity != 0)
-    if (const auto stopped = co_await write_verified(object::target_velocity, 0, parameters()); !stopped)
-      co_return stopped;
+    if (const auto stopped = co_await clear_target_velocity(parameters()); !stopped) co_return stopped;
   // A terminal may have released the motor that the control word still enables.
   constexpr std::int64_t enabling = 0x0007;
   const auto word = co_await read_object(object::control_word, parameters());

@@ -3,7 +3,8 @@
 // What could turn the shaft when 0Fh is sent or halt is released: 60FFh in velocity mode (there 0Fh is the
 // start command, 6.2.2), bit 4, and a set-point that a halt suspended. What releasing halt does with the last
 // is not said (6.2.4 "ends the present position", CiA 402 goes on with it), so it is released in velocity
-// mode with 60FFh = 0, where a set-point means nothing, and position mode is chosen after that.
+// mode with 60FFh = 0, where a set-point means nothing, and position mode is chosen after that. A drive
+// without velocity mode has another one for that: Model::neutral_mode.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -67,6 +68,23 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
   co_return Result<void>{};
 }
 
+Task<Result<std::int64_t>> Cia402Drive::read_target_velocity(SdoOptions options) {
+  if (!has_velocity_mode()) co_return std::int64_t{0};
+  co_return co_await read_object(object::target_velocity, std::move(options));
+}
+
+Task<Result<void>> Cia402Drive::clear_target_velocity(SdoOptions options) {
+  if (!has_velocity_mode()) co_return Result<void>{};
+  co_return co_await write_verified(object::target_velocity, 0, std::move(options));
+}
+
+/// Where that is homing mode it is entered anew, so that no homing that a halt interrupted goes on, either.
+Task<Result<void>> Cia402Drive::enter_neutral_mode(SdoOptions options) {
+  if (model_->neutral_mode == OperationMode::homing)
+    if (auto left = co_await change_mode(OperationMode::profile_position, options); !left) co_return left;
+  co_return co_await change_mode(model_->neutral_mode, std::move(options));
+}
+
 /// Leaves nothing that the end of a halt, or 0Fh, could start; in Operation Enabled halted. Everything is
 /// read back.
 Task<Result<void>> Cia402Drive::neutralise(State state, SdoOptions options) {
@@ -76,7 +94,7 @@ Task<Result<void>> Cia402Drive::neutralise(State state, SdoOptions options) {
   const auto word = static_cast<std::uint16_t>(quiet_word(state) | (halted ? control::halt : 0U));
   if (*held != word)
     if (const auto written = co_await write_control(word, options); !written) co_return written;
-  if (const auto zero = co_await write_verified(object::target_velocity, 0, options); !zero) co_return zero;
+  if (const auto zero = co_await clear_target_velocity(options); !zero) co_return zero;
   if (halt_option_ != model_->meaning.halt_on_ramp) {
     // After a quick stop; drives without the object have one way to halt.
     halt_option_.reset();
@@ -84,11 +102,11 @@ Task<Result<void>> Cia402Drive::neutralise(State state, SdoOptions options) {
     if (!ramp && ramp.error().outcome != Outcome::refused) co_return ramp;
     halt_option_ = model_->meaning.halt_on_ramp;
   }
-  if (const auto mode = co_await change_mode(OperationMode::profile_velocity, options); !mode) co_return mode;
+  if (const auto mode = co_await enter_neutral_mode(options); !mode) co_return mode;
   control_.reset();
   const auto now = co_await held_control(options);
   if (!now) co_return fail(now.error());
-  const auto speed = co_await read_object(object::target_velocity, std::move(options));
+  const auto speed = co_await read_target_velocity(std::move(options));
   if (!speed) co_return fail(speed.error());
   if (*now == word && *speed == 0) co_return Result<void>{};
   co_return fail(
@@ -179,7 +197,7 @@ Task<Result<void>> Cia402Drive::watch_standstill(std::int64_t position, SdoOptio
 Task<Result<void>> Cia402Drive::confirm_nothing_pending(SdoOptions options) {
   const auto word = co_await read_object(object::control_word, options);
   if (!word) co_return fail(word.error());
-  const auto speed = co_await read_object(object::target_velocity, options);
+  const auto speed = co_await read_target_velocity(options);
   if (!speed) co_return fail(speed.error());
   const auto mode = co_await read_object(object::mode_display, std::move(options));
   if (!mode) co_return fail(mode.error());
@@ -329,7 +347,7 @@ Task<Result<void>> Cia402Drive::clear_alarm(MotionGuard guard) {
       .transaction_class = TransactionClass::parameters, .guard = std::move(guard), .attempts = 3};
   const auto state = co_await read_status(options);
   if (!state) co_return fail(state.error());
-  if (const auto zero = co_await write_verified(object::target_velocity, 0, options); !zero) co_return zero;
+  if (const auto zero = co_await clear_target_velocity(options); !zero) co_return zero;
   if (*state == State::fault || *state == State::fault_reaction_active) {
     if (const auto reset = co_await reset_fault(options); !reset) co_return reset;
     const auto now = co_await read_status(options);

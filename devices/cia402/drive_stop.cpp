@@ -134,7 +134,7 @@ Task<> Cia402Drive::send_control_pdo(std::uint16_t word) {
 
 /// M12. In a mode that nobody knows it does no harm, and it asks for no knowledge of the control word.
 Task<> Cia402Drive::zero_velocity(SdoOptions options) {
-  if (mode_ && *mode_ != OperationMode::profile_velocity) co_return;
+  if (!has_velocity_mode() || (mode_ && *mode_ != OperationMode::profile_velocity)) co_return;
   (void)co_await write_object(object::target_velocity, 0, 0, std::move(options));
 }
 
@@ -240,21 +240,25 @@ Task<Result<void>> Cia402Drive::choose_mode_soon(OperationMode mode, SdoOptions 
 }
 
 /// An edge of bit 8 on a motor that turns under halt. Between its two words nothing can be behind it:
-/// velocity mode with 60FFh = 0, as in make_ready(). By RPDO at once, and by SDO, where the drive answers
+/// the neutral mode, with 60FFh = 0, as in make_ready(). By RPDO at once, and by SDO, where the drive answers
 /// each: one that looks at the word once per cycle sees no edge in the first pair. Nothing where that is not
 /// ready: in another mode a move that the halt suspended goes on, and a drive that falls silent may hear the
 /// first word of a pair alone. Errors: the drive does not answer, refuses, or stays in another mode.
 Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions options) {
   const auto word = static_cast<std::uint16_t>(bits | control::halt);
-  const auto zeroed = co_await write_object(object::target_velocity, 0, 0, options);
-  if (!zeroed) co_return fail(zeroed.error());
-  // In Switched On it is the change of the mode that ends a motion.
-  if (bits == control_word(Command::switch_on) && mode_ == OperationMode::profile_velocity)
+  const auto neutral = model_->neutral_mode;
+  if (has_velocity_mode())
+    if (auto zeroed = co_await write_object(object::target_velocity, 0, 0, options); !zeroed)
+      co_return zeroed;
+  // In Switched On it is the change of the mode that ends a motion; and what is under way may be a homing.
+  const bool of_neutral = neutral == OperationMode::homing
+                              ? mode_.value_or(neutral) == neutral
+                              : bits == control_word(Command::switch_on) && mode_ == neutral;
+  if (of_neutral)
     if (auto left = co_await choose_mode_soon(OperationMode::profile_position, options); !left)
       co_return left;
-  if (mode_ != OperationMode::profile_velocity)
-    if (auto chosen = co_await choose_mode_soon(OperationMode::profile_velocity, options); !chosen)
-      co_return chosen;
+  if (mode_ != neutral)
+    if (auto chosen = co_await choose_mode_soon(neutral, options); !chosen) co_return chosen;
   // Somebody has led the drive elsewhere meanwhile: these bits would lead it back.
   if (state_bits_ && *state_bits_ != bits) co_return Result<void>{};
   co_await send_control_pdo(bits);

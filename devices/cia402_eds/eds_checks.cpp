@@ -60,6 +60,7 @@ constexpr auto used_if_there = std::to_array<Used>({
     {cia402::object::homing_search_speed, kind},
     {cia402::object::homing_acceleration, kind},
     {object::inputs_value, kind},
+    {cia402::object::target_velocity, whole},
     {object::drive_modes, bit(EdsPart::value)},
 });
 
@@ -83,8 +84,11 @@ constexpr auto needed = std::to_array<Needed>({
     {cia402::object::profile_velocity, "profile velocity", Use::written, "u32", whole},
     {cia402::object::acceleration, "profile acceleration", Use::written, "u32", whole},
     {cia402::object::deceleration, "profile deceleration", Use::written_if_possible, "u32", whole},
-    {cia402::object::target_velocity, "target velocity", Use::written, "i32", whole},
 });
+/// What profile velocity mode uses beside them.
+constexpr Needed for_velocity{cia402::object::target_velocity, "target velocity", Use::written, "i32", whole};
+
+constexpr unsigned position_bit = 0, velocity_bit = 2;  ///< of 6502h
 
 /// As the configuration names it: without a sub-index of 0.
 std::string name_of(Object object) {
@@ -96,6 +100,12 @@ std::string settled(Object object, EdsPart part) {
   return found == keys.end()
              ? std::string()
              : fmt::format("{}: {{ {}: {} }}", name_of(object), found->key, found->placeholder);
+}
+
+EdsFinding without_mode(std::string_view name) {
+  return {0,
+          fmt::format("by object {} the drive has no profile {} mode", to_string(object::drive_modes), name),
+          settled(object::drive_modes, EdsPart::value)};
 }
 
 /// The object, as far as axisd uses it, that this flaw leaves open and the configuration does not settle.
@@ -149,6 +159,13 @@ bool can_write(const Eds& eds, Object object) {
   return entry != nullptr && canopen::writable(entry->access);
 }
 
+std::string velocity_mode_lack(const Eds& eds) {
+  if (!supports(eds, velocity_bit)) return without_mode("velocity").message;
+  std::vector<EdsFinding> found;
+  check_needed(eds, for_velocity, found);
+  return found.empty() ? std::string() : found.front().message;
+}
+
 std::vector<EdsFinding> check_eds(const Eds& eds, const Overrides& overrides) {
   std::vector<EdsFinding> found;
   std::set<Object> doubtful;
@@ -159,14 +176,8 @@ std::vector<EdsFinding> check_eds(const Eds& eds, const Overrides& overrides) {
     found.push_back({flaw.line, fmt::format("{}, and axisd uses object {}", flaw.message, to_string(*object)),
                      settled(*object, flaw.part)});
   }
-  constexpr unsigned position_bit = 0, velocity_bit = 2;
-  for (const auto& [mode_bit, name] :
-       {std::pair(position_bit, "position"), std::pair(velocity_bit, "velocity")})
-    if (!doubtful.contains(object::drive_modes) && !supports(eds, mode_bit))
-      found.push_back(
-          {0,
-           fmt::format("by object {} the drive has no profile {} mode", to_string(object::drive_modes), name),
-           settled(object::drive_modes, EdsPart::value)});
+  if (!doubtful.contains(object::drive_modes) && !supports(eds, position_bit))
+    found.push_back(without_mode("position"));
   for (const auto& one : needed)
     if (!doubtful.contains(one.object)) check_needed(eds, one, found);
   return found;
@@ -185,8 +196,7 @@ std::string remedy_of(const std::vector<EdsFinding>& findings) {
   const auto by_key = fmt::format("say what the drive's manual says: drive: {{ objects: {{ {} }} }}",
                                   fmt::join(keys_to_write, ", "));
   if (!of_the_drive) return by_key;
-  return "model cia402 needs a drive with profile position and profile velocity mode; where the drive has "
-         "what its file lacks, " +
+  return "model cia402 needs a drive with profile position mode; where the drive has what its file lacks, " +
          by_key;
 }
 

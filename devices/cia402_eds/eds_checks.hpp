@@ -25,6 +25,8 @@ std::string remedy_of(const std::vector<EdsFinding>& findings);
 std::vector<std::string> warnings_of(const canopen::Eds& eds, const Overrides& overrides,
                                      const std::string& path);
 
+/// Why the drive has no profile velocity mode, by its objects; empty: it has it.
+std::string velocity_mode_lack(const canopen::Eds& eds);
 /// 6502h; without it, or without its value, a drive is taken to have every mode.
 bool supports(const canopen::Eds& eds, unsigned mode_bit);
 /// The drive has it, and it is not read-only.

@@ -80,8 +80,8 @@ Capabilities capabilities_of(const Capabilities& base, std::span<const Parameter
                              const Conventions& conventions) {
   const auto row = [rows](Object object) { return find_parameter(rows, object.key()); };
   auto all = base;
-  const auto fastest =
-      std::min(row(cia402::object::profile_velocity)->maximum, row(cia402::object::target_velocity)->maximum);
+  auto fastest = row(cia402::object::profile_velocity)->maximum;
+  if (all.velocity_mode) fastest = std::min(fastest, row(cia402::object::target_velocity)->maximum);
   limit_velocities(all, fastest, conventions.units.velocity);
   const auto* target = row(cia402::object::target_position);
   const auto whole = [](std::int64_t value) {
@@ -118,11 +118,14 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
     : DriveDescriptor(base),
       catalogue_(catalogue_of(eds)),
       homing_codes_(homing_codes_of(eds)),
+      velocity_lack_(velocity_mode_lack(eds)),
       warnings_(std::move(warnings_of_file)),
       unit_objects_(unit_objects_of(eds)) {
   warnings = warnings_;
   parameters = catalogue_.rows;
-  capabilities = capabilities_of(base.capabilities, parameters, conventions);
+  capabilities.velocity_mode_lack = velocity_lack_;
+  capabilities.velocity_mode = velocity_lack_.empty();
+  capabilities = capabilities_of(capabilities, parameters, conventions);
   capabilities.homing = !homing_codes_.empty();
   capabilities.homing_ramp = eds.find(cia402::object::homing_acceleration) != nullptr;
   capabilities.own_deceleration = can_write(eds, cia402::object::deceleration);
@@ -134,6 +137,8 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   model_.identity.vendor = identity_of(eds, object::identity_vendor, eds.vendor);
   model_.identity.product = identity_of(eds, object::identity_product, eds.product);
   model_.homing_codes = homing_codes_;
+  if (!capabilities.velocity_mode)
+    model_.neutral_mode = capabilities.homing ? cia402::OperationMode::homing : cia402::OperationMode::none;
   model_.objects.velocity = object::velocity_value;
   if (has_inputs) model_.objects.inputs = object::inputs_value;
   if (eds.find(object::position_window) != nullptr) model_.objects.position_window = object::position_window;

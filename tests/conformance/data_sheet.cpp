@@ -75,6 +75,11 @@ class Sheet {
     const auto increments = value(0x608F, 1), turns = value(0x608F, 2);
     return increments > turns && turns > 0 ? increments / turns : usual_counts;
   }
+  [[nodiscard]] bool runs_at_velocities() const {
+    constexpr std::int64_t velocity_mode = 0x04;
+    const auto modes = value(0x6502);
+    return can_write(0x60FF) && (modes == 0 || (modes & velocity_mode) != 0);
+  }
   [[nodiscard]] bool homes() const {
     constexpr std::int64_t homing_mode = 0x20;
     const auto modes = value(0x6502);
@@ -118,6 +123,11 @@ Skipped skipped_by(const Sheet& sheet) {
          {"all_methods", "without_limit_switches", "again_with_the_bit_left_over", "on_the_switch",
           "switch_never_found", "stop_while_homing", "power_cycle_at_rest", "restarts", "conflicts"},
          "no 6098h, 6099h or bit 5 of 6502h: the drive does not home");
+  if (!sheet.runs_at_velocities())
+    skip(skipped,
+         {"velocity_moves", "velocity_to_the_software_limit", "jogging", "jogging_untrusted",
+          "run_into_limits", "limits_at_standstill"},
+         "no 60FFh, or no bit 2 of 6502h: the drive has no profile velocity mode");
   const auto braking = sheet.value(0x6084);
   if (sheet.has(0x6084) && !sheet.can_write(0x6084) && braking > 0 &&
       braking < turns_per_second * sheet.counts())

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "devices/axis/planner.hpp"
 #include "devices/cia402/encoding.hpp"
@@ -249,15 +250,38 @@ TEST(EdsDrive, NeedsWhatTheDriverUses) {
   EXPECT_THAT(missing_in(text), ElementsAre("object 6040h:00 (control word) is missing",
                                             "object 607Ah:00 (target position) is missing"));
   text = example();
-  text.replace(text.find("DefaultValue=0x00000025"), 23, "DefaultValue=0x00000021");
-  EXPECT_THAT(missing_in(text), ElementsAre("by object 6502h:00 the drive has no profile velocity mode"));
+  text.replace(text.find("DefaultValue=0x00000025"), 23, "DefaultValue=0x00000024");
+  EXPECT_THAT(missing_in(text), ElementsAre("by object 6502h:00 the drive has no profile position mode"));
   text = example();
-  const auto at = text.find("[60FF]");
+  const auto at = text.find("[6081]");
   text.replace(text.find("AccessType=rww", at), 14, "AccessType=ro");
   text.replace(text.find("DataType=0x0004", text.find("[6064]")), 15, "DataType=0x0015");
   EXPECT_THAT(missing_in(text),
               ElementsAre("object 6064h:00 (position actual value) is no whole number of 8, 16 or 32 bits",
-                          "object 60FFh:00 (target velocity) cannot be written"));
+                          "object 6081h:00 (profile velocity) cannot be written"));
+}
+
+TEST(EdsDrive, PositionsWithoutVelocityMode) {
+  auto no_bit = example(), read_only = example();
+  no_bit.replace(no_bit.find("DefaultValue=0x00000025"), 23, "DefaultValue=0x00000021");
+  read_only.replace(read_only.find("AccessType=rww", read_only.find("[60FF]")), 14, "AccessType=ro");
+  const std::pair<std::string, std::string_view> lacking[] = {
+      {without(example(), "60FF"), "object 60FFh:00 (target velocity) is missing"},
+      {no_bit, "by object 6502h:00 the drive has no profile velocity mode"},
+      {read_only, "object 60FFh:00 (target velocity) cannot be written"}};
+  for (const auto& [text, why] : lacking) {
+    EXPECT_THAT(missing_in(text), ElementsAre());
+    const auto drive = drive_of(text);
+    EXPECT_FALSE(drive.capabilities.velocity_mode);
+    EXPECT_EQ(drive.capabilities.velocity_mode_lack, why);
+    EXPECT_EQ(drive.capabilities.maximum_pulse_rate_hz, 2'000'000) << "6081h";
+    EXPECT_EQ(drive.model().neutral_mode, cia402::OperationMode::homing);
+  }
+  const auto positions_alone = drive_of(without(without(example(), "60FF"), "6098"));
+  EXPECT_EQ(positions_alone.model().neutral_mode, cia402::OperationMode::none);
+  const auto both = drive_of(example());
+  EXPECT_TRUE(both.capabilities.velocity_mode);
+  EXPECT_EQ(both.model().neutral_mode, cia402::OperationMode::profile_velocity);
 }
 
 TEST(EdsDrive, IsMadeFromItsFile) {

@@ -37,7 +37,6 @@ struct Row {
   std::string_view unit{};
 };
 
-constexpr std::string_view no_velocity_mode = "object 60FFh:00 (target velocity) is missing";
 constexpr std::string_view no_control_word = "object 6040h:00 (control word) is missing";
 
 const std::vector<Row>& table() {
@@ -47,7 +46,8 @@ const std::vector<Row>& table() {
       {"elmo-gold-whistle-v002.dcf", {}},
       {"elmo-simpliq.dcf", {}, 1},  // lists 6406h without describing it
       {"elmo.eds", {}},
-      {"emec-drv5-rev09.eds", {no_velocity_mode, "object 6081h:00 (profile velocity) is missing"}},
+      {"emec-drv5-rev09.eds",
+       {"object 606Ch:00 (velocity actual value", "object 6081h:00 (profile velocity) is missing"}},
       {"eyou-yiyou-servo-1.4.eds", {}, 2},  // limits of 2023h and 2025h beyond their type
       {"faulhaber-327-3150-1.eds", {}, 2},  // limits of 6061h, which is only read, the wrong way round
       {"faulhaber-605-3150-67-b.eds", {}},
@@ -59,13 +59,13 @@ const std::vector<Row>& table() {
       {"maxon-epos4.eds", {}, 0, "rpm"},       // 60A9h
       {"nanotec-cl4-e-1-12.eds", {}, 0, "rpm"},
       {"oriental-motor-blvd-krd-v400.eds", {}, 2},  // default and limit of 403Dh beyond their type
-      {"pilz-prbt-0-1.dcf", {no_velocity_mode, "the drive has no profile velocity mode"}},
+      {"pilz-prbt-0-1.dcf", {}},                    // without 60FFh: for positions alone
       {"roboteq-v60.eds", {no_control_word}},
       {"ros2-canopen-fake-slave.eds", {}},
       {"ros2-canopen-robot-control.eds", {}},  // without 6084h
       {"schunk-golems.eds", {no_control_word}},
-      {"schunk-lwa4p-0-63.dcf", {no_velocity_mode, "the drive has no profile velocity mode"}},
-      {"schunk-prl120.eds", {no_velocity_mode}},
+      {"schunk-lwa4p-0-63.dcf", {"by object 6502h:00 the drive has no profile position mode"}},
+      {"schunk-prl120.eds", {}},  // without 60FFh: for positions alone
       {"sevcon-gen4.eds", {no_control_word}},
       {"technosoft-isd860.eds", {}},  // without 6084h
       {"trinamic-tmcc-160.eds", {}},  // 6084h is read-only
