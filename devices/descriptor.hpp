@@ -118,6 +118,13 @@ struct VelocityCount {
   bool of_pulse = false;  ///< where a revolution has one pulse: it is that much less with more
 };
 
+/// A homing method that the configuration may name by its number: the drive's own affair, with whatever
+/// switches it has.
+struct HomingNumber {
+  std::int8_t number = 0;
+  std::int8_t mirror = 0;  ///< what an inverted axis needs instead (M18); 0: there is none
+};
+
 /// Ranges that hold for every command of this model.
 struct Capabilities {
   std::span<const std::int32_t> pulses_per_revolution;  ///< permitted microstep settings
@@ -140,7 +147,8 @@ struct Capabilities {
   bool velocity_mode = true;              ///< else jogs and velocity moves are refused
   std::string_view velocity_mode_lack{};  ///< why it has none: what is missing
   bool homing = true;
-  bool homing_ramp = true;       ///< homing has an acceleration time of its own
+  std::span<const HomingNumber> homing_numbers{};  ///< in order; none: methods have no numbers
+  bool homing_ramp = true;                         ///< homing has an acceleration time of its own
   bool own_deceleration = true;  ///< motions have a deceleration time of their own; else both ramps are alike
   int maximum_segments = 16;     ///< of positions and velocities that the inputs can select
   int minimum_segment_time_ms = 30;

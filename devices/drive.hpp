@@ -79,6 +79,7 @@ struct HomingProfile {
   int search_velocity_rpm = 0;
   Duration acceleration_time{};
   std::int32_t offset_pulses = 0;
+  std::optional<std::int8_t> number{};  ///< in place of `method`: the drive's own; drive direction
 };
 
 /// The drive's segment table in drive units and direction; index 0 is segment 1, unset ones are 0.

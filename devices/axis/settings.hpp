@@ -86,6 +86,9 @@ struct HomingSettings {
   std::optional<double> backoff;     ///< bounded move away from an already active switch, user units > 0
   std::optional<double> max_travel;  ///< user units > 0
   Duration timeout = std::chrono::seconds(60);
+  /// A method of the drive's own (Capabilities::homing_numbers), in axis direction; then `method` is not
+  /// used.
+  std::optional<std::int8_t> number{};
 };
 
 /// What an axis does when the lease under which it is commanded ends (M16).
