@@ -22,6 +22,19 @@ namespace {
 /// Relative slack in comparisons of motor speeds: the YAML's decimals pass through divisions.
 constexpr double slack = 1e-9;
 
+/// "-128 to -1, 1 to 37".
+std::string text_of(std::span<const HomingNumber> numbers) {
+  std::string text;
+  for (std::size_t first = 0; first < numbers.size();) {
+    auto last = first;
+    while (last + 1 < numbers.size() && numbers[last + 1].number == numbers[last].number + 1) ++last;
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", int{numbers[first].number});
+    if (last > first) text += fmt::format(" to {}", int{numbers[last].number});
+    first = last + 1;
+  }
+  return text;
+}
+
 }  // namespace
 
 void AxisChecks::run() {
@@ -375,8 +388,28 @@ void AxisChecks::check_homing() {
         fmt::format("'backoff' has no effect: this drive of model {} does not show its switches",
                     axis_.model),
         "leave it out: the drive leaves an active switch by itself");
+  if (homing.number) check_homing_number();
   check_below("homing.velocity", homing.velocity, "limits.velocity", axis_.limits.velocity);
   check_below("homing.search_velocity", homing.search_velocity, "homing.velocity", homing.velocity);
+}
+
+void AxisChecks::check_homing_number() {
+  if (given("homing.backoff"))
+    add("homing.backoff", "'backoff' has no effect with a homing method by its number",
+        "leave it out: the drive leaves an active switch by itself");
+  if (model_ == nullptr || !model_->capabilities.homing || !usable("homing.method")) return;
+  const auto numbers = model_->capabilities.homing_numbers;
+  const int wanted = *axis_.homing->number;
+  const auto found = std::ranges::find(numbers, wanted, &HomingNumber::number);
+  if (numbers.empty())
+    add("homing.method", fmt::format("homing methods of model {} have no numbers", axis_.model),
+        "permitted: " + alternatives(homing_methods()));
+  else if (found == numbers.end())
+    add("homing.method", fmt::format("this drive of model {} has no homing method {}", axis_.model, wanted),
+        "by its data sheet it may have " + text_of(numbers));
+  else if (axis_.scale.invert && usable("scale.invert") && found->mirror == 0)
+    add("homing.method", fmt::format("homing method {} cannot be mirrored for an inverted axis", wanted),
+        "write another one, or turn the motor's direction instead of scale.invert");
 }
 
 void complete_axis(AxisEntry& entry, Diagnostics& diagnostics, const Places& places) {

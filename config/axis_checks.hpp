@@ -51,6 +51,8 @@ class AxisChecks {
   void check_speeds();
   void check_start_speed();
   void check_homing();
+  /// A method of the drive's own.
+  void check_homing_number();
   // One value, if it was given and could be read.
   void check_time(std::string_view key, Duration value, int minimum_ms);
   void check_distance(std::string_view key, std::optional<double> value, std::string_view from = "");

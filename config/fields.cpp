@@ -60,7 +60,10 @@ void add_terminals(Fields& fields, std::string_view section, const std::vector<T
 
 void add_homing(Fields& fields, const HomingSettings& homing) {
   fields.enter("homing");
-  fields.add("method", homing.method);
+  if (homing.number)
+    fields.add("method", fmt::format("number {}", int{*homing.number}));
+  else
+    fields.add("method", homing.method);
   fields.add("velocity", homing.velocity);
   fields.add("search_velocity", homing.search_velocity);
   fields.add("acceleration_time", homing.acceleration_time);

@@ -11,12 +11,18 @@ constexpr KeySpec homing_keys[] = {
     {.key = "method",
      .kind = Kind::choice,
      .required = true,
-     .description = "Which switch is searched for and in which axis direction.",
+     .description = "Which switch is searched for and in which axis direction. A number is a method of a CiA "
+                    "402 drive (6098h), which homes by itself then, with whatever switches it has.",
      .example = "home_negative",
+     .minimum = -128,
+     .maximum = 127,
      .choices = methods,
      .apply =
          [](Target& t, const Value& v) {
-           t.axis->axis.homing->method = static_cast<HomingMethod>(choice_index(methods, v.text));
+           if (v.text.empty())
+             t.axis->axis.homing->number = static_cast<std::int8_t>(v.integer);
+           else
+             t.axis->axis.homing->method = static_cast<HomingMethod>(choice_index(methods, v.text));
          }},
     {.key = "velocity",
      .kind = Kind::velocity,

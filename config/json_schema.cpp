@@ -188,8 +188,14 @@ Object type_of(const KeySpec& spec) {
       return result.text("type", "number").raw("not", Object().raw("const", "0").json());
     case Kind::boolean:
       return result.text("type", "boolean");
-    case Kind::choice:
-      return result.raw("enum", choices_of(spec));
+    case Kind::choice: {
+      if (!spec.maximum) return result.raw("enum", choices_of(spec));
+      Object named, numbered;
+      named.raw("enum", choices_of(spec));
+      numbered.text("type", "integer");
+      add_bounds(numbered, spec);
+      return result.raw("anyOf", array({named.json(), numbered.json()}));
+    }
     case Kind::names:
       return result.text("type", "array")
           .raw("items", Object().text("type", "string").text("pattern", whole(spec.pattern)).json())

@@ -111,7 +111,7 @@ std::string form(const KeySpec& spec) {
     case Kind::boolean:
       return "true or false";
     case Kind::choice:
-      return alternatives(spec.choices);
+      return alternatives(spec.choices) + (spec.maximum ? ", or whole number" : "");
     case Kind::names:
       return "list of names";
     case Kind::roles:

@@ -26,7 +26,7 @@ enum class Kind : std::uint8_t {
   register_address,   ///< 256 or 0x0100; minimum..maximum
   number,             ///< "-0.1": a decimal number without unit, not 0
   boolean,
-  choice,          ///< one of `choices`
+  choice,          ///< one of `choices`; with a maximum also a whole number, minimum..maximum
   names,           ///< a list of at least two names, each once
   roles,           ///< for each of some clients, whose names match `pattern`, one of `choices`
   parts,           ///< true (all `choices`), false (none), or a list of some of them

@@ -64,7 +64,7 @@ void AxisChecks::check_brake() {
 }
 
 void AxisChecks::check_homing_switch() {
-  if (!axis_.homing || !usable("homing.method")) return;
+  if (!axis_.homing || axis_.homing->number || !usable("homing.method")) return;
   const auto method = axis_.homing->method;
   const auto name = homing_methods()[static_cast<std::size_t>(method)];
   const bool by_switch = method == HomingMethod::home_positive || method == HomingMethod::home_negative;

@@ -52,14 +52,6 @@ Parsed parse_text(const KeySpec& spec, const Node& node) {
   return Value{.text = node.text};
 }
 
-Parsed parse_choice(const KeySpec& spec, const Node& node) {
-  if (std::ranges::find(spec.choices, node.text) == spec.choices.end()) {
-    return wrong(node, fmt::format("'{}' cannot be {}", spec.key, quoted(node.text)),
-                 suggest(node.text, spec.choices));
-  }
-  return Value{.text = node.text};
-}
-
 Parsed parse_model(const KeySpec&, const Node& node) {
   if (find_drive_model(node.text) == nullptr) {
     const auto models = names_of(drive_models(), [](const DriveDescriptor* d) { return d->model; });
@@ -79,6 +71,13 @@ Parsed parse_integer(const KeySpec& spec, const Node& node) {
   if (!number) return wrong(spec, node, number.error());
   if (auto ok = check_bounds(spec, node, number->value, ""); !ok) return std::unexpected(ok.error());
   return Value{.integer = number->numerator};
+}
+
+Parsed parse_choice(const KeySpec& spec, const Node& node) {
+  if (std::ranges::find(spec.choices, node.text) != spec.choices.end()) return Value{.text = node.text};
+  if (spec.maximum && node.plain && matches(node.text, "-?[0-9]+")) return parse_integer(spec, node);
+  return wrong(node, fmt::format("'{}' cannot be {}", spec.key, quoted(node.text)),
+               suggest(node.text, spec.choices));
 }
 
 /// What YAML 1.1 and 1.2 both read as the same number: no leading zeros, lower-case 0x.

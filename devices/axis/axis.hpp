@@ -398,6 +398,8 @@ class Axis {
   Task<bool> back_off(ActivityPtr activity);
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
   [[nodiscard]] std::string_view homing_switch() const;
+  /// The switch that homing searches for is active; false: not, or the search is the drive's own affair.
+  [[nodiscard]] bool on_homing_switch() const;
   [[nodiscard]] Error reached_switch() const;
   [[nodiscard]] std::int64_t counter_at_home() const;
 

@@ -19,6 +19,10 @@ constexpr Duration home_settling = std::chrono::milliseconds(500);
 
 }  // namespace
 
+bool Axis::on_homing_switch() const {
+  return settings_.homing && !settings_.homing->number && input_active(homing_switch());
+}
+
 std::string_view Axis::homing_switch() const {
   switch (settings_.homing->method) {
     case HomingMethod::home_positive:
@@ -41,7 +45,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
     });
     co_return;
   }
-  if (input_active(homing_switch())) {
+  if (on_homing_switch()) {
     if (!co_await back_off(activity)) co_return;
     const auto now = env_.clock->now();
     start_by(activity, now, now + settings_.start_within);
@@ -66,7 +70,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
     const Chain chain(*this);
     if (activity->turn) result = co_await look(settings_.reboot_guard);  // it may have waited long
     if (!current(*activity) || !may_start(*activity)) co_return;
-    if (result && input_active(homing_switch())) result = axisd::fail(reached_switch());
+    if (result && on_homing_switch()) result = axisd::fail(reached_switch());
     if (result) {
       lose_trust();
       homed_before = sample_->homed;
@@ -137,7 +141,7 @@ Task<bool> Axis::back_off(ActivityPtr activity) {
   activity->plan = *plan;
   if (!co_await positioned(activity)) co_return false;
   tracker_.forget_base();
-  if (!input_active(homing_switch())) co_return true;
+  if (!on_homing_switch()) co_return true;
   finish(*activity, [this](CommandRecord& command) {
     command.error(error(Reason::limit_switch,
                         fmt::format("the {} switch is still active after backing off", homing_switch()),

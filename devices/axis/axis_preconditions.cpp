@@ -295,7 +295,7 @@ void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options
   if (!settings_.homing) {
     found.block(
         error(Reason::not_supported, "no homing is configured", "add homing: to the axis in the YAML"));
-  } else if (input_active(homing_switch()) && !settings_.homing->backoff) {
+  } else if (on_homing_switch() && !settings_.homing->backoff) {
     found.block(error(Reason::limit_switch, fmt::format("the {} switch is already active", homing_switch()),
                       "move away from it, or configure homing: { backoff: ... }"));
   }

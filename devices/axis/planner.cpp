@@ -267,6 +267,11 @@ Result<std::optional<HomingProfile>> Planner::homing() const {
                         .acceleration_time = homing.acceleration_time,
                         .offset_pulses = static_cast<std::int32_t>(std::clamp<std::int64_t>(
                             scale_->to_pulses(homing.offset), -1'000'000'000, 1'000'000'000))};
+  if (homing.number) {
+    const auto number = homing_number(*settings_, *capabilities_);
+    if (!number) return fail(number.error());
+    profile.number = *number;
+  }
   if (profile.velocity_rpm < capabilities_->minimum_homing_rpm || profile.velocity_rpm > highest)
     return fail(out_of_range(fmt::format("homing velocity {} {}", homing.velocity, unit),
                              units(capabilities_->minimum_homing_rpm), units(highest), unit));
@@ -319,6 +324,19 @@ HomingMethod mirrored(HomingMethod method) {
   return method;
 }
 
+Result<std::int8_t> homing_number(const AxisSettings& settings, const Capabilities& capabilities) {
+  const int wanted = settings.homing->number.value_or(0);
+  const auto found = std::ranges::find(capabilities.homing_numbers, wanted, &HomingNumber::number);
+  if (found == capabilities.homing_numbers.end())
+    return fail(Reason::misconfigured, fmt::format("the drive has no homing method {}", wanted),
+                "write another one, as homing: { method }");
+  if (!settings.scale.invert) return found->number;
+  if (found->mirror != 0) return found->mirror;
+  return fail(Reason::misconfigured,
+              fmt::format("homing method {} cannot be mirrored for an inverted axis", wanted),
+              "write another one, or turn the motor's direction instead of scale.invert");
+}
+
 Result<void> check_mirror(const AxisSettings& settings, const DriveDescriptor& descriptor) {
   if (!settings.scale.invert) return {};
   const auto has = [&](std::string_view function) {
@@ -332,8 +350,9 @@ Result<void> check_mirror(const AxisSettings& settings, const DriveDescriptor& d
   const bool mirrors = descriptor.capabilities.home_approach_mirrors ||
                        (approach != settings.model_settings.end() &&
                         approach->second == SettingValue(std::string("as_searched")));
-  const bool to_home = settings.homing && (settings.homing->method == HomingMethod::home_positive ||
-                                           settings.homing->method == HomingMethod::home_negative);
+  const bool to_home = settings.homing && !settings.homing->number &&
+                       (settings.homing->method == HomingMethod::home_positive ||
+                        settings.homing->method == HomingMethod::home_negative);
   if (to_home && !mirrors)
     return fail(
         Reason::misconfigured,

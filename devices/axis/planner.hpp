@@ -107,6 +107,9 @@ Duration soonest_duration(double pulses, double start_speed, double speed, Durat
 
 /// The opposite direction for inverted axes (M18).
 HomingMethod mirrored(HomingMethod method);
+/// In drive direction. Errors (misconfigured): the drive has no such method, or none that mirrors it.
+/// Precondition: homing is configured.
+Result<std::int8_t> homing_number(const AxisSettings& settings, const Capabilities& capabilities);
 /// May this configuration be inverted? Errors: misconfigured, where the drive cannot be mirrored (M18).
 Result<void> check_mirror(const AxisSettings& settings, const DriveDescriptor& descriptor);
 /// What the drive of this axis has to be, mirrored if inverted.

@@ -260,7 +260,7 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] Error answers_too_late() const;
   /// M11: what the object would take is 0.
   [[nodiscard]] Error too_slow(Object object) const;
-  Task<Result<void>> write_homing_method(HomingMethod method, SdoOptions options);
+  Task<Result<void>> write_homing_method(HomingProfile profile, SdoOptions options);
   Task<Result<void>> home_here(SdoOptions options);
 
   // drive_group_start.cpp

@@ -26,6 +26,12 @@ std::int32_t braking_pulses(const HomingProfile& profile, std::int64_t pulses_pe
   return static_cast<std::int32_t>(std::lround(per_second * seconds / 2));
 }
 
+/// CiA 402: 37, and 35 as it was called before, take the present position for home.
+bool is_in_place(const HomingProfile& profile) {
+  constexpr int present_position = 37, present_position_too = 35;
+  return profile.number == present_position || profile.number == present_position_too;
+}
+
 }  // namespace
 
 Task<Result<void>> Cia402Drive::start_move(MoveProfile profile, MotionGuard guard) {
@@ -199,7 +205,8 @@ Task<> Cia402Drive::acknowledge_set_point(SdoOptions options) {
 Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions options) {
   homing_start_ = {.offset = profile.offset_pulses,
                    .braking = braking_pulses(profile, setup_.pulses_per_revolution),
-                   .window = position_window()};
+                   .window = position_window(),
+                   .in_place = is_in_place(profile)};
   const auto word = co_await read_object(object::status_word, options);
   if (!word) co_return fail(word.error());
   const auto bits = static_cast<std::uint16_t>(*word);
@@ -213,7 +220,7 @@ Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions
     if (*present == value) continue;
     if (const auto written = co_await write_verified(object, value, options); !written) co_return written;
   }
-  if (const auto chosen = co_await write_homing_method(profile.method, options); !chosen) co_return chosen;
+  if (const auto chosen = co_await write_homing_method(profile, options); !chosen) co_return chosen;
   if ((bits & both) != 0) co_return Result<void>{};
   // Twice: the bits may follow the mode a cycle late.
   const auto again = co_await read_object(object::status_word, std::move(options));
@@ -223,8 +230,13 @@ Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions
 }
 
 /// The manual has two lists of codes (6.2.6: 17 ... 29, chapter 7: 0 ... 3): the drive says which it knows.
-Task<Result<void>> Cia402Drive::write_homing_method(HomingMethod method, SdoOptions options) {
-  const auto code = std::ranges::find(model_->homing_codes, method, &HomingCode::method);
+Task<Result<void>> Cia402Drive::write_homing_method(HomingProfile profile, SdoOptions options) {
+  if (profile.number) {
+    const auto present = co_await read_object(object::homing_method, options);
+    if (present && *present == *profile.number) co_return Result<void>{};
+    co_return co_await write_verified(object::homing_method, *profile.number, std::move(options));
+  }
+  const auto code = std::ranges::find(model_->homing_codes, profile.method, &HomingCode::method);
   if (code == model_->homing_codes.end())
     co_return fail(error_at(Reason::not_supported, object::homing_method,
                             "the drive has no such homing method", "choose another homing: { method: }"));

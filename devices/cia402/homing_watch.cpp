@@ -20,6 +20,7 @@ void HomingWatch::begin(TimePoint at, Start start) {
   began_ = at;
   start_ = start;
   was_low_ = start.was_low;
+  moved_ = start.in_place;
 }
 
 /// Which of the three it is after an offset is not said (6.2.6; CiA 402 has had both signs).

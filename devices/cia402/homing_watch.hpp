@@ -41,6 +41,8 @@ class HomingWatch {
     /// Before the start the bit was low, at rest: once it is high it has risen for this homing, however short
     /// that was.
     bool was_low = false;
+    /// Home is where the motor stands: nothing moves, and where the counter is 0 it is home, whoever did it.
+    bool in_place = false;
   };
 
   void begin(TimePoint at, Start start);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "devices/cia402/encoding.hpp"
@@ -47,6 +48,59 @@ std::vector<cia402::HomingCode> homing_codes_of(const Eds& eds) {
           {.method = HomingMethod::home_negative, .code = 28},
           {.method = HomingMethod::positive_limit, .code = 18},
           {.method = HomingMethod::negative_limit, .code = 17}};
+}
+
+/// Of the methods of CiA 402 the one that does the same in the other direction; 0: none is known, as of a
+/// maker's own.
+int mirror_of(int number) {
+  static constexpr std::pair<int, int> mirrors[] = {
+      {1, 2},   {3, 5},   {4, 6},   {7, 11},  {8, 12},  {9, 13},  {10, 14}, {17, 18}, {19, 21},
+      {20, 22}, {23, 27}, {24, 28}, {25, 29}, {26, 30}, {33, 34}, {35, 35}, {37, 37}};
+  for (const auto& [one, other] : mirrors) {
+    if (number == one) return other;
+    if (number == other) return one;
+  }
+  return 0;
+}
+
+/// 60E3h, where the file has all of it; else what 6098h takes: a maker's own methods, and those of CiA 402.
+std::set<int> homing_methods_of(const Eds& eds) {
+  std::set<int> all, listed;
+  const auto known = [&eds](Object object) -> std::optional<std::int64_t> {
+    const auto* entry = eds.find(object);
+    return entry == nullptr || !entry->known() ? std::nullopt : std::optional(entry->known()->value);
+  };
+  constexpr std::int64_t most_subs = 254;
+  const auto count = std::clamp<std::int64_t>(known(object::homing_methods).value_or(0), 0, most_subs);
+  bool complete = count > 0;
+  for (std::int64_t sub = 1; sub <= count; ++sub) {
+    const auto number = known({object::homing_methods.index, static_cast<std::uint8_t>(sub)});
+    complete = complete && number;
+    if (number) listed.insert(static_cast<std::int8_t>(*number));
+  }
+  const auto* method = eds.find(cia402::object::homing_method);
+  const auto low = method->low ? method->low->value : std::numeric_limits<std::int8_t>::min();
+  constexpr std::int64_t last_of_profile = 37;
+  const auto high = std::min(last_of_profile, method->high ? method->high->value : last_of_profile);
+  for (auto number = std::max<std::int64_t>(low, std::numeric_limits<std::int8_t>::min()); number <= high;
+       ++number)
+    all.insert(static_cast<int>(number));
+  if (complete) all = std::move(listed);
+  all.erase(0);
+  return all;
+}
+
+std::vector<HomingNumber> homing_numbers_of(const Eds& eds) {
+  if (!can_home(eds)) return {};
+  const auto methods = homing_methods_of(eds);
+  std::vector<HomingNumber> numbers;
+  numbers.reserve(methods.size());
+  for (const int number : methods) {
+    const int mirror = mirror_of(number);
+    numbers.push_back({.number = static_cast<std::int8_t>(number),
+                       .mirror = static_cast<std::int8_t>(methods.contains(mirror) ? mirror : 0)});
+  }
+  return numbers;
 }
 
 int as_int(std::int64_t value) {
@@ -118,6 +172,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
     : DriveDescriptor(base),
       catalogue_(catalogue_of(eds)),
       homing_codes_(homing_codes_of(eds)),
+      homing_numbers_(homing_numbers_of(eds)),
       velocity_lack_(velocity_mode_lack(eds)),
       warnings_(std::move(warnings_of_file)),
       unit_objects_(unit_objects_of(eds)) {
@@ -127,6 +182,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   capabilities.velocity_mode = velocity_lack_.empty();
   capabilities = capabilities_of(capabilities, parameters, conventions);
   capabilities.homing = !homing_codes_.empty();
+  capabilities.homing_numbers = homing_numbers_;
   capabilities.homing_ramp = eds.find(cia402::object::homing_acceleration) != nullptr;
   capabilities.own_deceleration = can_write(eds, cia402::object::deceleration);
   capabilities.fixed_deceleration = fixed_deceleration_of(eds);

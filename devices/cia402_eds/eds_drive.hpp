@@ -40,6 +40,7 @@ class EdsDrive final : public DriveDescriptor {
  private:
   Catalogue catalogue_;
   std::vector<cia402::HomingCode> homing_codes_;
+  std::vector<HomingNumber> homing_numbers_;
   std::string velocity_lack_;
   std::vector<std::string> warnings_;
   std::vector<canopen::Object> unit_objects_;

@@ -43,7 +43,8 @@ Settings settings_of(const AxisSettings& from) {
       .homing_travel = {},
       .inputs = {}};
   if (from.homing) {
-    to.homing_method = method_name(from.homing->method);
+    to.homing_method = from.homing->number ? fmt::format("method {} of the drive", int{*from.homing->number})
+                                           : method_name(from.homing->method);
     to.homing_velocity = from.homing->velocity;
     to.homing_travel = from.homing->max_travel;
   }

@@ -348,6 +348,33 @@ TEST_F(EdsFile, ADriveWithoutHomingModeHasNoHoming) {
       HasSubstr("this drive of model cia402 does not home"));
 }
 
+std::string homing_by(std::string_view method, std::string_view more = "") {
+  return fmt::format("    homing: {{ method: {}, velocity: 50 mm/s, search_velocity: 5 mm/s{} }}\n", method,
+                     more);
+}
+
+TEST(EdsHoming, AMethodByItsNumberIsTheDrivesOwn) {
+  const auto found = [](std::string_view method, std::string_view more = "", std::string invert = "false") {
+    return findings(load({.invert = std::move(invert), .inputs = "", .more = homing_by(method, more)}));
+  };
+  for (const auto* method : {"17", "1", "37", "-1", "-128"}) EXPECT_EQ(found(method), "") << method;
+  EXPECT_THAT(found("0"), AllOf(HasSubstr("this drive of model cia402 has no homing method 0"),
+                                HasSubstr("by its data sheet it may have -128 to -1, 1 to 37")));
+  EXPECT_THAT(found("38"), HasSubstr("this drive of model cia402 has no homing method 38"));
+  EXPECT_THAT(found("128"), HasSubstr("'method' is out of range"));
+  EXPECT_THAT(found("'17'"), HasSubstr("'method' cannot be '17'"));
+  EXPECT_THAT(found("17", ", backoff: 5 mm"), HasSubstr("'backoff' has no effect with a homing method by"));
+  EXPECT_EQ(found("24", "", "true"), "");
+  EXPECT_THAT(found("-3", "", "true"), HasSubstr("homing method -3 cannot be mirrored for an inverted axis"));
+  const auto axis = [](std::string_view method) {
+    return load({.inputs = "", .more = homing_by(method)}).configuration.value();
+  };
+  EXPECT_EQ(axis("-7").axes.at(0).axis.homing->number, std::optional<std::int8_t>(-7));
+  const auto changes = differences(axis("17"), axis("18"));
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_THAT(changes[0].keys, ElementsAre("homing.method"));
+}
+
 TEST_F(EdsFile, ADriveWithoutDigitalInputsHasNoTerminals) {
   write_without("60FD");
   EXPECT_EQ(found({.inputs = ""}), "");

@@ -18,6 +18,7 @@ LOADER_ONLY = {
     "function_twice_inverted",
     "group_axes",
     "home_approach",
+    "homing_number",
     "homing_without_switch",
     "jog_travel",
     "limit_homing_without_switch",

@@ -154,6 +154,17 @@ TEST(HomingWatch, AStartThatTheDriveIgnoredReachesNothing) {
   }
 }
 
+/// It has no motion to show: that the counter is 0 there is all that there is of it.
+TEST(HomingWatch, HomeWhereTheMotorStandsNeedsNoMotion) {
+  for (const std::int32_t where : {0, away}) {
+    HomingWatch watch;
+    watch.begin(start, {.from = where, .in_place = true});
+    EXPECT_TRUE(goes_on(watch, at(10ms, false, true, where)));
+    EXPECT_FALSE(goes_on(watch, at(520ms, false, true, where)));
+    EXPECT_EQ(watch.reached(), where == 0) << "ignored, with the counter as it was";
+  }
+}
+
 TEST(HomingWatch, AwayFromHomeABitThatRoseIsWaitedFor) {
   HomingWatch watch;
   watch.begin(start, {.from = away, .offset = offset});

@@ -261,6 +261,40 @@ TEST(EdsDrive, NeedsWhatTheDriverUses) {
                           "object 6081h:00 (profile velocity) cannot be written"));
 }
 
+std::vector<int> homing_numbers(const canopen::Eds& eds) {
+  const EdsDrive drive(base(), eds, {});
+  std::vector<int> numbers;
+  for (const auto& one : drive.capabilities.homing_numbers) numbers.push_back(one.number);
+  return numbers;
+}
+
+TEST(EdsDrive, HomesByNumbersThatItsEdsPermits) {
+  using canopen::EdsNumber;
+  auto eds = parsed(example());
+  EXPECT_EQ(homing_numbers(eds).size(), 128U + 37U);
+  eds.objects.at({0x6098, 0}).low = EdsNumber{.value = -2};
+  eds.objects.at({0x6098, 0}).high = EdsNumber{.value = 3};
+  EXPECT_THAT(homing_numbers(eds), ElementsAre(-2, -1, 1, 2, 3));
+  const auto list = [&eds](std::uint8_t sub, std::optional<std::int64_t> value) {
+    const canopen::Object object{0x60E3, sub};
+    canopen::EdsObject entry{.object = object, .name = "Supported homing methods"};
+    if (value) entry.initial = EdsNumber{.value = *value};
+    eds.objects.insert_or_assign(object, std::move(entry));
+  };
+  list(0, 4);
+  for (const auto& [sub, value] : {std::pair(1, 37), std::pair(2, 0xFF), std::pair(3, 17)})
+    list(static_cast<std::uint8_t>(sub), value);
+  list(4, std::nullopt);
+  EXPECT_EQ(homing_numbers(eds).size(), 5U) << "it does not say all of them";
+  list(4, 18);
+  EXPECT_THAT(homing_numbers(eds), ElementsAre(-1, 17, 18, 37));
+  const EdsDrive drive(base(), eds, {});
+  std::vector<int> mirrors;
+  for (const auto& one : drive.capabilities.homing_numbers) mirrors.push_back(one.mirror);
+  EXPECT_THAT(mirrors, ElementsAre(0, 18, 17, 37));
+  EXPECT_TRUE(drive_of(without(example(), "6098")).capabilities.homing_numbers.empty());
+}
+
 TEST(EdsDrive, PositionsWithoutVelocityMode) {
   auto no_bit = example(), read_only = example();
   no_bit.replace(no_bit.find("DefaultValue=0x00000025"), 23, "DefaultValue=0x00000021");
