@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "api/server/peer_socket.hpp"
+#include "buses/heartbeat.hpp"
 
 namespace axisd::server {
 namespace {
@@ -24,7 +25,7 @@ namespace {
 // Kept free for serial ports that come back, state files and the like.
 constexpr int kept_descriptors = 64;
 /// A flood of requests lasts no longer before it is noticed; that it is looked for costs some microseconds.
-constexpr Duration count_every = std::chrono::milliseconds(250);
+constexpr Duration count_every = heartbeat;
 
 int descriptor_limit() {
   rlimit limit{};
@@ -71,11 +72,9 @@ void AcceptLoop::run() {
       polled.push_back({.fd = connection.get(), .events = POLLRDHUP, .revents = 0});
       watched.push_back(id);
     }
-    const auto pause =
-        connections_.empty()
-            ? -1
-            : static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(count_every).count());
-    if (poll(polled.data(), polled.size(), pause) < 0 && errno != EINTR) {
+    progress_.store(monotonic_now(), std::memory_order_relaxed);
+    constexpr auto pause = std::chrono::ceil<std::chrono::milliseconds>(heartbeat);
+    if (poll(polled.data(), polled.size(), static_cast<int>(pause.count())) < 0 && errno != EINTR) {
       spdlog::error("accept loop: poll: {}", std::generic_category().message(errno));
       return;
     }

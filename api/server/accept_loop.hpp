@@ -39,6 +39,8 @@ class AcceptLoop {
 
   /// Connections turned away since the start. Thread: any.
   [[nodiscard]] std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
+  /// When the loop last came round, or was made. Thread: any.
+  [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
 
  private:
   void run();
@@ -59,6 +61,7 @@ class AcceptLoop {
   TimePoint counted_{};
   std::uint64_t cut_off_ = 0;
   std::atomic<std::uint64_t> refused_{0};
+  std::atomic<TimePoint> progress_{monotonic_now()};
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

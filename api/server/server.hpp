@@ -68,6 +68,9 @@ class Server {
   /// Full names of the services of ours that it serves. Thread: any.
   [[nodiscard]] std::vector<std::string> services() const;
 
+  /// When its accept loop last came round: it lets in who connects. Thread: any.
+  [[nodiscard]] TimePoint last_progress() const;
+
   /// Batches of axis states serialised since the start. Thread: any.
   [[nodiscard]] std::uint64_t batches_serialised() const;
 

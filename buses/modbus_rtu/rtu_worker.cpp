@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "buses/heartbeat.hpp"
 #include "buses/modbus_rtu/serial_port.hpp"
 #include "buses/modbus_rtu/wire_session.hpp"
 
@@ -18,7 +19,6 @@ namespace {
 
 constexpr Duration first_back_off = std::chrono::milliseconds(100);
 constexpr Duration longest_back_off = std::chrono::seconds(1);
-constexpr Duration longest_idle = std::chrono::seconds(1);
 /// A stop needs some 0.1 ms from its arrival to the slot. Where the core is later than this, the line goes
 /// on.
 constexpr Duration longest_yield = std::chrono::milliseconds(5);
@@ -231,7 +231,7 @@ bool RtuWorker::yield_to_stop() {
 
 void RtuWorker::idle(WireSession& session, int& lost) {
   idle_.store(true);
-  if (!armed() && !quitting()) lost = session.idle(longest_idle);
+  if (!armed() && !quitting()) lost = session.idle(heartbeat);
   idle_.store(false);
 }
 
@@ -244,7 +244,7 @@ void RtuWorker::wait_closed(Duration duration, int native_error) {
     if (const auto* exchange = take()) {
       report(*exchange, ExchangeResult{.status = ExchangeStatus::not_sent, .native_error = native_error});
     } else {
-      wakeup_.wait(until - monotonic_now());
+      wakeup_.wait(std::min<Duration>(until - monotonic_now(), heartbeat));
     }
     idle_.store(false);
   }

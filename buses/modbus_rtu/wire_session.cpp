@@ -8,11 +8,11 @@
 #include <cerrno>
 #include <utility>
 
+#include "buses/heartbeat.hpp"
+
 namespace axisd::modbus_rtu {
 namespace {
 
-/// Longest single wait, so that the watchdog sees an idle line alive.
-constexpr Duration longest_wait = std::chrono::seconds(1);
 constexpr int echo_attempts = 3;
 /// How often a wait for an echo asks whether it must end.
 constexpr Duration between_looks = std::chrono::milliseconds(1);
@@ -52,12 +52,20 @@ WireSession::WireSession(SerialPort port, const LineSettings& line, Wakeup& wake
       last_byte_(monotonic_now()),  // whatever was said before the opening may just have ended
       request_end_(last_byte_) {}
 
-WireSession::~WireSession() { block_until(request_end_ + wire_time(serial_, 1)); }
+WireSession::~WireSession() {
+  const auto end = request_end_ + wire_time(serial_, 1);
+  busy_until(end);
+  block_until(end);
+}
 
 TimePoint WireSession::touch() {
   const auto now = monotonic_now();
   progress_.store(now.time_since_epoch().count(), std::memory_order_relaxed);
   return now;
+}
+
+void WireSession::busy_until(TimePoint until) {
+  progress_.store(std::max(until, monotonic_now()).time_since_epoch().count(), std::memory_order_relaxed);
 }
 
 /// Waits for bytes until `until`, or with `for_bytes` false for the time alone; with `cut_from` a cut ends
@@ -68,7 +76,7 @@ WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_
     if (wakeup_.quit.load(std::memory_order_acquire)) return Wait::quit;
     const bool cut = cut_from != nullptr && wakeup_.cut.load(std::memory_order_acquire);
     const auto end = cut ? std::min(until, *cut_from) : until;
-    const auto timeout = to_timespec(std::min<Duration>(end - now, longest_wait));
+    const auto timeout = to_timespec(std::min<Duration>(end - now, heartbeat));
     // A negative descriptor is not looked at.
     std::array<pollfd, 2> watched{
         {{.fd = for_bytes ? port_.descriptor() : -1, .events = POLLIN, .revents = 0},
@@ -85,7 +93,7 @@ WireSession::Wait WireSession::wait_until(TimePoint until, const TimePoint* cut_
 
 int WireSession::idle(Duration limit) {
   touch();
-  const auto timeout = to_timespec(std::min(limit, longest_wait));
+  const auto timeout = to_timespec(std::min(limit, heartbeat));
   std::array<pollfd, 2> watched{{{.fd = port_.descriptor(), .events = POLLIN, .revents = 0},
                                  {.fd = wakeup_.descriptor(), .events = POLLIN, .revents = 0}}};
   if (ppoll(watched.data(), watched.size(), &timeout, nullptr) < 0) return errno == EINTR ? 0 : errno;
@@ -118,7 +126,7 @@ int WireSession::keep_silence() {
     const auto heard = absorb();
     if (heard.native_error != 0) return heard.native_error;
     if (heard.count == 0) return 0;
-    if (monotonic_now() < give_up) continue;
+    if (touch() < give_up) continue;
     silence_.abandon();
     return 0;
   }

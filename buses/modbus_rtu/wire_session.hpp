@@ -23,7 +23,8 @@ namespace axisd::modbus_rtu {
 /// Functions that return `int` return 0 or the errno with which the port was lost; it is useless afterwards.
 class WireSession {
  public:
-  /// `progress` is stamped (monotonic, in ticks of TimePoint) at least once per second.
+  /// `progress` is stamped (monotonic, in ticks of TimePoint) with each `heartbeat`; before a wait that
+  /// nothing ends sooner, with the end of it.
   WireSession(SerialPort port, const LineSettings& line, Wakeup& wakeup,
               std::atomic<TimePoint::rep>& progress);
   WireSession(const WireSession&) = delete;
@@ -84,6 +85,7 @@ class WireSession {
   void settle(ExchangeResult& result);
   void end(ExchangeResult& result, ExchangeStatus status, int native_error = 0);
   TimePoint touch();
+  void busy_until(TimePoint until);
 
   /// A line that never falls silent (a stuck transmitter, a second master) must not keep a stop from being
   /// tried.

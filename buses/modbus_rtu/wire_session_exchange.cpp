@@ -121,6 +121,7 @@ void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
 
 /// For the rest of a reply that has begun: nothing but its deadline ends this.
 WireSession::Wait WireSession::wait_for_more() {
+  busy_until(reply_deadline_);
   for (;;) {
     looked_ = monotonic_now();
     const auto left = reply_deadline_ - looked_;
@@ -202,6 +203,7 @@ TimePoint WireSession::begin_of(const Frame& frame, TimePoint seen) const {
 /// Lets libmodbus read one frame. True: the exchange has ended.
 bool WireSession::take_frame(const Exchange& exchange, ExchangeResult& result) {
   const auto first_byte = monotonic_now();
+  busy_until(reply_deadline_);
   const auto received = port_.receive(exchange.request.node, reply_deadline_ - first_byte);
   touch();
   if (received.kind == Reception::failed) {

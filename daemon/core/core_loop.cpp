@@ -4,12 +4,12 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
+#include "buses/heartbeat.hpp"
 #include "devices/access.hpp"
 
 namespace axisd::core {
 namespace {
 
-constexpr auto longest_sleep = std::chrono::seconds(1);
 /// Handlers that may run before input is looked for.
 constexpr int most_ready = 32;
 
@@ -126,9 +126,9 @@ bool CoreLoop::run_ready() {
 
 void CoreLoop::run() {
   const ReadyQueue::Here here(ready_);
-  // At most a second asleep, so that the watchdog sees an idle loop alive.
+  // So that the watchdog sees an idle loop alive.
   Clock::Timer beat;
-  const std::function<void()> beats = [&] { beat = clock_->call_at(clock_->now() + longest_sleep, beats); };
+  const std::function<void()> beats = [&] { beat = clock_->call_at(clock_->now() + heartbeat, beats); };
   beats();
   auto began = monotonic_now();
   while (!io_.stopped()) {

@@ -26,6 +26,7 @@
 #include "api/server/peer_socket.hpp"
 #include "api/server/status.hpp"
 #include "api/tls/identity.hpp"
+#include "buses/heartbeat.hpp"
 
 namespace axisd::server {
 
@@ -35,7 +36,6 @@ using lane::StopCalls;
 
 namespace {
 
-constexpr Duration longest_sleep = std::chrono::seconds(1);
 /// Until it is tried again to let somebody in, when the system has no descriptors.
 constexpr Duration when_full = std::chrono::milliseconds(100);
 /// Until it is looked again whether a client may be read from that had too many stops waiting.
@@ -177,9 +177,8 @@ bool StopLane::Loop::serve_once() {
                       .revents = 0});
     ids.push_back(id);
   }
-  const auto until =
-      std::min<Duration>({full ? when_full : longest_sleep, crowded ? when_crowded : longest_sleep,
-                          places_.next_due() - monotonic_now()});
+  const auto until = std::min<Duration>({full ? when_full : heartbeat, crowded ? when_crowded : heartbeat,
+                                         places_.next_due() - monotonic_now()});
   const auto patience = std::chrono::ceil<std::chrono::milliseconds>(std::max(until, Duration{}));
   if (poll(polled.data(), polled.size(), static_cast<int>(patience.count())) < 0 && errno != EINTR) {
     spdlog::critical("stop lane: poll: {}", std::generic_category().message(errno));

@@ -230,7 +230,7 @@ class WorkerBench {
   }
   /// Lets the worker go once around its loop, so that bytes already said have been noticed.
   void let_worker_notice() {
-    for (int turn = 0; turn < 2; ++turn) {
+    for (int turn = 0; turn < 3; ++turn) {
       const auto before = worker->last_progress();
       ASSERT_TRUE(run_until([&] { return worker->last_progress() != before; }));
     }
