@@ -33,6 +33,7 @@
 #include "daemon/ground.hpp"
 #include "daemon/metering.hpp"
 #include "daemon/state_copier.hpp"
+#include "daemon/supervise.hpp"
 #include "devices/simulation/control_socket.hpp"
 
 namespace axisd {
@@ -42,15 +43,6 @@ namespace {
 /// Longest that the end of the daemon waits for moving axes.
 constexpr auto stop_patience = std::chrono::seconds(10);
 constexpr auto close_patience = std::chrono::seconds(3);
-/// The loops come round at least every second; this is a stall.
-constexpr auto stalled_after = std::chrono::seconds(3);
-
-sigset_t ending_signals() {
-  sigset_t set;
-  sigemptyset(&set);
-  for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, number);
-  return set;
-}
 
 /// Runs `function` on the core thread and waits for its result.
 template <class Function>
@@ -69,43 +61,6 @@ bool wait_until(Condition condition, Duration limit) {
     block_until(monotonic_now() + milliseconds(10));
   }
   return true;
-}
-
-void reload_at_a_signal(ConfigurationService& served) {
-  served.reload("SIGHUP", false, [](const Result<ConfigurationReload>& result) {
-    if (!result)
-      spdlog::warn("SIGHUP: not reloaded: {}", to_string(result.error()));
-    else if (!result->applied)
-      spdlog::warn(
-          "SIGHUP: not reloaded, and nothing was changed; axisctl config reload --dry-run tells why");
-  });
-}
-
-/// Tells systemd that core, stop lane and workers make progress, and that clients are answered, until a
-/// signal asks for the end: which one.
-int supervise(core::CoreLoop& loop, const core::MachineCore& machine, const server::StopLane& stop_lane,
-              server::DoorCheck& doors, ConfigurationService& served) {
-  const auto signals = ending_signals();
-  std::uint64_t interval_us = 0;
-  const bool watched = sd_watchdog_enabled(0, &interval_us) > 0;
-  for (;;) {
-    const timespec period{.tv_sec = watched && interval_us < 4'000'000 ? 0 : 1,
-                          .tv_nsec = watched ? 300'000'000 : 0};
-    const int number = sigtimedwait(&signals, nullptr, &period);
-    if (number == SIGHUP) reload_at_a_signal(served);
-    if (number == SIGTERM || number == SIGINT) return number;
-    const auto oldest = monotonic_now() - stalled_after;
-    bool alive = loop.last_progress() > oldest && stop_lane.last_progress() > oldest;
-    for (const auto& bus : machine.buses()) alive = alive && bus->last_progress() > oldest;
-    doors.ask();
-    const auto silent = doors.silent_since(oldest);
-    if (!alive)
-      spdlog::critical("core, stop lane or a bus worker makes no progress");
-    else if (!silent.empty())
-      spdlog::critical("no answer for clients: {}", fmt::join(silent, ", "));
-    else if (watched)  // nobody may read what nobody asked for, and a full socket blocks
-      sd_notify(0, "WATCHDOG=1");
-  }
 }
 
 /// Stops what moves; true: everything rests.
@@ -309,7 +264,12 @@ int Doors::serve(int port) {
                configuration_.axes.size());
   const auto sim_socket = open_simulation(*ground_.ports, configuration_, ground_.instance_id);
   sd_notify(0, "READY=1");
-  const int number = supervise(ground_.loop, machine_, stop_lane_, doors, served_);
+  const int number = supervise({.loop = ground_.loop,
+                                .machine = machine_,
+                                .server = server_,
+                                .stop_lane = stop_lane_,
+                                .doors = doors,
+                                .served = served_});
   spdlog::info("ending: {}", number == SIGTERM ? "SIGTERM" : "SIGINT");
   sd_notify(0, "STOPPING=1");
   service_.close();

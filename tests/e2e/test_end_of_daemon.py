@@ -187,8 +187,8 @@ class Systemd(Scenario):
         machine.notify.wait_for("WATCHDOG=1", daemon)
         pid = daemon.process.pid
         for thread, told in (("nexting_thread", "no answer for clients: .*main server"),
-                             ("axisd-stops", "stop lane .* makes no progress|no answer for clients: .*stop lane"),
-                             ("axisd-core", "core.* makes no progress")):
+                             ("axisd-stops", "no progress: .*stop lane|no answer for clients: .*stop lane"),
+                             ("axisd-core", "no progress: .*core")):
             at = len(daemon.log())
             with frozen(pid, thread):
                 def silent():
