@@ -126,10 +126,29 @@ std::vector<BudgetExcess> excess_of(const BusBudget& budget, const BudgetPolicy&
   return found;
 }
 
+/// `learnt`: what `axisd --quiesce` has to find out about the bus first, at most.
+std::string note_on_hang(const BusBudget& budget, Duration learnt) {
+  const auto last = budget.stops.back().last_frame;
+  const auto before = killed_within + quiesce_begins_within + learnt;
+  const auto all = last == Duration::max() ? last : before + last;
+  return fmt::format(
+      "where the daemon hangs and the service runs as it is installed, the last stop frame of all axes goes "
+      "out {}: {} until systemd has killed it, {} until axisd --quiesce has the bus, and the stops",
+      within_text(all), bound_text(killed_within), bound_text(quiesce_begins_within + learnt));
+}
+
+Duration learnt_first(const modbus_rtu::LineSettings& line) {
+  return std::max<Duration>(longest_echo, line.turnaround_max);
+}
+
+Duration learnt_first(const canopen::NetworkSettings& /*network*/) { return Duration::zero(); }
+
 template <class Demand>
-BusBudgetReport report_on(BusKind kind, const BudgetPolicy& policy, const Demand& demand,
+BusBudgetReport report_on(BusKind kind, const BudgetPolicy& policy, const Demand& demand, Duration learnt,
                           const Configuration& configuration) {
   BusBudgetReport report{.kind = kind, .policy = policy, .predicted = budget_of(demand)};
+  if (!report.predicted.stops.empty())
+    report.predicted.notes.push_back(note_on_hang(report.predicted, learnt));
   report.axes = axis_reports(report.predicted, configuration);
   report.excess = excess_of(report.predicted, policy);
   return report;
@@ -141,11 +160,11 @@ std::vector<BusBudgetReport> budgets(const Configuration& configuration) {
   std::vector<BusBudgetReport> reports;
   reports.reserve(configuration.lines.size() + configuration.networks.size());
   for (const auto& line : configuration.lines)
-    reports.push_back(
-        report_on(BusKind::modbus_rtu, line.budget, demand_of(line, configuration), configuration));
+    reports.push_back(report_on(BusKind::modbus_rtu, line.budget, demand_of(line, configuration),
+                                learnt_first(line), configuration));
   for (const auto& network : configuration.networks)
-    reports.push_back(
-        report_on(BusKind::canopen, network.budget, demand_of(network, configuration), configuration));
+    reports.push_back(report_on(BusKind::canopen, network.budget, demand_of(network, configuration),
+                                learnt_first(network), configuration));
   return reports;
 }
 

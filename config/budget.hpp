@@ -9,6 +9,14 @@
 
 namespace axisd::config {
 
+/// By the service as it is installed: from the moment from which a daemon that hangs does nothing any more
+/// until systemd has killed it (WatchdogSec, and the 250 ms by which systemd's timers may be late).
+inline constexpr Duration killed_within = std::chrono::milliseconds(1250);
+/// From there until `axisd --quiesce` has started and opened its buses.
+inline constexpr Duration quiesce_begins_within = std::chrono::milliseconds(500);
+/// Until it knows that a line has no echo, where the drive that it asks for that is silent.
+inline constexpr Duration longest_echo = std::chrono::milliseconds(100);
+
 /// One report per bus, lines first, both in the order of the file. Nothing is observed in it. Precondition:
 /// the loader found no error in `configuration`.
 std::vector<BusBudgetReport> budgets(const Configuration& configuration);
