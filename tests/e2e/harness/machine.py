@@ -175,7 +175,8 @@ class Machine:
         return run([AXISCTL, "--server", f"unix:{self.socket}", *words], limit=120)
 
     def quiesce(self):
-        return run([AXISD, "--quiesce", self.config, "--link-helper", self.link_helper], limit=60)
+        return run([AXISD, "--quiesce", self.config, "--state-directory", self.state_directory, "--link-helper",
+                    self.link_helper], limit=60)
 
     def logs(self):
         """Everything that was written, the long logs by their ends."""

@@ -2,6 +2,7 @@
 import os
 import socket
 import threading
+import time
 
 from .programs import wait_for
 
@@ -14,6 +15,7 @@ class NotifySocket:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.bind(self.path)
         self._received = []
+        self._listeners = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -22,7 +24,15 @@ class NotifySocket:
             message = self._socket.recv(4096)
             if not message:
                 return
-            self._received.extend(message.decode().splitlines())
+            at = time.monotonic_ns()
+            for line in message.decode().splitlines():
+                self._received.append(line)
+                for listener in self._listeners if line != "FORGOTTEN" else ():
+                    listener(at, line)
+
+    def listen(self, listener):
+        """Also tells it of each message as it comes: when (CLOCK_MONOTONIC, ns), and what. Thread: the reader's."""
+        self._listeners.append(listener)
 
     def received(self):
         """All messages so far."""
