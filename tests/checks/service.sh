@@ -23,10 +23,18 @@ done
 complaints=$(systemd-analyze verify --man=no "$stage"/unit/axisd* 2>&1) || { echo "$complaints"; exit 1; }
 if grep -E 'axisd(-link)?\.(service|socket)' <<<"$complaints"; then exit 1; fi
 
-# 10 is without any protection; beyond 2.0 somebody has opened something.
-for unit in axisd.service axisd-link.service; do
-  systemd-analyze security --offline=true --threshold=20 "$stage/unit/$unit" >"$stage/exposure" ||
+# 10 is without any protection; beyond 1.6 somebody has opened something. Also with the example of a drop-in.
+mkdir "$stage/unit/axisd.service.d"
+cp "$stage/usr/share/doc/axisd/examples/axisd-networks.conf" "$stage/unit/axisd.service.d"
+for unit in "$stage/usr/lib/systemd/system/axisd.service" "$stage/unit/axisd.service" "$stage/unit/axisd-link.service"; do
+  systemd-analyze security --offline=true --threshold=16 "$unit" >"$stage/exposure" ||
     { cat "$stage/exposure"; exit 1; }
   tail -n 1 "$stage/exposure"
+done
+# What it may not be closed to: serial ports and CAN.
+for needed in '^DeviceAllow=char-ttyUSB rw$' '^DeviceAllow=char-ttyACM rw$' '^DeviceAllow=char-ttyS rw$' \
+  '^RestrictAddressFamilies=.*AF_CAN' '^RestrictAddressFamilies=.*AF_INET ' '^WatchdogSec=1$' '^WatchdogSignal=SIGKILL$' \
+  '^ExecStopPost=-/usr/bin/axisd --quiesce ' '^RestartPreventExitStatus=2$'; do
+  grep -q "$needed" "$stage/usr/lib/systemd/system/axisd.service" || { echo "axisd.service has no line $needed" >&2; exit 1; }
 done
 systemd-sysusers --dry-run "$stage/usr/lib/sysusers.d/axisd.conf"
