@@ -36,8 +36,8 @@ struct AuditedCall {
   Phase phase = Phase::asked;
   std::string rpc;  ///< "DriveService.WriteParameters"
   std::string client;
-  std::string axis{};  ///< empty: it concerns a bus
-  std::string bus{};   ///< empty: it concerns an axis
+  std::string axis{};  ///< empty: it concerns a bus, or the daemon
+  std::string bus{};   ///< empty: it concerns an axis, or the daemon
   std::uint64_t lease_token = 0;
   std::string text{};  ///< what it asks for, or what came of it, for people
   std::vector<AuditedParameter> parameters{};

@@ -1,8 +1,10 @@
-// buses, info, whoami: the machine as a whole.
+// buses, info, whoami, log-level: the machine as a whole.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,10 @@
 
 namespace axisd::axisctl {
 namespace {
+
+/// In the order of the contract.
+std::vector<std::string> log_levels() { return {"trace", "debug", "info", "warn", "error"}; }
+static_assert(v1::LOG_LEVEL_TRACE == 1 && v1::LOG_LEVEL_ERROR == 5);
 
 v1::GetInfoResponse ask(Invocation& invocation) {
   return invocation.client().call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(),
@@ -72,6 +78,22 @@ void info(Invocation& invocation) {
       held.empty() ? "permitted" : coloured(held, Colour::yellow, use_colour())));
 }
 
+/// Empty: only tells it.
+void log_level(Invocation& invocation, const std::string& level) {
+  v1::SetLogLevelRequest request;
+  const auto levels = log_levels();
+  if (const auto wanted = std::ranges::find(levels, level); wanted != levels.end())
+    request.set_level(static_cast<v1::LogLevel>(wanted - levels.begin() + 1));
+  const auto response =
+      invocation.client().call(&v1::SystemService::Stub::SetLogLevel, request, std::string_view());
+  if (invocation.json) return print_line(json(response));
+  const auto name = [](v1::LogLevel one) { return lower_word(v1::LogLevel_Name(one), "LOG_LEVEL_"); };
+  print_line(level.empty() ? name(response.level())
+                           : fmt::format("{}; {} before, and at the next start of the daemon that of its "
+                                         "command line",
+                                         name(response.level()), name(response.previous())));
+}
+
 }  // namespace
 
 void add_system_commands(CLI::App& app, Invocation& invocation) {
@@ -83,6 +105,11 @@ void add_system_commands(CLI::App& app, Invocation& invocation) {
   app.add_subcommand("whoami", "Who the daemon takes you for, and what you may do")->callback([&invocation] {
     who_am_i(invocation);
   });
+  auto* level_command =
+      app.add_subcommand("log-level", "How much the daemon writes into its log, until it ends");
+  const auto level = std::make_shared<std::string>();
+  level_command->add_option("LEVEL", *level, "None: only show it")->check(CLI::IsMember(log_levels()));
+  level_command->callback([&invocation, level] { log_level(invocation, *level); });
 }
 
 }  // namespace axisd::axisctl

@@ -5,7 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "api/server/audit_calls.hpp"
 #include "api/server/convert.hpp"
+#include "api/server/log_level.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
@@ -88,11 +90,11 @@ void say_who(const Callers& callers, const grpc::CallbackServerContext& context,
 
 SystemServiceImpl::SystemServiceImpl(const Services& services)
     : BoundedService(services), services_(services) {
-  begin_within_bounds(&SystemServiceImpl::GetInfo, &SystemServiceImpl::StopAll,
-                      &SystemServiceImpl::ReleaseStopAll, &SystemServiceImpl::GetState,
-                      &SystemServiceImpl::AcceptState, &SystemServiceImpl::BackUpState,
-                      &SystemServiceImpl::Explain, &SystemServiceImpl::GetConfig,
-                      &SystemServiceImpl::CheckConfig, &SystemServiceImpl::ReloadConfig);
+  begin_within_bounds(
+      &SystemServiceImpl::GetInfo, &SystemServiceImpl::StopAll, &SystemServiceImpl::ReleaseStopAll,
+      &SystemServiceImpl::GetState, &SystemServiceImpl::AcceptState, &SystemServiceImpl::BackUpState,
+      &SystemServiceImpl::Explain, &SystemServiceImpl::GetConfig, &SystemServiceImpl::CheckConfig,
+      &SystemServiceImpl::ReloadConfig, &SystemServiceImpl::SetLogLevel);
 }
 
 grpc::ServerUnaryReactor* SystemServiceImpl::GetInfo(Context* context, const v1::GetInfoRequest*,
@@ -259,6 +261,30 @@ grpc::ServerUnaryReactor* SystemServiceImpl::ReloadConfig(Context* context,
             reply_with_value<ConfigurationReload>(
                 call, [response](const ConfigurationReload& reload) { to_proto(reload, *response); }));
       });
+}
+
+grpc::ServerUnaryReactor* SystemServiceImpl::SetLogLevel(Context* context,
+                                                         const v1::SetLogLevelRequest* request,
+                                                         v1::SetLogLevelResponse* response) {
+  const auto caller = who_asks(*context, *request);
+  auto ticket = services_.admission.admit(caller.name, Admission::Kind::call);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  const auto before = log_level();
+  const auto after = request->level() == v1::LOG_LEVEL_UNSPECIFIED ? before : request->level();
+  if (!v1::LogLevel_IsValid(after))
+    return answer(context, to_status({.reason = Reason::invalid_argument,
+                                      .message = fmt::format("level {} is not known here", int{after}),
+                                      .remedy = "use one of trace, debug, info, warn, error"}));
+  response->set_previous(before);
+  response->set_level(after);
+  if (after == before) return answer(context, grpc::Status::OK);
+  record(services_.machine, services_.audit_sink,
+         {.phase = AuditedCall::Phase::done,
+          .rpc = "SystemService.SetLogLevel",
+          .client = caller.name,
+          .text = change_log_level(before, after, caller.name),
+          .origin = caller.origin});
+  return answer(context, grpc::Status::OK);
 }
 
 }  // namespace axisd::server

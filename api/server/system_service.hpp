@@ -32,6 +32,8 @@ class SystemServiceImpl final : public BoundedService<v1::SystemService::Callbac
                                         v1::CheckConfigResponse* response) override;
   grpc::ServerUnaryReactor* ReloadConfig(Context* context, const v1::ReloadConfigRequest* request,
                                          v1::ReloadConfigResponse* response) override;
+  grpc::ServerUnaryReactor* SetLogLevel(Context* context, const v1::SetLogLevelRequest* request,
+                                        v1::SetLogLevelResponse* response) override;
 
  private:
   const Services services_;

@@ -39,6 +39,7 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
         self.inhibited = False
         self.heeds_delegates = True
         self.instance_id = "fake"
+        self.log_level = system_pb.LOG_LEVEL_INFO
         self.calls = []
         self.losing = {}
         self.commands = {}
@@ -353,6 +354,11 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
                 observed=budget_pb.ObservedTimes(stop_frame=duration_pb2.Duration(nanos=7000000)))],
             excess=[budget_pb.BudgetExcess(key="stop_bound", message="too late", remedy="raise it")],
             notes=["a note"])])
+
+    async def SetLogLevel(self, request, context):
+        self.note("SetLogLevel", request, context)
+        previous, self.log_level = self.log_level, request.level or self.log_level
+        return system_pb.SetLogLevelResponse(level=self.log_level, previous=previous)
 
     async def GetInfo(self, request, context):
         self.note("GetInfo", request, context)

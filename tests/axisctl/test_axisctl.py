@@ -109,6 +109,13 @@ class Reading(AxisctlTest):
                                             "role:       operator; viewer on feeder\n")
         self.assertEqual(self.json("whoami")[0]["role"], "ROLE_OPERATOR")
 
+    def test_log_level(self):
+        self.assertEqual(self.ok("log-level"), "info\n")
+        self.assertRegex(self.ok("log-level", "debug"), r"\Adebug; info before, and at the next start")
+        self.assertEqual(self.ok("log-level"), "debug\n")
+        self.assertEqual(self.json("log-level", "warn")[0]["previous"], "LOG_LEVEL_DEBUG")
+        self.assertIn("LEVEL", self.fails(2, "log-level", "verbose"))
+
     def test_whom_it_speaks_for(self):
         self.assertIn("client:     bert via web\n", self.ok("--as", "bert", "whoami"))
         self.assertEqual(self.ok("--as", "bert:maintainer", "whoami").splitlines()[::2],

@@ -383,6 +383,14 @@ class Machine:
         response = await self._call(self._system.AcceptState, system_service_pb2.AcceptStateRequest(), "accept state")
         return [Conviction.of(conviction) for conviction in response.accepted]
 
+    async def log_level(self, level: str | None = None) -> str:
+        """How much the daemon writes into its log: "trace", "debug", "info", "warn" or "error". With `level` it does so from
+        now until it ends. Returns what it was before."""
+        wanted = system_service_pb2.LogLevel.Value(f"LOG_LEVEL_{level.upper()}") if level else 0
+        request = system_service_pb2.SetLogLevelRequest(level=wanted)
+        response = await self._call(self._system.SetLogLevel, request, "set log level")
+        return system_service_pb2.LogLevel.Name(response.previous).removeprefix("LOG_LEVEL_").lower()
+
     async def configuration(self) -> Configuration:
         """What is served: the daemon's file as it was at its start or at the last reload."""
         return Configuration.of(await self._call(self._system.GetConfig, system_service_pb2.GetConfigRequest(), ""))

@@ -1,6 +1,7 @@
 // The audit's records as lines, and AuditService through a real connection.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <spdlog/spdlog.h>
 
 #include <memory>
 #include <mutex>
@@ -11,6 +12,7 @@
 #include "api/server/audit_convert.hpp"
 #include "axisd/v1/audit_service.grpc.pb.h"
 #include "axisd/v1/bus_service.grpc.pb.h"
+#include "axisd/v1/system_service.grpc.pb.h"
 #include "tests/unit/api/serving.hpp"
 
 namespace axisd::testing {
@@ -263,6 +265,50 @@ TEST_F(AuditCalls, AWrittenRegisterIsToldBeforeAndBehind) {
   EXPECT_EQ(told.records(1).role(), "") << "there are no roles";
   EXPECT_EQ(told.records(1).rpc(), "BusService.Transact");
   EXPECT_THAT(told.records(1).call().text(), HasSubstr("line-a node 9"));
+}
+
+class LogLevel : public AuditCalls {
+ protected:
+  ~LogLevel() override { spdlog::set_level(before_); }
+  grpc::Status set(v1::LogLevel level) {
+    Call context;
+    v1::SetLogLevelRequest request;
+    request.set_level(level);
+    response_.Clear();
+    return v1::SystemService::NewStub(channel_)->SetLogLevel(&context, request, &response_);
+  }
+
+  const spdlog::level::level_enum before_ = spdlog::get_level();
+  v1::SetLogLevelResponse response_;
+};
+
+TEST_F(LogLevel, IsToldAndChangedAtOnceWithARecord) {
+  spdlog::set_level(spdlog::level::info);
+  ASSERT_TRUE(set(v1::LOG_LEVEL_UNSPECIFIED).ok());
+  EXPECT_EQ(response_.level(), v1::LOG_LEVEL_INFO);
+  EXPECT_EQ(spdlog::get_level(), spdlog::level::info);
+  EXPECT_THAT(audit_.lines(), SizeIs(0)) << "asking changes nothing";
+  ASSERT_TRUE(set(v1::LOG_LEVEL_DEBUG).ok());
+  EXPECT_EQ(response_.level(), v1::LOG_LEVEL_DEBUG);
+  EXPECT_EQ(response_.previous(), v1::LOG_LEVEL_INFO);
+  EXPECT_EQ(spdlog::get_level(), spdlog::level::debug);
+  ASSERT_TRUE(set(v1::LOG_LEVEL_ERROR).ok());
+  EXPECT_EQ(response_.previous(), v1::LOG_LEVEL_DEBUG);
+  EXPECT_EQ(spdlog::get_level(), spdlog::level::err);
+  const auto told = list({});
+  ASSERT_EQ(told.records_size(), 2);
+  EXPECT_EQ(told.records(0).client(), own_name());
+  EXPECT_EQ(told.records(0).rpc(), "SystemService.SetLogLevel");
+  EXPECT_EQ(told.records(0).call().text(), "the log has level debug now, and had info");
+}
+
+TEST_F(LogLevel, OfALaterVersionIsRefused) {
+  const auto before = spdlog::get_level();
+  const auto status = set(static_cast<v1::LogLevel>(99));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(detail_of(status).reason(), v1::REASON_INVALID_ARGUMENT);
+  EXPECT_EQ(spdlog::get_level(), before);
+  EXPECT_THAT(audit_.lines(), SizeIs(0));
 }
 
 TEST_F(AuditCalls, AServerWithoutAnAuditSaysSo) {
