@@ -27,7 +27,7 @@ Shared& shared() {
 }  // namespace
 
 void log_limited(spdlog::level::level_enum level, std::string_view who, std::string_view kind,
-                 std::string_view text) {
+                 std::string_view text, LogKind about, const LogSubject& subject) {
   if (!spdlog::should_log(level)) return;
   {
     auto& [mutex, limit] = shared();
@@ -35,7 +35,7 @@ void log_limited(spdlog::level::level_enum level, std::string_view who, std::str
     const std::lock_guard lock(mutex);
     if (!limit.admit(origin, monotonic_now())) return;
   }
-  spdlog::log(level, "{}: {}", who, text);
+  log_about(level, about, subject, fmt::format("{}: {}", who, text));
 }
 
 TimePoint tell_left_out(TimePoint now) {
@@ -49,7 +49,8 @@ TimePoint tell_left_out(TimePoint now) {
   }
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit.period()).count();
   for (const auto& each : told)
-    spdlog::warn("{}: {} more like this in the last {} s", each.origin, each.lines, seconds);
+    log_about(spdlog::level::warn, LogKind::lines_left_out, {},
+              fmt::format("{}: {} more like this in the last {} s", each.origin, each.lines, seconds));
   return now < TimePoint::max() - limit.period() ? std::min(next, now + limit.period()) : next;
 }
 
