@@ -1,14 +1,20 @@
 #include "daemon/logging.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/async.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/sinks/systemd_sink.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <memory>
+#include <string>
+
+#include "buses/log_about.hpp"
+#include "daemon/journal_sink.hpp"
 
 namespace axisd {
 
@@ -22,14 +28,24 @@ std::shared_ptr<spdlog::logger> make_async(const char* name, spdlog::sink_ptr si
                                                 spdlog::async_overflow_policy::overrun_oldest);
 }
 
+/// Whether what is written to stderr goes to the journal: whoever sends it elsewhere leaves JOURNAL_STREAM as
+/// it was (systemd.exec(5)).
+bool stderr_is_the_journal() {
+  const char* stream = std::getenv("JOURNAL_STREAM");
+  struct stat actual{};
+  if (stream == nullptr || fstat(STDERR_FILENO, &actual) != 0) return false;
+  return fmt::format("{}:{}", actual.st_dev, actual.st_ino) == stream;
+}
+
 }  // namespace
 
 Logging::Logging(const std::string& level)
     : writer_(std::make_shared<spdlog::details::thread_pool>(queue_size, 1)) {
-  const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;
+  const bool journal = stderr_is_the_journal();
+  set_log_fields(journal);
   spdlog::sink_ptr sink;
   if (journal)
-    sink = std::make_shared<spdlog::sinks::systemd_sink_mt>("axisd");
+    sink = std::make_shared<JournalSink>();
   else
     sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
   auto logger = make_async("axisd", std::move(sink), writer_);

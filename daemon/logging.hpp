@@ -11,8 +11,9 @@ class thread_pool;
 
 namespace axisd {
 
-/// Logging through a thread of its own, so that no caller ever waits for a pipe or a disk: under systemd to
-/// the journal with priorities, else to stderr. Whatever logs must have ended before this does.
+/// Logging through a thread of its own, so that no caller ever waits for a pipe or a disk: where
+/// stderr is the journal to it with priorities and fields (buses/log_about.hpp), else to stderr. Whatever
+/// logs must have ended before this does.
 class Logging {
  public:
   explicit Logging(const std::string& level);
