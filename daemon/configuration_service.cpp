@@ -160,7 +160,8 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
     for (const auto& found : result.findings)
       log_limited(spdlog::level::warn, request.client, "reloads",
                   fmt::format("reloads the configuration: {}:{}:{}: {}", parts_.path, found.line,
-                              found.column, found.message));
+                              found.column, found.message),
+                  LogKind::configuration_refused, {.client = request.client});
     return result;
   }
   auto& configuration = *loaded.configuration;
@@ -179,7 +180,8 @@ ConfigurationReload ConfigurationService::serve(const Request& request) {
   result.refusals = answer->get_future().get();
   for (const auto& refusal : result.refusals)
     log_limited(spdlog::level::warn, request.client, "reloads",
-                fmt::format("reloads the configuration, which is refused: {}", to_string(refusal)));
+                fmt::format("reloads the configuration, which is refused: {}", to_string(refusal)),
+                LogKind::configuration_refused, {.client = request.client});
   result.applied = result.refusals.empty() && !request.dry_run;
   if (!result.applied) return result;
   for (const auto& warning : result.warnings) spdlog::warn("{}", warning);

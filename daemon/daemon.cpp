@@ -23,6 +23,7 @@
 #include "api/server/lane/stop_lane.hpp"
 #include "api/server/server.hpp"
 #include "api/tls/pem_files.hpp"
+#include "buses/log_about.hpp"
 #include "daemon/audit_opening.hpp"
 #include "daemon/audit_reader.hpp"
 #include "daemon/configuration_service.hpp"
@@ -259,9 +260,10 @@ int Doors::serve(int port) {
   server::DoorCheck doors([this] { return server_.connect_inside(); },
                           [this] { return stop_lane_.connect_inside(); });
   doors.ask();  // its connections are there before anybody else's
-  spdlog::info("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration_.machine,
-               port == 0 ? configuration_.server.listen : fmt::format("port {}", port),
-               configuration_.axes.size());
+  log_about(spdlog::level::info, LogKind::daemon_serves, {},
+            fmt::format("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration_.machine,
+                        port == 0 ? configuration_.server.listen : fmt::format("port {}", port),
+                        configuration_.axes.size()));
   const auto sim_socket = open_simulation(*ground_.ports, configuration_, ground_.instance_id);
   sd_notify(0, "READY=1");
   const int number = supervise({.loop = ground_.loop,
@@ -274,7 +276,9 @@ int Doors::serve(int port) {
   sd_notify(0, "STOPPING=1");
   service_.close();
   const bool rests = stop_axes(ground_.loop, machine_);
-  if (!rests) spdlog::error("not every axis has confirmed its standstill; run axisd --quiesce");
+  if (!rests)
+    log_about(spdlog::level::err, LogKind::stop_unconfirmed, {},
+              "not every axis has confirmed its standstill; run axisd --quiesce");
   return rests ? exit_status::in_order : exit_status::failed;
 }
 
@@ -353,7 +357,7 @@ int run_daemon(const Options& options, const config::Configuration& configuratio
   } catch (const std::exception& error) {  // no memory, no more threads
     spdlog::critical("{}", error.what());
   }
-  spdlog::info("ended with status {}", status);
+  log_about(spdlog::level::info, LogKind::daemon_ends, {}, fmt::format("ended with status {}", status));
   return status;
 }
 

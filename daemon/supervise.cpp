@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "buses/log_about.hpp"
 #include "daemon/core/supervision.hpp"
 
 namespace axisd {
@@ -60,11 +61,13 @@ Duration look(Supervision& supervision, const Supervised& parts, bool watched) {
       tell(watched, "WATCHDOG=1");
       break;
     case Sign::silent:
-      spdlog::critical("no answer for clients: {}", fmt::join(silent, ", "));
+      log_about(spdlog::level::critical, LogKind::no_progress, {},
+                fmt::format("no answer for clients: {}", fmt::join(silent, ", ")));
       break;
     case Sign::dead:
       tell(watched, "WATCHDOG=trigger");  // first: the log may be what stands still
-      spdlog::critical("no progress: {}", fmt::join(found.dead, ", "));
+      log_about(spdlog::level::critical, LogKind::no_progress, {},
+                fmt::format("no progress: {}", fmt::join(found.dead, ", ")));
       break;
     case Sign::unsure:
       break;

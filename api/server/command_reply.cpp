@@ -35,14 +35,18 @@ void log(std::string_view client, std::string_view subject, std::string_view wha
          const Result<Command>& result, const std::optional<WallTime>& called) {
   if (!result)
     return log_limited(spdlog::level::info, client, "refused calls",
-                       fmt::format("{} {} refused: {}", subject, what, to_string(result.error())));
+                       fmt::format("{} {} refused: {}", subject, what, to_string(result.error())),
+                       LogKind::command_refused, {.axis = subject, .client = client});
   const auto level = is_renewal(*result, called) ? spdlog::level::debug : spdlog::level::info;
   const auto text = fmt::format("{} {} {} ({}){}", subject, what, to_string(result->state), result->id,
                                 result->cause ? ": " + to_string(*result->cause) : std::string());
+  const bool failed = result->state == CommandState::error || result->state == CommandState::unknown;
+  const auto about = failed ? LogKind::command_failed : LogKind::command_accepted;
+  const LogSubject about_it{.axis = result->axis, .client = client, .command = result->id};
   if (const auto kind = unlimited_kind(*result, called); !kind.empty())
-    log_limited(level, client, kind, text);
+    log_limited(level, client, kind, text, about, about_it);
   else
-    spdlog::log(level, "{}: {}", client, text);
+    log_about(level, about, about_it, fmt::format("{}: {}", client, text));
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ std::string change_log_level(v1::LogLevel before, v1::LogLevel after, std::strin
   auto text =
       fmt::format("the log has level {} now, and had {}", level_of(after).name, level_of(before).name);
   spdlog::set_level(level_of(std::min(before, after)).of_log);
-  log_limited(spdlog::level::warn, client, "calls", text);
+  log_limited(spdlog::level::warn, client, "calls", text, LogKind::log_level_changed, {.client = client});
   spdlog::set_level(level_of(after).of_log);
   return text;
 }

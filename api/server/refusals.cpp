@@ -26,7 +26,8 @@ std::string named(const google::protobuf::Message& request, const char* name) {
 void Refusals::tell(const Caller& caller, const google::protobuf::Message& request, const Error& error) {
   auto rpc = rpc_of(request);
   log_limited(spdlog::level::info, caller.identity, "refused calls",
-              fmt::format("{} refused: {}", rpc, to_string(error)));
+              fmt::format("{} refused: {}", rpc, to_string(error)), LogKind::call_denied,
+              {.client = caller.name});
   if (sink_ == nullptr) return;
   std::optional<std::uint64_t> left_out;
   {

@@ -23,7 +23,8 @@ void refuse(const ReplyPtr& reply, const std::string& client, std::string_view w
   reply->complete([error] { return to_status(error); },
                   [client, what = std::string(what), error] {
                     log_limited(spdlog::level::info, client, "refused calls",
-                                fmt::format("{} refused: {}", what, to_string(error)));
+                                fmt::format("{} refused: {}", what, to_string(error)),
+                                LogKind::command_refused, {.client = client});
                   });
 }
 
@@ -84,7 +85,8 @@ void stop_group(Machine& machine, const Request& request, StopKind kind, const C
               if (shared->empty()) return;  // the daemon asks this of itself, each second
               log_limited(spdlog::level::info, client, "stops",
                           fmt::format("group {} of {} axes", kind == StopKind::halt ? "halt" : "stop",
-                                      shared->size()));
+                                      shared->size()),
+                          LogKind::stop_called, {.client = client});
             });
       });
 }
@@ -149,7 +151,8 @@ void handle(Machine& machine, const v1::StopAllRequest& request, const Caller& c
                            log_limited(
                                spdlog::level::info, client, "stops",
                                fmt::format("stop_all of {} axes, inhibit latched{}", shared->stops.size(),
-                                           shared->not_durable ? ", not durable" : ""));
+                                           shared->not_durable ? ", not durable" : ""),
+                               LogKind::stop_all, {.client = client});
                          });
                    });
 }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "buses/heartbeat.hpp"
+#include "buses/log_about.hpp"
 #include "buses/modbus_rtu/serial_port.hpp"
 #include "buses/modbus_rtu/wire_session.hpp"
 
@@ -269,9 +270,10 @@ void RtuWorker::report(const PortStatus& status) {
   auto text = status.error ? to_string(*status.error) : std::string();
   if (!status.open && text == reported_error_) return;
   if (status.open)
-    spdlog::info("{}: port {} is open", settings_.name, settings_.port);
+    log_about(spdlog::level::info, LogKind::bus_up, {.bus = settings_.name},
+              fmt::format("{}: port {} is open", settings_.name, settings_.port));
   else
-    spdlog::warn("{}", text);
+    log_about(spdlog::level::warn, LogKind::bus_down, {.bus = settings_.name}, text);
   reported_error_ = std::move(text);
   post(core_, [callbacks = callbacks_, status] {
     if (callbacks->alive) callbacks->on_port(status);

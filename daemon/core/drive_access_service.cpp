@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "buses/limited_log.hpp"
 #include "buses/signal.hpp"
 #include "daemon/core/bus_access_network_scan.hpp"
 #include "devices/nearest.hpp"
@@ -286,7 +287,8 @@ std::vector<std::uint8_t> DriveAccessService::others_on_bus(const Axis& axis) co
 
 std::shared_ptr<AuditedCall> DriveAccessService::begin(std::string_view rpc, const std::string& axis,
                                                        const Requester& requester, std::string text) {
-  spdlog::warn("{}: {} {}", axis, requester.client, text);
+  log_limited(spdlog::level::warn, requester.client, "changes of drives", fmt::format("{}: {}", axis, text),
+              LogKind::drive_changed, {.axis = axis, .client = requester.client});
   return std::make_shared<AuditedCall>(AuditedCall{.rpc = fmt::format("DriveService.{}", rpc),
                                                    .client = requester.client,
                                                    .axis = axis,

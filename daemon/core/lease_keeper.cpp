@@ -66,7 +66,8 @@ Result<LeaseGrant> LeaseKeeper::acquire(const LeaseRequest& request) {
   prolong(lease);
   if (!grant->repeated) {
     log_limited(spdlog::level::info, lease.client, "leases",
-                fmt::format("{} leases {}", lease.holder(), fmt::join(lease.axes, ", ")));
+                fmt::format("{} leases {}", lease.holder(), fmt::join(lease.axes, ", ")),
+                LogKind::lease_changed, {.client = lease.client});
     for (const auto& name : lease.axes) {
       const bool was_taken = std::ranges::any_of(grant->taken, [&](const EndedLease& over) {
         return over.end == LeaseEnd::taken &&
@@ -80,7 +81,8 @@ Result<LeaseGrant> LeaseKeeper::acquire(const LeaseRequest& request) {
         change.before = command->client;
         log_limited(spdlog::level::warn, lease.client, "leases",
                     fmt::format("{}: {} takes the axis over from {} {} of {}", name, lease.holder(),
-                                to_string(command->kind), command->id, command->client));
+                                to_string(command->kind), command->id, command->client),
+                    LogKind::lease_changed, {.axis = name, .client = lease.client});
         axis->lease_lost({.reason = Reason::lease_lost,
                           .message = fmt::format("{} took the axis over", lease.holder()),
                           .remedy = "acquire a lease"});
@@ -118,7 +120,8 @@ void LeaseKeeper::end(const EndedLease& over, const Lease* next) {
   const auto level = over.end == LeaseEnd::released ? spdlog::level::info : spdlog::level::warn;
   // Whoever takes leases in a row must not fill the log as somebody else.
   log_limited(level, over.end == LeaseEnd::taken && next != nullptr ? next->client : over.lease.client,
-              "leases", fmt::format("{}: {}", fmt::join(over.lease.axes, ", "), cause.message));
+              "leases", fmt::format("{}: {}", fmt::join(over.lease.axes, ", "), cause.message),
+              LogKind::lease_changed, {.client = over.lease.client});
   const auto follows = [&](const std::string& axis) {
     return next != nullptr && std::ranges::find(next->axes, axis) != next->axes.end();
   };

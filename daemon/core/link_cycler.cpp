@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "buses/log_about.hpp"
+
 namespace axisd::core {
 
 LinkCycler::LinkCycler(Executor executor, Clock& clock, canopen::CanopenBus& bus, LinkHelper helper)
@@ -49,7 +51,8 @@ Task<> LinkCycler::cycle() {
   if (!answer) co_return;
   report(*answer);
   if (!*answer) co_return;
-  spdlog::warn("{}: {}; its link was taken down and up", bus_->name(), why);
+  log_about(spdlog::level::warn, LogKind::link_cycled, {.bus = bus_->name()},
+            fmt::format("{}: {}; its link was taken down and up", bus_->name(), why));
   // The interface's own report follows at once. Should it not, the pause ends the waiting.
   if (bus_->link().needs_cycle()) co_await bus_->port_changed().wait_until(asked_at_ + pause_);
 }

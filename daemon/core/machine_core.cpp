@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "buses/limited_log.hpp"
+#include "buses/log_about.hpp"
 #include "devices/nearest.hpp"
 
 namespace axisd::core {
@@ -36,9 +37,10 @@ void log_link(const canopen::CanopenBus& network, std::string& told) {
   const auto now = port.open || !port.error ? std::string() : to_string(*port.error);
   if (now == told) return;
   if (now.empty())
-    spdlog::info("{}: CAN interface {} is up", network.name(), network.settings().interface);
+    log_about(spdlog::level::info, LogKind::bus_up, {.bus = network.name()},
+              fmt::format("{}: CAN interface {} is up", network.name(), network.settings().interface));
   else
-    spdlog::warn("{}", now);
+    log_about(spdlog::level::warn, LogKind::bus_down, {.bus = network.name()}, now);
   told = now;
 }
 
@@ -288,7 +290,9 @@ void MachineCore::save_latch(const std::string& client, std::function<void(std::
   parts_.persistence->save_inhibit(
       {.active = true, .by = client, .since = parts_.clock->wall(parts_.clock->now())},
       [this, client, alive = std::weak_ptr(alive_), latch = latches_, tell](const Result<void>& saved) {
-        if (!saved) spdlog::error("the inhibit would not survive a restart: {}", to_string(saved.error()));
+        if (!saved)
+          log_about(spdlog::level::err, LogKind::storage_failed, {.client = client},
+                    fmt::format("the inhibit would not survive a restart: {}", to_string(saved.error())));
         if (alive.expired()) return;
         latch_waits_.erase(latch);
         if (saved) return tell(std::nullopt);
@@ -321,7 +325,7 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
   // After the stops: nobody's look at the events or the log may hold them up.
   tell_inhibit(InhibitChange::What::latched, client);
   log_limited(spdlog::level::warn, "StopAll by " + client, "stops",
-              "motion is inhibited until it is released");
+              "motion is inhibited until it is released", LogKind::stop_all, {.client = client});
   return results;
 }
 
@@ -334,7 +338,8 @@ void MachineCore::release_inhibit(const std::string& client, std::function<void(
     if (saved) {
       set_inhibit(false, client);
       tell_inhibit(InhibitChange::What::released, client);
-      log_limited(spdlog::level::warn, client, "releases", "StopAll is released");
+      log_limited(spdlog::level::warn, client, "releases", "StopAll is released", LogKind::stop_all_released,
+                  {.client = client});
       for (const auto& axis : axes_) axis->refresh();
     }
     done(saved);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "buses/limited_log.hpp"
+#include "buses/log_about.hpp"
 #include "daemon/core/machine_core.hpp"
 
 namespace axisd::core {
@@ -378,7 +379,8 @@ void MachineCore::tell_reloaded(const Reload& reload) {
                             reload.before == reload.revision ? "" : " but how it is written"));
   if (reload.changes.empty() && reload.before == reload.revision) return;
   for (const auto& change : reload.changes)
-    spdlog::warn("{} reloads the configuration: {}", reload.client, to_string(change));
+    log_about(spdlog::level::warn, LogKind::configuration_served, {.client = reload.client},
+              fmt::format("{} reloads the configuration: {}", reload.client, to_string(change)));
   events_.record(parts_.clock->wall(parts_.clock->now()), {},
                  ConfigurationReloaded{.client = reload.client,
                                        .before = reload.before,

@@ -1,9 +1,12 @@
 #include "daemon/core/state_gate.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <boost/smart_ptr/make_shared.hpp>
 #include <utility>
+
+#include "buses/log_about.hpp"
 
 namespace axisd::core {
 
@@ -23,8 +26,9 @@ void StateGate::set(std::vector<Conviction> convictions) {
 
 void StateGate::start() {
   if (convictions_.empty()) return;
-  spdlog::error("motion waits until the state is accepted (axisctl state accept): {}",
-                to_string(convictions_));
+  log_about(spdlog::level::err, LogKind::state_convicted, {},
+            fmt::format("motion waits until the state is accepted (axisctl state accept): {}",
+                        to_string(convictions_)));
   tell_({.convictions = convictions_, .accepted_by = {}});
 }
 
@@ -45,7 +49,8 @@ void StateGate::accept(const std::string& client, const Done& done) {
     auto accepted = std::exchange(convictions_, {});
     set({});
     if (!accepted.empty()) {
-      spdlog::warn("{} accepts the state as it is: {}", client, to_string(accepted));
+      log_about(spdlog::level::warn, LogKind::state_accepted, {.client = client},
+                fmt::format("{} accepts the state as it is: {}", client, to_string(accepted)));
       tell_({.convictions = accepted, .accepted_by = client});
       changed_();
     }

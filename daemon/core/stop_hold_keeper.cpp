@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "buses/limited_log.hpp"
+
 namespace axisd::core {
 
 namespace {
@@ -68,8 +70,9 @@ void StopHoldKeeper::saved(const std::string& axis, const HoldKey& key, bool fre
                            const Result<void>& result) {
   const bool news = holds_[axis].set_durable(key, result.has_value());
   if (!result && (fresh || news)) {
-    spdlog::error("{}: the hold of {} would not survive a restart: {}", axis, key.holder,
-                  to_string(result.error()));
+    log_about(spdlog::level::err, LogKind::storage_failed, {.axis = axis, .client = key.holder},
+              fmt::format("{}: the hold of {} would not survive a restart: {}", axis, key.holder,
+                          to_string(result.error())));
     tell_(axis, StopHoldChange{.what = StopHoldChange::What::not_durable, .hold = key, .by = std::string()});
   }
   if (news) changed_(axis);
@@ -99,8 +102,10 @@ Result<void> StopHoldKeeper::end(const std::string& axis, const std::vector<Stop
       anew = true;
       continue;
     }
-    spdlog::info("{}: {} releases the hold of {}{}{}", axis, by, hold.key.holder,
-                 hold.key.request_id.empty() ? "" : " by request ", hold.key.request_id);
+    log_limited(spdlog::level::info, by, "calls",
+                fmt::format("{}: releases the hold of {}{}{}", axis, hold.key.holder,
+                            hold.key.request_id.empty() ? "" : " by request ", hold.key.request_id),
+                LogKind::hold_changed, {.axis = axis, .client = by});
     tell_(axis, StopHoldChange{.what = StopHoldChange::What::released, .hold = hold.key, .by = by});
   }
   changed_(axis);

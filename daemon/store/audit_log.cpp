@@ -1,5 +1,6 @@
 #include "daemon/store/audit_log.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <variant>
 
+#include "buses/log_about.hpp"
 #include "daemon/store/thread.hpp"
 
 namespace axisd::store {
@@ -195,9 +197,10 @@ void AuditLog::tell(const Result<void>& written) {
     if (message == before) return;
   }
   if (message.empty())
-    spdlog::info("the audit can be written again");
+    log_about(spdlog::level::info, LogKind::storage_works, {}, "the audit can be written again");
   else
-    spdlog::error("the audit: {}; motion is refused until it can be written", message);
+    log_about(spdlog::level::err, LogKind::storage_failed, {},
+              fmt::format("the audit: {}; motion is refused until it can be written", message));
 }
 
 }  // namespace axisd::store

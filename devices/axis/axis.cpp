@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "devices/alarm_text.hpp"
+#include "devices/axis/axis_log.hpp"
 #include "devices/released_position.hpp"
 
 namespace axisd {
@@ -263,7 +264,8 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
     if (active_in(sample, "homing_start") || (before && active_in(*before, "homing_start"))) lose_trust();
     return;
   }
-  spdlog::warn("{}: moving without a command; stopping it", settings_.name);
+  log_about_axis(spdlog::level::warn, LogKind::moving_without_command, settings_,
+                 fmt::format("{}: moving without a command; stopping it", settings_.name));
   if (queues()) supersede(moved_before_start());
   begin_stop(StopKind::stop, nullptr);
 }

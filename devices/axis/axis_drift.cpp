@@ -1,7 +1,9 @@
 // What the drive no longer holds as configured, because somebody else changed it.
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/axis_log.hpp"
 
 namespace axisd {
 
@@ -42,7 +44,8 @@ Task<Result<void>> Axis::check_for_drift() {
 void Axis::set_drift(const std::string& text) {
   if (text == drift_) return;
   if (!text.empty())
-    spdlog::warn("{}: the drive no longer holds its configuration: {}", settings_.name, text);
+    log_about_axis(spdlog::level::warn, LogKind::configuration_drifted, settings_,
+                   fmt::format("{}: the drive no longer holds its configuration: {}", settings_.name, text));
   drift_ = text;
   publish();
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/axis_log.hpp"
 #include "devices/axis/settlement.hpp"
 
 namespace axisd {
@@ -31,13 +32,15 @@ void Axis::take_over() {
   settle_by_ = env_.clock->now() + settling_limit;
   for (const auto& earlier : unsettled_) {
     const auto& command = earlier.command->value();
-    spdlog::warn("{}: the daemon ended while {} {} was being executed; asking the drive", settings_.name,
-                 to_string(command.kind), command.id);
+    log_about_axis(spdlog::level::warn, LogKind::unknown_outcome, settings_,
+                   fmt::format("{}: the daemon ended while {} {} was being executed; asking the drive",
+                               settings_.name, to_string(command.kind), command.id),
+                   command.id);
     if (moves(command.kind)) stop_owed_ = left_running_ = true;
     if (command.kind == CommandKind::home) position_unsettled_ = true;
   }
   if (auto cause = env_.book->take_unknown_outcome(settings_.name)) {
-    spdlog::error("{}", to_string(*cause));
+    log_about_axis(spdlog::level::err, LogKind::unknown_outcome, settings_, to_string(*cause));
     fault_ = std::move(cause);
     stop_owed_ = left_running_ = true;
   }

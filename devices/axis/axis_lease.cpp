@@ -1,7 +1,9 @@
 // Who may command the axis, and what it does when the lease that it was commanded under ends.
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/axis_log.hpp"
 
 namespace axisd {
 
@@ -77,7 +79,9 @@ void Axis::release_as_owed() {
 void Axis::give_up_release(const Error& cause) {
   if (!release_owed_ || cause.outcome == Outcome::unknown) return;
   release_owed_.reset();
-  spdlog::error("{}: the lease ended, and the drive was not released: {}", settings_.name, to_string(cause));
+  log_about_axis(spdlog::level::err, LogKind::axis_fault, settings_,
+                 fmt::format("{}: the lease ended, and the drive was not released: {}", settings_.name,
+                             to_string(cause)));
   if (!fault_) fault_ = cause;
 }
 

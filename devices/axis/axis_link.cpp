@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/axis_log.hpp"
 
 namespace axisd {
 
@@ -43,15 +44,17 @@ Task<> Axis::connect() {
       link_error_.reset();
       unseen_ends_.reset();
       watch_continuity();
-      spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
-                   identity_ ? identity_->version : "");
+      log_about_axis(spdlog::level::info, LogKind::axis_online, settings_,
+                     fmt::format("{}: online ({} {})", settings_.name, settings_.model,
+                                 identity_ ? identity_->version : ""));
       break;
     }
     const bool answers =
         connected.error().reason != Reason::no_reply && connected.error().reason != Reason::bus_down;
     link_ = answers ? LinkState::configuring : LinkState::offline;
     if (!link_error_ || link_error_->reason != connected.error().reason)
-      spdlog::warn("{}: {}", settings_.name, to_string(connected.error()));
+      log_about_axis(spdlog::level::warn, answers ? LogKind::axis_trouble : LogKind::axis_offline, settings_,
+                     fmt::format("{}: {}", settings_.name, to_string(connected.error())));
     link_error_ = connected.error();
     if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
     publish();
@@ -141,7 +144,8 @@ Task<Result<void>> Axis::settle_found_motion() {
   std::string_view found = stop_owed_ ? "the stop that was owed to it was sent, and it came to rest" : "";
   if (found_in_motion() && !found_by_terminal()) {
     if (!stop_owed_ && sample_->moving) {  // else it may rest between the phases of homing, or for good
-      spdlog::warn("{}: found moving; stopping it", settings_.name);
+      log_about_axis(spdlog::level::warn, LogKind::moving_without_command, settings_,
+                     fmt::format("{}: found moving; stopping it", settings_.name));
       found = "it was found moving, was stopped, and came to rest";
     }
     stop_owed_ = true;
@@ -277,7 +281,8 @@ void Axis::bus_lost(Error cause) {
 void Axis::go_offline(const Error& cause) {
   bus_loss_.reset();
   if (terminal_may_void_position()) lose_trust();
-  spdlog::warn("{}: offline: {}", settings_.name, to_string(cause));
+  log_about_axis(spdlog::level::warn, LogKind::axis_offline, settings_,
+                 fmt::format("{}: offline: {}", settings_.name, to_string(cause)));
   link_ = LinkState::offline;
   link_error_ = cause;
   revoke_motion();
@@ -304,7 +309,8 @@ void Axis::go_offline(const Error& cause) {
 }
 
 void Axis::on_reboot(const Error& cause) {
-  spdlog::warn("{}: {}", settings_.name, to_string(cause));
+  log_about_axis(spdlog::level::warn, LogKind::axis_rebooted, settings_,
+                 fmt::format("{}: {}", settings_.name, to_string(cause)));
   ++reboots_;
   configured_ = false;
   enabled_by_us_ = false;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/axis_log.hpp"
 #include "devices/axis/chain.hpp"
 
 namespace axisd {
@@ -98,7 +99,7 @@ void Axis::abort_at_rest(Activity& activity, Error cause) {
 void Axis::enter_error_stop(const Error& cause) {
   revoke_motion();
   if (!fault_ || fault_->reason != cause.reason || fault_->where.native_code != cause.where.native_code) {
-    spdlog::error("{}", to_string(cause));
+    log_about_axis(spdlog::level::err, LogKind::axis_fault, settings_, to_string(cause));
     fault_ = cause;
   }
   if (auto activity = take_activity()) {

@@ -1,4 +1,5 @@
 // Stopping: one sequence per axis sends, confirms and escalates (M12 to M14).
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -6,6 +7,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/axis_log.hpp"
 
 namespace axisd {
 
@@ -93,7 +95,7 @@ Task<> Axis::run_stop() {
     if (confirmed.error().outcome == Outcome::unknown) bus_lost(confirmed.error());
     ++failed_stops_;
     if (!fault_) fault_ = confirmed.error();
-    spdlog::error("{}", to_string(confirmed.error()));
+    log_about_axis(spdlog::level::err, LogKind::stop_unconfirmed, settings_, to_string(confirmed.error()));
     for (const auto& command : commands) {
       if (link_ == LinkState::offline)
         command->unknown(confirmed.error());
@@ -110,11 +112,11 @@ void Axis::note_stop_sent(TimePoint end, bool answered) {
   const auto late = observed_.stop_sent(end, answered);
   if (!late) return;
   const auto in_ms = [](Duration time) { return std::chrono::duration<double, std::milli>(time).count(); };
-  spdlog::warn(
-      "{}: a stop frame had gone out {:.1f} ms after its request; the budget promises {:.1f} ms. Lost "
-      "frames, "
-      "or this computer: relieve it, or raise host_allowance of bus {} (told once)",
-      settings_.name, in_ms(late->seen), in_ms(late->expected), settings_.bus);
+  log_about_axis(
+      spdlog::level::warn, LogKind::stop_late, settings_,
+      fmt::format("{}: a stop frame had gone out {:.1f} ms after its request; the budget promises {:.1f} ms. "
+                  "Lost frames, or this computer: relieve it, or raise host_allowance of bus {} (told once)",
+                  settings_.name, in_ms(late->seen), in_ms(late->expected), settings_.bus));
 }
 
 Task<Result<void>> Axis::stop_and_confirm() {
@@ -160,11 +162,13 @@ Task<Result<void>> Axis::stop_and_confirm() {
       co_return fail(std::move(cause));
     }
     if (kind != StopKind::quick_stop) {
-      spdlog::warn("{}: standstill not confirmed in time; quick stop", settings_.name);
+      log_about_axis(spdlog::level::warn, LogKind::stop_escalated, settings_,
+                     fmt::format("{}: standstill not confirmed in time; quick stop", settings_.name));
       stopping_.kind = StopKind::quick_stop;
     } else if (settings_.stop_escalation_release && !released) {
-      spdlog::warn("{}: standstill not confirmed after a quick stop; releasing the power stage",
-                   settings_.name);
+      log_about_axis(spdlog::level::warn, LogKind::stop_escalated, settings_,
+                     fmt::format("{}: standstill not confirmed after a quick stop; releasing the power stage",
+                                 settings_.name));
       released = true;
       if (const auto off = co_await drive_->disable({}); !off) spdlog::error("{}", to_string(off.error()));
     } else {

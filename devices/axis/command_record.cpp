@@ -1,9 +1,12 @@
 #include "devices/axis/command_record.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "buses/log_about.hpp"
 
 namespace axisd {
 
@@ -25,8 +28,11 @@ void CommandRecord::end(CommandState state, std::optional<Error> cause) {
   command_.ended_at = clock_->wall(ended_when_);
   // Whoever sent it may not have waited for its end.
   if (state == CommandState::error || state == CommandState::unknown)
-    spdlog::warn("{}: {} ended as {} ({}){}", command_.axis, to_string(command_.kind), to_string(state),
-                 command_.id, command_.cause ? ": " + to_string(*command_.cause) : "");
+    log_about(
+        spdlog::level::warn, LogKind::command_failed,
+        {.axis = command_.axis, .client = command_.client, .command = command_.id},
+        fmt::format("{}: {} ended as {} ({}){}", command_.axis, to_string(command_.kind), to_string(state),
+                    command_.id, command_.cause ? ": " + to_string(*command_.cause) : ""));
   tell();
   observers_.clear();
 }
