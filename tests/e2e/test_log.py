@@ -1,7 +1,8 @@
 """The daemon's log: its level while it runs, and what clients can make of it."""
+import re
 import unittest
 
-from harness import Scenario, wait_for
+from harness import CallFailed, Scenario, feeder, wait_for
 
 
 class Level(Scenario):
@@ -22,6 +23,40 @@ class Level(Scenario):
         # Of what happened meanwhile there is nothing.
         between = machine.daemon.log().split("the log has level error now")[1].split("the log has level info now")[0]
         self.assertNotIn(" info ", between.split("\n", 1)[1].rsplit("\n", 1)[0])
+
+
+class Journal(Scenario):
+    def test_lines_of_text_where_stderr_goes_elsewhere(self):
+        """JOURNAL_STREAM is inherited, also by whoever sends standard error to a file."""
+        machine = self.machine({"feeder": feeder()})
+        machine.start_lines()
+        daemon = machine.start_daemon({"JOURNAL_STREAM": "8:1234567"})
+        machine.client.wait_online("feeder")
+        wait_for(lambda: " info feeder: online (" in daemon.log(), "it is told")
+        self.assertNotRegex(daemon.log(), "AXISD_|[\x1e\x1f]")
+
+
+class Floods(Scenario):
+    def test_refused_calls_are_counted_instead_of_written(self):
+        machine = self.machine({"feeder": feeder()}).start()
+        for _ in range(200):
+            with self.assertRaises(CallFailed):
+                machine.client.motion("MoveAbsolute", "nobody", position=1.0)
+        told = sum(" refused: " in line and "nobody" in line for line in machine.daemon.log().splitlines())
+        self.assertLess(told, 120, "50 of a client and a kind in 10 s, at most two periods")
+        left_out = r" warning [^\n]*: refused calls: \d+ more like this in the last 10 s\n"
+        wait_for(lambda: re.search(left_out, machine.daemon.log()), "the others are counted")
+
+    def test_renewals_are_not_written(self):
+        machine = self.ready_feeder()
+        jog = {"velocity": 5.0, "hold": 2.0, "request_id": "jog"}
+        machine.client.motion("Jog", "feeder", **jog)
+        written = len(machine.daemon.log().splitlines())
+        for _ in range(50):
+            machine.client.motion("Jog", "feeder", **jog)
+        machine.client.to_done("Halt", "feeder")
+        wait_for(lambda: " Halt" in machine.daemon.log() or "halt" in machine.daemon.log(), "the halt is told")
+        self.assertLess(len(machine.daemon.log().splitlines()), written + 10, machine.daemon.log())
 
 
 if __name__ == "__main__":
