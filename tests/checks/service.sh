@@ -1,5 +1,6 @@
 #!/bin/bash
-# Stages an installation of BUILD and checks what systemd will read: the unit (syntax, programs, exposure) and the user.
+# Stages an installation of BUILD and checks what systemd will read: the unit (syntax, programs, exposure), the catalog and the
+# user.
 #   tests/checks/service.sh BUILD
 set -euo pipefail
 build=$(readlink -f "${1:?"usage: tests/checks/service.sh BUILD"}")
@@ -31,6 +32,14 @@ for unit in "$stage/usr/lib/systemd/system/axisd.service" "$stage/unit/axisd.ser
     { cat "$stage/exposure"; exit 1; }
   tail -n 1 "$stage/exposure"
 done
+# The catalog has each kind of line that the daemon's journal knows, and no other.
+mkdir -p "$stage/var/lib/systemd/catalog"
+journalctl --root="$stage" --update-catalog
+ids=$(dirname "$0")/../../buses/log_about.cpp
+diff <(grep -o '"[0-9a-f]\{32\}"' "$ids" | tr -d '"' | sort) \
+  <(journalctl --root="$stage" --list-catalog | cut -d ' ' -f 1 | sort) ||
+  { echo "service.sh: deploy/axisd.catalog lacks kinds (<) of $ids, or has others (>)" >&2; exit 1; }
+
 # What it may not be closed to: serial ports and CAN.
 for needed in '^DeviceAllow=char-ttyUSB rw$' '^DeviceAllow=char-ttyACM rw$' '^DeviceAllow=char-ttyS rw$' \
   '^RestrictAddressFamilies=.*AF_CAN' '^RestrictAddressFamilies=.*AF_INET ' '^WatchdogSec=1$' '^WatchdogSignal=SIGKILL$' \

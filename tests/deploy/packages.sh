@@ -58,7 +58,7 @@ has() {  # PACKAGE PATH ...
 }
 has axisd usr/bin/axisd usr/bin/axisd-sim usr/lib/axisd/axisd-link etc/axisd/axisd.yaml etc/axisd/links \
   lib/systemd/system/axisd.service lib/systemd/system/axisd-link.socket usr/lib/sysusers.d/axisd.conf \
-  usr/lib/tmpfiles.d/axisd.conf lib/udev/rules.d/99-axisd.rules usr/share/man/man8/axisd.8.gz \
+  usr/lib/tmpfiles.d/axisd.conf usr/lib/systemd/catalog/axisd.catalog lib/udev/rules.d/99-axisd.rules usr/share/man/man8/axisd.8.gz \
   usr/share/man/man8/axisd-link.8.gz usr/share/man/man1/axisd-sim.1.gz usr/share/man/man5/axisd.yaml.5.gz
 has axisctl usr/bin/axisctl usr/share/man/man1/axisctl.1.gz usr/share/bash-completion/completions/axisctl \
   usr/share/zsh/vendor-completions/_axisctl usr/share/fish/vendor_completions.d/axisctl.fish
