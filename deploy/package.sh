@@ -31,9 +31,16 @@ else
   full=$version~$snapshot
 fi
 
-tree=$(mktemp -d "${TMPDIR:-/tmp}/axisd-package.XXXXXX")
+# Always at the same place: precompiled headers name the place where they were made, and ccache finds what was compiled
+# with them there. Of one user only one build at a time.
+tree=${TMPDIR:-/tmp}/axisd-package.$UID
+mkdir -m 0700 "$tree" 2>/dev/null || [ -d "$tree" ] || die "cannot make $tree"
+if [ ! -O "$tree" ] || [ -L "$tree" ]; then die "$tree is somebody else's"; fi
+exec 9<"$tree"
+flock --nonblock 9 || die "another build of packages is under way in $tree"
 trap 'rm -rf "$tree"' EXIT
 umask 022
+find "$tree" -mindepth 1 -delete  # of a build that was killed
 mkdir "$tree/axisd"
 git archive HEAD | tar -x -C "$tree/axisd"
 cd "$tree/axisd"
