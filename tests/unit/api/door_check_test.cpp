@@ -80,6 +80,13 @@ TEST_F(DoorCheck, TellsThatTheMainServerHasGone) {
   }
 }
 
+/// So that one that stands still is told from one that has nothing to do.
+TEST_F(DoorCheck, TheAcceptLoopComesRoundWithoutConnections) {
+  serve();
+  const auto begun = server_->last_progress();
+  EXPECT_TRUE(eventually([&] { return server_->last_progress() > begun; }));
+}
+
 TEST_F(DoorCheck, ConnectsAnewToALaneThatHasClosedItsConnection) {
   // Its own place is the only one, and the next client gets it.
   serve_both({.connections = 1});
