@@ -22,13 +22,14 @@ bool is_renewal(const Command& command, const std::optional<WallTime>& called) {
   return renewable && !ended(command.state) && is_repeat(command, called);
 }
 
-/// A client begins as many commands as it has request ids. Everything else it may ask for as often as it
-/// likes, and its lines are limited.
-std::string_view unlimited_kind(const Command& command, const std::optional<WallTime>& called) {
+/// Lines of each kind are limited. Each command is in the audit, and one that fails has a line of its own:
+/// journald takes so many lines of a service, and whom hundreds of axes index for must not have it leave out
+/// the warnings among them.
+std::string_view kind_of_line(const Command& command, const std::optional<WallTime>& called) {
   if (is_repeat(command, called)) return "repeated calls";
   const bool stops = command.kind == CommandKind::halt || command.kind == CommandKind::stop ||
                      command.kind == CommandKind::quick_stop || command.kind == CommandKind::disable;
-  return stops ? "stops" : std::string_view();
+  return stops ? "stops" : "commands";
 }
 
 void log(std::string_view client, std::string_view subject, std::string_view what,
@@ -43,10 +44,7 @@ void log(std::string_view client, std::string_view subject, std::string_view wha
   const bool failed = result->state == CommandState::error || result->state == CommandState::unknown;
   const auto about = failed ? LogKind::command_failed : LogKind::command_accepted;
   const LogSubject about_it{.axis = result->axis, .client = client, .command = result->id};
-  if (const auto kind = unlimited_kind(*result, called); !kind.empty())
-    log_limited(level, client, kind, text, about, about_it);
-  else
-    log_about(level, about, about_it, fmt::format("{}: {}", client, text));
+  log_limited(level, client, kind_of_line(*result, called), text, about, about_it);
 }
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <utility>
 
+#include "buses/limited_log.hpp"
+
 namespace axisd::metrics {
 
 namespace beast = boost::beast;
@@ -126,7 +128,7 @@ void HttpServer::run() {
     try {
       io_.run();
     } catch (const std::exception& error) {  // no memory: that connection has ended
-      spdlog::error("metrics: {}", error.what());
+      log_limited(spdlog::level::err, "metrics", "requests", error.what());
     }
   }
 }
