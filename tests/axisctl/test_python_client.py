@@ -45,6 +45,11 @@ class Motion(ClientTest):
         self.assertEqual((request.acceleration_time.nanos, request.deceleration_time.nanos),
                          (150_000_000, 200_000_000))
 
+    async def test_log_level(self):
+        self.assertEqual(await self.machine.log_level(), "info")
+        self.assertEqual(await self.machine.log_level("debug"), "info")
+        self.assertEqual(await self.machine.log_level(), "debug")
+
     async def test_zero_is_a_value(self):
         await self.feeder.set_position(5)
         await self.feeder.move(0)

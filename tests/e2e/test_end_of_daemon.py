@@ -190,6 +190,7 @@ class Systemd(Scenario):
                              ("axisd-stops", "no progress: .*stop lane|no answer for clients: .*stop lane"),
                              ("axisd-core", "no progress: .*core")):
             at = len(daemon.log())
+            machine.notify.forget()
             with frozen(pid, thread):
                 def silent():
                     return re.search(f" critical .*({told})", daemon.log()[at:])

@@ -386,8 +386,9 @@ class Machine:
     async def log_level(self, level: str | None = None) -> str:
         """How much the daemon writes into its log: "trace", "debug", "info", "warn" or "error". With `level` it does so from
         now until it ends. Returns what it was before."""
-        wanted = system_service_pb2.LogLevel.Value(f"LOG_LEVEL_{level.upper()}") if level else 0
-        request = system_service_pb2.SetLogLevelRequest(level=wanted)
+        request = system_service_pb2.SetLogLevelRequest()
+        if level is not None:
+            request.level = system_service_pb2.LogLevel.Value(f"LOG_LEVEL_{level.upper()}")
         response = await self._call(self._system.SetLogLevel, request, "set log level")
         return system_service_pb2.LogLevel.Name(response.previous).removeprefix("LOG_LEVEL_").lower()
 
