@@ -30,7 +30,7 @@ Supervision::Finding Supervision::look(TimePoint now, const std::vector<Part>& p
   if (!finding.dead.empty() && held_up) {
     finding.dead.clear();
     finding.sign = Sign::unsure;
-    finding.next = period_ / 8;
+    finding.next = period_ / 4;
   } else if (!finding.dead.empty()) {
     finding.sign = Sign::dead;
   } else if (!doors_answer) {
