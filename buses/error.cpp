@@ -47,7 +47,8 @@ std::string_view to_string(Reason reason) {
                                                                  "reloading",
                                                                  "eeprom_budget",
                                                                  "state_unaccepted",
-                                                                 "access_denied"});
+                                                                 "access_denied",
+                                                                 "unauthenticated"});
   static_assert(names.size() == std::to_underlying(last_reason) + 1U);
   return names.at(std::to_underlying(reason));
 }

@@ -52,9 +52,10 @@ enum class Reason : std::uint8_t {
   eeprom_budget,        ///< It would wear the drive's EEPROM beyond `limits.eeprom_saves_per_day`.
   state_unaccepted,     ///< Files of the state are not what they were. Look at the machine, then accept it.
   access_denied,        ///< The client lacks the role that this needs.
+  unauthenticated,      ///< The client's certificate has expired or was revoked. Connect with a good one.
 };
 /// The last one of the list, for whoever goes through all of it.
-inline constexpr Reason last_reason = Reason::access_denied;
+inline constexpr Reason last_reason = Reason::unauthenticated;
 
 std::string_view to_string(Reason reason);
 

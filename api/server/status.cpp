@@ -85,6 +85,8 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::lease_required:
     case Reason::access_denied:
       return grpc::StatusCode::PERMISSION_DENIED;
+    case Reason::unauthenticated:
+      return grpc::StatusCode::UNAUTHENTICATED;
     case Reason::request_id_conflict:
       return grpc::StatusCode::ALREADY_EXISTS;
     case Reason::busy:

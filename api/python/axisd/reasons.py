@@ -49,6 +49,7 @@ class Reason(enum.StrEnum):
     EEPROM_BUDGET = "eeprom_budget"
     STATE_UNACCEPTED = "state_unaccepted"
     ACCESS_DENIED = "access_denied"
+    UNAUTHENTICATED = "unauthenticated"
 
 
 class Outcome(enum.StrEnum):
