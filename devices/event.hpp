@@ -99,9 +99,24 @@ struct InhibitChange {
   std::string by;  ///< who called StopAll, or released it
 };
 
-using EventContent = std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift,
-                                  FlightRecordWritten, LeaseChange, ConfigurationReloaded, StopHoldChange,
-                                  CommandChange, AxisFault, KeptStateChange, InhibitChange>;
+/// The certificates of `server.tls` end soon, have ended, or were read again.
+struct CertificateNotice {
+  enum class What : std::uint8_t {
+    expires_soon,
+    expired,
+    replaced,      ///< new connections get what the files hold now
+    not_replaced,  ///< what they hold now is not usable: that of before stays
+  };
+  What what = What::replaced;
+  std::string path;    ///< the file; empty: all of them
+  WallTime expires{};  ///< the file, or what is served from now on: its first certificate to end
+  std::string text;    ///< one line, with what to do
+};
+
+using EventContent =
+    std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten, LeaseChange,
+                 ConfigurationReloaded, StopHoldChange, CommandChange, AxisFault, KeptStateChange,
+                 InhibitChange, CertificateNotice>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon

@@ -108,6 +108,8 @@ std::string text_of(const v1::InhibitChange& change) {
   }
 }
 
+std::string text_of(const v1::CertificateNotice& notice) { return notice.text(); }
+
 std::string kind_name(v1::EventKind kind) {
   auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
   std::ranges::replace(name, ' ', '-');
@@ -142,6 +144,8 @@ std::string content_text(const v1::Event& event) {
       return text_of(event.kept_state_change());
     case v1::Event::kInhibitChange:
       return text_of(event.inhibit_change());
+    case v1::Event::kCertificateNotice:
+      return text_of(event.certificate_notice());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -178,7 +182,7 @@ v1::EventKind parse_event_kind(std::string_view text) {
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
                             "configuration (of a drive), configuration-reloaded, flight, lease, stop "
-                            "(holds), command, axis-fault, kept-state, inhibit (StopAll)",
+                            "(holds), command, axis-fault, kept-state, inhibit (StopAll), certificate",
                             text));
 }
 

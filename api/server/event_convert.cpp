@@ -84,6 +84,17 @@ void fill(const InhibitChange& from, v1::Event& event) {
   to.set_kind(static_cast<v1::InhibitChangeKind>(std::to_underlying(from.what) + 1));  // 0 is "unspecified"
   to.set_by(from.by);
 }
+
+void fill(const CertificateNotice& from, v1::Event& event) {
+  auto& to = *event.mutable_certificate_notice();
+  to.set_kind(
+      static_cast<v1::CertificateNoticeKind>(std::to_underlying(from.what) + 1));  // 0 is "unspecified"
+  to.set_path(from.path);
+  if (from.expires != WallTime{}) to_proto(from.expires, *to.mutable_expires());
+  to.set_text(from.text);
+}
+static_assert(std::to_underlying(CertificateNotice::What::not_replaced) + 1 ==
+              v1::CERTIFICATE_NOTICE_KIND_NOT_REPLACED);
 static_assert(std::to_underlying(InhibitChange::What::not_durable) + 1 ==
               v1::INHIBIT_CHANGE_KIND_NOT_DURABLE);
 static_assert(std::to_underlying(StopHoldChange::What::not_durable) + 1 ==
@@ -107,6 +118,7 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const AxisFault&) const { return v1::EVENT_KIND_AXIS_FAULT; }
     v1::EventKind operator()(const KeptStateChange&) const { return v1::EVENT_KIND_KEPT_STATE_CHANGE; }
     v1::EventKind operator()(const InhibitChange&) const { return v1::EVENT_KIND_INHIBIT_CHANGE; }
+    v1::EventKind operator()(const CertificateNotice&) const { return v1::EVENT_KIND_CERTIFICATE_NOTICE; }
   };
   return std::visit(Kind{}, event.content);
 }

@@ -22,6 +22,7 @@ struct IsAudited {
   bool operator()(const LinkChange&) const { return false; }
   bool operator()(const ConfigurationDrift&) const { return false; }
   bool operator()(const FlightRecordWritten&) const { return false; }
+  bool operator()(const CertificateNotice&) const { return false; }
 };
 
 /// Who stopped or held something, or ceased to hold it; nullptr: it is something else.

@@ -13,6 +13,9 @@ from axisd.v1 import error_pb2, system_service_pb2 as pb
 FULL = error_pb2.ErrorDetail(reason=error_pb2.REASON_STORAGE, message="the latch would not outlive a restart",
                              remedy="free space on the disk")
 
+NOTICE = {"kind": "CERTIFICATE_NOTICE_KIND_EXPIRES_SOON", "path": "/etc/server.crt",
+          "text": "/etc/server.crt expires in 20 days: renew it"}
+
 
 class Axisctl(AxisctlTest):
     def test_all_is_well(self):
@@ -60,6 +63,10 @@ class Axisctl(AxisctlTest):
         shown = self.ok("events", "--kind", "inhibit")
         self.assertIn("StopAll by test: motion is inhibited until it is released\n", shown)
         self.assertIn("StopAll released by test\n", shown)
+
+    def test_certificates_are_events(self):
+        self.server.machine.happen("", certificate_notice=NOTICE)
+        self.assertIn("/etc/server.crt expires in 20 days: renew it\n", self.ok("events", "--kind", "certificate"))
 
     def test_stop_all_says_that_its_latch_is_not_on_the_disk(self):
         self.server.machine.latch_trouble = FULL
@@ -129,6 +136,15 @@ class Python(PythonTest):
                 if event.content.kind == "released":
                     break
         self.assertEqual(seen, [axisd.InhibitChange("latched", "test"), axisd.InhibitChange("released", "test")])
+
+    async def test_certificates_are_events(self):
+        self.fake.happen("", certificate_notice=NOTICE)
+        async for event in self.machine.events(kept=True):
+            if isinstance(event.content, axisd.CertificateNotice):
+                break
+        told = event.content
+        self.assertEqual((told.kind, told.path, told.text), ("expires_soon", "/etc/server.crt", NOTICE["text"]))
+        self.assertIsNone(told.expires)
 
     async def test_stop_all_says_that_its_latch_is_not_on_the_disk(self):
         self.assertIsNone((await self.machine.stop_all()).not_durable)

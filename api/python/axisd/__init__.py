@@ -11,7 +11,7 @@ from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
 from .configuration import ConfigChange, ConfigCheck, ConfigFinding, Configuration, Reload
 from .drive import Drive
-from .drives import (Alarm, AxisFault, CommandChange, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
+from .drives import (Alarm, AxisFault, CertificateNotice, CommandChange, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, Event, FlightRecordWritten, FoundNode,
                      InhibitChange, KeptStateChange, LeaseChange, LinkChange, Parameter, PositionSegment, ScanProgress, Segments, SerialProgress,
                      StateChange, StopHoldChange, TerminalCapability, TerminalEdge, VelocitySegment)
 from .errors import (ArgumentError, AxisdError, LeaseLostError, MotionError, RefusedError, StopError,
@@ -29,7 +29,7 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 
 __all__ = [
     "Alarm", "AllStopped", "ArgumentError", "AuditRecord", "Axis", "AxisBudget", "AxisFault", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
-    "ClassStatistics", "Command", "CommandChange", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
+    "CertificateNotice", "ClassStatistics", "Command", "CommandChange", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
     "ConfigurationDrift", "ConfigurationReloaded", "Conviction", "Cursor", "Device", "Drive", "DriveInfo",
     "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "InhibitChange", "Jog", "KeptFile", "KeptState", "KeptStateChange", "Latency", "Lease",

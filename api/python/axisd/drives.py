@@ -285,9 +285,19 @@ class InhibitChange:
     by: str
 
 
+@dataclasses.dataclass(frozen=True)
+class CertificateNotice:
+    """The certificates of the daemon end soon, have ended, or were read again. `kind`: "expires_soon", "expired",
+    "replaced" or "not_replaced"; `path`: the file, empty: all of them; `text`: one line, with what to do."""
+    kind: str
+    path: str
+    expires: datetime.datetime | None
+    text: str
+
+
 Content = (TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
            | ConfigurationReloaded | StopHoldChange | CommandChange | AxisFault | KeptStateChange
-           | InhibitChange)
+           | InhibitChange | CertificateNotice)
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -322,6 +332,10 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
     if kind == "inhibit_change":
         name = event_service_pb2.InhibitChangeKind.Name(content.kind)
         return InhibitChange(name.removeprefix("INHIBIT_CHANGE_KIND_").lower(), content.by)
+    if kind == "certificate_notice":
+        name = event_service_pb2.CertificateNoticeKind.Name(content.kind)
+        return CertificateNotice(name.removeprefix("CERTIFICATE_NOTICE_KIND_").lower(), content.path,
+                                 _optional_time(content, "expires"), content.text)
     if kind == "stop_hold_change":
         name = event_service_pb2.StopHoldChangeKind.Name(content.kind)
         return StopHoldChange(name.removeprefix("STOP_HOLD_CHANGE_KIND_").lower(), content.holder, content.request_id,

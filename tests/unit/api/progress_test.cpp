@@ -274,6 +274,24 @@ TEST_F(Events, FiltersByAxisAndKindAndStillMovesTheCursor) {
   EXPECT_EQ(axis.reader->Finish().error_code(), grpc::StatusCode::NOT_FOUND);
 }
 
+TEST_F(Events, CertificatesAreTold) {
+  serve();
+  machine_.event_log().add("", CertificateNotice{.what = CertificateNotice::What::expires_soon,
+                                                 .path = "/etc/server.crt",
+                                                 .expires = WallTime(std::chrono::seconds(1'800'000'000)),
+                                                 .text = "renew it"});
+  machine_.event_log().add("", CertificateNotice{.what = CertificateNotice::What::not_replaced});
+  EventWatch watch(channel_, all_);
+  ASSERT_TRUE(watch.read());
+  const auto& soon = watch.batch.events(0).certificate_notice();
+  EXPECT_EQ(soon.kind(), v1::CERTIFICATE_NOTICE_KIND_EXPIRES_SOON);
+  EXPECT_EQ(soon.path(), "/etc/server.crt");
+  EXPECT_EQ(soon.expires().seconds(), 1'800'000'000);
+  EXPECT_EQ(soon.text(), "renew it");
+  EXPECT_EQ(watch.batch.events(1).certificate_notice().kind(), v1::CERTIFICATE_NOTICE_KIND_NOT_REPLACED);
+  EXPECT_FALSE(watch.batch.events(1).certificate_notice().has_expires());
+}
+
 TEST_F(Events, ManyComeInOrderAndInBoundedMessages) {
   serve();
   constexpr std::uint64_t half = 400;
