@@ -27,6 +27,7 @@ namespace axisd::config {
 
 struct TlsSettings {
   std::string certificate, key, client_ca;  ///< PEM files
+  std::string crl;                          ///< likewise; empty: there is none
 };
 
 /// `limits:` of the server.

@@ -245,6 +245,7 @@ Section section_of(const ServerSettings& server) {
   fields.add("tls.certificate", server.tls->certificate);
   fields.add("tls.key", server.tls->key);
   fields.add("tls.client_ca", server.tls->client_ca);
+  fields.add("tls.crl", server.tls->crl);
   return fields.take();
 }
 

@@ -23,7 +23,7 @@ constexpr KeySpec tls_keys[] = {
     {.key = "key",
      .kind = Kind::text,
      .required = true,
-     .description = "Private key of the server (PEM file).",
+     .description = "Private key of the server (PEM file). Others than its owner and group must not read it.",
      .example = "/etc/axisd/server.key",
      .pattern = path_pattern,
      .pattern_hint = path_hint,
@@ -36,6 +36,14 @@ constexpr KeySpec tls_keys[] = {
      .pattern = path_pattern,
      .pattern_hint = path_hint,
      .apply = [](Target& t, const Value& v) { t.configuration->server.tls->client_ca = v.text; }},
+    {.key = "crl",
+     .kind = Kind::text,
+     .description =
+         "Certificates of clients that their authorities have revoked (PEM file, CRL). Without it none is.",
+     .example = "/etc/axisd/clients.crl",
+     .pattern = path_pattern,
+     .pattern_hint = path_hint,
+     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->crl = v.text; }},
 };
 
 constexpr KeySpec limit_keys[] = {

@@ -39,7 +39,8 @@ google::protobuf::Struct as_message(const config::LoadResult& result,
 }
 
 tls::Findings check_tls(const config::TlsSettings& tls) {
-  return tls::check({.certificate = tls.certificate, .key = tls.key, .client_ca = tls.client_ca});
+  return tls::check(
+      {.certificate = tls.certificate, .key = tls.key, .client_ca = tls.client_ca, .crl = tls.crl});
 }
 
 /// `elsewhere`: the file is for another computer, where its certificates are.

@@ -4,6 +4,9 @@
 #include <openssl/err.h>
 #include <openssl/pem.h>
 
+#include <algorithm>
+#include <chrono>
+#include <ctime>
 #include <utility>
 
 namespace axisd::tls {
@@ -16,6 +19,28 @@ Memory reader(const std::string& text) {
 // An encrypted key must fail, not ask on a terminal that a service does not have.
 int no_password(char*, int, int, void*) { return -1; }
 
+/// All that `read` finds in a PEM text. `name`, `mark`: of one of them, and of its first line.
+template <class Thing, class Read>
+Result<std::vector<Thing>> all_of(const std::string& path, const std::string& text, Read read,
+                                  std::string_view name, std::string_view mark) {
+  const auto memory = reader(text);
+  std::vector<Thing> all;
+  for (;;) {
+    Thing next(read(memory.get(), nullptr, no_password, nullptr));
+    if (next) {
+      all.push_back(std::move(next));
+      continue;
+    }
+    const bool at_end = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
+    ERR_clear_error();
+    if (at_end && !all.empty()) return all;
+    if (at_end)
+      return wrong(path, fmt::format("no {} in PEM format", name), fmt::format("give a file with {}", mark));
+    return wrong(path, fmt::format("{} {} is not readable", name, all.size() + 1),
+                 "repair or replace the file");
+  }
+}
+
 }  // namespace
 
 std::unexpected<Error> wrong(const std::string& path, std::string_view what, std::string remedy) {
@@ -24,21 +49,11 @@ std::unexpected<Error> wrong(const std::string& path, std::string_view what, std
 }
 
 Result<std::vector<Certificate>> certificates(const std::string& path, const std::string& text) {
-  const auto memory = reader(text);
-  std::vector<Certificate> all;
-  for (;;) {
-    Certificate next(PEM_read_bio_X509(memory.get(), nullptr, no_password, nullptr));
-    if (next) {
-      all.push_back(std::move(next));
-      continue;
-    }
-    const bool at_end = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
-    ERR_clear_error();
-    if (at_end && !all.empty()) return all;
-    if (at_end) return wrong(path, "no certificate in PEM format", "give a file with BEGIN CERTIFICATE");
-    return wrong(path, fmt::format("certificate {} is not readable", all.size() + 1),
-                 "repair or replace the file");
-  }
+  return all_of<Certificate>(path, text, PEM_read_bio_X509, "certificate", "BEGIN CERTIFICATE");
+}
+
+Result<std::vector<RevocationList>> revocation_lists(const std::string& path, const std::string& text) {
+  return all_of<RevocationList>(path, text, PEM_read_bio_X509_CRL, "CRL", "BEGIN X509 CRL");
 }
 
 Result<Key> private_key(const std::string& path, const std::string& text) {
@@ -48,6 +63,26 @@ Result<Key> private_key(const std::string& path, const std::string& text) {
     return wrong(path, "no usable private key in PEM format",
                  "give an unencrypted key with BEGIN PRIVATE KEY");
   return key;
+}
+
+const X509* issuer_of(const RevocationList& list, const std::vector<Certificate>& authorities) {
+  const X509* issuer = nullptr;
+  for (const auto& authority : authorities) {
+    if (X509_NAME_cmp(X509_CRL_get_issuer(list.get()), X509_get_subject_name(authority.get())) != 0) continue;
+    // The same name may be of several authorities.
+    if (X509_CRL_verify(list.get(), X509_get0_pubkey(authority.get())) == 1) issuer = authority.get();
+  }
+  ERR_clear_error();
+  return issuer;
+}
+
+std::optional<WallTime> time_of(const ASN1_TIME* time) {
+  std::tm parts{};
+  if (time == nullptr || ASN1_TIME_to_tm(time, &parts) != 1) return std::nullopt;
+  const std::chrono::seconds since(timegm(&parts));
+  const auto first = std::chrono::ceil<std::chrono::seconds>(WallTime::min().time_since_epoch());
+  const auto last = std::chrono::floor<std::chrono::seconds>(WallTime::max().time_since_epoch());
+  return WallTime(std::clamp(since, first, last));
 }
 
 }  // namespace axisd::tls

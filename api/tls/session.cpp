@@ -61,6 +61,8 @@ Result<std::shared_ptr<const Acceptor>> Acceptor::make(const Files& contents) {
     fine = fine && SSL_CTX_add1_chain_cert(context, (*chain)[i].get()) == 1;
   fine = fine && SSL_CTX_use_PrivateKey(context, key->get()) == 1;
   auto* trusted = SSL_CTX_get_cert_store(context);
+  // As gRPC does: an authority need not be a root.
+  X509_STORE_set_flags(trusted, X509_V_FLAG_PARTIAL_CHAIN | X509_V_FLAG_TRUSTED_FIRST);
   for (const auto& authority : *authorities) {
     fine = fine && X509_STORE_add_cert(trusted, authority.get()) == 1;
     fine = fine && SSL_CTX_add_client_CA(context, authority.get()) == 1;
@@ -111,6 +113,8 @@ std::string Session::certificate() const {
   const Certificate peer(SSL_get1_peer_certificate(session_.get()));
   const Memory text(BIO_new(BIO_s_mem()));
   if (!peer || !text || PEM_write_bio_X509(text.get(), peer.get()) != 1) return {};
+  const auto* shown = SSL_get_peer_cert_chain(session_.get());
+  for (int i = 0; i < sk_X509_num(shown); ++i) PEM_write_bio_X509(text.get(), sk_X509_value(shown, i));
   std::string pem(BIO_ctrl_pending(text.get()), '\0');
   BIO_read(text.get(), pem.data(), static_cast<int>(pem.size()));
   return pem;

@@ -45,7 +45,8 @@ class Session {
 
   /// The handshake is over, and the peer's certificate is good.
   [[nodiscard]] bool established() const;
-  /// The peer's certificate in PEM format. Precondition: established().
+  /// The peer's certificate in PEM format, and behind it those that it came with. Precondition:
+  /// established().
   [[nodiscard]] std::string certificate() const;
 
  private:
