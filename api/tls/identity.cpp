@@ -16,7 +16,6 @@ namespace axisd::tls {
 namespace {
 
 constexpr std::size_t longest_name = 128, longest_beginning = 96;
-constexpr std::size_t most_known = 1024;
 
 std::string text_of(const ASN1_STRING* from) {
   unsigned char* utf8 = nullptr;
@@ -54,12 +53,37 @@ std::string first_alternative(const X509* certificate) {
   return {};
 }
 
-std::string encoded(const X509_NAME* name) {
-  unsigned char* der = nullptr;
-  const int length = i2d_X509_NAME(name, &der);
-  std::string bytes = length > 0 ? std::string(reinterpret_cast<const char*>(der), length) : std::string();
-  OPENSSL_free(der);
-  return bytes;
+std::string encoded_name(const X509_NAME* name) { return encoded(name, i2d_X509_NAME); }
+std::string encoded_key(const X509* certificate) {
+  return encoded<EVP_PKEY>(X509_get0_pubkey(certificate), i2d_PUBKEY);
+}
+
+bool has_signed(const Authority& authority, X509* certificate) {
+  const auto* der = reinterpret_cast<const unsigned char*>(authority.key.data());
+  const Key key(d2i_PUBKEY(nullptr, &der, static_cast<long>(authority.key.size())));
+  return key && X509_verify(certificate, key.get()) == 1;
+}
+
+/// Who issued the first of them, by its signature: one name may be of several. One that is not among
+/// `authorities` is among those shown, or without a key.
+Authority issuer_of_first(const std::vector<Certificate>& shown, const std::vector<Authority>& authorities) {
+  auto* certificate = shown.front().get();
+  Authority issuer{
+      .name = encoded_name(X509_get_issuer_name(certificate)), .key = {}, .shares_its_name = true};
+  const auto known = std::ranges::find_if(
+      authorities, [&](const Authority& authority) { return has_signed(authority, certificate); });
+  for (std::size_t i = 1; i < shown.size() && known == authorities.end() && issuer.key.empty(); ++i) {
+    const Authority between{.name = issuer.name, .key = encoded_key(shown[i].get())};
+    if (has_signed(between, certificate)) issuer.key = between.key;
+  }
+  ERR_clear_error();
+  return known == authorities.end() ? issuer : *known;
+}
+
+/// What stands for it: equal for the same authority only.
+std::string text_of(const Authority& authority) {
+  // A name begins with another byte, so that none looks like a name and a key.
+  return authority.shares_its_name ? '\0' + authority.name + authority.key : authority.name;
 }
 
 /// 16 digits of a SHA-256: nobody finds another text with the same ones.
@@ -88,33 +112,29 @@ std::string beginning_of(std::string_view name) {
 }  // namespace
 
 Identities::Identities(const std::string& client_ca) {
-  if (const auto all = certificates("client_ca", client_ca); all)
-    first_authority_ = encoded(X509_get_subject_name(all->front().get()));
+  const auto all = certificates("client_ca", client_ca);
+  for (std::size_t i = 0; all && i < all->size(); ++i) {
+    const auto* certificate = (*all)[i].get();
+    Authority next{.name = encoded_name(X509_get_subject_name(certificate)), .key = encoded_key(certificate)};
+    for (auto& other : authorities_)
+      if (other.name == next.name && other.key != next.key)
+        other.shares_its_name = next.shares_its_name = true;
+    authorities_.push_back(std::move(next));
+  }
 }
 
 std::string Identities::of(const std::string& pem) const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (const auto found = known_.find(pem); found != known_.end()) return found->second;
-  }
-  auto name = read(pem);
-  const std::lock_guard lock(mutex_);
-  if (known_.size() >= most_known) known_.clear();
-  known_.emplace(pem, name);
-  return name;
-}
-
-std::string Identities::read(const std::string& pem) const {
   const auto all = certificates("the client's certificate", pem);
   if (!all) return "unnamed:" + hash_of(pem);
-  const auto* certificate = all->front().get();
+  auto* certificate = all->front().get();
   auto name = common_name(certificate);
   if (name.empty()) name = first_alternative(certificate);
   ERR_clear_error();
-  if (name.empty()) return "unnamed:" + hash_of(pem);
-  const auto issuer = encoded(X509_get_issuer_name(certificate));
-  if (issuer == first_authority_ && is_plain(name)) return name;
-  // The issuer's encoding says how long it is: no two pairs make the same text.
+  if (name.empty()) return "unnamed:" + hash_of(encoded(certificate, i2d_X509));
+  const auto issuer = text_of(issuer_of_first(*all, authorities_));
+  const bool first = !authorities_.empty() && issuer == text_of(authorities_.front());
+  if (first && is_plain(name)) return name;
+  // What stands for the issuer says how long it is: no two pairs make the same text.
   return fmt::format("{}~{}", beginning_of(name), hash_of(issuer + name));
 }
 
