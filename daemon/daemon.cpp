@@ -22,10 +22,12 @@
 #include "api/server/door_check.hpp"
 #include "api/server/lane/stop_lane.hpp"
 #include "api/server/server.hpp"
+#include "api/tls/live.hpp"
 #include "api/tls/pem_files.hpp"
 #include "buses/log_about.hpp"
 #include "daemon/audit_opening.hpp"
 #include "daemon/audit_reader.hpp"
+#include "daemon/certificate_keeper.hpp"
 #include "daemon/configuration_service.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
@@ -71,11 +73,17 @@ bool stop_axes(core::CoreLoop& loop, core::MachineCore& machine) {
   return wait_until([&] { return ask_core(loop, [&] { return machine.at_rest(); }); }, stop_patience);
 }
 
-std::optional<server::TlsFiles> tls_files(const config::ServerSettings& settings) {
-  if (!settings.tls) return std::nullopt;
-  return server::TlsFiles{.certificate = settings.tls->certificate,
-                          .key = settings.tls->key,
-                          .client_ca = settings.tls->client_ca};
+tls::Files files_of(const config::TlsSettings& settings) {
+  return {.certificate = settings.certificate,
+          .key = settings.key,
+          .client_ca = settings.client_ca,
+          .crl = settings.crl};
+}
+
+/// nullptr: there is no TLS. Errors: as of tls::Live::open().
+Result<std::shared_ptr<tls::Live>> open_tls(const config::ServerSettings& settings) {
+  if (!settings.tls) return nullptr;
+  return tls::Live::open(files_of(*settings.tls));
 }
 
 std::optional<AccessSettings> access_of(const config::Configuration& configuration) {
@@ -146,19 +154,24 @@ core::MachineParts machine_parts(Ground& ground, std::function<void()> published
 
 ConfigurationService::Parts served_parts(const Options& options, const config::Configuration& configuration,
                                          const std::string& yaml, core::MachineService& service,
-                                         const std::shared_ptr<server::AccessControl>& access) {
+                                         const std::shared_ptr<server::AccessControl>& access,
+                                         CertificateKeeper& certificates) {
   return {.path = options.config,
           .yaml = yaml,
           .configuration = configuration,
           .since = std::chrono::system_clock::now(),
-          .load = [&options] { return load_configuration(options); },
+          .load = [&options] { return load_configuration(options, TlsFilesMay::only_be_good); },
           .check_tls = check_tls,
           .last_good = last_good(configuration.state_directory),
           .apply =
               [&service](core::Reload reload, bool dry_run, core::ReloadDone done) {
                 service.reload(std::move(reload), dry_run, std::move(done));
               },
-          .adopted = [access](const auto& next) { access->replace(access_of(next)); }};
+          .adopted =
+              [access, &certificates](const auto& next) {
+                access->replace(access_of(next));
+                certificates.reload();
+              }};
 }
 
 /// The machine, and all that is asked of it by others, torn down in reverse. Thread: first.
@@ -166,15 +179,17 @@ class Doors {
  public:
   /// All of them outlive this.
   Doors(Ground& ground, const Options& options, const config::Configuration& configuration,
-        const std::string& yaml)
+        const std::string& yaml, std::shared_ptr<tls::Live> tls)
       : ground_(ground),
         configuration_(configuration),
+        tls_(std::move(tls)),
         audit_reader_(audit_directory(configuration), *ground.audit),
         state_copier_(configuration.state_directory),
         machine_(machine_parts(ground, [this] { published(); }), configuration),
         service_(ground.loop, machine_, configuration.machine, ground.instance_id),
         access_(std::make_shared<server::AccessControl>(access_of(configuration))),
-        served_(served_parts(options, configuration, yaml, service_, access_)),
+        certificates_(tls_, [this](CertificateNotice notice) { tell(std::move(notice)); }),
+        served_(served_parts(options, configuration, yaml, service_, access_, certificates_)),
         server_(service_, server_options()),
         stop_lane_(service_, stop_lane_options()),
         metering_({.loop = ground.loop,
@@ -182,7 +197,8 @@ class Doors {
                    .service = service_,
                    .journal = ground.state->journal(),
                    .settings = configuration.server,
-                   .budgets = ground.budgets}) {
+                   .budgets = ground.budgets,
+                   .tls = tls_}) {
     published_to_ = &service_;
   }
 
@@ -199,28 +215,39 @@ class Doors {
   void published() {
     if (published_to_ != nullptr) published_to_->published();
   }
+  /// Thread: any, until close().
+  void tell(CertificateNotice notice);
   [[nodiscard]] server::ServerOptions server_options();
   [[nodiscard]] server::StopLaneOptions stop_lane_options();
 
   Ground& ground_;
   const config::Configuration& configuration_;
+  const std::shared_ptr<tls::Live> tls_;  ///< nullptr: there is no TLS
   AuditReader audit_reader_;
   StateCopier state_copier_;
   core::MachineService* published_to_ = nullptr;
   core::MachineCore machine_;
   core::MachineService service_;
   const std::shared_ptr<server::AccessControl> access_;
+  CertificateKeeper certificates_;
   ConfigurationService served_;
   server::Server server_;
   server::StopLane stop_lane_;
   Metering metering_;
 };
 
+void Doors::tell(CertificateNotice notice) {
+  post(ground_.loop.executor(), [this, notice = std::move(notice)] {
+    const auto& clock = ground_.loop.clock();
+    machine_.events().record(clock.wall(clock.now()), {}, notice);
+  });
+}
+
 server::ServerOptions Doors::server_options() {
   const auto& settings = configuration_.server;
   const auto& limits = settings.limits;
   return {.listen = {settings.listen},
-          .tls = tls_files(settings),
+          .tls = tls_,
           .reflection = settings.reflection,
           .limits = {.calls = limits.calls, .streams = limits.streams},
           .peers = {.connections = limits.connections},
@@ -236,7 +263,7 @@ server::StopLaneOptions Doors::stop_lane_options() {
   const auto& settings = configuration_.server;
   return {
       .listen = settings.stop_listen.empty() ? server::stop_lane_of(settings.listen) : settings.stop_listen,
-      .tls = tls_files(settings),
+      .tls = tls_,
       .access = access_,
       .audit_sink = ground_.audit.get()};
 }
@@ -254,6 +281,7 @@ Result<int> Doors::open() {
 /// core runs. Exit status.
 int Doors::serve(int port) {
   stop_lane_.serve();
+  certificates_.start();
   wait_until([this] { return ask_core(ground_.loop, [this] { return machine_.buses_reported(); }); },
              std::chrono::seconds(1));
   served_.keep_copy();
@@ -286,6 +314,7 @@ int Doors::serve(int port) {
 bool Doors::close() {
   server_.shutdown();
   stop_lane_.stop();
+  certificates_.close();
   ask_core(ground_.loop, [this] {
     published_to_ = nullptr;
     machine_.close();
@@ -304,7 +333,9 @@ int serve(const Options& options, const config::Configuration& configuration, co
   Ground ground;
   if (const auto ready = prepare(ground, options, configuration, yaml, logging); !ready)
     return give_up(ready.error());
-  Doors doors(ground, options, configuration, yaml);
+  auto tls = open_tls(configuration.server);
+  if (!tls) return give_up(tls.error());
+  Doors doors(ground, options, configuration, yaml, *std::move(tls));
   malloc_trim(0);  // a full journal was read in many pieces: what they leave between each other goes back
   doors.start();
   const CoreThread core_thread(ground.loop);
@@ -325,11 +356,17 @@ std::filesystem::path last_good(const std::string& state_directory) {
 }
 
 std::vector<std::pair<std::string_view, Error>> check_tls(const config::TlsSettings& tls) {
-  return tls::check({.certificate = tls.certificate, .key = tls.key, .client_ca = tls.client_ca});
+  return tls::check(files_of(tls));
 }
 
-config::LoadResult load_configuration(const Options& options) {
-  auto loaded = config::load_file(options.config, {}, check_tls);
+config::LoadResult load_configuration(const Options& options, TlsFilesMay may) {
+  const auto check = [may](const config::TlsSettings& tls) {
+    auto findings = check_tls(tls);
+    if (may == TlsFilesMay::be_valid_later)
+      std::erase_if(findings, [](const auto& found) { return found.second.reason == Reason::configuring; });
+    return findings;
+  };
+  auto loaded = config::load_file(options.config, {}, check);
   if (!loaded.configuration) return loaded;
   if (!options.state_directory.empty()) loaded.configuration->state_directory = options.state_directory;
   auto& server = loaded.configuration->server;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -27,8 +28,16 @@ std::filesystem::path last_good(const std::string& state_directory);
 /// A config::TlsCheck: the files as the service's user sees them.
 std::vector<std::pair<std::string_view, Error>> check_tls(const config::TlsSettings& tls);
 
+/// What is right in the files of the certificates beside files that are good.
+enum class TlsFilesMay : std::uint8_t {
+  only_be_good,
+  /// For a start: a computer without a battery for its clock begins in the past. run_daemon() ends with
+  /// `failed` then, to be tried again.
+  be_valid_later,
+};
+
 /// Reads the file that `--config` names; what the command line says comes before what the file says.
-config::LoadResult load_configuration(const Options& options);
+config::LoadResult load_configuration(const Options& options, TlsFilesMay may);
 
 /// Runs the daemon until a signal ends it. `yaml`: what the configuration was read from. Exit status.
 /// Precondition: called on the first thread, before any other was started.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -11,11 +12,12 @@
 namespace axisd {
 namespace {
 
-/// Of the certificate that is served; nothing: there is none, or who serves it tells what is wrong with it.
-std::optional<WallTime> certificate_expiry(const config::ServerSettings& settings) {
-  if (settings.metrics.listen.empty() || !settings.tls) return std::nullopt;
-  const auto expires = tls::first_expiry(settings.tls->certificate);
-  return expires ? std::optional(*expires) : std::nullopt;
+/// Of the certificate that is served now.
+std::function<std::optional<WallTime>()> certificate_expiry(std::shared_ptr<const tls::Live> live) {
+  if (!live) return {};
+  return [live = std::move(live)] {
+    return std::optional(tls::first_expiry(live->served()->contents.certificate));
+  };
 }
 
 }  // namespace
@@ -27,7 +29,7 @@ Metering::Metering(const Parts& parts)
                 .reading = [this] { return meter_.latest(); },
                 .journal_syncs = [&journal = parts.journal] { return journal.sync_times(); },
                 .budgets = parts.budgets,
-                .certificate_expires = certificate_expiry(parts.settings)}) {}
+                .certificate_expires = certificate_expiry(parts.tls)}) {}
 
 void Metering::start() {
   if (!settings_.listen.empty()) meter_.start();

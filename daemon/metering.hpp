@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "api/tls/live.hpp"
 #include "config/configuration.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
@@ -25,6 +26,7 @@ class Metering {
     const store::JournalFile& journal;
     const config::ServerSettings& settings;
     const std::vector<BusBudgetReport>& budgets;
+    std::shared_ptr<const tls::Live> tls;  ///< nullptr: there is no TLS
   };
   /// All of them outlive this.
   explicit Metering(const Parts& parts);

@@ -197,6 +197,7 @@ Result<void> permits(const AccessSettings& access, const Caller& caller, const D
 
 Result<Caller> admitted(const AccessSettings* access, const Peer& peer, const Claim& claim,
                         const Message& request, std::span<const GroupSettings> groups) {
+  if (peer.refusal) return fail(*peer.refusal);
   auto caller = caller_of(access, peer, claim);
   if (access == nullptr && caller) return caller;
   const auto demand = demand_of(request);

@@ -23,6 +23,8 @@ struct Peer {
   std::string name;       ///< "shift-a", "unix:anna": by which `access:` knows it
   std::string program{};  ///< of a unix socket, as the program calls itself: shown, and nothing else
   std::string address{};  ///< "ipv4:10.0.0.5:51234", "unix:axisctl": shown, and nothing else
+  /// Why nothing is taken from it, stops included: its certificate is not, or no longer, good.
+  std::optional<Error> refusal{};
 };
 
 /// What the metadata of a call says of whom it is made for. Unset: nothing.
@@ -75,8 +77,8 @@ struct Demand {
 [[nodiscard]] Result<void> permits(const AccessSettings& access, const Caller& caller, const Demand& demand,
                                    std::span<const std::string> axes);
 
-/// Whom a request is for, where they may make it. What needs no role is refused to nobody: of somebody whose
-/// metadata is not usable it is taken as their own.
+/// Whom a request is for, where they may make it. What needs no role is refused to nobody but a peer with a
+/// refusal: of somebody whose metadata is not usable it is taken as their own.
 [[nodiscard]] Result<Caller> admitted(const AccessSettings* access, const Peer& peer, const Claim& claim,
                                       const google::protobuf::Message& request,
                                       std::span<const GroupSettings> groups);

@@ -21,6 +21,14 @@ std::optional<std::string> metadata(const grpc::CallbackServerContext& context, 
   return std::string(found->second.data(), found->second.size());
 }
 
+/// The peer's own, and behind it those that it came with.
+std::string certificates_of(const grpc::AuthContext& auth) {
+  std::string pem;
+  for (const auto* property : {GRPC_X509_PEM_CERT_PROPERTY_NAME, GRPC_X509_PEM_CERT_CHAIN_PROPERTY_NAME})
+    for (const auto& value : auth.FindPropertyValues(property)) pem.append(value.data(), value.size());
+  return pem;
+}
+
 Claim claim_of(const grpc::CallbackServerContext& context) {
   return {.user = metadata(context, user_key), .role = metadata(context, role_key)};
 }
@@ -40,11 +48,9 @@ void Callers::enter(int connection) {
 
 Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
   const auto auth = context.auth_context();
-  if (auth && auth->IsPeerAuthenticated()) {
-    const auto pem = auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-    auto name =
-        identities_->of(pem.empty() ? std::string() : std::string(pem.front().data(), pem.front().size()));
-    return {.name = std::move(name), .address = context.peer()};
+  if (live_ && auth && auth->IsPeerAuthenticated()) {
+    auto client = live_->served()->clients.of(certificates_of(*auth), machine_.wall(machine_.now()));
+    return {.name = std::move(client.name), .address = context.peer(), .refusal = std::move(client.refusal)};
   }
   const auto connection = context.peer();
   if (connection.starts_with(given)) {
@@ -54,11 +60,19 @@ Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
   return {.name = "local:" + peer_host(connection), .address = connection};
 }
 
+OpenCalls::Judge Callers::judge_of(const grpc::CallbackServerContext& context) const {
+  const auto auth = live_ ? context.auth_context() : nullptr;
+  if (!auth || !auth->IsPeerAuthenticated()) return {};
+  return [live = live_, machine = &machine_, pem = certificates_of(*auth)] {
+    return live->served()->clients.of(pem, machine->wall(machine->now())).refusal;
+  };
+}
+
 Result<void> Callers::admit(const grpc::CallbackServerContext& context,
                             const google::protobuf::Message& request) {
   const auto access = access_->settings();
   const auto claim = claim_of(context);
-  if (!access && !claim.user && !claim.role) return {};
+  if (!live_ && !access && !claim.user && !claim.role) return {};
   const auto peer = peer_of(context);
   const auto groups = groups_for(access.get());
   const auto admission = admitted(access.get(), peer, claim, request, groups);

@@ -8,11 +8,13 @@
 #include <mutex>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "api/server/access.hpp"
+#include "api/server/open_calls.hpp"
 #include "api/server/refusals.hpp"
-#include "api/tls/identity.hpp"
+#include "api/tls/live.hpp"
 #include "devices/machine.hpp"
 
 namespace axisd::server {
@@ -25,13 +27,14 @@ class Callers {
   /// `machine` outlives this. `access`: nullptr: everybody may do everything. `audit`: as of Refusals.
   Callers(Machine& machine, std::shared_ptr<const AccessControl> access, AuditSink* audit);
 
-  /// Names peers by certificates of these authorities (PEM). Before the first call.
-  void trust(const std::string& client_ca) { identities_ = std::make_unique<tls::Identities>(client_ca); }
+  /// Names peers, and judges them, by their certificates. Before the first call.
+  void trust(std::shared_ptr<const tls::Live> live) { live_ = std::move(live); }
   /// Notes who is at the other end of a unix socket. gRPC is given the socket after that, by its number,
   /// which is free for another one only when the last call on it is gone.
   void enter(int connection);
 
-  /// Whether the call may be made. Errors: access_denied, invalid_argument (metadata).
+  /// Whether the call may be made. Errors: access_denied, invalid_argument (metadata),
+  /// unauthenticated (a certificate that is not good any more).
   [[nodiscard]] Result<void> admit(const grpc::CallbackServerContext& context,
                                    const google::protobuf::Message& request);
   /// Whom a call is for that was admitted.
@@ -41,6 +44,8 @@ class Callers {
                           const google::protobuf::Message& request) const;
   /// Who made its connection.
   [[nodiscard]] Peer peer_of(const grpc::CallbackServerContext& context) const;
+  /// Whether a stream of its client may go on; empty: always. To be asked as long as the server runs.
+  [[nodiscard]] OpenCalls::Judge judge_of(const grpc::CallbackServerContext& context) const;
   /// nullptr: there is none.
   [[nodiscard]] std::shared_ptr<const AccessSettings> access() const { return access_->settings(); }
 
@@ -50,7 +55,7 @@ class Callers {
   Machine& machine_;
   const std::shared_ptr<const AccessControl> access_;
   Refusals refusals_;
-  std::unique_ptr<tls::Identities> identities_;
+  std::shared_ptr<const tls::Live> live_;  ///< nullptr: there is no TLS
   mutable std::mutex mutex_;
   std::unordered_map<std::string, Peer> local_;  ///< under mutex_; by what gRPC calls the connection
 };

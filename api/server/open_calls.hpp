@@ -1,16 +1,21 @@
-// What the daemon's shutdown has to finish.
+// What the daemon's shutdown has to finish, and what ends with its client's certificate.
 #pragma once
 
 #include <grpcpp/support/status.h>
 
+#include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "api/server/status.hpp"
 #include "buses/clock.hpp"
+#include "buses/error.hpp"
 
 namespace axisd::server {
 
@@ -25,10 +30,16 @@ class OpenCall {
 /// All open calls. Thread: any.
 class OpenCalls {
  public:
-  /// False: the server is shutting down, the call must not begin.
-  [[nodiscard]] bool add(const std::shared_ptr<OpenCall>& call) {
+  /// Why a call may not go on; nothing: it may.
+  using Judge = std::function<std::optional<Error>()>;
+  /// Between two looks at calls that have a judge.
+  static constexpr Duration judged_every = std::chrono::seconds(1);
+
+  /// False: the server is shutting down, the call must not begin. `judge`: may be empty; asked by tick().
+  [[nodiscard]] bool add(const std::shared_ptr<OpenCall>& call, Judge judge = {}) {
+    auto shared = judge ? std::make_shared<const Judge>(std::move(judge)) : nullptr;
     const std::lock_guard lock(mutex_);
-    if (!closed_) calls_.emplace(call.get(), call);
+    if (!closed_) calls_.emplace(call.get(), Entry{.call = call, .judge = std::move(shared)});
     return !closed_;
   }
   void remove(const OpenCall* call) {
@@ -36,13 +47,28 @@ class OpenCalls {
     calls_.erase(call);
     if (closed_ && calls_.empty()) empty_.notify_all();
   }
+  /// Ends calls that may not go on. When it wants to be called again. Thread: one.
+  TimePoint tick(TimePoint now) {
+    if (now < next_look_) return next_look_;
+    next_look_ = now + judged_every;
+    std::vector<std::pair<std::shared_ptr<OpenCall>, std::shared_ptr<const Judge>>> judged;
+    {
+      const std::lock_guard lock(mutex_);
+      for (const auto& [key, entry] : calls_)
+        if (auto call = entry.judge ? entry.call.lock() : nullptr)
+          judged.emplace_back(std::move(call), entry.judge);
+    }
+    for (const auto& [call, judge] : judged)
+      if (const auto error = (*judge)()) call->close(to_status(*error));
+    return next_look_;
+  }
   /// Closes all calls, refuses further ones, and waits until all have ended or `until` has come.
   void close_all(const grpc::Status& status, TimePoint until) {
     std::vector<std::shared_ptr<OpenCall>> calls;
     std::unique_lock lock(mutex_);
     closed_ = true;
-    for (const auto& [key, weak] : calls_)
-      if (auto call = weak.lock()) calls.push_back(std::move(call));
+    for (const auto& [key, entry] : calls_)
+      if (auto call = entry.call.lock()) calls.push_back(std::move(call));
     lock.unlock();
     for (const auto& call : calls) call->close(status);
     calls.clear();
@@ -54,7 +80,12 @@ class OpenCalls {
   std::mutex mutex_;
   std::condition_variable empty_;
   bool closed_ = false;
-  std::unordered_map<const OpenCall*, std::weak_ptr<OpenCall>> calls_;
+  struct Entry {
+    std::weak_ptr<OpenCall> call;
+    std::shared_ptr<const Judge> judge;  ///< nullptr: it may always go on
+  };
+  std::unordered_map<const OpenCall*, Entry> calls_;
+  TimePoint next_look_{};  ///< of tick()
 };
 
 }  // namespace axisd::server

@@ -36,13 +36,14 @@ class ReplyStream : public grpc::ServerWriteReactor<Response>,
       : reply_(services.reply),
         calls_(services.calls),
         guard_(services.guard),
+        judge_(services.callers.judge_of(*context)),
         context_(context),
         ticket_(std::move(ticket)) {}
 
   /// Takes gRPC's share of the stream. False: the server is shutting down, the stream must not begin.
   /// Thread: gRPC.
   [[nodiscard]] bool open() {
-    if (!calls_->add(this->shared_from_this())) return false;
+    if (!calls_->add(this->shared_from_this(), std::move(judge_))) return false;
     self_ = this->shared_from_this();
     return true;
   }
@@ -117,6 +118,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Response>,
   const std::shared_ptr<ReplyThread> reply_;
   const std::shared_ptr<OpenCalls> calls_;
   const std::shared_ptr<StallGuard> guard_;
+  OpenCalls::Judge judge_;                      ///< until open()
   grpc::CallbackServerContext* const context_;  ///< valid until Finish was called
   Admission::Ticket ticket_;
   Response response_;                     ///< of the pending write

@@ -26,6 +26,7 @@
 #include "api/server/lease_service.hpp"
 #include "api/server/status.hpp"
 #include "api/server/system_service.hpp"
+#include "api/server/tls.hpp"
 #include "api/server/watch_hub.hpp"
 #include "buses/limited_log.hpp"
 
@@ -187,16 +188,12 @@ Server::~Server() { shutdown(); }
 Result<int> Server::start() {
   std::shared_ptr<grpc::ServerCredentials> tcp_credentials = grpc::InsecureServerCredentials();
   if (options_.tls) {
-    auto tls = tls_credentials(*options_.tls);
-    if (!tls) return fail(std::move(tls).error());
-    tcp_credentials = *std::move(tls);
-    const auto contents = tls::read(*options_.tls);
-    if (!contents) return fail(contents.error());
-    parts_->callers.trust(contents->client_ca);
+    tcp_credentials = tls_credentials(options_.tls);
+    parts_->callers.trust(options_.tls);
   }
   std::vector<ListeningSocket> sockets;
   for (const auto& address : options_.listen) {
-    auto opened = listen_on(address, options_.tls.has_value());
+    auto opened = listen_on(address, options_.tls != nullptr);
     if (!opened) return fail(std::move(opened).error());
     std::ranges::move(*opened, std::back_inserter(sockets));
   }
@@ -213,8 +210,10 @@ Result<int> Server::start() {
   if (!parts_->server)
     return fail(Reason::internal, "gRPC refuses to start", "see the log; GRPC_VERBOSITY=debug tells more");
   parts_->serving = true;
-  parts_->reply->start([hub = parts_->hub.get(), guard = parts_->guard.get()](TimePoint now) {
-    return std::min({hub->tick(now), guard->tick(now), tell_left_out(now)});
+  parts_->reply->start([hub = parts_->hub.get(), guard = parts_->guard.get(),
+                        judged = options_.tls ? parts_->calls.get() : nullptr](TimePoint now) {
+    const auto judges_again = judged == nullptr ? TimePoint::max() : judged->tick(now);
+    return std::min({hub->tick(now), guard->tick(now), tell_left_out(now), judges_again});
   });
 
   int port = 0;

@@ -9,7 +9,7 @@
 #include "api/server/access.hpp"
 #include "api/server/admission.hpp"
 #include "api/server/peer_budgets.hpp"
-#include "api/server/tls.hpp"
+#include "api/tls/live.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
 #include "devices/audit.hpp"
@@ -23,7 +23,7 @@ struct ServerOptions {
   /// "HOST:PORT", "[IPV6]:PORT" or "unix:PATH".
   std::vector<std::string> listen{"localhost:7443"};
   /// Mutual TLS on all TCP addresses. Without it only loopback addresses; unix sockets are always plaintext.
-  std::optional<TlsFiles> tls{};
+  std::shared_ptr<const tls::Live> tls{};
   /// gRPC's reflection; without it its clients get UNIMPLEMENTED.
   bool reflection = false;
   Admission::Limits limits{};
@@ -53,7 +53,7 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   /// Begins to serve; returns the TCP port (of the first address; 0: unix sockets only). Once.
-  /// Errors: invalid_argument (address, TLS file), busy (address in use), offline (address refused by the
+  /// Errors: invalid_argument (address), busy (address in use), offline (address refused by the
   /// system).
   [[nodiscard]] Result<int> start();
 

@@ -5,16 +5,12 @@
 
 #include <memory>
 
-#include "api/tls/pem_files.hpp"
-#include "buses/error.hpp"
+#include "api/tls/live.hpp"
 
 namespace axisd::server {
 
-using TlsFiles = tls::Files;
-
-/// Mutual TLS: clients must show a certificate that verifies. The files are checked completely before,
-/// because gRPC itself accepts unusable ones and then fails every handshake. Errors: invalid_argument, naming
-/// the file.
-[[nodiscard]] Result<std::shared_ptr<grpc::ServerCredentials>> tls_credentials(const TlsFiles& files);
+/// Mutual TLS: clients must show a certificate that verifies. Each handshake gets what `live` serves at that
+/// time; connections that are there stay.
+[[nodiscard]] std::shared_ptr<grpc::ServerCredentials> tls_credentials(std::shared_ptr<const tls::Live> live);
 
 }  // namespace axisd::server

@@ -17,13 +17,14 @@ WatchStream::WatchStream(const Services& services, grpc::CallbackServerContext* 
                          Admission::Ticket ticket, std::string instance_id, Ready on_ready)
     : reply_(services.reply),
       calls_(services.calls),
+      judge_(services.callers.judge_of(*context)),
       context_(context),
       ticket_(std::move(ticket)),
       instance_id_(std::move(instance_id)),
       on_ready_(std::move(on_ready)) {}
 
 bool WatchStream::open() {
-  if (!calls_->add(shared_from_this())) return false;
+  if (!calls_->add(shared_from_this(), std::move(judge_))) return false;
   self_ = shared_from_this();
   return true;
 }

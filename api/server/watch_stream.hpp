@@ -65,6 +65,7 @@ class WatchStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   const std::shared_ptr<ReplyThread> reply_;
   const std::shared_ptr<OpenCalls> calls_;
+  OpenCalls::Judge judge_;                      ///< until open()
   grpc::CallbackServerContext* const context_;  ///< valid until Finish was called
   Admission::Ticket ticket_;
   const std::string instance_id_;

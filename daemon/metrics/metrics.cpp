@@ -32,7 +32,8 @@ std::string Metrics::render(Format format) const {
   write_buses(to, reading->buses);
   write_stops(to, reading->buses, sources_.budgets);
   write_tallies(to, reading->tallies);
-  write_daemon(to, *reading, sources_.journal_syncs(), sources_.certificate_expires);
+  write_daemon(to, *reading, sources_.journal_syncs(),
+               sources_.certificate_expires ? sources_.certificate_expires() : std::nullopt);
   write_process(to);
   to.family("axisd_metrics_scrapes_total", MetricType::counter, "Scrapes that were answered.");
   to.sample({}, scrapes_);

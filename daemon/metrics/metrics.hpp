@@ -22,8 +22,8 @@ struct Sources {
   std::function<core::MachineReadingPtr()> reading;  ///< not nullptr
   std::function<LatencyHistogram()> journal_syncs;
   std::vector<BusBudgetReport> budgets;  ///< the published bounds
-  std::optional<WallTime>
-      certificate_expires{};  ///< the first in the chain that the server shows; nothing: no TLS
+  /// The first in the chain that the server shows; nothing: no TLS. Empty: likewise.
+  std::function<std::optional<WallTime>()> certificate_expires{};
 };
 
 /// What a scrape gets. Labels have the names of the configuration and constants of this program, never what a

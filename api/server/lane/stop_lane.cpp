@@ -25,7 +25,6 @@
 #include "api/server/peer.hpp"
 #include "api/server/peer_socket.hpp"
 #include "api/server/status.hpp"
-#include "api/tls/identity.hpp"
 #include "buses/heartbeat.hpp"
 
 namespace axisd::server {
@@ -70,17 +69,14 @@ std::string stop_lane_of(const std::string& listen) {
 class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
  public:
   Loop(Machine& machine, const StopLaneOptions& options)
-      : machine_(&machine), calls_(machine, options.access, options.audit_sink), places_(options.limits) {
+      : machine_(&machine),
+        calls_(machine, options.access, options.audit_sink),
+        places_(options.limits),
+        tls_(options.tls) {
     if (wake_.get() < 0) throw std::bad_alloc();
   }
 
-  /// `identities`: with an acceptor.
-  void open(std::vector<ListeningSocket> sockets, std::shared_ptr<const tls::Acceptor> acceptor,
-            std::unique_ptr<const tls::Identities> identities) {
-    sockets_ = std::move(sockets);
-    acceptor_ = std::move(acceptor);
-    identities_ = std::move(identities);
-  }
+  void open(std::vector<ListeningSocket> sockets) { sockets_ = std::move(sockets); }
 
   void run();
   void stop() {
@@ -101,6 +97,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   struct Client {
     std::string host, address;
     std::optional<Peer> peer;  ///< once it is identified
+    std::string certificate;   ///< in PEM format, once it is identified by one
     std::unique_ptr<Connection> connection;
   };
   struct Done {
@@ -118,6 +115,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   void serve(Id id);
   void begin(Id id, const lane::Http2::Call& call);
   void identify(Id id, Client& client);
+  [[nodiscard]] Peer peer_of(const Client& client) const;
   void close(std::optional<Id> id);
   void post(Done done);
   void answer_what_is_done();
@@ -127,8 +125,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   StopCalls calls_;
   Places places_;
   std::vector<ListeningSocket> sockets_;
-  std::shared_ptr<const tls::Acceptor> acceptor_;
-  std::unique_ptr<const tls::Identities> identities_;
+  const std::shared_ptr<const tls::Live> tls_;  ///< nullptr: there is none
   std::map<Id, Client> clients_;
   Id last_ = 0;
   std::uint64_t turned_away_ = 0;
@@ -237,9 +234,9 @@ void StopLane::Loop::accept_from(const ListeningSocket& socket) {
     }
     const auto from = text_of(address, size);
     const bool local = !socket.unix_path.empty();
-    auto peer = local       ? std::optional(local_peer(connection.get()))
-                : acceptor_ ? std::nullopt
-                            : std::optional(peer_called(peer_host(from), from));
+    auto peer = local  ? std::optional(local_peer(connection.get()))
+                : tls_ ? std::nullopt
+                       : std::optional(peer_called(peer_host(from), from));
     enter(std::move(connection), std::move(peer), from);
   }
 }
@@ -258,7 +255,7 @@ void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, cons
   const auto id = ++last_;
   const auto now = monotonic_now();
   auto network = address_of_peer(socket.get());
-  auto acceptor = peer ? nullptr : acceptor_;
+  auto acceptor = peer ? nullptr : tls_->served()->acceptor;
   auto& client = clients_[id];
   client.host = peer_host(address);
   client.address = address;
@@ -272,9 +269,15 @@ void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, cons
 
 /// Precondition: the connection is identified, by a certificate.
 void StopLane::Loop::identify(Id id, Client& client) {
-  client.peer =
-      Peer{.name = identities_->of(client.connection->certificate().value_or("")), .address = client.address};
+  client.certificate = client.connection->certificate().value_or("");
+  client.peer = peer_of(client);
   close(places_.identify(id, client.peer->name, false, monotonic_now()));
+}
+
+/// As its certificate is judged now. Precondition: it is identified by one.
+Peer StopLane::Loop::peer_of(const Client& client) const {
+  auto known = tls_->served()->clients.of(client.certificate, machine_->wall(machine_->now()));
+  return {.name = std::move(known.name), .address = client.address, .refusal = std::move(known.refusal)};
 }
 
 void StopLane::Loop::serve(Id id) {
@@ -290,7 +293,10 @@ void StopLane::Loop::serve(Id id) {
 void StopLane::Loop::begin(Id id, const lane::Http2::Call& call) {
   auto& client = clients_.at(id);
   // Bytes of the first request may come with the last ones of the handshake.
-  if (!client.peer) identify(id, client);
+  if (!client.peer)
+    identify(id, client);
+  else if (!client.certificate.empty())
+    client.peer = peer_of(client);
   places_.asked(id);
   calls_.start(call, *client.peer, [loop = weak_from_this(), id, stream = call.stream](StopCalls::Make make) {
     if (const auto alive = loop.lock()) alive->post({.id = id, .stream = stream, .make = std::move(make)});
@@ -353,21 +359,11 @@ StopLane::StopLane(Machine& machine, StopLaneOptions options)
 StopLane::~StopLane() { stop(); }
 
 Result<int> StopLane::listen() {
-  std::shared_ptr<const tls::Acceptor> acceptor;
-  std::unique_ptr<const tls::Identities> identities;
-  if (options_.tls) {
-    const auto contents = tls::read(*options_.tls);
-    if (!contents) return fail(contents.error());
-    auto made = tls::Acceptor::make(*contents);
-    if (!made) return fail(std::move(made).error());
-    acceptor = *std::move(made);
-    identities = std::make_unique<const tls::Identities>(contents->client_ca);
-  }
-  auto sockets = listen_on(options_.listen, options_.tls.has_value());
+  auto sockets = listen_on(options_.listen, options_.tls != nullptr);
   if (!sockets) return fail(std::move(sockets).error());
   const int port = sockets->front().port;
   loop_ = std::make_shared<Loop>(machine_, options_);
-  loop_->open(*std::move(sockets), std::move(acceptor), std::move(identities));
+  loop_->open(*std::move(sockets));
   spdlog::info("stops are taken on {} as well", port == 0 ? options_.listen : fmt::format("port {}", port));
   return port;
 }

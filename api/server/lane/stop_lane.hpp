@@ -9,7 +9,7 @@
 
 #include "api/server/access.hpp"
 #include "api/server/lane/places.hpp"
-#include "api/server/tls.hpp"
+#include "api/tls/live.hpp"
 #include "buses/file_descriptor.hpp"
 #include "devices/audit.hpp"
 #include "devices/machine.hpp"
@@ -18,9 +18,9 @@ namespace axisd::server {
 
 struct StopLaneOptions {
   std::string listen;  ///< "HOST:PORT", "[IPV6]:PORT" or "unix:PATH"
-  std::optional<TlsFiles> tls{};
   lane::Places::Limits limits{};
   // As of ServerOptions: the same for both.
+  std::shared_ptr<const tls::Live> tls{};
   std::shared_ptr<const AccessControl> access{};
   AuditSink* audit_sink = nullptr;
 };
@@ -44,7 +44,7 @@ class StopLane {
   StopLane(const StopLane&) = delete;
 
   /// Takes its address; whoever connects waits until serve(). Returns the TCP port (0: a unix socket). Once.
-  /// Errors: as of listen_on(), and invalid_argument (TLS files).
+  /// Errors: as of listen_on().
   [[nodiscard]] Result<int> listen();
   /// Precondition: listen().
   void serve();

@@ -3,11 +3,13 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
-#include "api/server/tls.hpp"
+#include "api/tls/live.hpp"
 #include "tests/unit/api/serving.hpp"
 
 namespace axisd::testing {
@@ -16,9 +18,10 @@ class Certificates {
  public:
   explicit Certificates(const TemporaryDirectory& directory) : directory_(directory) {}
 
-  void make_ca(const std::string& name) {
-    run("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=" +
-        name + " -keyout " + (directory_ / (name + ".key")) + " -out " + (directory_ / (name + ".crt")));
+  void make_ca(const std::string& name) { make_ca(name, "/CN=" + name); }
+  void make_ca(const std::string& name, const std::string& subject) {
+    run("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj " + subject +
+        " -keyout " + (directory_ / (name + ".key")) + " -out " + (directory_ / (name + ".crt")));
   }
   void make_pair(const std::string& name, const std::string& ca) {
     make_pair(name, ca, "/CN=" + name, "subjectAltName=DNS:localhost,IP:127.0.0.1\n");
@@ -33,12 +36,38 @@ class Certificates {
     run("openssl x509 -req -days 2 -in " + base + ".csr -CA " + (directory_ / (ca + ".crt")) + " -CAkey " +
         (directory_ / (ca + ".key")) + " -CAcreateserial -extfile " + base + ".ext -out " + base + ".crt");
   }
+  /// Writes NAME.crl of `ca`, which names these and what it named before.
+  void revoke(const std::string& ca, const std::vector<std::string>& names) {
+    const auto base = directory_ / ca;
+    std::ofstream(base + ".index", std::ios::app);
+    std::ofstream(base + ".cnf") << "[ca]\ndefault_ca = own\n[own]\ndatabase = " << base
+                                 << ".index\ndefault_md = sha256\ndefault_crl_days = 2\n";
+    const auto of_ca =
+        "openssl ca -config " + base + ".cnf -cert " + base + ".crt -keyfile " + base + ".key ";
+    for (const auto& name : names) run(of_ca + "-revoke " + (directory_ / (name + ".crt")));
+    run(of_ca + "-gencrl -out " + base + ".crl");
+  }
   /// Of the pair "server", for clients of "ca".
-  [[nodiscard]] server::TlsFiles server_files() const {
+  [[nodiscard]] tls::Files server_files() const {
     return {.certificate = directory_ / "server.crt",
             .key = directory_ / "server.key",
             .client_ca = directory_ / "ca.crt"};
   }
+  /// The same as they are served.
+  [[nodiscard]] std::shared_ptr<tls::Live> served() const { return served(server_files()); }
+  static std::shared_ptr<tls::Live> served(const tls::Files& files) {
+    auto live = tls::Live::open(files);
+    EXPECT_TRUE(live) << to_string(live.error());
+    return live ? *live : nullptr;
+  }
+  /// An hour ahead of this computer's, on the clock of the fake machine: certificates are valid then.
+  static void set_clock(FakeMachine& machine) {
+    const auto behind =
+        std::chrono::system_clock::now() + std::chrono::hours(1) - machine.wall(machine.now());
+    machine.set_now(machine.now() + std::chrono::duration_cast<Duration>(behind));
+  }
+  /// The text of a file.
+  [[nodiscard]] std::string read(const std::string& file) const { return contents(directory_ / file); }
   /// Empty name: without a certificate.
   [[nodiscard]] std::shared_ptr<grpc::ChannelCredentials> client(const std::string& name) const {
     grpc::SslCredentialsOptions ssl;
@@ -52,7 +81,7 @@ class Certificates {
 
  private:
   static void run(const std::string& command) {
-    ASSERT_EQ(std::system((command + " 2>/dev/null").c_str()), 0) << command;
+    ASSERT_EQ(std::system((command + " >/dev/null 2>&1").c_str()), 0) << command;
   }
   static std::string contents(const std::string& path) {
     std::ifstream file(path);

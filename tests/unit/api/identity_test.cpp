@@ -49,6 +49,31 @@ TEST_F(Identity, OfASecondAuthorityIsAnother) {
   EXPECT_THAT(named("two", "/CN=operator", "", "second"), MatchesRegex("operator~[0-9a-f]{16}"));
 }
 
+/// A name is made up quickly, a key is not.
+TEST_F(Identity, OfAnotherAuthorityOfTheSameNameIsAnother) {
+  certificates_.make_ca("twin", "/CN=ca");
+  certificates_.make_pair("own", "ca", "/CN=operator", "");
+  certificates_.make_pair("twins", "twin", "/CN=operator", "");
+  const tls::Identities both(read("ca") + read("twin")), first(read("ca") + read("second"));
+  EXPECT_EQ(both.of(read("own")), "operator");
+  EXPECT_THAT(both.of(read("twins")), MatchesRegex("operator~[0-9a-f]{16}"));
+  // Nor by way of an authority in between that has the name of the first.
+  certificates_.make_pair("between", "second", "/CN=ca", "basicConstraints=critical,CA:TRUE\n");
+  certificates_.make_pair("below", "between", "/CN=operator", "");
+  const auto below = first.of(read("below") + read("between"));
+  EXPECT_THAT(below, MatchesRegex("operator~[0-9a-f]{16}"));
+  EXPECT_NE(below, both.of(read("twins")));
+}
+
+/// What a client sends beside its certificate does not make it another one.
+TEST_F(Identity, IsTheSameWithTheCertificatesThatCameWithIt) {
+  certificates_.make_pair("one", "second", "/CN=operator", "");
+  certificates_.make_pair("two", "ca", "/O=press", "");
+  const tls::Identities identities(read("ca") + read("second"));
+  for (const auto* file : {"one", "two"})
+    EXPECT_EQ(identities.of(read(file)), identities.of(read(file) + read("second"))) << file;
+}
+
 TEST_F(Identity, TellsLettersApartThatItCannotShow) {
   const auto one = named("one", "/CN=J\xC3\xBCrg"), two = named("two", "/CN=J\xC3\xB6rg");
   EXPECT_THAT(one, MatchesRegex("J[?]+rg~[0-9a-f]{16}"));

@@ -251,12 +251,13 @@ TEST_F(Lane, ManyCallsOfManyClients) {
 
 TEST_F(Lane, OnlyVerifiedClientsAreServedByTheirName) {
   Certificates certificates(directory_);
+  Certificates::set_clock(machine_);
   certificates.make_ca("ca");
   certificates.make_ca("stranger-ca");
   certificates.make_pair("server", "ca");
   certificates.make_pair("hmi-1", "ca");
   certificates.make_pair("intruder", "stranger-ca");
-  serve({.listen = "127.0.0.1:0", .tls = certificates.server_files()});
+  serve({.listen = "127.0.0.1:0", .tls = certificates.served()});
   auto hmi = client(certificates.client("hmi-1"));
   const auto [status, response] = stop(*hmi);
   EXPECT_TRUE(status.ok()) << status.error_message();
@@ -277,6 +278,7 @@ TEST_F(Lane, OnlyVerifiedClientsAreServedByTheirName) {
 /// Holds, leases and request ids are by identity.
 TEST_F(Lane, AClientIsTheSameAtBothAddresses) {
   Certificates certificates(directory_);
+  Certificates::set_clock(machine_);
   certificates.make_ca("ca");
   certificates.make_pair("server", "ca");
   certificates.make_pair("named", "ca");
@@ -284,8 +286,8 @@ TEST_F(Lane, AClientIsTheSameAtBothAddresses) {
   certificates.make_pair("uri", "ca", "/O=x", "subjectAltName=URI:spiffe://cell/hmi,DNS:other\n");
   certificates.make_pair("ip", "ca", "/O=x", "subjectAltName=IP:10.1.2.3\n");
   certificates.make_pair("nameless", "ca", "/O=x", "");
-  serve({.listen = "127.0.0.1:0", .tls = certificates.server_files()});
-  server::Server main(machine_, {.listen = {"127.0.0.1:0"}, .tls = certificates.server_files()});
+  serve({.listen = "127.0.0.1:0", .tls = certificates.served()});
+  server::Server main(machine_, {.listen = {"127.0.0.1:0"}, .tls = certificates.served()});
   const auto port = main.start();
   ASSERT_TRUE(port) << to_string(port.error());
   for (const auto* name : {"named", "dns", "uri", "ip", "nameless"}) {
@@ -303,6 +305,51 @@ TEST_F(Lane, AClientIsTheSameAtBothAddresses) {
     EXPECT_FALSE(same.command().client().empty()) << name;
   }
   main.shutdown();
+}
+
+TEST_F(Lane, ARevokedClientHasNoStopHereEither) {
+  Certificates certificates(directory_);
+  Certificates::set_clock(machine_);
+  certificates.make_ca("ca");
+  certificates.make_pair("server", "ca");
+  certificates.make_pair("hmi-1", "ca");
+  certificates.make_pair("hmi-2", "ca");
+  certificates.revoke("ca", {});
+  auto files = certificates.server_files();
+  files.crl = directory_ / "ca.crl";
+  const auto live = Certificates::served(files);
+  serve({.listen = "127.0.0.1:0", .tls = live});
+  auto old = client(certificates.client("hmi-1"));
+  ASSERT_TRUE(stop(*old).first.ok());
+  certificates.revoke("ca", {"hmi-1"});
+  ASSERT_TRUE(live->reload().value_or(false));
+  const auto again = client(certificates.client("hmi-1"));
+  for (auto* stub : {old.get(), again.get()}) {
+    const auto status = stop(*stub).first;
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+    EXPECT_NE(status.error_message().find("was revoked"), std::string::npos) << status.error_message();
+  }
+  auto other = client(certificates.client("hmi-2"));
+  EXPECT_TRUE(stop(*other).first.ok());
+  EXPECT_EQ(machine_.submitted().size(), 2U);
+}
+
+TEST_F(Lane, NewConnectionsGetNewFiles) {
+  Certificates certificates(directory_);
+  Certificates::set_clock(machine_);
+  certificates.make_ca("ca");
+  certificates.make_pair("server", "ca");
+  certificates.make_pair("hmi-1", "ca");
+  const auto live = certificates.served();
+  serve({.listen = "127.0.0.1:0", .tls = live});
+  certificates.make_ca("ca");
+  certificates.make_pair("server", "ca");
+  certificates.make_pair("hmi-1", "ca");
+  auto early = client(certificates.client("hmi-1"));
+  EXPECT_FALSE(stop(*early).first.ok()) << "the daemon still shows the old one";
+  ASSERT_TRUE(live->reload().value_or(false));
+  auto late = client(certificates.client("hmi-1"));
+  EXPECT_TRUE(stop(*late).first.ok());
 }
 
 TEST(StopLaneAddress, IsNextToThatOfTheServer) {

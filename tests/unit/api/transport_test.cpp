@@ -187,16 +187,22 @@ TEST_F(Transport, AFloodOfRequestsThatAreTakenBackIsCutOff) {
 
 class Tls : public Transport {
  protected:
-  ServerOptions options() { return {.listen = {"127.0.0.1:0"}, .tls = certificates_.server_files()}; }
+  ServerOptions options() { return options(certificates_.served()); }
+  static ServerOptions options(std::shared_ptr<tls::Live> live) {
+    return {.listen = {"127.0.0.1:0"}, .tls = std::move(live)};
+  }
+  void SetUp() override {
+    Certificates::set_clock(machine_);
+    certificates_.make_ca("ca");
+    certificates_.make_pair("server", "ca");
+    certificates_.make_pair("hmi-1", "ca");
+  }
 
   Certificates certificates_{directory_};
 };
 
 TEST_F(Tls, OnlyVerifiedClientsAreServedByTheirName) {
-  certificates_.make_ca("ca");
   certificates_.make_ca("stranger-ca");
-  certificates_.make_pair("server", "ca");
-  certificates_.make_pair("hmi-1", "ca");
   certificates_.make_pair("intruder", "stranger-ca");
   const auto port = start(options());
   ASSERT_TRUE(port) << to_string(port.error());
@@ -210,24 +216,74 @@ TEST_F(Tls, OnlyVerifiedClientsAreServedByTheirName) {
   EXPECT_EQ(machine_.submitted().size(), 1U);
 }
 
-TEST_F(Tls, UnusableFilesAreNamedAtTheStart) {
+TEST_F(Tls, NewConnectionsGetNewFilesAndOldOnesStay) {
+  const auto live = certificates_.served();
+  const auto port = start(options(live));
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto target = "127.0.0.1:" + std::to_string(*port);
+  const auto old = connect(target, certificates_.client("hmi-1"));
+  ASSERT_TRUE(stop(old).first.ok());
+  const auto before = certificates_.read("server.crt");
+
+  std::ofstream(directory_ / "server.crt") << "nonsense";
+  const auto damaged = live->reload();
+  ASSERT_FALSE(damaged);
+  EXPECT_THAT(damaged.error().message, HasSubstr("server.crt: no certificate in PEM format"));
+  EXPECT_TRUE(stop(connect(target, certificates_.client("hmi-1"))).first.ok()) << "what was served stays";
+
+  // Another authority for both sides: only whoever trusts that one gets in from now on.
   certificates_.make_ca("ca");
   certificates_.make_pair("server", "ca");
-  certificates_.make_pair("other", "ca");
-  const auto refused_file = [&](auto change, const std::string& file) {
-    auto wrong = options();
-    change(*wrong.tls);
-    EXPECT_EQ(refused(wrong), Reason::invalid_argument);
-    EXPECT_THAT(message_, HasSubstr(directory_ / file));
-  };
-  std::ofstream(directory_ / "garbage")
-      << "-----BEGIN CERTIFICATE-----\nnonsense\n-----END CERTIFICATE-----\n";
-  refused_file([&](auto& tls) { tls.key = directory_ / "other.key"; }, "other.key");
-  EXPECT_THAT(message_, HasSubstr("does not belong to the certificate"));
-  refused_file([&](auto& tls) { tls.key = directory_ / "missing"; }, "missing");
-  refused_file([&](auto& tls) { tls.key = directory_ / "garbage"; }, "garbage");
-  refused_file([&](auto& tls) { tls.certificate = directory_ / "garbage"; }, "garbage");
-  refused_file([&](auto& tls) { tls.client_ca = directory_ / "server.key"; }, "server.key");
+  const auto stranger = certificates_.client("hmi-1");
+  certificates_.make_pair("hmi-2", "ca");
+  ASSERT_TRUE(live->reload().value_or(false));
+  EXPECT_FALSE(live->reload().value_or(true)) << "nothing has changed";
+  EXPECT_TRUE(stop(connect(target, certificates_.client("hmi-2"))).first.ok());
+  EXPECT_FALSE(stop(connect(target, stranger)).first.ok());
+  EXPECT_NE(before, live->served()->contents.certificate);
+  // The old connection is there, but its client's authority is trusted no more.
+  EXPECT_EQ(stop(old).first.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+}
+
+TEST_F(Tls, NothingIsTakenFromARevokedClientStopsIncluded) {
+  auto files = certificates_.server_files();
+  files.crl = directory_ / "ca.crl";
+  certificates_.revoke("ca", {});
+  const auto live = Certificates::served(files);
+  const auto port = start(options(live));
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto target = "127.0.0.1:" + std::to_string(*port);
+  const auto old = connect(target, certificates_.client("hmi-1"));
+  ASSERT_TRUE(stop(old).first.ok());
+  Call watching;
+  const auto watch = v1::AxisService::NewStub(old)->WatchAxes(&watching, v1::WatchAxesRequest());
+  v1::WatchAxesResponse seen;
+  ASSERT_TRUE(watch->Read(&seen));
+
+  certificates_.revoke("ca", {"hmi-1"});
+  ASSERT_TRUE(live->reload().value_or(false));
+  for (const auto& channel : {old, connect(target, certificates_.client("hmi-1"))}) {
+    const auto status = stop(channel).first;
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+    EXPECT_THAT(status.error_message(), HasSubstr("the certificate of hmi-1 was revoked (2"));
+    EXPECT_EQ(detail_of(status).reason(), v1::REASON_UNAUTHENTICATED);
+  }
+  while (watch->Read(&seen)) {
+  }
+  EXPECT_EQ(watch->Finish().error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_EQ(machine_.submitted().size(), 1U);
+}
+
+TEST_F(Tls, AnExpiredClientHasNoRightOnItsOpenConnection) {
+  const auto port = start(options());
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto channel = connect("127.0.0.1:" + std::to_string(*port), certificates_.client("hmi-1"));
+  ASSERT_TRUE(stop(channel).first.ok());
+  machine_.set_now(machine_.now() + 72h);
+  const auto status = stop(channel).first;
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_THAT(status.error_message(), HasSubstr("has expired (2"));
+  EXPECT_EQ(machine_.submitted().size(), 1U);
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ class MetricsTest : public ::testing::Test {
        .budgets = {{.predicted = {.bus = "line-a",
                                   .stops = {{.axes = 1, .last_frame = 6ms, .standstill = 20ms},
                                             {.axes = 2, .last_frame = 9ms, .standstill = 30ms}}}}},
-       .certificate_expires = WallTime(1'800'000'000s)}};
+       .certificate_expires = [] { return std::optional(WallTime(1'800'000'000s)); }}};
 };
 
 TEST_F(MetricsTest, SaysWhatAxesPublish) {

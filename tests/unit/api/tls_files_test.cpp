@@ -1,0 +1,200 @@
+// What is wrong with the files of `server.tls`, when they end, and whether they were replaced.
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+
+#include "api/tls/clients.hpp"
+#include "api/tls/expiry.hpp"
+#include "api/tls/file_watch.hpp"
+#include "api/tls/pem_files.hpp"
+#include "tests/unit/api/certificates.hpp"
+#include "tests/unit/api/serving.hpp"
+
+namespace axisd::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::MatchesRegex;
+using ::testing::StartsWith;
+
+class TlsFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    certificates_.make_ca("ca");
+    certificates_.make_pair("server", "ca");
+    files_ = certificates_.server_files();
+  }
+  /// The only finding: at which key, and its text.
+  void finds(const std::string& key, const std::string& file, const std::string& what, WallTime now) const {
+    const auto found = tls::check(files_, now);
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].first, key);
+    EXPECT_THAT(found[0].second.message, StartsWith(directory_ / file + ": " + what));
+    EXPECT_FALSE(found[0].second.remedy.empty());
+    EXPECT_FALSE(tls::read(files_, now));
+  }
+  void finds(const std::string& key, const std::string& file, const std::string& what) const {
+    finds(key, file, what, std::chrono::system_clock::now());
+  }
+
+  TemporaryDirectory directory_;
+  Certificates certificates_{directory_};
+  tls::Files files_;
+};
+
+TEST_F(TlsFiles, GoodOnesAreRead) {
+  EXPECT_THAT(tls::check(files_), IsEmpty());
+  const auto contents = tls::read(files_);
+  ASSERT_TRUE(contents);
+  EXPECT_EQ(contents->certificate, certificates_.read("server.crt"));
+  EXPECT_EQ(contents->crl, "");
+  certificates_.revoke("ca", {"server"});
+  files_.crl = directory_ / "ca.crl";
+  EXPECT_EQ(tls::read(files_)->crl, certificates_.read("ca.crl"));
+}
+
+TEST_F(TlsFiles, ThatCannotBeUsedAreNamed) {
+  certificates_.make_pair("other", "ca");
+  std::ofstream(directory_ / "garbage")
+      << "-----BEGIN CERTIFICATE-----\nnonsense\n-----END CERTIFICATE-----\n";
+  const auto good = files_;
+  files_.key = directory_ / "other.key";
+  finds("key", "other.key", "the key does not belong to the certificate " + good.certificate);
+  files_ = good;
+  files_.key = directory_ / "missing";
+  finds("key", "missing", "cannot read: No such file");
+  files_.key = directory_ / "garbage";
+  finds("key", "garbage", "no usable private key in PEM format");
+  files_ = good;
+  files_.certificate = directory_ / "garbage";
+  finds("certificate", "garbage", "certificate 1 is not readable");
+  files_ = good;
+  files_.client_ca = directory_ / "server.key";
+  finds("client_ca", "server.key", "no certificate in PEM format");
+}
+
+TEST_F(TlsFiles, AKeyIsForItsOwnerAndGroup) {
+  namespace fs = std::filesystem;
+  fs::permissions(files_.key, fs::perms::owner_read | fs::perms::group_read);
+  EXPECT_THAT(tls::check(files_), IsEmpty());
+  fs::permissions(files_.key, fs::perms::others_read, fs::perm_options::add);
+  finds("key", "server.key", "every user of this computer may read or change this private key (mode 0444)");
+  EXPECT_EQ(tls::check(files_)[0].second.remedy, "chmod 640 " + files_.key);
+}
+
+TEST_F(TlsFiles, HaveToBeValid) {
+  const auto now = std::chrono::system_clock::now();
+  const auto later = tls::check(files_, now + 72h);
+  ASSERT_EQ(later.size(), 2U);
+  EXPECT_THAT(later[0].second.message, MatchesRegex(".*/server.crt: the certificate has expired .*Z\\)"));
+  EXPECT_THAT(later[1].second.message, HasSubstr("/ca.crt: the certificate has expired"));
+  EXPECT_EQ(later[0].second.reason, Reason::invalid_argument);
+  const auto earlier = tls::check(files_, now - 24h);
+  ASSERT_EQ(earlier.size(), 2U);
+  EXPECT_THAT(earlier[0].second.message, MatchesRegex(".*: the certificate is not valid before .*Z, and this "
+                                                      "computer's clock says .*Z"));
+  EXPECT_EQ(earlier[0].second.reason, Reason::configuring) << "to be tried again";
+}
+
+TEST_F(TlsFiles, RevocationListsAreOfTheAuthorityAndNew) {
+  certificates_.make_ca("second");
+  certificates_.revoke("ca", {});
+  certificates_.revoke("second", {});
+  files_.crl = directory_ / "second.crl";
+  finds("crl", "second.crl", "the CRL was not issued by an authority of " + files_.client_ca);
+  files_.crl = directory_ / "ca.crt";
+  finds("crl", "ca.crt", "no CRL in PEM format");
+  files_.crl = directory_ / "ca.crl";
+  const auto later = tls::check(files_, std::chrono::system_clock::now() + 72h);
+  ASSERT_EQ(later.size(), 3U);
+  EXPECT_THAT(later[2].second.message, HasSubstr("/ca.crl: the CRL has expired ("));
+  std::ofstream(files_.client_ca, std::ios::app) << certificates_.read("ca.crl");
+  files_.crl = "";
+  finds("client_ca", "ca.crt", "holds a CRL, which nobody looks at here");
+}
+
+TEST_F(TlsFiles, ClientsAreJudgedAtEachTime) {
+  certificates_.make_pair("hmi", "ca");
+  certificates_.make_pair("old", "ca");
+  certificates_.revoke("ca", {"old"});
+  files_.crl = directory_ / "ca.crl";
+  const tls::Clients clients(*tls::read(files_));
+  const auto soon = std::chrono::system_clock::now() + 1h;
+  const auto refusal = [&](const std::string& name, WallTime now) {
+    const auto client = clients.of(certificates_.read(name + ".crt"), now);
+    EXPECT_EQ(client.name, name);
+    if (client.refusal) {
+      EXPECT_EQ(client.refusal->reason, Reason::unauthenticated);
+    }
+    return client.refusal ? client.refusal->message : "";
+  };
+  EXPECT_EQ(refusal("hmi", soon), "");
+  EXPECT_THAT(refusal("old", soon), MatchesRegex("the certificate of old was revoked .*Z\\)"));
+  EXPECT_THAT(refusal("hmi", soon + 72h), StartsWith("the certificate of hmi "));
+  EXPECT_THAT(refusal("hmi", soon - 72h), HasSubstr("is not valid before "));
+  EXPECT_EQ(refusal("hmi", soon), "") << "the clock was put right";
+  EXPECT_THAT(refusal("old", soon + 36h), HasSubstr("was revoked")) << "the list is out of date by then";
+  certificates_.make_ca("second");
+  certificates_.make_pair("stranger", "second");
+  const auto stranger = clients.of(certificates_.read("stranger.crt"), soon);
+  ASSERT_TRUE(stranger.refusal);
+  EXPECT_THAT(stranger.refusal->message, HasSubstr("is not of an authority that the daemon trusts"));
+  EXPECT_TRUE(clients.of("nonsense", soon).refusal);
+}
+
+TEST_F(TlsFiles, EndIsToldThirtyDaysAheadAndEveryDay) {
+  const auto now = std::chrono::system_clock::now();
+  const auto all = tls::expiries(files_, *tls::read(files_), now);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].path, files_.certificate);
+  EXPECT_GT(all[0].at, now + 47h);
+  EXPECT_LE(all[0].at, now + 49h);
+  EXPECT_EQ(all[0].at, tls::first_expiry(certificates_.read("server.crt")));
+
+  tls::Reminder reminder;
+  const WallTime end(1'800'000'000s);
+  const std::vector<tls::Expiry> one{{.path = "/a.crt", .what = "the certificate", .at = end}};
+  TimePoint clock{};
+  const auto said = [&](WallTime wall) {
+    std::vector<std::string> texts;
+    for (const auto& notice : reminder.due(one, wall, clock)) texts.push_back(notice.text);
+    return texts;
+  };
+  EXPECT_THAT(said(end - std::chrono::days(31)), IsEmpty());
+  EXPECT_THAT(
+      said(end - std::chrono::days(20)),
+      ElementsAre(StartsWith("/a.crt: the certificate expires in 20 days (2027-01-15T08:00:00Z); renew")));
+  EXPECT_THAT(said(end - std::chrono::days(20)), IsEmpty());
+  clock += 24h;
+  EXPECT_THAT(said(end - std::chrono::days(1)), ElementsAre(HasSubstr("in 1 day (")));
+  EXPECT_THAT(said(end + 1s), ElementsAre(HasSubstr("the certificate has expired (")));
+  EXPECT_THAT(said(end + 2s), IsEmpty());
+  clock += 24h;
+  EXPECT_THAT(said(end + 3s), ElementsAre(HasSubstr("has expired")));
+}
+
+TEST_F(TlsFiles, AreWatchedUntilTheyRest) {
+  tls::FileWatch watch({files_.certificate, files_.key});
+  EXPECT_FALSE(watch.settled());
+  EXPECT_TRUE(watch.settled()) << "whatever was read before";
+  EXPECT_FALSE(watch.settled());
+  std::ofstream(files_.certificate, std::ios::app) << "\n";
+  EXPECT_FALSE(watch.settled()) << "its key may be on its way";
+  std::filesystem::rename(files_.key, directory_ / "away");
+  EXPECT_FALSE(watch.settled());
+  EXPECT_TRUE(watch.settled());
+  EXPECT_FALSE(watch.settled());
+  std::filesystem::rename(directory_ / "away", files_.key);
+  EXPECT_FALSE(watch.settled());
+  EXPECT_TRUE(watch.settled());
+}
+
+}  // namespace
+}  // namespace axisd::testing
