@@ -12,6 +12,7 @@
 
 #include "api/axisctl/completion.hpp"
 #include "api/axisctl/quantity.hpp"
+#include "api/axisctl/tls_trouble.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "config/text.hpp"
 
@@ -194,7 +195,8 @@ int run(int argc, const char* const* argv) {
     return app->exit(text);
   } catch (const Failure& failure) {
     // What could not be parsed has set nothing.
-    complain(failure, invocation.json || std::ranges::find(words, "--json") != words.end());
+    complain(with_tls_trouble(failure, invocation.connection),
+             invocation.json || std::ranges::find(words, "--json") != words.end());
     return std::to_underlying(failure.code());
   }
   return std::to_underlying(invocation.status);

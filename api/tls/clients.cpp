@@ -20,12 +20,6 @@ constexpr std::size_t most_known = 1024;
 /// cost much.
 constexpr auto refused_for = std::chrono::seconds(1);
 
-using Store = std::unique_ptr<X509_STORE, Release<X509_STORE, X509_STORE_free>>;
-using Verification = std::unique_ptr<X509_STORE_CTX, Release<X509_STORE_CTX, X509_STORE_CTX_free>>;
-
-void free_list(STACK_OF(X509) * list) { sk_X509_free(list); }
-using List = std::unique_ptr<STACK_OF(X509), Release<STACK_OF(X509), free_list>>;
-
 Error refusal(const std::string& name, std::string_view what, std::string remedy) {
   return {.reason = Reason::unauthenticated,
           .message = fmt::format("the certificate of {} {}", name, what),

@@ -1,10 +1,9 @@
 #include "api/tls/identity.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <openssl/err.h>
 #include <openssl/sha.h>
-#include <openssl/x509v3.h>
+#include <openssl/x509.h>
 
 #include <algorithm>
 #include <array>
@@ -17,40 +16,10 @@ namespace {
 
 constexpr std::size_t longest_name = 128, longest_beginning = 96;
 
-std::string text_of(const ASN1_STRING* from) {
-  unsigned char* utf8 = nullptr;
-  const int length = from == nullptr ? -1 : ASN1_STRING_to_UTF8(&utf8, from);
-  std::string text = length > 0 ? std::string(reinterpret_cast<const char*>(utf8), length) : std::string();
-  OPENSSL_free(utf8);
-  return text;
-}
-
 std::string common_name(const X509* certificate) {
   const auto* subject = X509_get_subject_name(certificate);
   const int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
-  return at < 0 ? std::string() : text_of(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
-}
-
-std::string address_of(const ASN1_OCTET_STRING* from) {
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  const bool v4 = ASN1_STRING_length(from) == 4;
-  if (!v4 && ASN1_STRING_length(from) != 16) return {};
-  const auto* bytes = ASN1_STRING_get0_data(from);
-  return inet_ntop(v4 ? AF_INET : AF_INET6, bytes, text.data(), text.size()) != nullptr ? text.data() : "";
-}
-
-std::string first_alternative(const X509* certificate) {
-  using Names = std::unique_ptr<GENERAL_NAMES, Release<GENERAL_NAMES, GENERAL_NAMES_free>>;
-  const Names names(
-      static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(certificate, NID_subject_alt_name, nullptr, nullptr)));
-  for (int i = 0; names && i < sk_GENERAL_NAME_num(names.get()); ++i) {
-    const auto* name = sk_GENERAL_NAME_value(names.get(), i);
-    // One member of the union has the strings of all three kinds.
-    if (name->type == GEN_DNS || name->type == GEN_URI || name->type == GEN_EMAIL)
-      if (auto text = text_of(name->d.ia5); !text.empty()) return text;
-    if (name->type == GEN_IPADD) return address_of(name->d.iPAddress);
-  }
-  return {};
+  return at < 0 ? std::string() : utf8_of(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
 }
 
 std::string encoded_name(const X509_NAME* name) { return encoded(name, i2d_X509_NAME); }
@@ -128,7 +97,8 @@ std::string Identities::of(const std::string& pem) const {
   if (!all) return "unnamed:" + hash_of(pem);
   auto* certificate = all->front().get();
   auto name = common_name(certificate);
-  if (name.empty()) name = first_alternative(certificate);
+  if (const auto others = alternatives_of(certificate); name.empty() && !others.empty())
+    name = others.front();
   ERR_clear_error();
   if (name.empty()) return "unnamed:" + hash_of(encoded(certificate, i2d_X509));
   const auto issuer = text_of(issuer_of_first(*all, authorities_));

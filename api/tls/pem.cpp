@@ -1,10 +1,13 @@
 #include "api/tls/pem.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <openssl/err.h>
 #include <openssl/pem.h>
+#include <openssl/x509v3.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <ctime>
 #include <utility>
@@ -18,6 +21,14 @@ Memory reader(const std::string& text) {
 
 // An encrypted key must fail, not ask on a terminal that a service does not have.
 int no_password(char*, int, int, void*) { return -1; }
+
+std::string address_of(const ASN1_OCTET_STRING* from) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const bool v4 = ASN1_STRING_length(from) == 4;
+  if (!v4 && ASN1_STRING_length(from) != 16) return {};
+  const auto* bytes = ASN1_STRING_get0_data(from);
+  return inet_ntop(v4 ? AF_INET : AF_INET6, bytes, text.data(), text.size()) != nullptr ? text.data() : "";
+}
 
 /// All that `read` finds in a PEM text. `name`, `mark`: of one of them, and of its first line.
 template <class Thing, class Read>
@@ -74,6 +85,43 @@ const X509* issuer_of(const RevocationList& list, const std::vector<Certificate>
   }
   ERR_clear_error();
   return issuer;
+}
+
+std::string name_text(const X509_NAME* name) {
+  const Memory text(BIO_new(BIO_s_mem()));
+  // Names are for people: letters stay as they are, as UTF-8.
+  constexpr unsigned long flags = XN_FLAG_RFC2253 & ~ASN1_STRFLGS_ESC_MSB;
+  if (!text || name == nullptr || X509_NAME_print_ex(text.get(), name, 0, flags) < 0) return {};
+  std::string bytes(BIO_ctrl_pending(text.get()), '\0');
+  if (!bytes.empty()) BIO_read(text.get(), bytes.data(), static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+std::vector<std::string> alternatives_of(const X509* certificate) {
+  using Names = std::unique_ptr<GENERAL_NAMES, Release<GENERAL_NAMES, GENERAL_NAMES_free>>;
+  const Names names(
+      static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(certificate, NID_subject_alt_name, nullptr, nullptr)));
+  std::vector<std::string> all;
+  for (int i = 0; names && i < sk_GENERAL_NAME_num(names.get()); ++i) {
+    const auto* name = sk_GENERAL_NAME_value(names.get(), i);
+    std::string text;
+    // One member of the union has the strings of all three kinds.
+    if (name->type == GEN_DNS || name->type == GEN_URI || name->type == GEN_EMAIL)
+      text = utf8_of(name->d.ia5);
+    else if (name->type == GEN_IPADD)
+      text = address_of(name->d.iPAddress);
+    if (!text.empty()) all.push_back(std::move(text));
+  }
+  ERR_clear_error();
+  return all;
+}
+
+std::string utf8_of(const ASN1_STRING* from) {
+  unsigned char* utf8 = nullptr;
+  const int length = from == nullptr ? -1 : ASN1_STRING_to_UTF8(&utf8, from);
+  std::string text = length > 0 ? std::string(reinterpret_cast<const char*>(utf8), length) : std::string();
+  OPENSSL_free(utf8);
+  return text;
 }
 
 std::optional<WallTime> time_of(const ASN1_TIME* time) {

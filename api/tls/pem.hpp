@@ -4,6 +4,7 @@
 #include <openssl/bio.h>
 #include <openssl/evp.h>
 #include <openssl/x509.h>
+#include <openssl/x509_vfy.h>
 
 #include <memory>
 #include <optional>
@@ -24,7 +25,13 @@ struct Release {
 using Certificate = std::unique_ptr<X509, Release<X509, X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Release<EVP_PKEY, EVP_PKEY_free>>;
 using RevocationList = std::unique_ptr<X509_CRL, Release<X509_CRL, X509_CRL_free>>;
+using Store = std::unique_ptr<X509_STORE, Release<X509_STORE, X509_STORE_free>>;
+using Verification = std::unique_ptr<X509_STORE_CTX, Release<X509_STORE_CTX, X509_STORE_CTX_free>>;
 using Memory = std::unique_ptr<BIO, Release<BIO, BIO_free_all>>;
+
+/// A list of certificates that belong to somebody else.
+inline void free_list(STACK_OF(X509) * list) { sk_X509_free(list); }
+using List = std::unique_ptr<STACK_OF(X509), Release<STACK_OF(X509), free_list>>;
 
 /// An error of the file at `path`; OpenSSL's own list of errors is emptied.
 [[nodiscard]] std::unexpected<Error> wrong(const std::string& path, std::string_view what,
@@ -44,6 +51,13 @@ using Memory = std::unique_ptr<BIO, Release<BIO, BIO_free_all>>;
 
 /// Times beyond what WallTime can say (the year 2262) are its first or last. Nothing: `time` is not readable.
 [[nodiscard]] std::optional<WallTime> time_of(const ASN1_TIME* time);
+
+/// A string of a certificate; empty: there is none, or it is not readable.
+[[nodiscard]] std::string utf8_of(const ASN1_STRING* from);
+/// "CN=cell-1,O=press".
+[[nodiscard]] std::string name_text(const X509_NAME* name);
+/// The alternative names of a certificate that can be shown: hosts, URIs, mail and network addresses.
+[[nodiscard]] std::vector<std::string> alternatives_of(const X509* certificate);
 
 /// The bytes of an object, by one of OpenSSL's i2d functions.
 template <class T>

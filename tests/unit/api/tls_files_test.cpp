@@ -4,9 +4,11 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <utility>
 
+#include "api/tls/client_check.hpp"
 #include "api/tls/clients.hpp"
 #include "api/tls/expiry.hpp"
 #include "api/tls/file_watch.hpp"
@@ -147,6 +149,70 @@ TEST_F(TlsFiles, ClientsAreJudgedAtEachTime) {
   ASSERT_TRUE(stranger.refusal);
   EXPECT_THAT(stranger.refusal->message, HasSubstr("is not of an authority that the daemon trusts"));
   EXPECT_TRUE(clients.of("nonsense", soon).refusal);
+}
+
+/// What a client is told where gRPC says that it could not connect.
+TEST_F(TlsFiles, ClientsAreToldWhatIsWrong) {
+  certificates_.make_ca("second");
+  certificates_.make_pair("hmi", "ca");
+  certificates_.make_pair("stranger", "second");
+  const auto now = std::chrono::system_clock::now() + 1h;
+  const auto files = [&](const std::string& ca, const std::string& name) {
+    return tls::ClientFiles{.ca = certificates_.read(ca + ".crt"),
+                            .certificate = name.empty() ? "" : certificates_.read(name + ".crt"),
+                            .key = name.empty() ? "" : certificates_.read(name + ".key")};
+  };
+  const auto text = [](const std::optional<Error>& error) { return error ? error->message : ""; };
+  EXPECT_EQ(text(tls::wrong_with(files("ca", "hmi"), now)), "");
+  auto mixed = files("ca", "hmi");
+  mixed.key = certificates_.read("stranger.key");
+  EXPECT_EQ(text(tls::wrong_with(mixed, now)),
+            "--tls-key: the key does not belong to the certificate of --tls-cert");
+  EXPECT_THAT(text(tls::wrong_with(files("ca", "hmi"), now + 72h)),
+              StartsWith("--tls-cert: the certificate has expired ("));
+
+  const tls::Shown shown{
+      .certificates = certificates_.read("server.crt"), .asks = true, .accepted = {"CN=ca", "CN=other"}};
+  const auto refused = [&](const tls::ClientFiles& own, const std::string& host, WallTime at) {
+    return text(tls::why_refused(own, shown, host, at));
+  };
+  EXPECT_EQ(refused(files("ca", "hmi"), "localhost", now), "");
+  EXPECT_EQ(refused(files("ca", "hmi"), "127.0.0.1", now), "");
+  EXPECT_EQ(refused(files("ca", "hmi"), "10.0.0.5", now),
+            "the daemon's certificate is for localhost, 127.0.0.1, you called 10.0.0.5");
+  EXPECT_EQ(refused(files("second", "hmi"), "localhost", now),
+            "the daemon's certificate is signed by CN=ca, which is not in --tls-ca");
+  EXPECT_THAT(refused(files("ca", "hmi"), "localhost", now + 72h), HasSubstr("has expired ("));
+  EXPECT_EQ(refused(files("ca", ""), "localhost", now), "the daemon asks for a certificate of the client");
+  EXPECT_EQ(refused(files("ca", "stranger"), "localhost", now),
+            "the daemon does not take certificates of CN=second, which signed that of --tls-cert");
+  EXPECT_EQ(text(tls::why_refused({}, shown, "localhost", now)), "the daemon speaks TLS");
+  EXPECT_EQ(text(tls::why_refused(files("ca", "hmi"), {}, "localhost", now)),
+            "the daemon speaks no TLS at that address");
+}
+
+TEST_F(TlsFiles, AServerShowsWhatItHas) {
+  FakeMachine machine;
+  server::Server server(machine, {.listen = {"127.0.0.1:0"}, .tls = certificates_.served()});
+  const auto port = server.start();
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto shown = tls::look_at("127.0.0.1", std::to_string(*port), patience);
+  ASSERT_TRUE(shown);
+  EXPECT_EQ(tls::first_expiry(shown->certificates), tls::first_expiry(certificates_.read("server.crt")));
+  EXPECT_TRUE(shown->asks);
+  EXPECT_THAT(shown->accepted, ElementsAre("CN=ca"));
+  server.shutdown();
+  EXPECT_FALSE(tls::look_at("127.0.0.1", std::to_string(*port), patience));
+}
+
+TEST_F(TlsFiles, AServerWithoutShowsNothing) {
+  FakeMachine machine;
+  server::Server server(machine, {.listen = {"127.0.0.1:0"}});
+  const auto port = server.start();
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto shown = tls::look_at("127.0.0.1", std::to_string(*port), patience);
+  ASSERT_TRUE(shown);
+  EXPECT_EQ(shown->certificates, "");
 }
 
 TEST_F(TlsFiles, EndIsToldThirtyDaysAheadAndEveryDay) {
