@@ -118,7 +118,7 @@ class Python(PythonTest):
     async def test_renewals_that_cannot_be_sent_end_the_block(self):
         with self.assertRaisesRegex(axisd.LeaseLostError, "the lease was not renewed: no such method"):
             async with self.machine.lease("feeder", ttl=0.3):
-                with mock.patch.object(self.machine, "_call", side_effect=AttributeError("no such method")):
+                with mock.patch.object(self.machine, "_attempt", side_effect=AttributeError("no such method")):
                     await asyncio.sleep(LIMIT)
 
     async def test_the_blocks_own_errors_and_cancellations_stay(self):

@@ -99,8 +99,8 @@ class Lease:
             await asyncio.sleep(min(ttl / 3, max(expires - loop.time(), 0)))
             asked = loop.time()
             try:
-                await self._machine._call(self._machine._stops.RenewLease, request, "",
-                                          limit=min(self._machine.timeout, ttl / 3))
+                await self._machine._attempt(self._machine._stops.RenewLease, request, "", wait=False,
+                                             limit=min(self._machine.timeout, ttl / 3))
                 expires = asked + ttl
             except UnreachableError as unreachable:
                 failure = unreachable

@@ -14,6 +14,7 @@ import grpc
 import grpc.aio
 from google.protobuf.field_mask_pb2 import FieldMask
 
+from . import tls_trouble
 from .audit import AuditRecord
 from .axis import Axis
 from .budget import BusBudget
@@ -89,6 +90,7 @@ class Machine:
         self.server = server
         self.stop_server = stop_server
         self.timeout = timeout
+        self._tls = (tls_ca, tls_certificate, tls_key)
         self._credentials = None
         if tls_ca is not None:
             self._credentials = grpc.ssl_channel_credentials(read(tls_ca), read(tls_key), read(tls_certificate))
@@ -124,9 +126,27 @@ class Machine:
             return grpc.aio.insecure_channel(address, options=_OPTIONS)
         return grpc.aio.secure_channel(address, self._credentials, options=_OPTIONS)
 
+    async def _in_words(self, error: UnreachableError, subject: str) -> UnreachableError:
+        """The same error, with what is wrong with the certificates where it is that."""
+        authority, certificate, key = self._tls
+        if authority is None:
+            return error
+        why = await asyncio.to_thread(tls_trouble.why, self.server, authority, certificate, key)
+        if why is None:
+            return error
+        lead = f"{subject}: " if subject else ""
+        return UnreachableError(f"{lead}cannot reach axisd at {self.server}: {why}", error.request_id,
+                                error.nothing_sent)
+
     async def _call(self, method: Any, request: Any, subject: str, wait: bool = False,
                     limit: float | None = None) -> Any:
         """One call; waiting for a motion has no time limit, keep-alive notices a daemon that is gone."""
+        try:
+            return await self._attempt(method, request, subject, wait, limit)
+        except UnreachableError as error:
+            raise await self._in_words(error, subject) from None
+
+    async def _attempt(self, method: Any, request: Any, subject: str, wait: bool, limit: float | None) -> Any:
         try:
             return await method(request, timeout=None if wait else limit or self.timeout, metadata=self._metadata)
         except grpc.aio.AioRpcError as error:
@@ -142,11 +162,12 @@ class Machine:
         unsent = True
         while True:
             try:
-                return await self._call(method, request, subject, wait, max(deadline - loop.time(), _FIRST_PAUSE))
+                return await self._attempt(method, request, subject, wait, max(deadline - loop.time(), _FIRST_PAUSE))
             except UnreachableError as error:
                 unsent = unsent and error.nothing_sent
                 if loop.time() + pause > deadline:
                     known = "it never arrived" if unsent else "whether it arrived is not known"
+                    error = await self._in_words(error, subject)
                     raise UnreachableError(f"{error}; the stop was repeated for {self.timeout:g} s: {known}",
                                            error.request_id, unsent) from None
             except RefusedError as error:
@@ -162,7 +183,10 @@ class Machine:
             async for message in call:
                 yield message
         except grpc.aio.AioRpcError as error:
-            raise translate(error, subject, self.server) from None
+            failure = translate(error, subject, self.server)
+            if isinstance(failure, UnreachableError):
+                failure = await self._in_words(failure, subject)
+            raise failure from None
         finally:
             call.cancel()
 

@@ -1,0 +1,126 @@
+"""Why there is no connection, where it is the certificates: gRPC says no more than that it could not connect."""
+from __future__ import annotations
+
+import datetime
+import os
+import socket
+import ssl
+import time
+
+Path = str | os.PathLike[str]
+
+_PATIENCE = 1.0
+# Of OpenSSL; ssl has no name for the first.
+_NO_CHECK_TIME = 0x200000
+_LENIENT = _NO_CHECK_TIME | ssl.VERIFY_X509_PARTIAL_CHAIN
+_UNKNOWN_AUTHORITY = (7, 18, 19, 20, 21)
+_OTHER_HOST = (62, 64)
+
+
+def _ended(certificate: dict) -> str | None:
+    """When a certificate ended; None: it has not."""
+    end = ssl.cert_time_to_seconds(certificate["notAfter"])
+    if end >= time.time():
+        return None
+    return datetime.datetime.fromtimestamp(end, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _decoded(certificate: Path, key: Path) -> dict:
+    """What stands in a certificate of one's own: ssl only tells that of a peer, so it is shown to itself."""
+    server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    server.load_cert_chain(certificate, key)
+    server.verify_mode = ssl.CERT_REQUIRED
+    server.load_verify_locations(certificate)
+    server.verify_flags |= _LENIENT
+    client = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.check_hostname = False
+    client.verify_mode = ssl.CERT_NONE
+    client.load_cert_chain(certificate, key)
+    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
+    ends = [client.wrap_bio(back, there), server.wrap_bio(there, back, server_side=True)]
+    for _ in range(4):
+        for end in ends:
+            try:
+                end.do_handshake()
+            except ssl.SSLWantReadError:
+                pass
+    return ends[1].getpeercert() or {}
+
+
+def _own(certificate: Path, key: Path) -> str | None:
+    try:
+        ended = _ended(_decoded(certificate, key))
+    except ssl.SSLError as error:
+        if error.reason == "KEY_VALUES_MISMATCH":
+            return ("tls_key: the key does not belong to the certificate of tls_certificate; "
+                    "give the pair that was made together")
+        return None
+    except (OSError, KeyError, ValueError):
+        return None
+    return f"tls_certificate: the certificate has expired ({ended}); renew it" if ended else None
+
+
+def _names(shown: dict) -> str:
+    names = [value for kind, value in shown.get("subjectAltName", ()) if kind in ("DNS", "IP Address")]
+    common = [value for part in shown.get("subject", ()) for key, value in part if key == "commonName"]
+    return ", ".join(names or common)
+
+
+def _shake_hands(address: tuple[str, int], context: ssl.SSLContext) -> tuple[dict, bool]:
+    """What the daemon shows, and whether it takes what is shown to it."""
+    with socket.create_connection(address, timeout=_PATIENCE) as raw:
+        with context.wrap_socket(raw, server_hostname=address[0]) as connection:
+            shown = connection.getpeercert() or {}
+            try:
+                return shown, connection.recv(1) != b""  # a gRPC server speaks first
+            except TimeoutError:
+                return shown, True
+            except OSError:
+                return shown, False
+
+
+def _daemon(address: tuple[str, int], tls_ca: Path, certificate: Path | None, key: Path | None) -> str | None:
+    context = ssl.create_default_context(cafile=tls_ca)
+    context.set_alpn_protocols(["h2"])
+    context.check_hostname = False
+    context.verify_flags |= _LENIENT
+    if certificate is not None:
+        context.load_cert_chain(certificate, key)
+    shown, taken = _shake_hands(address, context)
+    if ended := _ended(shown):
+        return f"the daemon's certificate has expired ({ended}); renew it there"
+    context.check_hostname = True
+    try:
+        _shake_hands(address, context)
+    except ssl.SSLCertVerificationError as error:
+        if error.verify_code in _OTHER_HOST:
+            return (f"the daemon's certificate is for {_names(shown)}, you called {address[0]}; "
+                    f"call it by a name of its certificate, or give it one for {address[0]}")
+        raise
+    if taken:
+        return None
+    if certificate is None:
+        return "the daemon asks for a certificate of the client; give tls_certificate and tls_key"
+    return "the daemon does not take the certificate of tls_certificate; give one of an authority that it trusts"
+
+
+def why(server: str, tls_ca: Path, certificate: Path | None, key: Path | None) -> str | None:
+    """What is wrong with the certificates of either side, in a line; None: nothing that is seen. Connects to see what
+    the daemon shows: waits for some seconds at most."""
+    host, _, port = server.rpartition(":")
+    if certificate is not None and key is not None and (own := _own(certificate, key)):
+        return own
+    if server.startswith("unix:") or not port.isdecimal():
+        return None
+    try:
+        return _daemon((host.strip("[]"), int(port)), tls_ca, certificate, key)
+    except ssl.SSLCertVerificationError as error:
+        if error.verify_code in _UNKNOWN_AUTHORITY:
+            return "the daemon's certificate is not signed by an authority of tls_ca; give that of this machine"
+        return f"the daemon's certificate is not accepted: {error.verify_message}"
+    except ssl.SSLError as error:
+        if error.reason == "WRONG_VERSION_NUMBER":
+            return "the daemon speaks no TLS at that address; leave out tls_ca, or call its address for TLS"
+        return None
+    except (OSError, KeyError, ValueError):
+        return None  # nobody is there

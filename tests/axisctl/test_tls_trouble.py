@@ -1,0 +1,126 @@
+"""What a user is told where a certificate is in the way: axisctl and the Python client, against servers of all kinds."""
+import concurrent.futures
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import grpc
+
+from support import AXISCTL, LIMIT, environment
+import axisd
+
+PKI = pathlib.Path(__file__).resolve().parents[2] / "deploy/pki.sh"
+
+
+def run(*words):
+    subprocess.run([str(word) for word in words], check=True, capture_output=True)
+
+
+class Trouble(unittest.IsolatedAsyncioTestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = cls.enterClassContext(tempfile.TemporaryDirectory())
+        for cell, daemon in (("ours", "press-1"), ("theirs", "press-2")):
+            run(PKI, "--dir", cls.path(cell), "init", cell)
+            run(PKI, "--dir", cls.path(cell), "server", daemon, "127.0.0.1")
+            run(PKI, "--dir", cls.path(cell), "client", "shift-a")
+        run(PKI, "--dir", cls.path("ours"), "server", "elsewhere", "press-9.local")
+        cls.expire("press-1")
+        cls.expire("shift-a")
+
+    @classmethod
+    def path(cls, name):
+        return f"{cls.folder}/{name}"
+
+    @classmethod
+    def expire(cls, name):
+        """Makes old-NAME.crt, which ended long ago, for the key of NAME."""
+        base, configuration = cls.path(f"ours/{name}"), cls.path("ours/openssl.cnf")
+        run("openssl", "req", "-new", "-config", configuration, "-key", f"{base}.key", "-subj", f"/CN={name}", "-out",
+            f"{base}.csr")
+        run("openssl", "ca", "-config", configuration, "-batch", "-notext", "-startdate", "20200101000000Z", "-enddate",
+            "20210101000000Z", "-extfile", f"{base}.ext", "-in", f"{base}.csr", "-out", cls.path(f"ours/old-{name}.crt"))
+
+    def serve(self, certificate="ours/press-1.crt", key="ours/press-1.key", tls=True):
+        def read(name):
+            return pathlib.Path(self.path(name)).read_bytes()
+
+        server = grpc.server(concurrent.futures.ThreadPoolExecutor(1))
+        if tls:
+            credentials = grpc.ssl_server_credentials([(read(key), read(certificate))], read("ours/ca.crt"), True)
+            port = server.add_secure_port("127.0.0.1:0", credentials)
+        else:
+            port = server.add_insecure_port("127.0.0.1:0")
+        server.start()
+        self.addCleanup(server.stop, None)
+        return f"127.0.0.1:{port}"
+
+    async def told(self, server, ca="ours/ca.crt", certificate="ours/shift-a.crt", key="ours/shift-a.key"):
+        """The lines of axisctl and of Python, without what leads them."""
+        words = [AXISCTL, "--server", server, "--tls-ca", self.path(ca)]
+        files = {"tls_ca": self.path(ca)}
+        if certificate:
+            words += ["--tls-cert", self.path(certificate), "--tls-key", self.path(key)]
+            files |= {"tls_certificate": self.path(certificate), "tls_key": self.path(key)}
+        done = subprocess.run([*words, "list"], capture_output=True, text=True, env=environment(), timeout=LIMIT,
+                              check=False)
+        self.assertEqual(done.returncode, 3, done)
+        self.assertRegex(done.stderr, r"\Aaxisctl: [^\n]+\n\Z")
+        lead = f"cannot reach axisd at {server}: "
+        self.assertIn(lead, done.stderr)
+        async with axisd.connect(server, **files) as machine:
+            with self.assertRaises(axisd.UnreachableError) as raised:
+                await machine.info()
+        self.assertIn(lead, str(raised.exception))
+        return done.stderr.partition(lead)[2].rstrip("\n"), str(raised.exception).partition(lead)[2]
+
+    async def test_no_certificate(self):
+        shell, python = await self.told(self.serve(), certificate=None)
+        self.assertEqual(shell, "the daemon asks for a certificate of the client; give --tls-cert and --tls-key")
+        self.assertEqual(python,
+                         "the daemon asks for a certificate of the client; give tls_certificate and tls_key")
+
+    async def test_one_of_another_authority(self):
+        shell, python = await self.told(self.serve(), certificate="theirs/shift-a.crt", key="theirs/shift-a.key")
+        self.assertEqual(shell, "the daemon does not take certificates of CN=theirs, which signed that of --tls-cert; "
+                                "give one of CN=ours")
+        self.assertIn("the daemon does not take the certificate of tls_certificate", python)
+
+    async def test_one_that_has_expired(self):
+        shell, python = await self.told(self.serve(), certificate="ours/old-shift-a.crt")
+        self.assertEqual(shell, "--tls-cert: the certificate has expired (2021-01-01T00:00:00Z); renew it")
+        self.assertEqual(python, "tls_certificate: the certificate has expired (2021-01-01T00:00:00Z); renew it")
+
+    async def test_key_of_another_certificate(self):
+        shell, python = await self.told(self.serve(), key="ours/press-1.key")
+        self.assertIn("--tls-key: the key does not belong to the certificate of --tls-cert; ", shell)
+        self.assertIn("tls_key: the key does not belong to the certificate of tls_certificate; ", python)
+
+    async def test_daemon_of_another_authority(self):
+        shell, python = await self.told(self.serve(), ca="theirs/ca.crt")
+        self.assertIn("the daemon's certificate is signed by CN=ours, which is not in --tls-ca; ", shell)
+        self.assertIn("the daemon's certificate is not signed by an authority of tls_ca; ", python)
+
+    async def test_daemon_that_has_expired(self):
+        for line in await self.told(self.serve("ours/old-press-1.crt")):
+            self.assertEqual(line, "the daemon's certificate has expired (2021-01-01T00:00:00Z); renew it there")
+
+    async def test_daemon_of_another_name(self):
+        for line in await self.told(self.serve("ours/elsewhere.crt", "ours/elsewhere.key")):
+            self.assertIn("the daemon's certificate is for press-9.local, you called 127.0.0.1; ", line)
+
+    async def test_daemon_without_tls(self):
+        for line in await self.told(self.serve(tls=False)):
+            self.assertIn("the daemon speaks no TLS at that address; ", line)
+
+    async def test_client_without_tls(self):
+        server = self.serve()
+        done = subprocess.run([AXISCTL, "--server", server, "list"], capture_output=True, text=True, env=environment(),
+                              timeout=LIMIT, check=False)
+        self.assertEqual(done.returncode, 3, done)
+        self.assertIn("the daemon speaks TLS; give --tls-ca", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
