@@ -56,7 +56,7 @@ has() {  # PACKAGE PATH ...
   shift
   for path in "$@"; do grep -qx "\./$path" <<<"$list" || die "$package has no /$path"; done
 }
-has axisd usr/bin/axisd usr/bin/axisd-sim usr/lib/axisd/axisd-link etc/axisd/axisd.yaml etc/axisd/links \
+has axisd usr/share/axisd/pki.sh usr/bin/axisd usr/bin/axisd-sim usr/lib/axisd/axisd-link etc/axisd/axisd.yaml etc/axisd/links \
   lib/systemd/system/axisd.service lib/systemd/system/axisd-link.socket usr/lib/sysusers.d/axisd.conf \
   usr/lib/tmpfiles.d/axisd.conf usr/lib/systemd/catalog/axisd.catalog lib/udev/rules.d/99-axisd.rules usr/share/man/man8/axisd.8.gz \
   usr/share/man/man8/axisd-link.8.gz usr/share/man/man1/axisd-sim.1.gz usr/share/man/man5/axisd.yaml.5.gz

@@ -62,6 +62,19 @@ Role role_in_contract(const MethodDescriptor& call) {
   return static_cast<Role>(int{call.options().GetExtension(v1::access).role()} - 1);
 }
 
+/// Not even what needs no role: whoever it is, it is not known to be that any more.
+TEST(Access, NothingIsTakenFromAPeerWhoseCertificateIsNotGood) {
+  const Peer gone{.name = "anna",
+                  .refusal = Error{.reason = Reason::unauthenticated, .message = "revoked", .remedy = "ask"}};
+  const AccessSettings access{.roles = {{"anna", Role::maintainer}}};
+  for (const auto* call : calls())
+    for (const auto* table : {static_cast<const AccessSettings*>(nullptr), &access}) {
+      const auto result = admitted(table, gone, {}, *request_of(*call), {});
+      ASSERT_FALSE(result) << call->full_name();
+      EXPECT_EQ(result.error().reason, Reason::unauthenticated);
+    }
+}
+
 TEST(Access, EveryCallSaysWhoMayMakeIt) {
   for (const auto* call : served_calls())
     EXPECT_NE(call->options().GetExtension(v1::access).role(), v1::ROLE_UNSPECIFIED) << call->full_name();
