@@ -11,6 +11,7 @@
 
 #include "buses/port_number.hpp"
 #include "config/checks.hpp"
+#include "config/quantity.hpp"
 #include "config/text.hpp"
 #include "devices/descriptor.hpp"
 

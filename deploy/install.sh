@@ -39,7 +39,7 @@ uninstall() {
   done
   if under_systemd; then
     systemctl daemon-reload
-    journalctl --update-catalog
+    journalctl --update-catalog || true
   fi
   [ -n "$staged" ] ||
     echo "Left: /etc/axisd, /var/lib/axisd and the user axisd. Without them (userdel axisd) nothing is left."
@@ -94,7 +94,7 @@ if command -v udevadm >/dev/null; then
   udevadm trigger --subsystem-match=tty --subsystem-match=usb-serial
 fi
 if [ -d /run/systemd/system ]; then systemctl daemon-reload; fi
-if command -v journalctl >/dev/null; then journalctl --update-catalog; fi
+if command -v journalctl >/dev/null; then journalctl --update-catalog || true; fi
 
 echo
 echo "1. /etc/axisd/axisd.yaml describes a simulated axis, and says how to go on with a machine"

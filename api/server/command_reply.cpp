@@ -34,10 +34,14 @@ std::string_view kind_of_line(const Command& command, const std::optional<WallTi
 
 void log(std::string_view client, std::string_view subject, std::string_view what,
          const Result<Command>& result, const std::optional<WallTime>& called) {
-  if (!result)
+  if (!result) {
+    // A command that is cancelled is named by its id.
+    const LogSubject refused = what == "cancel" ? LogSubject{.client = client, .command = subject}
+                                                : LogSubject{.axis = subject, .client = client};
     return log_limited(spdlog::level::info, client, "refused calls",
                        fmt::format("{} {} refused: {}", subject, what, to_string(result.error())),
-                       LogKind::command_refused, {.axis = subject, .client = client});
+                       LogKind::command_refused, refused);
+  }
   const auto level = is_renewal(*result, called) ? spdlog::level::debug : spdlog::level::info;
   const auto text = fmt::format("{} {} {} ({}){}", subject, what, to_string(result->state), result->id,
                                 result->cause ? ": " + to_string(*result->cause) : std::string());

@@ -82,7 +82,7 @@ void stop_group(Machine& machine, const Request& request, StopKind kind, const C
               return nothing ? to_status(shared->front().command.error()) : grpc::Status::OK;
             },
             [client, kind, shared] {
-              if (shared->empty()) return;  // the daemon asks this of itself, each second
+              if (shared->empty()) return;  // the daemon asks this of itself, again and again
               log_limited(spdlog::level::info, client, "stops",
                           fmt::format("group {} of {} axes", kind == StopKind::halt ? "halt" : "stop",
                                       shared->size()),

@@ -279,11 +279,11 @@ grpc::ServerUnaryReactor* SystemServiceImpl::SetLogLevel(Context* context,
   response->set_level(after);
   if (after == before) return answer(context, grpc::Status::OK);
   record(services_.machine, services_.audit_sink,
-         {.phase = AuditedCall::Phase::done,
-          .rpc = "SystemService.SetLogLevel",
-          .client = caller.name,
-          .text = change_log_level(before, after, caller.name),
-          .origin = caller.origin});
+         AuditedCall{.phase = AuditedCall::Phase::done,
+                     .rpc = "SystemService.SetLogLevel",
+                     .client = caller.name,
+                     .text = change_log_level(before, after, caller.name),
+                     .origin = caller.origin});
   return answer(context, grpc::Status::OK);
 }
 

@@ -116,16 +116,23 @@ void RtuWorker::touch() {
   progress_.store(monotonic_now().time_since_epoch().count(), std::memory_order_relaxed);
 }
 
+void RtuWorker::expect_port_call() {
+  progress_.store((monotonic_now() + longest_port_call).time_since_epoch().count(),
+                  std::memory_order_relaxed);
+}
+
 void RtuWorker::run() {
   constexpr std::size_t longest_name = 15;
   pthread_setname_np(pthread_self(), ("rtu:" + settings_.name).substr(0, longest_name).c_str());
   use_precise_waits();
   auto back_off = first_back_off;
   while (!quitting()) {
-    touch();
+    expect_port_call();
     auto port = open_port();
+    touch();
     if (port) back_off = first_back_off;
     const auto error = port ? serve(std::move(*port)) : std::move(port.error());
+    touch();
     if (quitting()) return;
     report(PortStatus{.open = false, .error = error});
     wait_closed(back_off, static_cast<int>(error.where.native_code.value_or(0)));
@@ -174,7 +181,9 @@ Error RtuWorker::serve(SerialPort port) {
 bool RtuWorker::prepare(WireSession& session, const Exchange& exchange, int& lost) {
   const auto wanted = exchange.serial.value_or(settings_.serial());
   if (session.uses(wanted)) return true;
+  expect_port_call();
   const int failed = session.use(wanted);
+  touch();
   if (failed == EINVAL && exchange.serial) {
     const auto now = monotonic_now();
     report(exchange, ExchangeResult{.status = ExchangeStatus::unsupported,

@@ -74,6 +74,8 @@ class RtuWorker final : public Line {
   std::span<const ExchangeResult> take_results();
   void report(const PortStatus& status);
   void touch();
+  /// It may block in the port's driver from now on.
+  void expect_port_call();
   [[nodiscard]] bool quitting() const { return wakeup_.quit.load(std::memory_order_acquire); }
 
   Executor core_;

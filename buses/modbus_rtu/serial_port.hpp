@@ -15,6 +15,10 @@
 
 namespace axisd::modbus_rtu {
 
+/// Opening, setting and closing a port may block in the driver of a sick adapter for so long (closing_wait).
+/// No frame is under way then, and the other buses go on: no reason to kill the daemon.
+inline constexpr Duration longest_port_call = std::chrono::seconds(30);
+
 /// What libmodbus made of the bytes that came.
 enum class Reception : std::uint8_t {
   frame,       ///< sound, and from the node asked

@@ -54,7 +54,7 @@ WireSession::WireSession(SerialPort port, const LineSettings& line, Wakeup& wake
 
 WireSession::~WireSession() {
   const auto end = request_end_ + wire_time(serial_, 1);
-  busy_until(end);
+  busy_until(end + longest_port_call);  // the port is closed next
   block_until(end);
 }
 

@@ -9,7 +9,7 @@ namespace {
 constexpr Duration longest_period = std::chrono::seconds(1);
 constexpr Duration unwatched_stall = std::chrono::seconds(3);
 /// A server under siege answers late, which costs nobody a stop.
-constexpr Duration doors_patience = std::chrono::seconds(3);
+constexpr Duration doors_patience = std::chrono::seconds(8);
 
 }  // namespace
 

@@ -104,6 +104,8 @@ def main():
     parser.add_argument("--hangs", type=int, default=100)
     parser.add_argument("--axes", type=int, default=8)
     parser.add_argument("--baud", type=int, default=115200)
+    parser.add_argument("--patience", type=int, default=1,
+                        help="so many times the unit's interval, on a computer that is busy with other things")
     parser.add_argument("--report-only", action="store_true", help="ends with 0 whatever was seen")
     given = parser.parse_args()
     tools = harness(given.build)
@@ -113,7 +115,7 @@ def main():
     try:
         machine.start_lines()
         bound = bound_of(machine)
-        supervisor = tools.Supervisor(machine)
+        supervisor = tools.Supervisor(machine, patience=given.patience)
         try:
             supervisor.wait_for("READY=1")
             hangs = [hang(tools, machine, supervisor, axes, chance) for _ in range(given.hangs)]

@@ -70,7 +70,7 @@ if(AXISD_GRPC)
     "--after 1 --only nobody --only \"rapid reset\" --only \"silent connections\" --report-only)\n"
     "add_test(bench.siege_kill /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/siege_bench.py ${CMAKE_BINARY_DIR} --kill 1 "
     "--only nobody --only \"rapid reset\" --only \"silent connections\" --report-only)\n"
-    "add_test(bench.hang /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/hang_bench.py ${CMAKE_BINARY_DIR} --hangs 2 --axes 2 "
+    "add_test(bench.hang /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/hang_bench.py ${CMAKE_BINARY_DIR} --hangs 2 --axes 2 --patience 5 "
     "--report-only)\n"
     "set_tests_properties(bench.rtu bench.stop_all bench.index bench.rpc bench.machine bench.admission bench.siege bench.siege_kill bench.hang PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
     "set_tests_properties(bench.bring-up bench.core bench.index_on_can bench.groups_on_can bench.virtual_rates bench.virtual_stops bench.virtual_done "

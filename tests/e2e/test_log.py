@@ -55,7 +55,8 @@ class Floods(Scenario):
         for _ in range(50):
             machine.client.motion("Jog", "feeder", **jog)
         machine.client.to_done("Halt", "feeder")
-        wait_for(lambda: " Halt" in machine.daemon.log() or "halt" in machine.daemon.log(), "the halt is told")
+        wait_for(lambda: any("halt" in line.lower() for line in machine.daemon.log().splitlines()[written:]),
+                 "the halt is told")
         self.assertLess(len(machine.daemon.log().splitlines()), written + 10, machine.daemon.log())
 
 

@@ -70,10 +70,11 @@ class Service(Scenario):
         machine, supervisor = self.moving_feeder()
         at = time.monotonic_ns()
         machine.daemon.process.kill()
+        killed = time.monotonic_ns()
         supervisor.wait_for("READY=1", since=at)
         self.assertEqual(supervisor.events(since=at)[:4], ["ended -9", "quiesced 0", "started", "READY=1"])
         self.assertFalse(machine.sim.shaft().moving)
-        self.assert_told_to_stop_and_nothing_else(machine, since=at)
+        self.assert_told_to_stop_and_nothing_else(machine, since=killed)
         self.assert_known_or_not_trusted(machine)
 
     def test_a_stop_is_waited_for_and_final(self):

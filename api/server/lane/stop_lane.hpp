@@ -55,7 +55,7 @@ class StopLane {
   /// (get() < 0): out of descriptors. Precondition: listen(). Thread: any.
   [[nodiscard]] FileDescriptor connect_inside();
 
-  /// When its thread last came round, at most every second. Thread: any.
+  /// When its thread last came round, at most 200 ms apart. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;
 
  private:

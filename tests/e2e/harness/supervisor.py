@@ -73,9 +73,10 @@ class Supervisor(threading.Thread):
     def close(self):
         """Stops the daemon, unless it has ended for good; returns once all is done."""
         self._closing.set()
-        if self.is_alive() and self._machine.daemons:
-            self._machine.daemon.terminate()
-        self.join()
+        while self.is_alive():  # again, where a daemon is just being started
+            if self._machine.daemons:
+                self._machine.daemon.terminate()
+            self.join(0.2)
 
     def _note(self, what, at=None):
         with self._lock:
@@ -93,7 +94,9 @@ class Supervisor(threading.Thread):
             if self._closing.is_set() or not self.unit.restarts(status):
                 self._note("left")
                 return
-            self._closing.wait(self.unit.pause)
+            if self._closing.wait(self.unit.pause):
+                self._note("left")
+                return
 
     def _watch(self, daemon):
         """Until it has ended: with which status."""

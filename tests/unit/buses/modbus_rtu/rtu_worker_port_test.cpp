@@ -52,6 +52,22 @@ TEST(RtuWorkerPort, MissingAtStartIsReportedOnceAndOpenedWhenItComes) {
   EXPECT_EQ(bench.run(read_of(0x0020, 1)).status, ExchangeStatus::replied);
 }
 
+TEST(RtuWorkerPort, ADriverThatBlocksTheOpeningIsNoHang) {
+  std::atomic<bool> asked = false;
+  std::atomic<bool> answered = false;
+  WorkerBench bench(line_at(115200, "unused"), [&]() -> Result<std::string> {
+    asked = true;
+    while (!answered) std::this_thread::yield();
+    return fail(Error{.reason = Reason::bus_down, .message = "no port", .remedy = "plug it in"});
+  });
+  bench.start();
+  ASSERT_TRUE(bench.run_until([&] { return asked.load(); }));
+  EXPECT_GT(bench.worker->last_progress(), monotonic_now()) << "it is busy until then";
+  answered = true;
+  ASSERT_TRUE(bench.run_until([&] { return is_lost(bench); }));
+  EXPECT_LE(bench.worker->last_progress(), monotonic_now()) << "from here on a hang is one";
+}
+
 TEST(RtuWorkerPort, HangUpInAWaitIsAnIoErrorAndThePortComesBackElsewhere) {
   const PortLink link;
   ScriptedNode first(silent());
