@@ -113,6 +113,8 @@ class Cia402Drive final : public Drive {
     bool quick = false;   ///< without a ramp
     bool rested = false;  ///< the motor was seen at rest under it
   };
+  /// What the mode that is set was chosen for.
+  enum class ModeUse : std::uint8_t { motion, neutral };
   /// A motion that was triggered and has not been seen to end.
   struct Live {
     TimePoint since;
@@ -181,6 +183,8 @@ class Cia402Drive final : public Drive {
   Task<> leave_homing(SdoOptions options);
   void give_up_leaving();
   [[nodiscard]] DriveMode mode_of(const DriveSample& sample, const Reading& reading);
+  /// Homing mode in this reading may be the neutral mode, in which nothing homes.
+  [[nodiscard]] bool may_be_neutral(const Reading& reading) const;
   /// A terminal with one of these functions is active.
   [[nodiscard]] bool input_active(const DriveSample& sample,
                                   std::initializer_list<std::string_view> functions) const;
@@ -363,6 +367,7 @@ class Cia402Drive final : public Drive {
   std::uint64_t proven_losses_ = 0;  ///< of the port, until then
   std::optional<OperationMode> mode_;
   TimePoint mode_at_ = TimePoint::min();  ///< likewise
+  ModeUse mode_use_ = ModeUse::motion;
   std::optional<std::int16_t> halt_option_;
   std::optional<Halt> halt_;
   std::uint64_t stops_ = 0;

@@ -65,6 +65,7 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
   mode_ = mode;
   mode_at_ = clock_->now();
   if (mode != OperationMode::homing) leave_homing_ = false;
+  if (mode != model_->neutral_mode) mode_use_ = ModeUse::motion;
   co_return Result<void>{};
 }
 
@@ -82,6 +83,7 @@ Task<Result<void>> Cia402Drive::clear_target_velocity(SdoOptions options) {
 Task<Result<void>> Cia402Drive::enter_neutral_mode(SdoOptions options) {
   if (model_->neutral_mode == OperationMode::homing)
     if (auto left = co_await change_mode(OperationMode::profile_position, options); !left) co_return left;
+  mode_use_ = ModeUse::neutral;  // before the drive shows it
   co_return co_await change_mode(model_->neutral_mode, std::move(options));
 }
 

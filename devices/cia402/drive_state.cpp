@@ -239,6 +239,7 @@ DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
   sample.mode = mode_of(sample, reading);
   // A bit that is left from an earlier homing says nothing about the last one; of CiA 402's bit 12 nothing is
   // left in another mode.
+  if (may_be_neutral(reading)) sample.homed = false;
   const bool bit_fell = !sample.moving && !home_bit(*model_, reading.values).value_or(false);
   if (homed_ == false && !homing_.active() && bit_fell) homed_.reset();
   sample.homed = homed_.value_or(sample.homed);
@@ -265,6 +266,12 @@ Task<> Cia402Drive::leave_homing(SdoOptions options) {
   (void)co_await change_mode(OperationMode::profile_position, std::move(options));
 }
 
+/// There, and on the way there and back, bit 12 may be that of any homing before.
+bool Cia402Drive::may_be_neutral(const Reading& reading) const {
+  if (model_->neutral_mode != OperationMode::homing || homing_.active()) return false;
+  return mode_use_ == ModeUse::neutral || reading.asked_at <= mode_at_;
+}
+
 /// 6061h stays as it is when a motion has ended; the contract wants `homing` only while it lasts.
 DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading) {
   if (homing_.active()) {
@@ -278,7 +285,7 @@ DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading
   }
   if (leave_homing_) return sample.moving ? DriveMode::homing : DriveMode::positioning;
   if (live_) return DriveMode::positioning;
-  if (mode_ == OperationMode::homing && sample.enabled) {
+  if (mode_ == OperationMode::homing && mode_use_ != ModeUse::neutral && sample.enabled) {
     // Found homing: between its phases the motor rests, but bit 4 stands (6.2.6).
     const auto status = reading.values.find(object::status_word.key());
     const bool told = expected_.empty() && status != reading.values.end() &&

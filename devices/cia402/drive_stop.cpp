@@ -17,6 +17,8 @@ using std::chrono::milliseconds;
 constexpr auto proof_lasts = milliseconds(1000);
 /// Under a stop nobody waits longer for a mode.
 constexpr auto urgent_mode_limit = milliseconds(20);
+/// A drive that shows another mode for longer is not on its way to one that it was told.
+constexpr auto longest_mode_change = milliseconds(500);
 /// Nor for the reply to what goes before the halt: with the reply lost it is there all the same.
 constexpr auto urgent_reply_limit = milliseconds(20);
 constexpr std::size_t word_bytes = 2;
@@ -40,6 +42,7 @@ void Cia402Drive::forget_words() {
   control_.reset();
   state_bits_.reset();
   mode_.reset();
+  mode_use_ = ModeUse::motion;
   halt_option_.reset();
 }
 
@@ -53,6 +56,8 @@ void Cia402Drive::note_knowledge(const Reading& reading) {
   const auto mode = reading.values.find(object::mode_display.key());
   if (mode != reading.values.end() && reading.asked_at > mode_at_)
     mode_ = static_cast<OperationMode>(mode->second);
+  if (mode_ && *mode_ != model_->neutral_mode && reading.asked_at > mode_at_ + longest_mode_change)
+    mode_use_ = ModeUse::motion;
   const auto status = reading.values.find(object::status_word.key());
   if (status == reading.values.end()) return;
   if (control_writing_ > 0 || reading.asked_at <= control_at_) return;
@@ -143,7 +148,8 @@ Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   leave_gate_->raise();
   bus_->purge_superseded(node_.id(), *leave_gate_);
   give_up_common_start();
-  leave_homing_ = leave_homing_ || homing_.active() || mode_ == OperationMode::homing;
+  const bool homes = mode_ == OperationMode::homing && mode_use_ != ModeUse::neutral;
+  leave_homing_ = leave_homing_ || homing_.active() || homes;
   if (live_ || triggering_ > 0 || homing_.active()) standstill_.doubt();
   homing_.end();
   live_.reset();
@@ -257,6 +263,7 @@ Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions option
   if (of_neutral)
     if (auto left = co_await choose_mode_soon(OperationMode::profile_position, options); !left)
       co_return left;
+  mode_use_ = ModeUse::neutral;  // before the drive shows it
   if (mode_ != neutral)
     if (auto chosen = co_await choose_mode_soon(neutral, options); !chosen) co_return chosen;
   // Somebody has led the drive elsewhere meanwhile: these bits would lead it back.

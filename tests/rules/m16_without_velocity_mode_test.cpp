@@ -177,5 +177,71 @@ TEST(M21, WithoutVelocityModeADriveHomes) {
   }
 }
 
+/// The quick stop goes by way of homing mode while the motor turns, and nothing homes.
+TEST(M20, WithoutVelocityModeAQuickStopUnderAHaltKeepsThePosition) {
+  for (const auto& lack : lacks())
+    for (const auto first : {StopKind::halt, StopKind::stop}) {
+      SCOPED_TRACE(lack.why);
+      CanRig rig(rig_of(lack));
+      rig.ready();
+      for (const double target : {300.0, 390.0}) {
+        rig.submit(MoveAbsoluteRequest{.position = target, .with = {.acceleration_time = 600ms}});
+        rig.run(900ms);
+        rig.submit(StopRequest{.kind = first});
+        rig.run(50ms);
+        EXPECT_TRUE(rig.drive->shaft_moving());
+        const auto modes = rig.writes_of(0x606000).size();
+        const auto quick = rig.submit(StopRequest{.kind = StopKind::quick_stop});
+        rig.run(20ms);
+        rig.done(
+            StopRequest{.kind = StopKind::quick_stop});  // once more in the mode that the first one chose
+        EXPECT_GT(rig.writes_of(0x606000).size(), modes) << "not by way of another mode";
+        EXPECT_TRUE(quick->has_ended());
+        EXPECT_EQ(rig.state()->trust, PositionTrust::set);
+        EXPECT_NEAR(rig.state()->position, static_cast<double>(rig.shaft()) / 100, 0.1);
+      }
+      rig.run(500ms);
+      rig.done(MoveAbsoluteRequest{.position = 5});
+      EXPECT_EQ(rig.state()->trust, PositionTrust::set);
+      EXPECT_NEAR(static_cast<double>(rig.shaft()), 500, 5);
+    }
+}
+
+/// What homing mode shows of the homing before says nothing where a start or a stop only passes through it.
+TEST(M20, WithoutVelocityModeAHomedDriveKeepsItsPositionOverARestart) {
+  for (const auto& lack : lacks())
+    for (const bool polled : {false, true}) {
+      if (!lack.homes) continue;
+      SCOPED_TRACE(lack.why);
+      auto options = rig_of(lack);
+      options.persistence = options.journal = true;
+      options.polled = polled;
+      CanRig rig(std::move(options));
+      rig.done(EnableRequest{});
+      rig.done(HomeRequest{});
+      rig.done(MoveAbsoluteRequest{.position = 10});
+      const auto at = rig.shaft();
+      for (const bool released : {false, true}) {
+        rig.stop_daemon();
+        rig.start_daemon();
+        ASSERT_EQ(rig.state()->trust, PositionTrust::restored);
+        if (released) rig.done(DisableRequest{});
+        rig.done(EnableRequest{});
+        rig.done(StopRequest{});
+        rig.run(1s);
+        EXPECT_EQ(rig.state()->trust, PositionTrust::restored);
+        rig.submit(MoveAbsoluteRequest{.position = 300, .with = {.acceleration_time = 500ms}});
+        rig.run(1s);
+        rig.submit(StopRequest{.kind = StopKind::halt});
+        rig.run(50ms);
+        rig.done(StopRequest{.kind = StopKind::quick_stop});
+        rig.run(1s);
+        rig.done(MoveAbsoluteRequest{.position = 10});
+        EXPECT_EQ(rig.state()->trust, PositionTrust::restored);
+        EXPECT_NEAR(static_cast<double>(rig.shaft()), static_cast<double>(at), 5);
+      }
+    }
+}
+
 }  // namespace
 }  // namespace axisd::test
