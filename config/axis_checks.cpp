@@ -14,6 +14,7 @@
 #include "config/checks.hpp"
 #include "config/quantity.hpp"
 #include "config/text.hpp"
+#include "devices/axis/planner.hpp"
 
 namespace axisd::config {
 
@@ -342,9 +343,24 @@ void AxisChecks::check_start_speed() {
   }
 }
 
+/// A deceleration that is only read is believed: one that no drive has (1 count/s^2, as templates have it)
+/// would make every bound of a stop meaningless.
+void AxisChecks::check_braking() {
+  constexpr auto longest = std::chrono::seconds(60);
+  if (model_->capabilities.fixed_deceleration <= 0) return;
+  if (!usable("limits.velocity") || reported_.contains("limits.velocity")) return;
+  const auto time = Planner(axis_, *model_, *scale_).braking_time(axis_.limits.velocity, Duration::zero());
+  if (time <= longest) return;
+  add("limits.velocity",
+      fmt::format("by 6084h it brakes for {} s from limits.velocity",
+                  std::chrono::round<std::chrono::seconds>(time).count()),
+      "lower limits.velocity, or say what the drive does: objects: { 6084h: { access: none } }");
+}
+
 void AxisChecks::check_speeds() {
   const auto& capabilities = model_->capabilities;
   check_speed("limits.velocity", axis_.limits.velocity, capabilities.minimum_rpm, maximum_rpm());
+  check_braking();
   check_start_speed();
   if (!axis_.homing) return;
   const auto& homing = *axis_.homing;

@@ -50,6 +50,7 @@ class AxisChecks {
   void check_distances();
   void check_speeds();
   void check_start_speed();
+  void check_braking();
   void check_homing();
   /// A method of the drive's own.
   void check_homing_number();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "buses/seconds.hpp"
@@ -20,9 +21,16 @@ Error out_of_range(std::string message, double minimum, double maximum, std::str
           .permitted = Range{.minimum = minimum, .maximum = maximum, .unit = std::move(unit)}};
 }
 
+/// In nanoseconds a Duration holds 292 years: the slowest of motions is shorter than this.
+constexpr double longest_seconds = 5e9;
+
 Duration duration_of(double seconds) {
-  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+  const auto within = std::clamp(seconds, 0.0, longest_seconds);
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(within));
 }
+
+/// As long as a ramp may be told, and what of one a drive can be sent.
+constexpr double longest_ramp_seconds = 86'400, most_counts = std::numeric_limits<std::int32_t>::max();
 
 int milliseconds_of(Duration time) {
   return static_cast<int>(std::chrono::duration_cast<milliseconds>(time).count());
@@ -87,7 +95,9 @@ Planner::Ramps Planner::sent_ramps(int rpm, const Ramps& told) const {
   };
   const auto rounded_down = [](double counts) { return std::floor(counts * (1 + exact)); };
   const auto rounded_up = [](double counts) { return std::ceil(counts * (1 - exact)); };
-  const auto takes = [&](double counts) { return duration_of(sent / (std::max(counts, 1.0) * step)); };
+  const auto takes = [&](double counts) {
+    return duration_of(std::min(sent / (std::clamp(counts, 1.0, most_counts) * step), longest_ramp_seconds));
+  };
   // One ramp for both is that of a brake.
   const bool two_ramps = capabilities_->own_deceleration;
   const auto start = counts_of(told.acceleration);

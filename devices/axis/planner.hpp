@@ -66,7 +66,7 @@ class Planner {
   /// The drive takes this as a target without its counter being zeroed first.
   [[nodiscard]] bool reachable(std::int64_t counter) const;
   /// How long braking from `velocity` (user units per second) takes where a ramp of `told` is sent; never
-  /// less than that.
+  /// less than that. A ramp of the drive's own counts as a day at most.
   [[nodiscard]] Duration braking_time(double velocity, Duration told) const;
   /// Homing in drive direction and drive units; nullopt without `homing:`. Errors: out_of_range.
   [[nodiscard]] Result<std::optional<HomingProfile>> homing() const;

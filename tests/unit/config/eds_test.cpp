@@ -330,6 +330,26 @@ TEST(EdsObjects, WithoutADecelerationBothRampsAreAlike) {
   }
 }
 
+/// A value that templates have: from 100 mm/s it would brake for two weeks.
+TEST(EdsObjects, ADecelerationThatNoDriveHasIsNotBelieved) {
+  const auto found = [](const std::string& value, const std::string& velocity, const std::string& more = "") {
+    return findings(load(
+        {.velocity = velocity,
+         .more = fmt::format("      objects: {{ 6084h: {{ access: ro, default: {} }} }}\n{}", value, more)}));
+  };
+  EXPECT_THAT(
+      found("1", "100 mm/s"),
+      AllOf(HasSubstr("test.yaml:12:"), HasSubstr("by 6084h it brakes for 86400 s from limits.velocity"),
+            HasSubstr("lower limits.velocity, or say what the drive does: objects: { 6084h: { access: "
+                      "none } }")));
+  EXPECT_EQ(found("25000", "100 mm/s"), "") << "52 s";
+  EXPECT_THAT(found("20000", "100 mm/s"), HasSubstr("it brakes for 66 s"));
+  EXPECT_EQ(found("20000", "50 mm/s"), "");
+  EXPECT_EQ(found("60000", "100 mm/s", "      ramps: time\n"), "");
+  EXPECT_THAT(found("60001", "100 mm/s", "      ramps: time\n"), HasSubstr("it brakes for 60 s"));
+  EXPECT_EQ(found("0", "100 mm/s"), "") << "it tells nothing";
+}
+
 TEST_F(EdsFile, EachMissingObjectIsNamed) {
   write(
       "[DeviceInfo]\nVendorNumber=1\n[6041]\nParameterName=Statusword\nObjectType=7\nDataType=6\nAccessType="

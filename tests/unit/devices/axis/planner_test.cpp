@@ -114,6 +114,8 @@ TEST(Planner, AFixedDecelerationIsPartOfThePrediction) {
       << "one that follows what it is told is not seen too late";
   const auto longer = pulses.planner().stretched(plan, 100'000, 25s);
   EXPECT_NEAR(seconds(longer.predicted), 25, 0.05);
+  const CoarseDrive endless({.rpm = 60, .of_pulse = true}, {.rpm = 0.0006, .of_pulse = true}, 1, false);
+  EXPECT_EQ(endless.planner().braking_time(5, 100ms), Duration(24h)) << "and no overflow";
   const CoarseDrive times({}, {}, 3000, false);
   EXPECT_EQ(*times.profile(300).granted.deceleration_time, Duration(3s));
   EXPECT_EQ(*times.profile(300).granted.acceleration_time, Duration(500ms));
