@@ -160,14 +160,14 @@ void Planner::check_profile(double velocity, const MotionValues& asked, Obstacle
     found.block(out_of_range(fmt::format("velocity {} {}", negative_in_move ? velocity : speed, unit),
                              minimum_velocity(), maximum_velocity(), unit));
   const auto [acceleration, deceleration] = ramps(asked);
-  if (asked.deceleration_time && *asked.deceleration_time != deceleration)
-    found.block(
-        {.reason = Reason::not_supported,
-         .message = fmt::format("deceleration time of {} ms beside an acceleration time of {} ms: {}",
-                                milliseconds_of(*asked.deceleration_time), milliseconds_of(acceleration),
-                                capabilities_->fixed_deceleration > 0 ? "the drive's deceleration is fixed"
-                                                                      : "the drive brakes as it accelerates"),
-         .remedy = "leave the deceleration time out"});
+  const bool fixed = capabilities_->fixed_deceleration > 0;
+  if (asked.deceleration_time && (fixed || *asked.deceleration_time != deceleration))
+    found.block({.reason = Reason::not_supported,
+                 .message = fmt::format(
+                     "deceleration time of {} ms beside an acceleration time of {} ms: {}",
+                     milliseconds_of(*asked.deceleration_time), milliseconds_of(acceleration),
+                     fixed ? "the drive's deceleration is fixed" : "the drive brakes as it accelerates"),
+                 .remedy = "leave the deceleration time out"});
   check_ramp(acceleration, "acceleration time", found);
   check_ramp(deceleration, "deceleration time", found);
 }

@@ -55,9 +55,12 @@ TEST(M12, ADecelerationThatCannotBeSetIsInPredictionsAndBounds) {
     EXPECT_EQ(move.granted.acceleration_time, std::optional<Duration>(150ms));
     EXPECT_EQ(move.granted.deceleration_time, std::optional<Duration>(2s));
   }
-  const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1, .with = {.deceleration_time = 1s}});
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().reason, Reason::not_supported) << to_string(refused.error());
+  for (const auto& with : {MotionValues{.deceleration_time = 1s},
+                           MotionValues{.acceleration_time = 1s, .deceleration_time = 1s}}) {
+    const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1, .with = with});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().reason, Reason::not_supported) << to_string(refused.error());
+  }
   for (const Action& action :
        {Action(MoveRelativeRequest{.distance = 400}), Action(MoveVelocityRequest{.velocity = -100})}) {
     ASSERT_TRUE(rig.try_submit(action));

@@ -114,6 +114,13 @@ TEST(Planner, AFixedDecelerationIsPartOfThePrediction) {
       << "one that follows what it is told is not seen too late";
   const auto longer = pulses.planner().stretched(plan, 100'000, 25s);
   EXPECT_NEAR(seconds(longer.predicted), 25, 0.05);
+  for (const auto time : {100ms, 200ms}) {
+    const auto refused = pulses.planner().profile(5, {.acceleration_time = 100ms, .deceleration_time = time});
+    ASSERT_FALSE(refused) << "it would not be kept";
+    EXPECT_EQ(refused.error().reason, Reason::not_supported);
+  }
+  const CoarseDrive alike({.rpm = 60, .of_pulse = true}, {.rpm = 60, .of_pulse = true}, 0, false);
+  EXPECT_TRUE(alike.planner().profile(5, {.acceleration_time = 100ms, .deceleration_time = 100ms}));
   const CoarseDrive endless({.rpm = 60, .of_pulse = true}, {.rpm = 0.0006, .of_pulse = true}, 1, false);
   EXPECT_EQ(endless.planner().braking_time(5, 100ms), Duration(24h)) << "and no overflow";
   const CoarseDrive times({}, {}, 3000, false);
