@@ -144,6 +144,9 @@ struct Capabilities {
   /// Of targets and distances of single motions, as the drive counts them.
   std::int32_t minimum_target_pulses = std::numeric_limits<std::int32_t>::min();
   std::int32_t maximum_target_pulses = std::numeric_limits<std::int32_t>::max();
+  /// Enabling it, and a start after a stop, lead through no mode of operation (6060h = 0): what it does with
+  /// its load there is not said.
+  bool passes_no_mode = false;
   bool velocity_mode = true;              ///< else jogs and velocity moves are refused
   std::string_view velocity_mode_lack{};  ///< why it has none: what is missing
   bool homing = true;
