@@ -164,6 +164,13 @@ void AxisChecks::check_policies() {
   }
   if (axis_.on_lease_loss == LeaseLoss::disable)
     add("on_lease_loss", "'on_lease_loss: disable' would release a vertical load", "use halt or stop");
+  if (model_ != nullptr && model_->capabilities.passes_no_mode)
+    add("load",
+        fmt::format(
+            "this drive of model {} may let a vertical load sag: with neither velocity nor homing mode "
+            "it is enabled, and moved after a stop, by way of no mode at all",
+            axis_.model),
+        "where it has one of them, say so: drive: { objects: ... }; else take another drive");
 }
 
 void AxisChecks::check_persist() {

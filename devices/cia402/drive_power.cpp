@@ -84,7 +84,14 @@ Task<Result<void>> Cia402Drive::enter_neutral_mode(SdoOptions options) {
   if (model_->neutral_mode == OperationMode::homing)
     if (auto left = co_await change_mode(OperationMode::profile_position, options); !left) co_return left;
   mode_use_ = ModeUse::neutral;  // before the drive shows it
-  co_return co_await change_mode(model_->neutral_mode, std::move(options));
+  auto entered = co_await change_mode(model_->neutral_mode, std::move(options));
+  const bool refused =
+      !entered && (entered.error().reason == Reason::refused || entered.error().outcome == Outcome::refused);
+  if (refused && model_->neutral_mode == OperationMode::none) {
+    entered.error().message += ": it cannot rest in no mode, and has neither velocity nor homing mode";
+    entered.error().remedy = "where it has one of them, say so: drive: { objects: ... }";
+  }
+  co_return entered;
 }
 
 /// Leaves nothing that the end of a halt, or 0Fh, could start; in Operation Enabled halted. Everything is

@@ -88,7 +88,7 @@ constexpr auto needed = std::to_array<Needed>({
 /// What profile velocity mode uses beside them.
 constexpr Needed for_velocity{cia402::object::target_velocity, "target velocity", Use::written, "i32", whole};
 
-constexpr unsigned position_bit = 0, velocity_bit = 2;  ///< of 6502h
+constexpr unsigned position_bit = 0, velocity_bit = 2, homing_bit = 5;  ///< of 6502h
 
 /// As the configuration names it: without a sub-index of 0.
 std::string name_of(Object object) {
@@ -146,6 +146,20 @@ void check_needed(const Eds& eds, const Needed& one, std::vector<EdsFinding>& fo
         fmt::format("{}: {{ access: {} }}", name_of(object), access));
 }
 
+/// CiA 402: 0 is no mode. Each enable writes it where nothing else is neutral.
+void check_no_mode(const Eds& eds, std::vector<EdsFinding>& found) {
+  const auto* mode = eds.find(cia402::object::mode);
+  if (mode == nullptr || neutral_mode_of(eds) != cia402::OperationMode::none) return;
+  const bool low = mode->low && mode->low->value > 0, high = mode->high && mode->high->value < 0;
+  if (!low && !high) return;
+  found.push_back(
+      {0,
+       fmt::format("object {} cannot be 0: a drive without velocity mode and homing mode is enabled "
+                   "by way of that",
+                   to_string(cia402::object::mode)),
+       settled(cia402::object::mode, low ? EdsPart::low : EdsPart::high)});
+}
+
 }  // namespace
 
 bool supports(const Eds& eds, unsigned mode_bit) {
@@ -166,6 +180,13 @@ std::string velocity_mode_lack(const Eds& eds) {
   return found.empty() ? std::string() : found.front().message;
 }
 
+cia402::OperationMode neutral_mode_of(const Eds& eds) {
+  using cia402::OperationMode;
+  if (velocity_mode_lack(eds).empty()) return OperationMode::profile_velocity;
+  const bool homing = supports(eds, homing_bit) && can_write(eds, cia402::object::homing_method);
+  return homing ? OperationMode::homing : OperationMode::none;
+}
+
 std::vector<EdsFinding> check_eds(const Eds& eds, const Overrides& overrides) {
   std::vector<EdsFinding> found;
   std::set<Object> doubtful;
@@ -180,6 +201,7 @@ std::vector<EdsFinding> check_eds(const Eds& eds, const Overrides& overrides) {
     found.push_back(without_mode("position"));
   for (const auto& one : needed)
     if (!doubtful.contains(one.object)) check_needed(eds, one, found);
+  if (found.empty()) check_no_mode(eds, found);
   return found;
 }
 

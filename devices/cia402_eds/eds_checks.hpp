@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "buses/canopen/eds.hpp"
+#include "devices/cia402/objects.hpp"
 #include "devices/cia402_eds/overrides.hpp"
 
 namespace axisd::cia402_eds {
@@ -27,6 +28,9 @@ std::vector<std::string> warnings_of(const canopen::Eds& eds, const Overrides& o
 
 /// Why the drive has no profile velocity mode, by its objects; empty: it has it.
 std::string velocity_mode_lack(const canopen::Eds& eds);
+/// See cia402::Model::neutral_mode. Homing mode is entered and left there, and nothing homes: only that the
+/// drive has the mode matters.
+cia402::OperationMode neutral_mode_of(const canopen::Eds& eds);
 /// 6502h; without it, or without its value, a drive is taken to have every mode.
 bool supports(const canopen::Eds& eds, unsigned mode_bit);
 /// The drive has it, and it is not read-only.

@@ -193,8 +193,8 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   model_.identity.vendor = identity_of(eds, object::identity_vendor, eds.vendor);
   model_.identity.product = identity_of(eds, object::identity_product, eds.product);
   model_.homing_codes = homing_codes_;
-  if (!capabilities.velocity_mode)
-    model_.neutral_mode = capabilities.homing ? cia402::OperationMode::homing : cia402::OperationMode::none;
+  model_.neutral_mode = neutral_mode_of(eds);
+  capabilities.passes_no_mode = model_.neutral_mode == cia402::OperationMode::none;
   model_.objects.velocity = object::velocity_value;
   if (has_inputs) model_.objects.inputs = object::inputs_value;
   if (eds.find(object::position_window) != nullptr) model_.objects.position_window = object::position_window;

@@ -143,7 +143,7 @@ void StandardDrive::on_start_bit(bool set) {
 }
 
 void StandardDrive::set_mode(int mode) {
-  if (mode == mode_) return;
+  if (mode == mode_ || (mode == 0 && behaviour_.no_mode_changes_nothing)) return;
   mode_ = mode;
   acknowledged_ = velocity_held_ = limited_ = false;
   suspended_.reset();

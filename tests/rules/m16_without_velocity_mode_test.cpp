@@ -119,6 +119,35 @@ TEST(M23, WithoutVelocityModeNothingGoesOnThatAStopInterrupted) {
     }
 }
 
+/// CiA 402: 0 may be no mode, and may be no change of it.
+TEST(M23, ADriveThatStaysInItsModeIsNeitherEnabledNorMovedAfterAStop) {
+  for (const bool stopped : {false, true}) {
+    auto options = rig_of(lacks().back());
+    options.switches["no_mode_changes_nothing"] = true;
+    CanRig rig(std::move(options));
+    rig.ready();  // as it comes up, in no mode
+    if (stopped) {
+      rig.submit(MoveAbsoluteRequest{.position = 300});
+      rig.run(1s);
+      rig.done(StopRequest{});
+    } else {
+      rig.done(MoveAbsoluteRequest{.position = 20});
+      rig.done(DisableRequest{});
+    }
+    rig.run(500ms);
+    const auto at = rig.shaft();
+    const auto starts = rig.drive->starts();
+    const auto refused = rig.complete(stopped ? Action(MoveAbsoluteRequest{}) : Action(EnableRequest{}));
+    EXPECT_EQ(refused.state, CommandState::error) << describe(refused);
+    ASSERT_TRUE(refused.cause);
+    EXPECT_THAT(refused.cause->message, HasSubstr("stays in mode 1 instead of 0: it cannot rest in no mode"));
+    EXPECT_THAT(refused.cause->remedy, HasSubstr("drive: { objects: ... }"));
+    rig.run(2s);
+    EXPECT_EQ(rig.drive->starts(), starts);
+    EXPECT_NEAR(static_cast<double>(rig.shaft()), static_cast<double>(at), 3);
+  }
+}
+
 TEST(M16, WithoutVelocityModeJogsAndVelocityMovesAreRefused) {
   for (const auto& lack : lacks())
     for (const bool limits : {true, false}) {

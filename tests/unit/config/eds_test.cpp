@@ -350,6 +350,19 @@ TEST(EdsObjects, ADecelerationThatNoDriveHasIsNotBelieved) {
   EXPECT_EQ(found("0", "100 mm/s"), "") << "it tells nothing";
 }
 
+/// It is enabled by way of no mode, in which nobody knows what holds the load.
+TEST(EdsObjects, AVerticalLoadNeedsAModeToRestIn) {
+  const auto found = [](const std::string& lacking) {
+    return findings(load({.more = "      objects: { " + lacking + " }\n    load: vertical\n"}));
+  };
+  const std::string no_velocity = "60FFh: { access: none }", no_homing = "6098h: { access: none }";
+  EXPECT_EQ(found(no_homing), "");
+  EXPECT_EQ(found(no_velocity), "");
+  EXPECT_THAT(found(no_velocity + ", " + no_homing),
+              AllOf(HasSubstr("test.yaml:18:11: this drive of model cia402 may let a vertical load sag"),
+                    HasSubstr("drive: { objects: ... }")));
+}
+
 TEST_F(EdsFile, EachMissingObjectIsNamed) {
   write(
       "[DeviceInfo]\nVendorNumber=1\n[6041]\nParameterName=Statusword\nObjectType=7\nDataType=6\nAccessType="

@@ -139,6 +139,21 @@ TEST(EdsChecks, TheRemedyNamesKeysAndNeverTheFile) {
   EXPECT_THAT(of("[1000]\nParameterName=a\nDataType=7\nAccessType=ro\n"), Not(HasSubstr("correct")));
 }
 
+TEST(EdsChecks, NoModeHasToBePermittedWhereNothingElseIsNeutral) {
+  const auto text = changed("6060", "LowLimit", "LowLimit=1");
+  EXPECT_THAT(judge(text).findings, IsEmpty()) << "it has velocity mode";
+  Settings settings{{"objects.60FFh:00.access", "none"}};
+  EXPECT_THAT(judge(text, settings).findings, IsEmpty()) << "and homing mode";
+  settings["objects.6098h:00.access"] = "none";
+  EXPECT_THAT(judge(example(), settings).findings, IsEmpty());
+  const auto judged = judge(text, settings);
+  ASSERT_THAT(judged.findings, SizeIs(1));
+  EXPECT_THAT(judged.findings[0].message, HasSubstr("object 6060h:00 cannot be 0"));
+  EXPECT_EQ(judged.findings[0].settled_by, "6060h: { minimum: NUMBER }");
+  settings["objects.6060h:00.minimum"] = std::int64_t{0};
+  EXPECT_THAT(judge(text, settings).findings, IsEmpty());
+}
+
 TEST(EdsChecks, WhatTheFileLacksCanBeSaid) {
   auto text = example();
   const auto at = text.find("\n[6083]");

@@ -43,6 +43,18 @@ TEST(StandardDriveSwitches, HomedIsShownUntilTheNextStart) {
   EXPECT_FALSE(bench.bit(12));
 }
 
+TEST(StandardDriveSwitches, NoModeIsAModeOrLeavesTheOneBefore) {
+  for (const bool nothing : {false, true}) {
+    auto bench = with("no_mode_changes_nothing", nothing);
+    bench.enable(1);
+    EXPECT_EQ(bench.write(0x6060, 1, 0), 0U);
+    EXPECT_EQ(bench.read(0x6061) & 0xFF, nothing ? 1 : 0);
+    bench.move(5'000);
+    bench.run(1s);
+    EXPECT_EQ(bench.position(), nothing ? 5'000 : 0);
+  }
+}
+
 TEST(StandardDriveSwitches, ASetPointIsAcknowledgedAtOnceOrLate) {
   for (const bool late : {false, true}) {
     auto bench = with("acknowledges_late", late);
