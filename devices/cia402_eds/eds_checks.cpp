@@ -109,7 +109,7 @@ EdsFinding without_mode(std::string_view name) {
 }
 
 /// The object, as far as axisd uses it, that this flaw leaves open and the configuration does not settle.
-std::optional<Object> left_open(const EdsFlaw& flaw, const Overrides& overrides) {
+std::optional<Object> left_open(const Eds& eds, const EdsFlaw& flaw, const Overrides& overrides) {
   const auto open = [&](Object object, unsigned parts) {
     const auto by = overrides.find(object);
     return flaw.concerns(object) && (parts & bit(flaw.part)) != 0 &&
@@ -117,8 +117,12 @@ std::optional<Object> left_open(const EdsFlaw& flaw, const Overrides& overrides)
   };
   for (const auto& one : needed)
     if (open(one.object, one.parts)) return one.object;
+  // Whatever 60FFh is in a drive without velocity mode.
+  const auto is_used = [&](Object object) {
+    return object != cia402::object::target_velocity || supports(eds, velocity_bit);
+  };
   for (const auto& one : used_if_there)
-    if (open(one.object, one.parts)) return one.object;
+    if (is_used(one.object) && open(one.object, one.parts)) return one.object;
   return std::nullopt;
 }
 
@@ -191,7 +195,7 @@ std::vector<EdsFinding> check_eds(const Eds& eds, const Overrides& overrides) {
   std::vector<EdsFinding> found;
   std::set<Object> doubtful;
   for (const auto& flaw : eds.flaws) {
-    const auto object = left_open(flaw, overrides);
+    const auto object = left_open(eds, flaw, overrides);
     if (!object) continue;
     doubtful.insert(*object);
     found.push_back({flaw.line, fmt::format("{}, and axisd uses object {}", flaw.message, to_string(*object)),
@@ -229,7 +233,7 @@ std::vector<std::string> warnings_of(const Eds& eds, const Overrides& overrides,
   for (const auto& flaw : eds.flaws) {
     const bool settled_by_key = std::ranges::any_of(
         overrides, [&](const auto& one) { return flaw.concerns(one.first) && one.second.has(flaw.part); });
-    if (settled_by_key || left_open(flaw, overrides)) continue;
+    if (settled_by_key || left_open(eds, flaw, overrides)) continue;
     if (lines.size() < most)
       lines.push_back(fmt::format("{}:{}: {}", path, flaw.line, flaw.message));
     else

@@ -120,6 +120,15 @@ TEST(EdsChecks, AFlawInWhatIsNotUsedIsAWarning) {
   }
 }
 
+TEST(EdsChecks, AFlawOfTheTargetVelocityDoesNotMatterWithoutVelocityMode) {
+  const auto text = changed("60FF", "LowLimit", "LowLimit=0xFFFFFFFFF");
+  EXPECT_THAT(judge(text).findings, SizeIs(1));
+  const auto judged = judge(text, {{"objects.6502h:00.default", std::int64_t{0x21}}});
+  EXPECT_THAT(judged.findings, IsEmpty());
+  ASSERT_THAT(judged.warnings, SizeIs(1));
+  EXPECT_THAT(judged.warnings[0], HasSubstr("lowlimit"));
+}
+
 TEST(EdsChecks, FewWarningsAreShown) {
   auto text = example();
   for (int i = 0; i < 40; ++i) text += "nothing\n";
