@@ -31,6 +31,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       stopped_(env_.executor, *env_.clock),
       observed_(env_.stop_delays),
       speed_watch_(static_cast<double>(settings_.scale.pulses_per_revolution)) {
+  last_deceleration_ = planner_.braking_time(settings_.limits.velocity, last_deceleration_);
   if (env_.persistence != nullptr) {
     const auto& axes = env_.persistence->current().axes;
     if (const auto found = axes.find(settings_.name); found != axes.end()) {

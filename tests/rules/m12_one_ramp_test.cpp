@@ -72,5 +72,24 @@ TEST(M12, ADecelerationThatCannotBeSetIsInPredictionsAndBounds) {
   EXPECT_EQ(rig.drive->peek(0x608400), 5000U) << "it was never written";
 }
 
+/// 6084h = 2500: 4 s, also for a stop of which nobody knows what it ends (M4).
+TEST(M12, ADecelerationThatCannotBeSetIsInTheBoundOfADriveFoundMoving) {
+  ModelRig rig({.model = "cia402",
+                .limits = false,
+                .drive_keys = "objects: { 6084h: { access: ro, default: 2500 } }"});
+  rig.drive->poke(0x608400, 2500);
+  for (const Action& action : {Action(EnableRequest{}), Action(SetPositionRequest{.position = 0})})
+    EXPECT_EQ(rig.complete(action).state, CommandState::done);
+  ASSERT_TRUE(rig.try_submit(MoveVelocityRequest{.velocity = 100}));
+  rig.run(600ms);
+  rig.stop_daemon();
+  ASSERT_TRUE(rig.moving()) << "the end of the daemon stops nothing";
+  const auto before = rig.load_mm();
+  rig.start_daemon();
+  EXPECT_TRUE(rig.run_until([&] { return !rig.moving(); }, 10s));
+  EXPECT_GT(rig.load_mm() - before, 195) << "braked harder than it brakes by itself";
+  EXPECT_EQ(rig.drive->peek(0x605D00) & 0xFFU, 1U) << "no quick stop";
+}
+
 }  // namespace
 }  // namespace axisd::test
