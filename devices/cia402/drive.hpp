@@ -144,6 +144,8 @@ class Cia402Drive final : public Drive {
   /// The drive counts as the axis was planned; else misconfigured.
   Task<Result<void>> check_units();
   Task<Result<std::optional<UnitConflict>>> unit_conflict(SdoOptions options);
+  /// It brakes at least as hard as its data sheet says, where that is fixed; else misconfigured.
+  Task<Result<void>> check_deceleration();
   Task<Result<void>> set_emergency_id();
   Task<Result<void>> set_heartbeat();
   Task<Result<void>> set_pdos();

@@ -210,6 +210,34 @@ TEST(UnitCheck, ARevolutionWithOtherCountsIsRefused) {
                  "scale: { microstep: ... }");
 }
 
+/// 6084h of the file is in each prediction and each bound.
+TEST(UnitCheck, ADriveThatBrakesForLongerThanItsDataSheetSaysIsRefused) {
+  constexpr std::uint32_t deceleration = 0x608400;
+  auto settings = with_objects({}, "pulses_per_second");
+  settings["objects.6084h:00.access"] = std::string("ro");
+  settings["objects.6084h:00.default"] = std::int64_t{5000};
+  UnitBench bench(settings, {{deceleration, 4999}});
+  expect_refused(bench.bring_up(), deceleration,
+                 "it brakes for longer than its data sheet says: 6084h is 4999 instead of 5000",
+                 "objects: { 6084h: { default: 4999 } }");
+  bench.answers()[deceleration] = 0;
+  expect_refused(bench.bring_up(), deceleration, "6084h is 0 instead of 5000", "6084h: { access: none }");
+  bench.answers()[deceleration] = std::nullopt;
+  const auto missing = bench.bring_up();
+  ASSERT_FALSE(missing) << "nobody knows what it brakes with";
+  EXPECT_THAT(missing.error().remedy, HasSubstr("6084h: { access: none }"));
+  for (const std::uint32_t good : {5000U, 6000U}) {
+    bench.answers()[deceleration] = good;
+    const auto configured = bench.bring_up();
+    EXPECT_TRUE(configured) << to_string(configured.error());
+  }
+  settings["ramps"] = std::string("time");
+  UnitBench times(settings, {{deceleration, 5001}});
+  expect_refused(times.bring_up(), deceleration, "6084h is 5001 instead of 5000", "{ default: 5001 }");
+  times.answers()[deceleration] = 4000;
+  EXPECT_TRUE(times.bring_up());
+}
+
 /// The unit that was set is gone with the power.
 TEST(UnitCheck, APowerCycleIsLookedAtAnew) {
   UnitBench bench(with_objects({{"60A9h:00", in_pulses}}, ""), {{velocity_si, in_pulses}});
