@@ -1,5 +1,6 @@
 #include "devices/cia402/homing_watch.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 
 namespace axisd::cia402 {
@@ -8,6 +9,9 @@ namespace {
 
 /// Motor and bit need not come to rest in the same cycle of the drive.
 constexpr Duration bit_lag = std::chrono::milliseconds(50);
+
+/// By how much a counter wavers that was set to 0 just now (M30).
+constexpr std::int64_t widest_in_place = 10;
 
 bool within(std::int64_t position, std::int64_t other, std::int64_t tolerance) {
   return std::abs(position - other) <= tolerance;
@@ -19,6 +23,11 @@ void HomingWatch::begin(TimePoint at, Start start) {
   *this = {};
   began_ = at;
   start_ = start;
+  if (start.in_place) {
+    // Nothing brakes, and a counter that is only near 0 is that of a start which the drive ignored.
+    start_.braking = 0;
+    start_.window = std::min(start.window, widest_in_place);
+  }
   was_low_ = start.was_low;
   moved_ = start.in_place;
 }

@@ -42,6 +42,7 @@ class HomingWatch {
     /// that was.
     bool was_low = false;
     /// Home is where the motor stands: nothing moves, and where the counter is 0 it is home, whoever did it.
+    /// `braking` and a wide `window` do not count then.
     bool in_place = false;
   };
 
