@@ -61,20 +61,6 @@ std::string time_range(double from, double to) {
   return least == most ? least : fmt::format("{} to {}", least, most);
 }
 
-/// Velocities are granted as they are sent, and ramps as they are planned. A drive that a data sheet
-/// describes is sent accelerations, as whole counts of a unit that is not known here, 1 at least. Of n
-/// counts, as planned (ramp_of() in devices/cia402/units.hpp):
-/// - a start gets the whole part of n. From n = 1 on that is more than half of n, so that it takes less than
-///   twice its granted time; below, 1 is more than n, and it takes less than its granted time.
-/// - a brake, and a start with the same ramp, gets the next whole number: it takes its granted time at most.
-/// How much shorter a ramp is has no bound: that is, nothing. With longer ramps the shaft is nowhere faster,
-/// and so in the middle for no shorter time.
-void widen_by_rounding(SpeedFigures& figures, double distance, double velocity, double acceleration_time,
-                       double deceleration_time) {
-  figures.told_least = middle_time(distance, velocity, 0, 0);
-  figures.told_most = middle_time(distance, velocity, 2 * acceleration_time, deceleration_time);
-}
-
 /// Where an axis is not as fast as it was told to be: by the keys that its model has.
 std::string compare_units(const std::string& axis, bool described_by_file) {
   const auto scale = fmt::format("compare axes.{}.scale (microstep: pulses per revolution; gear)", axis);
@@ -177,8 +163,6 @@ SpeedFigures measure_speed(const SpeedObservation& move) {
   const double down = seconds(move.command.granted().deceleration_time());
   SpeedFigures figures{.told = middle_time(distance, velocity, up, down),
                        .way = distance * (1 - 2 * share_of_edge)};
-  figures.told_least = figures.told_most = figures.told;
-  if (move.described_by_file) widen_by_rounding(figures, distance, velocity, up, down);
   // The last sample before each end of the middle, and the first behind it.
   std::array<std::optional<double>, 2> before;
   std::array<std::optional<double>, 2> behind;
@@ -200,12 +184,10 @@ SpeedFigures measure_speed(const SpeedObservation& move) {
 SpeedJudgement judge_speed(const SpeedObservation& move, const std::string& unit) {
   const auto figures = measure_speed(move);
   const double tolerance = figures.told * share_of_time + staleness;
-  const double rounded = figures.told_most - figures.told_least;
-  const bool slow = figures.least > figures.told_most + tolerance;
-  const bool fast = figures.most < figures.told_least - tolerance;
-  const auto told =
-      fmt::format("{} were told for it at {}", time_range(figures.told_least, figures.told_most),
-                  with_unit(move.command.granted().velocity(), unit + "/s"));
+  const bool slow = figures.least > figures.told + tolerance;
+  const bool fast = figures.most < figures.told - tolerance;
+  const auto told = fmt::format("{} were told for it at {}", duration_text(figures.told),
+                                with_unit(move.command.granted().velocity(), unit + "/s"));
   if (figures.most > 0 && (slow || fast)) {
     auto reason = fmt::format("it was in the middle {} of its way for {}, and {}: it is too {}",
                               with_unit(figures.way, unit), time_range(figures.least, figures.most), told,
@@ -213,7 +195,7 @@ SpeedJudgement judge_speed(const SpeedObservation& move, const std::string& unit
     return {.proof = SPEED_PROOF_WRONG,
             .judgement = failed(std::move(reason), compare_units(move.axis, move.described_by_file))};
   }
-  if (figures.most == 0 || figures.most - figures.least + rounded + tolerance > figures.told / 2)
+  if (figures.most == 0 || figures.most - figures.least + tolerance > figures.told / 2)
     return {.proof = SPEED_PROOF_UNSPECIFIED,
             .judgement = failed(fmt::format("too short to tell its speed: {}, and its samples leave open {}",
                                             told, time_range(figures.least, figures.most)),

@@ -62,9 +62,7 @@ struct SpeedObservation {
 /// How long the shaft was in the middle of its way, from a tenth of it to nine tenths, s: there neither
 /// settling nor the beginning counts. What the samples leave open lies between `least` and `most`.
 struct SpeedFigures {
-  double told = 0;  ///< by velocity and ramps, as granted
-  /// With the shortest and the longest ramps that the drive may have been given for those.
-  double told_least = 0, told_most = 0;
+  double told = 0;  ///< by velocity and ramps, which are granted as the drive is sent them
   double least = 0, most = 0;
   double way = 0;  ///< of the middle, user units
 };
@@ -76,8 +74,8 @@ struct SpeedJudgement {
 /// Of a move that did not come where it was told, or was ended: because the axis counts otherwise than its
 /// drive.
 bool disproves_speed(const v1::Command& command);
-/// A speed that is off by some per cent, by what samples may be late, and by what the drive rounds, is wrong;
-/// one that could be twice as high, or half, is not known.
+/// A speed that is off by some per cent, and by what samples may be late, is wrong; one that could be twice
+/// as high, or half, is not known.
 SpeedJudgement judge_speed(const SpeedObservation& move, const std::string& unit);
 
 struct LimitObservation {
