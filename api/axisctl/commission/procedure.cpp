@@ -66,11 +66,15 @@ void Procedure::read_settings() {
   record_.set_configuration_revision(config.revision());
   auto read = settings_of(config.yaml(), config.path(), axis_.name());
   settings_ = std::move(read.settings);
-  if (!settings_)
+  if (!settings_) {
     person_.tell(
         fmt::format("The configuration cannot be read here, so that polarity, soft limits and homing are not "
                     "known: {}",
                     read.why_not));
+    return;
+  }
+  if (const auto budget = axis_.budget(axis_.state().bus()))
+    settings_ = with_braking(*std::move(settings_), seconds(budget->deceleration_time()));
 }
 
 void Procedure::carry_out(const StepPlan& plan, Step& step) {

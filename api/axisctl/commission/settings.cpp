@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "config/configuration.hpp"
 
@@ -70,6 +71,11 @@ SettingsResult settings_of(std::string_view yaml, const std::string& path, std::
       std::ranges::find_if(axes, [&](const config::AxisEntry& entry) { return entry.axis.name == axis; });
   if (found == axes.end()) return {.settings = {}, .why_not = fmt::format("{}: no axis {}", path, axis)};
   return {.settings = settings_of(found->axis), .why_not = {}};
+}
+
+Settings with_braking(Settings settings, double published) {
+  settings.deceleration_time = std::max(settings.deceleration_time, published);
+  return settings;
 }
 
 }  // namespace axisd::axisctl::commission

@@ -36,4 +36,8 @@ struct SettingsResult {
 /// elsewhere. `path` leads error texts.
 SettingsResult settings_of(std::string_view yaml, const std::string& path, std::string_view axis);
 
+/// With what the daemon publishes of a stop from the highest velocity, s: a drive may brake for longer than
+/// it is told.
+Settings with_braking(Settings settings, double published);
+
 }  // namespace axisd::axisctl::commission

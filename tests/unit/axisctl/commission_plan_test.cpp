@@ -52,6 +52,8 @@ TEST(Settings, AreThoseOfTheFile) {
   EXPECT_EQ(one.position_maximum, 400);
   EXPECT_EQ(one.velocity, 100);
   EXPECT_DOUBLE_EQ(one.deceleration_time, 0.25);
+  EXPECT_DOUBLE_EQ(with_braking(one, 2.5).deceleration_time, 2.5) << "the drive's own";
+  EXPECT_DOUBLE_EQ(with_braking(one, 0).deceleration_time, 0.25) << "nothing is published";
   EXPECT_TRUE(one.invert && one.vertical);
   EXPECT_EQ(one.homing_method, "home_negative");
   ASSERT_EQ(one.inputs.size(), 2U);
