@@ -406,7 +406,7 @@ void AxisChecks::check_homing() {
         fmt::format("'acceleration_time' has no effect: this drive of model {} has none for homing",
                     axis_.model),
         "leave it out");
-  if (model_ != nullptr && model_->inputs.empty() && given("homing.backoff"))
+  if (model_ != nullptr && model_->inputs.empty() && !homing.number && given("homing.backoff"))
     add("homing.backoff",
         fmt::format("'backoff' has no effect: this drive of model {} does not show its switches",
                     axis_.model),
@@ -424,7 +424,11 @@ void AxisChecks::check_homing_number() {
   const auto numbers = model_->capabilities.homing_numbers;
   const int wanted = *axis_.homing->number;
   const auto found = std::ranges::find(numbers, wanted, &HomingNumber::number);
-  if (numbers.empty())
+  if (numbers.empty() && axis_.own_descriptor != nullptr)
+    add("homing.method",
+        fmt::format("this drive of model {} has no homing method, by its data sheet", axis_.model),
+        "where it has some, say so: drive: { objects: { 6098h: { minimum: NUMBER, maximum: NUMBER } } }");
+  else if (numbers.empty())
     add("homing.method", fmt::format("homing methods of model {} have no numbers", axis_.model),
         "permitted: " + alternatives(homing_methods()));
   else if (found == numbers.end())

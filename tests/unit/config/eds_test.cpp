@@ -397,6 +397,16 @@ TEST(EdsHoming, AMethodByItsNumberIsTheDrivesOwn) {
   EXPECT_THAT(found("128"), HasSubstr("'method' is out of range"));
   EXPECT_THAT(found("'17'"), HasSubstr("'method' cannot be '17'"));
   EXPECT_THAT(found("17", ", backoff: 5 mm"), HasSubstr("'backoff' has no effect with a homing method by"));
+  const auto objects = [](std::string_view said, std::string_view more) {
+    return findings(load(
+        {.inputs = "", .more = fmt::format("      objects: {{ {} }}\n{}", said, homing_by("17", more))}));
+  };
+  const auto once = objects("60FDh: { access: none }", ", backoff: 5 mm");
+  EXPECT_THAT(once, HasSubstr("'backoff' has no effect with a homing method by its number"));
+  EXPECT_EQ(std::ranges::count(once, '\n'), 1) << once;
+  EXPECT_THAT(objects("6098h: { minimum: 0, maximum: 0 }", ""),
+              AllOf(HasSubstr("this drive of model cia402 has no homing method, by its data sheet"),
+                    HasSubstr("6098h: { minimum: NUMBER, maximum: NUMBER }")));
   EXPECT_EQ(found("24", "", "true"), "");
   EXPECT_THAT(found("-3", "", "true"), HasSubstr("homing method -3 cannot be mirrored for an inverted axis"));
   const auto axis = [](std::string_view method) {
