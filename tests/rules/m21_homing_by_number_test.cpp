@@ -71,6 +71,29 @@ TEST(M21, ANumberThatTheDriveRefusesMovesNothing) {
   }
 }
 
+/// It takes the method, searches between its limits for a switch that is not there, and says so (bit 13).
+TEST(M21, ANumberByWhichTheDriveFailsIsNoHome) {
+  for (const bool polled : {false, true}) {
+    auto options = homes_by(24);
+    options.polled = polled;
+    options.adjust_drive = [](simulation::SimulatedNodeSettings& drive) {
+      drive.mechanics = {.positive_limit_from = 3000, .negative_limit_from = -3000};
+    };
+    CanRig rig(std::move(options));
+    rig.done(EnableRequest{});
+    const auto starts = rig.drive->starts();
+    const auto home = rig.complete(HomeRequest{}, 200s);
+    EXPECT_EQ(rig.drive->starts(), starts + 1) << "it was taken";
+    EXPECT_EQ(home.state, CommandState::error) << describe(home);
+    ASSERT_TRUE(home.cause);
+    EXPECT_EQ(home.cause->reason, Reason::not_reached) << describe(home);
+    EXPECT_NE(rig.state()->trust, PositionTrust::homed);
+    rig.run(2s);
+    EXPECT_FALSE(rig.drive->shaft_moving());
+    EXPECT_EQ(rig.drive->starts(), starts + 1);
+  }
+}
+
 TEST(M18, ANumberThatCannotBeMirroredIsRefused) {
   for (const auto& [number, invert, good] : {std::tuple(-5, false, true), std::tuple(-5, true, false),
                                              std::tuple(17, true, true), std::tuple(0, false, false)}) {
