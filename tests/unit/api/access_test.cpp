@@ -67,7 +67,7 @@ TEST(Access, NothingIsTakenFromAPeerWhoseCertificateIsNotGood) {
   const Peer gone{.name = "anna",
                   .refusal = Error{.reason = Reason::unauthenticated, .message = "revoked", .remedy = "ask"}};
   const AccessSettings access{.roles = {{"anna", Role::maintainer}}};
-  for (const auto* call : calls())
+  for (const auto* call : served_calls())
     for (const auto* table : {static_cast<const AccessSettings*>(nullptr), &access}) {
       const auto result = admitted(table, gone, {}, *request_of(*call), {});
       ASSERT_FALSE(result) << call->full_name();
