@@ -314,7 +314,7 @@ TEST(EdsDrive, PositionsWithoutVelocityMode) {
   const auto positions_alone = drive_of(without(without(example(), "60FF"), "6098"));
   EXPECT_EQ(positions_alone.model().neutral_mode, cia402::OperationMode::none);
   EXPECT_TRUE(positions_alone.capabilities.passes_no_mode);
-  const auto homes_by_itself = drive_of(without(without(example(), "60FF"), "6099"));
+  const auto homes_by_itself = drive_of(without(without(example(), "60FF"), "6099sub1"));
   EXPECT_FALSE(homes_by_itself.capabilities.homing) << "no speeds";
   EXPECT_EQ(homes_by_itself.model().neutral_mode, cia402::OperationMode::homing) << "the mode is there";
   EXPECT_FALSE(homes_by_itself.capabilities.passes_no_mode);
