@@ -80,6 +80,12 @@ tls::Files files_of(const config::TlsSettings& settings) {
           .crl = settings.crl};
 }
 
+config::TlsCheck tls_check(tls::Demand demand) {
+  return [demand](const config::TlsSettings& settings) {
+    return tls::check(files_of(settings), std::chrono::system_clock::now(), demand);
+  };
+}
+
 /// nullptr: there is no TLS. Errors: as of tls::Live::open().
 Result<std::shared_ptr<tls::Live>> open_tls(const config::ServerSettings& settings) {
   if (!settings.tls) return nullptr;
@@ -160,8 +166,8 @@ ConfigurationService::Parts served_parts(const Options& options, const config::C
           .yaml = yaml,
           .configuration = configuration,
           .since = std::chrono::system_clock::now(),
-          .load = [&options] { return load_configuration(options, TlsFilesMay::only_be_good); },
-          .check_tls = check_tls,
+          .load = [&options] { return load_configuration(options, tls::Demand::usable); },
+          .check_tls = tls_check(tls::Demand::good),
           .last_good = last_good(configuration.state_directory),
           .apply =
               [&service](core::Reload reload, bool dry_run, core::ReloadDone done) {
@@ -355,18 +361,8 @@ std::filesystem::path last_good(const std::string& state_directory) {
   return std::filesystem::path(state_directory) / "last-good.yaml";
 }
 
-std::vector<std::pair<std::string_view, Error>> check_tls(const config::TlsSettings& tls) {
-  return tls::check(files_of(tls));
-}
-
-config::LoadResult load_configuration(const Options& options, TlsFilesMay may) {
-  const auto check = [may](const config::TlsSettings& tls) {
-    auto findings = check_tls(tls);
-    if (may == TlsFilesMay::be_valid_later)
-      std::erase_if(findings, [](const auto& found) { return found.second.reason == Reason::configuring; });
-    return findings;
-  };
-  auto loaded = config::load_file(options.config, {}, check);
+config::LoadResult load_configuration(const Options& options, tls::Demand demand) {
+  auto loaded = config::load_file(options.config, {}, tls_check(demand));
   if (!loaded.configuration) return loaded;
   if (!options.state_directory.empty()) loaded.configuration->state_directory = options.state_directory;
   auto& server = loaded.configuration->server;

@@ -13,9 +13,8 @@ int main(int argc, char** argv) {
     return 0;
   }
   if (options.quiesce) return axisd::run_quiesce(options);
-  using axisd::TlsFilesMay;
-  auto loaded = axisd::load_configuration(
-      options, options.check ? TlsFilesMay::only_be_good : TlsFilesMay::be_valid_later);
+  using axisd::tls::Demand;
+  auto loaded = axisd::load_configuration(options, options.check ? Demand::good : Demand::usable_some_time);
   for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
   if (!loaded.configuration) return axisd::exit_status::configuration;
   const auto& configuration = *loaded.configuration;

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <optional>
 #include <system_error>
+#include <utility>
 
 #include "api/tls/pem.hpp"
 #include "buses/file_descriptor.hpp"
@@ -64,19 +65,20 @@ Period period_of(const RevocationList& list) {
           .until = time_of(X509_CRL_get0_nextUpdate(list.get()))};
 }
 
-/// Why `what` ("the certificate") cannot be used at `now`.
+/// Why `what` ("the certificate") is out of its time at `now`.
 std::optional<Error> out_of(const Period& period, const std::string& path, std::string_view what,
                             WallTime now) {
+  const auto by_the_clock = [&](std::string_view text, std::string remedy) {
+    auto error = wrong(path, text, std::move(remedy)).error();
+    error.reason = Reason::configuring;
+    return error;
+  };
   if (period.until && *period.until < now)
-    return wrong(path, fmt::format("{} has expired ({})", what, to_text(*period.until)), "renew it").error();
+    return by_the_clock(fmt::format("{} has expired ({})", what, to_text(*period.until)), "renew it");
   if (!period.from || *period.from <= now) return std::nullopt;
-  auto error = wrong(path,
-                     fmt::format("{} is not valid before {}, and this computer's clock says {}", what,
-                                 to_text(*period.from), to_text(now)),
-                     "set the clock, or give a file that is valid now")
-                   .error();
-  error.reason = Reason::configuring;
-  return error;
+  return by_the_clock(
+      fmt::format("{} is not valid before {}", what, to_text(*period.from)),
+      fmt::format("this computer's clock says {}: set it, or give a file that is valid now", to_text(now)));
 }
 
 /// Lists of what changed since another one, or of some certificates only, are marked as critical.
@@ -87,7 +89,7 @@ bool is_of_a_kind_that_is_not_understood(const RevocationList& list) {
 /// Reads the files one after the other, and keeps what was found at each.
 class Examination {
  public:
-  Examination(const Files& files, WallTime now) : files_(files), now_(now) {
+  Examination(const Files& files, WallTime now, Demand demand) : files_(files), now_(now), demand_(demand) {
     const auto chain = examine("certificate", files.certificate, contents_.certificate, certificates);
     const auto key = examine("key", files.key, contents_.key, private_key);
     const auto authorities = examine("client_ca", files.client_ca, contents_.client_ca, certificates);
@@ -130,7 +132,7 @@ class Examination {
   void look_at_chain(const std::vector<Certificate>& chain) {
     for (const auto& certificate : chain)
       if (auto bad = out_of(period_of(certificate), files_.certificate, "the certificate", now_))
-        return add("certificate", std::unexpected(*std::move(bad)));
+        return add_out_of_time("certificate", *std::move(bad), Demand::usable);
   }
 
   /// One that cannot be used is an old one, or one for later, as long as another can.
@@ -140,7 +142,7 @@ class Examination {
       last = out_of(period_of(authority), files_.client_ca, "the certificate", now_);
       if (!last) break;
     }
-    if (last) add("client_ca", std::unexpected(*std::move(last)));
+    if (last) add_out_of_time("client_ca", *std::move(last), Demand::usable);
     if (contents_.client_ca.contains("-----BEGIN X509 CRL-----"))
       add("client_ca", wrong(files_.client_ca, "holds a CRL, which nobody looks at here",
                              "put it into a file of its own, under server.tls.crl"));
@@ -151,12 +153,19 @@ class Examination {
       if (issuer_of(list, authorities) == nullptr)
         return add("crl", wrong(files_.crl, "the CRL was not issued by an authority of " + files_.client_ca,
                                 "give the one that the authority of the clients has made"));
-      if (auto bad = out_of(period_of(list), files_.crl, "the CRL", now_))
-        return add("crl", std::unexpected(*std::move(bad)));
       if (is_of_a_kind_that_is_not_understood(list))
         return add("crl", wrong(files_.crl, "the CRL is not a complete one of its authority",
                                 "give the full list, no delta and no part"));
     }
+    // Of no list the time keeps another from being looked at: it may be all that is told.
+    for (const auto& list : lists)
+      if (auto bad = out_of(period_of(list), files_.crl, "the CRL", now_))
+        return add_out_of_time("crl", *std::move(bad), Demand::good);
+  }
+
+  /// `least`: the least that is wanted where this is a finding.
+  void add_out_of_time(std::string_view key, Error error, Demand least) {
+    if (demand_ <= least) findings_.emplace_back(key, std::move(error));
   }
 
   void add(std::string_view key, std::unexpected<Error> error) {
@@ -165,6 +174,7 @@ class Examination {
 
   const Files& files_;
   const WallTime now_;
+  const Demand demand_;
   mode_t mode_of_key_ = 0;
   Files contents_;
   Findings findings_;
@@ -172,10 +182,12 @@ class Examination {
 
 }  // namespace
 
-Findings check(const Files& files, WallTime now) { return std::move(Examination(files, now).findings()); }
+Findings check(const Files& files, WallTime now, Demand demand) {
+  return std::move(Examination(files, now, demand).findings());
+}
 
 Result<Files> read(const Files& files, WallTime now) {
-  Examination examination(files, now);
+  Examination examination(files, now, Demand::usable);
   if (!examination.findings().empty()) return fail(std::move(examination.findings().front().second));
   return std::move(examination.contents());
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,15 +24,24 @@ struct Files {
 };
 
 /// Under which key of `server.tls` a file is named, and what is wrong with it, with its path: configuring
-/// where a file is not valid yet by this computer's clock, else invalid_argument.
+/// where it is out of its time by this computer's clock, else invalid_argument. The time itself is in the
+/// remedy only: the same finding has the same message.
 using Findings = std::vector<std::pair<std::string_view, Error>>;
+
+/// What files are wanted for: the less, the fewer findings.
+enum class Demand : std::uint8_t {
+  good,    ///< nothing is wrong with them
+  usable,  ///< they can be served: a revocation list that is out of its time goes on to revoke what it names
+  usable_some_time,  ///< they can be served once the clock is right: whatever is out of its time may be
+};
 
 /// Reads all files and looks at them completely: missing, unreadable, not PEM, not valid at `now`, a key of
 /// another certificate or open to every user, a revocation list of another authority or out of date. Empty:
-/// nothing is wrong. Blocks for the disk.
-[[nodiscard]] Findings check(const Files& files, WallTime now = std::chrono::system_clock::now());
+/// they are what is wanted. Blocks for the disk.
+[[nodiscard]] Findings check(const Files& files, WallTime now = std::chrono::system_clock::now(),
+                             Demand demand = Demand::good);
 
-/// The contents of all files. Errors: the first of check().
+/// The contents of all files. Errors: the first of check() for Demand::usable.
 [[nodiscard]] Result<Files> read(const Files& files, WallTime now = std::chrono::system_clock::now());
 
 }  // namespace axisd::tls

@@ -151,7 +151,7 @@ class Clients(Cell):
 
     def test_expires_while_it_is_connected(self):
         self.start()
-        end = datetime.datetime.now(datetime.timezone.utc) + datetime.timedelta(seconds=20)
+        end = datetime.datetime.now(datetime.timezone.utc) + datetime.timedelta(seconds=45)
         panel = self.connect("panel", self.issue("panel", "20200101000000Z", end.strftime("%Y%m%d%H%M%SZ")))
         panel.wait_online("feeder")
 
@@ -160,6 +160,8 @@ class Clients(Cell):
                 panel.info()
                 return None
             except CallFailed as failed:
+                if failed.code is not grpc.StatusCode.UNAUTHENTICATED:
+                    raise
                 return failed
         failure = wait_for(refusal, "its end")
         self.assertEqual((failure.code, failure.reason), (grpc.StatusCode.UNAUTHENTICATED, "REASON_UNAUTHENTICATED"))
@@ -183,13 +185,36 @@ class Files(Cell):
         self.pki("init", "other", cell="other")
         self.put(self.made("clients.crl", "other"), "clients.crl")
         self.refused_by_check("clients.crl", "the CRL was not issued by an authority of ")
+        done = run([AXISD, "--config", self.subject.config])
+        self.assertEqual(done.returncode, 2, done)
+
+    def test_revocation_list_that_has_expired(self):
+        for suffix in ("crt", "key"):
+            shutil.copy(self.made(f"panel.{suffix}"), self.subject.path(f"panel.{suffix}"))
+        self.pki("revoke", "panel")
         openssl("ca", "-config", self.made("openssl.cnf"), "-gencrl", "-crl_lastupdate", "20200101000000Z",
                 "-crl_nextupdate", "20210101000000Z", "-out", str(self.tls / "clients.crl"))
-        self.refused_by_check("clients.crl", rf"the CRL has expired {STAMP}; renew it")
+        text = r"the CRL has expired \(2021-01-01T00:00:00Z\); renew it"
+        self.refused_by_check("clients.crl", text)
+        # It stops no machine, and goes on to revoke what it names.
+        self.start()
+        shift = self.made("shift-a.crt")
+        wait_for(lambda: re.search(rf"{self.tls / 'clients.crl'}: {text}", self.daemon.log()), "the warning")
+        self.assertRegex(self.axisctl("events", "--kind", "certificate", certificate=shift).stdout, text)
+        self.pki("renew", "press-1")
+        self.put(self.made("press-1.key"), "server.key")
+        self.put(self.made("press-1.crt"), "server.crt")
+        wait_for(lambda: self.served(self.made("press-1.crt")), "the new pair")
+        done = self.axisctl("config", "reload", certificate=shift)
+        self.assertEqual(done.returncode, 0, done)
+        self.told(4, "the certificate of panel was revoked", certificate=self.subject.path("panel.crt"))
+        config = pathlib.Path(self.subject.config).read_text()
+        checked = self.connect("shift-a").system.CheckConfig(system_pb.CheckConfigRequest(yaml=config))
+        self.assertRegex(" ".join(found.message for found in checked.findings), r"the CRL has expired")
 
     def test_not_valid_yet(self):
         self.put(self.issue("press-1", "20400101000000Z", "20410101000000Z"), "server.crt")
-        text = "the certificate is not valid before 2040-01-01T00:00:00Z, and this computer's clock says 20"
+        text = "the certificate is not valid before 2040-01-01T00:00:00Z; this computer's clock says 20"
         self.refused_by_check("server.crt", text)
         # A start is tried again: the clock may be wrong.
         self.subject.start_lines()

@@ -14,14 +14,15 @@
 
 namespace axisd::testing {
 
+/// Authorities end after 30 days, pairs and revocation lists after 2.
 class Certificates {
  public:
   explicit Certificates(const TemporaryDirectory& directory) : directory_(directory) {}
 
   void make_ca(const std::string& name) { make_ca(name, "/CN=" + name); }
   void make_ca(const std::string& name, const std::string& subject) {
-    run("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj " + subject +
-        " -keyout " + (directory_ / (name + ".key")) + " -out " + (directory_ / (name + ".crt")));
+    run("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 30 -subj " +
+        subject + " -keyout " + (directory_ / (name + ".key")) + " -out " + (directory_ / (name + ".crt")));
   }
   void make_pair(const std::string& name, const std::string& ca) {
     make_pair(name, ca, "/CN=" + name, "subjectAltName=DNS:localhost,IP:127.0.0.1\n");
@@ -36,8 +37,9 @@ class Certificates {
     run("openssl x509 -req -days 2 -in " + base + ".csr -CA " + (directory_ / (ca + ".crt")) + " -CAkey " +
         (directory_ / (ca + ".key")) + " -CAcreateserial -extfile " + base + ".ext -out " + base + ".crt");
   }
-  /// Writes NAME.crl of `ca`, which names these and what it named before.
-  void revoke(const std::string& ca, const std::vector<std::string>& names) {
+  /// Writes NAME.crl of `ca`, which names these and what it named before. `times`: as of `openssl ca`; empty:
+  /// from now on.
+  void revoke(const std::string& ca, const std::vector<std::string>& names, const std::string& times = "") {
     const auto base = directory_ / ca;
     std::ofstream(base + ".index", std::ios::app);
     std::ofstream(base + ".cnf") << "[ca]\ndefault_ca = own\n[own]\ndatabase = " << base
@@ -45,7 +47,7 @@ class Certificates {
     const auto of_ca =
         "openssl ca -config " + base + ".cnf -cert " + base + ".crt -keyfile " + base + ".key ";
     for (const auto& name : names) run(of_ca + "-revoke " + (directory_ / (name + ".crt")));
-    run(of_ca + "-gencrl -out " + base + ".crl");
+    run(of_ca + "-gencrl " + times + " -out " + base + ".crl");
   }
   /// Of the pair "server", for clients of "ca".
   [[nodiscard]] tls::Files server_files() const {

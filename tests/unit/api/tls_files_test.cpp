@@ -12,6 +12,7 @@
 #include "api/tls/clients.hpp"
 #include "api/tls/expiry.hpp"
 #include "api/tls/file_watch.hpp"
+#include "api/tls/live.hpp"
 #include "api/tls/pem_files.hpp"
 #include "tests/unit/api/certificates.hpp"
 #include "tests/unit/api/serving.hpp"
@@ -93,16 +94,22 @@ TEST_F(TlsFiles, AKeyIsForItsOwnerAndGroup) {
 
 TEST_F(TlsFiles, HaveToBeValid) {
   const auto now = std::chrono::system_clock::now();
-  const auto later = tls::check(files_, now + 72h);
+  finds("certificate", "server.crt", "the certificate has expired (2", now + 72h);
+  const auto later = tls::check(files_, now + std::chrono::days(31));
   ASSERT_EQ(later.size(), 2U);
   EXPECT_THAT(later[0].second.message, MatchesRegex(".*/server.crt: the certificate has expired .*Z\\)"));
   EXPECT_THAT(later[1].second.message, HasSubstr("/ca.crt: the certificate has expired"));
-  EXPECT_EQ(later[0].second.reason, Reason::invalid_argument);
   const auto earlier = tls::check(files_, now - 24h);
   ASSERT_EQ(earlier.size(), 2U);
-  EXPECT_THAT(earlier[0].second.message, MatchesRegex(".*: the certificate is not valid before .*Z, and this "
-                                                      "computer's clock says .*Z"));
-  EXPECT_EQ(earlier[0].second.reason, Reason::configuring) << "to be tried again";
+  EXPECT_THAT(earlier[0].second.message, MatchesRegex(".*: the certificate is not valid before .*Z"));
+  EXPECT_THAT(earlier[0].second.remedy, MatchesRegex("this computer's clock says .*Z: set it, or .*"));
+  EXPECT_EQ(tls::check(files_, now - 23h)[0].second.message, earlier[0].second.message) << "of another time";
+  for (const auto& found : {later[0], later[1], earlier[0], earlier[1]})
+    EXPECT_EQ(found.second.reason, Reason::configuring) << "to be tried again";
+  for (const auto wrong_clock : {now + std::chrono::days(31), now - 24h}) {
+    EXPECT_EQ(tls::check(files_, wrong_clock, tls::Demand::usable).size(), 2U);
+    EXPECT_THAT(tls::check(files_, wrong_clock, tls::Demand::usable_some_time), IsEmpty());
+  }
 }
 
 TEST_F(TlsFiles, RevocationListsAreOfTheAuthorityAndNew) {
@@ -115,11 +122,33 @@ TEST_F(TlsFiles, RevocationListsAreOfTheAuthorityAndNew) {
   finds("crl", "ca.crt", "no CRL in PEM format");
   files_.crl = directory_ / "ca.crl";
   const auto later = tls::check(files_, std::chrono::system_clock::now() + 72h);
-  ASSERT_EQ(later.size(), 3U);
-  EXPECT_THAT(later[2].second.message, HasSubstr("/ca.crl: the CRL has expired ("));
+  ASSERT_EQ(later.size(), 2U);
+  EXPECT_THAT(later[1].second.message, HasSubstr("/ca.crl: the CRL has expired ("));
   std::ofstream(files_.client_ca, std::ios::app) << certificates_.read("ca.crl");
   files_.crl = "";
   finds("client_ca", "ca.crt", "holds a CRL, which nobody looks at here");
+}
+
+/// That nobody has written a new list must not keep a daemon from starting, nor from a new pair.
+TEST_F(TlsFiles, ARevocationListThatIsOutOfDateIsServed) {
+  const auto now = std::chrono::system_clock::now();
+  certificates_.make_pair("old", "ca");
+  files_.crl = directory_ / "ca.crl";
+  for (const auto* times : {"-crl_lastupdate 20200101000000Z -crl_nextupdate 20210101000000Z",
+                            "-crl_lastupdate 20900101000000Z -crl_nextupdate 20910101000000Z"}) {
+    certificates_.revoke("ca", {}, times);
+    const auto found = tls::check(files_, now);
+    ASSERT_EQ(found.size(), 1U) << times;
+    EXPECT_THAT(found[0].second.message, StartsWith(files_.crl + ": the CRL ")) << times;
+    EXPECT_THAT(tls::check(files_, now, tls::Demand::usable), IsEmpty()) << times;
+  }
+  certificates_.revoke("ca", {"old"}, "-crl_lastupdate 20200101000000Z -crl_nextupdate 20210101000000Z");
+  const auto live = tls::Live::open(files_);
+  ASSERT_TRUE(live) << to_string(live.error());
+  certificates_.make_pair("server", "ca");
+  EXPECT_TRUE((*live)->reload().value_or(false));
+  EXPECT_EQ((*live)->served()->contents.certificate, certificates_.read("server.crt"));
+  EXPECT_TRUE((*live)->served()->clients.of(certificates_.read("old.crt"), now + 1h).refusal);
 }
 
 TEST_F(TlsFiles, ClientsAreJudgedAtEachTime) {
@@ -139,7 +168,9 @@ TEST_F(TlsFiles, ClientsAreJudgedAtEachTime) {
   };
   EXPECT_EQ(refusal("hmi", soon), "");
   EXPECT_THAT(refusal("old", soon), MatchesRegex("the certificate of old was revoked .*Z\\)"));
-  EXPECT_THAT(refusal("hmi", soon + 72h), StartsWith("the certificate of hmi "));
+  EXPECT_THAT(refusal("hmi", soon + 72h), StartsWith("the certificate of hmi has expired ("));
+  EXPECT_THAT(refusal("hmi", soon + std::chrono::days(31)),
+              StartsWith("the certificate of hmi is of an authority whose own has expired ("));
   EXPECT_THAT(refusal("hmi", soon - 72h), HasSubstr("is not valid before "));
   EXPECT_EQ(refusal("hmi", soon), "") << "the clock was put right";
   EXPECT_THAT(refusal("old", soon + 36h), HasSubstr("was revoked")) << "the list is out of date by then";
@@ -182,7 +213,10 @@ TEST_F(TlsFiles, ClientsAreToldWhatIsWrong) {
             "the daemon's certificate is for localhost, 127.0.0.1, you called 10.0.0.5");
   EXPECT_EQ(refused(files("second", "hmi"), "localhost", now),
             "the daemon's certificate is signed by CN=ca, which is not in --tls-ca");
-  EXPECT_THAT(refused(files("ca", "hmi"), "localhost", now + 72h), HasSubstr("has expired ("));
+  EXPECT_THAT(refused(files("ca", "hmi"), "localhost", now + 72h),
+              StartsWith("the daemon's certificate has expired ("));
+  EXPECT_THAT(refused(files("ca", "hmi"), "localhost", now + std::chrono::days(31)),
+              StartsWith("the authority that signed the daemon's certificate has expired ("));
   EXPECT_EQ(refused(files("ca", ""), "localhost", now), "the daemon asks for a certificate of the client");
   EXPECT_EQ(refused(files("ca", "stranger"), "localhost", now),
             "the daemon does not take certificates of CN=second, which signed that of --tls-cert");

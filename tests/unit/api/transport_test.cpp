@@ -282,7 +282,7 @@ TEST_F(Tls, AnExpiredClientHasNoRightOnItsOpenConnection) {
   machine_.set_now(machine_.now() + 72h);
   const auto status = stop(channel).first;
   EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED);
-  EXPECT_THAT(status.error_message(), HasSubstr("has expired (2"));
+  EXPECT_THAT(status.error_message(), HasSubstr("the certificate of hmi-1 has expired (2"));
   EXPECT_EQ(machine_.submitted().size(), 1U);
 }
 
