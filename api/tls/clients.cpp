@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <openssl/err.h>
+#include <openssl/sha.h>
 #include <openssl/x509.h>
 #include <openssl/x509_vfy.h>
 
@@ -26,19 +27,27 @@ Error refusal(const std::string& name, std::string_view what, std::string remedy
           .remedy = std::move(remedy)};
 }
 
-struct Period {
-  WallTime from = WallTime::min(), until = WallTime::max();
-};
+/// When the first of a chain ends.
+WallTime end_of(STACK_OF(X509) * chain) {
+  auto end = WallTime::max();
+  for (int i = 0; i < sk_X509_num(chain); ++i)
+    end = std::min(end, time_of(X509_get0_notAfter(sk_X509_value(chain, i))).value_or(WallTime::min()));
+  return end;
+}
 
-/// When all of a chain are valid.
-Period common_period(STACK_OF(X509) * chain) {
-  Period period;
-  for (int i = 0; i < sk_X509_num(chain); ++i) {
-    const auto* certificate = sk_X509_value(chain, i);
-    period.from = std::max(period.from, time_of(X509_get0_notBefore(certificate)).value_or(WallTime::max()));
-    period.until = std::min(period.until, time_of(X509_get0_notAfter(certificate)).value_or(WallTime::min()));
-  }
-  return period;
+/// The handshake has seen that all of the chain had begun: by now the clock may have stepped back.
+int take_what_has_not_begun(int good, X509_STORE_CTX* verification) {
+  if (good == 1 || X509_STORE_CTX_get_error(verification) != X509_V_ERR_CERT_NOT_YET_VALID) return good;
+  X509_STORE_CTX_set_error(verification, X509_V_OK);
+  return 1;
+}
+
+/// No two texts have the same.
+std::string digest_of(const std::string& text) {
+  std::string digest(SHA256_DIGEST_LENGTH, '\0');
+  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(),
+         reinterpret_cast<unsigned char*>(digest.data()));
+  return digest;
 }
 
 /// Of a chain that was not accepted.
@@ -52,11 +61,6 @@ Error why_not(const std::string& name, X509_STORE_CTX* verification) {
                    fmt::format("{}has expired ({})", whose,
                                to_text(time_of(X509_get0_notAfter(certificate)).value_or(WallTime::min()))),
                    "renew it, then connect again");
-  if (code == X509_V_ERR_CERT_NOT_YET_VALID && certificate != nullptr)
-    return refusal(name,
-                   fmt::format("{}is not valid before {}", whose,
-                               to_text(time_of(X509_get0_notBefore(certificate)).value_or(WallTime::max()))),
-                   "compare the clocks of both computers, or connect with another certificate");
   if (code == X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY || code == X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT ||
       code == X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN || code == X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT)
     return refusal(name, "is not of an authority that the daemon trusts (server.tls.client_ca)",
@@ -110,16 +114,17 @@ Clients::Clients(const Files& contents)
 Clients::~Clients() = default;
 
 Client Clients::of(const std::string& pem, WallTime now) const {
+  auto digest = digest_of(pem);
   {
     const std::lock_guard lock(mutex_);
-    const auto found = known_.find(pem);
+    const auto found = known_.find(digest);
     if (found != known_.end() && found->second.from <= now && now <= found->second.until)
       return found->second.client;
   }
   auto known = look_at(pem, now);
   const std::lock_guard lock(mutex_);
   if (known_.size() >= most_known) known_.clear();
-  return known_.insert_or_assign(pem, std::move(known)).first->second.client;
+  return known_.insert_or_assign(std::move(digest), std::move(known)).first->second.client;
 }
 
 Clients::Known Clients::look_at(const std::string& pem, WallTime now) const {
@@ -144,6 +149,7 @@ Clients::Known Clients::look_at(const std::string& pem, WallTime now) const {
     return known;
   }
   X509_STORE_CTX_set_time(context, 0, std::chrono::system_clock::to_time_t(now));
+  X509_STORE_CTX_set_verify_cb(context, take_what_has_not_begun);
   const bool good = X509_verify_cert(context) == 1;
   auto* chain = X509_STORE_CTX_get0_chain(context);
   if (!good) refused = why_not(name, context);
@@ -154,9 +160,8 @@ Clients::Known Clients::look_at(const std::string& pem, WallTime now) const {
           fmt::format("{} revoked ({})", i == 0 ? "was" : "is of an authority that was", to_text(*since)),
           "connect with another certificate");
   if (!refused) {
-    const auto period = common_period(chain);
-    known.from = period.from;
-    known.until = period.until;
+    known.from = WallTime::min();
+    known.until = end_of(chain);
   }
   ERR_clear_error();
   return known;

@@ -22,8 +22,8 @@ struct Client {
 
 /// Looks at certificates as a handshake does, and at what the authorities have revoked: a connection that was
 /// made with a good certificate ends to have any right when that is revoked, expires, or is of an authority
-/// that is not trusted any more. A revocation list that is out of date goes on to revoke what it names.
-/// Thread: any.
+/// that is not trusted any more. When it began was looked at by the handshake: a clock that steps back later
+/// takes nothing away. A revocation list that is out of date goes on to revoke what it names. Thread: any.
 class Clients {
  public:
   /// `contents`: as read() gives them.
@@ -46,7 +46,8 @@ class Clients {
   const Identities identities_;
   const std::unique_ptr<const Trusted> trusted_;
   mutable std::mutex mutex_;
-  mutable std::unordered_map<std::string, Known> known_;  ///< under mutex_
+  /// Under mutex_; by a hash of what the client has shown, which may be long.
+  mutable std::unordered_map<std::string, Known> known_;
 };
 
 }  // namespace axisd::tls

@@ -274,6 +274,18 @@ TEST_F(Tls, NothingIsTakenFromARevokedClientStopsIncluded) {
   EXPECT_EQ(machine_.submitted().size(), 1U);
 }
 
+TEST_F(Tls, AClockThatStepsBackTakesNoStopAway) {
+  const auto port = start(options());
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto channel = connect("127.0.0.1:" + std::to_string(*port), certificates_.client("hmi-1"));
+  ASSERT_TRUE(stop(channel).first.ok());
+  machine_.set_now(machine_.now() - 48h);
+  const auto [status, name] = stop(channel);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(name, "hmi-1");
+  EXPECT_EQ(machine_.submitted().size(), 2U);
+}
+
 TEST_F(Tls, AnExpiredClientHasNoRightOnItsOpenConnection) {
   const auto port = start(options());
   ASSERT_TRUE(port) << to_string(port.error());
