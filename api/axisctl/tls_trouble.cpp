@@ -40,6 +40,9 @@ Failure with_tls_trouble(const Failure& failure, const Connection& connection) {
   const auto server = with_port(connection.server, usual_port);
   const auto why = trouble(connection, server);
   if (!why) return failure;
+  // What may have been done is said as well: there was a connection then.
+  if (!failure.nothing_sent())
+    return failure.saying(fmt::format("{}; {}; {}", failure.what(), why->message, why->remedy));
   return failure.saying(fmt::format("cannot reach axisd at {}: {}; {}", server, why->message, why->remedy));
 }
 

@@ -3,6 +3,7 @@ import concurrent.futures
 import pathlib
 import subprocess
 import tempfile
+import threading
 import unittest
 
 import grpc
@@ -26,29 +27,30 @@ class Trouble(unittest.IsolatedAsyncioTestCase):
             run(PKI, "--dir", cls.path(cell), "server", daemon, "127.0.0.1")
             run(PKI, "--dir", cls.path(cell), "client", "shift-a")
         run(PKI, "--dir", cls.path("ours"), "server", "elsewhere", "press-9.local")
-        cls.expire("press-1")
-        cls.expire("shift-a")
+        for name in ("press-1", "shift-a"):
+            cls.issue("old", name, "20200101000000Z", "20210101000000Z")
+            cls.issue("later", name, "20400101000000Z", "20410101000000Z")
 
     @classmethod
     def path(cls, name):
         return f"{cls.folder}/{name}"
 
     @classmethod
-    def expire(cls, name):
-        """Makes old-NAME.crt, which ended long ago, for the key of NAME."""
+    def issue(cls, lead, name, begin, end):
+        """Makes LEAD-NAME.crt, for the key of NAME."""
         base, configuration = cls.path(f"ours/{name}"), cls.path("ours/openssl.cnf")
         run("openssl", "req", "-new", "-config", configuration, "-key", f"{base}.key", "-subj", f"/CN={name}", "-out",
             f"{base}.csr")
-        run("openssl", "ca", "-config", configuration, "-batch", "-notext", "-startdate", "20200101000000Z", "-enddate",
-            "20210101000000Z", "-extfile", f"{base}.ext", "-in", f"{base}.csr", "-out", cls.path(f"ours/old-{name}.crt"))
+        run("openssl", "ca", "-config", configuration, "-batch", "-notext", "-startdate", begin, "-enddate", end,
+            "-extfile", f"{base}.ext", "-in", f"{base}.csr", "-out", cls.path(f"ours/{lead}-{name}.crt"))
 
-    def serve(self, certificate="ours/press-1.crt", key="ours/press-1.key", tls=True):
+    def serve(self, certificate="ours/press-1.crt", key="ours/press-1.key", tls=True, asks=True, answers=()):
         def read(name):
             return pathlib.Path(self.path(name)).read_bytes()
 
-        server = grpc.server(concurrent.futures.ThreadPoolExecutor(1))
+        server = grpc.server(concurrent.futures.ThreadPoolExecutor(1), handlers=answers)
         if tls:
-            credentials = grpc.ssl_server_credentials([(read(key), read(certificate))], read("ours/ca.crt"), True)
+            credentials = grpc.ssl_server_credentials([(read(key), read(certificate))], read("ours/ca.crt") if asks else None, asks)
             port = server.add_secure_port("127.0.0.1:0", credentials)
         else:
             port = server.add_insecure_port("127.0.0.1:0")
@@ -92,6 +94,43 @@ class Trouble(unittest.IsolatedAsyncioTestCase):
         self.assertEqual(shell, "--tls-cert: the certificate has expired (2021-01-01T00:00:00Z); renew it")
         self.assertEqual(python, "tls_certificate: the certificate has expired (2021-01-01T00:00:00Z); renew it")
 
+    async def test_one_that_has_not_begun(self):
+        shell, python = await self.told(self.serve(), certificate="ours/later-shift-a.crt")
+        self.assertEqual(shell, "--tls-cert: the certificate is not valid before 2040-01-01T00:00:00Z; "
+                                "set the clock of this computer, or give another one")
+        self.assertEqual(python, shell.replace("--tls-cert", "tls_certificate"))
+
+    async def test_what_may_have_been_done_is_said_as_well(self):
+        """The daemon took the call and did not answer: that the certificate has expired since is only half of it."""
+        over = threading.Event()
+
+        class Silent(grpc.GenericRpcHandler):
+            def service(self, handler_call_details):
+                return grpc.unary_unary_rpc_method_handler(lambda request, context: over.wait(LIMIT) and b"")
+
+        server = self.serve(asks=False, answers=(Silent(),))
+        self.addCleanup(over.set)
+        files = [self.path(f"ours/{name}") for name in ("ca.crt", "old-shift-a.crt", "shift-a.key")]
+        words = [AXISCTL, "--server", server, "--stop-server", server, "--timeout", "300ms", "--tls-ca", files[0],
+                 "--tls-cert", files[1], "--tls-key", files[2]]
+        text = "the certificate has expired (2021-01-01T00:00:00Z); renew it"
+        for command, known in ((["list"], "no answer from axisd at "),
+                               (["stop", "--all"], "repeated for 300 ms: whether it arrived is not known; ")):
+            done = subprocess.run([*words, *command], capture_output=True, text=True, env=environment(), timeout=LIMIT,
+                                  check=False)
+            self.assertEqual(done.returncode, 3, done)
+            self.assertIn(known, done.stderr)
+            self.assertTrue(done.stderr.endswith(f"; --tls-cert: {text}\n"), done)
+        async with axisd.connect(server, tls_ca=files[0], tls_certificate=files[1], tls_key=files[2], timeout=0.3,
+                                 stop_server=server) as machine:
+            with self.assertRaises(axisd.UnreachableError) as raised:
+                await machine.info()
+            self.assertRegex(str(raised.exception), f"no answer from axisd at {server}: .*; tls_certificate: ")
+            self.assertFalse(raised.exception.nothing_sent)
+            with self.assertRaises(axisd.UnreachableError) as raised:
+                await machine.stop_all(wait=False)
+            self.assertRegex(str(raised.exception), "tls_certificate: .*repeated for 0.3 s: whether it arrived is not known")
+
     async def test_key_of_another_certificate(self):
         shell, python = await self.told(self.serve(), key="ours/press-1.key")
         self.assertIn("--tls-key: the key does not belong to the certificate of --tls-cert; ", shell)
@@ -105,6 +144,11 @@ class Trouble(unittest.IsolatedAsyncioTestCase):
     async def test_daemon_that_has_expired(self):
         for line in await self.told(self.serve("ours/old-press-1.crt")):
             self.assertEqual(line, "the daemon's certificate has expired (2021-01-01T00:00:00Z); renew it there")
+
+    async def test_daemon_that_has_not_begun(self):
+        for line in await self.told(self.serve("ours/later-press-1.crt")):
+            self.assertEqual(line, "the daemon's certificate is not valid before 2040-01-01T00:00:00Z; "
+                                   "compare the clocks of both computers")
 
     async def test_daemon_of_another_name(self):
         for line in await self.told(self.serve("ours/elsewhere.crt", "ours/elsewhere.key")):

@@ -127,13 +127,16 @@ class Machine:
         return grpc.aio.secure_channel(address, self._credentials, options=_OPTIONS)
 
     async def _in_words(self, error: UnreachableError, subject: str) -> UnreachableError:
-        """The same error, with what is wrong with the certificates where it is that."""
+        """The same error, with what is wrong with the certificates where it is that: behind its own words where something
+        may have been sent."""
         authority, certificate, key = self._tls
         if authority is None:
             return error
         why = await asyncio.to_thread(tls_trouble.why, self.server, authority, certificate, key)
         if why is None:
             return error
+        if not error.nothing_sent:
+            return UnreachableError(f"{error}; {why}", error.request_id)
         lead = f"{subject}: " if subject else ""
         return UnreachableError(f"{lead}cannot reach axisd at {self.server}: {why}", error.request_id,
                                 error.nothing_sent)

@@ -17,12 +17,15 @@ _UNKNOWN_AUTHORITY = (7, 18, 19, 20, 21)
 _OTHER_HOST = (62, 64)
 
 
-def _ended(certificate: dict) -> str | None:
-    """When a certificate ended; None: it has not."""
-    end = ssl.cert_time_to_seconds(certificate["notAfter"])
-    if end >= time.time():
-        return None
-    return datetime.datetime.fromtimestamp(end, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+def _out_of_time(certificate: dict) -> tuple[bool, str] | None:
+    """Why a certificate is not valid now, and whether it has ended, else has not begun; None: it is."""
+    def text(at: float) -> str:
+        return datetime.datetime.fromtimestamp(at, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+    begin, end = (ssl.cert_time_to_seconds(certificate[key]) for key in ("notBefore", "notAfter"))
+    if end < time.time():
+        return True, f"has expired ({text(end)})"
+    return (False, f"is not valid before {text(begin)}") if begin > time.time() else None
 
 
 def _decoded(certificate: Path, key: Path) -> dict:
@@ -49,7 +52,7 @@ def _decoded(certificate: Path, key: Path) -> dict:
 
 def _own(certificate: Path, key: Path) -> str | None:
     try:
-        ended = _ended(_decoded(certificate, key))
+        wrong = _out_of_time(_decoded(certificate, key))
     except ssl.SSLError as error:
         if error.reason == "KEY_VALUES_MISMATCH":
             return ("tls_key: the key does not belong to the certificate of tls_certificate; "
@@ -57,7 +60,11 @@ def _own(certificate: Path, key: Path) -> str | None:
         return None
     except (OSError, KeyError, ValueError):
         return None
-    return f"tls_certificate: the certificate has expired ({ended}); renew it" if ended else None
+    if wrong is None:
+        return None
+    ended, text = wrong
+    return (f"tls_certificate: the certificate {text}; "
+            + ("renew it" if ended else "set the clock of this computer, or give another one"))
 
 
 def _names(shown: dict) -> str:
@@ -87,8 +94,9 @@ def _daemon(address: tuple[str, int], tls_ca: Path, certificate: Path | None, ke
     if certificate is not None:
         context.load_cert_chain(certificate, key)
     shown, taken = _shake_hands(address, context)
-    if ended := _ended(shown):
-        return f"the daemon's certificate has expired ({ended}); renew it there"
+    if wrong := _out_of_time(shown):
+        ended, text = wrong
+        return f"the daemon's certificate {text}; " + ("renew it there" if ended else "compare the clocks of both computers")
     context.check_hostname = True
     try:
         _shake_hands(address, context)
