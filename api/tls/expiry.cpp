@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "api/tls/pem.hpp"
 
@@ -69,16 +70,17 @@ std::vector<Reminder::Notice> Reminder::due(const std::vector<Expiry>& all, Wall
   std::vector<Notice> notices;
   for (const auto& expiry : all) {
     const bool over = expiry.at < wall;
+    const std::pair file(expiry.path, expiry.what);
     // Not "wall + ahead": the last time that there is has none behind it.
     if (!over && expiry.at - ahead > wall) {
-      said_.erase(expiry.path);
+      said_.erase(file);
       continue;
     }
-    const auto found = said_.find(expiry.path);
+    const auto found = said_.find(file);
     if (found != said_.end() && found->second.at == expiry.at && found->second.over == over &&
         now - found->second.when < again)
       continue;
-    said_.insert_or_assign(expiry.path, Said{.at = expiry.at, .over = over, .when = now});
+    said_.insert_or_assign(file, Said{.at = expiry.at, .over = over, .when = now});
     notices.push_back({.over = over, .path = expiry.path, .at = expiry.at, .text = text_of(expiry, wall)});
   }
   return notices;

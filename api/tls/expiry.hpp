@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "api/tls/pem_files.hpp"
@@ -18,7 +19,7 @@ namespace axisd::tls {
 /// A file that is of use for some time only.
 struct Expiry {
   std::string path;
-  std::string_view what;  ///< "the certificate", "an authority of the clients", "the CRL"
+  std::string_view what;  ///< "the certificate", "an authority of the clients", "the CRL": for ever
   WallTime at;            ///< the first thing in it that ends
 };
 
@@ -47,7 +48,8 @@ class Reminder {
     bool over;
     TimePoint when;
   };
-  std::map<std::string, Said> said_;  ///< by path
+  /// By path and what: a file may be named by two keys.
+  std::map<std::pair<std::string, std::string_view>, Said> said_;
 };
 
 }  // namespace axisd::tls

@@ -308,6 +308,19 @@ TEST_F(TlsFiles, EndIsToldThirtyDaysAheadAndEveryDay) {
   EXPECT_THAT(said(end + 3s), ElementsAre(HasSubstr("has expired")));
 }
 
+/// An authority may have signed the daemon's certificate and those of its clients: one file for two keys.
+TEST(TlsReminder, TellsOfOneFileUnderEachKey) {
+  const WallTime end(1'800'000'000s);
+  const std::vector<tls::Expiry> all{
+      {.path = "/a.crt", .what = "the certificate", .at = end},
+      {.path = "/a.crt", .what = "an authority of the clients", .at = end + 24h}};
+  tls::Reminder reminder;
+  TimePoint clock{};
+  EXPECT_EQ(reminder.due(all, end - 48h, clock).size(), 2U);
+  EXPECT_THAT(reminder.due(all, end - 48h, clock + 1min), IsEmpty()) << "both were told";
+  EXPECT_EQ(reminder.due(all, end - 24h, clock + 24h).size(), 2U);
+}
+
 TEST_F(TlsFiles, AreWatchedUntilTheyRest) {
   tls::FileWatch watch({files_.certificate, files_.key});
   EXPECT_FALSE(watch.settled());
