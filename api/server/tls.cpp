@@ -11,8 +11,9 @@
 namespace axisd::server {
 namespace {
 
-/// gRPC's C++ layer has no credentials that change, its core has: before each handshake it asks for those
-/// that are new. grpc::experimental::TlsServerCredentials has others only from files that gRPC reads by
+/// Of one port only: what was handed over is remembered here, and a second port would be told that nothing is
+/// new. gRPC's C++ layer has no credentials that change, its core has: before each handshake it asks for
+/// those that are new. grpc::experimental::TlsServerCredentials has others only from files that gRPC reads by
 /// itself, of which a damaged pair would end all handshakes.
 class LiveCredentials final : public grpc::ServerCredentials {
  public:
