@@ -19,7 +19,7 @@ namespace axisd::tls {
 /// A file that is of use for some time only.
 struct Expiry {
   std::string path;
-  std::string_view what;  ///< "the certificate", "an authority of the clients", "the CRL": for ever
+  std::string_view what;  ///< "the certificate", "an authority of the clients", "the CRL": a literal
   WallTime at;            ///< the first thing in it that ends
 };
 

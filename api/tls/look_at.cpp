@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <memory>
 
 #include "api/tls/client_check.hpp"
@@ -23,6 +24,31 @@ namespace {
 using Context = std::unique_ptr<SSL_CTX, Release<SSL_CTX, SSL_CTX_free>>;
 using Handshake = std::unique_ptr<SSL, Release<SSL, SSL_free>>;
 using Addresses = std::unique_ptr<addrinfo, Release<addrinfo, freeaddrinfo>>;
+
+/// OpenSSL writes to a socket so that one whose other side has left raises SIGPIPE, which ends a program that
+/// does not say otherwise. Not in this thread, as long as this lives.
+class WithoutSigpipe {
+ public:
+  WithoutSigpipe() {
+    sigemptyset(&pipe_);
+    sigaddset(&pipe_, SIGPIPE);
+    sigset_t pending;
+    sigpending(&pending);
+    was_pending_ = sigismember(&pending, SIGPIPE) == 1;
+    pthread_sigmask(SIG_BLOCK, &pipe_, &before_);
+  }
+  ~WithoutSigpipe() {
+    const timespec at_once{};
+    while (!was_pending_ && sigtimedwait(&pipe_, nullptr, &at_once) < 0 && errno == EINTR) {
+    }
+    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  WithoutSigpipe(const WithoutSigpipe&) = delete;
+
+ private:
+  sigset_t pipe_{}, before_{};
+  bool was_pending_ = false;
+};
 
 /// False: nothing came in time.
 bool wait_for(int fd, short events, TimePoint until) {
@@ -98,6 +124,7 @@ bool shake_hands(SSL* handshake, int fd, TimePoint until) {
 }  // namespace
 
 std::optional<Shown> look_at(const std::string& host, const std::string& port, Duration patience) {
+  const WithoutSigpipe without_sigpipe;
   const auto until = monotonic_now() + patience;
   const auto fd = connected(host, port, until);
   if (fd.get() < 0) return std::nullopt;

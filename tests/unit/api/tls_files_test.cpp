@@ -1,11 +1,17 @@
 // What is wrong with the files of `server.tls`, when they end, and whether they were replaced.
 #include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
 
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <thread>
 #include <utility>
 
 #include "api/tls/client_check.hpp"
@@ -14,6 +20,7 @@
 #include "api/tls/file_watch.hpp"
 #include "api/tls/live.hpp"
 #include "api/tls/pem_files.hpp"
+#include "buses/file_descriptor.hpp"
 #include "tests/unit/api/certificates.hpp"
 #include "tests/unit/api/serving.hpp"
 
@@ -275,6 +282,42 @@ TEST_F(TlsFiles, AServerWithoutShowsNothing) {
   const auto shown = tls::look_at("127.0.0.1", std::to_string(*port), patience);
   ASSERT_TRUE(shown);
   EXPECT_EQ(shown->certificates, "");
+}
+
+/// It says something that is answered with an alert, and is gone: a write to it raises SIGPIPE.
+void leave_in_the_handshake(int listener) {
+  const FileDescriptor client(accept4(listener, nullptr, nullptr, SOCK_CLOEXEC));
+  pollfd hello{.fd = client.get(), .events = POLLIN, .revents = 0};
+  if (poll(&hello, 1, -1) != 1) return;
+  constexpr std::string_view nonsense("\x16\x03\x03\0\x04\x02\0\0\0", 9);
+  send(client.get(), nonsense.data(), nonsense.size(), MSG_NOSIGNAL | MSG_MORE);
+  shutdown(client.get(), SHUT_WR);
+}  // the hello was not read: that is told with a reset
+
+TEST(TlsLook, AtOneThatLeavesEndsNothing) {
+  const FileDescriptor listener(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(bind(listener.get(), reinterpret_cast<sockaddr*>(&address), size), 0);
+  ASSERT_EQ(listen(listener.get(), 8), 0);
+  ASSERT_EQ(getsockname(listener.get(), reinterpret_cast<sockaddr*>(&address), &size), 0);
+  // As axisctl has it, whatever a library of this program has made of it.
+  struct sigaction usual{}, before{};
+  usual.sa_handler = SIG_DFL;
+  ASSERT_EQ(sigaction(SIGPIPE, &usual, &before), 0);
+  for (int i = 0; i < 8; ++i) {
+    std::thread leaving(leave_in_the_handshake, listener.get());
+    EXPECT_FALSE(tls::look_at("127.0.0.1", std::to_string(ntohs(address.sin_port)), patience));
+    leaving.join();
+  }
+  sigset_t blocked, pending;
+  pthread_sigmask(SIG_BLOCK, nullptr, &blocked);
+  sigpending(&pending);
+  EXPECT_EQ(sigismember(&blocked, SIGPIPE), 0);
+  EXPECT_EQ(sigismember(&pending, SIGPIPE), 0);
+  sigaction(SIGPIPE, &before, nullptr);
 }
 
 TEST_F(TlsFiles, EndIsToldThirtyDaysAheadAndEveryDay) {
