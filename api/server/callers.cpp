@@ -21,11 +21,13 @@ std::optional<std::string> metadata(const grpc::CallbackServerContext& context, 
   return std::string(found->second.data(), found->second.size());
 }
 
-/// The peer's own, and behind it those that it came with.
-std::string certificates_of(const grpc::AuthContext& auth) {
+/// The peer's own, and behind it those that it came with; empty: it has shown none.
+std::string certificates_of(const grpc::CallbackServerContext& context) {
   std::string pem;
+  const auto auth = context.auth_context();
+  if (!auth) return pem;
   for (const auto* property : {GRPC_X509_PEM_CERT_PROPERTY_NAME, GRPC_X509_PEM_CERT_CHAIN_PROPERTY_NAME})
-    for (const auto& value : auth.FindPropertyValues(property)) pem.append(value.data(), value.size());
+    for (const auto& value : auth->FindPropertyValues(property)) pem.append(value.data(), value.size());
   return pem;
 }
 
@@ -47,9 +49,9 @@ void Callers::enter(int connection) {
 }
 
 Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
-  const auto auth = context.auth_context();
-  if (live_ && auth && auth->IsPeerAuthenticated()) {
-    auto client = live_->served()->clients.of(certificates_of(*auth), machine_.wall(machine_.now()));
+  const auto shown = live_ ? certificates_of(context) : std::string();
+  if (!shown.empty()) {
+    auto client = live_->served()->clients.of(shown, machine_.wall(machine_.now()));
     return {.name = std::move(client.name), .address = context.peer(), .refusal = std::move(client.refusal)};
   }
   const auto connection = context.peer();
@@ -57,13 +59,19 @@ Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
     const std::lock_guard lock(mutex_);
     if (const auto found = local_.find(connection); found != local_.end()) return found->second;
   }
-  return {.name = "local:" + peer_host(connection), .address = connection};
+  Peer peer{.name = "local:" + peer_host(connection), .address = connection};
+  // Beside the sockets above nothing but TLS is listened to, which asks for a certificate.
+  if (live_)
+    peer.refusal = Error{.reason = Reason::unauthenticated,
+                         .message = "no certificate was shown",
+                         .remedy = "connect with one"};
+  return peer;
 }
 
 OpenCalls::Judge Callers::judge_of(const grpc::CallbackServerContext& context) const {
-  const auto auth = live_ ? context.auth_context() : nullptr;
-  if (!auth || !auth->IsPeerAuthenticated()) return {};
-  return [live = live_, machine = &machine_, pem = certificates_of(*auth)] {
+  auto shown = live_ ? certificates_of(context) : std::string();
+  if (shown.empty()) return {};
+  return [live = live_, machine = &machine_, pem = std::move(shown)] {
     return live->served()->clients.of(pem, machine->wall(machine->now())).refusal;
   };
 }

@@ -34,7 +34,7 @@ class Callers {
   void enter(int connection);
 
   /// Whether the call may be made. Errors: access_denied, invalid_argument (metadata),
-  /// unauthenticated (a certificate that is not good any more).
+  /// unauthenticated (a certificate that is not good any more, or none where there is TLS).
   [[nodiscard]] Result<void> admit(const grpc::CallbackServerContext& context,
                                    const google::protobuf::Message& request);
   /// Whom a call is for that was admitted.

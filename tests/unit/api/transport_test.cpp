@@ -12,6 +12,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "api/server/callers.hpp"
 #include "buses/file_descriptor.hpp"
 #include "tests/unit/api/certificates.hpp"
 #include "tests/unit/api/serving.hpp"
@@ -214,6 +215,28 @@ TEST_F(Tls, OnlyVerifiedClientsAreServedByTheirName) {
   EXPECT_FALSE(stop(connect(target, certificates_.client(""))).first.ok());
   EXPECT_FALSE(stop(connect(target)).first.ok());
   EXPECT_EQ(machine_.submitted().size(), 1U);
+}
+
+TEST_F(Tls, AUnixSocketBesideItNeedsNoCertificate) {
+  const auto path = "unix:" + (directory_ / "axisd.sock");
+  ASSERT_TRUE(start({.listen = {"127.0.0.1:0", path}, .tls = certificates_.served()}));
+  const auto [status, name] = stop(connect(path));
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(name, own_name());
+}
+
+/// No address lets such a call in: where one does by mistake, it gets nothing.
+TEST_F(Tls, ACallWithoutACertificateIsRefused) {
+  server::Callers callers(machine_, nullptr, nullptr);
+  const grpc::CallbackServerContext context;
+  EXPECT_TRUE(callers.admit(context, v1::StopRequest())) << "there is no TLS";
+  callers.trust(certificates_.served());
+  for (const auto& refused :
+       {callers.admit(context, v1::StopRequest()), callers.admit(context, v1::ListAxesRequest())}) {
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().reason, Reason::unauthenticated);
+    EXPECT_EQ(to_string(refused.error()), "no certificate was shown; connect with one");
+  }
 }
 
 TEST_F(Tls, NewConnectionsGetNewFilesAndOldOnesStay) {
