@@ -49,30 +49,32 @@ void CertificateKeeper::run() {
   std::unique_lock lock(mutex_);
   while (!closing_) {
     lock.unlock();
-    look();
-    remind();
+    look(std::chrono::system_clock::now(), monotonic_now());
     lock.lock();
     wake_.wait_for(lock, looked_at_every, [this] { return closing_; });
   }
 }
 
-void CertificateKeeper::look() {
+void CertificateKeeper::look(WallTime wall, TimePoint now) {
   bool due = watch_.settled();
   {
     const std::lock_guard lock(reloading_);
-    due = due || (retry_ && *retry_ <= monotonic_now());
+    due = due || (retry_ && *retry_ <= now);
   }
-  if (due) reload();
+  if (due) reload(wall, now);
+  remind(wall, now);
 }
 
-void CertificateKeeper::reload() {
+void CertificateKeeper::reload(WallTime wall, TimePoint now) {
   if (!live_) return;
   const std::lock_guard lock(reloading_);
-  const auto replaced = live_->reload();
+  const auto replaced = live_->reload(wall);
   if (!replaced) {
-    retry_ = monotonic_now() + tried_again_after;
+    retry_ = now + tried_again_after;
+    // The remedy may say what time it is.
+    const auto& message = replaced.error().message;
+    if (std::exchange(complaint_, message) == message) return;
     auto text = fmt::format("server.tls: {}; what was served before stays", to_string(replaced.error()));
-    if (std::exchange(complaint_, text) == text) return;
     spdlog::error("{}", text);
     return tell_({.what = CertificateNotice::What::not_replaced, .text = std::move(text)});
   }
@@ -86,12 +88,10 @@ void CertificateKeeper::reload() {
   tell_({.what = CertificateNotice::What::replaced, .expires = expires, .text = std::move(text)});
 }
 
-void CertificateKeeper::remind() {
+void CertificateKeeper::remind(WallTime wall, TimePoint now) {
   using What = CertificateNotice::What;
-  const auto now = monotonic_now();
   if (now < remind_at_) return;
   remind_at_ = now + reminded_every;
-  const auto wall = std::chrono::system_clock::now();
   const auto contents = live_->served();
   for (auto& notice : reminder_.due(tls::expiries(live_->paths(), contents->contents, wall), wall, now)) {
     spdlog::warn("{}", notice.text);

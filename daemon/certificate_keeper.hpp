@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "api/tls/expiry.hpp"
 #include "api/tls/file_watch.hpp"
 #include "api/tls/live.hpp"
+#include "buses/clock.hpp"
 #include "devices/event.hpp"
 
 namespace axisd {
@@ -29,15 +31,19 @@ class CertificateKeeper {
 
   /// Begins to look, about every second. Once.
   void start();
-  /// Reads the files now. What is not usable is told, and what was served before stays.
-  void reload();
+  /// One look, by the clock of the certificates and by one that does not jump: reads files that were replaced
+  /// or are due to be tried again, and reminds. Precondition: there is something to keep; one at a time, so
+  /// not after start().
+  void look(WallTime wall, TimePoint now);
+  /// Reads the files now. What is not usable is told, once, and tried again after a minute; what was served
+  /// before stays.
+  void reload(WallTime wall = std::chrono::system_clock::now(), TimePoint now = monotonic_now());
   /// Looks no more. Idempotent.
   void close();
 
  private:
   void run();
-  void look();
-  void remind();
+  void remind(WallTime wall, TimePoint now);
 
   const std::shared_ptr<tls::Live> live_;
   const Tell tell_;
@@ -45,7 +51,7 @@ class CertificateKeeper {
   tls::Reminder reminder_;  ///< likewise
   TimePoint remind_at_{};   ///< likewise
   std::mutex reloading_;
-  std::string complaint_;           ///< under reloading_; why the files are not served; empty: they are
+  std::string complaint_;  ///< under reloading_; what keeps the files from it; empty: they are served
   std::optional<TimePoint> retry_;  ///< under reloading_; when they may be valid by the clock
   std::mutex mutex_;
   std::condition_variable wake_;
