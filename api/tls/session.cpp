@@ -109,8 +109,10 @@ std::string Session::take_output() {
 
 bool Session::established() const { return SSL_is_init_finished(session_.get()) == 1; }
 
-std::string Session::certificate() const {
-  const Certificate peer(SSL_get1_peer_certificate(session_.get()));
+std::string Session::certificate() const { return certificate_of(*session_); }
+
+std::string certificate_of(const ssl_st& session) {
+  const Certificate peer(SSL_get1_peer_certificate(&session));
   const Memory text(BIO_new(BIO_s_mem()));
   if (!peer || !text || PEM_write_bio_X509(text.get(), peer.get()) != 1) return {};
   const auto* shown = SSL_get_peer_cert_chain(session_.get());

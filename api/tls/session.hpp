@@ -57,4 +57,7 @@ class Session {
   std::unique_ptr<ssl_st, Free> session_;
 };
 
+/// The peer's certificate in PEM format, of a session of anybody's; empty: it has shown none.
+[[nodiscard]] std::string certificate_of(const ssl_st& session);
+
 }  // namespace axisd::tls
