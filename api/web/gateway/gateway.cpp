@@ -1,0 +1,105 @@
+#include "api/web/gateway/gateway.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "api/web/gateway/http_rules.hpp"
+
+namespace axisd::web {
+namespace {
+
+/// How soon sessions that are over end, users that were taken out lose theirs, and a lost daemon is looked
+/// for.
+constexpr Duration tick_period = std::chrono::seconds(1);
+
+SessionLimits session_limits(const Settings& settings) {
+  return {.idle = settings.session_idle, .longest = settings.session_longest};
+}
+
+}  // namespace
+
+Gateway::Gateway(boost::asio::io_context& context, Clock& time, const Settings& said, Assets page,
+                 People known, std::unique_ptr<Upstream> daemon, const std::string& client_ca)
+    : io(context),
+      clock(time),
+      settings(said),
+      assets(std::move(page)),
+      people(std::move(known)),
+      upstream(std::move(daemon)),
+      passwords(context.get_executor()),
+      connections(said.limits.connections, said.limits.connections_each),
+      streams(said.limits.streams, said.limits.streams_each),
+      lanes(said.limits.lanes, said.limits.lanes_each),
+      sessions(session_limits(said), [this](const Session& session) { end_session(session.id); }) {
+  if (!client_ca.empty()) identities_.emplace(client_ca);
+  tick();
+}
+
+void Gateway::tick() {
+  timer_ = clock.call_at(clock.now() + tick_period, [this] { tick(); });
+  upstream->stay_connected();
+  sessions.expire(clock.now());
+  if (!people.refresh()) return;
+  spdlog::info("{} users", people.users().size());
+  sessions.end_if([this](const Session& session) {
+    const auto* user = find_user(people.users(), session.person.name);
+    return user == nullptr || user->role != session.person.role || user->hash != session.proof;
+  });
+}
+
+std::optional<Known> Gateway::who(std::string_view cookie, const std::string& certificate, bool encrypted,
+                                  bool is_use) {
+  if (const auto token = cookie_of(cookie, cookie_name(encrypted))) {
+    const auto* session = is_use ? sessions.use(*token, clock.now()) : sessions.look(*token, clock.now());
+    if (session != nullptr) return Known{.person = session->person, .session = session->id};
+  }
+  if (!certificate.empty() && identities_) return by_certificate(certificate);
+  if (!encrypted && people.nobody())
+    return Known{.person = {.name = "loopback", .role = "", .how = How::loopback}};
+  return std::nullopt;
+}
+
+std::optional<Known> Gateway::by_certificate(const std::string& certificate) const {
+  auto name = identities_->of(certificate);
+  if (!is_user_name(name)) return std::nullopt;
+  const auto* user = find_user(people.users(), name);
+  return Known{.person = {.name = std::move(name),
+                          .role = user == nullptr ? "viewer" : user->role,
+                          .how = How::certificate}};
+}
+
+void Gateway::enter(const std::shared_ptr<Guest>& guest) {
+  std::erase_if(guests_, [](const auto& known) { return known.expired(); });
+  guests_.push_back(guest);
+}
+
+std::vector<std::shared_ptr<Guest>> Gateway::guests() {
+  std::vector<std::shared_ptr<Guest>> alive;
+  for (const auto& guest : guests_)
+    if (auto one = guest.lock()) alive.push_back(std::move(one));
+  return alive;
+}
+
+bool Gateway::make_room() {
+  std::shared_ptr<Guest> idlest;
+  for (const auto& guest : guests())
+    if (const auto since = guest->idle_since(); since && (!idlest || *since < *idlest->idle_since()))
+      idlest = guest;
+  if (idlest) idlest->close();
+  return idlest != nullptr;
+}
+
+void Gateway::end_session(std::uint64_t id) {
+  for (const auto& guest : guests())
+    if (guest->session() == id) guest->close();
+}
+
+void Gateway::end_all() {
+  for (const auto& guest : guests()) guest->close();
+}
+
+bool Gateway::deserted() { return guests().empty() && upstream->open() == 0; }
+
+}  // namespace axisd::web

@@ -1,0 +1,48 @@
+// gRPC-Web: frames in a body of HTTP/1.1, as a browser can send and read them. Pure.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <expected>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "buses/clock.hpp"
+
+namespace axisd::web {
+
+/// How a call ended, as gRPC says it.
+struct CallStatus {
+  int code = 0;  ///< of gRPC; 0: OK
+  std::string message{};
+  std::string details{};  ///< google.rpc.Status, encoded; may be empty
+};
+
+/// Codes of gRPC that the gateway uses itself.
+namespace code {
+inline constexpr int cancelled = 1, unknown = 2, invalid_argument = 3, deadline_exceeded = 4,
+                     resource_exhausted = 8, unimplemented = 12, internal = 13, unavailable = 14,
+                     data_loss = 15, unauthenticated = 16;
+}  // namespace code
+
+inline constexpr std::string_view grpc_web_type = "application/grpc-web+proto";
+inline constexpr std::size_t frame_head_size = 5;
+
+/// Whether a path is that of a call which is passed on: "/axisd.v1.AxisService/Stop".
+[[nodiscard]] bool is_call_path(std::string_view path);
+/// The message of a request's body: exactly one frame, uncompressed. Errors: invalid_argument, unimplemented.
+[[nodiscard]] std::expected<std::string_view, CallStatus> message_of(std::string_view body);
+/// What comes before a message of that many bytes.
+[[nodiscard]] std::string message_head(std::size_t size);
+/// The last frame of an answer.
+[[nodiscard]] std::string trailers_frame(const CallStatus& status);
+/// "grpc-timeout": up to 8 digits and one of H M S m u n. Nothing: it is none.
+[[nodiscard]] std::optional<Duration> timeout_of(std::string_view text);
+
+/// As grpc-message has it: printable ASCII without '%'; every other byte is %XX.
+[[nodiscard]] std::string percent_encoded(std::string_view text);
+/// With padding.
+[[nodiscard]] std::string base64(std::string_view bytes);
+
+}  // namespace axisd::web

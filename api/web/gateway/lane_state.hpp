@@ -1,0 +1,149 @@
+// What a page may ask for over its lane, and what becomes of it. Pure: events go in, effects come out.
+//
+// Of each axis that is jogged over the lane:
+//
+//            jog                   answer: it runs
+//   none -----------> starting ---------------------> running <--+
+//    ^ ^               |  ^  |                        |  |  |    | jog (it is renewed)
+//    | |  refused,     |  |  | stop, silence, close   |  |  +----+
+//    | |  has ended    |  |  |                        |  |
+//    | +---------------+  |  |   +--------------------+  | has ended; stop, silence, close
+//    |                    |  v   v  the same, while an answer is owed
+//    |               jog  +- ending                      |
+//    |                          | the last answer        |
+//    +--------------------------+------------------------+
+//
+// Silence and close send a Halt at once. A start that is on its way then may still come to the drive: from
+// ending a second one goes behind its answer, unless that says that nothing runs. A stop of the page is its
+// own first Halt.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "api/web/gateway/grpc_web.hpp"
+#include "api/web/gateway/lane_message.hpp"
+#include "api/web/gateway/lateness.hpp"
+#include "api/web/gateway/rates.hpp"
+#include "buses/clock.hpp"
+
+namespace axisd::web {
+
+enum class LaneMethod : std::uint8_t {
+  halt,
+  stop,
+  quick_stop,
+  jog,
+  group_halt,
+  group_stop,
+  stop_all,
+  renew_lease
+};
+
+/// A call to the daemon.
+struct LaneCall {
+  std::uint64_t number = 0;
+  LaneMethod method = LaneMethod::halt;
+  std::string message{};  ///< the request, encoded
+};
+/// Bytes for the page.
+struct LaneSend {
+  std::string bytes;
+};
+/// The lane ends: nothing more is taken from the page.
+struct LaneClose {
+  std::string why;
+};
+using LaneEffect = std::variant<LaneCall, LaneSend, LaneClose>;
+using LaneEffects = std::vector<LaneEffect>;
+
+/// How far an axis is on the way between the press of a button and its standstill.
+enum class Jogging : std::uint8_t { none, starting, running, ending };
+
+/// One page's lane. It renews nothing by itself, and starts nothing. Thread: one at a time.
+class LaneState {
+ public:
+  /// Of presses and renewals, beyond the page's fastest message; later ones are not meant any more.
+  static constexpr Duration latest = std::chrono::milliseconds(150);
+  /// So late is no message of a link that works: the page begins anew.
+  static constexpr Duration lost = std::chrono::seconds(5);
+  /// What the daemon takes for a jog that says nothing, and its longest (M16).
+  static constexpr Duration usual_hold = std::chrono::milliseconds(300),
+                            longest_hold = std::chrono::seconds(2);
+  /// Calls that wait for their answers.
+  static constexpr int most_moves = 32, most_stops = 64;
+  /// Messages in a second, and at once.
+  static constexpr Pace pace{.per_second = 200, .at_once = 400};
+  /// Until a Halt that found nobody is tried again.
+  static constexpr Duration pause = std::chrono::milliseconds(100);
+
+  /// A message of the page.
+  [[nodiscard]] LaneEffects receive(std::string_view bytes, TimePoint now);
+  /// The call of that number has ended.
+  [[nodiscard]] LaneEffects answered(std::uint64_t number, const CallStatus& status,
+                                     std::string_view response, TimePoint now);
+  /// Time has come to next_due().
+  [[nodiscard]] LaneEffects pass(TimePoint now);
+  /// The page is gone, or may not be here any more.
+  [[nodiscard]] LaneEffects close(TimePoint now);
+
+  /// TimePoint::max(): nothing is due.
+  [[nodiscard]] TimePoint next_due() const;
+  [[nodiscard]] Jogging jogging(std::string_view axis) const;
+  /// Closed, and nothing is owed to any axis.
+  [[nodiscard]] bool at_rest() const { return closed_ && axes_.empty() && calls_.empty() && owed_.empty(); }
+
+ private:
+  struct Axis {
+    Jogging state = Jogging::none;
+    int on_the_way = 0;     ///< jogs without an answer
+    bool may_run = false;   ///< while ending: an answer did not say that it had ended
+    TimePoint silent_at{};  ///< unless it is renewed before
+  };
+  struct Pending {
+    LaneMethod method = LaneMethod::halt;
+    std::optional<std::uint32_t> id{};  ///< of the page; nothing: it is the gateway's own Halt
+    std::string axis{};
+    TimePoint until{};  ///< own: no Halt is worth more attempts from then on
+  };
+  struct Owed {
+    TimePoint at{}, until{};
+  };
+  using Axes = std::map<std::string, Axis, std::less<>>;
+
+  void carry_out(const LaneRequest& request, LaneMethod method, Duration lateness, TimePoint now,
+                 LaneEffects& effects);
+  /// Why it is not carried out; code 0: it may be.
+  [[nodiscard]] CallStatus refusal(LaneMethod method) const;
+  void call(LaneMethod method, std::optional<std::uint32_t> id, std::string axis, std::string message,
+            TimePoint until, LaneEffects& effects);
+  void press(const std::string& axis, Duration hold, TimePoint now);
+  void let_go(const std::string& axis);
+  /// Sends a Halt, and says what is owed to the axis from now on. Returns what comes behind it.
+  Axes::iterator halt(Axes::iterator axis, TimePoint now, LaneEffects& effects);
+  void jog_answered(const std::string& axis, bool over, TimePoint now, LaneEffects& effects);
+  void own_halt(const std::string& axis, TimePoint until, LaneEffects& effects);
+
+  Lateness lateness_;
+  Rate messages_{pace};
+  bool closed_ = false;
+  std::uint64_t last_number_ = 0;
+  int moves_ = 0, stops_ = 0;  ///< of calls_, the page's
+  std::map<std::uint64_t, Pending> calls_;
+  Axes axes_;
+  std::map<std::string, Owed, std::less<>> owed_;  ///< Halts that are to be tried again
+};
+
+/// "Halt": the name of the call, in StopService and in its own.
+[[nodiscard]] std::string_view name_of(LaneMethod method);
+/// "/axisd.v1.AxisService/Halt": where the daemon's main address has it.
+[[nodiscard]] std::string_view main_path_of(LaneMethod method);
+/// Not a press or a renewal: it may be asked for twice.
+[[nodiscard]] bool is_stop(LaneMethod method);
+
+}  // namespace axisd::web

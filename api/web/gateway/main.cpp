@@ -1,0 +1,164 @@
+// The composition root: the whole gateway from top to bottom, torn down in reverse.
+#include <fmt/format.h>
+#include <grpc/support/log.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <utility>
+
+#include "api/web/gateway/gateway.hpp"
+#include "api/web/gateway/listener.hpp"
+#include "api/web/gateway/options.hpp"
+#include "api/web/gateway/passwords.hpp"
+#include "api/web/gateway/settings.hpp"
+#include "buses/asio_clock.hpp"
+
+namespace {
+
+using namespace axisd;
+using namespace axisd::web;
+
+constexpr int failed = 1, wrong = 2;
+/// For the halts of pages that are still jogging, and their answers.
+constexpr Duration end_patience = std::chrono::seconds(2);
+
+void start_logging(const std::string& level) {
+  auto logger = spdlog::stderr_logger_st("axisd-web");
+  logger->set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
+  logger->set_level(spdlog::level::from_str(level == "warn" ? "warning" : level));
+  spdlog::set_default_logger(std::move(logger));
+  if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
+}
+
+int give_up(const Error& error) {
+  std::cerr << "axisd-web: " << to_string(error) << '\n';
+  return error.reason == Reason::invalid_argument ? wrong : failed;
+}
+
+std::string content_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// What is read before anybody is served.
+struct Ground {
+  People people;
+  Assets assets;
+  std::unique_ptr<boost::asio::ssl::context> tls;
+  std::string client_ca;
+};
+
+Result<Ground> prepare(const Settings& settings) {
+  auto people = People::load(settings.users);
+  if (!people) return fail(std::move(people).error());
+  auto assets = Assets::load(settings.files);
+  if (!assets) return fail(std::move(assets).error());
+  Ground ground{.people = *std::move(people), .assets = *std::move(assets), .tls = {}, .client_ca = {}};
+  if (!settings.tls) return ground;
+  auto tls = make_tls(*settings.tls);
+  if (!tls) return fail(std::move(tls).error());
+  ground.tls = *std::move(tls);
+  if (!settings.tls->client_ca.empty()) ground.client_ca = content_of(settings.tls->client_ca);
+  return ground;
+}
+
+/// Tells systemd that the loop comes round.
+class Heartbeat {
+ public:
+  explicit Heartbeat(Clock& clock) : clock_(clock) {
+    std::uint64_t interval_us = 0;
+    if (sd_watchdog_enabled(0, &interval_us) <= 0) return;
+    period_ = std::chrono::microseconds(interval_us) / 3;
+    beat();
+  }
+
+ private:
+  void beat() {
+    sd_notify(0, "WATCHDOG=1");
+    timer_ = clock_.call_at(clock_.now() + period_, [this] { beat(); });
+  }
+  Clock& clock_;
+  Duration period_{};
+  Clock::Timer timer_;
+};
+
+void run(boost::asio::io_context& io) {
+  while (!io.stopped()) {
+    try {
+      io.run();
+    } catch (const std::exception& error) {  // no memory: that connection has ended
+      spdlog::error("{}", error.what());
+    }
+  }
+}
+
+/// Nobody is let in any more; what is jogged is halted, and everything that is open ends.
+void end(boost::asio::io_context& io, Gateway& gateway, Listener& listener) {
+  sd_notify(0, "STOPPING=1");
+  listener.close();
+  gateway.end_all();
+  io.restart();
+  const auto until = gateway.clock.now() + end_patience;
+  while (!gateway.deserted() && gateway.clock.now() < until) io.run_one_for(std::chrono::milliseconds(50));
+  if (gateway.deserted()) return;
+  spdlog::warn("something that is open does not end");
+  std::_Exit(0);  // it may still want to tell the gateway something
+}
+
+int serve(const Settings& settings, Ground ground) {
+  boost::asio::io_context io{1};
+  AsioClock clock(io);
+  auto upstream = Upstream::make(io.get_executor(), clock, settings.axisd);
+  if (!upstream) return give_up(upstream.error());
+  Gateway gateway(io, clock, settings, std::move(ground.assets), std::move(ground.people),
+                  *std::move(upstream), ground.client_ca);
+  auto listener = Listener::open(gateway, std::move(ground.tls));
+  if (!listener) return give_up(listener.error());
+  if (gateway.people.nobody() && !settings.tls)
+    spdlog::warn("there are no users: everybody at this computer is let in");
+  if (gateway.people.nobody() && settings.tls)
+    spdlog::warn("there are no users: axisd-web user add NAME --role ROLE");
+  spdlog::info("{}://{} with {} files; port {}", settings.tls ? "https" : "http", settings.listen,
+               gateway.assets.count(), (*listener)->port());
+  boost::asio::signal_set signals(io, SIGTERM, SIGINT);
+  signals.async_wait([&](const boost::system::error_code& error, int) {
+    if (!error) io.stop();
+  });
+  const Heartbeat heartbeat(clock);
+  sd_notify(0, "READY=1");
+  run(io);
+  end(io, gateway, **listener);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto options = parse_options(argc, argv);
+  const auto loaded = load_settings(options.config);
+  for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
+  if (!loaded.settings) return wrong;
+  const auto& settings = *loaded.settings;
+  if (options.user) return run_user_command(*options.user, settings.users);
+  if (!start_passwords()) {
+    std::cerr << "axisd-web: no random numbers\n";
+    return failed;
+  }
+  ::signal(SIGPIPE, SIG_IGN);
+  start_logging(options.log_level);
+  auto ground = prepare(settings);
+  if (!ground) return give_up(ground.error());
+  if (options.check) {
+    std::cout << options.config << ": ok\n";
+    return 0;
+  }
+  return serve(settings, *std::move(ground));
+}
