@@ -10,7 +10,7 @@ command -v systemd-analyze >/dev/null ||
 stage=$(mktemp -d "${TMPDIR:-/tmp}/axisd-service.XXXXXX")
 trap 'rm -rf "$stage"' EXIT
 DESTDIR=$stage cmake --install "$build" --prefix /usr >/dev/null
-for program in axisd axisctl axisd-sim; do
+for program in axisd axisctl axisd-sim axisd-web; do
   [ -x "$stage/usr/bin/$program" ] || { echo "service.sh: $program is not installed" >&2; exit 1; }
 done
 
@@ -18,11 +18,11 @@ done
 
 # The units name /usr; this computer has the programs elsewhere.
 mkdir "$stage/unit"
-for unit in axisd.service axisd-link.service axisd-link.socket; do
+for unit in axisd.service axisd-link.service axisd-link.socket axisd-web.service; do
   sed "s#/usr/\(bin\|lib/axisd\)/axisd#$stage/usr/\1/axisd#" "$stage/usr/lib/systemd/system/$unit" >"$stage/unit/$unit"
 done
 complaints=$(systemd-analyze verify --man=no "$stage"/unit/axisd* 2>&1) || { echo "$complaints"; exit 1; }
-if grep -E 'axisd(-link)?\.(service|socket)' <<<"$complaints"; then exit 1; fi
+if grep -E 'axisd(-link|-web)?\.(service|socket)' <<<"$complaints"; then exit 1; fi
 
 # 10 is without any protection; beyond 1.6 somebody has opened something. Also with the example of a drop-in.
 mkdir "$stage/unit/axisd.service.d"
@@ -46,4 +46,8 @@ for needed in '^DeviceAllow=char-ttyUSB rw$' '^DeviceAllow=char-ttyACM rw$' '^De
   '^ExecStopPost=-/usr/bin/axisd --quiesce ' '^RestartPreventExitStatus=2$'; do
   grep -q "$needed" "$stage/usr/lib/systemd/system/axisd.service" || { echo "axisd.service has no line $needed" >&2; exit 1; }
 done
+
+systemd-analyze security --offline=true --threshold=13 "$stage/unit/axisd-web.service" >"$stage/exposure" ||
+  { cat "$stage/exposure"; exit 1; }
+tail -n 1 "$stage/exposure"
 systemd-sysusers --dry-run "$stage/usr/lib/sysusers.d/axisd.conf"

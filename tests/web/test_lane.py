@@ -1,0 +1,208 @@
+"""The lane of a page: what is jogged over it ends with it, by the simulator's truth, and never moves afterwards."""
+import os
+import signal
+import unittest
+
+from harness import DONE, axis_pb, command_pb, lease_pb, system_pb, wait_for
+from support import ANSWER, DELEGATE, ECHO, LATE, REFUSED, LaneRefused, Page, WebScenario, jog_request
+
+
+class Motion(WebScenario):
+    def setUp(self):
+        super().setUp()
+        self.start_machine()
+        self.gateway = self.web().start()
+        self.page = Page(self.gateway)
+        self.wire = self.lane(self.page)
+
+    def command(self, answer, kind=axis_pb.JogResponse):
+        self.assertEqual(answer[:2], (ANSWER, 0), answer)
+        return kind.FromString(answer[3]).command
+
+    def test_a_button_is_pressed_and_let_go(self):
+        self.assertEqual(self.wire.ask("")[0], ECHO)
+        finger = self.held(self.wire)
+        finger.let_go()
+        answer = self.wire.ask("AxisService/Halt", axis_pb.HaltRequest(axis="spinner", options={"wait_until": DONE}))
+        self.assert_command(self.command(answer, axis_pb.HaltResponse), "DONE")
+        self.stands_for_good()
+        self.assertEqual(self.subject.sim.shaft().starts, 1, "renewals start nothing")
+
+    def test_the_page_closes_its_lane(self):
+        finger = self.held(self.wire, hold=2.0)
+        self.wire.close()
+        self.stands_for_good(3)
+        finger.let_go()
+
+    def test_the_page_is_silent(self):
+        finger = self.held(self.wire, hold=0.8)
+        finger.let_go()
+        self.stands_for_good()
+        self.wire.jog(finger.press, 0.8)  # a renewal that comes too late
+        self.wire.jog(finger.press, 0.8, late=0.3)
+        self.stands_for_good()
+        self.assertEqual(self.subject.sim.shaft().starts, 1)
+
+    def test_an_echo_is_no_renewal(self):
+        finger = self.held(self.wire, hold=0.8)
+        finger.let_go()
+        wait_for(lambda: self.wire.ask("")[0] == ECHO and not self.subject.sim.shaft().moving, "it stands")
+        self.stands_for_good()
+
+    def test_the_gateway_is_killed(self):
+        self.held(self.wire)
+        self.gateway.kill()
+        self.stands_for_good(2)
+
+    def test_the_gateway_ends_in_order(self):
+        self.held(self.wire, hold=2.0)
+        self.assertEqual(self.gateway.program.terminate(), 0)
+        self.stands_for_good(2)
+
+    def test_the_gateway_is_stopped_and_continued(self):
+        finger = self.held(self.wire)
+        os.kill(self.gateway.program.process.pid, signal.SIGSTOP)
+        self.addCleanup(os.kill, self.gateway.program.process.pid, signal.SIGCONT)
+        self.subject.sim.wait_rest()
+        os.kill(self.gateway.program.process.pid, signal.SIGCONT)
+        finger.let_go()  # what it said meanwhile renewed a press that is over
+        self.stands_for_good(2)
+        self.assertEqual(self.subject.sim.shaft().starts, 1)
+
+    def test_the_daemon_is_killed_and_comes_back(self):
+        finger = self.held(self.wire)
+        finger.let_go()
+        self.wire.send("AxisService/Halt", axis_pb.HaltRequest(axis="spinner"))
+        self.stands_for_good()
+        self.subject.daemon.kill()
+        wait_for(lambda: self.gateway.request("GET", "/healthz")[0] == 503, "the gateway tells that axisd is away")
+        kind, status, _, _ = self.wire.ask("AxisService/Jog", jog_request("in vain"))
+        self.assertEqual((kind, status), (ANSWER, 14))
+        self.subject.start_daemon()
+        wait_for(lambda: self.gateway.request("GET", "/healthz")[0] == 200, "the gateway has found axisd again")
+        self.subject.client.wait_online("spinner")
+        self.subject.client.to_done("Enable", "spinner")
+        self.held(self.wire).let_go()  # on the same lane
+        self.stands_for_good()
+
+    def test_a_press_that_was_held_up_moves_nothing(self):
+        self.assertEqual(self.wire.ask("")[0], ECHO)
+        self.assertEqual(self.wire.ask("AxisService/Jog", jog_request("late"), late=1.0)[0], LATE)
+        self.assertEqual(self.wire.ask("LeaseService/RenewLease", lease_pb.RenewLeaseRequest(), late=1.0)[0], LATE)
+        answer = self.wire.ask("AxisService/Stop", axis_pb.StopRequest(axis="spinner"), late=1.0)
+        self.command(answer, axis_pb.StopResponse)
+        self.assertEqual(self.subject.sim.shaft().starts, 0)
+
+    def test_a_press_and_a_stop_that_come_together_leave_it_standing(self):
+        for i in range(20):
+            self.wire.jog(f"press-{i}", 2.0)
+            self.wire.send("AxisService/Halt", axis_pb.HaltRequest(axis="spinner"))
+        last = self.wire.ask("AxisService/Halt", axis_pb.HaltRequest(axis="spinner", options={"wait_until": DONE}))
+        self.command(last, axis_pb.HaltResponse)
+        self.stands_for_good(2.5)
+
+    def test_stop_all_needs_nothing(self):
+        self.held(self.wire)
+        kind, status, _, _ = self.wire.ask("SystemService/StopAll", system_pb.StopAllRequest())
+        self.assertEqual((kind, status), (ANSWER, 0))
+        self.stands_for_good()
+
+    def test_ten_thousand_messages_at_once_end_the_lane_and_the_jog(self):
+        finger = self.held(self.wire, hold=2.0)
+        echo, _ = self.wire.message("")
+        try:
+            for _ in range(10_000):
+                self.wire.send_frame(echo)
+        except OSError:
+            pass
+        self.assertLess(len(self.wire.until_end()), 1000)
+        self.stands_for_good(2.5)
+        finger.let_go()
+        self.assertEqual(self.lane(self.page).ask("")[0], ECHO, "another lane is fine")
+
+    def test_what_is_no_message_ends_the_lane(self):
+        for opcode, payload in ((2, b"nonsense"), (1, b"text"), (2, b"\1" + bytes(17_000)), (11, b""), (2, b"")):
+            lane = self.lane(self.page)
+            lane.send_frame(payload, opcode)
+            self.assertEqual(lane.until_end(), [], (opcode, payload[:10]))
+        self.assertEqual(self.wire.ask("")[0], ECHO)
+
+    def test_half_a_message_ends_with_its_connection(self):
+        finger = self.held(self.wire, hold=2.0)
+        finger.let_go()
+        self.wire.socket.sendall(b"\x82\xfe")
+        self.wire.close()
+        self.stands_for_good(2.5)
+
+    def test_only_what_belongs_there_is_taken(self):
+        kind, status, message, _ = self.wire.ask("AxisService/Enable", axis_pb.EnableRequest(axis="spinner"))
+        self.assertEqual((kind, status, message), (REFUSED, 12, "the lane takes no such call"))
+        self.assertEqual(self.wire.ask("AxisService/Jog", b"\xff")[0], REFUSED)
+        kind, status, message, _ = self.wire.ask("AxisService/Stop", axis_pb.StopRequest(axis="nobody"))
+        self.assertEqual((kind, status), (ANSWER, 5))
+        self.assertIn("nobody", message)
+
+    def test_other_pages_have_no_lane(self):
+        for origin, protocol, status in (("http://evil.example", "axisd-lane-1", 403),
+                                         (f"https://localhost:{self.gateway.port}", "axisd-lane-1", 403),
+                                         (None, "chat", 400)):
+            with self.assertRaises(LaneRefused) as refused:
+                self.page.lane(origin, protocol)
+            self.assertEqual(refused.exception.args, (status,))
+
+
+class Persons(WebScenario):
+    def setUp(self):
+        super().setUp()
+        self.start_machine(DELEGATE)
+        self.gateway = self.web()
+        self.gateway.user("add", "anna", "--role", "operator", password="correct horse")
+        self.gateway.user("add", "bert", "--role", "viewer", password="battery staple")
+        self.gateway.start()
+
+    def logged_in(self, name, password):
+        page = Page(self.gateway)
+        self.assertEqual(page.log_in(name, password)[0], 204)
+        return page
+
+    def test_nobody_has_no_lane(self):
+        with self.assertRaises(LaneRefused) as refused:
+            Page(self.gateway).lane()
+        self.assertEqual(refused.exception.args, (401,))
+
+    def test_the_daemon_knows_who_jogs(self):
+        lane = self.lane(self.logged_in("anna", "correct horse"))
+        self.held(lane).let_go()
+        client = self.subject.client
+        request = command_pb.GetCommandRequest(id=client.state("spinner").command_id)
+        self.assertTrue(client.call(client.command.GetCommand, request).command.client.startswith("anna via unix:"))
+        lane.send("AxisService/Halt", axis_pb.HaltRequest(axis="spinner"))
+        self.stands_for_good()
+
+    def test_a_viewer_may_stop_and_not_jog(self):
+        lane = self.lane(self.logged_in("bert", "battery staple"))
+        kind, status, message, _ = lane.ask("AxisService/Jog", jog_request("mine"))
+        self.assertEqual((kind, status), (ANSWER, 7), message)
+        self.assertEqual(lane.ask("AxisService/Stop", axis_pb.StopRequest(axis="spinner"))[:2], (ANSWER, 0))
+        self.assertEqual(self.subject.sim.shaft().starts, 0)
+
+    def test_the_end_of_a_session_ends_its_jog(self):
+        page = self.logged_in("anna", "correct horse")
+        lane = self.lane(page)
+        self.held(lane, hold=2.0)
+        self.assertEqual(page.log_out(), 204)
+        lane.until_end()
+        self.stands_for_good(2.5)
+
+    def test_a_user_who_is_removed_is_out(self):
+        page = self.logged_in("anna", "correct horse")
+        lane = self.lane(page)
+        self.held(lane, hold=2.0)
+        self.gateway.user("remove", "anna")
+        lane.until_end()
+        self.stands_for_good(2.5)
+        self.assertEqual(page.session()[0], 401)
+
+
+if __name__ == "__main__":
+    unittest.main()
