@@ -1,9 +1,9 @@
 # What deploy/install.sh and deploy/package.sh install, below the prefix /usr. Configuration and state are the
 # administrator's.
 if(AXISD_GRPC)
-  install(TARGETS axisd axisctl axisd-sim RUNTIME DESTINATION bin)
+  install(TARGETS axisd axisctl axisd-sim axisd-web RUNTIME DESTINATION bin)
   install(TARGETS axisd-link RUNTIME DESTINATION lib/axisd)
-  install(FILES deploy/axisd.service deploy/axisd-link.service deploy/axisd-link.socket DESTINATION lib/systemd/system)
+  install(FILES deploy/axisd.service deploy/axisd-link.service deploy/axisd-link.socket deploy/axisd-web.service DESTINATION lib/systemd/system)
   install(FILES deploy/axisd.sysusers DESTINATION lib/sysusers.d RENAME axisd.conf)
   install(FILES deploy/axisd.tmpfiles DESTINATION lib/tmpfiles.d RENAME axisd.conf)
   install(FILES deploy/axisd.catalog DESTINATION lib/systemd/catalog)
@@ -11,11 +11,11 @@ if(AXISD_GRPC)
   install(FILES deploy/README.md DESTINATION share/doc/axisd)
   install(DIRECTORY config/examples DESTINATION share/doc/axisd)
   install(FILES deploy/80-axisd-can.network deploy/80-axisd-can.link deploy/axisd-networks.conf
-                deploy/axisd.yaml DESTINATION share/doc/axisd/examples)
+                deploy/axisd.yaml deploy/web.yaml DESTINATION share/doc/axisd/examples)
   set(made ${CMAKE_BINARY_DIR}/api/axisctl)
   install(FILES ${made}/axisctl.1 deploy/man/axisd-sim.1 DESTINATION share/man/man1)
   install(FILES ${made}/axisd.yaml.5 DESTINATION share/man/man5)
-  install(FILES deploy/man/axisd.8 deploy/man/axisd-link.8 DESTINATION share/man/man8)
+  install(FILES deploy/man/axisd.8 deploy/man/axisd-link.8 deploy/man/axisd-web.8 DESTINATION share/man/man8)
   install(FILES ${made}/axisctl.bash DESTINATION share/bash-completion/completions RENAME axisctl)
   install(FILES ${made}/axisctl.fish DESTINATION share/fish/vendor_completions.d)
   # Debian's zsh does not look into site-functions below /usr.

@@ -8,11 +8,11 @@ set -euo pipefail
 
 build=(
   ca-certificates ccache clang-19 cmake git libbenchmark-dev libboost1.81-dev libcli11-dev libfmt-dev libgmock-dev
-  libgrpc++-dev libgrpc-dev libgtest-dev libmodbus-dev libnghttp2-dev libprotobuf-dev libspdlog-dev libssl-dev libsystemd-dev
+  libgrpc++-dev libgrpc-dev libgtest-dev libmodbus-dev libnghttp2-dev libprotobuf-dev libsodium-dev libspdlog-dev libssl-dev libsystemd-dev
   libyaml-cpp-dev lld-19 llvm-19 ninja-build pkg-config protobuf-compiler protobuf-compiler-grpc
   python3 python3-protobuf
 )
-run=(libabsl20220623 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
+run=(libabsl20220623 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libsodium23 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
 # prometheus starts a server of its own where there is an init: systemctl disable --now prometheus.
 test=(
   can-utils clang-format-19 clang-tidy-19 fish groff-base iproute2 libclang-rt-19-dev mypy openssl procps prometheus python3-can

@@ -21,7 +21,7 @@ under_systemd() { [ -z "$staged" ] && [ -d /run/systemd/system ]; }
 uninstall() {
   [ -f "$list" ] || die "$list is not there: nothing was installed by this script"
   if under_systemd; then
-    systemctl disable --now axisd.service axisd-link.socket 2>/dev/null || true  # stops the axes
+    systemctl disable --now axisd.service axisd-link.socket axisd-web.service 2>/dev/null || true  # stops the axes
     systemctl stop axisd-link.service 2>/dev/null || true
   fi
   local -A folders=()
@@ -61,7 +61,7 @@ else
   echo "install.sh: not Debian 12: deploy/install-packages.sh names what has to be here, as Debian calls it" >&2
 fi
 cmake --preset release
-cmake --build --preset release --target axisd axisctl axisd-sim axisd-link api_reference axisctl_manual
+cmake --build --preset release --target axisd axisctl axisd-sim axisd-link axisd-web api_reference axisctl_manual
 rm -f build/release/install_manifest.txt
 cmake --install build/release --prefix /usr --strip
 
@@ -86,7 +86,7 @@ grep . build/release/install_manifest.txt >"$list"
 systemd-sysusers /usr/lib/sysusers.d/axisd.conf
 install -d -m 0755 /etc/axisd
 systemd-tmpfiles --create /usr/lib/tmpfiles.d/axisd.conf
-for file in axisd.yaml links; do
+for file in axisd.yaml links web.yaml; do
   [ -e "/etc/axisd/$file" ] || install -m 0644 "deploy/$file" "/etc/axisd/$file"
 done
 if command -v udevadm >/dev/null; then

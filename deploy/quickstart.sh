@@ -13,7 +13,7 @@ case "${1:-}" in
 esac
 
 scratch=$(mktemp -d "${TMPDIR:-/tmp}/axisd-quickstart.XXXXXX")
-daemon='' mover=''
+daemon='' mover='' web=''
 
 say() { printf '\n== %s\n' "$*"; }
 die() { echo "quickstart.sh: $*" >&2; exit 1; }
@@ -29,6 +29,7 @@ clean_up() {
   local status=$?
   trap '' INT TERM
   end_group "$mover"
+  end_group "$web"
   end_group "$daemon"
   if [ "$status" -ne 0 ] && [ -s "$scratch/axisd.log" ]; then
     echo "-- the last lines of axisd's log:" >&2
@@ -60,7 +61,7 @@ show_build() {
 say "Packages and build (some minutes the first time)"
 deploy/install-packages.sh build
 deploy/install-packages.sh run
-if ! { cmake --preset release && cmake --build --preset release --target axisd axisctl axisd-sim; } 2>&1 |
+if ! { cmake --preset release && cmake --build --preset release --target axisd axisctl axisd-sim axisd-web; } 2>&1 |
     tee "$scratch/build.log" | show_build; then
   tail -n 60 "$scratch/build.log" >&2
   die "the build failed"
@@ -87,6 +88,16 @@ set -m
 "$axisd" --config config/examples/demo.yaml --state-directory "$scratch/state" --listen "$AXISD_SERVER" \
   >"$scratch/axisd.log" 2>&1 &
 daemon=$!
+page=7480
+while taken "$page"; do page=$((30000 + RANDOM % 10000)); done
+cat >"$scratch/web.yaml" <<END
+listen: localhost:$page
+axisd: { server: $AXISD_SERVER }
+files: $PWD/build/web
+users: $scratch/users
+END
+"$bin/api/web/gateway/axisd-web" --config "$scratch/web.yaml" >"$scratch/web.log" 2>&1 &
+web=$!
 set +m
 
 # Repeats a command until it succeeds, while axisd lives; its own complaint is shown when it never does.
@@ -104,6 +115,8 @@ step() {  # shows a command as it would be typed, and runs it
   "$axisctl" "${@:2}" || die "failed: $*"
 }
 eventually "$axisctl" list
+kill -0 "$web" 2>/dev/null || { cat "$scratch/web.log" >&2; die "axisd-web ended by itself"; }
+[ -n "$once" ] || echo "The machine in a browser of this computer: http://localhost:$page"
 for axis in feeder lifter turntable carousel; do
   eventually "$axisctl" enable "$axis" --wait  # refused until the drive's identity and configuration are verified
 done
@@ -145,6 +158,8 @@ say "Stopping and switching off"
 step axisctl stop --all
 step axisctl release-stop --all
 for axis in feeder lifter turntable carousel; do step axisctl disable "$axis" --wait; done
+end_group "$web"
+web=''
 kill -TERM "$daemon"
 wait "$daemon" || die "axisd ended with status $?"
 daemon=''

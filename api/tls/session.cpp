@@ -115,7 +115,7 @@ std::string certificate_of(const ssl_st& session) {
   const Certificate peer(SSL_get1_peer_certificate(&session));
   const Memory text(BIO_new(BIO_s_mem()));
   if (!peer || !text || PEM_write_bio_X509(text.get(), peer.get()) != 1) return {};
-  const auto* shown = SSL_get_peer_cert_chain(session_.get());
+  const auto* shown = SSL_get_peer_cert_chain(&session);
   for (int i = 0; i < sk_X509_num(shown); ++i) PEM_write_bio_X509(text.get(), sk_X509_value(shown, i));
   std::string pem(BIO_ctrl_pending(text.get()), '\0');
   BIO_read(text.get(), pem.data(), static_cast<int>(pem.size()));
