@@ -1,6 +1,7 @@
 """axisd-web in front of a real daemon with simulated drives, and what a browser would send to it."""
 import base64
 import http.client
+import itertools
 import json
 import os
 import pathlib
@@ -19,6 +20,7 @@ from harness.notify import NotifySocket
 
 AXISD_WEB = os.environ["AXISD_WEB"]
 GRPC_WEB = "application/grpc-web+proto"
+_numbers = itertools.count()
 ANSWER, LATE, ECHO, REFUSED = 1, 2, 3, 4
 #: A person's role, and what the daemon has to know of the gateway, which comes as this user of the computer.
 DELEGATE = f"access: {{ roles: {{ {OWN_NAME}: maintainer }}, delegates: {{ {OWN_NAME}: operator }} }}"
@@ -39,7 +41,7 @@ class Web:
         pathlib.Path(self.config).write_text(
             f"listen: localhost:0\naxisd: {{ server: \"unix:{machine.socket}\" }}\nfiles: {self.page}\n"
             f"users: {self.users}\n{keys}")
-        self.prefix, self.notify, self.program, self.port, self.count = prefix, None, None, 0, 0
+        self.prefix, self.notify, self.program, self.port = prefix, None, None, 0
 
     def user(self, *words, password=None):
         done = subprocess.run([AXISD_WEB, "--config", self.config, "user", *words], capture_output=True, text=True,
@@ -50,12 +52,12 @@ class Web:
     def start(self, port=0):
         text = pathlib.Path(self.config).read_text()
         pathlib.Path(self.config).write_text(re.sub(r"(?m)^listen: .*$", f"listen: localhost:{port}", text))
-        directory = pathlib.Path(self.machine.path(f"notify-{self.count}"))
+        number = next(_numbers)
+        directory = pathlib.Path(self.machine.path(f"notify-{number}"))
         directory.mkdir()
         self.notify = NotifySocket(str(directory))
-        self.program = Program(f"axisd-web-{self.count}", [*self.prefix, AXISD_WEB, "--config", self.config],
+        self.program = Program(f"axisd-web-{number}", [*self.prefix, AXISD_WEB, "--config", self.config],
                                self.machine.directory, {"NOTIFY_SOCKET": self.notify.path})
-        self.count += 1
         self.notify.wait_for("READY=1", self.program)
         self.port = int(re.search(r"; port (\d+)", self.program.log())[1])
         wait_for(lambda: self.request("GET", "/healthz")[0] == 200, "axisd-web has reached axisd")
@@ -197,7 +199,7 @@ class Lane:
     """A page's WebSocket, by hand."""
 
     def __init__(self, page, origin=None, protocol="axisd-lane-1"):
-        self.page, self._ids, self._lock = page, 0, threading.Lock()
+        self.page, self._ids, self._lock, self._sending = page, 0, threading.Lock(), threading.Lock()
         web = page.web
         self.socket = web.raw()
         if web.tls:
@@ -228,7 +230,8 @@ class Lane:
             head += bytes([0x80 | 126]) + struct.pack(">H", len(payload))
         else:
             head += bytes([0x80 | 127]) + struct.pack(">Q", len(payload))
-        self.socket.sendall(head + mask + bytes(byte ^ mask[i % 4] for i, byte in enumerate(payload)))
+        with self._sending:  # a finger is a thread
+            self.socket.sendall(head + mask + bytes(byte ^ mask[i % 4] for i, byte in enumerate(payload)))
 
     def message(self, method, request=b"", late=0.0):
         """Bytes of a message, and its id."""
