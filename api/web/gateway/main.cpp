@@ -1,5 +1,6 @@
 // The composition root: the whole gateway from top to bottom, torn down in reverse.
 #include <fmt/format.h>
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -36,6 +37,8 @@ void start_logging(const std::string& level) {
   logger->set_level(spdlog::level::from_str(level == "warn" ? "warning" : level));
   spdlog::set_default_logger(std::move(logger));
   if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
+  // It would tell of every message of a page that is not readable.
+  google::protobuf::SetLogHandler(nullptr);
 }
 
 int give_up(const Error& error) {
