@@ -1,0 +1,86 @@
+// Why a button cannot be used now: what the page knows itself, then what the daemon explains.
+import { effect, signal, type ReadonlySignal } from '@preact/signals';
+import type { MessageInitShape } from '@bufbuild/protobuf';
+import { Role } from '@proto/access_pb';
+import { Reason, type ErrorDetail } from '@proto/error_pb';
+import type { AxisState } from '@proto/types_pb';
+import type { ExplainRequestSchema } from '@proto/system_service_pb';
+import { roleFor, store, tokenFor } from './app';
+import { t } from './i18n';
+import { reasonKey } from './i18n/names';
+import { remedyOf, type Remedy } from './model/remedy';
+import { CALL_MS, clients } from './transport/clients';
+
+export type CommandCase = MessageInitShape<typeof ExplainRequestSchema>['command'];
+
+/** One thing in the way. */
+export interface Obstacle { word: string; text: string; remedy: Remedy | null; hint: string }
+
+export interface Question { key: string; command: CommandCase; asked: { position?: number; velocity?: number; held?: boolean } }
+
+export interface Answer { obstacle: Obstacle | null; details: readonly ErrorDetail[] }
+
+const reasonWord = (reason: Reason): string => { const key = reasonKey(reason); return key === null ? '' : t(key); };
+
+export function obstacleOf(detail: ErrorDetail, asked: Question['asked']): Obstacle {
+  return { word: reasonWord(detail.reason), text: detail.message, remedy: remedyOf(detail, asked), hint: detail.remedy };
+}
+
+/** What forbids any command of this page, before the daemon is asked; null: nothing. Reads signals. */
+export function pageObstacle(axis: string): Obstacle | null {
+  if (!store.live.value) return { word: '', text: t('page.nothing-live'), remedy: { act: 'reconnect' }, hint: '' };
+  const role = roleFor(axis);
+  if (role === Role.NONE || role === Role.VIEWER) {
+    return { word: t('reason.access-denied'), text: t('page.role-too-small'), remedy: { act: 'show', screen: 'people' }, hint: '' };
+  }
+  if (tokenFor(axis) === 0n) return { word: '', text: t('page.observer'), remedy: { act: 'take-control' }, hint: '' };
+  return null;
+}
+
+/** Whatever of a state the answers may depend on. */
+export function signature(state: AxisState): string {
+  const bits = [...state.inputs, ...state.outputs].map(({ active }) => (active ? '1' : '0')).join('');
+  return [state.state, state.link, state.enabled, state.stopHeld, state.inhibited, state.trust, state.alarmCode, state.drift,
+          state.leaseHolder, state.fault?.reason ?? 0, state.holds.length, bits, state.moving,
+          state.moving ? '' : state.position.toFixed(2)].join('|');
+}
+
+const SETTLE_MS = 80;
+
+/** Asks the daemon anew whenever the axis or a question changes. Ends with `stop`. */
+export function watchExplanations(axis: string, questions: ReadonlySignal<readonly Question[]>) {
+  const answers = signal<ReadonlyMap<string, Answer>>(new Map());
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let controller: AbortController | null = null;
+  let asked = '';
+  const ask = async (list: readonly Question[], token: bigint) => {
+    controller?.abort();
+    const own = new AbortController();
+    controller = own;
+    try {
+      const found = await Promise.all(list.map(async ({ key, command, asked: values }): Promise<[string, Answer]> => {
+        const { obstacles } = await clients.system.explain({ axis, command: command!, leaseToken: token },
+                                                           { timeoutMs: CALL_MS, signal: own.signal });
+        const details = obstacles.flatMap(({ blocking, detail }) => (blocking && detail !== undefined ? [detail] : []));
+        return [key, { obstacle: details[0] === undefined ? null : obstacleOf(details[0], { ...values, held: (store.axis(axis)?.state.peek().holds.length ?? 0) > 0 }), details }];
+      }));
+      if (!own.signal.aborted) answers.value = new Map(found);
+    } catch {
+      // Asked anew with the next change; what is unknown forbids nothing, as the daemon decides.
+      if (!own.signal.aborted) asked = '';
+    }
+  };
+  const stop = effect(() => {
+    const state = store.axis(axis)?.state.value;
+    const list = questions.value;
+    const token = tokenFor(axis);
+    const live = store.live.value;
+    if (state === undefined || !live) return;
+    const wanted = `${signature(state)}#${token}#${list.map(({ key, asked: values }) => `${key}:${values.position}:${values.velocity}`).join()}`;
+    if (wanted === asked) return;
+    asked = wanted;
+    clearTimeout(timer);
+    timer = setTimeout(() => void ask(list, token), SETTLE_MS);
+  });
+  return { answers, stop: () => { stop(); clearTimeout(timer); controller?.abort(); } };
+}

@@ -1,0 +1,41 @@
+// What leads out of a refusal: for each reason the button that belongs beside its text.
+import { Reason, type ErrorDetail } from '@proto/error_pb';
+
+export type Remedy =
+  | { act: 'home' | 'enable' | 'reset' | 'halt' | 'release-all' | 'release-hold' | 'take-control' | 'reconnect' | 'accept-state' }
+  | { act: 'show'; screen: 'buses' | 'terminals' | 'people' | 'events' }
+  | { act: 'use'; field: 'position' | 'velocity'; value: number };
+
+/** The value within a permitted range that is nearest to what was asked. */
+export function nearest(asked: number, minimum: number, maximum: number): number {
+  return Math.min(maximum, Math.max(minimum, asked));
+}
+
+/** Null: time, or somebody at the machine, has to do it; the text says what. */
+export function remedyOf(detail: ErrorDetail, asked: { position?: number; velocity?: number; held?: boolean }): Remedy | null {
+  switch (detail.reason) {
+    case Reason.NOT_TRUSTED: return { act: 'home' };
+    case Reason.DISABLED: return { act: 'enable' };
+    case Reason.FAULT: case Reason.ALARM: case Reason.DID_NOT_START: case Reason.NOT_REACHED: case Reason.TOOK_TOO_LONG:
+    case Reason.NOT_CONFIRMED: case Reason.REBOOTED: return { act: 'reset' };
+    case Reason.INHIBITED: return { act: 'release-all' };
+    case Reason.STOPPING: return asked.held ? { act: 'release-hold' } : null;
+    case Reason.MOVING: return { act: 'halt' };
+    case Reason.LEASE_REQUIRED: case Reason.LEASE_LOST: return { act: 'take-control' };
+    case Reason.OFFLINE: case Reason.BUS_DOWN: case Reason.CONFIGURING: case Reason.NO_REPLY: case Reason.WRONG_MODEL:
+      return { act: 'show', screen: 'buses' };
+    case Reason.LIMIT_SWITCH: case Reason.TERMINAL: case Reason.MISCONFIGURED: return { act: 'show', screen: 'terminals' };
+    case Reason.ACCESS_DENIED: return { act: 'show', screen: 'people' };
+    case Reason.STATE_UNACCEPTED: return { act: 'accept-state' };
+    case Reason.SUPERSEDED: case Reason.BUSY: case Reason.STORAGE: return { act: 'show', screen: 'events' };
+    case Reason.SOFT_LIMIT: case Reason.OUT_OF_RANGE: {
+      const { permitted } = detail;
+      if (permitted === undefined) return null;
+      const velocity = permitted.unit.endsWith('/s');
+      const value = velocity ? asked.velocity : asked.position;
+      if (value === undefined || permitted.unit === 'ms') return null;
+      return { act: 'use', field: velocity ? 'velocity' : 'position', value: nearest(value, permitted.minimum, permitted.maximum) };
+    }
+    default: return null;
+  }
+}
