@@ -20,8 +20,9 @@ import { Refused, type FakeLease, type FakeMachine } from './machine';
 const span = (ms: number) => ({ seconds: BigInt(Math.floor(ms / 1000)), nanos: Math.round((ms % 1000) * 1e6) });
 const ms = (duration: Duration | undefined, otherwise: number) => (duration === undefined ? otherwise : Number(duration.seconds) * 1000 + duration.nanos / 1e6);
 const pause = (time: number, signal: AbortSignal) => new Promise<void>((resolve) => {
-  const timer = setTimeout(resolve, time);
-  signal.addEventListener('abort', () => { clearTimeout(timer); resolve(); }, { once: true });
+  const over = () => { clearTimeout(timer); signal.removeEventListener('abort', over); resolve(); };
+  const timer = setTimeout(over, time);
+  signal.addEventListener('abort', over);
 });
 
 export interface World {

@@ -102,7 +102,7 @@ export const de: Texts = {
   'axis.to': 'nach',
   'axis.by': 'um',
   'axis.at': 'mit',
-  'axis.range': '{low} bis {high} {unit}',
+  'axis.range': '{low} bis {high}',
   'axis.most': 'höchstens {velocity}',
   'axis.simulated': 'simuliert',
   'axis.type-target': 'Sagen Sie, wohin.',

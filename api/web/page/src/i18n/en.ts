@@ -101,7 +101,7 @@ export const en = {
   'axis.to': 'to',
   'axis.by': 'by',
   'axis.at': 'at',
-  'axis.range': '{low} to {high} {unit}',
+  'axis.range': '{low} to {high}',
   'axis.most': 'at most {velocity}',
   'axis.simulated': 'simulated',
   'axis.type-target': 'Say where to.',

@@ -102,7 +102,7 @@ export const zh: Texts = {
   'axis.to': '到',
   'axis.by': '相对',
   'axis.at': '速度',
-  'axis.range': '{low} 至 {high} {unit}',
+  'axis.range': '{low} 至 {high}',
   'axis.most': '最高 {velocity}',
   'axis.simulated': '仿真',
   'axis.type-target': '请输入目标。',

@@ -21,12 +21,15 @@ const FIRST = 256;
 
 /** A ring that grows as it needs, and forgets what is older than ten minutes. Thread: the page's only one. */
 export class Series {
-  private capacity = FIRST;
+  private capacity: number;
   private first = 0;
   private count = 0;
-  private columns = Series.make(FIRST);
+  private columns;
 
-  constructor(private readonly most = 13_000) {}
+  constructor(private readonly most = 13_000) {
+    this.capacity = Math.min(FIRST, most);
+    this.columns = Series.make(this.capacity);
+  }
 
   private static make(size: number) {
     const numbers = () => new Float64Array(size);

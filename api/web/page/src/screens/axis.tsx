@@ -9,7 +9,7 @@ import { ageText, shown, typed, decimals } from '../model/numbers';
 import type { AxisEntry } from '../model/store';
 import { disable, enable, home, moveBy, moveTo, reset } from '../motion';
 import { go } from '../route';
-import { ActButton, Explanations, type Act } from '../ui/explained';
+import { ActButton, describedBy, Explanations, type Act } from '../ui/explained';
 import { NumberField } from '../ui/field';
 import { JogPad } from '../ui/jog-pad';
 import { StateMark, tone } from '../ui/marks';
@@ -119,8 +119,11 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
     'jog-': { id: 'jog-', label: t('jog.minus'), obstacle: obstacle('jog-') },
   };
   const { enabled } = entry.state.value;
-  // Where it is on already, or has no fault, nobody asks why it cannot be switched on or reset.
-  const told = [...(enabled ? [] : [acts['enable']!]), acts['home']!, ...(position.value === '' ? [] : [acts['move']!]), acts['jog-']!, acts['jog+']!,
+  const waits = acts['move']!.obstacle === noTarget;
+  const limits = ranges.value.position;
+  const range = limits === null ? '' : `, ${t('axis.range', { low: shown(limits[0], 0), high: shown(limits[1], 0) })}`;
+  // Without a fault nobody asks why it cannot be reset.
+  const told = [acts[enabled ? 'disable' : 'enable']!, acts['home']!, ...(waits ? [] : [acts['move']!]), acts['jog-']!, acts['jog+']!,
                 ...(entry.state.value.fault !== undefined ? [acts['reset']!] : [])];
   const active = store.commands.value.find((command) => command.axis === name && command.state === CommandState.ACTIVE);
   return (
@@ -138,13 +141,10 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
         <div class="row move">
           <Choice label={t('axis.mode')} value={mode.value} pick={(id) => { mode.value = id; }}
                   options={[{ id: 'to', name: t('axis.to') }, { id: 'by', name: t('axis.by') }]} />
-          <NumberField value={position} label={t(mode.value === 'to' ? 'axis.move-to' : 'axis.move-by')} unit={unit} />
-          <NumberField value={velocity} label={t('axis.at')} unit={`${unit}/s`} width={5} />
+          <NumberField value={position} label={mode.value === 'to' ? `${t('axis.move-to')}${range}` : t('axis.move-by')} unit={unit} />
+          <NumberField value={velocity} label={`${t('axis.at')}${most === null ? '' : `, ${t('axis.most', { velocity: shown(most, 0) })}`}`} unit={`${unit}/s`} width={5} />
           <ActButton act={acts['move']!} primary run={() => { if (to !== null) void (mode.peek() === 'to' ? moveTo : moveBy)(name, to, at ?? undefined, unit); }} />
-          {ranges.value.position !== null && (
-            <span class="hint">{t('axis.range', { low: shown(ranges.value.position[0], 0), high: shown(ranges.value.position[1], 0), unit })}
-              {most !== null && `, ${t('axis.most', { velocity: `${shown(most, 0)} ${unit}/s` })}`}</span>
-          )}
+          {waits && <span class="hint" id={describedBy(acts['move']!)}>{t('axis.type-target')}</span>}
         </div>
         <JogPad key={name} axis={name} speeds={speeds.value} unit={unit} plus={acts['jog+']!} minus={acts['jog-']!} typedSpeed={jogSpeed} />
         <Explanations acts={told} axis={name} unit={unit}

@@ -22,7 +22,7 @@ function Beside({ label, seen, bound }: { label: string; seen: number | null | u
       <span class="caption">{label}</span>
       <span><b>{span(seen)}</b> {t('bus.at-most', { bound: span(bound) })}{beyond && <> · {t('bus.beyond')}</>}</span>
       <svg class="bar" viewBox="0 0 100 6" preserveAspectRatio="none" aria-hidden="true">
-        <rect class="all" width="100" height="6" rx="3" /><rect class="part" width={Math.max(part * 100, known ? 1 : 0)} height="6" rx="3" />
+        <rect class="all" width="100" height="6" /><rect class="part" width={Math.max(part * 100, known ? 1 : 0)} height="6" />
       </svg>
     </div>
   );
@@ -36,7 +36,7 @@ function LoadBar({ statistics, budget }: { statistics: BusStatistics | undefined
       <span class="caption">{t('bus.load')}</span>
       <span><b>{share(statistics?.utilisation)}</b> {t('bus.of', { bound: share(bound) })}</span>
       <svg class="bar" viewBox="0 0 100 6" preserveAspectRatio="none" aria-hidden="true">
-        <rect class="all" width="100" height="6" rx="3" /><rect class="part" width={Math.min(100, now * 100)} height="6" rx="3" />
+        <rect class="all" width="100" height="6" /><rect class="part" width={Math.min(100, now * 100)} height="6" />
         {bound !== undefined && <rect class="bound" x={Math.min(99, bound * 100)} width="0.8" height="6" />}
       </svg>
     </div>

@@ -64,8 +64,8 @@ function MoveReport({ move }: { move: GroupMove }) {
               <th scope="row">{command?.axis}</th>
               <td class="number">{span(milliseconds(startedAfter))}</td>
               <td class="number">{span(milliseconds(arrivedAfter))}
-                <svg class="bar" viewBox="0 0 100 6" preserveAspectRatio="none" aria-hidden="true"><rect class="all" width="100" height="6" rx="3" />
-                  <rect class="part" x={begin} width={Math.max(0, end - begin)} height="6" rx="3" /></svg></td>
+                <svg class="bar" viewBox="0 0 100 6" preserveAspectRatio="none" aria-hidden="true"><rect class="all" width="100" height="6" />
+                  <rect class="part" x={begin} width={Math.max(0, end - begin)} height="6" /></svg></td>
               <td>{bySync ? t('group.by-sync') : startNote}</td>
             </tr>
           );

@@ -25,7 +25,7 @@ function AxisTerminals({ name }: { name: string }) {
   return (
     <section class="card terminals" id={`terminals-${name}`} aria-label={name}>
       <h2><a href={`/axis/${name}`} onClick={(event) => { event.preventDefault(); go('axis', name); }}>{name}</a>
-        {stale && <small class="old">{Number.isFinite(entry.age.value) ? t('live.old', { age: ageText(entry.age.value) }) : t('link.offline')}</small>}</h2>
+        {stale && ' '}{stale && <small class="old">{Number.isFinite(entry.age.value) ? t('live.old', { age: ageText(entry.age.value) }) : t('link.offline')}</small>}</h2>
       <h3>{t('terminal.inputs')}</h3>
       <ul class="lamps">{inputs.map((terminal) => <Lamp key={terminal.name} terminal={terminal} stale={stale} />)}</ul>
       <h3>{t('terminal.outputs')}</h3>

@@ -25,7 +25,7 @@ export function ActButton({ act, run, primary, children }:
 }
 
 /** The same reason has one line, whatever it is in the way of. */
-const describedBy = ({ obstacle }: Act): string =>
+export const describedBy = ({ obstacle }: Act): string =>
   `why-${[...`${obstacle?.text}`].reduce((hash, letter) => (hash * 31 + letter.charCodeAt(0)) | 0, 7) >>> 0}`;
 
 const remedyWords: { [act: string]: Key } = {

@@ -63,6 +63,10 @@ function Banners() {
   const info = store.info.value;
   const inhibited = info?.inhibited || (store.tick.value >= 0 && store.names.value.some((name) => store.axis(name)?.state.peek().inhibited));
   const live = store.live.value;
+  // The screen of the axis itself shows it.
+  const { screen, of } = route.value;
+  const held = leases.value.flatMap(({ axes }) => axes);
+  const elsewhere = held.length > 0 && !(screen === 'axis' && held.length === 1 && held[0] === of);
   return (
     <>
       {!live && (
@@ -78,9 +82,9 @@ function Banners() {
           <button class="button" onClick={askReleaseAll}>{t('action.release-all')}…</button>
         </div>
       )}
-      {leases.value.length > 0 && (
+      {elsewhere && (
         <div class="banner control" role="status">
-          <b>{t('control.mine')}</b> <span>{leases.value.flatMap(({ axes }) => axes).join(', ')}</span>
+          <b>{t('control.mine')}</b> <span>{held.join(', ')}</span>
           <button class="button" onClick={() => endControl('released')}>{t('action.give-back')}</button>
         </div>
       )}

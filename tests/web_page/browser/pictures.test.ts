@@ -1,0 +1,51 @@
+// Pictures of each screen: light, dark, on a panel, in Chinese. They are looked at by people.
+import { after, before, test } from 'node:test';
+import type { Browser } from 'playwright-core';
+import { launch, open, picture, ready, type Look } from './support';
+
+let browser: Browser;
+before(async () => { browser = await launch(); });
+after(() => browser.close());
+
+const screens = ['machine', 'axis/feeder', 'scope/feeder', 'groups', 'terminals', 'buses', 'events', 'people'];
+const looks: [string, Look][] = [
+  ['light', {}], ['dark', { theme: 'dark' }], ['panel', { panel: true, width: 1280, height: 800, touch: true }], ['zh', { lang: 'zh' }]];
+
+for (const [name, look] of looks) {
+  test(`pictures: ${name}`, async () => {
+    const opened = await open(browser, { ...look, path: '/axis/feeder' });
+    const { page } = opened;
+    await ready(page);
+    await page.evaluate(() => { (window as { done?: boolean }).done = false; });
+    const fields = page.locator('.controls .move input');
+    if (look.panel) {
+      await fields.first().click();
+      for (const key of ['2', '6', '0']) await page.locator(`.key-${key}`).click();
+      await picture(page, `${name}-keypad`);
+      await page.locator('.key-ok').click();
+    } else {
+      await fields.nth(0).fill('260');
+      await fields.nth(1).fill('80');
+    }
+    await page.locator('[data-act="move"]').click();
+    await page.waitForTimeout(1300);
+    await picture(page, `${name}-moving`);
+    await page.waitForTimeout(2600);
+    await fields.nth(0).evaluate(() => {});
+    for (const screen of screens) {
+      const [id, of] = screen.split('/');
+      await page.locator(`nav a[href="/${id}"]`).click();
+      await page.waitForTimeout(id === 'scope' || id === 'buses' ? 900 : 350);
+      await picture(page, `${name}-${id}`);
+      void of;
+    }
+    await page.locator('[data-stop="all"]').click();
+    await page.locator('nav a[href="/machine"]').click();
+    await page.waitForTimeout(400);
+    await picture(page, `${name}-stopped`);
+    await page.locator('nav a[href="/axis"]').click();
+    await page.waitForTimeout(400);
+    await picture(page, `${name}-explained`);
+    await opened.close();
+  });
+}

@@ -1,0 +1,68 @@
+// What the browser tests share: the built page behind a gateway that is made up, in Debian's Chromium.
+import { createRequire } from 'node:module';
+import { mkdirSync } from 'node:fs';
+import { join } from 'node:path';
+import type { Browser, BrowserContext, Page } from 'playwright-core';
+import { MockGateway } from '../mock/gateway';
+import type { Model } from '../mock/axis';
+
+const { chromium } = createRequire(process.env['AXISD_WEB_MODULES']!)('playwright-core') as typeof import('playwright-core');
+const axePath = createRequire(process.env['AXISD_WEB_MODULES']!).resolve('axe-core/axe.min.js');
+
+export const CHROMIUM = process.env['AXISD_CHROMIUM'] ?? '/usr/bin/chromium';
+
+export function launch(): Promise<Browser> {
+  return chromium.launch({ executablePath: CHROMIUM, args: ['--no-sandbox', '--disable-gpu', '--force-color-profile=srgb'] });
+}
+
+export interface Opened { gateway: MockGateway; url: string; context: BrowserContext; page: Page; close(): Promise<void> }
+
+export interface Look { width?: number; height?: number; panel?: boolean; theme?: 'light' | 'dark'; lang?: 'en' | 'de' | 'zh'; touch?: boolean; path?: string }
+
+/** Opens a screen of a machine of its own. What goes wrong in the page fails the test. */
+export async function open(browser: Browser, look: Look = {}, axes?: readonly Model[]): Promise<Opened> {
+  const gateway = axes === undefined ? new MockGateway(process.env['AXISD_WEB_PAGE']!) : new MockGateway(process.env['AXISD_WEB_PAGE']!, axes);
+  const url = await gateway.listen();
+  const context = await browser.newContext({
+    viewport: { width: look.width ?? 1440, height: look.height ?? 900 }, hasTouch: look.touch ?? false, locale: 'en-GB', reducedMotion: 'reduce', timezoneId: 'Europe/Berlin' });
+  const page = await context.newPage();
+  const errors: string[] = [];
+  page.on('pageerror', (error) => errors.push(String(error)));
+  page.on('console', (message) => { if (message.type() === 'error' && !/401|Failed to load resource|WebSocket/.test(message.text())) errors.push(message.text()); });
+  const query = new URLSearchParams({ panel: look.panel ? '1' : '0', theme: look.theme ?? 'light', lang: look.lang ?? 'en' });
+  await page.goto(`${url}${look.path ?? '/'}?${query}`);
+  return {
+    gateway, url, context, page,
+    async close() {
+      await context.close();
+      await gateway.close();
+      if (errors.length > 0) throw new Error(errors.join('\n'));
+    },
+  };
+}
+
+/** Waits until something holds. */
+export async function until(holds: () => boolean | Promise<boolean>, what: string, atMost = 5000): Promise<void> {
+  const end = performance.now() + atMost;
+  while (!(await holds())) {
+    if (performance.now() > end) throw new Error(`not within ${atMost} ms: ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+}
+
+export async function picture(page: Page, name: string): Promise<void> {
+  const folder = process.env['AXISD_WEB_PICTURES']!;
+  mkdirSync(folder, { recursive: true });
+  await page.screenshot({ path: join(folder, `${name}.png`) });
+}
+
+/** Takes control of the axis that is shown, and enables it. */
+export async function ready(page: Page): Promise<void> {
+  await page.locator('[data-act="take-control"]').first().click();
+  await page.locator('[data-act="give-back"]').waitFor();
+  const enable = page.locator('[data-act="enable"]:not([aria-disabled="true"])');
+  await enable.click();
+  await page.locator('[data-act="disable"]').waitFor();
+}
+
+export const axeSource = axePath;
