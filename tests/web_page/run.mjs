@@ -11,7 +11,9 @@ const files = readdirSync(join(here, 'browser')).filter((name) => name.endsWith(
   .filter((name) => names.length === 0 || names.includes(name.replace('.test.ts', '')));
 await page(join(out, 'page'));
 const bundles = await bundle(files.map((name) => join(here, 'browser', name)), join(out, 'tests'));
-const { status } = spawnSync(process.execPath, ['--enable-source-maps', '--test', '--test-concurrency=1', ...bundles], {
+// TEST: only tests whose names match.
+const only = process.env.TEST ? [`--test-name-pattern=${process.env.TEST}`] : [];
+const { status } = spawnSync(process.execPath, ['--enable-source-maps', '--test', ...only, ...bundles], {
   stdio: 'inherit',
   env: { ...process.env, AXISD_WEB_PAGE: join(out, 'page'), AXISD_WEB_PICTURES: join(out, 'pictures'), AXISD_WEB_MODULES: join(web, 'package.json') },
 });

@@ -4,11 +4,11 @@ import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import type { Browser, Page } from 'playwright-core';
 import { Role } from '@proto/access_pb';
-import { axeSource, launch, open, ready, until } from './support';
+import { axeSource, closeAll, launch, open, ready, until } from './support';
 
 let browser: Browser;
 before(async () => { browser = await launch(); });
-after(() => browser.close());
+after(() => closeAll(browser));
 
 const screens = ['machine', 'axis', 'scope', 'groups', 'terminals', 'buses', 'events', 'people'];
 
@@ -125,7 +125,7 @@ test('a page starts as observer: whatever cannot be used says why, and leads out
   await reasons.first().waitFor();
   assert.equal(await reasons.count(), 1);
   assert.match((await reasons.first().textContent())!, /take control first/);
-  await page.locator('[data-act="enable"]').click();
+  await page.locator('[data-act="enable"]').click({ force: true });
   assert.equal(gateway.machine.commands.length, 0, 'a button that says why it cannot be used does nothing');
   await page.locator('[data-remedy="take-control"]').click();
   await page.locator('[data-remedy="enable"]').click();
@@ -273,7 +273,7 @@ test('hold to run is refused with the reason while the lane takes longer than 30
   await ready(page);
   gateway.laneDelay = 450;
   await page.locator('.jog-said', { hasText: 'too slow to jog' }).waitFor();
-  await page.locator('[data-jog="+"]').hover();
+  await page.locator('[data-jog="+"]').hover({ force: true });
   await page.mouse.down();
   await page.locator('.jog-said', { hasText: 'takes more than 300 ms' }).waitFor();
   await page.waitForTimeout(600);

@@ -1,11 +1,11 @@
 // Pictures of each screen: light, dark, on a panel, in Chinese. They are looked at by people.
 import { after, before, test } from 'node:test';
 import type { Browser } from 'playwright-core';
-import { launch, open, picture, ready, type Look } from './support';
+import { closeAll, launch, open, picture, ready, type Look } from './support';
 
 let browser: Browser;
 before(async () => { browser = await launch(); });
-after(() => browser.close());
+after(() => closeAll(browser));
 
 const screens = ['machine', 'axis/feeder', 'scope/feeder', 'groups', 'terminals', 'buses', 'events', 'people'];
 const looks: [string, Look][] = [

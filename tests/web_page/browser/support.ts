@@ -31,14 +31,28 @@ export async function open(browser: Browser, look: Look = {}, axes?: readonly Mo
   page.on('console', (message) => { if (message.type() === 'error' && !/401|Failed to load resource|WebSocket/.test(message.text())) errors.push(message.text()); });
   const query = new URLSearchParams({ panel: look.panel ? '1' : '0', theme: look.theme ?? 'light', lang: look.lang ?? 'en' });
   await page.goto(`${url}${look.path ?? '/'}?${query}`);
-  return {
+  let closed = false;
+  const opened: Opened = {
     gateway, url, context, page,
     async close() {
+      if (closed) return;
+      closed = true;
+      all.delete(opened);
       await context.close();
       await gateway.close();
       if (errors.length > 0) throw new Error(errors.join('\n'));
     },
   };
+  all.add(opened);
+  return opened;
+}
+
+const all = new Set<Opened>();
+
+/** Also of tests that failed. */
+export async function closeAll(browser: Browser): Promise<void> {
+  for (const opened of [...all]) await opened.close().catch(() => {});
+  await browser.close();
 }
 
 /** Waits until something holds. */

@@ -102,7 +102,7 @@ function QuantityChart({ quantity, keep }: { quantity: Quantity; keep: (chart: C
   const height = quantities.value.length === 1 ? 420 : panel.value ? 200 : 260;
   return (
     <div class="scope-chart">
-      <h3>{t(`quantity.${quantity}`)}</h3>
+      <h2 class="minor">{t(`quantity.${quantity}`)}</h2>
       <ChartView spec={{ lines, height, clock: live, pick }} picture={picture} keep={keep} label={t(`quantity.${quantity}`)} />
     </div>
   );

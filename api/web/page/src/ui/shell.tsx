@@ -117,7 +117,10 @@ export function Shell() {
       <div class="middle">
         <Banners />
         <StopReportView />
-        <main tabIndex={-1}><Screen /></main>
+        <main tabIndex={0}>
+          {route.value.screen !== 'axis' && <h1 class="unseen">{t(`nav.${route.value.screen}` as 'nav.machine')}</h1>}
+          <Screen />
+        </main>
         <Notices />
         <Dialog />
       </div>
