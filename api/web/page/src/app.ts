@@ -183,6 +183,8 @@ function start(): void {
     if (document.visibilityState === 'visible') visible.value = true;
     else leave('hidden');
   });
+  document.addEventListener('freeze', () => leave('hidden'));
+  document.addEventListener('resume', () => { visible.value = document.visibilityState === 'visible'; });
   addEventListener('pagehide', () => leave('page-hide'));
   addEventListener('pageshow', () => { visible.value = document.visibilityState === 'visible'; });
   for (const type of ['pointerdown', 'keydown'] as const) {

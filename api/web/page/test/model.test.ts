@@ -5,7 +5,7 @@ import { ErrorDetailSchema, Reason } from '@proto/error_pb';
 import { machineOf, machinesOf, plainName } from '../src/model/cell';
 import { csv, isoTime } from '../src/model/csv';
 import { valueAt } from '../src/model/cursor';
-import { ageNow, ServerClock, staleAfter } from '../src/model/fresh';
+import { ageNow, PollMeter, ServerClock, staleAfter } from '../src/model/fresh';
 import { quantile } from '../src/model/histogram';
 import { ageText, keyed, shown, typed } from '../src/model/numbers';
 import { moveTime } from '../src/model/profile';
@@ -120,6 +120,18 @@ test('fresh: older than three polls is old', () => {
   assert.equal(staleAfter(50, null), 750);
   assert.equal(ageNow(30, 1000, 1500), 530);
   assert.equal(ageNow(30, 1000, 900), 30);
+});
+
+test('polls: as often as they were seen, at rest and in motion; a gap changes nothing', () => {
+  const meter = new PollMeter();
+  assert.equal(meter.period(false), null);
+  for (let at = 0; at <= 2000; at += 200) meter.read(at, false);
+  assert.equal(meter.period(false), 200);
+  for (let at = 2050; at <= 2500; at += 50) meter.read(at, true);
+  assert.equal(meter.period(true), 50);
+  meter.read(9000, true);
+  assert.equal(meter.period(true), 50);
+  assert.equal(meter.period(false), 200);
 });
 
 test('server clock: never later than the daemon, whatever the network does', () => {

@@ -77,6 +77,7 @@ export const zh: Texts = {
   'lease.mine': '由您控制',
   'lease.by': '由 {who} 占用',
   'note.held': '{who} 保持停止',
+  'note.not-ours': '功率级已接通；并非由此处使能',
   'notices.label': '消息',
   'command.sent': '{what}：已发送',
   'command.accepted': '{what}：已接受',

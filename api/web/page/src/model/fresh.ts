@@ -3,6 +3,31 @@
 /** Refresh periods that are taken for one that is not known. */
 const UNKNOWN_POLL_MS = 250;
 
+const SEEN = 9;
+const LONGEST_POLL_MS = 5000;
+
+/** How often an axis is read, at rest and in motion: as it was seen, since what a bus promises is the worst case. */
+export class PollMeter {
+  private last: { at: number; moving: boolean } | null = null;
+  private readonly seen: { [moving: string]: number[] } = { true: [], false: [] };
+
+  /** A reading of the drive. */
+  read(at: number, moving: boolean): void {
+    if (this.last !== null && this.last.moving === moving && at > this.last.at) {
+      const list = this.seen[String(moving)]!;
+      list.push(at - this.last.at);
+      if (list.length > SEEN) list.shift();
+    }
+    this.last = { at, moving };
+  }
+
+  /** The usual time between readings: a gap does not change it. Null: not known yet. */
+  period(moving: boolean): number | null {
+    const list = [...this.seen[String(moving)]!].sort((a, b) => a - b);
+    return list.length < 3 ? null : Math.min(list[list.length >> 1]!, LONGEST_POLL_MS);
+  }
+}
+
 /** Older than three polls is old: by then a reading is missing, and not just late. */
 export function staleAfter(streamMs: number, pollMs: number | null): number {
   return 3 * Math.max(streamMs, pollMs ?? UNKNOWN_POLL_MS);

@@ -7,7 +7,7 @@ import type { Command } from '@proto/types_pb';
 import type { Bus, BusStatistics } from '@proto/bus_service_pb';
 import type { BusBudget } from '@proto/budget_pb';
 import type { GetInfoResponse } from '@proto/system_service_pb';
-import { ageNow, ServerClock, staleAfter } from './fresh';
+import { ageNow, PollMeter, ServerClock, staleAfter } from './fresh';
 import { Recorder, MOST_RECORDS, type Record, type Trigger } from './record';
 import { Series } from './series';
 import { instant, milliseconds, sampleOf } from './wire';
@@ -20,6 +20,7 @@ export class AxisEntry {
   readonly state: Signal<AxisState>;
   readonly series = new Series();
   readonly recorder: Recorder;
+  readonly polls = new PollMeter();
   /** By performance.now(). */
   received = 0;
 
@@ -29,8 +30,7 @@ export class AxisEntry {
     this.age = computed(() => ageNow(milliseconds(this.state.value.age) ?? Infinity, this.received, store.now.value));
     this.stale = computed(() => {
       const { moving, link } = this.state.value;
-      const poll = store.pollOf(name, moving);
-      return !store.live.value || link !== LinkState.ONLINE || this.age.value > staleAfter(STREAM_MS, poll);
+      return !store.live.value || link !== LinkState.ONLINE || this.age.value > staleAfter(STREAM_MS, this.polls.period(moving));
     });
   }
 
@@ -61,25 +61,9 @@ export class Store {
   /** Counts the batches: what is drawn anew, is drawn with them. */
   readonly tick = signal(0);
   private readonly axes = new Map<string, AxisEntry>();
-  private readonly polls = computed(() => {
-    const polls = new Map<string, { idle: number | null; moving: number | null }>();
-    for (const { axes } of this.budgets.value) {
-      for (const budget of axes) {
-        polls.set(budget.axis, {
-          idle: milliseconds(budget.refreshIdle), moving: milliseconds(budget.refreshMovingAll) ?? milliseconds(budget.refreshMoving) });
-      }
-    }
-    return polls;
-  });
   private nextRecord = 1;
 
   axis(name: string): AxisEntry | undefined { return this.axes.get(name); }
-
-  /** As far apart as readings of the axis may be; null: not known. */
-  pollOf(name: string, moving: boolean): number | null {
-    const poll = this.polls.value.get(name);
-    return poll === undefined ? null : moving ? poll.moving : poll.idle;
-  }
 
   /** A batch of the stream of states. */
   take(states: readonly AxisState[], instance: string, dropped: bigint, at: number): void {
@@ -117,6 +101,7 @@ export class Store {
     entry.state.value = state;
     const sample = sampleOf(state);
     if (sample !== null && state.link === LinkState.ONLINE && entry.series.push(sample)) {
+      entry.polls.read(sample.at, sample.moving);
       const trigger = this.trigger.peek();
       entry.recorder.feed(sample, trigger, trigger.on === 'edge' ? trigger.name : trigger.on === 'level' ? trigger.quantity : '',
                           this.after.peek());

@@ -136,7 +136,7 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
           {enabled ? <ActButton act={acts['disable']!} run={() => void disable(name)} />
             : <ActButton act={acts['enable']!} run={() => void enable(name)} />}
           <ActButton act={acts['home']!} run={() => void home(name)} />
-          {(entry.state.value.fault !== undefined || acts['reset']!.obstacle === null) && <ActButton act={acts['reset']!} run={() => void reset(name)} />}
+          {entry.state.value.fault !== undefined && <ActButton act={acts['reset']!} run={() => void reset(name)} />}
         </div>
         <div class="row move">
           <Choice label={t('axis.mode')} value={mode.value} pick={(id) => { mode.value = id; }}

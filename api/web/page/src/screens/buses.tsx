@@ -37,7 +37,7 @@ function LoadBar({ statistics, budget }: { statistics: BusStatistics | undefined
       <span><b>{share(statistics?.utilisation)}</b> {t('bus.of', { bound: share(bound) })}</span>
       <svg class="bar" viewBox="0 0 100 6" preserveAspectRatio="none" aria-hidden="true">
         <rect class="all" width="100" height="6" /><rect class="part" width={Math.min(100, now * 100)} height="6" />
-        {bound !== undefined && <rect class="bound" x={Math.min(99, bound * 100)} width="0.8" height="6" />}
+        {bound !== undefined && <rect class="bound" x={Math.min(99, bound * 100)} width="0.3" height="6" />}
       </svg>
     </div>
   );

@@ -40,6 +40,7 @@ export function noteText(state: AxisState): string {
     : state.state === State.ERROR_STOP ? state.fault : undefined;
   if (error !== undefined) return [error.message, error.remedy].filter(Boolean).join(': ');
   if (state.holds.length > 0) return t('note.held', { who: state.holds.map(({ holder }) => holder).join(', ') });
+  if (state.enabled && !state.enabledByDaemon) return t('note.not-ours');
   return state.drift || state.alarmName || state.linkNote;
 }
 
