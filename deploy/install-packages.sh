@@ -15,7 +15,7 @@ build=(
 run=(libabsl20220623 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libsodium23 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
 # prometheus starts a server of its own where there is an init: systemctl disable --now prometheus.
 test=(
-  can-utils clang-format-19 clang-tidy-19 fish groff-base iproute2 libclang-rt-19-dev mypy openssl procps prometheus python3-can
+  can-utils chromium clang-format-19 clang-tidy-19 fish fonts-wqy-microhei groff-base iproute2 libclang-rt-19-dev mypy openssl procps prometheus python3-can
   python3-grpcio python3-jsonschema python3-pymodbus python3-serial python3-serial-asyncio
   python3-setuptools python3-venv python3-wheel python3-yaml shellcheck systemd user-mode-linux zsh
 )
@@ -42,7 +42,7 @@ installed=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2
   true
 mapfile -t missing < <(printf '%s\n' "${wanted[@]}" | grep -vxF -f <(printf '%s\n' "$installed") || true)
 
-# npm fetches buf, the Node.js example's libraries and the CANopen library of tests/foreign. Debian's npm conflicts with
+# npm fetches buf, the libraries of the page and of the Node.js example, and the CANopen library of tests/foreign. Debian's npm conflicts with
 # Node.js from elsewhere, so any npm will do.
 case "${1:-all}" in test | all) command -v npm >/dev/null || missing+=(nodejs npm) ;; esac
 

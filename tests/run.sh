@@ -24,6 +24,7 @@ node_packages() { (cd "$1" && npm ci --ignore-scripts --no-audit --no-fund --log
 compgen -G 'node_modules/@bufbuild/buf-linux-*/bin/buf' >/dev/null || node_packages .
 [ -d api/examples/node/node_modules/@grpc/grpc-js ] || node_packages api/examples/node
 [ -d tests/foreign/node_modules/canopen ] || node_packages tests/foreign
+[ -d api/web/node_modules/esbuild ] || node_packages api/web
 
 symbolizer=$(command -v llvm-symbolizer-19)
 export ASAN_OPTIONS="detect_stack_use_after_return=1:external_symbolizer_path=$symbolizer"

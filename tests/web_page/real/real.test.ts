@@ -13,6 +13,8 @@ const AXIS = 'turntable';
 /** From the last renewal to standstill: the hold, the ramp, and the readings that show it. */
 const HOLD_MS = 300;
 const RAMP_MS = 300;
+/** A daemon with sanitizers, on a busy computer, shows later that it rests. */
+const SLACK_MS = process.env['AXISD_SANITIZE'] ? 1500 : 150;
 /** How long nothing may move afterwards. */
 const QUIET_MS = 3000;
 
@@ -52,6 +54,8 @@ async function until(holds: () => Promise<boolean>, what: string, atMost: number
 
 /** A page of the axis, under control, enabled, with a finger on the button and the axis in motion. */
 async function held(touch = false): Promise<{ page: Page; cdp: CDPSession; at: { x: number; y: number } }> {
+  // What an earlier row left behind: after the daemon's end nobody knows what became of the jog.
+  if ((await stack.axisctl('state', AXIS, '--json')).includes('STATE_ERROR_STOP')) await stack.axisctl('reset', AXIS, '--wait');
   const context = await browser.newContext({ viewport: { width: 1440, height: 900 }, hasTouch: touch });
   const page = await context.newPage();
   await page.goto(`${stack.url}/axis/${AXIS}?panel=0&theme=light&lang=en`);
@@ -73,7 +77,9 @@ async function pressed(touch = false) {
   const { page, cdp, at } = opened;
   if (touch) await cdp.send('Input.dispatchTouchEvent', { type: 'touchStart', touchPoints: [{ ...at, id: 1 }] });
   else { await page.mouse.move(at.x, at.y); await page.mouse.down(); }
-  await until(async () => (await stack.truth(AXIS)).moving, 'it moves', 5000);
+  await until(async () => (await stack.truth(AXIS)).moving, 'it moves', 5000).catch(async (error: Error) => {
+    throw new Error(`${error.message}: ${await page.locator('.controls').innerText()} ${await page.locator('.axis-head').innerText()}`);
+  });
   await sleep(300);
   return opened;
 }
@@ -97,7 +103,7 @@ async function restsAfterLastRenewal(): Promise<void> {
   const took = performance.now() - stack.network.lastOf('/Jog');
   console.log(`# from the last renewal to standstill: ${took.toFixed(0)} ms`);
   // 50 ms beyond hold and ramp; and what the readings take that show it here.
-  assert.ok(took <= HOLD_MS + RAMP_MS + 50 + 150, `${took.toFixed(0)} ms`);
+  assert.ok(took <= HOLD_MS + RAMP_MS + 50 + SLACK_MS, `${took.toFixed(0)} ms`);
   await restsForGood(100);
 }
 
@@ -250,20 +256,45 @@ test('a finger holds for long: it moves on, started once', async () => {
   await restsForGood(1000);
 });
 
-test('the texts of what cannot be used are those of the refusals', async () => {
+/** Asks for a command by hand, and gives the text with which it is refused. */
+async function refusal(...words: string[]): Promise<string> {
+  return stack.axisctl(...words).then(() => '', (error: { stderr: string }) => error.stderr);
+}
+
+test('a button that cannot be used shows the text of the refusal, and its remedy leads out', async () => {
   const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
   const page = await context.newPage();
-  await stack.axisctl('disable', 'lifter').catch(() => '');
-  await page.goto(`${stack.url}/axis/lifter?panel=0&lang=en`);
-  await page.locator('.controls [data-act="take-control"]').click();
+  await stack.axisctl('disable', 'pusher', '--wait');
+  await page.goto(`${stack.url}/axis/pusher?panel=0&lang=en`);
+  await page.locator('.controls [data-remedy="take-control"]').click();
   await page.locator('[data-act="give-back"]').waitFor();
-  await page.locator('[data-explain]').first().waitFor();
-  await page.locator('[data-act="give-back"]').click();
-  await page.close();
-  const refused = await stack.axisctl('move', 'lifter', '10mm').then(() => '', (error: { stderr: string }) => error.stderr);
-  const explained = await stack.axisctl('explain', 'lifter', 'move', '10mm').catch((error: { stdout: string }) => error.stdout);
-  assert.notEqual(refused, '');
-  assert.notEqual(explained, '');
+  const lease = async () => (JSON.parse(await stack.axisctl('lease', 'list', '--json')) as { leases?: unknown[] }).leases?.length ?? 0;
+  assert.equal(await lease(), 1);
+  const shown = async (what: string) => {
+    const line = page.locator('.controls .reasons li', { hasText: what });
+    await line.waitFor();
+    return (await line.locator('[data-explain]').textContent())!;
+  };
+  const field = (index: number) => page.locator('.controls .move input').nth(index);
+  // Everybody is the same client here, so a command without the page's token is refused for that: give control back to ask.
+  const situations: [string, string, string[], (() => Promise<void>)?][] = [
+    ['off', 'Home', ['home', 'pusher']],
+    ['not homed', 'Move', ['move', 'pusher', '50mm'], async () => { await page.locator('[data-remedy="enable"]').click(); await page.locator('[data-act="disable"]').waitFor(); await field(0).fill('50'); }],
+    ['too fast', 'Move', ['move', 'pusher', '--relative', '5mm', '--velocity', '900mm/s'],
+      async () => { await page.locator('.controls .choice .button', { hasText: 'by' }).click(); await field(0).fill('5'); await field(1).fill('900'); }],
+    ['too slow', 'Move', ['move', 'pusher', '--relative', '5mm', '--velocity', '0.01mm/s'], async () => { await field(1).fill('0.01'); }]];
+  for (const [what, label, words, reach] of situations) {
+    await reach?.();
+    await sleep(400);
+    const text = await shown(label);
+    await page.locator('[data-act="give-back"]').click();
+    await page.locator('.controls [data-act="take-control"]').waitFor();
+    assert.ok((await refusal(...words)).includes(text), `${what}: '${text}' is not what is said: ${await refusal(...words)}`);
+    await page.locator('.controls .row [data-act="take-control"]').click();
+    await page.locator('[data-act="give-back"]').waitFor();
+  }
+  await page.locator('[data-remedy="use"]').click();
+  await until(async () => await page.locator('.controls .reasons li', { hasText: 'Move' }).count() === 0, 'the remedy leads out', 3000);
 });
 
 test('STOP ALL: every axis says what became of it, and a question comes before the release', async () => {
