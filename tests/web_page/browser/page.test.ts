@@ -217,7 +217,7 @@ test('hold to run: whatever ends it, the button has to be let go first', async (
     await until(() => feeder.moving, `${what}: it moves`);
     await end();
     await until(() => !feeder.moving, `${what}: it rests`);
-    assert.equal(await pad.getAttribute('data-hold'), 'lost', what);
+    await until(async () => (await pad.getAttribute('data-hold')) === 'lost', `${what}: it is lost`);
     const gone = feeder.gone;
     await page.waitForTimeout(250);
     assert.equal(feeder.gone, gone, `${what}: still down, and nothing moves`);
@@ -264,6 +264,31 @@ test('hold to run by keys: an arrow moves with the dead-man key only, and never 
   await page.keyboard.up('Shift');
   await until(() => !feeder.moving, 'it rests');
   await page.keyboard.up('ArrowRight');
+  await opened.close();
+});
+
+test('keys in the field beside the buttons move its cursor, and no axis', async () => {
+  const opened = await open(browser, { path: '/axis/feeder' });
+  await ready(opened.page);
+  await opened.page.locator('.jog-pad input').fill('50');
+  await opened.page.keyboard.down('Shift');
+  await opened.page.keyboard.down('ArrowLeft');
+  await opened.page.waitForTimeout(300);
+  assert.equal(opened.gateway.machine.axis('feeder').gone, 0);
+  await opened.close();
+});
+
+test('hold to run ends when the states no longer arrive, though the lane is quick', async () => {
+  const opened = await open(browser, { path: '/axis/feeder' });
+  const { page, gateway } = opened;
+  await ready(page);
+  await page.locator('[data-jog="+"]:not([aria-disabled="true"])').hover();
+  await page.mouse.down();
+  await until(() => gateway.machine.axis('feeder').moving, 'it moves');
+  gateway.world.silent = true;
+  await until(() => !gateway.machine.axis('feeder').moving, 'it rests', 1500);
+  await page.locator('.jog-said', { hasText: 'no longer hears from the machine' }).waitFor();
+  await page.mouse.up();
   await opened.close();
 });
 

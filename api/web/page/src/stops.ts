@@ -12,6 +12,7 @@ import { lane } from './app';
 import { Kind } from './lane/frame';
 import { detailOf } from './model/wire';
 import { clients, problem } from './transport/clients';
+import { notify } from './ui/notices';
 
 /** What became of a stop of one axis: the command is looked up as it goes on. */
 export interface StopOutcome { axis: string; command: Command | null; error: ErrorDetail | string | null }
@@ -90,8 +91,9 @@ export function haltAxis(axis: string): Promise<void> {
 export function stopAll(): Promise<void> {
   const message = create(StopAllRequestSchema, { waitUntil: WaitUntil.ACCEPTED });
   return reported('stop-all', '', async () => {
-    const { results } = await sent(`${SystemService.typeName}/StopAll`, StopAllRequestSchema, message, StopAllResponseSchema,
+    const { results, notDurable } = await sent(`${SystemService.typeName}/StopAll`, StopAllRequestSchema, message, StopAllResponseSchema,
                                    () => clients.system.stopAll(message));
+    if (notDurable !== undefined) notify('warning', { plain: notDurable.message }, notDurable.remedy);
     return results.map(({ axis, command, error }) => ({ axis, command: command ?? null, error: error ?? null }));
   });
 }

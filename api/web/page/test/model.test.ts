@@ -11,7 +11,7 @@ import { ageText, keyed, shown, typed } from '../src/model/numbers';
 import { moveTime } from '../src/model/profile';
 import { niceSpeed, rangesOf } from '../src/model/ranges';
 import { AFTER_MS, BEFORE_MS, fires, Recorder, type Record } from '../src/model/record';
-import { remedyOf } from '../src/model/remedy';
+import { nearest, remedyOf } from '../src/model/remedy';
 import { align, KEPT_MS, listed, Series, thin, type Sample } from '../src/model/series';
 
 const sample = (at: number, change: Partial<Sample> = {}): Sample => ({
@@ -181,6 +181,12 @@ test('remedies: what a reason leads to', () => {
   assert.deepEqual(remedyOf(detail(Reason.SOFT_LIMIT, { minimum: 0, maximum: 400, unit: 'mm' }), { position: 500 }), { act: 'use', field: 'position', value: 400 });
   assert.deepEqual(remedyOf(detail(Reason.OUT_OF_RANGE, { minimum: 1, maximum: 90, unit: 'mm/s' }), { position: 5, velocity: 200 }), { act: 'use', field: 'velocity', value: 90 });
   assert.equal(remedyOf(detail(Reason.OUT_OF_RANGE, { minimum: 1, maximum: 90, unit: 'ms' }), { position: 5 }), null);
+});
+
+test('the nearest value that is permitted is permitted when it is written with few digits', () => {
+  assert.equal(nearest(0, 1 / 3, 2 / 3), 0.3334);
+  assert.equal(nearest(9, 1 / 3, 2 / 3), 0.6666);
+  assert.equal(nearest(0.5, 1 / 3, 2 / 3), 0.5);
 });
 
 test('ranges are read from what stands in the way', () => {

@@ -9,6 +9,8 @@ import { clients } from '../transport/clients';
 import { HOLD_MS, idle, step, type Effect, type Event, type Loss, type Source, type State } from './machine';
 
 const VALID_MS = 1000;
+/** While held, states have to arrive at least so often. */
+const SEEN_MS = 1000;
 
 export class Holder {
   readonly state = signal<State>(idle);
@@ -64,7 +66,10 @@ export class Holder {
     // The time of the frame itself may be that of before a hang.
     this.painting = requestAnimationFrame(() => {
       this.painting = 0;
-      this.dispatch({ type: 'frame', at: performance.now() });
+      const now = performance.now();
+      // Nobody moves what they do not see.
+      if (now - (store.axis(this.axis)?.received ?? -Infinity) > SEEN_MS) this.dispatch({ type: 'loss', loss: 'not-live' });
+      this.dispatch({ type: 'frame', at: now });
     });
   }
 

@@ -6,9 +6,13 @@ export type Remedy =
   | { act: 'show'; screen: 'buses' | 'terminals' | 'people' | 'events' }
   | { act: 'use'; field: 'position' | 'velocity'; value: number };
 
-/** The value within a permitted range that is nearest to what was asked. */
+/** The value within a permitted range that is nearest to what was asked, with so few digits that people can read it. */
 export function nearest(asked: number, minimum: number, maximum: number): number {
-  return Math.min(maximum, Math.max(minimum, asked));
+  const value = Math.min(maximum, Math.max(minimum, asked));
+  const grain = 10_000;
+  const rounded = Math.round(value * grain) / grain;
+  if (rounded < minimum) return Math.ceil(minimum * grain) / grain;
+  return rounded > maximum ? Math.floor(maximum * grain) / grain : rounded;
 }
 
 /** Null: time, or somebody at the machine, has to do it; the text says what. */

@@ -13,6 +13,7 @@ import { Series } from './series';
 import { instant, milliseconds, sampleOf } from './wire';
 
 export const STREAM_MS = 50;
+const MOST_RECORDED_SAMPLES = 100_000;
 const MOST_EVENTS = 1000;
 const MOST_COMMANDS = 500;
 
@@ -58,6 +59,12 @@ export class Store {
   /** How long a trigger records. */
   readonly after = signal(2000);
   readonly clock = new ServerClock();
+  /** STOP ALL holds the machine, as the axes tell it. */
+  readonly inhibited = computed(() => {
+    this.tick.value;
+    for (const { state } of this.axes.values()) if (state.peek().inhibited) return true;
+    return this.info.value?.inhibited ?? false;
+  });
   /** Counts the batches: what is drawn anew, is drawn with them. */
   readonly tick = signal(0);
   private readonly axes = new Map<string, AxisEntry>();
@@ -110,7 +117,10 @@ export class Store {
 
   recorded(entry: AxisEntry, record: Omit<Record, 'id' | 'axis' | 'unit'>): void {
     const whole = { ...record, id: this.nextRecord++, axis: entry.name, unit: entry.state.peek().unit };
-    this.records.value = [whole, ...this.records.peek()].slice(0, MOST_RECORDS);
+    // As many as there is room for, the newest in any case.
+    let room = MOST_RECORDED_SAMPLES;
+    this.records.value = [whole, ...this.records.peek()].slice(0, MOST_RECORDS)
+      .filter(({ id, samples }) => { room -= samples.length; return room >= 0 || id === whole.id; });
   }
 
   heardEvents(events: readonly MachineEvent[], anew: boolean): void {

@@ -1,4 +1,5 @@
 // Below an axis: its commands, its events, and its bus.
+import { useComputed } from '@preact/signals';
 import { store } from '../app';
 import { t } from '../i18n';
 import type { AxisEntry } from '../model/store';
@@ -8,7 +9,7 @@ import { go } from '../route';
 import { CommandList, EventList } from './events';
 
 export function AxisLogs({ name, entry }: { name: string; entry: AxisEntry }) {
-  const { bus } = entry.state.value;
+  const bus = useComputed(() => entry.state.value.bus).value;
   const budget = store.budgets.value.find((known) => known.bus === bus);
   const axis = budget?.axes.find((known) => known.axis === name);
   const load = store.statistics.value.find((known) => known.bus === bus)?.utilisation;

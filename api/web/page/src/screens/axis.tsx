@@ -104,7 +104,9 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
 
   const page = useComputed(() => pageObstacle(name));
   const obstacle = (key: string): Obstacle | null => page.value ?? explained.answers.value.get(key)?.obstacle ?? null;
-  const { unit } = entry.state.value;
+  const unit = useComputed(() => entry.state.value.unit).value;
+  const enabled = useComputed(() => entry.state.value.enabled).value;
+  const faulty = useComputed(() => entry.state.value.fault !== undefined).value;
   const mine = tokenFor(name) !== 0n;
   const to = typed(position.value);
   const at = typed(velocity.value);
@@ -118,13 +120,12 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
     'jog+': { id: 'jog+', label: t('jog.plus'), obstacle: obstacle('jog+') },
     'jog-': { id: 'jog-', label: t('jog.minus'), obstacle: obstacle('jog-') },
   };
-  const { enabled } = entry.state.value;
   const waits = acts['move']!.obstacle === noTarget;
   const limits = ranges.value.position;
   const range = limits === null ? '' : `, ${t('axis.range', { low: shown(limits[0], 0), high: shown(limits[1], 0) })}`;
   // Without a fault nobody asks why it cannot be reset.
   const told = [acts[enabled ? 'disable' : 'enable']!, acts['home']!, ...(waits ? [] : [acts['move']!]), acts['jog-']!, acts['jog+']!,
-                ...(entry.state.value.fault !== undefined ? [acts['reset']!] : [])];
+                ...(faulty ? [acts['reset']!] : [])];
   const active = store.commands.value.find((command) => command.axis === name && command.state === CommandState.ACTIVE);
   return (
     <div class="axis-screen">
@@ -136,7 +137,7 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
           {enabled ? <ActButton act={acts['disable']!} run={() => void disable(name)} />
             : <ActButton act={acts['enable']!} run={() => void enable(name)} />}
           <ActButton act={acts['home']!} run={() => void home(name)} />
-          {entry.state.value.fault !== undefined && <ActButton act={acts['reset']!} run={() => void reset(name)} />}
+          {faulty && <ActButton act={acts['reset']!} run={() => void reset(name)} />}
         </div>
         <div class="row move">
           <Choice label={t('axis.mode')} value={mode.value} pick={(id) => { mode.value = id; }}

@@ -31,7 +31,7 @@ export function predictedEnd(command: Command | undefined, entry: AxisEntry): nu
 export function MotionPlot({ entry, active, scope }: { entry: AxisEntry; active: Command | undefined; scope: () => void }) {
   const { name } = entry;
   const record = useComputed(() => store.records.value.find((known) => known.axis === name && known.why === 'motion'));
-  const unit = entry.state.value.unit;
+  const unit = useComputed(() => entry.state.value.unit).value;
   const lines: Line[] = [
     { label: t('quantity.position'), scale: unit, style: 0 }, { label: t('quantity.velocity'), scale: `${unit}/s`, style: 1 },
     { label: t('quantity.target'), scale: unit, style: 2, stepped: true }];

@@ -35,7 +35,7 @@ export class Chart {
       },
     });
     this.plot = new uPlot({
-      width: Math.max(200, place.clientWidth), height: spec.height, padding: [10, scales.length > 1 ? 0 : 14, 0, 0],
+      width: Math.max(200, place.clientWidth), height: spec.height, padding: [10, scales.length > 1 ? 0 : 34, 0, 0],
       legend: { show: false }, cursor: { drag: { x: false, y: false }, points: { show: false }, y: false },
       scales: { x: { time: false }, ...Object.fromEntries(scales.map((scale) => [scale, {
         range: (_: uPlot, low: number | null, high: number | null): [number, number] => {

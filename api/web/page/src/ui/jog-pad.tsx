@@ -63,7 +63,8 @@ export function JogPad({ axis, speeds, unit, plus, minus, typedSpeed }: Props) {
   }, [holder]);
 
   const keyDown = (event: KeyboardEvent) => {
-    if (event.key !== 'ArrowLeft' && event.key !== 'ArrowRight') return;
+    // In a field the same keys move the cursor.
+    if ((event.key !== 'ArrowLeft' && event.key !== 'ArrowRight') || (event.target as Element).closest('input')) return;
     event.preventDefault();
     const { speeds: now, plus: up, minus: down } = latest.current;
     if (event.repeat || !event.getModifierState(DEAD_MAN)) return;

@@ -61,7 +61,7 @@ function Nav() {
 /** What everybody at this page has to know now. */
 function Banners() {
   const info = store.info.value;
-  const inhibited = info?.inhibited || (store.tick.value >= 0 && store.names.value.some((name) => store.axis(name)?.state.peek().inhibited));
+  const inhibited = store.inhibited.value;
   const live = store.live.value;
   // The screen of the axis itself shows it.
   const { screen, of } = route.value;
