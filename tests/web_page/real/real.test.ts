@@ -139,10 +139,13 @@ test('the tab is hidden', async () => {
 });
 
 test('the tab is frozen', async () => {
-  const { cdp } = await pressed();
+  // A browser freezes what is hidden. What it calls frozen while it is shown may go on being painted, and is in use then.
+  const { page, cdp } = await pressed();
+  await setVisibility(page, 'hidden');
   await cdp.send('Page.setWebLifecycleState', { state: 'frozen' });
   await restsForGood(1500);
   await cdp.send('Page.setWebLifecycleState', { state: 'active' });
+  await setVisibility(page, 'visible');
   await restsForGood(100);
 });
 
