@@ -11,7 +11,7 @@ add_test(NAME web_page.types COMMAND ${AXISD_NODE} ${web}/node_modules/typescrip
 add_test(NAME web_page.types_of_tests
          COMMAND ${AXISD_NODE} ${web}/node_modules/typescript/bin/tsc --noEmit -p ${page_tests}/tsconfig.json)
 add_test(NAME web_page.unit COMMAND ${AXISD_NODE} ${web}/tools/test.mjs WORKING_DIRECTORY ${web})
-add_test(NAME web_page.browser COMMAND ${AXISD_NODE} ${page_tests}/run.mjs ${CMAKE_BINARY_DIR}/web_page page)
+add_test(NAME web_page.browser COMMAND ${AXISD_NODE} ${page_tests}/run.mjs ${CMAKE_BINARY_DIR}/web_page page load)
 # For people: build/*/web_page_pictures/pictures.
 add_test(NAME web_page.pictures COMMAND ${AXISD_NODE} ${page_tests}/run.mjs ${CMAKE_BINARY_DIR}/web_page_pictures pictures)
 set(names types types_of_tests unit browser pictures)

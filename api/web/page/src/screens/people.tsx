@@ -33,7 +33,7 @@ function Leases() {
   if (leases.value.length === 0) return <p class="empty">{t('people.no-leases')}</p>;
   return (
     <table>
-      <thead><tr><th scope="col">{t('people.who')}</th><th scope="col">{t('nav.machine')}</th><th scope="col" class="number">{t('people.remaining')}</th><th /></tr></thead>
+      <thead><tr><th scope="col">{t('people.who')}</th><th scope="col">{t('column.axis')}</th><th scope="col" class="number">{t('people.remaining')}</th><th /></tr></thead>
       <tbody>{leases.value.map((lease) => (
         <tr key={`${lease.client}${lease.axes.join()}`}>
           <th scope="row">{lease.client} <span class="function">{lease.label}</span></th>
