@@ -28,7 +28,9 @@ std::string_view innermost(std::string_view text) {
 
 /// gRPC's words for a call that never had a connection.
 bool never_connected(std::string_view message) {
-  return message.starts_with("failed to connect") || message.starts_with("DNS resolution failed");
+  // The last one: no connection can be made with the pair of certificate and key.
+  return message.starts_with("failed to connect") || message.starts_with("DNS resolution failed") ||
+         message.starts_with("empty address list");
 }
 
 /// The daemon's end cut the call off: what it was to do may have been accepted.

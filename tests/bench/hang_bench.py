@@ -62,7 +62,7 @@ def hang(tools, machine, supervisor, axes, chance):
     if still:
         sys.exit(f"hang_bench.py: nodes {still} turn after axisd --quiesce")
     ready = supervisor.wait_for("READY=1", since=began)
-    return began, supervisor.last_before("WATCHDOG=1", killed), killed, quiesced, ready
+    return began, supervisor.last_word_before(killed), killed, quiesced, ready
 
 
 def stop_ends(tools, machine, hangs, nodes, baud):

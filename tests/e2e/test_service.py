@@ -54,7 +54,7 @@ class Service(Scenario):
         killed = supervisor.wait_for("SIGKILL", since=at)
         ready = supervisor.wait_for("READY=1", since=at)
         self.assertEqual(supervisor.events(since=killed)[:5], ["SIGKILL", "ended -9", "quiesced 0", "started", "READY=1"])
-        last_word = supervisor.last_before("WATCHDOG=1", killed)
+        last_word = supervisor.last_word_before(killed)
         self.assertGreaterEqual(killed - last_word, supervisor.interval * 1e9, "not before its time")
         self.assertEqual(supervisor.events(since=max(at, last_word) + 1, without=())[0], "SIGKILL", "it said nothing more")
         shaft = machine.sim.shaft()

@@ -9,8 +9,9 @@ from .types import Command, ErrorDetail, StopResult
 from .v1 import error_pb2
 
 _TRAILER = "grpc-status-details-bin"
-# How gRPC's texts begin for a call that never had a connection.
-_NEVER_CONNECTED = ("failed to connect", "DNS resolution failed")
+# How gRPC's texts begin for a call that never had a connection; the last one, where none can be made with the pair of
+# certificate and key.
+_NEVER_CONNECTED = ("failed to connect", "DNS resolution failed", "empty address list")
 
 
 class AxisdError(Exception):

@@ -6,6 +6,7 @@ import os
 import socket
 import ssl
 import time
+from typing import Any
 
 Path = str | os.PathLike[str]
 
@@ -17,7 +18,7 @@ _UNKNOWN_AUTHORITY = (7, 18, 19, 20, 21)
 _OTHER_HOST = (62, 64)
 
 
-def _out_of_time(certificate: dict) -> tuple[bool, str] | None:
+def _out_of_time(certificate: dict[str, Any]) -> tuple[bool, str] | None:
     """Why a certificate is not valid now, and whether it has ended, else has not begun; None: it is."""
     def text(at: float) -> str:
         return datetime.datetime.fromtimestamp(at, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -28,7 +29,7 @@ def _out_of_time(certificate: dict) -> tuple[bool, str] | None:
     return (False, f"is not valid before {text(begin)}") if begin > time.time() else None
 
 
-def _decoded(certificate: Path, key: Path) -> dict:
+def _decoded(certificate: Path, key: Path) -> dict[str, Any]:
     """What stands in a certificate of one's own: ssl only tells that of a peer, so it is shown to itself."""
     server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     server.load_cert_chain(certificate, key)
@@ -67,13 +68,13 @@ def _own(certificate: Path, key: Path) -> str | None:
             + ("renew it" if ended else "set the clock of this computer, or give another one"))
 
 
-def _names(shown: dict) -> str:
+def _names(shown: dict[str, Any]) -> str:
     names = [value for kind, value in shown.get("subjectAltName", ()) if kind in ("DNS", "IP Address")]
     common = [value for part in shown.get("subject", ()) for key, value in part if key == "commonName"]
     return ", ".join(names or common)
 
 
-def _shake_hands(address: tuple[str, int], context: ssl.SSLContext) -> tuple[dict, bool]:
+def _shake_hands(address: tuple[str, int], context: ssl.SSLContext) -> tuple[dict[str, Any], bool]:
     """What the daemon shows, and whether it takes what is shown to it."""
     with socket.create_connection(address, timeout=_PATIENCE) as raw:
         with context.wrap_socket(raw, server_hostname=address[0]) as connection:

@@ -80,6 +80,7 @@ class Program:
                 raise AssertionError(f"{self.name}: {text[text.index(mark):][:4000]}")
 
 
-def run(arguments, limit=LIMIT):
-    """Runs a program to its end; the completed process with its texts."""
-    return subprocess.run(arguments, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=limit, check=False)
+def run(arguments, limit=LIMIT, env=None):
+    """Runs a program to its end; the completed process with its texts. `env`: in place of the own environment."""
+    return subprocess.run(arguments, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=limit, check=False,
+                          env=env)

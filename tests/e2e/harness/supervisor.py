@@ -62,9 +62,10 @@ class Supervisor(threading.Thread):
         with self._lock:
             return next((at for at, each in self._events if at >= since and each == what), None)
 
-    def last_before(self, what, before):
+    def last_word_before(self, before):
+        """When the daemon last said that it lives."""
         with self._lock:
-            return max(at for at, each in self._events if at < before and each == what)
+            return max(at for at, each in self._events if at < before and each in ("READY=1", "WATCHDOG=1"))
 
     def wait_for(self, what, since=0):
         """When it happened."""
