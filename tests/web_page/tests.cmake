@@ -27,5 +27,5 @@ set_tests_properties(${names} PROPERTIES FIXTURES_REQUIRED web_page_stubs TIMEOU
 # They hold buttons and measure how soon an axis rests.
 set(browsers ${names})
 list(FILTER browsers INCLUDE REGEX "browser|real")
-set_tests_properties(${browsers} PROPERTIES PROCESSORS 2)
+set_tests_properties(${browsers} PROPERTIES RUN_SERIAL ON)
 set_tests_properties(web_page.pictures PROPERTIES LABELS "web;slow")

@@ -95,13 +95,13 @@ export class Stack {
 
   async start(): Promise<void> {
     const port = await freePort();
-    this.server = `localhost:${port}`;
+    this.server = `127.0.0.1:${port}`;
     const demo = readFileSync(this.programs.demo, 'utf8')
       .replace('state_directory: /tmp/axisd-demo', `state_directory: ${join(this.folder, 'state')}`)
-      .replace('listen: localhost:7443', `listen: localhost:${port}\n  stop_listen: localhost:${await freePort()}`);
+      .replace('listen: localhost:7443', `listen: 127.0.0.1:${port}\n  stop_listen: 127.0.0.1:${await freePort()}`);
     writeFileSync(join(this.folder, 'axisd.yaml'), demo);
     this.port = await freePort();
-    const stop = /stop_listen: (localhost:\d+)/.exec(demo)![1]!;
+    const stop = /stop_listen: ([\d.]+:\d+)/.exec(demo)![1]!;
     writeFileSync(join(this.folder, 'web.yaml'),
                   `listen: localhost:${this.port}\naxisd: { server: "${this.server}", stop_server: "${stop}" }\nfiles: ${this.programs.page}\nusers: ${join(this.folder, 'users')}\n`);
     this.startDaemon();

@@ -361,4 +361,5 @@ export const de: Texts = {
   'reason.eeprom-budget': 'EEPROM geschützt',
   'reason.state-unaccepted': 'Zustand nicht angenommen',
   'reason.access-denied': 'Nicht erlaubt',
+  'reason.unauthenticated': 'Zertifikat nicht mehr gültig',
 };

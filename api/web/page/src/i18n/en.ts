@@ -360,4 +360,5 @@ export const en = {
   'reason.eeprom-budget': 'EEPROM protected',
   'reason.state-unaccepted': 'State not accepted',
   'reason.access-denied': 'Not permitted',
+  'reason.unauthenticated': 'Certificate no longer valid',
 };

@@ -361,4 +361,5 @@ export const zh: Texts = {
   'reason.eeprom-budget': 'EEPROM 保护',
   'reason.state-unaccepted': '状态未确认',
   'reason.access-denied': '没有权限',
+  'reason.unauthenticated': '证书已失效',
 };

@@ -46,6 +46,7 @@ export function eventText({ content }: Event): string {
       if (kind === InhibitChangeKind.NOT_DURABLE) return t('event.inhibit-not-durable');
       return t('event.inhibit', { who: by });
     }
+    case 'certificateNotice': return content.value.text;
     case 'commandChange': return '';
     default: return '?';
   }
