@@ -1,8 +1,9 @@
 #!/bin/bash
 # Installs what axisd needs on Debian 12. Quick, and without a network, when everything is there.
-#   deploy/install-packages.sh [build|run|test|package|all]      (default: all)
+#   deploy/install-packages.sh [build|run|test|page|package|all]      (default: all)
 # build: compiler and libraries; run: what built programs need; test: what tests/run.sh needs beside build;
-# package: what deploy/package.sh and its test need beside build; all: everything but package.
+# page: what the page of axisd-web is built with; package: what deploy/package.sh and its test need beside build;
+# all: everything but package.
 # Run as root, or as a user who may use sudo.
 set -euo pipefail
 
@@ -33,8 +34,9 @@ case "${1:-all}" in
   build) wanted=("${build[@]}") ;;
   run) wanted=("${run[@]}") ;;
   package) wanted=("${package[@]}") ;;
+  page) wanted=(ca-certificates protobuf-compiler) ;;
   test | all) wanted=("${build[@]}" "${run[@]}" "${test[@]}") ;;
-  *) die "unknown set '$1': use build, run, test, package or all" ;;
+  *) die "unknown set '$1': use build, run, test, page, package or all" ;;
 esac
 
 # One query for all: names that dpkg does not know appear only on its standard error and are missing, too.
@@ -44,7 +46,7 @@ mapfile -t missing < <(printf '%s\n' "${wanted[@]}" | grep -vxF -f <(printf '%s\
 
 # npm fetches buf, the libraries of the page and of the Node.js example, and the CANopen library of tests/foreign. Debian's npm conflicts with
 # Node.js from elsewhere, so any npm will do.
-case "${1:-all}" in test | all) command -v npm >/dev/null || missing+=(nodejs npm) ;; esac
+case "${1:-all}" in test | all | page) command -v npm >/dev/null || missing+=(nodejs npm) ;; esac
 
 [ "${#missing[@]}" -gt 0 ] || exit 0
 
