@@ -149,11 +149,10 @@ std::optional<bool> told_motion(const Model& model, const Values& values) {
     case OperationMode::profile_velocity:
       rests = (word & status::mode_specific) != 0;
       break;
-    case OperationMode::profile_position:  // bit 10 under halt: the velocity is 0
+    case OperationMode::profile_position:  // bit 10 under halt, in any mode: the velocity is 0
     case OperationMode::homing:
-      rests = (word & status::target_reached) != 0;
-      break;
     case OperationMode::none:
+      rests = (word & status::target_reached) != 0;
       break;
   }
   return rests ? std::optional(false) : std::nullopt;
