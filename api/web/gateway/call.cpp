@@ -88,6 +88,14 @@ void Call::cancel() {
   next();  // so that a read fails, and the hold goes
 }
 
+void Call::leave(std::function<void()> over) {
+  if (std::exchange(cancelled_, true)) return;
+  events_ = {.message = {}, .done = [over = std::move(over)](const CallStatus&) { over(); }};
+  next();
+}
+
+void Call::abort() { reactor_->cancel(); }
+
 void Call::on_message() {
   reading_ = false;
   const auto message = reactor_->take();

@@ -45,6 +45,10 @@ class Call : public std::enable_shared_from_this<Call> {
   void next();
   /// From now on nothing is told any more. A command that was accepted is none the less executed.
   void cancel();
+  /// The same, but that the call goes on to its end, of which `over` is told.
+  void leave(std::function<void()> over);
+  /// Ends it as soon as may be; what comes of that is told. What has not left here yet never will.
+  void abort();
 
  private:
   class Reactor;

@@ -18,13 +18,13 @@ class Rate {
  public:
   explicit Rate(Pace pace) : pace_(pace), left_(pace.at_once) {}
 
-  /// Takes one, if there is one.
-  bool take(TimePoint now) {
+  /// Takes so much, if there is so much, and `kept` besides.
+  bool take(TimePoint now, double amount = 1, double kept = 0) {
     const std::chrono::duration<double> passed = now - refilled_;
     left_ = std::min(pace_.at_once, left_ + passed.count() * pace_.per_second);
     refilled_ = now;
-    if (left_ < 1) return false;
-    left_ -= 1;
+    if (left_ < amount + kept) return false;
+    left_ -= amount;
     return true;
   }
   /// It is as if nothing had been taken.
@@ -44,11 +44,12 @@ class Rates {
  public:
   Rates(Pace total, Pace each) : total_(total), each_(each) {}
 
-  bool take(const std::string& key, TimePoint now) {
+  /// `kept`: what is left of the total for others.
+  bool take(const std::string& key, TimePoint now, double amount = 1, double kept = 0) {
     if (shares_.size() > 256)
       std::erase_if(shares_, [&](const auto& share) { return share.second.rested(now); });
     auto& share = shares_.try_emplace(key, each_).first->second;
-    return share.take(now) && total_.take(now);
+    return share.take(now, amount) && total_.take(now, amount, kept);
   }
 
  private:

@@ -11,13 +11,6 @@
 namespace axisd::web {
 namespace {
 
-/// The daemon's stop lane takes 100 calls of a connection at once; the others would wait, stops as well.
-constexpr int most_at_lane = 80, most_moves_at_lane = 48;
-/// It cuts off a connection that makes more than some 500 calls in a second. Ten renewals a second hold a
-/// button.
-constexpr Pace all_moves{.per_second = 300, .at_once = 600}, moves_of_one{.per_second = 60, .at_once = 120};
-constexpr Pace all_stops{.per_second = 150, .at_once = 600};
-
 Result<std::string> read_pem(const std::string& path) {
   if (path.empty()) return std::string();
   std::ifstream file(path, std::ios::binary);
@@ -62,9 +55,9 @@ std::vector<std::pair<std::string, std::string>> metadata_of(const Person& perso
   return {{"axisd-user", person.name}, {"axisd-role", person.role}};
 }
 
-/// Another address may have what this one has not.
+/// Another address may have what this one has not. What the daemon itself says has details.
 bool is_for_another(const CallStatus& status) {
-  return status.code == code::unavailable || status.code == code::unimplemented;
+  return status.details.empty() && (status.code == code::unavailable || status.code == code::unimplemented);
 }
 
 }  // namespace
@@ -78,11 +71,7 @@ Result<std::unique_ptr<Upstream>> Upstream::make(boost::asio::any_io_executor ex
 
 Upstream::Upstream(boost::asio::any_io_executor executor, const Clock& clock, const DaemonSettings& settings,
                    const std::shared_ptr<grpc::ChannelCredentials>& trusted)
-    : executor_(std::move(executor)),
-      clock_(clock),
-      settings_(settings),
-      moves_(all_moves, moves_of_one),
-      stops_(all_stops) {
+    : executor_(std::move(executor)), clock_(clock), settings_(settings) {
   if (settings_.stop_server.empty()) settings_.stop_server = stop_lane_next_to(settings_.server);
   const auto connect = [&](Link& link, const std::string& address) {
     link.channel = grpc::CreateCustomChannel(address, trusted, arguments());
@@ -103,8 +92,8 @@ std::shared_ptr<Call> Upstream::start(const std::string& path, std::string_view 
       std::move(events), open_);
 }
 
-void Upstream::ask_at(Link& link, std::string path, std::string_view message, const Person& person,
-                      Duration timeout, Done done) {
+std::shared_ptr<Call> Upstream::ask_at(Link& link, std::string path, std::string_view message,
+                                       const Person& person, Duration timeout, Done done) {
   struct Answer {
     std::shared_ptr<Call> call;
     std::string response;
@@ -127,42 +116,77 @@ void Upstream::ask_at(Link& link, std::string path, std::string_view message, co
                                     done(status, answer->response);
                                   }},
                              open_);
+  return answer->call;
 }
 
 void Upstream::ask(LaneMethod method, std::string_view message, const Person& person, Duration timeout,
                    Done done) {
-  const bool stop = is_stop(method);
+  if (is_stop(method))
+    stop(method, message, person, timeout, std::move(done));
+  else
+    press(method, message, person, timeout, std::move(done));
+}
+
+void Upstream::press(LaneMethod method, std::string_view message, const Person& person, Duration timeout,
+                     Done done) {
   const bool reachable = lane_.channel->GetState(true) == GRPC_CHANNEL_READY;
-  const auto now = clock_.now();
-  const bool room = stop ? at_lane_ < most_at_lane && stops_.take(now)
-                         : at_lane_ < most_moves_at_lane && moves_.take(person.key(), now);
-  if (!stop && (!reachable || !room)) {
+  auto room = reachable ? room_.move(person.key(), message.size(), clock_.now()) : std::nullopt;
+  if (!room) {
     CallStatus why{.code = reachable ? code::resource_exhausted : code::unavailable,
-                   .message = reachable ? "too many presses wait for their answers"
+                   .message = reachable ? "too many presses wait for their answers, or this one is too large"
                                         : "the stop lane of axisd does not answer"};
     boost::asio::post(executor_, [done = std::move(done), why = std::move(why)] { done(why, {}); });
     return;
   }
-  if (!reachable || !room)
-    return ask_at(main_, std::string(main_path_of(method)), message, person, timeout, std::move(done));
-  ++at_lane_;
-  ask_at(lane_, fmt::format("/axisd.v1.StopService/{}", name_of(method)), message, person, timeout,
-         [this, method, stop, person, timeout, message = std::string(stop ? message : std::string_view()),
-          done = std::move(done)](const CallStatus& status, const std::string& response) {
-           --at_lane_;
-           if (stop && is_for_another(status))
-             ask_at(main_, std::string(main_path_of(method)), message, person, timeout, done);
-           else
-             done(status, response);
-         });
+  const auto number = ++last_press_;
+  auto call =
+      ask_at(lane_, fmt::format("/axisd.v1.StopService/{}", name_of(method)), message, person, timeout,
+             [this, number, place = std::make_shared<LaneRoom::Place>(*std::move(room)),
+              done = std::move(done)](const CallStatus& status, const std::string& response) mutable {
+               place.reset();
+               presses_.erase(number);
+               done(status, response);
+             });
+  if (method == LaneMethod::jog)
+    presses_.emplace(number, Press{.who = person.key(), .call = std::move(call)});
+}
+
+void Upstream::stop(LaneMethod method, std::string_view message, const Person& person, Duration timeout,
+                    Done done) {
+  const bool reachable = lane_.channel->GetState(true) == GRPC_CHANNEL_READY;
+  auto room = reachable ? room_.stop(person.key(), message.size(), clock_.now()) : std::nullopt;
+  if (!room) {
+    abort_presses(reachable ? std::optional(person.key()) : std::nullopt);
+    return stop_at_main(method, message, person, timeout, std::move(done));
+  }
+  (void)ask_at(lane_, fmt::format("/axisd.v1.StopService/{}", name_of(method)), message, person, timeout,
+               [this, method, person, timeout, message = std::string(message),
+                place = std::make_shared<LaneRoom::Place>(*std::move(room)),
+                done = std::move(done)](const CallStatus& status, const std::string& response) mutable {
+                 place.reset();
+                 if (!is_for_another(status)) return done(status, response);
+                 abort_presses(std::nullopt);
+                 stop_at_main(method, message, person, timeout, std::move(done));
+               });
+}
+
+void Upstream::stop_at_main(LaneMethod method, std::string_view message, const Person& person,
+                            Duration timeout, Done done) {
+  (void)ask_at(main_, std::string(main_path_of(method)), message, person, timeout, std::move(done));
+}
+
+void Upstream::abort_presses(const std::optional<std::string>& who) {
+  for (const auto& [number, press] : presses_)
+    if (!who || press.who == *who) press.call->abort();
 }
 
 void Upstream::stay_connected() {
   for (auto* link : {&main_, &lane_}) {
     if (link->channel->GetState(true) == GRPC_CHANNEL_READY || link->probing) continue;
     link->probing = true;
-    ask_at(*link, link->probe, {}, {.name = {}, .role = {}, .how = How::loopback}, std::chrono::seconds(1),
-           [link](const CallStatus&, const std::string&) { link->probing = false; });
+    (void)ask_at(*link, link->probe, {}, {.name = {}, .role = {}, .how = How::loopback},
+                 std::chrono::seconds(1),
+                 [link](const CallStatus&, const std::string&) { link->probing = false; });
   }
 }
 

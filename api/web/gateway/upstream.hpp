@@ -6,16 +6,18 @@
 #include <grpcpp/security/credentials.h>
 
 #include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "api/web/gateway/call.hpp"
+#include "api/web/gateway/lane_room.hpp"
 #include "api/web/gateway/lane_state.hpp"
 #include "api/web/gateway/person.hpp"
-#include "api/web/gateway/rates.hpp"
 #include "api/web/gateway/settings.hpp"
 #include "buses/error.hpp"
 
@@ -37,8 +39,9 @@ class Upstream {
   [[nodiscard]] std::shared_ptr<Call> start(const std::string& path, std::string_view message,
                                             const Person& person, std::optional<Duration> timeout,
                                             Call::Events events);
-  /// A call of a page's lane. Where the stop lane cannot be reached, stops go to the main address, and
-  /// whatever starts or renews something is refused. `done` is called later, once.
+  /// A call of a page's lane. Where the stop lane cannot be reached, or has no room, stops go to the main
+  /// address, behind the end of presses that wait for their answers; whatever starts or renews something is
+  /// refused. `done` is called later, once.
   void ask(LaneMethod method, std::string_view message, const Person& person, Duration timeout, Done done);
 
   /// Connects where that has been lost. To be called every second or so: gRPC connects only while somebody
@@ -58,16 +61,28 @@ class Upstream {
   };
   Upstream(boost::asio::any_io_executor executor, const Clock& clock, const DaemonSettings& settings,
            const std::shared_ptr<grpc::ChannelCredentials>& trusted);
-  void ask_at(Link& link, std::string path, std::string_view message, const Person& person, Duration timeout,
-              Done done);
+  std::shared_ptr<Call> ask_at(Link& link, std::string path, std::string_view message, const Person& person,
+                               Duration timeout, Done done);
+  void press(LaneMethod method, std::string_view message, const Person& person, Duration timeout, Done done);
+  void stop(LaneMethod method, std::string_view message, const Person& person, Duration timeout, Done done);
+  void stop_at_main(LaneMethod method, std::string_view message, const Person& person, Duration timeout,
+                    Done done);
+  /// Of one person; of all: nothing. A press that gRPC holds back would else come behind a stop that took
+  /// the other connection.
+  void abort_presses(const std::optional<std::string>& who);
 
   boost::asio::any_io_executor executor_;
   const Clock& clock_;
   DaemonSettings settings_;
   Link main_, lane_;
-  int open_ = 0, at_lane_ = 0;
-  Rates moves_;
-  Rate stops_;  ///< at the stop lane
+  int open_ = 0;
+  LaneRoom room_;
+  struct Press {
+    std::string who;
+    std::shared_ptr<Call> call;
+  };
+  std::map<std::uint64_t, Press> presses_;  ///< at the stop lane
+  std::uint64_t last_press_ = 0;
 };
 
 }  // namespace axisd::web
