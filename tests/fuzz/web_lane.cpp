@@ -11,7 +11,8 @@ namespace axisd::fuzz {
 void run(Input input) {
   using namespace web;
   TimePoint now{std::chrono::hours(1)};
-  LaneState lane;
+  std::uint64_t last = 0;
+  LaneState lane([&] { return ++last; });
   std::vector<std::uint64_t> open;
   bool closed = false;
   const auto take = [&](const LaneEffects& effects, bool of_the_page) {

@@ -1,5 +1,6 @@
 #include "api/web/gateway/lane_socket.hpp"
 
+#include <sodium.h>
 #include <spdlog/spdlog.h>
 
 #include <utility>
@@ -18,9 +19,10 @@ constexpr std::size_t most_out = std::size_t{1024} * 1024;
 /// Until a page has said goodbye in turn.
 constexpr Duration goodbye = std::chrono::seconds(1);
 
-/// A start that comes late is worse than none, and a stop is better late than never.
-Duration patience_of(LaneMethod method) {
-  return is_stop(method) ? std::chrono::seconds(30) : std::chrono::seconds(1);
+std::uint64_t random_number() {
+  std::uint64_t number = 0;
+  randombytes_buf(&number, sizeof number);
+  return number;
 }
 
 }  // namespace
@@ -31,7 +33,8 @@ LaneSocket::LaneSocket(Gateway& gateway, Transport transport, Known known, Share
       known_(std::move(known)),
       lane_(std::move(lane)),
       connection_(std::move(connection)),
-      socket_(std::move(transport)) {}
+      socket_(std::move(transport)),
+      state_(random_number) {}
 
 void LaneSocket::start(Head head) {
   gateway_.enter(shared_from_this());
@@ -86,7 +89,7 @@ void LaneSocket::carry_out(const LaneEffects& effects) {
 
 void LaneSocket::ask(const LaneCall& call) {
   gateway_.upstream->ask(
-      call.method, call.message, known_.person, patience_of(call.method),
+      call.method, call.message, known_.person, call.patience,
       [self = shared_from_this(), number = call.number](const CallStatus& status,
                                                         const std::string& response) {
         self->carry_out(self->state_.answered(number, status, response, self->gateway_.clock.now()));
@@ -123,7 +126,7 @@ void LaneSocket::write() {
 void LaneSocket::shut(std::string_view why) {
   if (std::exchange(closed_, true)) return;
   carry_out(state_.close(gateway_.clock.now()));
-  spdlog::info("the lane of {} ends: {}", known_.person.name, why);
+  if (gateway_.may_tell()) spdlog::info("the lane of {} ends: {}", known_.person.name, why);
   end_ = gateway_.clock.call_at(gateway_.clock.now() + goodbye,
                                 [self = shared_from_this()] { self->socket_.next_layer().close(); });
   if (!socket_.is_open()) return socket_.next_layer().close();

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "api/web/gateway/big_endian.hpp"
 #include "axisd/v1/axis_service.pb.h"
 
 namespace axisd::web {
@@ -23,13 +24,6 @@ constexpr std::array<Known, 8> methods{{
     {LaneMethod::stop_all, "/axisd.v1.SystemService/StopAll"},
     {LaneMethod::renew_lease, "/axisd.v1.LeaseService/RenewLease"},
 }};
-
-std::optional<LaneMethod> method_of(std::string_view name) {
-  const auto found =
-      std::ranges::find(methods, name, [](const Known& known) { return known.path.substr(1); });
-  if (found == methods.end()) return std::nullopt;
-  return found->method;
-}
 
 v1::JogRequest jog_of(std::string_view message, bool& readable) {
   v1::JogRequest request;
@@ -63,21 +57,18 @@ std::string axis_of(LaneMethod method, std::string_view message) {
   }
 }
 
-/// It is not known whether the daemon has executed the call.
+/// It is not known whether the daemon has executed the call. What the daemon itself says has details.
 bool is_open(const CallStatus& status) {
-  return status.code == code::cancelled || status.code == code::unknown ||
-         status.code == code::deadline_exceeded || status.code == code::internal ||
-         status.code == code::unavailable || status.code == code::data_loss;
+  return status.details.empty() && (status.code == code::cancelled || status.code == code::unknown ||
+                                    status.code == code::deadline_exceeded || status.code == code::internal ||
+                                    status.code == code::unavailable || status.code == code::data_loss);
 }
 
-/// Nothing of this jog runs, nor will.
-bool is_over(const CallStatus& status, std::string_view response) {
-  if (status.code != 0) return !is_open(status);
-  v1::JogResponse answer;
-  if (!answer.ParseFromArray(response.data(), static_cast<int>(response.size()))) return false;
-  const auto state = answer.command().state();
-  return state == v1::COMMAND_STATE_DONE || state == v1::COMMAND_STATE_ABORTED ||
-         state == v1::COMMAND_STATE_ERROR;
+std::string bytes_of(std::uint64_t number) {
+  std::string bytes;
+  append_big_endian32(bytes, static_cast<std::uint32_t>(number >> 32U));
+  append_big_endian32(bytes, static_cast<std::uint32_t>(number));
+  return bytes;
 }
 
 void refuse(std::uint32_t id, int why, std::string message, LaneEffects& effects) {
@@ -98,6 +89,12 @@ std::string_view name_of(LaneMethod method) {
 
 bool is_stop(LaneMethod method) { return method != LaneMethod::jog && method != LaneMethod::renew_lease; }
 
+std::optional<LaneMethod> method_of_path(std::string_view path) {
+  const auto found = std::ranges::find(methods, path, &Known::path);
+  if (found == methods.end()) return std::nullopt;
+  return found->method;
+}
+
 LaneEffects LaneState::receive(std::string_view bytes, TimePoint now) {
   if (closed_) return {};
   auto effects = pass(now);  // what was silent for too long stays so, however this message reads
@@ -107,19 +104,21 @@ LaneEffects LaneState::receive(std::string_view bytes, TimePoint now) {
                    std::make_move_iterator(halts.end()));
     effects.emplace_back(LaneClose{std::move(why)});
   };
+  const auto request = parse_lane_request(bytes);
+  const auto method = request ? method_of_path('/' + std::string(request->method)) : std::nullopt;
   if (!messages_.take(now)) {
+    if (method && is_stop(*method)) stop(*request, *method, now, effects);
     close_for("too many messages");
     return effects;
   }
-  const auto request = parse_lane_request(bytes);
   if (!request) {
     close_for("no message of this version");
     return effects;
   }
   const auto lateness = lateness_.of(request->sent_ms, now);
   if (request->method.empty())
-    effects.emplace_back(LaneSend{lane_reply(LaneReply::echo, request->id)});
-  else if (const auto method = method_of(request->method))
+    echo(*request, now, effects);
+  else if (method)
     carry_out(*request, *method, lateness, now, effects);
   else
     refuse(request->id, code::unimplemented, "the lane takes no such call", effects);
@@ -127,81 +126,166 @@ LaneEffects LaneState::receive(std::string_view bytes, TimePoint now) {
   return effects;
 }
 
-CallStatus LaneState::refusal(LaneMethod method) const {
-  if (is_stop(method) ? stops_ < most_stops : moves_ < most_moves) return {};
-  return {.code = code::resource_exhausted, .message = "too many calls of this page wait for their answers"};
+void LaneState::echo(const LaneRequest& request, TimePoint now, LaneEffects& effects) {
+  // What brings the number was sent after that had left here: no message is older than that makes it.
+  if (!number_.empty() && request.message == number_ && now - echoed_ <= longest_round_trip) measured_ = true;
+  number_ = bytes_of(random_());
+  echoed_ = now;
+  effects.emplace_back(LaneSend{lane_reply(LaneReply::echo, request.id, {}, number_)});
 }
 
 void LaneState::carry_out(const LaneRequest& request, LaneMethod method, Duration lateness, TimePoint now,
                           LaneEffects& effects) {
-  if (!is_stop(method) && lateness > latest) {
+  if (is_stop(method)) return stop(request, method, now, effects);
+  if (method == LaneMethod::jog) return jog(request, lateness, now, effects);
+  if (lateness > latest) {
+    effects.emplace_back(LaneSend{lane_reply(LaneReply::late, request.id)});
+  } else if (auto why = refusal_of_move(); why.code != 0) {
+    refuse(request.id, why.code, std::move(why.message), effects);
+  } else {
+    call(method, {.method = method, .id = request.id}, std::string(request.message), patience_of_moves,
+         effects);
+  }
+}
+
+CallStatus LaneState::refusal_of_move() const {
+  if (!measured_)
+    return {.code = code::failed_precondition,
+            .message = "how long this lane takes is not known yet: return the number of an echo"};
+  if (moves_ >= most_moves)
+    return {.code = code::resource_exhausted,
+            .message = "too many calls of this page wait for their answers"};
+  return {};
+}
+
+void LaneState::jog(const LaneRequest& request, Duration lateness, TimePoint now, LaneEffects& effects) {
+  bool readable = false;
+  const auto jog = jog_of(request.message, readable);
+  const auto wrong = [&](std::string why) {
+    refuse(request.id, code::invalid_argument, std::move(why), effects);
+  };
+  if (!readable || jog.axis().empty()) return wrong("no JogRequest of an axis");
+  if (jog.options().request_id().empty())
+    return wrong("a jog on the lane needs a request_id, one for each press");
+  if (jog.options().wait_until() == v1::WAIT_UNTIL_DONE)
+    return wrong("a jog on the lane is not waited for until it is done");
+  const Press press{.axis = jog.axis(), .id = jog.options().request_id(), .hold = hold_of(jog)};
+  if (lateness > latest) {
+    bar_start(press);
     effects.emplace_back(LaneSend{lane_reply(LaneReply::late, request.id)});
     return;
   }
-  if (auto why = refusal(method); why.code != 0) {
-    refuse(request.id, why.code, std::move(why.message), effects);
-    return;
+  if (is_barred(press.axis, press.id))
+    return refuse(request.id, code::failed_precondition,
+                  "this press was refused: let the button go, and press it again", effects);
+  if (auto why = refusal_of_move(); why.code != 0) {
+    bar_start(press);
+    return refuse(request.id, why.code, std::move(why.message), effects);
   }
-  std::string axis;
-  if (method == LaneMethod::jog) {
-    bool readable = false;
-    const auto jog = jog_of(request.message, readable);
-    if (!readable || jog.axis().empty()) {
-      refuse(request.id, code::invalid_argument, "no JogRequest of an axis", effects);
-      return;
-    }
-    if (jog.options().wait_until() == v1::WAIT_UNTIL_DONE) {
-      refuse(request.id, code::invalid_argument, "a jog on the lane is not waited for until it is done",
-             effects);
-      return;
-    }
-    axis = jog.axis();
-    press(axis, hold_of(jog), now);
-  } else if (is_stop(method)) {
-    axis = axis_of(method, request.message);
-    if (!axis.empty()) let_go(axis);
-  }
-  call(method, request.id, std::move(axis), std::string(request.message), {}, effects);
+  begin(press, now);
+  call(LaneMethod::jog, {.method = LaneMethod::jog, .id = request.id, .axis = press.axis, .press = press.id},
+       std::string(request.message), patience_of_moves, effects);
 }
 
-void LaneState::call(LaneMethod method, std::optional<std::uint32_t> id, std::string axis,
-                     std::string message, TimePoint until, LaneEffects& effects) {
+void LaneState::stop(const LaneRequest& request, LaneMethod method, TimePoint now, LaneEffects& effects) {
+  if (stops_ >= most_stops)
+    return refuse(request.id, code::resource_exhausted, "too many stops of this page wait for their answers",
+                  effects);
+  auto axis = axis_of(method, request.message);
+  if (!axis.empty()) let_go(axis, now);
+  call(method, {.method = method, .id = request.id, .axis = std::move(axis)}, std::string(request.message),
+       patience_of_stops, effects);
+  // Who stops more than one axis is not jogging any of them, whether or not it is one of those.
+  if (method == LaneMethod::stop_all || method == LaneMethod::group_stop || method == LaneMethod::group_halt)
+    halt_all(now, effects);
+}
+
+void LaneState::call(LaneMethod method, Pending pending, std::string message, Duration patience,
+                     LaneEffects& effects) {
   const auto number = ++last_number_;
-  calls_.emplace(number, Pending{.method = method, .id = id, .axis = std::move(axis), .until = until});
-  if (id) ++(is_stop(method) ? stops_ : moves_);
-  effects.emplace_back(LaneCall{.number = number, .method = method, .message = std::move(message)});
+  if (pending.id) ++(is_stop(method) ? stops_ : moves_);
+  calls_.emplace(number, std::move(pending));
+  effects.emplace_back(
+      LaneCall{.number = number, .method = method, .message = std::move(message), .patience = patience});
 }
 
-void LaneState::press(const std::string& name, Duration hold, TimePoint now) {
-  owed_.erase(name);  // it would halt what begins now
-  auto& axis = axes_[name];
+void LaneState::begin(const Press& press, TimePoint now) {
+  barred_.erase(press.axis);  // of another press
+  owed_.erase(press.axis);    // it would halt what begins now
+  auto& axis = axes_[press.axis];
   if (axis.state != Jogging::running) axis.state = Jogging::starting;
   axis.may_run = false;
   ++axis.on_the_way;
-  axis.silent_at = now + hold;
+  axis.silent_at = now + press.hold;
 }
 
-void LaneState::let_go(const std::string& name) {
+void LaneState::let_go(const std::string& name, TimePoint now) {
+  barred_.erase(name);
   owed_.erase(name);  // this one stops it as well
   const auto axis = axes_.find(name);
   if (axis == axes_.end()) return;
-  if (axis->second.on_the_way == 0)
-    axes_.erase(axis);
-  else
+  if (axis->second.on_the_way > 0) {
     axis->second.state = Jogging::ending;
+    return;
+  }
+  if (axis->second.unknown) owe_another(name, now);
+  axes_.erase(axis);
 }
 
 LaneState::Axes::iterator LaneState::halt(Axes::iterator axis, TimePoint now, LaneEffects& effects) {
-  own_halt(axis->first, now + longest_hold, effects);
-  if (axis->second.on_the_way == 0) return axes_.erase(axis);
-  axis->second.state = Jogging::ending;
-  return std::next(axis);
+  own_halt(axis->first, now + longest_hold, now, effects);
+  if (axis->second.on_the_way > 0) {
+    axis->second.state = Jogging::ending;
+    return std::next(axis);
+  }
+  if (axis->second.unknown) owe_another(axis->first, now);
+  return axes_.erase(axis);
 }
 
-void LaneState::own_halt(const std::string& axis, TimePoint until, LaneEffects& effects) {
+void LaneState::halt_all(TimePoint now, LaneEffects& effects) {
+  barred_.clear();
+  for (auto axis = axes_.begin(); axis != axes_.end();)
+    axis = axis->second.state != Jogging::ending ? halt(axis, now, effects) : std::next(axis);
+}
+
+void LaneState::own_halt(const std::string& axis, TimePoint until, TimePoint now, LaneEffects& effects) {
   v1::HaltRequest request;
   request.set_axis(axis);
-  call(LaneMethod::halt, std::nullopt, axis, request.SerializeAsString(), until, effects);
+  call(LaneMethod::halt, {.method = LaneMethod::halt, .axis = axis, .until = until},
+       request.SerializeAsString(), until - now, effects);
+}
+
+void LaneState::owe_another(const std::string& axis, TimePoint now) {
+  owed_[axis] = {.at = now + pause, .until = now + longest_hold};
+}
+
+bool LaneState::is_barred(const std::string& axis, std::string_view press) const {
+  const auto barred = barred_.find(axis);
+  return barred != barred_.end() && barred->second == press;
+}
+
+void LaneState::bar(const std::string& axis, const std::string& press) {
+  if (barred_.size() >= most_barred && !barred_.contains(axis)) barred_.erase(barred_.begin());
+  barred_[axis] = press;
+}
+
+void LaneState::bar_start(const Press& press) {
+  const auto axis = axes_.find(press.axis);
+  if (axis != axes_.end() && axis->second.running == press.id) return;
+  const bool on_the_way = std::ranges::any_of(calls_, [&](const auto& call) {
+    return call.second.axis == press.axis && call.second.press == press.id;
+  });
+  if (!on_the_way) bar(press.axis, press.id);
+}
+
+LaneState::Outcome LaneState::outcome_of(const CallStatus& status, std::string_view response) {
+  if (status.code != 0) return is_open(status) ? Outcome::unknown : Outcome::refused;
+  v1::JogResponse answer;
+  if (!answer.ParseFromArray(response.data(), static_cast<int>(response.size()))) return Outcome::unknown;
+  const auto state = answer.command().state();
+  const bool over = state == v1::COMMAND_STATE_DONE || state == v1::COMMAND_STATE_ABORTED ||
+                    state == v1::COMMAND_STATE_ERROR;
+  return over ? Outcome::over : Outcome::runs;
 }
 
 LaneEffects LaneState::answered(std::uint64_t number, const CallStatus& status, std::string_view response,
@@ -213,28 +297,39 @@ LaneEffects LaneState::answered(std::uint64_t number, const CallStatus& status, 
   if (ended.id) {
     --(is_stop(ended.method) ? stops_ : moves_);
     if (!closed_) effects.emplace_back(LaneSend{lane_reply(LaneReply::answer, *ended.id, status, response)});
-    if (ended.method == LaneMethod::jog) jog_answered(ended.axis, is_over(status, response), now, effects);
-  } else if (is_open(status) && now + pause < ended.until &&
-             (jogging(ended.axis) == Jogging::none || jogging(ended.axis) == Jogging::ending)) {
-    owed_[ended.axis] = {.at = now + pause, .until = ended.until};
+    if (ended.method == LaneMethod::jog) jog_answered(ended, outcome_of(status, response), now, effects);
+    return effects;
   }
+  const bool again = is_open(status) || status.code == code::resource_exhausted;
+  const auto state = jogging(ended.axis);
+  if (again && now + pause < ended.until && (state == Jogging::none || state == Jogging::ending))
+    owed_[ended.axis] = {.at = now + pause, .until = ended.until};
   return effects;
 }
 
-void LaneState::jog_answered(const std::string& name, bool over, TimePoint now, LaneEffects& effects) {
-  const auto found = axes_.find(name);
+void LaneState::jog_answered(const Pending& jog, Outcome outcome, TimePoint now, LaneEffects& effects) {
+  const auto found = axes_.find(jog.axis);
   if (found == axes_.end()) return;
   auto& axis = found->second;
   --axis.on_the_way;
+  axis.unknown = axis.unknown || outcome == Outcome::unknown;
   if (axis.state == Jogging::ending) {
-    axis.may_run = axis.may_run || !over;
+    axis.may_run = axis.may_run || outcome == Outcome::runs;
     if (axis.on_the_way > 0) return;
-    if (axis.may_run) own_halt(name, now + longest_hold, effects);
+    if (axis.may_run) own_halt(jog.axis, now + longest_hold, now, effects);
+    if (axis.unknown) owe_another(jog.axis, now);
     axes_.erase(found);
-  } else if (over) {
-    if (axis.on_the_way == 0) axes_.erase(found);
-  } else {
+    return;
+  }
+  const bool refused_before = is_barred(jog.axis, jog.press);
+  if (outcome == Outcome::unknown || (outcome == Outcome::refused && axis.running != jog.press))
+    bar(jog.axis, jog.press);
+  if (outcome == Outcome::runs || outcome == Outcome::unknown) {
     axis.state = Jogging::running;
+    if (outcome == Outcome::runs) axis.running = jog.press;
+    if (refused_before) (void)halt(found, now, effects);
+  } else if (axis.on_the_way == 0 && (outcome == Outcome::over || axis.state == Jogging::starting)) {
+    axes_.erase(found);
   }
 }
 
@@ -248,7 +343,7 @@ LaneEffects LaneState::pass(TimePoint now) {
       ++owed;
       continue;
     }
-    own_halt(owed->first, owed->second.until, effects);
+    own_halt(owed->first, owed->second.until, now, effects);
     owed = owed_.erase(owed);
   }
   return effects;
@@ -257,8 +352,7 @@ LaneEffects LaneState::pass(TimePoint now) {
 LaneEffects LaneState::close(TimePoint now) {
   LaneEffects effects;
   if (std::exchange(closed_, true)) return effects;
-  for (auto axis = axes_.begin(); axis != axes_.end();)
-    axis = axis->second.state != Jogging::ending ? halt(axis, now, effects) : std::next(axis);
+  halt_all(now, effects);
   return effects;
 }
 

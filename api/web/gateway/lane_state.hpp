@@ -13,12 +13,17 @@
 //    |                          | the last answer        |
 //    +--------------------------+------------------------+
 //
-// Silence and close send a Halt at once. A start that is on its way then may still come to the drive: from
-// ending a second one goes behind its answer, unless that says that nothing runs. A stop of the page is its
-// own first Halt.
+// Silence, close, and a stop of more than one axis send a Halt at once. A start that is on its way then may
+// still come to the drive: from ending a second one goes behind its answer, unless that says that nothing
+// runs. A stop of the page is its own first Halt. Where a connection has swallowed an answer, what it had
+// taken before may still come out of it: then one more Halt follows after a pause.
+//
+// A renewal that is refused ends nothing, as what it was to renew goes on until its hold is over. A press
+// that was refused, or came too late, stays refused: else it would start while nobody expects it any more.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -50,6 +55,7 @@ struct LaneCall {
   std::uint64_t number = 0;
   LaneMethod method = LaneMethod::halt;
   std::string message{};  ///< the request, encoded
+  Duration patience{};    ///< until its answer
 };
 /// Bytes for the page.
 struct LaneSend {
@@ -70,6 +76,8 @@ class LaneState {
  public:
   /// Of presses and renewals, beyond the page's fastest message; later ones are not meant any more.
   static constexpr Duration latest = std::chrono::milliseconds(150);
+  /// Between an echo and the page's return of its number: then no message is older than it seems by more.
+  static constexpr Duration longest_round_trip = std::chrono::milliseconds(300);
   /// So late is no message of a link that works: the page begins anew.
   static constexpr Duration lost = std::chrono::seconds(5);
   /// What the daemon takes for a jog that says nothing, and its longest (M16).
@@ -81,6 +89,14 @@ class LaneState {
   static constexpr Pace pace{.per_second = 200, .at_once = 400};
   /// Until a Halt that found nobody is tried again.
   static constexpr Duration pause = std::chrono::milliseconds(100);
+  /// A start that comes late is worse than none, and a stop is better late than never.
+  static constexpr Duration patience_of_moves = std::chrono::seconds(1),
+                            patience_of_stops = std::chrono::seconds(30);
+  /// Axes of which a refused press is remembered.
+  static constexpr std::size_t most_barred = 256;
+
+  /// `random`: numbers that the page cannot know before they reach it.
+  explicit LaneState(std::function<std::uint64_t()> random) : random_(std::move(random)) {}
 
   /// A message of the page.
   [[nodiscard]] LaneEffects receive(std::string_view bytes, TimePoint now);
@@ -102,33 +118,55 @@ class LaneState {
   struct Axis {
     Jogging state = Jogging::none;
     int on_the_way = 0;     ///< jogs without an answer
-    bool may_run = false;   ///< while ending: an answer did not say that it had ended
+    bool may_run = false;   ///< while ending: an answer said that it runs
+    bool unknown = false;   ///< an answer was lost, and what it was to may still come to the daemon
+    std::string running{};  ///< the press of which an answer said that it runs
     TimePoint silent_at{};  ///< unless it is renewed before
   };
   struct Pending {
     LaneMethod method = LaneMethod::halt;
     std::optional<std::uint32_t> id{};  ///< of the page; nothing: it is the gateway's own Halt
     std::string axis{};
-    TimePoint until{};  ///< own: no Halt is worth more attempts from then on
+    std::string press{};  ///< of a jog: its request_id
+    TimePoint until{};    ///< own: no Halt is worth more attempts from then on
+  };
+  /// What an answer says of a jog.
+  enum class Outcome : std::uint8_t { runs, over, refused, unknown };
+  struct Press {
+    std::string axis, id;
+    Duration hold{};
   };
   struct Owed {
     TimePoint at{}, until{};
   };
   using Axes = std::map<std::string, Axis, std::less<>>;
 
+  [[nodiscard]] static Outcome outcome_of(const CallStatus& status, std::string_view response);
+  void echo(const LaneRequest& request, TimePoint now, LaneEffects& effects);
   void carry_out(const LaneRequest& request, LaneMethod method, Duration lateness, TimePoint now,
                  LaneEffects& effects);
-  /// Why it is not carried out; code 0: it may be.
-  [[nodiscard]] CallStatus refusal(LaneMethod method) const;
-  void call(LaneMethod method, std::optional<std::uint32_t> id, std::string axis, std::string message,
-            TimePoint until, LaneEffects& effects);
-  void press(const std::string& axis, Duration hold, TimePoint now);
-  void let_go(const std::string& axis);
+  void jog(const LaneRequest& request, Duration lateness, TimePoint now, LaneEffects& effects);
+  void stop(const LaneRequest& request, LaneMethod method, TimePoint now, LaneEffects& effects);
+  /// Why a press or a renewal is not carried out; code 0: it may be.
+  [[nodiscard]] CallStatus refusal_of_move() const;
+  void call(LaneMethod method, Pending pending, std::string message, Duration patience, LaneEffects& effects);
+  void begin(const Press& press, TimePoint now);
+  void let_go(const std::string& axis, TimePoint now);
   /// Sends a Halt, and says what is owed to the axis from now on. Returns what comes behind it.
   Axes::iterator halt(Axes::iterator axis, TimePoint now, LaneEffects& effects);
-  void jog_answered(const std::string& axis, bool over, TimePoint now, LaneEffects& effects);
-  void own_halt(const std::string& axis, TimePoint until, LaneEffects& effects);
+  void halt_all(TimePoint now, LaneEffects& effects);
+  void jog_answered(const Pending& jog, Outcome outcome, TimePoint now, LaneEffects& effects);
+  void own_halt(const std::string& axis, TimePoint until, TimePoint now, LaneEffects& effects);
+  void owe_another(const std::string& axis, TimePoint now);
+  [[nodiscard]] bool is_barred(const std::string& axis, std::string_view press) const;
+  void bar(const std::string& axis, const std::string& press);
+  /// The same, unless it runs already, or may still begin to.
+  void bar_start(const Press& press);
 
+  const std::function<std::uint64_t()> random_;
+  std::string number_;  ///< of the last echo
+  TimePoint echoed_{};
+  bool measured_ = false;  ///< one came back
   Lateness lateness_;
   Rate messages_{pace};
   bool closed_ = false;
@@ -137,6 +175,8 @@ class LaneState {
   std::map<std::uint64_t, Pending> calls_;
   Axes axes_;
   std::map<std::string, Owed, std::less<>> owed_;  ///< Halts that are to be tried again
+  /// Presses that were refused, until the axis gets another one or a stop.
+  std::map<std::string, std::string, std::less<>> barred_;
 };
 
 /// "Halt": the name of the call, in StopService and in its own.
@@ -145,5 +185,7 @@ class LaneState {
 [[nodiscard]] std::string_view main_path_of(LaneMethod method);
 /// Not a press or a renewal: it may be asked for twice.
 [[nodiscard]] bool is_stop(LaneMethod method);
+/// What that path asks for; nothing: the lane does not take it.
+[[nodiscard]] std::optional<LaneMethod> method_of_path(std::string_view path);
 
 }  // namespace axisd::web

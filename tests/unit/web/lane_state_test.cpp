@@ -27,9 +27,11 @@ class LaneTest : public testing::Test {
         log.push_back(std::string(name_of(call->method)));
         numbers.push_back(call->number);
         messages.push_back(call->message);
+        patience.push_back(call->patience);
       } else if (const auto* bytes = std::get_if<LaneSend>(&effect)) {
         constexpr const char* kinds[] = {"?", "answer", "late", "echo", "refused"};
         log.emplace_back(kinds[static_cast<std::size_t>(bytes->bytes.front())]);
+        if (log.back() == "echo") number = bytes->bytes.substr(bytes->bytes.size() - 8);
       } else {
         log.emplace_back("close");
       }
@@ -45,10 +47,17 @@ class LaneTest : public testing::Test {
     note(lane.receive(bytes, now));
   }
   void echo(Duration late = {}) { say("", "", late); }
+  void return_number() { say("", number); }
+  void SetUp() override {
+    echo();
+    return_number();
+    (void)taken();
+  }
   void jog(Duration hold = 300ms, Duration late = {}, const std::string& axis = "feeder") {
     v1::JogRequest request;
     request.set_axis(axis);
     request.set_velocity(1);
+    request.mutable_options()->set_request_id(press);
     request.mutable_hold()->set_nanos(static_cast<std::int32_t>(hold.count()));
     say("axisd.v1.AxisService/Jog", request.SerializeAsString(), late);
   }
@@ -63,7 +72,9 @@ class LaneTest : public testing::Test {
     response.mutable_command()->set_state(state);
     note(lane.answered(numbers.at(call), {}, response.SerializeAsString(), now));
   }
-  void fail(std::size_t call, int code) { note(lane.answered(numbers.at(call), {.code = code}, {}, now)); }
+  void fail(std::size_t call, int code, const std::string& details = {}) {
+    note(lane.answered(numbers.at(call), {.code = code, .message = {}, .details = details}, {}, now));
+  }
   void wait(Duration duration) {
     const auto end = now + duration;
     while (lane.next_due() <= end) {
@@ -85,9 +96,12 @@ class LaneTest : public testing::Test {
   }
 
   TimePoint now{Duration(1h)};
-  LaneState lane;
+  std::uint64_t random = 0x0123456789ABCDEF;
+  LaneState lane{[this] { return ++random; }};
+  std::string press = "press-1", number;
   std::vector<std::string> log, messages;
   std::vector<std::uint64_t> numbers;
+  std::vector<Duration> patience;
   std::uint32_t last_id = 0;
 };
 
@@ -108,12 +122,44 @@ TEST_F(LaneTest, AnAnswerSaysThatItRuns) {
 TEST_F(LaneTest, NobodyKnowsWhetherItRunsWhereTheAnswerIsLost) {
   for (const int lost :
        {code::unavailable, code::deadline_exceeded, code::cancelled, code::internal, code::unknown}) {
+    press = "press-" + std::to_string(lost);
     jog();
     fail(numbers.size() - 1, lost);
     EXPECT_EQ(feeder(), Jogging::running);
+    (void)taken();
     wait(300ms);
-    fail(numbers.size() - 1, 9);
+    EXPECT_THAT(taken(), ElementsAre("Halt"));
+    wait(LaneState::pause);
+    EXPECT_THAT(taken(), ElementsAre("Halt")) << "behind whatever still came";
+    for (const auto back : {1, 2}) answer(numbers.size() - static_cast<std::size_t>(back));
   }
+}
+
+TEST_F(LaneTest, WhatTheDaemonItselfSaysIsKnown) {
+  jog();
+  fail(0, code::unavailable, "details");  // the drive is offline
+  EXPECT_EQ(feeder(), Jogging::none);
+}
+
+TEST_F(LaneTest, AStopBehindALostAnswerIsFollowedByAHalt) {
+  jog();
+  fail(0, code::cancelled);
+  (void)taken();
+  stop();
+  EXPECT_THAT(taken(), ElementsAre("Halt"));
+  EXPECT_EQ(feeder(), Jogging::none);
+  wait(LaneState::pause);
+  EXPECT_THAT(taken(), ElementsAre("Halt"));
+}
+
+TEST_F(LaneTest, AnAnswerThatIsLostBehindAStopIsFollowedByAHalt) {
+  jog();
+  stop();
+  (void)taken();
+  fail(0, code::cancelled);
+  EXPECT_THAT(taken(), ElementsAre("answer"));
+  wait(LaneState::pause);
+  EXPECT_THAT(taken(), ElementsAre("Halt"));
 }
 
 TEST_F(LaneTest, ARenewalKeepsItRunning) {
@@ -134,6 +180,21 @@ TEST_F(LaneTest, AStartThatIsRefusedIsNone) {
   (void)taken();
   close();
   EXPECT_THAT(taken(), IsEmpty());
+}
+
+TEST_F(LaneTest, ARenewalThatIsRefusedEndsNothing) {
+  run();
+  jog();
+  fail(1, code::resource_exhausted);
+  EXPECT_EQ(feeder(), Jogging::running);
+  jog();
+  answer(2);
+  (void)taken();
+  jog();
+  fail(3, code::failed_precondition, "details");
+  (void)taken();
+  close();
+  EXPECT_THAT(taken(), ElementsAre("Halt"));
 }
 
 TEST_F(LaneTest, AStartThatHasEndedIsNone) {
@@ -259,6 +320,129 @@ TEST_F(LaneTest, ANewPressTakesThePlaceOfAnEnd) {
   EXPECT_THAT(taken(), ElementsAre("Halt"));
 }
 
+// What was refused stays refused.
+
+TEST_F(LaneTest, APressThatWasRefusedNeverStarts) {
+  for (const int why : {code::resource_exhausted, code::unavailable, code::failed_precondition}) {
+    press = "press-" + std::to_string(why);
+    jog();
+    fail(numbers.size() - 1, why);
+    (void)taken();
+    jog();
+    EXPECT_THAT(taken(), ElementsAre("refused"));
+    wait(1s);
+    jog();
+    EXPECT_EQ(taken().back(), "refused");
+  }
+  press = "another";
+  jog();
+  EXPECT_THAT(taken(), ElementsAre("Jog"));
+}
+
+TEST_F(LaneTest, APressThatCameTooLateNeverStarts) {
+  jog(300ms, 200ms);
+  EXPECT_THAT(taken(), ElementsAre("late"));
+  jog();
+  EXPECT_THAT(taken(), ElementsAre("refused"));
+  jog(300ms, {}, "lifter");
+  EXPECT_THAT(taken(), ElementsAre("Jog")) << "another axis";
+  stop();
+  (void)taken();
+  jog();
+  EXPECT_THAT(taken(), ElementsAre("Jog")) << "behind a stop";
+}
+
+TEST_F(LaneTest, ALateRenewalOfWhatIsOnItsWayIsOnlyDropped) {
+  jog();
+  jog(300ms, 200ms);
+  answer(0);
+  (void)taken();
+  jog();
+  EXPECT_THAT(taken(), ElementsAre("Jog"));
+}
+
+TEST_F(LaneTest, APressThatStartsAfterItWasRefusedIsHalted) {
+  jog();
+  jog();
+  (void)taken();
+  fail(0, code::resource_exhausted);
+  answer(1);
+  EXPECT_THAT(taken(), ElementsAre("answer", "answer", "Halt"));
+  EXPECT_EQ(feeder(), Jogging::none);
+}
+
+TEST_F(LaneTest, ARefusalOfAnotherPressLeavesWhatRuns) {
+  run();
+  press = "press-2";
+  jog();
+  fail(1, code::resource_exhausted);
+  EXPECT_EQ(feeder(), Jogging::running);
+  (void)taken();
+  jog();
+  EXPECT_THAT(taken(), ElementsAre("refused"));
+  wait(300ms);
+  EXPECT_THAT(taken(), ElementsAre("Halt"));
+}
+
+TEST_F(LaneTest, RefusedPressesOfABoundedNumberOfAxesAreRemembered) {
+  for (std::size_t i = 0; i < LaneState::most_barred + 10; ++i) {
+    jog(300ms, 200ms, "axis-" + std::to_string(i));
+    wait(20ms);
+  }
+  jog(300ms, {}, "axis-" + std::to_string(LaneState::most_barred + 9));
+  EXPECT_EQ(taken().back(), "refused") << "the last ones";
+}
+
+// How late the first message is.
+
+TEST(LaneMeasure, NothingStartsBeforeTheNumberOfAnEchoCameBack) {
+  TimePoint now{Duration(1h)};
+  std::uint64_t last = 7;
+  LaneState lane([&] { return ++last; });
+  std::uint32_t id = 0;
+  std::string reply;
+  const auto say = [&](std::string_view method, const std::string& message) {
+    std::string bytes(1, '\1');
+    append_big_endian32(bytes, ++id);
+    append_big_endian32(bytes, static_cast<std::uint32_t>(now.time_since_epoch() / 1ms));
+    bytes += static_cast<char>(method.size());
+    bytes += method;
+    bytes += message;
+    const auto effects = lane.receive(bytes, now);
+    const auto* sent = effects.empty() ? nullptr : std::get_if<LaneSend>(&effects.front());
+    reply = sent == nullptr ? "passed on" : sent->bytes;
+  };
+  v1::JogRequest jog;
+  jog.set_axis("feeder");
+  const auto press = [&] {
+    jog.mutable_options()->set_request_id(std::to_string(id));
+    say("axisd.v1.AxisService/Jog", jog.SerializeAsString());
+    return reply == "passed on";
+  };
+  const auto number = [&] { return reply.substr(reply.size() - 8); };
+  EXPECT_FALSE(press());
+  EXPECT_EQ(reply.front(), '\4');
+  say("axisd.v1.AxisService/Stop", "");
+  EXPECT_EQ(reply, "passed on") << "stops wait for nothing";
+  say("", "");
+  EXPECT_FALSE(press()) << "the echo may have been on its way for long, and so may this";
+  say("", "");
+  const auto old = number();
+  say("", "");
+  say("", old);
+  EXPECT_FALSE(press()) << "not the last one";
+  auto late = number();
+  now += LaneState::longest_round_trip + 1ms;
+  say("", late);
+  EXPECT_FALSE(press()) << "too slow to know it well";
+  late = number();
+  now += LaneState::longest_round_trip;
+  say("", late);
+  EXPECT_TRUE(press());
+  say("axisd.v1.LeaseService/RenewLease", "");
+  EXPECT_EQ(reply, "passed on");
+}
+
 // What is sent, and to whom.
 
 TEST_F(LaneTest, HaltsEachAxisByItsName) {
@@ -304,6 +488,29 @@ TEST_F(LaneTest, AHaltThatFoundNobodyIsTriedAgainForAWhile) {
   EXPECT_TRUE(lane.at_rest());
 }
 
+TEST_F(LaneTest, AHaltThatFoundNoRoomIsTriedAgain) {
+  run();
+  close();
+  (void)taken();
+  fail(1, code::resource_exhausted, "details");
+  wait(LaneState::pause);
+  EXPECT_THAT(taken(), ElementsAre("Halt"));
+}
+
+TEST_F(LaneTest, CallsHaveTheirTime) {
+  run();
+  stop("Stop");
+  jog();
+  answer(2);
+  close();
+  fail(numbers.size() - 1, code::unavailable);
+  wait(LaneState::pause);
+  EXPECT_THAT(patience, ElementsAre(LaneState::patience_of_moves, LaneState::patience_of_stops,
+                                    LaneState::patience_of_moves, LaneState::longest_hold,
+                                    LaneState::longest_hold - LaneState::pause))
+      << "a Halt of the gateway: what is left of it";
+}
+
 TEST_F(LaneTest, ANewPressIsNotHaltedByAnOlderHaltThatIsOwed) {
   run();
   wait(300ms);
@@ -340,6 +547,23 @@ TEST_F(LaneTest, StopsAreNeverTooLate) {
   EXPECT_THAT(taken(), ElementsAre("Stop", "StopAll", "GroupHalt", "GroupStop"));
 }
 
+TEST_F(LaneTest, WhoStopsManyLetsGoOfAll) {
+  for (const auto* method : {"SystemService/StopAll", "GroupService/GroupStop", "GroupService/GroupHalt"}) {
+    const auto kind = std::string(method).substr(std::string(method).find('/') + 1);
+    jog(300ms, {}, "feeder");
+    const auto first = numbers.size() - 1;
+    answer(first);
+    jog(300ms, {}, "lifter");
+    (void)taken();
+    say("axisd.v1." + std::string(method), "");
+    EXPECT_THAT(taken(), ElementsAre(kind, "Halt", "Halt"));
+    EXPECT_EQ(feeder(), Jogging::none);
+    EXPECT_EQ(lane.jogging("lifter"), Jogging::ending);
+    answer(first + 1);
+    EXPECT_THAT(taken(), ElementsAre("answer", "Halt"));
+  }
+}
+
 TEST_F(LaneTest, ALinkThatIsFarTooLateBeginsAnew) {
   run();
   stop("Stop", 6s);
@@ -359,11 +583,15 @@ TEST_F(LaneTest, OtherCallsAreRefused) {
 TEST_F(LaneTest, AJogThatIsNoneIsRefused) {
   say("axisd.v1.AxisService/Jog", "\xFF");
   say("axisd.v1.AxisService/Jog", "");
+  v1::JogRequest nameless;
+  nameless.set_axis("feeder");
+  say("axisd.v1.AxisService/Jog", nameless.SerializeAsString());
   v1::JogRequest waits;
   waits.set_axis("feeder");
+  waits.mutable_options()->set_request_id("press-1");
   waits.mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE);
   say("axisd.v1.AxisService/Jog", waits.SerializeAsString());
-  EXPECT_THAT(taken(), ElementsAre("refused", "refused", "refused"));
+  EXPECT_THAT(taken(), ElementsAre("refused", "refused", "refused", "refused"));
 }
 
 TEST_F(LaneTest, AStopThatNobodyCanReadIsTheDaemonsToRefuse) {
@@ -384,6 +612,14 @@ TEST_F(LaneTest, TenThousandMessagesAtOnceEndTheLane) {
   EXPECT_EQ(said.back(), "close");
   EXPECT_THAT(said, testing::Contains("Halt"));
   EXPECT_LE(said.size(), static_cast<std::size_t>(LaneState::pace.at_once) + 2);
+}
+
+TEST_F(LaneTest, TheMessageThatIsTooMuchStopsAllTheSame) {
+  run();
+  for (int i = 0; i < static_cast<int>(LaneState::pace.at_once) - 4; ++i) echo();
+  (void)taken();
+  stop("QuickStop");
+  EXPECT_THAT(taken(), ElementsAre("QuickStop", "close"));
 }
 
 TEST_F(LaneTest, SixtyMessagesASecondAreFine) {

@@ -35,9 +35,9 @@ class FakeSocket implements Socket {
   onmessage: ((event: { data: unknown }) => void) | null = null;
   send(bytes: Uint8Array): void { this.sent.push(bytes); }
   close(): void { this.closed = true; this.onclose?.(); }
-  answer(index: number, kind: number): void {
+  answer(index: number, kind: number, response: number[] = []): void {
     const id = new DataView(this.sent[index]!.buffer).getUint32(1);
-    this.onmessage?.({ data: answerBytes(kind, id, 0, '', [], []).buffer });
+    this.onmessage?.({ data: answerBytes(kind, id, 0, '', [], response).buffer });
   }
 }
 
@@ -92,6 +92,21 @@ test('how long it takes is that of the last echo, or of the one that is awaited'
   assert.equal(socket.sent.length, 2);
   world.advance(700);
   assert.equal(lane.takes(), 712);
+});
+
+test('the number of an echo comes back at once, and no further', () => {
+  const [, world, socket] = opened();
+  const number = [1, 2, 3, 4, 5, 6, 7, 8];
+  world.advance(5);
+  socket.answer(0, Kind.echo, number);
+  assert.equal(socket.sent.length, 2);
+  assert.deepEqual([...socket.sent[1]!.subarray(9)], [0, ...number]);
+  assert.equal(new DataView(socket.sent[1]!.buffer).getUint32(5), 5, 'its own time');
+  socket.answer(1, Kind.echo, [9, 9, 9, 9, 9, 9, 9, 9]);
+  assert.equal(socket.sent.length, 2);
+  world.advance(1000);
+  socket.answer(2, Kind.echo, number);
+  assert.equal(socket.sent.length, 4);
 });
 
 test('answers go to their calls, whatever their order', async () => {
