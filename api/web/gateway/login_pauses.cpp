@@ -3,20 +3,25 @@
 #include <algorithm>
 
 namespace axisd::web {
+namespace {
+
+std::string both(const std::string& address, const std::string& name) { return address + ' ' + name; }
+
+}  // namespace
 
 Duration LoginPauses::left(const std::string& address, const std::string& name, TimePoint now) const {
   return std::max(left_of(addresses_, address, longest_of_address, now),
-                  left_of(names_, name, longest_of_name, now));
+                  left_of(names_, both(address, name), longest_of_name, now));
 }
 
 void LoginPauses::failed(const std::string& address, const std::string& name, TimePoint now) {
   count(addresses_, address, now);
-  count(names_, name, now);
+  count(names_, both(address, name), now);
 }
 
 void LoginPauses::succeeded(const std::string& address, const std::string& name) {
   addresses_.erase(address);
-  names_.erase(name);
+  names_.erase(both(address, name));
 }
 
 Duration LoginPauses::left_of(const Table& table, const std::string& key, Duration longest, TimePoint now) {

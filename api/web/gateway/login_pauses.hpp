@@ -9,14 +9,14 @@
 
 namespace axisd::web {
 
-/// Counts failures of each address and of each name. Who guesses waits; whoever's name is guessed waits
-/// little: nobody is locked out by a stranger. Thread: one at a time.
+/// Counts failures of each name from each address, and of each address. Who guesses waits, and others at
+/// that address a little: nobody is locked out by a stranger. Thread: one at a time.
 class LoginPauses {
  public:
   static constexpr int free_attempts = 3;
   static constexpr Duration first = std::chrono::seconds(1);
-  static constexpr Duration longest_of_address = std::chrono::minutes(1),
-                            longest_of_name = std::chrono::seconds(5);
+  static constexpr Duration longest_of_name = std::chrono::minutes(1),  ///< from one address
+      longest_of_address = std::chrono::seconds(5);
   /// Without another failure all is forgotten.
   static constexpr Duration remembered = std::chrono::minutes(15);
   static constexpr std::size_t most = 4096;  ///< addresses, and names, that are remembered

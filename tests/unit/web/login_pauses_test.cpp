@@ -9,27 +9,39 @@ using namespace std::chrono_literals;
 
 constexpr TimePoint start{Duration(1h)};
 
-TEST(LoginPauses, GrowWithEachFailureOfAnAddress) {
+TEST(LoginPauses, GrowWithEachFailureOfANameFromAnAddress) {
   LoginPauses pauses;
   EXPECT_EQ(pauses.left("a", "anna", start), 0s);
-  pauses.failed("a", "n1", start);
-  pauses.failed("a", "n2", start);
+  pauses.failed("a", "anna", start);
+  pauses.failed("a", "anna", start);
   EXPECT_EQ(pauses.left("a", "anna", start), 0s);
-  pauses.failed("a", "n3", start);
+  pauses.failed("a", "anna", start);
   EXPECT_EQ(pauses.left("a", "anna", start), 1s);
   EXPECT_EQ(pauses.left("a", "anna", start + 400ms), 600ms);
-  pauses.failed("a", "n4", start);
+  pauses.failed("a", "anna", start);
   EXPECT_EQ(pauses.left("a", "anna", start), 2s);
-  for (int i = 0; i < 100; ++i) pauses.failed("a", "n5", start);
-  EXPECT_EQ(pauses.left("a", "anna", start), LoginPauses::longest_of_address);
-  EXPECT_EQ(pauses.left("b", "anna", start), 0s) << "another address does not wait for it";
+  for (int i = 0; i < 100; ++i) pauses.failed("a", "anna", start);
+  EXPECT_EQ(pauses.left("a", "anna", start), LoginPauses::longest_of_name);
 }
 
-TEST(LoginPauses, OfANameAreShortSoThatNobodyIsLockedOut) {
+TEST(LoginPauses, OfAnAddressAreShort) {
   LoginPauses pauses;
+  for (int i = 0; i < 100; ++i) pauses.failed("a", "n" + std::to_string(i), start);
+  EXPECT_EQ(pauses.left("a", "anna", start), LoginPauses::longest_of_address);
+}
+
+TEST(LoginPauses, LockNobodyOutWhoComesFromElsewhere) {
+  LoginPauses pauses;
+  for (int i = 0; i < 100; ++i) pauses.failed("a", "anna", start);
   for (int i = 0; i < 100; ++i) pauses.failed("a" + std::to_string(i), "anna", start);
-  EXPECT_EQ(pauses.left("b", "anna", start), LoginPauses::longest_of_name);
-  EXPECT_EQ(pauses.left("b", "bert", start), 0s);
+  EXPECT_EQ(pauses.left("b", "anna", start), 0s);
+}
+
+TEST(LoginPauses, AreNotShortenedByALogInOfOnesOwn) {
+  LoginPauses pauses;
+  for (int i = 0; i < 6; ++i) pauses.failed("a", "anna", start);
+  pauses.succeeded("a", "mallory");
+  EXPECT_EQ(pauses.left("a", "anna", start), 8s);
 }
 
 TEST(LoginPauses, AreForgotten) {
