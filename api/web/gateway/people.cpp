@@ -1,5 +1,6 @@
 #include "api/web/gateway/people.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
 
@@ -9,9 +10,13 @@
 
 namespace axisd::web {
 
-Result<People> People::load(std::string path) {
+Result<People> People::load(std::string path, bool named) {
   People people(std::move(path));
   people.read_at_ = people.stamp();
+  if (named && people.read_at_.size < 0)
+    return fail(Reason::invalid_argument,
+                fmt::format("{}: the users file that the configuration names is not there", people.path_),
+                "axisd-web user add NAME --role ROLE makes it");
   auto users = load_users(people.path_);
   if (!users) return fail(std::move(users).error());
   people.users_ = *std::move(users);

@@ -16,8 +16,10 @@ namespace axisd::web {
 /// Who may log in, as the file says it now. Thread: one at a time.
 class People {
  public:
-  /// Blocks for the disk. Errors: those of load_users().
-  [[nodiscard]] static Result<People> load(std::string path);
+  /// `named`: the configuration names the file, so it has to be there: who took it away did not mean that
+  /// everybody at this computer is let in. Blocks for the disk. Errors: those of load_users(), and
+  /// invalid_argument: it is not there.
+  [[nodiscard]] static Result<People> load(std::string path, bool named);
 
   /// Reads the file anew where it has changed; a file that is wrong or gone changes nothing. True: it has
   /// changed.

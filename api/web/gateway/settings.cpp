@@ -219,6 +219,7 @@ LoadedSettings read_settings(std::string_view text, const std::string& file_name
   }
   Settings settings;
   Reader(settings, diagnostics).read_section(**document, {});
+  settings.users_named = (*document)->kind == Node::Kind::section && (*document)->find("users") != nullptr;
   check(settings, diagnostics, **document);
   if (!diagnostics.empty()) return {{}, diagnostics.sorted()};
   return {std::move(settings), {}};

@@ -42,6 +42,7 @@ struct Settings {
   DaemonSettings axisd;
   std::string files = "/usr/share/axisd-web";  ///< the page
   std::string users = "/var/lib/axisd-web/users";
+  bool users_named = false;  ///< the file says it
   Duration session_idle = std::chrono::minutes(60), session_longest = std::chrono::minutes(720);
   LimitSettings limits;
 };

@@ -17,12 +17,16 @@
 namespace axisd::web {
 namespace {
 
-constexpr std::size_t longest_name = 64;
 constexpr std::size_t largest_file = std::size_t{256} * 1024;
 
 std::unexpected<Error> failed(const std::string& path, std::string_view what) {
+  const int why = errno;
   return fail(Reason::storage,
-              fmt::format("{}: cannot be {}: {}", path, what, std::generic_category().message(errno)));
+              fmt::format("{}: cannot be {}: {}", path, what, std::generic_category().message(why)),
+              why == ENOENT                   ? "start axisd-web once, which makes the directory: systemctl "
+                                                "start axisd-web; or make it yourself"
+              : why == EACCES || why == EPERM ? "say it as root, or as the user of axisd-web"
+                                              : "");
 }
 
 std::unexpected<Error> wrong(const std::string& path, std::size_t line, std::string_view what) {
@@ -57,7 +61,7 @@ bool write_all(int file, std::string_view text) {
 }  // namespace
 
 bool is_user_name(std::string_view text) {
-  return !text.empty() && text.size() <= longest_name &&
+  return !text.empty() && text.size() <= longest_user_name &&
          std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~' && c != ':'; });
 }
 
@@ -66,6 +70,11 @@ bool is_role(std::string_view text) { return text == "viewer" || text == "operat
 const User* find_user(const Users& users, std::string_view name) {
   const auto found = std::ranges::find(users, name, &User::name);
   return found == users.end() ? nullptr : &*found;
+}
+
+std::string_view role_of_certificate(const Users& users, std::string_view name) {
+  const auto* user = find_user(users, name);
+  return user == nullptr || !user->hash.empty() ? "viewer" : std::string_view(user->role);
 }
 
 Result<Users> parse_users(std::string_view text, const std::string& path) {

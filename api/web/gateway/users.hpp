@@ -2,6 +2,7 @@
 // certificate.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,10 +19,15 @@ struct User {
 };
 using Users = std::vector<User>;
 
+inline constexpr std::size_t longest_user_name = 64;
 [[nodiscard]] bool is_user_name(std::string_view text);
 [[nodiscard]] bool is_role(std::string_view text);
 /// nullptr: there is none.
 [[nodiscard]] const User* find_user(const Users& users, std::string_view name);
+
+/// Of who comes with a certificate of that name: what the file says of a user without a password, else
+/// "viewer". A name that logs in with a password is somebody else's.
+[[nodiscard]] std::string_view role_of_certificate(const Users& users, std::string_view name);
 
 /// `path` leads errors: invalid_argument, with the line.
 [[nodiscard]] Result<Users> parse_users(std::string_view text, const std::string& path);

@@ -23,6 +23,7 @@ TEST(Settings, HaveDefaultsForAComputerOfItsOwn) {
   EXPECT_EQ(settings.axisd.server, "localhost:7443");
   EXPECT_FALSE(settings.tls);
   EXPECT_EQ(settings.session_idle, 1h);
+  EXPECT_FALSE(settings.users_named);
 }
 
 TEST(Settings, ReadEveryKey) {
@@ -42,6 +43,7 @@ limits: { connections: 11, connections_each: 12, streams: 13, streams_each: 14, 
   EXPECT_EQ(s.axisd.server + s.axisd.stop_server + s.axisd.ca + s.axisd.certificate + s.axisd.key,
             "cell:7443cell:7500def");
   EXPECT_EQ(s.files + s.users, "/g/h");
+  EXPECT_TRUE(s.users_named);
   EXPECT_EQ(s.session_idle + s.session_longest, 11min);
   EXPECT_THAT((std::vector{s.limits.connections, s.limits.connections_each, s.limits.streams,
                            s.limits.streams_each, s.limits.lanes, s.limits.lanes_each, s.limits.body}),

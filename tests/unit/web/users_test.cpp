@@ -43,6 +43,20 @@ TEST(Users, HaveNamesThatForgeNothing) {
   EXPECT_FALSE(is_user_name(std::string(65, 'a')));
 }
 
+TEST(Users, WithAPasswordAreNobodyWhoComesWithACertificate) {
+  EXPECT_EQ(role_of_certificate({{.name = "panel-1", .role = "operator", .hash = ""}}, "panel-1"),
+            "operator");
+  EXPECT_EQ(role_of_certificate(two, "shift-a"), "viewer");
+  EXPECT_EQ(role_of_certificate(two, "stranger"), "viewer");
+}
+
+TEST(Users, CannotBeSavedWhereThereIsNoDirectoryYet) {
+  const test::TemporaryDirectory directory;
+  const auto saved = save_users((directory.path() / "axisd-web" / "users").string(), two);
+  ASSERT_FALSE(saved);
+  EXPECT_THAT(saved.error().remedy, HasSubstr("systemctl start axisd-web"));
+}
+
 TEST(Users, HaveAFileOfTheirOwn) {
   const test::TemporaryDirectory directory;
   const auto path = (directory.path() / "users").string();

@@ -138,7 +138,7 @@ export class MockGateway {
     const id = view.getUint32(1);
     const length = view.getUint8(9);
     const method = new TextDecoder().decode(message.subarray(10, 10 + length));
-    if (length === 0) return answered(3, id, 0, '', new Uint8Array(), new Uint8Array());
+    if (length === 0) return answered(3, id, 0, '', new Uint8Array(), new Uint8Array(8).fill(7));
     this.lane.push({ at: performance.now(), method });
     const body = message.subarray(10 + length);
     const { machine } = this;

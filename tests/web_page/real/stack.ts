@@ -101,6 +101,7 @@ export class Stack {
       .replace('listen: localhost:7443', `listen: 127.0.0.1:${port}\n  stop_listen: 127.0.0.1:${await freePort()}`);
     writeFileSync(join(this.folder, 'axisd.yaml'), demo);
     this.port = await freePort();
+    writeFileSync(join(this.folder, 'users'), '', { mode: 0o600 });  // nobody: whoever is at this computer is let in
     const stop = /stop_listen: ([\d.]+:\d+)/.exec(demo)![1]!;
     writeFileSync(join(this.folder, 'web.yaml'),
                   `listen: localhost:${this.port}\naxisd: { server: "${this.server}", stop_server: "${stop}" }\nfiles: ${this.programs.page}\nusers: ${join(this.folder, 'users')}\n`);
