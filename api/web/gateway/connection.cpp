@@ -14,6 +14,7 @@
 #include "api/web/gateway/http_rules.hpp"
 #include "api/web/gateway/lane_message.hpp"
 #include "api/web/gateway/lane_socket.hpp"
+#include "api/web/gateway/lane_state.hpp"
 
 namespace axisd::web {
 
@@ -56,14 +57,21 @@ void Connection::close() {
   if (phase_ == Phase::closed) return;
   phase_ = Phase::closed;
   deadline_.reset();
-  if (auto call = std::exchange(call_, nullptr)) call->cancel();
+  if (auto call = std::exchange(call_, nullptr)) {
+    // A page that has left wanted none the less that it stops.
+    if (stopping_)
+      call->leave([place = std::make_shared<std::optional<Shares::Place>>(std::move(stream_))] {});
+    else
+      call->cancel();
+  }
   stream_.reset();
+  acting_ = false;
   transport_.close();
   place_.reset();
 }
 
 std::optional<TimePoint> Connection::idle_since() const {
-  if (phase_ == Phase::working || phase_ == Phase::closed) return std::nullopt;
+  if (phase_ == Phase::closed || (phase_ == Phase::working && acting_)) return std::nullopt;
   return since_;
 }
 
@@ -99,8 +107,8 @@ void Connection::watched(Error error, std::size_t size) {
   if (phase_ == Phase::closed) return;
   if (error) return close();  // a call that nobody reads ends with it
   buffer_.commit(size);
-  // While it works, what comes is the next request's. Nothing more is read then: who sends that may leave
-  // unnoticed until something is written.
+  // While it works, what comes is the next request's. Nothing more is read then.
+  if (acting_) return close();
   if (phase_ == Phase::waiting) read_head();
   if (phase_ == Phase::ending) drain();
 }
@@ -136,8 +144,12 @@ void Connection::read_body(std::function<void()> then) {
                        return self->refuse(plain(413, "the request is too large"));
                      if (error) return self->close();
                      self->phase_ = Phase::working;
+                     self->since_ = self->gateway_.clock.now();
                      self->deadline_.reset();
-                     if (self->buffer_.size() == 0) self->watch();
+                     if (self->buffer_.size() == 0)
+                       self->watch();
+                     else if (self->acting_)
+                       return self->close();
                      then();
                    });
 }
@@ -233,22 +245,32 @@ void Connection::begin_lane() {
 
 // A call.
 
-void Connection::begin_call() {
+std::optional<Answer> Connection::objection_to_call() const {
   const auto& request = parser_->get();
-  const auto target = view(request.target());
-  if (request.method() != http::verb::post || !is_call_path(target))
-    return refuse(refused_call(404, {.code = code::unimplemented, .message = "there is no such call"}));
-  if (!same_origin())
-    return refuse(refused_call(403, {.code = code::unauthenticated, .message = "another origin"}));
+  if (request.method() != http::verb::post || !is_call_path(view(request.target())))
+    return refused_call(404, {.code = code::unimplemented, .message = "there is no such call"});
+  if (!same_origin()) return refused_call(403, {.code = code::unauthenticated, .message = "another origin"});
   if (header(http::field::content_type) != grpc_web_type)
-    return refuse(refused_call(
-        415, {.code = code::invalid_argument, .message = fmt::format("only {} is taken", grpc_web_type)}));
+    return refused_call(
+        415, {.code = code::invalid_argument, .message = fmt::format("only {} is taken", grpc_web_type)});
+  return std::nullopt;
+}
+
+void Connection::begin_call() {
+  if (const auto objected = objection_to_call()) return refuse(*objected);
   if (!identify(true))
     return refuse(refused_call(401, {.code = code::unauthenticated, .message = "nobody is logged in"}));
-  stream_ = gateway_.streams.take(known_.person.key());
+  const auto target = view(parser_->get().target());
+  // Nothing would end it when the page is gone, and a Halt could overtake it.
+  if (target.ends_with("/Jog"))
+    return refuse(failed_call({.code = code::failed_precondition, .message = "a jog goes over the lane"}));
+  const auto method = method_of_path(target);
+  stopping_ = method && is_stop(*method);
+  stream_ = (stopping_ ? gateway_.stops : gateway_.streams).take(known_.person.key());
   if (!stream_)
     return refuse(refused_call(
         429, {.code = code::resource_exhausted, .message = "too many calls of this person are open"}));
+  acting_ = true;
   read_body([this] { start_call(); });
 }
 
@@ -256,11 +278,15 @@ void Connection::start_call() {
   const auto message = message_of(parser_->get().body());
   if (!message) {
     stream_.reset();
+    acting_ = false;
     return answer(refused_call(400, message.error()));
   }
   head_sent_ = false;
+  auto timeout = timeout_of(header("grpc-timeout"));
+  if (stopping_)
+    timeout = std::min<Duration>(timeout.value_or(Duration::max()), LaneState::patience_of_stops);
   call_ = gateway_.upstream->start(
-      std::string(view(parser_->get().target())), *message, known_.person, timeout_of(header("grpc-timeout")),
+      std::string(view(parser_->get().target())), *message, known_.person, timeout,
       {.message = [self = shared_from_this()](const grpc::ByteBuffer& part) { self->pass_on(part); },
        .done = [self = shared_from_this()](const CallStatus& status) { self->end_call(status); }});
   parser_->get().body() = {};
@@ -284,6 +310,7 @@ void Connection::pass_on(const grpc::ByteBuffer& message) {
 void Connection::end_call(const CallStatus& status) {
   call_.reset();
   stream_.reset();
+  acting_ = false;
   std::string bytes;
   if (!std::exchange(head_sent_, true)) bytes = head_of(200, grpc_web_type, std::nullopt, {}, keep_alive_);
   bytes += chunk(trailers_frame(status));
@@ -295,6 +322,7 @@ void Connection::end_call(const CallStatus& status) {
 
 void Connection::answer(const Answer& said) {
   phase_ = Phase::working;
+  since_ = gateway_.clock.now();
   // A body that nobody asked for is not read.
   if (!parser_->is_done() && (parser_->chunked() || parser_->content_length().value_or(0) > 0))
     return refuse(said);
@@ -304,7 +332,9 @@ void Connection::answer(const Answer& said) {
 
 void Connection::refuse(const Answer& said) {
   phase_ = Phase::working;
+  since_ = gateway_.clock.now();
   stream_.reset();
+  acting_ = false;
   write(to_bytes(said, false), [this] { end_gently(); });
 }
 

@@ -23,10 +23,12 @@ namespace axisd::web {
 /// Keeps itself until it has ended.
 ///
 ///   handshake --> waiting --first byte--> reading --whole--> working --answered--> waiting
-///                                           |                   | client gone: the call is cancelled
+///                                           |                   | client gone: the call is cancelled,
+///                                           |                   | unless it is a stop
 ///                                           +--refused--> ending (reads what still comes, for a while)
 ///
-/// While it works it goes on reading, so that a client that leaves is noticed. Thread: the gateway's.
+/// While it works it goes on reading, so that a client that leaves is noticed: who sends another request
+/// before a call is answered could leave unnoticed, and is cut off. Thread: the gateway's.
 class Connection final : public Guest, public std::enable_shared_from_this<Connection> {
  public:
   Connection(Gateway& gateway, Transport transport, std::string peer, Shares::Place place);
@@ -34,7 +36,8 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
 
   void close() override;
   [[nodiscard]] std::optional<TimePoint> idle_since() const override;
-  [[nodiscard]] std::uint64_t session() const override { return call_ ? known_.session : 0; }
+  [[nodiscard]] std::uint64_t session() const override { return acting_ ? known_.session : 0; }
+  [[nodiscard]] const Person* person() const override { return acting_ ? &known_.person : nullptr; }
 
  private:
   enum class Phase : std::uint8_t { handshake, waiting, reading, working, ending, closed };
@@ -72,6 +75,8 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
 
   // A call.
   void begin_call();
+  /// What is wrong with its head, whoever asks.
+  [[nodiscard]] std::optional<Answer> objection_to_call() const;
   void start_call();
   void pass_on(const grpc::ByteBuffer& message);
   void end_call(const CallStatus& status);
@@ -98,6 +103,8 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
   std::optional<Parser> parser_;
   bool watching_ = false, keep_alive_ = false, head_sent_ = false, ever_known_ = false;
   Known known_{};
+  bool acting_ = false;    ///< a call is read or carried out
+  bool stopping_ = false;  ///< which is a stop
   std::shared_ptr<Call> call_;
   std::optional<Shares::Place> stream_;
   std::string out_;

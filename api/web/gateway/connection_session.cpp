@@ -17,6 +17,9 @@ namespace http = boost::beast::http;
 
 namespace {
 
+/// Bytes of the body.
+constexpr std::uint64_t most_log_in = 8192;
+
 /// A member of a JSON object that is text; nothing: there is none.
 std::optional<std::string> text_of(const google::protobuf::Struct& object, const std::string& name) {
   const auto found = object.fields().find(name);
@@ -57,15 +60,16 @@ void Connection::log_in() {
   if (!same_origin()) return refuse(plain(403, "another origin"));
   if (!header(http::field::content_type).starts_with("application/json"))
     return refuse(plain(415, "only application/json is taken"));
+  if (parser_->chunked() || parser_->content_length().value_or(0) > most_log_in)
+    return refuse(plain(413, "a log-in is no longer than 8192 bytes"));
   read_body([this] {
     google::protobuf::Struct object;
     const auto& body = parser_->get().body();
-    const bool is_json =
-        body.size() <= 8192 && google::protobuf::util::JsonStringToMessage(body, &object).ok();
+    const bool is_json = google::protobuf::util::JsonStringToMessage(body, &object).ok();
     const auto name = is_json ? text_of(object, "name") : std::nullopt;
     const auto password = is_json ? text_of(object, "password") : std::nullopt;
     parser_->get().body() = {};
-    if (!name || !password || password->size() > longest_password)
+    if (!name || !password || name->size() > longest_user_name || password->size() > longest_password)
       return answer(json(400, R"({"reason":"no_log_in","message":"a name and a password are needed"})"));
     compare_password(*name, *password);
   });
@@ -94,10 +98,10 @@ void Connection::logged_in(const std::string& name, const std::string& proof, bo
     gateway_.pauses.failed(peer_, name, now);
   if (phase_ == Phase::closed) return;
   if (!is_known) {
-    spdlog::warn("log-in from {} failed", peer_);
+    if (gateway_.may_tell()) spdlog::warn("log-in from {} failed", peer_);
     return refuse_log_in("wrong", "name or password is wrong", gateway_.pauses.left(peer_, name, now));
   }
-  spdlog::info("{} ({}) has logged in from {}", name, user->role, peer_);
+  if (gateway_.may_tell()) spdlog::info("{} ({}) has logged in from {}", name, user->role, peer_);
   const auto token =
       gateway_.sessions.begin({.name = name, .role = user->role, .how = How::password}, peer_, proof, now);
   ever_known_ = true;

@@ -14,6 +14,10 @@ namespace {
 /// for.
 constexpr Duration tick_period = std::chrono::seconds(1);
 
+/// Calls that stop something: of all, and of each person.
+constexpr int most_stops = 128, most_stops_each = 32;
+constexpr Pace lines{.per_second = 1, .at_once = 30};
+
 SessionLimits session_limits(const Settings& settings) {
   return {.idle = settings.session_idle, .longest = settings.session_longest};
 }
@@ -32,7 +36,9 @@ Gateway::Gateway(boost::asio::io_context& context, Clock& time, const Settings& 
       connections(said.limits.connections, said.limits.connections_each),
       streams(said.limits.streams, said.limits.streams_each),
       lanes(said.limits.lanes, said.limits.lanes_each),
-      sessions(session_limits(said), [this](const Session& session) { end_session(session.id); }) {
+      stops(most_stops, most_stops_each),
+      sessions(session_limits(said), [this](const Session& session) { end_session(session.id); }),
+      lines_(lines) {
   if (!client_ca.empty()) identities_.emplace(client_ca);
   tick();
 }
@@ -47,6 +53,23 @@ void Gateway::tick() {
     const auto* user = find_user(people.users(), session.person.name);
     return user == nullptr || user->role != session.person.role || user->hash != session.proof;
   });
+  for (const auto& guest : guests())
+    if (const auto* person = guest->person(); person != nullptr && guest->session() == 0 && !stands(*person))
+      guest->close();
+}
+
+bool Gateway::stands(const Person& person) const {
+  if (person.how == How::loopback) return people.nobody();
+  return person.how == How::certificate && person.role == role_of_certificate(people.users(), person.name);
+}
+
+bool Gateway::may_tell() {
+  if (!lines_.take(clock.now())) {
+    ++untold_;
+    return false;
+  }
+  if (untold_ > 0) spdlog::info("{} lines of this kind were left out", std::exchange(untold_, 0));
+  return true;
 }
 
 std::optional<Known> Gateway::who(std::string_view cookie, const std::string& certificate, bool encrypted,
@@ -64,10 +87,8 @@ std::optional<Known> Gateway::who(std::string_view cookie, const std::string& ce
 std::optional<Known> Gateway::by_certificate(const std::string& certificate) const {
   auto name = identities_->of(certificate);
   if (!is_user_name(name)) return std::nullopt;
-  const auto* user = find_user(people.users(), name);
-  return Known{.person = {.name = std::move(name),
-                          .role = user == nullptr ? "viewer" : user->role,
-                          .how = How::certificate}};
+  std::string role(role_of_certificate(people.users(), name));
+  return Known{.person = {.name = std::move(name), .role = std::move(role), .how = How::certificate}};
 }
 
 void Gateway::enter(const std::shared_ptr<Guest>& guest) {

@@ -14,6 +14,7 @@
 #include "api/web/gateway/login_pauses.hpp"
 #include "api/web/gateway/people.hpp"
 #include "api/web/gateway/person.hpp"
+#include "api/web/gateway/rates.hpp"
 #include "api/web/gateway/sessions.hpp"
 #include "api/web/gateway/settings.hpp"
 #include "api/web/gateway/shares.hpp"
@@ -32,6 +33,8 @@ class Guest {
   [[nodiscard]] virtual std::optional<TimePoint> idle_since() const = 0;
   /// On whose behalf it does what it does; 0: no session's.
   [[nodiscard]] virtual std::uint64_t session() const = 0;
+  /// The same; nullptr: nobody's.
+  [[nodiscard]] virtual const Person* person() const = 0;
 };
 
 /// Who somebody is, and by which session; 0: by none.
@@ -62,6 +65,8 @@ class Gateway {
   /// Ends everything; calls that stop something go on.
   void end_all();
   [[nodiscard]] bool deserted();
+  /// Whether a line may be logged about what anybody may bring about as often as they like.
+  [[nodiscard]] bool may_tell();
 
   boost::asio::io_context& io;
   Clock& clock;
@@ -72,16 +77,21 @@ class Gateway {
   LoginPauses pauses;
   PasswordWorker passwords;
   Shares connections, streams, lanes;
+  Shares stops;  ///< calls that stop something, which other calls leave their places
   Sessions sessions;
 
  private:
   void tick();
   void end_session(std::uint64_t id);
   [[nodiscard]] std::optional<Known> by_certificate(const std::string& certificate) const;
+  /// Whether somebody without a session would be let in as they are.
+  [[nodiscard]] bool stands(const Person& person) const;
   [[nodiscard]] std::vector<std::shared_ptr<Guest>> guests();
 
   std::optional<tls::Identities> identities_;
   std::vector<std::weak_ptr<Guest>> guests_;
+  Rate lines_;
+  int untold_ = 0;
   Clock::Timer timer_;
 };
 

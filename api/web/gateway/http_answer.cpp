@@ -96,6 +96,10 @@ Answer refused_call(int status, const CallStatus& why) {
   return answer;
 }
 
+Answer failed_call(const CallStatus& why) {
+  return {.status = 200, .type = grpc_web_type, .body = trailers_frame(why)};
+}
+
 std::string chunk(std::string_view bytes) { return fmt::format("{:x}\r\n{}\r\n", bytes.size(), bytes); }
 
 }  // namespace axisd::web

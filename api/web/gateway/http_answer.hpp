@@ -33,6 +33,8 @@ struct Answer {
 /// A call that was refused before it was one: the status of gRPC in the head, as a client of gRPC-Web reads
 /// it.
 [[nodiscard]] Answer refused_call(int status, const CallStatus& why);
+/// The same of a call that is well-formed: as if the daemon had refused it.
+[[nodiscard]] Answer failed_call(const CallStatus& why);
 [[nodiscard]] Answer json(int status, std::string body);
 
 /// A chunk of a body that comes in chunks. Precondition: not empty, which would be its end.

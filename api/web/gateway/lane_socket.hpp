@@ -33,6 +33,7 @@ class LaneSocket final : public Guest, public std::enable_shared_from_this<LaneS
   void close() override { shut("this session is over"); }
   [[nodiscard]] std::optional<TimePoint> idle_since() const override { return std::nullopt; }
   [[nodiscard]] std::uint64_t session() const override { return known_.session; }
+  [[nodiscard]] const Person* person() const override { return &known_.person; }
 
  private:
   void read();
