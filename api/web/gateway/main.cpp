@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
+#include <spdlog/async.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
@@ -28,17 +29,28 @@ using namespace axisd;
 using namespace axisd::web;
 
 constexpr int failed = 1, wrong = 2;
+/// Lines that nobody takes; beyond that the oldest get lost.
+constexpr std::size_t log_queue = 8192;
 /// For the halts of pages that are still jogging, and their answers.
 constexpr Duration end_patience = std::chrono::seconds(2);
 
+/// On a thread of its own: whoever does not read the log holds up nothing.
 void start_logging(const std::string& level) {
-  auto logger = spdlog::stderr_logger_st("axisd-web");
+  spdlog::init_thread_pool(log_queue, 1);
+  auto logger = spdlog::create_async_nb<spdlog::sinks::stderr_sink_mt>("axisd-web");
+  logger->flush_on(spdlog::level::warn);
   logger->set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
   logger->set_level(spdlog::level::from_str(level == "warn" ? "warning" : level));
   spdlog::set_default_logger(std::move(logger));
   if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
   // It would tell of every message of a page that is not readable.
   google::protobuf::SetLogHandler(nullptr);
+}
+
+/// gRPC's threads, and what is open, may still want something of what would be torn down.
+[[noreturn]] void leave_at_once(int status) {
+  spdlog::shutdown();  // with the last lines written
+  std::_Exit(status);
 }
 
 int give_up(const Error& error) {
@@ -60,7 +72,7 @@ struct Ground {
 };
 
 Result<Ground> prepare(const Settings& settings) {
-  auto people = People::load(settings.users);
+  auto people = People::load(settings.users, settings.users_named);
   if (!people) return fail(std::move(people).error());
   auto assets = Assets::load(settings.files);
   if (!assets) return fail(std::move(assets).error());
@@ -93,27 +105,34 @@ class Heartbeat {
   Clock::Timer timer_;
 };
 
-void run(boost::asio::io_context& io) {
-  while (!io.stopped()) {
-    try {
-      io.run();
-    } catch (const std::exception& error) {  // no memory: that connection has ended
-      spdlog::error("{}", error.what());
-    }
+/// False: something failed, in the middle of whatever it was. What it leaves behind is not to be trusted.
+bool run(boost::asio::io_context& io) {
+  try {
+    io.run();
+    return true;
+  } catch (const std::exception& error) {
+    spdlog::critical("{}; axisd-web ends", error.what());
+    return false;
   }
 }
 
 /// Nobody is let in any more; what is jogged is halted, and everything that is open ends.
-void end(boost::asio::io_context& io, Gateway& gateway, Listener& listener) {
+void end(boost::asio::io_context& io, Gateway& gateway, Listener& listener, int status) {
   sd_notify(0, "STOPPING=1");
   listener.close();
   gateway.end_all();
   io.restart();
   const auto until = gateway.clock.now() + end_patience;
-  while (!gateway.deserted() && gateway.clock.now() < until) io.run_one_for(std::chrono::milliseconds(50));
+  while (!gateway.deserted() && gateway.clock.now() < until) {
+    try {
+      io.run_one_for(std::chrono::milliseconds(50));
+    } catch (const std::exception& error) {  // the others are to end all the same
+      spdlog::error("{}", error.what());
+    }
+  }
   if (gateway.deserted()) return;
   spdlog::warn("something that is open does not end");
-  std::_Exit(0);  // it may still want to tell the gateway something
+  leave_at_once(status);
 }
 
 int serve(const Settings& settings, Ground ground) {
@@ -124,7 +143,7 @@ int serve(const Settings& settings, Ground ground) {
   Gateway gateway(io, clock, settings, std::move(ground.assets), std::move(ground.people),
                   *std::move(upstream), ground.client_ca);
   auto listener = Listener::open(gateway, std::move(ground.tls));
-  if (!listener) return give_up(listener.error());
+  if (!listener) leave_at_once(give_up(listener.error()));
   if (gateway.people.nobody() && !settings.tls)
     spdlog::warn("there are no users: everybody at this computer is let in");
   if (gateway.people.nobody() && settings.tls)
@@ -137,9 +156,9 @@ int serve(const Settings& settings, Ground ground) {
   });
   const Heartbeat heartbeat(clock);
   sd_notify(0, "READY=1");
-  run(io);
-  end(io, gateway, **listener);
-  return 0;
+  const int status = run(io) ? 0 : failed;
+  end(io, gateway, **listener, status);
+  return status;
 }
 
 }  // namespace
@@ -163,5 +182,7 @@ int main(int argc, char** argv) {
     std::cout << options.config << ": ok\n";
     return 0;
   }
-  return serve(settings, *std::move(ground));
+  const int status = serve(settings, *std::move(ground));
+  spdlog::shutdown();
+  return status;
 }
