@@ -17,6 +17,7 @@ struct CallStatus {
   int code = 0;  ///< of gRPC; 0: OK
   std::string message{};
   std::string details{};  ///< google.rpc.Status, encoded; may be empty
+  bool not_sent = false;  ///< the gateway refused it: nothing has left here
 };
 
 /// Codes of gRPC that the gateway uses itself.

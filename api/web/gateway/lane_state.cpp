@@ -279,7 +279,7 @@ void LaneState::bar_start(const Press& press) {
 }
 
 LaneState::Outcome LaneState::outcome_of(const CallStatus& status, std::string_view response) {
-  if (status.code != 0) return is_open(status) ? Outcome::unknown : Outcome::refused;
+  if (status.code != 0) return is_open(status) && !status.not_sent ? Outcome::unknown : Outcome::refused;
   v1::JogResponse answer;
   if (!answer.ParseFromArray(response.data(), static_cast<int>(response.size()))) return Outcome::unknown;
   const auto state = answer.command().state();

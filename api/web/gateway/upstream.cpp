@@ -134,7 +134,8 @@ void Upstream::press(LaneMethod method, std::string_view message, const Person& 
   if (!room) {
     CallStatus why{.code = reachable ? code::resource_exhausted : code::unavailable,
                    .message = reachable ? "too many presses wait for their answers, or this one is too large"
-                                        : "the stop lane of axisd does not answer"};
+                                        : "the stop lane of axisd does not answer",
+                   .not_sent = true};
     boost::asio::post(executor_, [done = std::move(done), why = std::move(why)] { done(why, {}); });
     return;
   }

@@ -45,6 +45,15 @@ TEST_F(LaneTest, WhatTheDaemonItselfSaysIsKnown) {
   EXPECT_EQ(feeder(), Jogging::none);
 }
 
+TEST_F(LaneTest, WhatHasNotLeftTheGatewayNeedsNoHalt) {
+  jog();
+  note(lane.answered(numbers.at(0), {.code = code::unavailable, .not_sent = true}, {}, now));
+  EXPECT_EQ(feeder(), Jogging::none);
+  (void)taken();
+  wait(1s);
+  EXPECT_THAT(taken(), IsEmpty());
+}
+
 TEST_F(LaneTest, AStopBehindALostAnswerIsFollowedByAHalt) {
   jog();
   fail(0, code::cancelled);
