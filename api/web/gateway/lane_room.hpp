@@ -22,14 +22,14 @@ class LaneRoom {
   static constexpr int most_stops = 32, most_stops_each = 16;
   static constexpr Pace effort{.per_second = 3000, .at_once = 6000};
   /// Of a person's presses and renewals, and once more of their stops: sixty a second.
-  static constexpr Pace effort_each{.per_second = 700, .at_once = 1400};
+  static constexpr Pace effort_each{.per_second = 800, .at_once = 1600};
   static constexpr double kept_for_stops = 1500;
   /// Bytes of a request; a usual one has 100.
   static constexpr std::size_t largest = 1024;
 
   /// What a call costs the daemon, with its headers and what the connection says besides; rather more.
   [[nodiscard]] static constexpr double cost_of(std::size_t size) {
-    return 10 + 2 * static_cast<double>(size) / 128;
+    return 12 + 2 * static_cast<double>(size) / 128;
   }
 
   /// A place for a press or a renewal. Nothing: there is none.
