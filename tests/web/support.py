@@ -14,7 +14,7 @@ import threading
 import time
 import uuid
 
-from harness import LIMIT, OWN_NAME, Program, Scenario, axis_pb, spinner, wait_for
+from harness import LIMIT, OWN_NAME, Program, Scenario, axis_pb, command_pb, pb, spinner, wait_for
 from harness.client import error_pb
 from harness.notify import NotifySocket
 
@@ -41,6 +41,7 @@ class Web:
         pathlib.Path(self.config).write_text(
             f"listen: localhost:0\naxisd: {{ server: \"unix:{machine.socket}\" }}\nfiles: {self.page}\n"
             f"users: {self.users}\n{keys}")
+        os.close(os.open(self.users, os.O_CREAT | os.O_WRONLY, 0o600))  # nobody yet
         self.prefix, self.notify, self.program, self.port = prefix, None, None, 0
 
     def user(self, *words, password=None):
@@ -59,7 +60,7 @@ class Web:
         self.program = Program(f"axisd-web-{number}", [*self.prefix, AXISD_WEB, "--config", self.config],
                                self.machine.directory, {"NOTIFY_SOCKET": self.notify.path})
         self.notify.wait_for("READY=1", self.program)
-        self.port = int(re.search(r"; port (\d+)", self.program.log())[1])
+        self.port = int(wait_for(lambda: re.search(r"; port (\d+)", self.program.log()), "it tells its port")[1])
         wait_for(lambda: self.request("GET", "/healthz")[0] == 200, "axisd-web has reached axisd")
         return self
 
@@ -285,6 +286,19 @@ class Lane:
                 return (answer[0], *answer[2:])
         return None
 
+    def measure(self):
+        """As a page does once it is open: without that no press is taken."""
+        kind, _, _, number = self.ask("")
+        assert (kind, len(number)) == (ECHO, 8)
+        assert self.ask("", number)[0] == ECHO
+        return self
+
+    def ask_to_jog(self):
+        """The answer to a press that came in time, as on a computer that is busy not each does."""
+        while (answer := self.ask("AxisService/Jog", jog_request(str(uuid.uuid4()))))[0] == LATE:
+            pass
+        return answer
+
     def until_end(self):
         """What still comes."""
         rest = []
@@ -351,18 +365,39 @@ class WebScenario(Scenario):
     def lane(self, page, **arguments):
         lane = page.lane(**arguments)
         self.addCleanup(lane.close)
-        return lane
+        return lane.measure()
 
     def held(self, lane, hold=1.0):
         """A finger on a button, and the shaft that turns for it."""
         before = self.subject.sim.shaft()
         finger = Finger(lane, hold)
         self.addCleanup(finger.let_go)
-        wait_for(lambda: self.subject.sim.shaft().position - before.position > 100, "the shaft turns")
+        again = time.monotonic() + 3
+
+        def turns():
+            nonlocal again
+            if self.subject.sim.shaft().position - before.position > 100:
+                return True
+            if time.monotonic() > again:  # a press that came late, on a computer that is busy, starts nothing
+                finger.press, again = str(uuid.uuid4()), time.monotonic() + 3
+            return False
+        wait_for(turns, "the shaft turns")
         return finger
 
-    def stands_for_good(self, seconds=1.5):
-        """The shaft comes to rest, and stays there."""
+    def was_halted(self, client=OWN_NAME):
+        """What the daemon tells: the last jog was ended by a Halt of that client, and not by its hold."""
+        own = self.subject.client
+        commands = own.call(own.command.ListCommands, command_pb.ListCommandsRequest(axis="spinner")).commands
+
+        def last(kind):
+            return max((c for c in commands if c.kind == kind), key=lambda c: c.accepted_at.ToNanoseconds())
+        jog, halt = last(pb.COMMAND_KIND_JOG), last(pb.COMMAND_KIND_HALT)
+        self.assertEqual((jog.state, jog.cause.reason), (pb.COMMAND_STATE_ABORTED, error_pb.REASON_SUPERSEDED), jog)
+        self.assertEqual(halt.client, client)
+        self.assertGreater(halt.accepted_at.ToNanoseconds(), jog.started_at.ToNanoseconds())
+
+    def stands_for_good(self, seconds=1.2):
+        """The shaft comes to rest, and stays there: longer than a start may be on its way."""
         self.subject.sim.wait_rest()
         rest = self.subject.sim.shaft()
         until = time.monotonic() + seconds

@@ -11,7 +11,7 @@ import unittest
 from certificates import Certificates
 from harness import LIMIT, OWN_NAME, axis_pb, error_pb, run, system_pb, wait_for
 from harness.client import event_pb
-from support import AXISD_WEB, DELEGATE, Page, WebScenario, frame, frames
+from support import AXISD_WEB, DELEGATE, ECHO, Page, WebScenario, frame, frames
 
 
 class Loopback(WebScenario):
@@ -20,7 +20,7 @@ class Loopback(WebScenario):
     def setUp(self):
         super().setUp()
         self.start_machine()
-        self.gateway = self.web("limits: { streams_each: 8, request: 1 s }\n").start()
+        self.gateway = self.web("limits: { streams_each: 8 }\n").start()
         self.page = Page(self.gateway)
 
     def info(self, page=None):
@@ -94,6 +94,8 @@ class Loopback(WebScenario):
                  for _ in range(8)]
         status, headers, _ = self.page.post("SystemService/GetInfo", system_pb.GetInfoRequest())
         self.assertEqual((status, headers["grpc-status"]), (429, "8"))
+        stop = axis_pb.StopRequest(axis="spinner")
+        self.assertEqual(self.page.post("AxisService/Stop", stop)[0], 200, "stops have places of their own")
         for connection, _ in open_:
             connection.close()
         wait_for(lambda: self.post_status() == 200, "the places are free again")
@@ -137,10 +139,40 @@ class Loopback(WebScenario):
         self.assertIn(" 421 ", self.says(b"GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n"))
         self.assertIn(" 431 ", self.says(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * 20_000 + b"\r\n\r\n"))
         self.assertIn(" 400 ", self.says(b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n"))
+        self.assertEqual(self.info().identity, OWN_NAME)
+
+    def test_half_a_request_is_cut_off_after_its_time(self):
+        self.gateway.stop()
+        self.gateway = self.web("limits: { request: 1 s }\n").start()
+        clients = []
         for text in (b"G", b"GET / HTTP/1.1\r\nHost: localh", b"POST /session HTTP/1.1\r\nHost: localhost\r\n"
                      b"Origin: http://localhost\r\nContent-Type: application/json\r\nContent-Length: 5\r\n\r\n{"):
-            self.assertEqual(self.says(text), "", "cut off after its time")
-        self.assertEqual(self.info().identity, OWN_NAME)
+            clients.append(self.gateway.raw())
+            self.addCleanup(clients[-1].close)
+            clients[-1].sendall(text)
+        for client in clients:
+            self.assertEqual(client.recv(1), b"", "closed by the gateway")
+
+    def test_who_asks_for_more_before_a_call_is_answered_is_cut_off(self):
+        content = frame(b"")
+        head = "\r\n".join(["POST /axisd.v1.AxisService/WatchAxes HTTP/1.1", f"Host: localhost:{self.gateway.port}",
+                            *(f"{key}: {value}" for key, value in self.page.headers().items()),
+                            f"Content-Length: {len(content)}", "", ""]).encode()
+        with self.gateway.raw() as client:
+            client.sendall(head + content)
+            self.assertIn(b"200", client.recv(4096))
+            client.sendall(b"GET / HTTP/1.1\r\n")
+            try:
+                while client.recv(4096):
+                    pass
+            except ConnectionError:
+                pass
+        with self.gateway.raw() as client:
+            client.sendall(head + content + b"GET / HTTP/1.1\r\n")
+            try:
+                self.assertEqual(client.recv(4096), b"")
+            except ConnectionError:
+                pass
 
     def test_out_of_descriptors_it_goes_on(self):
         self.gateway.stop()
@@ -172,6 +204,10 @@ class Loopback(WebScenario):
         done = run([AXISD_WEB, "--config", second.config])
         self.assertEqual(done.returncode, 1, done)
         self.assertIn("nothing else listens there", done.stderr)
+        pathlib.Path(second.users).unlink()
+        done = run([AXISD_WEB, "--config", second.config])
+        self.assertEqual(done.returncode, 2, done)
+        self.assertIn("the users file that the configuration names is not there", done.stderr)
         pathlib.Path(second.config).write_text("listn: localhost:1\nfiles: []\n")
         done = run([AXISD_WEB, "--config", second.config, "--check"])
         self.assertEqual((done.returncode, len(done.stderr.splitlines())), (2, 2), done)
@@ -227,10 +263,14 @@ class Persons(WebScenario):
             "POST", "/session", json.dumps({"name": "anna", "password": "correct horse"}),
             {"Origin": "http://evil.example", "Content-Type": "application/json"})
         self.assertEqual(status, 403)
-        for body in ("", "[]", "{", '{"name": 1}', '{"name": "anna"}', json.dumps({"name": "anna", "password": "x" * 2000})):
+        for body in ("", "[]", "{", '{"name": 1}', '{"name": "anna"}', json.dumps({"name": "anna", "password": "x" * 2000}),
+                     json.dumps({"name": "a" * 65, "password": "x"})):
             status, _, _ = self.gateway.request("POST", "/session", body,
                                                 {"Origin": self.gateway.origin, "Content-Type": "application/json"})
             self.assertEqual(status, 400, body[:20])
+        status, _, _ = self.gateway.request("POST", "/session", " " * 8193,
+                                            {"Origin": self.gateway.origin, "Content-Type": "application/json"})
+        self.assertEqual(status, 413)
 
     def test_each_may_do_what_its_role_says(self):
         viewer = Page(self.gateway)
@@ -283,7 +323,7 @@ class Tls(WebScenario):
         super().setUp()
         self.start_machine(DELEGATE)
         self.authority = Certificates(self.subject.directory, "authority")
-        for name in ("server", "panel-1", "stranger"):
+        for name in ("server", "panel-1", "stranger", "anna"):
             self.authority.issue(name)
         self.context = self.trusting()
         self.gateway = self.web(
@@ -309,7 +349,8 @@ class Tls(WebScenario):
         lane = self.lane(page)
         self.held(lane, hold=2.0)
         lane.close()
-        self.stands_for_good(2.5)
+        self.stands_for_good()
+        self.was_halted(f"anna via {OWN_NAME}")
 
     def test_a_certificate_is_a_person(self):
         self.gateway.tls = self.trusting("panel-1")
@@ -320,8 +361,32 @@ class Tls(WebScenario):
         self.assertEqual(answer.command.client, f"panel-1 via {OWN_NAME}")
         self.gateway.tls = self.trusting("stranger")
         self.assertEqual(Page(self.gateway).session()[1]["role"], "viewer")
+        self.gateway.tls = self.trusting("anna")
+        self.assertEqual(Page(self.gateway).session()[1], {"name": "anna", "role": "viewer", "how": "certificate",
+                                                           "expires_in_s": 0}, "a certificate knows no password")
         self.gateway.tls = self.context
         self.assertEqual(Page(self.gateway).session()[0], 401)
+
+    def test_a_certificate_of_another_role_is_out_at_once(self):
+        self.gateway.tls = self.trusting("panel-1")
+        page = Page(self.gateway)
+        lane = self.lane(page)
+        connection, following = page.stream("AxisService/WatchAxes", axis_pb.WatchAxesRequest(), axis_pb.WatchAxesResponse)
+        self.addCleanup(connection.close)
+        self.assertIsNotNone(following())
+        self.held(lane, hold=2.0)
+        self.gateway.user("add", "bert", "--role", "viewer", "--certificate")
+        wait_for(lambda: "3 users" in self.gateway.program.log(), "the gateway has read it")
+        self.assertEqual(lane.ask("")[0], ECHO, "nothing has changed for this one")
+        self.gateway.user("add", "panel-1", "--role", "viewer", "--certificate")
+        lane.until_end()
+        self.stands_for_good()
+        self.was_halted(f"panel-1 via {OWN_NAME}")
+        with self.assertRaises((http.client.IncompleteRead, ConnectionError, ssl.SSLError)):
+            while following() is not None:
+                pass
+            raise ConnectionError  # it ended in order
+        self.assertEqual(page.session()[1]["role"], "viewer")
 
     def test_garbage_in_tls_is_contained(self):
         for garbage in (b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", os.urandom(500), b"\x16\x03\x01\xff\xff" + bytes(70_000)):
@@ -347,6 +412,10 @@ class Tls(WebScenario):
         self.assertEqual(Page(self.gateway).log_in("anna", "correct horse")[0], 204)
 
     def test_the_handshake_has_its_time(self):
+        self.gateway.stop()
+        with open(self.gateway.config, "a") as config:
+            config.write("limits: { request: 1 s }\n")
+        self.gateway.start()
         with self.gateway.raw() as client:
             client.settimeout(LIMIT)
             self.assertEqual(client.recv(1), b"", "closed by the gateway")

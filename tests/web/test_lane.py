@@ -1,10 +1,11 @@
 """The lane of a page: what is jogged over it ends with it, by the simulator's truth, and never moves afterwards."""
+import http.client
 import os
 import signal
 import unittest
 
-from harness import DONE, axis_pb, command_pb, lease_pb, system_pb, wait_for
-from support import ANSWER, DELEGATE, ECHO, LATE, REFUSED, LaneRefused, Page, WebScenario, jog_request
+from harness import DONE, OWN_NAME, axis_pb, command_pb, lease_pb, system_pb, wait_for
+from support import ANSWER, DELEGATE, ECHO, LATE, REFUSED, LaneRefused, Page, WebScenario, frame, jog_request
 
 
 class Motion(WebScenario):
@@ -31,7 +32,8 @@ class Motion(WebScenario):
     def test_the_page_closes_its_lane(self):
         finger = self.held(self.wire, hold=2.0)
         self.wire.close()
-        self.stands_for_good(3)
+        self.stands_for_good()
+        self.was_halted()
         finger.let_go()
 
     def test_the_page_is_silent(self):
@@ -52,12 +54,13 @@ class Motion(WebScenario):
     def test_the_gateway_is_killed(self):
         self.held(self.wire)
         self.gateway.kill()
-        self.stands_for_good(2)
+        self.stands_for_good()
 
     def test_the_gateway_ends_in_order(self):
         self.held(self.wire, hold=2.0)
         self.assertEqual(self.gateway.program.terminate(), 0)
-        self.stands_for_good(2)
+        self.stands_for_good()
+        self.was_halted()
 
     def test_the_gateway_is_stopped_and_continued(self):
         finger = self.held(self.wire)
@@ -66,7 +69,7 @@ class Motion(WebScenario):
         self.subject.sim.wait_rest()
         os.kill(self.gateway.program.process.pid, signal.SIGCONT)
         finger.let_go()  # what it said meanwhile renewed a press that is over
-        self.stands_for_good(2)
+        self.stands_for_good()
         self.assertEqual(self.subject.sim.shaft().starts, 1)
 
     def test_the_daemon_is_killed_and_comes_back(self):
@@ -76,14 +79,54 @@ class Motion(WebScenario):
         self.stands_for_good()
         self.subject.daemon.kill()
         wait_for(lambda: self.gateway.request("GET", "/healthz")[0] == 503, "the gateway tells that axisd is away")
-        kind, status, _, _ = self.wire.ask("AxisService/Jog", jog_request("in vain"))
-        self.assertEqual((kind, status), (ANSWER, 14))
+        answer = self.wire.ask("AxisService/Jog", jog_request("in vain"))
+        self.assertIn(answer[:2], ((ANSWER, 14), (LATE, 0)))
         self.subject.start_daemon()
         wait_for(lambda: self.gateway.request("GET", "/healthz")[0] == 200, "the gateway has found axisd again")
         self.subject.client.wait_online("spinner")
         self.subject.client.to_done("Enable", "spinner")
         self.held(self.wire).let_go()  # on the same lane
         self.stands_for_good()
+
+    def test_a_press_that_was_refused_never_starts(self):
+        self.subject.daemon.kill()
+        wait_for(lambda: self.gateway.request("GET", "/healthz")[0] == 503, "the gateway tells that axisd is away")
+        self.assertNotEqual(self.wire.ask("AxisService/Jog", jog_request("in vain"))[:2], (ANSWER, 0))
+        self.subject.start_daemon()
+        wait_for(lambda: self.gateway.request("GET", "/healthz")[0] == 200, "the gateway has found axisd again")
+        self.subject.client.wait_online("spinner")
+        self.subject.client.to_done("Enable", "spinner")
+        for _ in range(5):  # the finger is still there
+            answer = self.wire.ask("AxisService/Jog", jog_request("in vain"))
+            self.assertIn(answer[:2], ((REFUSED, 9), (LATE, 0)))
+        self.assertEqual(self.subject.sim.shaft().starts, 0)
+
+    def test_a_lane_that_is_new_starts_nothing_before_it_is_measured(self):
+        lane = self.page.lane()
+        self.addCleanup(lane.close)
+        self.assertEqual(lane.ask("")[0], ECHO)
+        self.assertEqual(lane.ask_to_jog()[:2], (REFUSED, 9))
+        self.assertEqual(lane.ask("LeaseService/RenewLease", lease_pb.RenewLeaseRequest())[:2], (REFUSED, 9))
+        self.assertEqual(lane.ask("", b"guessed!")[0], ECHO)
+        self.assertEqual(lane.ask_to_jog()[:2], (REFUSED, 9))
+        self.assertEqual(lane.ask("AxisService/Stop", axis_pb.StopRequest(axis="spinner"))[:2], (ANSWER, 0))
+        self.assertEqual(self.subject.sim.shaft().starts, 0)
+
+    def test_a_jog_by_a_call_is_refused(self):
+        status, message, _ = self.page.call("AxisService/Jog", jog_request("by a call"), axis_pb.JogResponse)
+        self.assertEqual((status, message), (9, "a jog goes over the lane"))
+        self.assertEqual(self.subject.sim.shaft().starts, 0)
+
+    def test_a_stop_by_a_call_outlives_its_page(self):
+        request = axis_pb.HaltRequest(axis="spinner", options={"wait_until": DONE})
+        finger = self.held(self.wire, hold=2.0)
+        finger.let_go()
+        for _ in range(40):  # more than a person has places for
+            connection = self.gateway.connect()
+            connection.request("POST", "/axisd.v1.AxisService/Halt", frame(request.SerializeToString()), self.page.headers())
+            connection.close()
+        self.stands_for_good()
+        wait_for(lambda: self.page.post("AxisService/Halt", request)[0] == 200, "a place for a stop")
 
     def test_a_press_that_was_held_up_moves_nothing(self):
         self.assertEqual(self.wire.ask("")[0], ECHO)
@@ -99,7 +142,7 @@ class Motion(WebScenario):
             self.wire.send("AxisService/Halt", axis_pb.HaltRequest(axis="spinner"))
         last = self.wire.ask("AxisService/Halt", axis_pb.HaltRequest(axis="spinner", options={"wait_until": DONE}))
         self.command(last, axis_pb.HaltResponse)
-        self.stands_for_good(2.5)
+        self.stands_for_good()
 
     def test_stop_all_needs_nothing(self):
         self.held(self.wire)
@@ -116,7 +159,8 @@ class Motion(WebScenario):
         except OSError:
             pass
         self.assertLess(len(self.wire.until_end()), 1000)
-        self.stands_for_good(2.5)
+        self.stands_for_good()
+        self.was_halted()
         finger.let_go()
         self.assertEqual(self.lane(self.page).ask("")[0], ECHO, "another lane is fine")
 
@@ -132,7 +176,8 @@ class Motion(WebScenario):
         finger.let_go()
         self.wire.socket.sendall(b"\x82\xfe")
         self.wire.close()
-        self.stands_for_good(2.5)
+        self.stands_for_good()
+        self.was_halted()
 
     def test_only_what_belongs_there_is_taken(self):
         kind, status, message, _ = self.wire.ask("AxisService/Enable", axis_pb.EnableRequest(axis="spinner"))
@@ -149,6 +194,29 @@ class Motion(WebScenario):
             with self.assertRaises(LaneRefused) as refused:
                 self.page.lane(origin, protocol)
             self.assertEqual(refused.exception.args, (status,))
+
+
+class Anybody(WebScenario):
+    """Without users, until there is one."""
+
+    def test_the_first_user_shuts_out_whoever_is_at_this_computer(self):
+        self.start_machine(DELEGATE)
+        gateway = self.web().start()
+        page = Page(gateway)
+        lane = self.lane(page)
+        connection, following = page.stream("AxisService/WatchAxes", axis_pb.WatchAxesRequest(), axis_pb.WatchAxesResponse)
+        self.addCleanup(connection.close)
+        self.assertIsNotNone(following())
+        self.held(lane, hold=2.0)
+        gateway.user("add", "anna", "--role", "operator", password="correct horse")
+        lane.until_end()
+        self.stands_for_good()
+        self.was_halted()
+        with self.assertRaises((http.client.IncompleteRead, ConnectionError)):
+            while following() is not None:
+                pass
+            raise ConnectionError  # it ended in order
+        self.assertEqual(page.session()[0], 401)
 
 
 class Persons(WebScenario):
@@ -181,7 +249,7 @@ class Persons(WebScenario):
 
     def test_a_viewer_may_stop_and_not_jog(self):
         lane = self.lane(self.logged_in("bert", "battery staple"))
-        kind, status, message, _ = lane.ask("AxisService/Jog", jog_request("mine"))
+        kind, status, message, _ = lane.ask_to_jog()
         self.assertEqual((kind, status), (ANSWER, 7), message)
         self.assertEqual(lane.ask("AxisService/Stop", axis_pb.StopRequest(axis="spinner"))[:2], (ANSWER, 0))
         self.assertEqual(self.subject.sim.shaft().starts, 0)
@@ -192,7 +260,8 @@ class Persons(WebScenario):
         self.held(lane, hold=2.0)
         self.assertEqual(page.log_out(), 204)
         lane.until_end()
-        self.stands_for_good(2.5)
+        self.stands_for_good()
+        self.was_halted(f"anna via {OWN_NAME}")
 
     def test_a_user_who_is_removed_is_out(self):
         page = self.logged_in("anna", "correct horse")
@@ -200,7 +269,8 @@ class Persons(WebScenario):
         self.held(lane, hold=2.0)
         self.gateway.user("remove", "anna")
         lane.until_end()
-        self.stands_for_good(2.5)
+        self.stands_for_good()
+        self.was_halted(f"anna via {OWN_NAME}")
         self.assertEqual(page.session()[0], 401)
 
 
