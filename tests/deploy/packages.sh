@@ -56,9 +56,10 @@ has() {  # PACKAGE PATH ...
   shift
   for path in "$@"; do grep -qx "\./$path" <<<"$list" || die "$package has no /$path"; done
 }
-has axisd usr/share/axisd/pki.sh usr/bin/axisd usr/bin/axisd-sim usr/lib/axisd/axisd-link etc/axisd/axisd.yaml etc/axisd/links \
-  lib/systemd/system/axisd.service lib/systemd/system/axisd-link.socket usr/lib/sysusers.d/axisd.conf \
-  usr/lib/tmpfiles.d/axisd.conf usr/lib/systemd/catalog/axisd.catalog lib/udev/rules.d/99-axisd.rules usr/share/man/man8/axisd.8.gz \
+has axisd usr/share/axisd/pki.sh usr/bin/axisd usr/bin/axisd-sim usr/bin/axisd-web usr/lib/axisd/axisd-link \
+  etc/axisd/axisd.yaml etc/axisd/links etc/axisd/web.yaml lib/systemd/system/axisd.service lib/systemd/system/axisd-web.service \
+  lib/systemd/system/axisd-link.socket usr/lib/sysusers.d/axisd.conf usr/lib/tmpfiles.d/axisd.conf \
+  usr/lib/systemd/catalog/axisd.catalog lib/udev/rules.d/99-axisd.rules usr/share/man/man8/axisd.8.gz \
   usr/share/man/man8/axisd-link.8.gz usr/share/man/man1/axisd-sim.1.gz usr/share/man/man5/axisd.yaml.5.gz
 has axisctl usr/bin/axisctl usr/share/man/man1/axisctl.1.gz usr/share/bash-completion/completions/axisctl \
   usr/share/zsh/vendor-completions/_axisctl usr/share/fish/vendor_completions.d/axisctl.fish
@@ -66,7 +67,7 @@ has python3-axisd usr/lib/python3/dist-packages/axisd/__init__.py usr/lib/python
   usr/lib/python3/dist-packages/axisd/v1/axis_service_pb2_grpc.py
 has axisd-doc usr/share/axisd/proto/axisd/v1/axis_service.proto usr/share/doc/axisd/api.html
 conffiles=$(dpkg-deb -I "$(one axisd)" conffiles | sort | xargs)
-[ "$conffiles" = "/etc/axisd/axisd.yaml /etc/axisd/links" ] || die "conffiles of axisd: $conffiles"
+[ "$conffiles" = "/etc/axisd/axisd.yaml /etc/axisd/links /etc/axisd/web.yaml" ] || die "conffiles of axisd: $conffiles"
 
 step "a Debian 12"
 needed=$(for package in axisd axisctl python3-axisd; do dpkg-deb -f "$(one "$package")" Depends | tr ',' '\n' |
@@ -101,6 +102,7 @@ stop() {
 }
 case "$*" in
   *is-active*axisd.service*) alive ;;
+  *is-active*axisd-web.service*) [ -e /run/axisd-web.on ] ;;
   *show*MainPID*) cat /run/axisd.pid ;;
   *restart*axisd.service*) stop; start ;;
   *start*axisd.service*) start ;;
@@ -147,8 +149,11 @@ sed -i 's/^machine: .*/machine: changed/' "$root/etc/axisd/axisd.yaml"
 ctl move feeder 390mm --velocity 20mm/s
 sleep 1
 first=$(cat "$root/run/axisd.pid")
+touch "$root/run/axisd-web.on"
 upgrade +later1
-grep -q '^axisd: restarting' "$scratch/log" || { cat "$scratch/log"; die "the upgrade did not say that it restarts axisd"; }
+grep -q 'restart axisd-web.service' "$root/var/tmp/asked" || { cat "$scratch/log"; die "the old axisd-web still runs"; }
+rm "$root/run/axisd-web.on"
+grep -q '^axisd: restarting. What moves' "$scratch/log" || { cat "$scratch/log"; die "the upgrade did not say that it restarts axisd"; }
 [ "$(cat "$root/run/axisd.pid")" != "$first" ] || die "the old daemon still runs"
 grep -q 'stopping what moves: feeder' "$root/var/tmp/log" || die "the moving axis was not stopped"
 grep -q '^machine: changed' "$root/etc/axisd/axisd.yaml" || die "the upgrade overwrote the configuration"
@@ -176,16 +181,21 @@ running() { kill -0 "$(cat "$root/run/axisd.pid")" 2>/dev/null; }
 step "removing, and installing again"
 inside dpkg -r axisd python3-axisd >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -r failed"; }
 ! running || die "the daemon still runs"
+grep -q 'stop axisd-web.service' "$root/var/tmp/asked" || die "axisd-web was not stopped"
 [ -d "$root/var/lib/axisd" ] && [ -f "$root/etc/axisd/axisd.yaml" ] || die "removing took configuration or state"
 inside dpkg -i /packages/later-axisd.deb >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -i failed"; }
 eventually ctl list
 running || die "the daemon was not started"
 
 step "purging"
+mkdir -p "$root/var/lib/private/axisd-web"
+touch "$root/var/lib/private/axisd-web/users"
+ln -s private/axisd-web "$root/var/lib/axisd-web"
 inside dpkg -P axisd axisctl python3-axisd >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -P failed"; }
 ! running || die "the daemon still runs"
 rm -f "$root/run/axisd.pid"
 ! inside getent passwd axisd >/dev/null || die "the user is left"
+rmdir "$root/var/lib/private" || die "purging left the users of the page"
 snapshot >"$scratch/after"
 diff "$scratch/before" "$scratch/after" || die "purging left something (>), or took something (<)"
 echo "packages: ok"
