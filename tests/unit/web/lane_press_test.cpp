@@ -85,7 +85,7 @@ TEST(LaneMeasure, NothingStartsBeforeTheNumberOfAnEchoCameBack) {
   std::uint64_t last = 7;
   LaneState lane([&] { return ++last; });
   std::uint32_t id = 0;
-  std::string reply;
+  std::string reply, number;
   const auto say = [&](std::string_view method, const std::string& message) {
     std::string bytes(1, '\1');
     append_big_endian32(bytes, ++id);
@@ -96,6 +96,7 @@ TEST(LaneMeasure, NothingStartsBeforeTheNumberOfAnEchoCameBack) {
     const auto effects = lane.receive(bytes, now);
     const auto* sent = effects.empty() ? nullptr : std::get_if<LaneSend>(&effects.front());
     reply = sent == nullptr ? "passed on" : sent->bytes;
+    if (method.empty()) number = reply.substr(reply.size() - 8);
   };
   v1::JogRequest jog;
   jog.set_axis("feeder");
@@ -104,7 +105,6 @@ TEST(LaneMeasure, NothingStartsBeforeTheNumberOfAnEchoCameBack) {
     say("axisd.v1.AxisService/Jog", jog.SerializeAsString());
     return reply == "passed on";
   };
-  const auto number = [&] { return reply.substr(reply.size() - 8); };
   EXPECT_FALSE(press());
   EXPECT_EQ(reply.front(), '\4');
   say("axisd.v1.AxisService/Stop", "");
@@ -112,17 +112,15 @@ TEST(LaneMeasure, NothingStartsBeforeTheNumberOfAnEchoCameBack) {
   say("", "");
   EXPECT_FALSE(press()) << "the echo may have been on its way for long, and so may this";
   say("", "");
-  const auto old = number();
+  const auto old = number;
   say("", "");
   say("", old);
   EXPECT_FALSE(press()) << "not the last one";
-  auto late = number();
   now += LaneState::longest_round_trip + 1ms;
-  say("", late);
+  say("", number);
   EXPECT_FALSE(press()) << "too slow to know it well";
-  late = number();
   now += LaneState::longest_round_trip;
-  say("", late);
+  say("", number);
   EXPECT_TRUE(press());
   say("axisd.v1.LeaseService/RenewLease", "");
   EXPECT_EQ(reply, "passed on");
