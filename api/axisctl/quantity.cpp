@@ -47,8 +47,8 @@ std::chrono::nanoseconds parse_duration(std::string_view text, std::string_view 
 
 Since parse_since(std::string_view text, std::string_view what) {
   std::uint64_t number = 0;
-  const auto* end = text.data() + text.size();
-  if (const auto read = std::from_chars(text.data(), end, number); read.ec == std::errc{} && read.ptr == end)
+  if (const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+      error == std::errc{} && end == text.data() + text.size())
     return {.number = number};
   if (const auto ago = config::parse_duration(text)) return {.number = std::nullopt, .ago = *ago};
   throw Failure(ExitCode::usage,
