@@ -10,8 +10,7 @@ namespace axisd::web {
 /// are asked for from outside of its reactions; without one the call would end between two of them.
 class Call::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
-  Reactor(std::shared_ptr<Call> call, Request request)
-      : call_(std::move(call)), request_(std::move(request.message)) {
+  Reactor(std::shared_ptr<Call> call, Request request) : call_(std::move(call)), request_(request.message) {
     for (const auto& [key, value] : request.metadata) context_.AddMetadata(key, value);
     if (request.timeout)
       context_.set_deadline(

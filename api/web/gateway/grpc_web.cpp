@@ -62,9 +62,9 @@ std::string trailers_frame(const CallStatus& status) {
 std::optional<Duration> timeout_of(std::string_view text) {
   if (text.size() < 2 || text.size() > 9) return std::nullopt;
   std::int64_t number = 0;
-  const auto* end = text.data() + text.size() - 1;
-  const auto [read, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc() || read != end || number < 0) return std::nullopt;
+  const auto digits = text.substr(0, text.size() - 1);
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (error != std::errc() || end != digits.data() + digits.size() || number < 0) return std::nullopt;
   switch (text.back()) {
     case 'H':
       // 99,999,999 hours are more than a Duration holds.

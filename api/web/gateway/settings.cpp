@@ -30,7 +30,7 @@ struct Key {
 
 TlsSettings& tls_of(Settings& settings) { return settings.tls ? *settings.tls : settings.tls.emplace(); }
 
-constexpr std::int64_t day = 24 * 3600 * 1000;
+constexpr std::int64_t day = std::int64_t{24} * 3600 * 1000;
 
 constexpr Key keys[] = {
     {.path = "listen", .text = [](Settings& s) { return &s.listen; }},
