@@ -1,10 +1,9 @@
-// What an axis is executing, what waits for its end, and its stops.
+// What an axis is executing, and what waits for its end.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "buses/clock.hpp"
 #include "buses/start_turns.hpp"
@@ -55,16 +54,6 @@ struct Buffered {
   Action action;
   CommandOptions options;
   PositionTracker end;  ///< as it will be when this is done
-};
-
-/// Stops in progress; one sequence serves all that arrive meanwhile.
-struct Stopping {
-  bool running = false;
-  StopKind kind = StopKind::none;  ///< strongest requested
-  int requests = 0;                ///< each needs a frame of its own
-  bool from_motion = false;        ///< the first of them found the axis in motion
-  std::vector<CommandPtr> commands;
-  CommandPtr last;
 };
 
 }  // namespace axisd

@@ -25,6 +25,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       simulated_(simulated),
       eeprom_budget_(settings_.limits.eeprom_saves_per_day, {}),
       absolute_segments_(settings_.segments && settings_.segments->absolute),
+      stop_(*gate_, env_.holds),
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
       stopped_(env_.executor, *env_.clock),
@@ -77,19 +78,19 @@ Error Axis::error(Reason reason, std::string message, std::string remedy) const 
 }
 
 bool Axis::busy() const {
-  return activity_ || stopping_.running || stop_owed_ || terminal_motion_ || (sample_ && sample_->moving);
+  return activity_ || stop_.under_way() || stop_.owed() || terminal_motion_ || (sample_ && sample_->moving);
 }
 
 bool Axis::works() const {
   const bool only_waits =
-      queues() && !stopping_.running && !stop_owed_ && !terminal_motion_ && !(sample_ && sample_->moving);
+      queues() && !stop_.under_way() && !stop_.owed() && !terminal_motion_ && !(sample_ && sample_->moving);
   return busy() && !only_waits;
 }
 
 bool Axis::queues() const { return activity_ && activity_->waits_for == StartWait::turn; }
 
 bool Axis::at_rest() const {
-  return !stopping_.running && !stop_owed_ && !(activity_ && activity_->state != AxisState::standstill) &&
+  return !stop_.under_way() && !stop_.owed() && !(activity_ && activity_->state != AxisState::standstill) &&
          !(sample_ && sample_->moving);
 }
 
@@ -160,14 +161,13 @@ void Axis::on_sample(const DriveSample& sample) {
   if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
   const bool begun = activity_ && activity_->may_run && activity_->waits_for == StartWait::begun;
-  if (rezeroing_ || left_running_ || begun) ours_until_ = sample.asked_at + settling();
+  if (rezeroing_ || stop_.left_running() || begun) ours_until_ = sample.asked_at + settling();
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   watch_speed(SpeedWatch::Event::sampled);
   // What a link that failed kept back was not heard, wherever the drive rests.
-  if (!sample.moving && !stopping_.running && link_ == LinkState::online && !bus_loss_)
-    stop_owed_ = left_running_ = false;
+  if (!sample.moving && link_ == LinkState::online && !bus_loss_) stop_.seen_at_rest();
   if (link_ == LinkState::online)
     observed_.on_sample(sample, busy());
   else
@@ -175,7 +175,7 @@ void Axis::on_sample(const DriveSample& sample) {
   if (terminal_motion_ && !sample.moving) {
     terminal_motion_ = false;
   }
-  if (sample.moving && (!activity_ || queues()) && !stopping_.running && link_ == LinkState::online)
+  if (sample.moving && (!activity_ || queues()) && !stop_.under_way() && link_ == LinkState::online)
     on_unexplained_motion(sample, before);
   release_as_owed();
   publish();
@@ -253,12 +253,12 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
   const bool possible = std::ranges::any_of(
       settings_.inputs, [this](const TerminalSettings& input) { return starts_motion(input); });
   const bool just_began = before && !before->moving;
-  if (!stop_owed_ && !fault_ && possible && just_began && !segments && !homing && !started) {
+  if (!stop_.owed() && !fault_ && possible && just_began && !segments && !homing && !started) {
     wake();
     return;
   }
   // A motor that was told to stop, and has not confirmed it, is never a terminal's.
-  if (!stop_owed_ && !fault_ && (segments || homing || started || drive_->moves_by_itself())) {
+  if (!stop_.owed() && !fault_ && (segments || homing || started || drive_->moves_by_itself())) {
     terminal_motion_ = true;
     if (active_in(sample, "homing_start") || (before && active_in(*before, "homing_start"))) lose_trust();
     return;
@@ -302,10 +302,10 @@ void Axis::remember_position() {
 
 AxisState Axis::state() const {
   if (fault_) return AxisState::error_stop;
-  if (!unheld() || (stopping_.running && stopping_.kind > StopKind::halt)) return AxisState::stopping;
+  if (!unheld() || stop_.stops()) return AxisState::stopping;
   if (activity_ && activity_->state != AxisState::standstill) return activity_->state;
   // MC_Halt shows DiscreteMotion until the axis rests (PLCopen part 1, 3.6).
-  if (stopping_.running && stopping_.from_motion) return AxisState::discrete_motion;
+  if (stop_.ends_motion()) return AxisState::discrete_motion;
   if (terminal_motion_ && sample_) {
     if (sample_->mode == DriveMode::homing) return AxisState::homing;
     return sample_->mode == DriveMode::multi_velocity ? AxisState::continuous_motion

@@ -28,6 +28,8 @@
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/axis/speed_watch.hpp"
+#include "devices/axis/standstill.hpp"
+#include "devices/axis/stop_machine.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
@@ -83,9 +85,9 @@ class Axis {
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
   /// Nobody holds it in Stopping.
-  [[nodiscard]] bool unheld() const { return env_.holds == nullptr || env_.holds->empty(); }
+  [[nodiscard]] bool unheld() const { return !stop_.held(); }
   /// The newest stop; nullptr: there was none.
-  [[nodiscard]] const CommandPtr& last_stop() const { return stopping_.last; }
+  [[nodiscard]] const CommandPtr& last_stop() const { return stop_.last(); }
   /// Everything that stands in the way of a request now: submit() would refuse it with the first that blocks
   /// (a repeat of an accepted request is never refused, though). Nothing: of motion in general. Only looks.
   [[nodiscard]] std::vector<Obstacle> explain(const std::optional<Action>& action,
@@ -194,6 +196,7 @@ class Axis {
 
   // axis_journal.cpp: commands over restarts of the daemon
   void take_over();
+  void owe_stop_of_motion();
   Task<Result<void>> settle_earlier();
   void settle_positions_set();
   void settle_as(const Unsettled& earlier, bool continuous);
@@ -413,10 +416,11 @@ class Axis {
   Task<> run_stop();
   void note_stop_sent(TimePoint end, bool answered);
   Task<Result<void>> stop_and_confirm();
-  Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
-  Task<bool> standstill_unpolled(TimePoint deadline, std::optional<int> requests);
+  [[nodiscard]] Error not_stopped(StopMachine::Step step, const Result<void>& sent) const;
+  Task<bool> rests_in_time(bool acknowledged);
+  Task<bool> standstill_by(TimePoint since, TimePoint deadline);
+  Task<bool> standstill_unpolled(TimePoint deadline, bool of_stop);
   void leave_running(const Activity& activity);
-  [[nodiscard]] Duration deceleration_bound() const;
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
   /// "{what} alarm 2 (overvoltage)", with what there is to do.
   [[nodiscard]] Error alarm_error(std::uint16_t code, std::string_view what) const;
@@ -455,13 +459,14 @@ class Axis {
   UnknownOutcomes unknown_starts_;
   bool absolute_segments_ = false;
 
+  StopMachine stop_;
+
   std::optional<DriveSample> sample_;
   Signal sampled_;  ///< a new sample, or the link changed
   Signal wake_;     ///< the poll loop has something to look at
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
   int sequences_ = 0;               ///< coroutines that still run
-  TimePoint stop_arrived_{};        ///< at the server: the newest stop, disable or cancel
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
   bool closing_ = false;
   bool reloading_ = false;  ///< it was told to make room
@@ -470,25 +475,19 @@ class Axis {
   ActivityPtr activity_;
   std::deque<Buffered> buffer_;  ///< nothing waits where nothing is executed
   CommandPtr next_;              ///< of the buffer, while it is being started
-  Stopping stopping_;
   /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
   std::optional<TimePoint> release_owed_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
-  std::optional<Error> bus_loss_;   ///< not yet acted upon
-  bool stop_owed_ = false;          ///< M4: to a silent node, until standstill is confirmed
-  std::uint64_t failed_stops_ = 0;  ///< tells whether one has failed meanwhile
-  TimePoint ours_until_{};          ///< what turned the shaft before was told to, or settles after it
+  std::optional<Error> bus_loss_;  ///< not yet acted upon
+  TimePoint ours_until_{};         ///< what turned the shaft before was told to, or settles after it
   /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
   std::optional<std::vector<std::int64_t>> unseen_ends_;
-  bool left_running_ = false;  ///< a command has ended, and what it began may go on
   bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed
   bool last_positive_ = true;
   std::optional<Error> fault_;
-  /// Of the motion in progress; at first the drive's longest.
-  Duration last_deceleration_ = milliseconds(2000);
   boost::shared_ptr<AxisSnapshot> shown_;  ///< the last snapshot
   std::uint64_t revision_ = 0;
   std::uint64_t sampled_revision_ = 0;  ///< of the snapshot after the last sample

@@ -40,7 +40,7 @@ void Axis::look_at(const GroupMemberRequest& request, const CommandOptions& opti
             found);
   if (activity_ && activity_->state == AxisState::standstill)
     found.block(error(Reason::busy, "another command is being executed", "wait for it"));
-  else if (activity_ || stopping_.running || (sample_ && sample_->moving))
+  else if (activity_ || stop_.under_way() || (sample_ && sample_->moving))
     found.block(
         error(Reason::moving, "a member of a group move has to rest", "wait for standstill, or halt it"));
 }

@@ -33,15 +33,21 @@ void Axis::take_over() {
     const auto& command = earlier.command->value();
     spdlog::warn("{}: the daemon ended while {} {} was being executed; asking the drive", settings_.name,
                  to_string(command.kind), command.id);
-    if (moves(command.kind)) stop_owed_ = left_running_ = true;
+    if (moves(command.kind)) owe_stop_of_motion();
     if (command.kind == CommandKind::home) position_unsettled_ = true;
   }
   if (auto cause = env_.book->take_unknown_outcome(settings_.name)) {
     spdlog::error("{}", to_string(*cause));
     fault_ = std::move(cause);
-    stop_owed_ = left_running_ = true;
+    owe_stop_of_motion();
   }
   publish();
+}
+
+/// What runs was begun by a command that has ended.
+void Axis::owe_stop_of_motion() {
+  stop_.owe();
+  stop_.leave_running();
 }
 
 /// Asks a drive that rests what became of what may have been sent to it, before anything in it is changed.
@@ -61,7 +67,7 @@ Task<Result<void>> Axis::settle_earlier() {
   on_sample(*sample);
   if (closing_) co_return fail(error(Reason::cancelled, "the daemon ends"));
   if (found_in_motion()) {
-    stop_owed_ = left_running_ = true;
+    owe_stop_of_motion();
     co_return fail(error(Reason::moving, "it began to move; stopping it", "wait"));
   }
   for (const auto& earlier : unsettled_) settle_as(earlier, continuous);

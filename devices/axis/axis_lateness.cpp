@@ -57,7 +57,7 @@ void Axis::bound_start(const ActivityPtr& activity, bool waited, bool halting) {
   auto since = env_.clock->now();
   if (!waited && options.arrived != TimePoint{}) since = options.arrived;
   auto latest = since + settings_.start_within;
-  if (halting) latest += deceleration_bound() + settings_.stop_margin;
+  if (halting) latest += stop_.deceleration() + settings_.stop_margin;
   if (!waited) latest = std::min(latest, options.call_deadline);
   start_by(activity, since, latest);
 }

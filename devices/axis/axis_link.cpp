@@ -33,11 +33,11 @@ Task<> Axis::connect() {
     while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
     if (closing_) co_return;
     // The bus sees to it that repeated silence does not cost the neighbours much.
-    const auto failed_stops = failed_stops_;
+    const auto failed_stops = stop_.failures();
     const auto connected = co_await try_connect(TransactionClass::idle_state, std::exchange(again, true));
     if (closing_) co_return;
-    if (!connected && failed_stops != failed_stops_) continue;  // with that stop, at once
-    if (connected && !configured_) continue;                    // it was told to begin again meanwhile
+    if (!connected && failed_stops != stop_.failures()) continue;  // with that stop, at once
+    if (connected && !configured_) continue;                       // it was told to begin again meanwhile
     if (connected) {
       link_ = LinkState::online;
       link_error_.reset();
@@ -77,13 +77,13 @@ Task<> Axis::wait_for_port() {
 
 Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   // A stop that fails from here on is not the one that is sent here: this attempt is given up for it.
-  const auto failed_stops = failed_stops_;
+  const auto failed_stops = stop_.failures();
   const auto stop_failed = [&]() -> Result<void> {
-    if (failed_stops == failed_stops_) return {};
+    if (failed_stops == stop_.failures()) return {};
     return fail(error(Reason::no_reply, "a stop failed while the drive was being connected",
                       "it is sent before anything else"));
   };
-  if (stop_owed_) {
+  if (stop_.owed()) {
     // Whatever the drive is doing now, the first frame it gets is a stop (M4).
     const auto stopped = co_await (again ? drive_->repeat_stop() : drive_->stop(StopKind::stop));
     if (!stopped) co_return stopped;
@@ -116,7 +116,7 @@ bool Axis::may_have_been_stopped_abruptly() const {
                            has_input("negative_limit") || has_input("quick_stop");
   if (drive_->closed_loop() || !unseen_ends_ || !by_terminal) return false;
   const bool runs_on =
-      sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_owed_;
+      sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_.owed();
   return !runs_on && std::ranges::find(*unseen_ends_, tracker_.counter()) == unseen_ends_->end();
 }
 
@@ -132,27 +132,27 @@ void Axis::note_unseen_ends() {
 bool Axis::found_in_motion() const { return sample_->moving || sample_->mode == DriveMode::homing; }
 
 bool Axis::found_by_terminal() const {
-  return !stop_owed_ && (sample_->mode >= DriveMode::multi_position || drive_->moves_by_itself() ||
-                         (sample_->mode == DriveMode::homing && input_active("homing_start")));
+  return !stop_.owed() && (sample_->mode >= DriveMode::multi_position || drive_->moves_by_itself() ||
+                           (sample_->mode == DriveMode::homing && input_active("homing_start")));
 }
 
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
-  std::string_view found = stop_owed_ ? "the stop that was owed to it was sent, and it came to rest" : "";
+  std::string_view found = stop_.owed() ? "the stop that was owed to it was sent, and it came to rest" : "";
   if (found_in_motion() && !found_by_terminal()) {
-    if (!stop_owed_ && sample_->moving) {  // else it may rest between the phases of homing, or for good
+    if (!stop_.owed() && sample_->moving) {  // else it may rest between the phases of homing, or for good
       spdlog::warn("{}: found moving; stopping it", settings_.name);
       found = "it was found moving, was stopped, and came to rest";
     }
-    stop_owed_ = true;
+    stop_.owe();
     bool rests = false;
     for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
       const auto sent = co_await drive_->stop(kind);
       const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
       if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
       if (!sent) co_return sent;
-      const auto deadline = env_.clock->now() + deceleration_bound() + settings_.stop_margin;
-      rests = co_await standstill_unpolled(deadline, std::nullopt);
+      const auto deadline = env_.clock->now() + stop_.deceleration() + settings_.stop_margin;
+      rests = co_await standstill_unpolled(deadline, false);
       if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
         co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",
                              "check power and wiring"));
@@ -164,7 +164,7 @@ Task<Result<void>> Axis::settle_found_motion() {
                            "look at the machine; cut its power if it moves"));
     }
   }
-  stop_owed_ = left_running_ = false;
+  stop_.pay();
   if (!found.empty()) {
     spdlog::info("{}: {}", settings_.name, found);
     if (env_.event) env_.event(settings_.name, LinkChange{.to = link_, .detail = std::string(found)});
@@ -282,10 +282,10 @@ void Axis::go_offline(const Error& cause) {
   link_error_ = cause;
   revoke_motion();
   env_.bus->give_up_readings(settings_.node);
-  const bool moved = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
+  const bool moved = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
                      terminal_motion_ || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
-  if (moved) stop_owed_ = true;
+  if (moved) stop_.owe();
   note_unseen_ends();
   if (auto activity = take_activity()) {
     auto unknown = error(Reason::offline, "the drive stopped answering while the command was being executed",
@@ -313,7 +313,7 @@ void Axis::on_reboot(const Error& cause) {
   auto told = cause;
   if (activity_ && activity_->may_run) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);
-  left_running_ = false;
+  stop_.restarted();
   lose_trust();
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();

@@ -122,7 +122,7 @@ Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience)
 
 /// Lets a halt in progress end. False: no longer current.
 Task<bool> Axis::reach_standstill(ActivityPtr activity) {
-  while (stopping_.running && current(*activity)) co_await stopped_.wait();
+  while (stop_.under_way() && current(*activity)) co_await stopped_.wait();
   if (!current(*activity)) co_return false;
   if (fault_) {
     finish(*activity, [this](CommandRecord& command) { command.error(*fault_); });

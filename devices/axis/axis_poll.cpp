@@ -67,7 +67,7 @@ void Axis::keep_quiet(TimePoint until) {
 /// Whatever stops it is looked after at once.
 bool Axis::keeps_quiet() const {
   const bool begun = activity_ && activity_->waits_for == StartWait::begun;
-  return begun && !stopping_.running && !stop_owed_ && env_.clock->now() < quiet_until_;
+  return begun && !stop_.under_way() && !stop_.owed() && env_.clock->now() < quiet_until_;
 }
 
 void Axis::poll_fast(TimePoint from, Duration longest) {
@@ -198,7 +198,7 @@ bool Axis::only_watches() const { return chains_ == 0 && !bus_loss_ && drift_.em
 void Axis::wake() {
   env_.bus->end_repetition(settings_.node);
   // A reading that came due since the stop began is waited for like those before.
-  if (stopping_.running) env_.bus->hasten(settings_.node, TransactionClass::moving_state);
+  if (stop_.under_way()) env_.bus->hasten(settings_.node, TransactionClass::moving_state);
   wake_.notify_all();
 }
 

@@ -19,7 +19,7 @@ constexpr auto sample_patience = std::chrono::seconds(5);
 /// M1, M23: power, or the end of a halt, never moves. Whatever this is, it ends here.
 void Axis::on_turned_by_power(const Error& cause) {
   enter_error_stop(cause);
-  left_running_ = true;
+  stop_.leave_running();
   begin_stop(StopKind::stop, nullptr);
   publish();
 }
@@ -82,9 +82,9 @@ Task<> Axis::run_enable(ActivityPtr activity) {
 Task<> Axis::run_disable(ActivityPtr activity) {
   activity->command->activate();
   // A fault does not stand in the way of releasing: only the motion has to have ended.
-  while (stopping_.running && current(*activity)) co_await stopped_.wait();
+  while (stop_.under_way() && current(*activity)) co_await stopped_.wait();
   if (!current(*activity)) co_return;
-  if (stop_owed_) {
+  if (stop_.owed()) {
     finish(*activity, [&](CommandRecord& command) {
       command.error(error(Reason::not_confirmed, "not released: standstill was not confirmed",
                           "look at the machine; cut its power if it moves"));

@@ -95,7 +95,7 @@ void Axis::look_at_link(Obstacles& found) const {
         fmt::format("check its power, address and serial settings; look who answers: axisctl bus scan {}",
                     settings_.bus)));
   }
-  if (stop_owed_)
+  if (stop_.owed())
     found.note(error(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
                      "look at the machine; the stop is the first that the drive gets when it answers"));
 }
@@ -132,12 +132,12 @@ void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) co
   if (reloading_) return found.block(reloading());
   look_at_options(options, found);
   // Stops overtake what waits for the core: their order is that in which they arrived (M14).
-  if (options.arrived != TimePoint{} && options.arrived < stop_arrived_)
+  if (stop_.overtook(options.arrived))
     found.block(
         error(Reason::superseded, "a stop that arrived later was served first", "send a new request"));
   // A stop that the core has not seen yet comes before everything that is accepted now.
   look_at_holds(options, found);
-  if (unheld() && (gate_->stop_pending() || (stopping_.running && stopping_.kind > StopKind::halt)))
+  if (unheld() && stop_.forbids_motion())
     found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   look_at_fault(found);
   look_at_maintenance(found);
@@ -218,7 +218,7 @@ void Axis::look_at_direction(bool positive, Obstacles& found) const {
 /// M9: a start that is accepted waits for the end of what moves.
 void Axis::look_at_present_motion(Obstacles& found) const {
   if (found.blocked()) return;
-  const bool moves = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
+  const bool moves = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
                      (sample_ && sample_->moving && !terminal_motion_);
   const auto executed = activity_ ? fmt::format("{} {}", to_string(activity_->command->value().kind),
                                                 activity_->command->value().id)
@@ -316,7 +316,7 @@ void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& opt
   const bool number = std::isfinite(request.distance);
   if (!number)
     found.block(error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
-  if ((activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
+  if ((activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
       (sample_ && sample_->moving))
     found.block(error(Reason::moving, "a relative move needs standstill: its base would be uncertain",
                       "wait for standstill, or move to an absolute position"));
@@ -364,7 +364,7 @@ void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& option
   look_at_options(options, found);
   look_at_link(found);
   look_at_maintenance(found);
-  if (stopping_.running) found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
+  if (stop_.under_way()) found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   if (activity_) found.block(error(Reason::busy, "another command is being executed", "wait for it"));
   if (!sample_ || sample_->alarm_code == 0) return;
   // All others may have lost their cause and wait for this: the drive says whether they have.
@@ -375,7 +375,7 @@ void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& option
 
 void Axis::look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const {
   look_at_readiness(options, found);
-  if (activity_ || stopping_.running || (sample_ && sample_->moving))
+  if (activity_ || stop_.under_way() || (sample_ && sample_->moving))
     found.block(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
   const bool number = scale_.checked_pulses(request.position).has_value();
   if (number && absolute_segments_ && !is_from_home(tracker_.offset_for(request.position)))

@@ -93,7 +93,7 @@ MotionCause Axis::motion_cause() const {
   if (!sample_ || !sample_->moving) return MotionCause::none;
   if (activity_ && activity_->state != AxisState::standstill) return MotionCause::command;
   const bool by_terminal = sample_->mode >= DriveMode::multi_position || start_terminal_active(*sample_);
-  return left_running_ && !by_terminal ? MotionCause::command : MotionCause::unknown;
+  return stop_.left_running() && !by_terminal ? MotionCause::command : MotionCause::unknown;
 }
 
 /// False: nothing was written since the last look. Else the next sample is published, whatever it says.

@@ -21,12 +21,11 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
         fmt::format("executes {} {}{}", to_string(command.kind), command.id,
                     buffer_.empty() ? "" : fmt::format(", and {} more wait for it", buffer_.size())),
         "wait for its end, or stop it: " + shell("stop"));
-  } else if ((sample_ && sample_->moving && !stop_owed_) || terminal_motion_) {
+  } else if ((sample_ && sample_->moving && !stop_.owed()) || terminal_motion_) {
     add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + shell("stop"));
   }
-  if (stopping_.running || gate_->stop_pending())
-    add(Reason::stopping, "the axis is stopping", "wait for standstill");
-  if (stop_owed_ && !stopping_.running)
+  if (stop_.coming()) add(Reason::stopping, "the axis is stopping", "wait for standstill");
+  if (stop_.owed() && !stop_.under_way())
     add(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
         "look at the machine; the stop is the first that the drive gets when it answers");
   if (release_owed_) add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
