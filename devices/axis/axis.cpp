@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "devices/alarm_text.hpp"
+#include "devices/axis/plcopen_state.hpp"
 #include "devices/released_position.hpp"
 
 namespace axisd {
@@ -301,17 +302,11 @@ void Axis::remember_position() {
 }
 
 AxisState Axis::state() const {
-  if (fault_) return AxisState::error_stop;
-  if (!unheld() || stop_.stops()) return AxisState::stopping;
-  if (activity_ && activity_->state != AxisState::standstill) return activity_->state;
-  // MC_Halt shows DiscreteMotion until the axis rests (PLCopen part 1, 3.6).
-  if (stop_.ends_motion()) return AxisState::discrete_motion;
-  if (terminal_motion_ && sample_) {
-    if (sample_->mode == DriveMode::homing) return AxisState::homing;
-    return sample_->mode == DriveMode::multi_velocity ? AxisState::continuous_motion
-                                                      : AxisState::discrete_motion;
-  }
-  return sample_ && sample_->enabled ? AxisState::standstill : AxisState::disabled;
+  StateSources sources{.fault = fault_.has_value(), .stop = stop_.shown()};
+  if (activity_) sources.executed = activity_->state;
+  if (sample_) sources.energised = sample_->enabled;
+  if (sample_ && terminal_motion_) sources.moved_by_terminal = sample_->mode;
+  return plcopen_state(sources);
 }
 
 }  // namespace axisd

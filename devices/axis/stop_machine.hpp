@@ -108,6 +108,13 @@ class StopMachine {
   /// A stop, a disable or a cancel arrived then at the server.
   void arrived(TimePoint at) { arrived_ = std::max(arrived_, at); }
 
+  /// What of it the axis shows (M14).
+  enum class Shown : std::uint8_t {
+    nothing,
+    ended_motion,  ///< a halt, until the motion that it ends has ended
+    stopping,      ///< a stop, or somebody holds one
+  };
+
   // What is coming
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] Debt debt() const { return debt_; }
@@ -119,12 +126,14 @@ class StopMachine {
   [[nodiscard]] bool coming() const { return under_way() || gate_->stop_pending(); }
   /// Under way, and not only a halt: no motion may take its place (M14).
   [[nodiscard]] bool stops() const { return under_way() && kind_ > StopKind::halt; }
-  /// Under way, and what it ends was a motion.
-  [[nodiscard]] bool ends_motion() const { return under_way() && of_motion_; }
   /// A stop that forbids motion until it has ended by itself.
   [[nodiscard]] bool forbids_motion() const { return stops() || gate_->stop_pending(); }
   /// Somebody keeps the axis in Stopping.
   [[nodiscard]] bool held() const { return holds_ != nullptr && !holds_->empty(); }
+  [[nodiscard]] Shown shown() const {
+    if (held() || stops()) return Shown::stopping;
+    return under_way() && of_motion_ ? Shown::ended_motion : Shown::nothing;
+  }
   /// A request that arrived then is older than a stop. Not set: it is the daemon's own.
   [[nodiscard]] bool overtook(TimePoint request) const {
     return request != TimePoint{} && request < arrived_;

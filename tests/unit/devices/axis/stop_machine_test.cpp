@@ -12,6 +12,7 @@ using State = StopMachine::State;
 using Debt = StopMachine::Debt;
 using Step = StopMachine::Step;
 using Answer = StopMachine::Answer;
+using Shown = StopMachine::Shown;
 
 class StopMachineTest : public testing::Test {
  protected:
@@ -264,22 +265,24 @@ TEST_F(StopMachineTest, AStopIsComingFromItsRequestToItsEnd) {
 
 TEST_F(StopMachineTest, AHaltForbidsNoMotionAndShowsTheOneThatItEnds) {
   stop_.found_in_motion();
-  EXPECT_FALSE(stop_.ends_motion());
+  EXPECT_EQ(stop_.shown(), Shown::nothing);
   begin(StopKind::halt);
-  EXPECT_TRUE(stop_.ends_motion());
+  EXPECT_EQ(stop_.shown(), Shown::ended_motion);
   EXPECT_FALSE(stop_.stops());
   EXPECT_FALSE(stop_.forbids_motion());
   begin(StopKind::stop);
   EXPECT_TRUE(stop_.stops());
+  EXPECT_EQ(stop_.shown(), Shown::stopping);
   stop_.confirmed();
   begin(StopKind::halt);
-  EXPECT_FALSE(stop_.ends_motion()) << "this one found it at rest";
+  EXPECT_EQ(stop_.shown(), Shown::nothing) << "this one found it at rest";
 }
 
 TEST_F(StopMachineTest, ItIsHeldWhileSomebodyHolds) {
   EXPECT_FALSE(stop_.held());
   const auto hold = holds_.add({.holder = "hmi", .request_id = {}}, {}, {});
   EXPECT_TRUE(stop_.held());
+  EXPECT_EQ(stop_.shown(), Shown::stopping);
   EXPECT_TRUE(holds_.end(hold));
   EXPECT_FALSE(stop_.held());
   EXPECT_FALSE(StopMachine(gate_, nullptr).held());
