@@ -9,6 +9,7 @@
 #include "buses/start_turns.hpp"
 #include "devices/axis/command.hpp"
 #include "devices/axis/command_book.hpp"
+#include "devices/axis/motion_machine.hpp"
 #include "devices/axis/planner.hpp"
 #include "devices/axis/position_tracker.hpp"
 #include "devices/drive.hpp"
@@ -32,15 +33,15 @@ struct Activity {
   CommandOptions options;
   Plan plan{};
   std::optional<TimePoint> hold_until{};  ///< jog and held velocity: halts at this time
-  bool started = false;                   ///< the drive was seen moving for it
   bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
   bool lease_over = false;                ///< goes on without its lease, and starts nothing more
   bool noted = false;                     ///< durably, or that is under way
   TimePoint start_by = TimePoint::max();  ///< no start frame goes out later (M31)
   TimePoint waits_since{};                ///< the time from which start_by counts
   StartWait waits_for = StartWait::line;
-  Clock::Timer late{};      ///< at start_by
-  StartTurns::Turn turn{};  ///< of its start, until that was sent
+  Clock::Timer late{};                    ///< at start_by
+  StartTurns::Turn turn{};                ///< of its start, until that was sent
+  std::optional<MotionMachine> motion{};  ///< once its start was acknowledged, and it is followed
 };
 using ActivityPtr = std::shared_ptr<Activity>;
 

@@ -354,14 +354,24 @@ class Axis {
 
   void end_unsent(Activity& activity, Error cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
+
+  // axis_follow.cpp: from the start to the end
+  Task<bool> read_back(ActivityPtr activity, Error cause, std::int64_t base, TimePoint since);
+  [[nodiscard]] std::optional<StartReadback::Reading> readback_of(std::int64_t base) const;
   void expect_end(const Plan& plan, std::int64_t base, TimePoint since);
+  [[nodiscard]] MotionMachine followed(const Plan& plan, std::int64_t base, TimePoint since) const;
+  [[nodiscard]] MotionMachine::Reading reading_of(const Plan& plan, std::int64_t base) const;
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
+  void end_hold(Activity& activity);
+  void end_motion(Activity& activity, MotionMachine::State state);
+  void end_at_rest(Activity& activity);
   [[nodiscard]] bool shows(const Plan& plan, std::int64_t base) const;
   [[nodiscard]] bool held_back(const Plan& plan) const;
   Task<std::optional<TimePoint>> arrived(ActivityPtr activity, std::int64_t base, TimePoint since);
   Task<bool> is_no_reboot(ActivityPtr activity);
   Task<bool> still_there(ActivityPtr activity);
   Task<bool> proven_continuous(ActivityPtr activity);
+
   /// A measured position comes to its target so late, at most, after the drive has sent its last pulse (M30).
   [[nodiscard]] Duration settling() const;
   /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
@@ -370,7 +380,6 @@ class Axis {
   [[nodiscard]] bool is_at(const PositionTracker::Target& target) const;
   /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
   [[nodiscard]] bool moved_from(std::int64_t counter) const;
-  bool judge_rest(Activity& activity);
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
   Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
   [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;

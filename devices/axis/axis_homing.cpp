@@ -70,7 +70,6 @@ Task<> Axis::run_home(ActivityPtr activity) {
       lose_trust();
       homed_before = sample_->homed;
       base = tracker_.counter();
-      activity->started = false;
       result = co_await drive_->start_homing(**profile, guard(*activity));
     }
   }

@@ -14,8 +14,6 @@ namespace axisd {
 
 namespace {
 
-/// A drive that was told to start moves within this, or not at all.
-constexpr auto start_window = milliseconds(500);
 /// A drive that cannot be read for so long does not tell any more what became of a command.
 constexpr auto settling_limit = std::chrono::seconds(15);
 
