@@ -22,6 +22,7 @@
 #include "devices/axis/axis_environment.hpp"
 #include "devices/axis/axis_face.hpp"
 #include "devices/axis/eeprom_budget.hpp"
+#include "devices/axis/homing_machine.hpp"
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
 #include "devices/axis/planner.hpp"
@@ -406,7 +407,9 @@ class Axis {
   // axis_homing.cpp
   Task<> run_home(ActivityPtr activity);
   Task<bool> back_off(ActivityPtr activity);
+  [[nodiscard]] HomingMachine followed_homing(TimePoint since, bool homed_before) const;
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
+  [[nodiscard]] Error not_homed(HomingMachine::State state) const;
   [[nodiscard]] std::string_view homing_switch() const;
   [[nodiscard]] Error reached_switch() const;
   [[nodiscard]] std::int64_t counter_at_home() const;
