@@ -48,7 +48,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
 Axis::~Axis() = default;
 
 void Axis::start(bool answered) {
-  if (answered) link_ = LinkState::configuring;
+  if (answered) link_.answers();
   take_over();
   launch(run(), "link");
 }
@@ -64,7 +64,7 @@ void Axis::launch(Task<> sequence, const char* name) {
 
 void Axis::close() {
   closing_ = true;
-  link_ = LinkState::offline;
+  link_.close();
   supersede(error(Reason::cancelled, "the daemon ends"));
   publish();
   wake();
@@ -168,15 +168,15 @@ void Axis::on_sample(const DriveSample& sample) {
   if (!sample.enabled) on_released(sample, before && before->enabled);
   watch_speed(SpeedWatch::Event::sampled);
   // What a link that failed kept back was not heard, wherever the drive rests.
-  if (!sample.moving && link_ == LinkState::online && !bus_loss_) stop_.seen_at_rest();
-  if (link_ == LinkState::online)
+  if (!sample.moving && link_.online() && !link_.bus_loss()) stop_.seen_at_rest();
+  if (link_.online())
     observed_.on_sample(sample, busy());
   else
     observed_.interrupted();
   if (terminal_motion_ && !sample.moving) {
     terminal_motion_ = false;
   }
-  if (sample.moving && (!activity_ || queues()) && !stop_.under_way() && link_ == LinkState::online)
+  if (sample.moving && (!activity_ || queues()) && !stop_.under_way() && link_.online())
     on_unexplained_motion(sample, before);
   release_as_owed();
   publish();

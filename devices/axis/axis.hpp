@@ -23,6 +23,7 @@
 #include "devices/axis/axis_face.hpp"
 #include "devices/axis/eeprom_budget.hpp"
 #include "devices/axis/homing_machine.hpp"
+#include "devices/axis/link_machine.hpp"
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
 #include "devices/axis/planner.hpp"
@@ -448,13 +449,10 @@ class Axis {
   std::shared_ptr<AxisGate> gate_;  ///< that of the face
   bool simulated_;
 
-  LinkState link_ = LinkState::offline;
-  std::optional<Error> link_error_;
+  LinkMachine link_;
   std::optional<DriveIdentity> identity_;
-  bool configured_ = false;  ///< in this power cycle of the drive
   bool restore_tried_ = false;
   bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
-  int reboots_ = 0;
   TimePoint continuity_checked_{}, drift_checked_{};
   Duration waited_{};  ///< for the line, the longest of the last of what the bus repeats
   Clock::Timer continuity_watch_;
@@ -491,8 +489,7 @@ class Axis {
   std::optional<TimePoint> release_owed_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
-  std::optional<Error> bus_loss_;  ///< not yet acted upon
-  TimePoint ours_until_{};         ///< what turned the shaft before was told to, or settles after it
+  TimePoint ours_until_{};  ///< what turned the shaft before was told to, or settles after it
   /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
   std::optional<std::vector<std::int64_t>> unseen_ends_;
   bool enabled_by_us_ = false;

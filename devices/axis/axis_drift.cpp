@@ -16,9 +16,9 @@ bool Axis::drift_is_next() const {
 /// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
 /// once the drive is released, and forbids motion until then.
 Task<> Axis::look_for_drift() {
-  if (link_ != LinkState::online || busy()) co_return;
+  if (!link_.online() || busy()) co_return;
   if (drift_is_next() && !co_await check_for_drift()) co_return;
-  const bool free = link_ == LinkState::online && !busy() && maintenance_.expired();
+  const bool free = link_.online() && !busy() && maintenance_.expired();
   if (!drift_.empty() && free && sample_ && !sample_->enabled) reconfigure(drift_, false);
 }
 

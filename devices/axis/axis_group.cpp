@@ -76,8 +76,8 @@ void Axis::Member::let_go() {
 }
 
 bool Axis::Member::ready() const {
-  return current() && axis_->link_ == LinkState::online && !axis_->bus_loss_ &&
-         axis_->env_.bus->port().open && !axis_->fault_ && !axis_->drive_->in_trouble() &&
+  return current() && axis_->link_.online() && !axis_->link_.bus_loss() && axis_->env_.bus->port().open &&
+         !axis_->fault_ && !axis_->drive_->in_trouble() &&
          may_send_alone(guard(), axis_->env_.clock->now()) == Verdict::send;
 }
 
@@ -114,7 +114,7 @@ Error Axis::Member::gone() const {
     return axis_->late(*activity_, {});
   if (verdict == Verdict::expired)
     return axis_->error(Reason::expired, "the request's validity has passed", "repeat it");
-  if (axis_->bus_loss_) return *axis_->bus_loss_;
+  if (axis_->link_.bus_loss()) return *axis_->link_.bus_loss();
   if (!axis_->env_.bus->port().open)
     return axis_->error(Reason::bus_down, "the port was lost before the start", "check the adapter");
   return axis_->error(Reason::superseded, "a stop came before the start");
@@ -257,7 +257,7 @@ Task<Result<void>> Axis::Member::look_after() {
   // As often as polling would.
   if (axis_->env_.clock->now() - axis_->continuity_checked_ >= continuity_period) {
     const auto proof = co_await axis_->prove_continuity(TransactionClass::motion);
-    if (!proof && proof.error().reason == Reason::rebooted && axis_->link_ == LinkState::online)
+    if (!proof && proof.error().reason == Reason::rebooted && axis_->link_.online())
       axis_->on_reboot(proof.error());
     if (!current()) co_return axisd::fail(gone());
   }
@@ -265,7 +265,7 @@ Task<Result<void>> Axis::Member::look_after() {
   if (!current()) co_return axisd::fail(gone());
   if (sample)
     axis_->on_sample(*sample);
-  else if (axis_->link_ == LinkState::online)
+  else if (axis_->link_.online())
     axis_->go_offline(sample.error());
   if (!ready()) co_return axisd::fail(gone());
   co_return Result<void>{};

@@ -64,7 +64,7 @@ void Axis::lease_lost(const Error& cause) {
 /// `on_lease_loss: disable` is done once the drive shows that it is released: whatever comes between (a stop,
 /// silence, an enable that was on its way) only puts it off.
 void Axis::release_as_owed() {
-  if (!release_owed_ || link_ != LinkState::online || activity_ || stop_.owed() || !sample_) return;
+  if (!release_owed_ || !link_.online() || activity_ || stop_.owed() || !sample_) return;
   if (sample_->enabled) {
     accept_epoch_ = gate_->epoch();
     (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});

@@ -27,7 +27,7 @@ Task<> Axis::run() {
 Task<> Axis::connect() {
   Duration backoff = first_backoff;
   bool again = false;
-  while (!closing_ && link_ != LinkState::online) {
+  while (!closing_ && !link_.online()) {
     co_await wait_for_port();
     // Both would write to the drive's memory.
     while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
@@ -37,10 +37,9 @@ Task<> Axis::connect() {
     const auto connected = co_await try_connect(TransactionClass::idle_state, std::exchange(again, true));
     if (closing_) co_return;
     if (!connected && failed_stops != stop_.failures()) continue;  // with that stop, at once
-    if (connected && !configured_) continue;                       // it was told to begin again meanwhile
+    if (connected && !link_.is_configured()) continue;             // it was told to begin again meanwhile
     if (connected) {
-      link_ = LinkState::online;
-      link_error_.reset();
+      link_.connected();
       unseen_ends_.reset();
       watch_continuity();
       spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
@@ -49,10 +48,8 @@ Task<> Axis::connect() {
     }
     const bool answers =
         connected.error().reason != Reason::no_reply && connected.error().reason != Reason::bus_down;
-    link_ = answers ? LinkState::configuring : LinkState::offline;
-    if (!link_error_ || link_error_->reason != connected.error().reason)
+    if (link_.failed(connected.error(), answers))
       spdlog::warn("{}: {}", settings_.name, to_string(connected.error()));
-    link_error_ = connected.error();
     if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
     publish();
     // What the bus holds back goes out as soon as anything of the node is heard: it should be there by then.
@@ -66,9 +63,8 @@ Task<> Axis::connect() {
 
 Task<> Axis::wait_for_port() {
   while (!closing_ && !env_.bus->port().open) {
-    link_ = LinkState::offline;
-    link_error_ = env_.bus->port().error.value_or(
-        error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists"));
+    link_.port_closed(env_.bus->port().error.value_or(
+        error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists")));
     if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
     publish();
     co_await env_.bus->port_changed().wait_until(env_.clock->now() + longest_backoff);
@@ -91,11 +87,7 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   auto identity = co_await drive_->identify(contact);
   if (!identity) co_return fail(identity.error());
   if (closing_) co_return fail(ending());
-  if (link_ != LinkState::configuring) {
-    link_ = LinkState::configuring;
-    link_error_.reset();
-    publish();
-  }
+  if (link_.answers()) publish();
   identity_ = std::move(*identity);
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
@@ -167,7 +159,7 @@ Task<Result<void>> Axis::settle_found_motion() {
   stop_.pay();
   if (!found.empty()) {
     spdlog::info("{}: {}", settings_.name, found);
-    if (env_.event) env_.event(settings_.name, LinkChange{.to = link_, .detail = std::string(found)});
+    if (env_.event) env_.event(settings_.name, LinkChange{.to = link_.shown(), .detail = std::string(found)});
   }
   co_return Result<void>{};
 }
@@ -178,7 +170,7 @@ Error Axis::ending() const { return error(Reason::cancelled, "the axis is being 
 Task<Result<void>> Axis::prove_or_configure() {
   if (const auto settled = co_await settle_earlier(); !settled) co_return settled;
   std::optional<OffsetRecord> stored;
-  if (!configured_ && !restore_tried_ && env_.persistence != nullptr) {
+  if (!link_.is_configured() && !restore_tried_ && env_.persistence != nullptr) {
     const auto& axes = env_.persistence->current().axes;
     if (const auto found = axes.find(settings_.name); found != axes.end()) stored = found->second.offset;
   }
@@ -197,15 +189,15 @@ Task<Result<void>> Axis::prove_or_configure() {
     env_.persistence->forget_offset(settings_.name, {});
   };
   if (stored && !restorable) void_record();
-  if (configured_ || restorable) {
+  if (link_.is_configured() || restorable) {
     const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
-    if (!proof && configured_) on_reboot(proof.error());
+    if (!proof && link_.is_configured()) on_reboot(proof.error());
     if (!proof && restorable) void_record();
     if (!proof) restorable = false;
     if (closing_) co_return fail(ending());
   }
-  if (!configured_) {
+  if (!link_.is_configured()) {
     // A terminal's motion is not disturbed by writing parameters under it.
     if (sample_->moving || (found_in_motion() && found_by_terminal()))
       co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
@@ -213,7 +205,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
     if (!configured) co_return configured;
     if (closing_) co_return fail(ending());
-    configured_ = true;
+    link_.configured();
     continuity_checked_ = env_.clock->now();
     restore_tried_ = true;
     drift_checked_ = env_.clock->now();
@@ -254,9 +246,7 @@ Result<std::shared_ptr<void>> Axis::begin_maintenance() {
 
 void Axis::reconfigure(const std::string& why, bool position_lost) {
   spdlog::info("{}: applying the configuration again: {}", settings_.name, why);
-  configured_ = false;
-  link_ = LinkState::configuring;
-  link_error_ = error(Reason::configuring, "the configuration is applied again: " + why, "wait");
+  link_.reconfigure(error(Reason::configuring, "the configuration is applied again: " + why, "wait"));
   if (position_lost) {
     lose_trust();
     tracker_.forget_base();
@@ -267,19 +257,17 @@ void Axis::reconfigure(const std::string& why, bool position_lost) {
 }
 
 void Axis::bus_lost(Error cause) {
-  if (link_ != LinkState::online) return;  // whatever is under way fails by itself, and is repeated
-  bus_loss_ = std::move(cause);
+  if (!link_.bus_lost(std::move(cause))) return;
   // The others of its group look at its gate.
   if (activity_ && activity_->state == AxisState::synchronized_motion) gate_->raise();
   wake();
 }
 
 void Axis::go_offline(const Error& cause) {
-  bus_loss_.reset();
+  link_.forget_bus_loss();
   if (terminal_may_void_position()) lose_trust();
   spdlog::warn("{}: offline: {}", settings_.name, to_string(cause));
-  link_ = LinkState::offline;
-  link_error_ = cause;
+  link_.lost(cause);
   revoke_motion();
   env_.bus->give_up_readings(settings_.node);
   const bool moved = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
@@ -305,11 +293,8 @@ void Axis::go_offline(const Error& cause) {
 
 void Axis::on_reboot(const Error& cause) {
   spdlog::warn("{}: {}", settings_.name, to_string(cause));
-  ++reboots_;
-  configured_ = false;
+  link_.restarted(cause);
   enabled_by_us_ = false;
-  link_ = LinkState::configuring;
-  link_error_ = cause;
   auto told = cause;
   if (activity_ && activity_->may_run) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);

@@ -93,7 +93,7 @@ void Axis::enter_error_stop(const Error& cause) {
 Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience) {
   const auto deadline = env_.clock->now() + patience;
   wake();
-  while (env_.clock->now() < deadline && link_ != LinkState::offline) {
+  while (env_.clock->now() < deadline && !link_.offline()) {
     if (sample_ && sample_->asked_at >= since) co_return *sample_;
     co_await sampled_.wait_until(deadline);
   }

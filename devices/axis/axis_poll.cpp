@@ -33,12 +33,12 @@ constexpr Duration continuity_grid = milliseconds(500);
 
 Task<> Axis::poll() {
   Polling polling;
-  while (link_ == LinkState::online) {
+  while (link_.online()) {
     if (chains_ > 0) {
       co_await wake_.wait();
       continue;
     }
-    if (bus_loss_) co_return go_offline(Error(*bus_loss_));
+    if (link_.bus_loss()) co_return go_offline(Error(*link_.bus_loss()));
     if (keeps_quiet()) {
       co_await wake_.wait_until(quiet_until_);
       continue;
@@ -50,7 +50,7 @@ Task<> Axis::poll() {
     if (works()) {
       // Whoever waits for this sample goes first: it may be the last one that is wanted.
       co_await let_others_run(env_.executor, *env_.clock);
-      if (link_ != LinkState::online || bus_loss_ || chains_ > 0) continue;
+      if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
     const auto canary = works() ? continuity_checked_ + continuity_latest : canary_latest();
@@ -112,18 +112,18 @@ Task<bool> Axis::poll_once(Polling& polling) {
   if (result) {
     const auto sample = co_await next_sample(polling);
     polling.woken = sample && !*sample;
-    if (polling.woken) co_return link_ == LinkState::online;
+    if (polling.woken) co_return link_.online();
     if (!sample) result = fail(sample.error());
     // Its node was held back: what was proven before that says nothing of it.
     else if ((*sample)->asked_at - continuity_checked_ > continuity_forgotten)
       result = co_await prove_continuity(TransactionClass::moving_state);
     if (result && !seen_again(**sample)) on_sample(**sample);
     if (!result && result.error().reason == Reason::rebooted) {
-      if (link_ == LinkState::online) on_reboot(result.error());
+      if (link_.online()) on_reboot(result.error());
       co_return false;
     }
   }
-  if (link_ != LinkState::online) co_return false;  // a sequence found the reboot first
+  if (!link_.online()) co_return false;  // a sequence found the reboot first
   if (result) {
     polling.failures = 0;
     co_return true;
@@ -160,7 +160,7 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
 /// then only the time at which that is known has.
 bool Axis::seen_again(const DriveSample& sample) {
   if (sample.asked_at - continuity_checked_ > continuity_forgotten) return false;  // to be proven first
-  if (link_ != LinkState::online || revision_ != sampled_revision_ || busy() || release_owed_ || !sample_ ||
+  if (!link_.online() || revision_ != sampled_revision_ || busy() || release_owed_ || !sample_ ||
       note_eeprom_writes() || shown_->link_note != drive_->link_note() ||
       shown_->start_note != drive_->no_common_start())
     return false;
@@ -192,7 +192,9 @@ TimePoint Axis::canary_due(TimePoint next_reading) const {
 }
 
 /// The poll loop has nothing to do but to read the state and the canary.
-bool Axis::only_watches() const { return chains_ == 0 && !bus_loss_ && drift_.empty() && !drift_is_next(); }
+bool Axis::only_watches() const {
+  return chains_ == 0 && !link_.bus_loss() && drift_.empty() && !drift_is_next();
+}
 
 /// The poll loop has something to look at.
 void Axis::wake() {
@@ -205,7 +207,7 @@ void Axis::wake() {
 /// While its node is held back no request fails, as none is sent: nothing else would tell that nobody has
 /// heard of the drive for so long.
 void Axis::watch_continuity() {
-  if (link_ != LinkState::online) return;
+  if (!link_.online()) return;
   const auto now = env_.clock->now();
   const auto limit = continuity_checked_ + continuity_longest;
   if (now >= limit && env_.bus->holds_back(settings_.node)) {

@@ -63,11 +63,11 @@ void Axis::look_at_holds(const CommandOptions& options, Obstacles& found) const 
 
 void Axis::look_at_link(Obstacles& found) const {
   if (reloading_) return found.block(reloading());
-  if (link_ == LinkState::configuring) {
+  if (!link_.online() && !link_.offline()) {
     auto cause = error(Reason::configuring, "the drive is being identified and configured", "wait");
-    if (link_error_) {
-      cause = *link_error_;
-      cause.message = fmt::format("{}: not configured: {}", settings_.name, link_error_->message);
+    if (link_.error()) {
+      cause = *link_.error();
+      cause.message = fmt::format("{}: not configured: {}", settings_.name, link_.error()->message);
       const bool lasting = cause.reason == Reason::wrong_model || cause.reason == Reason::misconfigured ||
                            cause.reason == Reason::eeprom_budget;
       if (!lasting) cause.reason = Reason::configuring;
@@ -75,8 +75,8 @@ void Axis::look_at_link(Obstacles& found) const {
     }
     found.block(std::move(cause));
   }
-  if (link_ != LinkState::offline) return;
-  found.block(error(Reason::offline, link_error_ ? "offline: " + to_string(*link_error_) : "offline",
+  if (!link_.offline()) return;
+  found.block(error(Reason::offline, link_.error() ? "offline: " + to_string(*link_.error()) : "offline",
                     "check power and wiring; it is retried by itself"));
   if (const auto& port = env_.bus->port(); !port.open) {
     auto cause = port.error.value_or(Error{
@@ -179,7 +179,7 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
 
 /// The drive decides what an active terminal does to a start: worth knowing, but not refused for.
 void Axis::look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const {
-  if (!sample_ || link_ != LinkState::online) return;
+  if (!sample_ || !link_.online()) return;
   for (const auto& input : settings_.inputs)
     if (std::ranges::find(functions, input.function) != functions.end() && active_in(*sample_, input))
       found.note(error(Reason::terminal,
@@ -271,7 +271,7 @@ void Axis::look_at(const EnableRequest& /*request*/, const CommandOptions& optio
 /// Also while the drive is not configured: some of its configuration is only written while it is released.
 void Axis::look_at(const DisableRequest& /*request*/, const CommandOptions& /*options*/,
                    Obstacles& found) const {
-  if (link_ == LinkState::offline) look_at_link(found);
+  if (link_.offline()) look_at_link(found);
 }
 
 void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {

@@ -131,8 +131,8 @@ void Axis::publish() {
   next->unit = settings_.scale.unit;
   next->simulated = simulated_;
   next->state = state();
-  next->link = link_;
-  next->link_error = link_error_;
+  next->link = link_.shown();
+  next->link_error = link_.error();
   next->link_note = drive_->link_note();
   next->start_note = drive_->no_common_start();
   next->fault = fault_;
@@ -156,7 +156,7 @@ void Axis::publish() {
     if (next->commanded_position) next->commanded_position = into_turn(*next->commanded_position);
   }
   next->identity = identity_;
-  next->reboots = reboots_;
+  next->reboots = link_.restarts();
   next->drift = drift_;
   next->eeprom_writes = eeprom_writes_;
   next->motion_cause = motion_cause();

@@ -37,8 +37,8 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
   // Nobody would look after a drive that is left, and one that stays is not configured under power (M1).
   if (sample_ && sample_->enabled && (!energised || !drift_.empty()))
     add(Reason::busy,
-        link_ == LinkState::online ? "its power stage is on" : "its power stage was on when it was last seen",
-        link_ == LinkState::online
+        link_.online() ? "its power stage is on" : "its power stage was on when it was last seen",
+        link_.online()
             ? "disable it first: " + shell("disable")
             : "look at the machine and let the drive answer; or restart the service with this configuration");
   if (fault_)  // whoever comes after would know nothing of it
@@ -52,8 +52,8 @@ Error Axis::reloading() const {
 
 void Axis::retire(bool position_holds) {
   reloading_ = true;
-  answered_ = link_ != LinkState::offline;
-  link_error_ = reloading();
+  answered_ = !link_.offline();
+  link_.explain(reloading());
   if (terminal_may_void_position() || !position_holds) lose_trust();
   if (!position_holds && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
   remember_position();

@@ -55,8 +55,8 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
   } else {
     // The running sequence sends this one, too. It may wait for a reading that is held back, or will be,
     // because the node does not answer.
-    const bool held = link_ != LinkState::online && env_.bus->holds_back(settings_.node);
-    if (link_ == LinkState::offline || held) env_.bus->give_up_readings(settings_.node);
+    const bool held = !link_.online() && env_.bus->holds_back(settings_.node);
+    if (link_.offline() || held) env_.bus->give_up_readings(settings_.node);
     sampled_.notify_all();
   }
 }
@@ -83,7 +83,7 @@ Task<> Axis::run_stop() {
     if (!fault_) fault_ = confirmed.error();
     spdlog::error("{}", to_string(confirmed.error()));
     for (const auto& command : commands) {
-      if (link_ == LinkState::offline)
+      if (link_.offline())
         command->unknown(confirmed.error());
       else
         command->error(confirmed.error());
@@ -128,10 +128,10 @@ Task<Result<void>> Axis::stop_and_confirm() {
     if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
     wake();
     if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out, sent.has_value());
-    auto step = stop_.sent(answer_of(sent), link_ == LinkState::offline);
+    auto step = stop_.sent(answer_of(sent), link_.offline());
     if (step == Step::look) {
       const bool rests = co_await rests_in_time(sent.has_value());
-      step = stop_.looked(rests, link_ == LinkState::offline, settings_.stop_escalation_release);
+      step = stop_.looked(rests, link_.offline(), settings_.stop_escalation_release);
     }
     switch (step) {
       case Step::send:
@@ -161,14 +161,14 @@ Task<bool> Axis::rests_in_time(bool acknowledged) {
   const auto patience = stop_.patience(settings_.stop_margin);
   poll_fast(since, patience);
   // Only an axis that is online is polled.
-  if (link_ == LinkState::online) co_return co_await standstill_by(since, since + patience);
-  if (!acknowledged && link_ == LinkState::offline) co_return false;
+  if (link_.online()) co_return co_await standstill_by(since, since + patience);
+  if (!acknowledged && link_.offline()) co_return false;
   co_return co_await standstill_unpolled(since + patience, true);
 }
 
 Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline) {
   StandstillWatch watch(since, deadline);
-  while (link_ != LinkState::offline && !stop_.overtaken()) {
+  while (!link_.offline() && !stop_.overtaken()) {
     if (sample_) {
       const auto found = watch.look(*sample_, tracker_.counter(), drive_->position_window());
       if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
