@@ -21,6 +21,7 @@
 #include "devices/axis/activity.hpp"
 #include "devices/axis/axis_environment.hpp"
 #include "devices/axis/axis_face.hpp"
+#include "devices/axis/continuity.hpp"
 #include "devices/axis/eeprom_budget.hpp"
 #include "devices/axis/homing_machine.hpp"
 #include "devices/axis/link_machine.hpp"
@@ -179,8 +180,6 @@ class Axis {
   Task<Result<std::optional<DriveSample>>> next_sample(Polling& polling);
   bool seen_again(const DriveSample& sample);
   [[nodiscard]] bool only_watches() const;
-  [[nodiscard]] TimePoint canary_due(TimePoint next_reading) const;
-  [[nodiscard]] TimePoint canary_latest() const;
   void wake();
   void watch_continuity();
   Task<Result<void>> prove_continuity(TransactionClass priority);
@@ -453,8 +452,8 @@ class Axis {
   std::optional<DriveIdentity> identity_;
   bool restore_tried_ = false;
   bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
-  TimePoint continuity_checked_{}, drift_checked_{};
-  Duration waited_{};  ///< for the line, the longest of the last of what the bus repeats
+  Continuity continuity_;
+  TimePoint drift_checked_{};
   Clock::Timer continuity_watch_;
   TimePoint had_turn_{};  ///< the last time that it was its turn to start
   TimePoint settle_by_{};

@@ -9,8 +9,8 @@ namespace axisd {
 bool Axis::drift_is_next() const {
   const auto now = env_.clock->now();
   const auto due = drift_checked_ + settings_.drift_check;
-  const bool in_good_time = now - continuity_checked_ < continuity_period / 2;
-  return now >= due && maintenance_.expired() && (in_good_time || now >= due + 2 * continuity_period);
+  return now >= due && maintenance_.expired() &&
+         (continuity_.just_proven(now) || now >= due + 2 * continuity_period);
 }
 
 /// Reads the terminals' functions again now and then, at rest: what another master changed is applied again

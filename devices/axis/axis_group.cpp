@@ -210,7 +210,7 @@ Result<void> Axis::Member::judge(const DriveSample& sample) const {
 Task<Result<void>> Axis::Member::verify() {
   if (!loaded_ || there_) co_return Result<void>{};
   auto verified = co_await loaded_->verify();
-  if (verified) axis_->continuity_checked_ = axis_->env_.clock->now();
+  if (verified) axis_->continuity_.proven(axis_->env_.clock->now());
   co_return verified;
 }
 
@@ -241,7 +241,7 @@ void Axis::Member::started(TimePoint at) {
   started_at_ = at;
   activity_->waits_for = StartWait::begun;
   axis_->watch_speed(SpeedWatch::Event::begun);
-  axis_->continuity_checked_ = axis_->env_.clock->now();  // the canary was part of its start
+  axis_->continuity_.proven(axis_->env_.clock->now());  // the canary was part of its start
   axis_->tracker_.forget_base();
   activity_->command->activate();
   axis_->publish();
@@ -255,7 +255,7 @@ Duration Axis::Member::unseen_for() const {
 
 Task<Result<void>> Axis::Member::look_after() {
   // As often as polling would.
-  if (axis_->env_.clock->now() - axis_->continuity_checked_ >= continuity_period) {
+  if (axis_->continuity_.state(axis_->env_.clock->now()) >= Continuity::State::due) {
     const auto proof = co_await axis_->prove_continuity(TransactionClass::motion);
     if (!proof && proof.error().reason == Reason::rebooted && axis_->link_.online())
       axis_->on_reboot(proof.error());

@@ -206,7 +206,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (!configured) co_return configured;
     if (closing_) co_return fail(ending());
     link_.configured();
-    continuity_checked_ = env_.clock->now();
+    continuity_.proven(env_.clock->now());
     restore_tried_ = true;
     drift_checked_ = env_.clock->now();
     set_drift({});
@@ -220,7 +220,7 @@ Task<Result<void>> Axis::prove_or_configure() {
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   // Where replies are lost all this may have taken long, and the drive may have been restarted meanwhile.
-  if (sample->asked_at - continuity_checked_ > continuity_forgotten) {
+  if (continuity_.forgotten(sample->asked_at)) {
     const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason == Reason::rebooted) on_reboot(proof.error());
     if (!proof) co_return proof;

@@ -275,8 +275,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   watch_speed(SpeedWatch::Event::begun);
   if (result) {
     // A proof was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.
-    const auto proven = drive_->proven_at().value_or(since - 2 * settings_.reboot_guard);
-    continuity_checked_ = std::max(continuity_checked_, proven);
+    continuity_.proven(drive_->proven_at().value_or(since - 2 * settings_.reboot_guard));
     activity->command->activate();
     publish();
     co_return true;

@@ -9,25 +9,6 @@ namespace axisd {
 namespace {
 
 constexpr int attempts_before_offline = 3;
-constexpr auto continuity_latest = milliseconds(950);
-/// M7.
-constexpr auto continuity_every = milliseconds(1000);
-/// At rest nothing is lost where it is asked for in good time: something else may need the line just then.
-constexpr auto continuity_latest_at_rest = milliseconds(850);
-/// Sooner it is not asked for, however well it would fit between two readings.
-constexpr auto continuity_soonest = milliseconds(700);
-/// However long others have kept the line.
-constexpr auto continuity_soonest_of_all = milliseconds(200);
-/// So long after its reply, at most, a bus tells of a reading that it repeats: others are carried out behind
-/// it, and the last of them may have no answer.
-constexpr auto told_late = milliseconds(140);
-/// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
-/// trusted meanwhile.
-constexpr auto continuity_longest = milliseconds(2500);
-/// How soon the watch looks again at an axis that is beyond it, but is being asked.
-constexpr auto continuity_look = milliseconds(50);
-/// At multiples of this the watch looks at all axes whose time is not near: they wake the core together.
-constexpr Duration continuity_grid = milliseconds(500);
 
 }  // namespace
 
@@ -53,8 +34,7 @@ Task<> Axis::poll() {
       if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
-    const auto canary = works() ? continuity_checked_ + continuity_latest : canary_latest();
-    const auto next = std::min(next_poll(asked), canary);
+    const auto next = std::min(next_poll(asked), continuity_.latest(works()));
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }
 }
@@ -86,8 +66,8 @@ TimePoint Axis::next_poll(TimePoint began) const {
 /// The drive was not restarted since its parameters were last written.
 Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
   auto proof = co_await drive_->check_continuity(priority);
-  if (proof) continuity_checked_ = env_.clock->now();
-  waited_ = waited_ * 3 / 4;  // nobody measures it while the bus repeats nothing
+  if (proof) continuity_.proven(env_.clock->now());
+  continuity_.forget_waits();
   co_return proof;
 }
 
@@ -98,10 +78,9 @@ Task<bool> Axis::poll_once(Polling& polling) {
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
   const bool urgent = now >= fast_from_ && now < fast_until_ && works();
-  const bool asked_in_vain = !urgent && now >= polling.proof_due && continuity_checked_ < polling.proof_due;
-  const bool late = !works() && now >= canary_latest();
-  if (asked_in_vain || late ||
-      now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
+  using Pace = Continuity::Pace;
+  const auto pace = urgent ? Pace::awaiting_end : works() ? Pace::moving : Pace::at_rest;
+  if (continuity_.is_due(now, pace, polling.proof_due)) {
     result =
         co_await prove_continuity(works() ? TransactionClass::moving_state : TransactionClass::idle_state);
     if (!result && result.error().reason == Reason::rebooted) {
@@ -115,7 +94,7 @@ Task<bool> Axis::poll_once(Polling& polling) {
     if (polling.woken) co_return link_.online();
     if (!sample) result = fail(sample.error());
     // Its node was held back: what was proven before that says nothing of it.
-    else if ((*sample)->asked_at - continuity_checked_ > continuity_forgotten)
+    else if (continuity_.forgotten((*sample)->asked_at))
       result = co_await prove_continuity(TransactionClass::moving_state);
     if (result && !seen_again(**sample)) on_sample(**sample);
     if (!result && result.error().reason == Reason::rebooted) {
@@ -128,7 +107,7 @@ Task<bool> Axis::poll_once(Polling& polling) {
     polling.failures = 0;
     co_return true;
   }
-  const bool unproven = env_.clock->now() - continuity_checked_ >= continuity_longest;
+  const bool unproven = continuity_.lost(env_.clock->now());
   if (result.error().reason == Reason::bus_down || ++polling.failures >= attempts_before_offline ||
       unproven) {
     go_offline(result.error());
@@ -149,17 +128,17 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
     return goes_on;
   };
   watch.proof_due = [this, &polling](TimePoint next, Duration waited) {
-    waited_ = std::max(waited, waited_ * 3 / 4);  // a canary waits less, a reading behind others' longer
-    return polling.proof_due = canary_due(next);
+    continuity_.waited(waited);
+    return polling.proof_due = continuity_.due_beside(next, settings_.poll_idle);
   };
-  watch.proven = [this](TimePoint at) { continuity_checked_ = std::max(continuity_checked_, at); };
+  watch.proven = [this](TimePoint at) { continuity_.proven(at); };
   co_return co_await drive_->watch_state(std::move(watch));
 }
 
 /// The drive is as it was, and nothing has changed about the axis since it was looked at with that state:
 /// then only the time at which that is known has.
 bool Axis::seen_again(const DriveSample& sample) {
-  if (sample.asked_at - continuity_checked_ > continuity_forgotten) return false;  // to be proven first
+  if (continuity_.forgotten(sample.asked_at)) return false;  // to be proven first
   if (!link_.online() || revision_ != sampled_revision_ || busy() || release_owed_ || !sample_ ||
       note_eeprom_writes() || shown_->link_note != drive_->link_note() ||
       shown_->start_note != drive_->no_common_start())
@@ -173,22 +152,6 @@ bool Axis::seen_again(const DriveSample& sample) {
   shown_->sampled.set(sample.asked_at, sample.measured_at, env_.clock->wall(sample.measured_at));
   sampled_.notify_all();
   return true;
-}
-
-/// At rest, so that M7 holds though a reading goes first that waits for the line: twice as long as others did
-/// where all axes ask for their canaries just then, and the canary behind those.
-TimePoint Axis::canary_latest() const {
-  return continuity_checked_ + std::clamp<Duration>(continuity_every - told_late - 3 * waited_,
-                                                    continuity_soonest_of_all, continuity_latest_at_rest);
-}
-
-/// With the last reading that is in time, or between two where they are rare.
-TimePoint Axis::canary_due(TimePoint next_reading) const {
-  const auto latest = canary_latest();
-  if (next_reading > latest) return latest;
-  const bool last_in_time = next_reading + settings_.poll_idle > latest;
-  return last_in_time && next_reading >= continuity_checked_ + continuity_soonest ? next_reading
-                                                                                  : TimePoint::max();
 }
 
 /// The poll loop has nothing to do but to read the state and the canary.
@@ -209,15 +172,12 @@ void Axis::wake() {
 void Axis::watch_continuity() {
   if (!link_.online()) return;
   const auto now = env_.clock->now();
-  const auto limit = continuity_checked_ + continuity_longest;
-  if (now >= limit && env_.bus->holds_back(settings_.node)) {
+  if (continuity_.lost(now) && env_.bus->holds_back(settings_.node)) {
     go_offline(error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
                      "check power, wiring, address and baud rate of the node"));
     return;
   }
-  const auto on_grid = limit - limit.time_since_epoch() % continuity_grid;
-  const auto next = on_grid > now ? on_grid : std::max(limit, now + continuity_look);
-  continuity_watch_ = env_.clock->call_at(next, [this] { watch_continuity(); });
+  continuity_watch_ = env_.clock->call_at(continuity_.next_look(now), [this] { watch_continuity(); });
 }
 
 }  // namespace axisd
