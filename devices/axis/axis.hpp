@@ -28,6 +28,7 @@
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
 #include "devices/axis/planner.hpp"
+#include "devices/axis/poll_pace.hpp"
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/axis/speed_watch.hpp"
@@ -187,7 +188,6 @@ class Axis {
   void poll_fast(TimePoint from, Duration longest);
   void keep_quiet(TimePoint until);
   [[nodiscard]] bool keeps_quiet() const;
-  [[nodiscard]] TimePoint next_poll(TimePoint began) const;
 
   // axis_drift.cpp
   [[nodiscard]] bool drift_is_next() const;
@@ -457,9 +457,8 @@ class Axis {
   Clock::Timer continuity_watch_;
   TimePoint had_turn_{};  ///< the last time that it was its turn to start
   TimePoint settle_by_{};
-  std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon
-  TimePoint fast_from_{}, fast_until_{};                  ///< of poll_fast()
-  TimePoint quiet_until_{};                               ///< of keep_quiet()
+  std::vector<Unsettled> unsettled_;  ///< of earlier runs of the daemon
+  PollPace pace_;
   std::string drift_;                                     ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
   std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()

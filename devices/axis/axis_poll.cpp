@@ -21,7 +21,7 @@ Task<> Axis::poll() {
     }
     if (link_.bus_loss()) co_return go_offline(Error(*link_.bus_loss()));
     if (keeps_quiet()) {
-      co_await wake_.wait_until(quiet_until_);
+      co_await wake_.wait_until(pace_.quiet_until());
       continue;
     }
     const auto began = env_.clock->now();
@@ -34,33 +34,26 @@ Task<> Axis::poll() {
       if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
-    const auto next = std::min(next_poll(asked), continuity_.latest(works()));
+    const auto next = std::min(pace_.next(asked, works()), continuity_.latest(works()));
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }
 }
 
 /// What was started is not read before. Where starts need no turns a reading costs no other axis anything.
 void Axis::keep_quiet(TimePoint until) {
-  if (env_.bus->start_turns() != nullptr) quiet_until_ = until;
+  if (env_.bus->start_turns() != nullptr) pace_.keep_quiet(until);
 }
 
 /// Whatever stops it is looked after at once.
 bool Axis::keeps_quiet() const {
   const bool begun = activity_ && activity_->waits_for == StartWait::begun;
-  return begun && !stop_.under_way() && !stop_.owed() && env_.clock->now() < quiet_until_;
+  return begun && !stop_.under_way() && !stop_.owed() &&
+         pace_.state(env_.clock->now()) == PollPace::State::quiet;
 }
 
 void Axis::poll_fast(TimePoint from, Duration longest) {
-  fast_from_ = from;
-  fast_until_ = from + longest;
+  pace_.expect(from, longest);
   wake();
-}
-
-TimePoint Axis::next_poll(TimePoint began) const {
-  if (!works()) return began + settings_.poll_idle;
-  if (began >= fast_from_ && began < fast_until_) return began + fastest_poll;
-  const auto next = began + settings_.poll_moving;
-  return began < fast_from_ ? std::min(next, fast_from_) : next;
 }
 
 /// The drive was not restarted since its parameters were last written.
@@ -77,7 +70,7 @@ Task<bool> Axis::poll_once(Polling& polling) {
   Result<void> result;
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
-  const bool urgent = now >= fast_from_ && now < fast_until_ && works();
+  const bool urgent = pace_.is_fast(now) && works();
   using Pace = Continuity::Pace;
   const auto pace = urgent ? Pace::awaiting_end : works() ? Pace::moving : Pace::at_rest;
   if (continuity_.is_due(now, pace, polling.proof_due)) {
