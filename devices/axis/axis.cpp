@@ -229,9 +229,8 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
   // What nothing holds can be turned by hand.
   if (!counts_while_released() && sample.alarm_code == 0 && tracker_.trust() != PositionTrust::unknown)
     lose_trust();
-  if (!enabled_by_us_ && !enabled_before) return;
+  if (!power_.released(enabled_before)) return;
   const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
-  enabled_by_us_ = false;
   if (releasing || fault_) return;
   const bool moved = activity_ && activity_->state != AxisState::standstill;
   if (moved && limit_active(last_positive_)) {

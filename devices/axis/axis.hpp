@@ -30,6 +30,7 @@
 #include "devices/axis/planner.hpp"
 #include "devices/axis/poll_pace.hpp"
 #include "devices/axis/position_tracker.hpp"
+#include "devices/axis/power_machine.hpp"
 #include "devices/axis/settings.hpp"
 #include "devices/axis/speed_watch.hpp"
 #include "devices/axis/standstill.hpp"
@@ -67,7 +68,7 @@ class Axis {
   /// From then on.
   [[nodiscard]] bool retired() const { return reloading_; }
   /// `on_lease_loss: disable` was not done yet.
-  [[nodiscard]] bool owes_release() const { return release_owed_.has_value(); }
+  [[nodiscard]] bool owes_release() const { return power_.owes_release(); }
   /// Its drive answered when it was retired.
   [[nodiscard]] bool answered() const { return answered_; }
   /// Keeps the axis from being exchanged while it lives. Errors: reloading.
@@ -400,6 +401,7 @@ class Axis {
   // axis_power.cpp: sequences that move nothing
   void on_turned_by_power(const Error& cause);
   Task<> run_enable(ActivityPtr activity);
+  void end_enable(Activity& activity, EnableMachine::State state);
   Task<> run_disable(ActivityPtr activity);
   Task<> run_reset(ActivityPtr activity);
   Task<> run_set_position(ActivityPtr activity);
@@ -468,6 +470,7 @@ class Axis {
   bool absolute_segments_ = false;
 
   StopMachine stop_;
+  PowerMachine power_;
 
   std::optional<DriveSample> sample_;
   Signal sampled_;  ///< a new sample, or the link changed
@@ -483,14 +486,11 @@ class Axis {
   ActivityPtr activity_;
   std::deque<Buffered> buffer_;  ///< nothing waits where nothing is executed
   CommandPtr next_;              ///< of the buffer, while it is being started
-  /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
-  std::optional<TimePoint> release_owed_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
   TimePoint ours_until_{};  ///< what turned the shaft before was told to, or settles after it
   /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
   std::optional<std::vector<std::int64_t>> unseen_ends_;
-  bool enabled_by_us_ = false;
   bool terminal_motion_ = false;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed
   bool last_positive_ = true;

@@ -7,9 +7,6 @@ namespace axisd {
 
 namespace {
 
-/// As long as run_enable() waits for it.
-constexpr auto enable_shows_within = std::chrono::seconds(1);
-
 /// Ends by itself, where its request said.
 bool is_bounded(CommandKind kind) {
   return kind == CommandKind::home || kind == CommandKind::move_absolute ||
@@ -47,7 +44,7 @@ void Axis::lease_lost(const Error& cause) {
   if (policy == LeaseLoss::disable) {
     // An enable may be on its way to the drive, which then shows it some time later.
     const bool enabling = command != nullptr && command->kind == CommandKind::enable;
-    release_owed_ = env_.clock->now() + (enabling ? enable_shows_within : Duration{});
+    power_.owe_release(env_.clock->now() + (enabling ? EnableMachine::shows_within : Duration{}));
   }
   if (command != nullptr && command->kind == CommandKind::disable) return;  // it needs no lease
   const bool motion = activity_ && activity_->state != AxisState::standstill;
@@ -64,19 +61,16 @@ void Axis::lease_lost(const Error& cause) {
 /// `on_lease_loss: disable` is done once the drive shows that it is released: whatever comes between (a stop,
 /// silence, an enable that was on its way) only puts it off.
 void Axis::release_as_owed() {
-  if (!release_owed_ || !link_.online() || activity_ || stop_.owed() || !sample_) return;
-  if (sample_->enabled) {
-    accept_epoch_ = gate_->epoch();
-    (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});
-  } else if (sample_->asked_at >= *release_owed_) {
-    release_owed_.reset();
-  }
+  if (!link_.online() || activity_ || stop_.owed() || !sample_) return;
+  if (!power_.has_to_release(*sample_)) return;
+  accept_epoch_ = gate_->epoch();
+  (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});
 }
 
 /// The drive took part, and is not released: trying again and again would help nobody.
 void Axis::give_up_release(const Error& cause) {
-  if (!release_owed_ || cause.outcome == Outcome::unknown) return;
-  release_owed_.reset();
+  if (!power_.owes_release() || cause.outcome == Outcome::unknown) return;
+  power_.give_up();
   spdlog::error("{}: the lease ended, and the drive was not released: {}", settings_.name, to_string(cause));
   if (!fault_) fault_ = cause;
 }

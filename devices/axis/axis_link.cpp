@@ -294,7 +294,7 @@ void Axis::go_offline(const Error& cause) {
 void Axis::on_reboot(const Error& cause) {
   spdlog::warn("{}: {}", settings_.name, to_string(cause));
   link_.restarted(cause);
-  enabled_by_us_ = false;
+  power_.restarted();
   auto told = cause;
   if (activity_ && activity_->may_run) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);

@@ -132,7 +132,7 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
 /// then only the time at which that is known has.
 bool Axis::seen_again(const DriveSample& sample) {
   if (continuity_.forgotten(sample.asked_at)) return false;  // to be proven first
-  if (!link_.online() || revision_ != sampled_revision_ || busy() || release_owed_ || !sample_ ||
+  if (!link_.online() || revision_ != sampled_revision_ || busy() || power_.owes_release() || !sample_ ||
       note_eeprom_writes() || shown_->link_note != drive_->link_note() ||
       shown_->start_note != drive_->no_common_start())
     return false;

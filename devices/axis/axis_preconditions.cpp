@@ -141,7 +141,7 @@ void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) co
     found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   look_at_fault(found);
   look_at_maintenance(found);
-  if (release_owed_)
+  if (power_.owes_release())
     found.block(error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
   found.block_on(check_journal());
   if (!drift_.empty())

@@ -138,7 +138,7 @@ void Axis::publish() {
   next->fault = fault_;
   if (env_.holds != nullptr) next->holds = env_.holds->all();
   next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
-  next->enabled_by_us = enabled_by_us_;
+  next->enabled_by_us = power_.enabled_by_us();
   next->trust = tracker_.trust();
   next->position_source = descriptor_->capabilities.position_source;
   next->position = tracker_.position();

@@ -28,7 +28,8 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
   if (stop_.owed() && !stop_.under_way())
     add(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
         "look at the machine; the stop is the first that the drive gets when it answers");
-  if (release_owed_) add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
+  if (power_.owes_release())
+    add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
   if (!maintenance_.expired() || users_.use_count() > 1)
     add(Reason::busy, "the drive's parameters, segments or memory are being worked on", "wait for it");
   if (!unsettled_.empty())
