@@ -64,7 +64,7 @@ void Axis::launch(Task<> sequence, const char* name) {
 }
 
 void Axis::close() {
-  closing_ = true;
+  life_.close();
   link_.close();
   supersede(error(Reason::cancelled, "the daemon ends"));
   publish();

@@ -21,6 +21,7 @@
 #include "devices/axis/activity.hpp"
 #include "devices/axis/axis_environment.hpp"
 #include "devices/axis/axis_face.hpp"
+#include "devices/axis/axis_life.hpp"
 #include "devices/axis/continuity.hpp"
 #include "devices/axis/eeprom_budget.hpp"
 #include "devices/axis/homing_machine.hpp"
@@ -55,7 +56,7 @@ class Axis {
 
   /// Ends all sequences; they run out on the core thread until closed(). The drive is left as it is.
   void close();
-  [[nodiscard]] bool closed() const { return closing_ && sequences_ == 0; }
+  [[nodiscard]] bool closed() const { return life_.ends() && sequences_ == 0; }
 
   // axis_reload.cpp: for another axis of the same name, or none, to take its place
   /// Why that cannot be now, all reasons, each with what to do; empty: nothing stands against it. Leases are
@@ -66,11 +67,11 @@ class Axis {
   /// Precondition: check_exchange() found nothing.
   void retire(bool position_holds);
   /// From then on.
-  [[nodiscard]] bool retired() const { return reloading_; }
+  [[nodiscard]] bool retired() const { return life_.retired(); }
   /// `on_lease_loss: disable` was not done yet.
   [[nodiscard]] bool owes_release() const { return power_.owes_release(); }
   /// Its drive answered when it was retired.
-  [[nodiscard]] bool answered() const { return answered_; }
+  [[nodiscard]] bool answered() const { return life_.answered(); }
   /// Keeps the axis from being exchanged while it lives. Errors: reloading.
   Result<std::shared_ptr<void>> use();
   /// A stop that was accepted for the axis before this one, and not executed.
@@ -469,6 +470,7 @@ class Axis {
   UnknownOutcomes unknown_starts_;
   bool absolute_segments_ = false;
 
+  AxisLife life_;
   StopMachine stop_;
   PowerMachine power_;
 
@@ -479,9 +481,6 @@ class Axis {
   int chains_ = 0;
   int sequences_ = 0;               ///< coroutines that still run
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
-  bool closing_ = false;
-  bool reloading_ = false;  ///< it was told to make room
-  bool answered_ = false;   ///< until then
 
   ActivityPtr activity_;
   std::deque<Buffered> buffer_;  ///< nothing waits where nothing is executed

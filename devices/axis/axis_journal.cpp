@@ -63,7 +63,7 @@ Task<Result<void>> Axis::settle_earlier() {
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
-  if (closing_) co_return fail(error(Reason::cancelled, "the daemon ends"));
+  if (life_.ends()) co_return fail(error(Reason::cancelled, "the daemon ends"));
   if (found_in_motion()) {
     owe_stop_of_motion();
     co_return fail(error(Reason::moving, "it began to move; stopping it", "wait"));

@@ -17,7 +17,7 @@ constexpr auto longest_backoff = milliseconds(1000);
 }  // namespace
 
 Task<> Axis::run() {
-  while (!closing_) {
+  while (!life_.ends()) {
     co_await connect();
     co_await poll();
   }
@@ -27,15 +27,16 @@ Task<> Axis::run() {
 Task<> Axis::connect() {
   Duration backoff = first_backoff;
   bool again = false;
-  while (!closing_ && !link_.online()) {
+  while (!life_.ends() && !link_.online()) {
     co_await wait_for_port();
     // Both would write to the drive's memory.
-    while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
-    if (closing_) co_return;
+    while (!life_.ends() && !maintenance_.expired())
+      co_await wake_.wait_until(env_.clock->now() + first_backoff);
+    if (life_.ends()) co_return;
     // The bus sees to it that repeated silence does not cost the neighbours much.
     const auto failed_stops = stop_.failures();
     const auto connected = co_await try_connect(TransactionClass::idle_state, std::exchange(again, true));
-    if (closing_) co_return;
+    if (life_.ends()) co_return;
     if (!connected && failed_stops != stop_.failures()) continue;  // with that stop, at once
     if (connected && !link_.is_configured()) continue;             // it was told to begin again meanwhile
     if (connected) {
@@ -62,7 +63,7 @@ Task<> Axis::connect() {
 }
 
 Task<> Axis::wait_for_port() {
-  while (!closing_ && !env_.bus->port().open) {
+  while (!life_.ends() && !env_.bus->port().open) {
     link_.port_closed(env_.bus->port().error.value_or(
         error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists")));
     if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
@@ -86,7 +87,7 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   }
   auto identity = co_await drive_->identify(contact);
   if (!identity) co_return fail(identity.error());
-  if (closing_) co_return fail(ending());
+  if (life_.ends()) co_return fail(ending());
   if (link_.answers()) publish();
   identity_ = std::move(*identity);
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
@@ -95,7 +96,7 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   if (may_have_been_stopped_abruptly()) lose_trust();
   if (auto failed = stop_failed(); !failed) co_return failed;
   if (const auto settled = co_await settle_found_motion(); !settled) co_return settled;
-  if (closing_) co_return fail(ending());
+  if (life_.ends()) co_return fail(ending());
   if (const auto ready = co_await prove_or_configure(); !ready) co_return ready;
   co_return stop_failed();
 }
@@ -148,10 +149,10 @@ Task<Result<void>> Axis::settle_found_motion() {
       if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
         co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",
                              "check power and wiring"));
-      if (rests || closing_) break;
+      if (rests || life_.ends()) break;
     }
     if (!rests) {
-      if (settings_.stop_escalation_release && !closing_) co_await drive_->disable({});
+      if (settings_.stop_escalation_release && !life_.ends()) co_await drive_->disable({});
       co_return fail(error(Reason::not_confirmed, "found moving, and it does not stop",
                            "look at the machine; cut its power if it moves"));
     }
@@ -195,7 +196,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (!proof && link_.is_configured()) on_reboot(proof.error());
     if (!proof && restorable) void_record();
     if (!proof) restorable = false;
-    if (closing_) co_return fail(ending());
+    if (life_.ends()) co_return fail(ending());
   }
   if (!link_.is_configured()) {
     // A terminal's motion is not disturbed by writing parameters under it.
@@ -204,7 +205,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     const auto configured = co_await drive_->configure();
     if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
     if (!configured) co_return configured;
-    if (closing_) co_return fail(ending());
+    if (life_.ends()) co_return fail(ending());
     link_.configured();
     continuity_.proven(env_.clock->now());
     restore_tried_ = true;

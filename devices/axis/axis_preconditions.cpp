@@ -62,7 +62,7 @@ void Axis::look_at_holds(const CommandOptions& options, Obstacles& found) const 
 }
 
 void Axis::look_at_link(Obstacles& found) const {
-  if (reloading_) return found.block(reloading());
+  if (life_.retired()) return found.block(reloading());
   if (!link_.online() && !link_.offline()) {
     auto cause = error(Reason::configuring, "the drive is being identified and configured", "wait");
     if (link_.error()) {
@@ -129,7 +129,7 @@ void Axis::look_at_maintenance(Obstacles& found) const {
 }
 
 void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
-  if (reloading_) return found.block(reloading());
+  if (life_.retired()) return found.block(reloading());
   look_at_options(options, found);
   // Stops overtake what waits for the core: their order is that in which they arrived (M14).
   if (stop_.overtook(options.arrived))

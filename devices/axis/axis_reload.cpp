@@ -14,7 +14,7 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
   const auto add = [&](Reason reason, std::string message, std::string remedy) {
     found.push_back(error(reason, std::move(message), std::move(remedy)));
   };
-  if (reloading_ || closing_) add(Reason::reloading, "it is being reloaded already", "wait for it");
+  if (life_.ends()) add(Reason::reloading, "it is being reloaded already", "wait for it");
   if (activity_) {
     const auto& command = activity_->command->value();
     add(activity_->state == AxisState::standstill ? Reason::busy : Reason::moving,
@@ -52,8 +52,7 @@ Error Axis::reloading() const {
 }
 
 void Axis::retire(bool position_holds) {
-  reloading_ = true;
-  answered_ = !link_.offline();
+  life_.retire(!link_.offline());
   link_.explain(reloading());
   if (terminal_may_void_position() || !position_holds) lose_trust();
   if (!position_holds && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
@@ -63,7 +62,7 @@ void Axis::retire(bool position_holds) {
 }
 
 Result<std::shared_ptr<void>> Axis::use() {
-  if (reloading_) return fail(reloading());
+  if (life_.retired()) return fail(reloading());
   return users_;
 }
 
