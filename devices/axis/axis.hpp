@@ -166,6 +166,9 @@ class Axis {
   void note_unseen_ends();
   [[nodiscard]] bool found_by_terminal() const;
   Task<Result<void>> prove_or_configure();
+  [[nodiscard]] std::optional<OffsetRecord> restorable_position();
+  void void_saved_position();
+  Task<Result<void>> configure(std::optional<OffsetRecord> restorable);
   Task<> wait_for_port();
   void go_offline(const Error& cause);
   void on_reboot(const Error& cause);
@@ -218,6 +221,8 @@ class Axis {
   void on_released(const DriveSample& sample, bool enabled_before);
   void on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before);
   void publish();
+  void show_position(AxisSnapshot& shown) const;
+  void show_sample(AxisSnapshot& shown) const;
   bool note_eeprom_writes();
   [[nodiscard]] Result<void> permit_saves(std::uint64_t saves);
   void tell_edges(const DriveSample& before, const DriveSample& now);
@@ -409,6 +414,7 @@ class Axis {
 
   // axis_homing.cpp
   Task<> run_home(ActivityPtr activity);
+  Task<> declare_home(ActivityPtr activity);
   Task<bool> back_off(ActivityPtr activity);
   [[nodiscard]] HomingMachine followed_homing(TimePoint since, bool homed_before) const;
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);

@@ -67,8 +67,11 @@ Task<> Axis::run_home(ActivityPtr activity) {
   result ? activity->turn.done() : activity->turn.leave();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
-  if (!co_await follow_homing(activity, since, homed_before)) co_return;
+  if (co_await follow_homing(activity, since, homed_before)) co_await declare_home(activity);
+}
 
+/// The drive rests at home: the position there is the one that the configuration says.
+Task<> Axis::declare_home(ActivityPtr activity) {
   const auto position = settings_.homing->position;
   // Should the disk fail, the position holds for this run of the daemon; only a restart will not find it.
   const auto counter = counter_at_home();

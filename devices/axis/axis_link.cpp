@@ -170,51 +170,17 @@ Error Axis::ending() const { return error(Reason::cancelled, "the axis is being 
 
 Task<Result<void>> Axis::prove_or_configure() {
   if (const auto settled = co_await settle_earlier(); !settled) co_return settled;
-  std::optional<OffsetRecord> stored;
-  if (!link_.is_configured() && !restore_tried_ && env_.persistence != nullptr) {
-    const auto& axes = env_.persistence->current().axes;
-    if (const auto found = axes.find(settings_.name); found != axes.end()) stored = found->second.offset;
-  }
-  bool restorable = false;
-  if (stored) {
-    const auto& record = *stored;
-    restorable = !position_unsettled_ && !terminal_may_void_position() &&
-                 record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
-                 record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
-                 !moved_from(tracker_.counter() - sample_->position_pulses + record.last_position_pulses) &&
-                 (sample_->enabled || counts_while_released());
-    if (restorable) drive_->expect_marks({record.canary});
-  }
-  const auto void_record = [this] {  // what it says may come true again by chance, but never by right
-    restore_tried_ = true;
-    env_.persistence->forget_offset(settings_.name, {});
-  };
-  if (stored && !restorable) void_record();
+  auto restorable = restorable_position();
   if (link_.is_configured() || restorable) {
     const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     if (!proof && link_.is_configured()) on_reboot(proof.error());
-    if (!proof && restorable) void_record();
-    if (!proof) restorable = false;
+    if (!proof && restorable) void_saved_position();
+    if (!proof) restorable.reset();
     if (life_.ends()) co_return fail(ending());
   }
   if (!link_.is_configured()) {
-    // A terminal's motion is not disturbed by writing parameters under it.
-    if (sample_->moving || (found_in_motion() && found_by_terminal()))
-      co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
-    const auto configured = co_await drive_->configure();
-    if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
-    if (!configured) co_return configured;
-    if (life_.ends()) co_return fail(ending());
-    link_.configured();
-    continuity_.proven(env_.clock->now());
-    restore_tried_ = true;
-    drift_checked_ = env_.clock->now();
-    set_drift({});
-    if (restorable) {
-      tracker_.restore(stored->offset_pulses);
-      remember_position();
-    }
+    if (const auto configured = co_await configure(restorable); !configured) co_return configured;
   } else if (const auto checked = co_await check_for_drift(); !checked) {
     co_return checked;  // somebody may have changed it while it was out of reach
   }
@@ -228,6 +194,55 @@ Task<Result<void>> Axis::prove_or_configure() {
   }
   on_sample(*sample);
   settle_positions_set();
+  co_return Result<void>{};
+}
+
+/// The position that an earlier run of the daemon saved, if it still holds should the drive prove that it
+/// kept its memory since. Else it is voided.
+std::optional<OffsetRecord> Axis::restorable_position() {
+  if (link_.is_configured() || restore_tried_ || env_.persistence == nullptr) return std::nullopt;
+  const auto& axes = env_.persistence->current().axes;
+  const auto found = axes.find(settings_.name);
+  const auto record = found == axes.end() ? std::nullopt : found->second.offset;
+  if (!record) return std::nullopt;
+  const bool restorable =
+      !position_unsettled_ && !terminal_may_void_position() && record->trust != PositionTrust::unknown &&
+      record->invert == settings_.scale.invert &&
+      record->pulses_per_revolution == settings_.scale.pulses_per_revolution &&
+      !moved_from(tracker_.counter() - sample_->position_pulses + record->last_position_pulses) &&
+      (sample_->enabled || counts_while_released());
+  if (!restorable) {
+    void_saved_position();
+    return std::nullopt;
+  }
+  drive_->expect_marks({record->canary});
+  return record;
+}
+
+/// What it says may come true again by chance, but never by right.
+void Axis::void_saved_position() {
+  restore_tried_ = true;
+  env_.persistence->forget_offset(settings_.name, {});
+}
+
+/// `restorable`: takes that position over.
+Task<Result<void>> Axis::configure(std::optional<OffsetRecord> restorable) {
+  // A terminal's motion is not disturbed by writing parameters under it.
+  if (sample_->moving || (found_in_motion() && found_by_terminal()))
+    co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
+  const auto configured = co_await drive_->configure();
+  if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
+  if (!configured) co_return configured;
+  if (life_.ends()) co_return fail(ending());
+  link_.configured();
+  continuity_.proven(env_.clock->now());
+  restore_tried_ = true;
+  drift_checked_ = env_.clock->now();
+  set_drift({});
+  if (restorable) {
+    tracker_.restore(restorable->offset_pulses);
+    remember_position();
+  }
   co_return Result<void>{};
 }
 

@@ -120,6 +120,42 @@ Result<void> Axis::permit_saves(std::uint64_t saves) {
   return permitted;
 }
 
+void Axis::show_position(AxisSnapshot& shown) const {
+  shown.position = tracker_.position();
+  if (sample_ && sample_->commanded_pulses) {
+    const auto ahead = static_cast<std::int32_t>(static_cast<std::uint32_t>(*sample_->commanded_pulses) -
+                                                 static_cast<std::uint32_t>(sample_->position_pulses));
+    shown.commanded_position = scale_.to_units(tracker_.counter() + tracker_.offset() + ahead);
+    shown.following_error = *shown.commanded_position - shown.position;
+  }
+  if (settings_.scale.modulo) {
+    const auto into_turn = [turn = *settings_.scale.modulo](double position) {
+      return position - std::floor(position / turn) * turn;
+    };
+    shown.position = into_turn(shown.position);
+    if (shown.commanded_position) shown.commanded_position = into_turn(*shown.commanded_position);
+  }
+}
+
+/// What the drive tells of itself.
+void Axis::show_sample(AxisSnapshot& shown) const {
+  const auto bits = sample_.value_or(DriveSample{});
+  shown.inputs = inputs(bits.inputs);
+  shown.outputs = outputs(bits.outputs);
+  if (!sample_) return;
+  shown.enabled = bits.enabled;
+  // The sign of the speed register is not said; the direction register's is.
+  const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
+  shown.velocity = last_positive_ || speed == 0 ? speed : -speed;
+  shown.moving = bits.moving;
+  shown.in_position = bits.in_position;
+  shown.homed = bits.homed;
+  shown.alarm_code = bits.alarm_code;
+  const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*descriptor_, bits.alarm_code);
+  if (alarm != nullptr) shown.alarm_name = alarm->name;
+  shown.sampled.set(bits.asked_at, bits.measured_at, env_.clock->wall(bits.measured_at));
+}
+
 void Axis::publish() {
   note_eeprom_writes();
   auto next = boost::make_shared<AxisSnapshot>();
@@ -141,20 +177,7 @@ void Axis::publish() {
   next->enabled_by_us = power_.enabled_by_us();
   next->trust = tracker_.trust();
   next->position_source = descriptor_->capabilities.position_source;
-  next->position = tracker_.position();
-  if (sample_ && sample_->commanded_pulses) {
-    const auto ahead = static_cast<std::int32_t>(static_cast<std::uint32_t>(*sample_->commanded_pulses) -
-                                                 static_cast<std::uint32_t>(sample_->position_pulses));
-    next->commanded_position = scale_.to_units(tracker_.counter() + tracker_.offset() + ahead);
-    next->following_error = *next->commanded_position - next->position;
-  }
-  if (settings_.scale.modulo) {
-    const auto into_turn = [turn = *settings_.scale.modulo](double position) {
-      return position - std::floor(position / turn) * turn;
-    };
-    next->position = into_turn(next->position);
-    if (next->commanded_position) next->commanded_position = into_turn(*next->commanded_position);
-  }
+  show_position(*next);
   next->identity = identity_;
   next->reboots = link_.restarts();
   next->drift = drift_;
@@ -167,22 +190,7 @@ void Axis::publish() {
     next->command_id = activity_->command->value().id;
     if (activity_->plan.target) next->target = activity_->plan.target->position;
   }
-  const auto bits = sample_.value_or(DriveSample{});
-  next->inputs = inputs(bits.inputs);
-  next->outputs = outputs(bits.outputs);
-  if (sample_) {
-    next->enabled = bits.enabled;
-    // The sign of the speed register is not said; the direction register's is.
-    const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
-    next->velocity = last_positive_ || speed == 0 ? speed : -speed;
-    next->moving = bits.moving;
-    next->in_position = bits.in_position;
-    next->homed = bits.homed;
-    next->alarm_code = bits.alarm_code;
-    const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*descriptor_, bits.alarm_code);
-    if (alarm != nullptr) next->alarm_name = alarm->name;
-    next->sampled.set(bits.asked_at, bits.measured_at, env_.clock->wall(bits.measured_at));
-  }
+  show_sample(*next);
   shown_ = next;
   const auto before = face_->snapshot.load();
   face_->snapshot.store(next);
