@@ -80,12 +80,12 @@ Error Axis::error(Reason reason, std::string message, std::string remedy) const 
 }
 
 bool Axis::busy() const {
-  return activity_ || stop_.under_way() || stop_.owed() || terminal_motion_ || (sample_ && sample_->moving);
+  return activity_ || stop_.under_way() || stop_.owed() || terminal_.moves() || (sample_ && sample_->moving);
 }
 
 bool Axis::works() const {
   const bool only_waits =
-      queues() && !stop_.under_way() && !stop_.owed() && !terminal_motion_ && !(sample_ && sample_->moving);
+      queues() && !stop_.under_way() && !stop_.owed() && !terminal_.moves() && !(sample_ && sample_->moving);
   return busy() && !only_waits;
 }
 
@@ -174,9 +174,7 @@ void Axis::on_sample(const DriveSample& sample) {
     observed_.on_sample(sample, busy());
   else
     observed_.interrupted();
-  if (terminal_motion_ && !sample.moving) {
-    terminal_motion_ = false;
-  }
+  if (!sample.moving) terminal_.at_rest();
   if (sample.moving && (!activity_ || queues()) && !stop_.under_way() && link_.online())
     on_unexplained_motion(sample, before);
   release_as_owed();
@@ -245,24 +243,27 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
 }
 
 void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before) {
-  if (terminal_motion_) return;
   // The drive says so itself, or a terminal that starts motions is, or was just now, active.
   const bool segments = sample.mode == DriveMode::multi_position || sample.mode == DriveMode::multi_velocity;
   const bool homing = sample.mode == DriveMode::homing && has_input("homing_start");
   const bool started = start_terminal_active(sample) || (before && start_terminal_active(*before));
-  // Motion and terminals may come in different frames: the terminal shows one sample later at most.
   const bool possible = std::ranges::any_of(
       settings_.inputs, [this](const TerminalSettings& input) { return starts_motion(input); });
-  const bool just_began = before && !before->moving;
-  if (!stop_.owed() && !fault_ && possible && just_began && !segments && !homing && !started) {
-    wake();
-    return;
-  }
-  // A motor that was told to stop, and has not confirmed it, is never a terminal's.
-  if (!stop_.owed() && !fault_ && (segments || homing || started || drive_->moves_by_itself())) {
-    terminal_motion_ = true;
-    if (active_in(sample, "homing_start") || (before && active_in(*before, "homing_start"))) lose_trust();
-    return;
+  using Verdict = TerminalMotion::Verdict;
+  switch (terminal_.judge({.told_to_stop = stop_.owed() || fault_,
+                           .terminals_start = possible,
+                           .just_began = before && !before->moving,
+                           .shown = segments || homing || started,
+                           .by_itself = drive_->moves_by_itself()})) {
+    case Verdict::known:
+      return;
+    case Verdict::look_again:
+      return wake();
+    case Verdict::begins:
+      if (active_in(sample, "homing_start") || (before && active_in(*before, "homing_start"))) lose_trust();
+      return;
+    case Verdict::nobodys:
+      break;
   }
   spdlog::warn("{}: moving without a command; stopping it", settings_.name);
   if (queues()) supersede(moved_before_start());
@@ -305,7 +306,7 @@ AxisState Axis::state() const {
   StateSources sources{.fault = fault_.has_value(), .stop = stop_.shown()};
   if (activity_) sources.executed = activity_->state;
   if (sample_) sources.energised = sample_->enabled;
-  if (sample_ && terminal_motion_) sources.moved_by_terminal = sample_->mode;
+  if (sample_ && terminal_.moves()) sources.moved_by_terminal = sample_->mode;
   return plcopen_state(sources);
 }
 

@@ -36,6 +36,7 @@
 #include "devices/axis/speed_watch.hpp"
 #include "devices/axis/standstill.hpp"
 #include "devices/axis/stop_machine.hpp"
+#include "devices/axis/terminal_motion.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
@@ -496,7 +497,7 @@ class Axis {
   TimePoint ours_until_{};  ///< what turned the shaft before was told to, or settles after it
   /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
   std::optional<std::vector<std::int64_t>> unseen_ends_;
-  bool terminal_motion_ = false;
+  TerminalMotion terminal_;
   bool rezeroing_ = false;  ///< the drive's counter is being zeroed
   bool last_positive_ = true;
   std::optional<Error> fault_;

@@ -194,7 +194,7 @@ Result<void> Axis::Member::judge(const DriveSample& sample) const {
   const auto& axis = *axis_;
   if (!sample.enabled)
     return axisd::fail(axis.error(Reason::disabled, "the power stage is off", "enable the axis first"));
-  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_motion_)
+  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_.moves())
     return axisd::fail(axis.error(Reason::moving, "the drive moves by itself", "check its terminals"));
   if (axis.start_terminal_active(sample))
     return axisd::fail(

@@ -250,7 +250,7 @@ Result<std::shared_ptr<void>> Axis::begin_maintenance() {
   if (auto online = check_online(); !online) return fail(online.error());
   if (!maintenance_.expired() || activity_)
     return fail(error(Reason::busy, "something else is being done to the drive", "wait for it"));
-  if (!at_rest() || terminal_motion_)
+  if (!at_rest() || terminal_.moves())
     return fail(error(Reason::moving, "the axis moves", "wait for standstill"));
   if (!sample_ || sample_->enabled)
     return fail(error(Reason::moving, "the power stage is on: what is written could move the motor",
@@ -287,7 +287,7 @@ void Axis::go_offline(const Error& cause) {
   revoke_motion();
   env_.bus->give_up_readings(settings_.node);
   const bool moved = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
-                     terminal_motion_ || (sample_ && sample_->moving);
+                     terminal_.moves() || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
   if (moved) stop_.owe();
   note_unseen_ends();
@@ -301,7 +301,7 @@ void Axis::go_offline(const Error& cause) {
     drop_buffer(unknown);
   }
   tracker_.forget_base();  // nobody sees whether somebody turns it
-  terminal_motion_ = false;
+  terminal_.lost();
   publish();
   sampled_.notify_all();
   wake();

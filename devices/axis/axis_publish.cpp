@@ -89,7 +89,7 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
 }
 
 MotionCause Axis::motion_cause() const {
-  if (terminal_motion_) return MotionCause::terminal;
+  if (terminal_.moves()) return MotionCause::terminal;
   if (!sample_ || !sample_->moving) return MotionCause::none;
   if (activity_ && activity_->state != AxisState::standstill) return MotionCause::command;
   const bool by_terminal = sample_->mode >= DriveMode::multi_position || start_terminal_active(*sample_);
