@@ -12,18 +12,10 @@
 #include "devices/axis/motion_machine.hpp"
 #include "devices/axis/planner.hpp"
 #include "devices/axis/position_tracker.hpp"
+#include "devices/axis/start_machine.hpp"
 #include "devices/drive.hpp"
 
 namespace axisd {
-
-/// What a command is waiting for before its start (M31).
-enum class StartWait : std::uint8_t {
-  halt,   ///< the end of the motion before it (M9)
-  disk,   ///< its durable record, or that of the position
-  turn,   ///< the starts of other axes on its bus that asked before it
-  line,   ///< its frames are with the bus, whose gate decides
-  begun,  ///< nothing any more
-};
 
 /// A command that is being executed.
 struct Activity {
@@ -32,13 +24,11 @@ struct Activity {
   std::uint64_t epoch = 0;
   CommandOptions options;
   Plan plan{};
+  StartMachine start{};
   std::optional<TimePoint> hold_until{};  ///< jog and held velocity: halts at this time
-  bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
   bool lease_over = false;                ///< goes on without its lease, and starts nothing more
-  bool noted = false;                     ///< durably, or that is under way
   TimePoint start_by = TimePoint::max();  ///< no start frame goes out later (M31)
   TimePoint waits_since{};                ///< the time from which start_by counts
-  StartWait waits_for = StartWait::line;
   Clock::Timer late{};                    ///< at start_by
   StartTurns::Turn turn{};                ///< of its start, until that was sent
   std::optional<MotionMachine> motion{};  ///< once its start was acknowledged, and it is followed

@@ -89,7 +89,7 @@ bool Axis::works() const {
   return busy() && !only_waits;
 }
 
-bool Axis::queues() const { return activity_ && activity_->waits_for == StartWait::turn; }
+bool Axis::queues() const { return activity_ && activity_->start.is_queued(); }
 
 bool Axis::at_rest() const {
   return !stop_.under_way() && !stop_.owed() && !(activity_ && activity_->state != AxisState::standstill) &&
@@ -162,7 +162,7 @@ void Axis::on_sample(const DriveSample& sample) {
   const bool homed_by_others = !homing && !rezeroing_ && before && !before->homed && sample.homed;
   if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
   if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
-  const bool begun = activity_ && activity_->may_run && activity_->waits_for == StartWait::begun;
+  const bool begun = activity_ && activity_->start.has_begun();
   if (rezeroing_ || stop_.left_running() || begun) ours_until_ = sample.asked_at + settling();
   if (sample.alarm_code != 0) on_alarm(sample);
   if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();

@@ -87,7 +87,7 @@ void Axis::Member::wait_for_others(Duration more) {
 }
 
 void Axis::Member::waits_for_turn(bool waits) {
-  activity_->waits_for = waits ? StartWait::turn : StartWait::line;
+  waits ? activity_->start.queue() : activity_->start.has_turn();
   if (!waits) axis_->had_turn_ = axis_->env_.clock->now();
 }
 
@@ -239,7 +239,7 @@ Task<Result<TimePoint>> Axis::Member::trigger() {
 
 void Axis::Member::started(TimePoint at) {
   started_at_ = at;
-  activity_->waits_for = StartWait::begun;
+  activity_->start.begun();
   axis_->watch_speed(SpeedWatch::Event::begun);
   axis_->continuity_.proven(axis_->env_.clock->now());  // the canary was part of its start
   axis_->tracker_.forget_base();
@@ -303,9 +303,9 @@ void Axis::Member::end(Error cause, bool aborted) {
     cause = axis.late(*activity_, cause);
   if (!aborted && own && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
   if (!aborted && own && cause.reason == Reason::terminal) return axis.on_turned_by_power(cause);
-  const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->may_run;
+  const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->start.may_run();
   axis.revoke_motion();
-  if (activity_->may_run) {
+  if (activity_->start.may_run()) {
     // The stop of one that may move goes out whatever is known of its start.
     axis.tracker_.forget_base();
     axis.leave_running(*activity_);

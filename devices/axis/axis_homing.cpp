@@ -38,10 +38,10 @@ Task<> Axis::run_home(ActivityPtr activity) {
   }
 
   // Before it can come true again: homing may end where the saved record says that the axis stood (M20).
-  activity->waits_for = StartWait::disk;
+  activity->start.save();
   auto forgotten = co_await forget_saved_position();
   if (!current(*activity)) co_return;
-  activity->waits_for = StartWait::line;
+  activity->start.saved();
   if (!forgotten) {
     tell_part(*activity, forgotten.error());
     finish(*activity, [&](CommandRecord& command) { command.error(forgotten.error()); });

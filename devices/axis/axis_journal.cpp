@@ -157,17 +157,14 @@ SendingNote Axis::note_of(const Activity& activity, std::vector<ContinuityMark> 
 /// Makes the command known to a restart, before anything is sent for it that may move. False: the activity
 /// has ended, and nothing was sent.
 Task<bool> Axis::noted(ActivityPtr activity, SendingNote note) {
-  if (std::exchange(activity->noted, true)) co_return true;
-  const bool may_run = std::exchange(activity->may_run, false);  // not before it is known
+  if (!activity->start.note()) co_return true;
   // Shared: the answer may come after this sequence was left.
-  activity->waits_for = StartWait::disk;
   auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
   env_.book->sending(activity->command, std::move(note),
                      [answer](Result<void> result) { answer->set(std::move(result)); });
   const auto durable = co_await answer->get();
   if (!current(*activity)) co_return false;
-  activity->may_run = may_run;
-  activity->waits_for = StartWait::line;
+  activity->start.noted();
   if (durable) co_return true;
   auto cause =
       error(durable.error().reason, "nothing was sent: " + durable.error().message, durable.error().remedy);

@@ -25,13 +25,14 @@ bool may_be_late(CommandKind kind) {
   return kind == CommandKind::disable || kind == CommandKind::reset || kind == CommandKind::set_position;
 }
 
-std::string_view to_string(StartWait wait) {
-  switch (wait) {
-    case StartWait::halt:
+std::string_view to_string(StartMachine::State waits) {
+  switch (waits) {
+    case StartMachine::State::halting:
       return "for the motion before it to end";
-    case StartWait::disk:
+    case StartMachine::State::noting:
+    case StartMachine::State::saving:
       return "for the disk";
-    case StartWait::turn:
+    case StartMachine::State::queued:
       return "for its turn on the line";
     default:
       return "for its line";
@@ -51,7 +52,7 @@ bool Axis::too_late(const CommandOptions& options) const {
 }
 
 void Axis::bound_start(const ActivityPtr& activity, bool waited, bool halting) {
-  if (halting) activity->waits_for = StartWait::halt;
+  if (halting) activity->start.wait_for_halt();
   if (may_be_late(activity->command->value().kind)) return;
   const auto& options = activity->options;
   auto since = env_.clock->now();
@@ -73,7 +74,7 @@ void Axis::start_by(const ActivityPtr& activity, TimePoint since, TimePoint late
 
 /// What is with the bus is ended by its gate.
 void Axis::end_late(Activity& activity) {
-  if (activity.waits_for >= StartWait::line) return;
+  if (!activity.start.waits()) return;
   if (!current(activity)) return;
   revoke_motion();
   auto cause = late(activity, {});
@@ -88,7 +89,7 @@ Error Axis::late(const Activity& activity, Error cause) const {
       error(Reason::expired,
             fmt::format("too late to start: it waited {:.3f} s {}, at most {:.3f} s are allowed "
                         "(start_within{})",
-                        in_seconds(waited), to_string(activity.waits_for),
+                        in_seconds(waited), to_string(activity.start.state()),
                         in_seconds(activity.start_by - activity.waits_since),
                         activity.start_by == activity.options.call_deadline ? ", the call's deadline" : ""),
             "repeat it, if it is still wanted; if it is often so, look at the load of disk and line");

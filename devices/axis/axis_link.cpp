@@ -117,7 +117,7 @@ bool Axis::may_have_been_stopped_abruptly() const {
 void Axis::note_unseen_ends() {
   auto& ends = unseen_ends_.emplace();
   if (sample_ && !sample_->moving) ends.push_back(tracker_.counter());
-  if (activity_ && activity_->may_run && activity_->plan.target)
+  if (activity_ && activity_->start.may_run() && activity_->plan.target)
     ends.push_back(activity_->plan.target->counter);
 }
 
@@ -312,7 +312,7 @@ void Axis::on_reboot(const Error& cause) {
   link_.restarted(cause);
   power_.restarted();
   auto told = cause;
-  if (activity_ && activity_->may_run) told.outcome = Outcome::unknown;  // it may have started before
+  if (activity_ && activity_->start.may_run()) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);
   stop_.restarted();
   lose_trust();

@@ -108,8 +108,7 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
     finish(*activity, [this](CommandRecord& command) { command.error(*fault_); });
     co_return false;
   }
-  activity->may_run = true;
-  activity->waits_for = StartWait::line;
+  activity->start.standstill();
   co_return true;
 }
 
@@ -144,14 +143,12 @@ bool Axis::may_start(Activity& activity) {
 Task<bool> Axis::take_turn(ActivityPtr activity) {
   auto* turns = env_.bus->start_turns();
   if (turns == nullptr) co_return true;
-  const bool may_run = std::exchange(activity->may_run, false);
-  activity->waits_for = StartWait::turn;
+  activity->start.queue();
   if (!activity->turn) activity->turn = turns->announce();
   co_await turns->take(activity->turn);
   if (!current(*activity)) co_return false;
   had_turn_ = env_.clock->now();
-  activity->may_run = may_run;
-  activity->waits_for = StartWait::line;
+  activity->start.has_turn();
   co_return true;
 }
 
@@ -271,7 +268,7 @@ void Axis::end_unsent(Activity& activity, Error cause) {
 /// again: the drive is read back until it shows what it did (M8).
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
   if (!current(*activity)) co_return false;
-  if (result || result.error().outcome == Outcome::unknown) activity->waits_for = StartWait::begun;
+  if (result || result.error().outcome == Outcome::unknown) activity->start.begun();
   watch_speed(SpeedWatch::Event::begun);
   if (result) {
     // A proof was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.

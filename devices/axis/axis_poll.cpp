@@ -46,7 +46,7 @@ void Axis::keep_quiet(TimePoint until) {
 
 /// Whatever stops it is looked after at once.
 bool Axis::keeps_quiet() const {
-  const bool begun = activity_ && activity_->waits_for == StartWait::begun;
+  const bool begun = activity_ && activity_->start.has_begun();
   return begun && !stop_.under_way() && !stop_.owed() &&
          pace_.state(env_.clock->now()) == PollPace::State::quiet;
 }

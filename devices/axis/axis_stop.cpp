@@ -32,8 +32,9 @@ void Axis::supersede(const Error& cause) {
   if (auto activity = take_activity()) {
     leave_running(*activity);
     auto told = cause;
-    const bool enabling = activity->noted && activity->command->value().kind == CommandKind::enable;
-    if (activity->may_run || enabling) told.outcome = Outcome::unknown;  // its start may be under way
+    const bool enabling =
+        activity->start.is_noted() && activity->command->value().kind == CommandKind::enable;
+    if (activity->start.may_run() || enabling) told.outcome = Outcome::unknown;  // its start may be under way
     activity->command->abort(std::move(told));
     drop_buffer(cause);
   }
@@ -64,7 +65,7 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
 /// What the drive may go on with after its command has ended. A command that never started leaves the ramps
 /// of the motion before it in force.
 void Axis::leave_running(const Activity& activity) {
-  if (!activity.may_run) return;
+  if (!activity.start.may_run()) return;
   stop_.set_deceleration(activity.plan.deceleration_time);
   if (activity.state != AxisState::standstill) stop_.leave_running();
 }
