@@ -1,4 +1,4 @@
-// What an axis is executing, and what waits for its end.
+// What an axis is executing.
 #pragma once
 
 #include <cstdint>
@@ -38,13 +38,5 @@ using ActivityPtr = std::shared_ptr<Activity>;
 MoveProfile profile_of(const Plan& plan);
 /// A start that fails does not undo what was executed before it: homing backs off first.
 void tell_part(const Activity& activity, Error& cause);
-
-/// Accepted to start when what is before it is done.
-struct Buffered {
-  CommandPtr command;
-  Action action;
-  CommandOptions options;
-  PositionTracker end;  ///< as it will be when this is done
-};
 
 }  // namespace axisd

@@ -22,6 +22,7 @@
 #include "devices/axis/axis_environment.hpp"
 #include "devices/axis/axis_face.hpp"
 #include "devices/axis/axis_life.hpp"
+#include "devices/axis/command_buffer.hpp"
 #include "devices/axis/continuity.hpp"
 #include "devices/axis/eeprom_budget.hpp"
 #include "devices/axis/homing_machine.hpp"
@@ -293,6 +294,7 @@ class Axis {
   [[nodiscard]] Result<Plan> plan_behind(const Action& action, const PositionTracker& from) const;
   void start_next();
   void drop_buffer(const Error& cause);
+  void end_waiting(const std::deque<Buffered>& commands, const Error& cause);
   bool cancel_buffered(const CommandPtr& command);
 
   // axis_preconditions.cpp: what does not hold of what each request needs, in the order of refusals
@@ -490,8 +492,7 @@ class Axis {
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
 
   ActivityPtr activity_;
-  std::deque<Buffered> buffer_;  ///< nothing waits where nothing is executed
-  CommandPtr next_;              ///< of the buffer, while it is being started
+  CommandBuffer buffer_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
   TimePoint ours_until_{};  ///< what turned the shaft before was told to, or settles after it

@@ -45,7 +45,7 @@ double in_seconds(Duration time) { return std::chrono::duration<double>(time).co
 
 /// It arrived longer ago than it may wait, or its caller has given up. What is buffered may wait.
 bool Axis::too_late(const CommandOptions& options) const {
-  if (options.buffer_mode == BufferMode::buffered && (next_ || activity_)) return false;
+  if (options.buffer_mode == BufferMode::buffered && (buffer_.starts() || activity_)) return false;
   const auto now = env_.clock->now();
   return now > options.call_deadline ||
          (options.arrived != TimePoint{} && now > options.arrived + settings_.start_within);

@@ -236,7 +236,7 @@ void Axis::look_at_present_motion(Obstacles& found) const {
 /// before.
 void Axis::look_at_line(Obstacles& found) const {
   const auto* turns = env_.bus->start_turns();
-  if (turns == nullptr || next_ || found.blocked()) return;
+  if (turns == nullptr || buffer_.starts() || found.blocked()) return;
   const auto wait = turns->expected_wait();
   const bool lately = env_.clock->now() - had_turn_ < settings_.start_within;
   const auto most = lately ? settings_.start_within / 2 : settings_.start_within * 3 / 4;

@@ -76,8 +76,8 @@ Result<void> Axis::permit(const Request& request, const CommandOptions& options)
 /// Enters a command and makes it the one that is executed; whatever was executed before is aborted and
 /// halted.
 ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan) {
-  const bool waited = next_ != nullptr;
-  auto command = waited ? std::exchange(next_, nullptr) : env_.book->open(settings_.name, action, options);
+  const bool waited = buffer_.starts();
+  auto command = waited ? buffer_.take_starting() : env_.book->open(settings_.name, action, options);
   const auto replaced = activity_;
   const bool moving = (replaced && replaced->state != AxisState::standstill) || (sample_ && sample_->moving);
   note_motion_to_stop();
