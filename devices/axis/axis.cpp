@@ -24,6 +24,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       face_(std::move(face)),
       gate_(face_->gate),
       simulated_(simulated),
+      drift_(settings_.drift_check),
       pace_(settings_.poll_moving, settings_.poll_idle),
       eeprom_budget_(settings_.limits.eeprom_saves_per_day, {}),
       absolute_segments_(settings_.segments && settings_.segments->absolute),

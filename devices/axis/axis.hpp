@@ -24,6 +24,8 @@
 #include "devices/axis/axis_life.hpp"
 #include "devices/axis/command_buffer.hpp"
 #include "devices/axis/continuity.hpp"
+#include "devices/axis/drift_watch.hpp"
+#include "devices/axis/earlier_run.hpp"
 #include "devices/axis/eeprom_budget.hpp"
 #include "devices/axis/homing_machine.hpp"
 #include "devices/axis/link_machine.hpp"
@@ -462,16 +464,12 @@ class Axis {
 
   LinkMachine link_;
   std::optional<DriveIdentity> identity_;
-  bool restore_tried_ = false;
-  bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
   Continuity continuity_;
-  TimePoint drift_checked_{};
   Clock::Timer continuity_watch_;
   TimePoint had_turn_{};  ///< the last time that it was its turn to start
-  TimePoint settle_by_{};
-  std::vector<Unsettled> unsettled_;  ///< of earlier runs of the daemon
+  EarlierRun earlier_;
+  DriftWatch drift_;
   PollPace pace_;
-  std::string drift_;                                     ///< what the drive no longer holds as configured
   std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
   std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()
   std::uint64_t eeprom_writes_ = 0;                       ///< registers

@@ -8,9 +8,7 @@ namespace axisd {
 /// Soon after the canary was read, if that can be: what a comparison reads would keep the next one waiting.
 bool Axis::drift_is_next() const {
   const auto now = env_.clock->now();
-  const auto due = drift_checked_ + settings_.drift_check;
-  return now >= due && maintenance_.expired() &&
-         (continuity_.just_proven(now) || now >= due + 2 * continuity_period);
+  return maintenance_.expired() && drift_.is_next(now, continuity_.just_proven(now));
 }
 
 /// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
@@ -19,11 +17,11 @@ Task<> Axis::look_for_drift() {
   if (!link_.online() || busy()) co_return;
   if (drift_is_next() && !co_await check_for_drift()) co_return;
   const bool free = link_.online() && !busy() && maintenance_.expired();
-  if (!drift_.empty() && free && sample_ && !sample_->enabled) reconfigure(drift_, false);
+  if (drift_.drifted() && free && sample_ && !sample_->enabled) reconfigure(drift_.text(), false);
 }
 
 Task<Result<void>> Axis::check_for_drift() {
-  drift_checked_ = env_.clock->now();
+  drift_.checked(env_.clock->now());
   const auto drift = co_await drive_->check_drift(TransactionClass::idle_state);
   if (!drift) co_return fail(drift.error());
   if (drift->scale_changed) lose_trust();
@@ -40,10 +38,9 @@ Task<Result<void>> Axis::check_for_drift() {
 }
 
 void Axis::set_drift(const std::string& text) {
-  if (text == drift_) return;
+  if (!drift_.found(text)) return;
   if (!text.empty())
     spdlog::warn("{}: the drive no longer holds its configuration: {}", settings_.name, text);
-  drift_ = text;
   publish();
 }
 

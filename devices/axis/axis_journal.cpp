@@ -25,14 +25,13 @@ bool moves(CommandKind kind) {
 
 /// What the run before this one left: a drive that may run, and outcomes that nobody has looked at (M4).
 void Axis::take_over() {
-  unsettled_ = env_.book->take_unsettled(settings_.name);
-  settle_by_ = env_.clock->now() + settling_limit;
-  for (const auto& earlier : unsettled_) {
+  earlier_.take_over(env_.book->take_unsettled(settings_.name), env_.clock->now() + settling_limit);
+  for (const auto& earlier : earlier_.commands()) {
     const auto& command = earlier.command->value();
     spdlog::warn("{}: the daemon ended while {} {} was being executed; asking the drive", settings_.name,
                  to_string(command.kind), command.id);
     if (moves(command.kind)) owe_stop_of_motion();
-    if (command.kind == CommandKind::home) position_unsettled_ = true;
+    if (command.kind == CommandKind::home) earlier_.doubt();
   }
   if (auto cause = env_.book->take_unknown_outcome(settings_.name)) {
     spdlog::error("{}", to_string(*cause));
@@ -50,9 +49,9 @@ void Axis::owe_stop_of_motion() {
 
 /// Asks a drive that rests what became of what may have been sent to it, before anything in it is changed.
 Task<Result<void>> Axis::settle_earlier() {
-  if (unsettled_.empty()) co_return Result<void>{};
+  if (!earlier_.open()) co_return Result<void>{};
   bool continuous = false;
-  if (const auto& marks = unsettled_.back().note.marks; !marks.empty()) {
+  if (const auto& marks = earlier_.commands().back().note.marks; !marks.empty()) {
     drive_->expect_marks(marks);
     const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
@@ -68,8 +67,8 @@ Task<Result<void>> Axis::settle_earlier() {
     owe_stop_of_motion();
     co_return fail(error(Reason::moving, "it began to move; stopping it", "wait"));
   }
-  for (const auto& earlier : unsettled_) settle_as(earlier, continuous);
-  std::erase_if(unsettled_, [](const Unsettled& earlier) { return earlier.command->has_ended(); });
+  for (const auto& earlier : earlier_.commands()) settle_as(earlier, continuous);
+  earlier_.drop_ended();
   co_return Result<void>{};
 }
 
@@ -122,7 +121,7 @@ void Axis::settle_as(const Unsettled& earlier, bool continuous) {
 
 /// Setting a position sends nothing: it was done if it is what the restart found saved.
 void Axis::settle_positions_set() {
-  for (const auto& earlier : std::exchange(unsettled_, {})) {
+  for (const auto& earlier : earlier_.take_all()) {
     const auto position = earlier.command->value().asked.position.value_or(0);
     const bool kept = tracker_.trust() == PositionTrust::restored;
     if (kept && earlier.tellable && tracker_.offset_for(position) == tracker_.offset())
@@ -135,7 +134,7 @@ void Axis::settle_positions_set() {
 }
 
 void Axis::give_up_settling() {
-  for (const auto& earlier : std::exchange(unsettled_, {}))
+  for (const auto& earlier : earlier_.take_all())
     settle_as_unknown(earlier, "the drive could not be read since");
 }
 

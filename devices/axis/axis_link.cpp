@@ -51,7 +51,7 @@ Task<> Axis::connect() {
         connected.error().reason != Reason::no_reply && connected.error().reason != Reason::bus_down;
     if (link_.failed(connected.error(), answers))
       spdlog::warn("{}: {}", settings_.name, to_string(connected.error()));
-    if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
+    if (earlier_.overdue(env_.clock->now())) give_up_settling();
     publish();
     // What the bus holds back goes out as soon as anything of the node is heard: it should be there by then.
     const auto pause = env_.bus->holds_back(settings_.node) ? Duration(first_backoff) : backoff;
@@ -66,7 +66,7 @@ Task<> Axis::wait_for_port() {
   while (!life_.ends() && !env_.bus->port().open) {
     link_.port_closed(env_.bus->port().error.value_or(
         error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists")));
-    if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
+    if (earlier_.overdue(env_.clock->now())) give_up_settling();
     publish();
     co_await env_.bus->port_changed().wait_until(env_.clock->now() + longest_backoff);
   }
@@ -200,14 +200,16 @@ Task<Result<void>> Axis::prove_or_configure() {
 /// The position that an earlier run of the daemon saved, if it still holds should the drive prove that it
 /// kept its memory since. Else it is voided.
 std::optional<OffsetRecord> Axis::restorable_position() {
-  if (link_.is_configured() || restore_tried_ || env_.persistence == nullptr) return std::nullopt;
+  using Position = EarlierRun::Position;
+  if (link_.is_configured() || earlier_.position() == Position::tried || env_.persistence == nullptr)
+    return std::nullopt;
   const auto& axes = env_.persistence->current().axes;
   const auto found = axes.find(settings_.name);
   const auto record = found == axes.end() ? std::nullopt : found->second.offset;
   if (!record) return std::nullopt;
   const bool restorable =
-      !position_unsettled_ && !terminal_may_void_position() && record->trust != PositionTrust::unknown &&
-      record->invert == settings_.scale.invert &&
+      earlier_.position() == Position::saved && !terminal_may_void_position() &&
+      record->trust != PositionTrust::unknown && record->invert == settings_.scale.invert &&
       record->pulses_per_revolution == settings_.scale.pulses_per_revolution &&
       !moved_from(tracker_.counter() - sample_->position_pulses + record->last_position_pulses) &&
       (sample_->enabled || counts_while_released());
@@ -221,7 +223,7 @@ std::optional<OffsetRecord> Axis::restorable_position() {
 
 /// What it says may come true again by chance, but never by right.
 void Axis::void_saved_position() {
-  restore_tried_ = true;
+  earlier_.tried();
   env_.persistence->forget_offset(settings_.name, {});
 }
 
@@ -236,8 +238,8 @@ Task<Result<void>> Axis::configure(std::optional<OffsetRecord> restorable) {
   if (life_.ends()) co_return fail(ending());
   link_.configured();
   continuity_.proven(env_.clock->now());
-  restore_tried_ = true;
-  drift_checked_ = env_.clock->now();
+  earlier_.tried();
+  drift_.checked(env_.clock->now());
   set_drift({});
   if (restorable) {
     tracker_.restore(restorable->offset_pulses);

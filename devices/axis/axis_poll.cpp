@@ -149,7 +149,7 @@ bool Axis::seen_again(const DriveSample& sample) {
 
 /// The poll loop has nothing to do but to read the state and the canary.
 bool Axis::only_watches() const {
-  return chains_ == 0 && !link_.bus_loss() && drift_.empty() && !drift_is_next();
+  return chains_ == 0 && !link_.bus_loss() && !drift_.drifted() && !drift_is_next();
 }
 
 /// The poll loop has something to look at.

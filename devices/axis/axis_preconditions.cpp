@@ -144,9 +144,9 @@ void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) co
   if (power_.owes_release())
     found.block(error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
   found.block_on(check_journal());
-  if (!drift_.empty())
+  if (drift_.drifted())
     found.block(error(
-        Reason::misconfigured, "the drive no longer holds its configuration: " + drift_,
+        Reason::misconfigured, "the drive no longer holds its configuration: " + drift_.text(),
         fmt::format("disable the axis ({}): the configuration is then applied again", shell("disable"))));
   look_at_link(found);
 }

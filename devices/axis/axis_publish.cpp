@@ -180,7 +180,7 @@ void Axis::publish() {
   show_position(*next);
   next->identity = identity_;
   next->reboots = link_.restarts();
-  next->drift = drift_;
+  next->drift = drift_.text();
   next->eeprom_writes = eeprom_writes_;
   next->motion_cause = motion_cause();
   if (const auto* lease = env_.leases->find(settings_.name)) next->lease_holder = lease->holder();

@@ -32,11 +32,11 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
     add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
   if (!maintenance_.expired() || users_.use_count() > 1)
     add(Reason::busy, "the drive's parameters, segments or memory are being worked on", "wait for it");
-  if (!unsettled_.empty())
+  if (earlier_.open())
     add(Reason::busy, "what became of a command of before the daemon's start is not known yet",
         "wait until the drive has been asked");
   // Nobody would look after a drive that is left, and one that stays is not configured under power (M1).
-  if (sample_ && sample_->enabled && (!energised || !drift_.empty()))
+  if (sample_ && sample_->enabled && (!energised || drift_.drifted()))
     add(Reason::busy,
         link_.online() ? "its power stage is on" : "its power stage was on when it was last seen",
         link_.online()
