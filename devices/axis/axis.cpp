@@ -151,22 +151,15 @@ void Axis::on_sample(const DriveSample& sample) {
   sample_ = sample;
   if (before) tell_edges(*before, sample);
   const auto counter = tracker_.counter();
-  if (!rezeroing_) tracker_.update(sample.position_pulses, drive_->position_window());
+  if (!shaft_.rezeroes()) tracker_.update(sample.position_pulses, drive_->position_window());
   const auto turned_by = tracker_.counter() - counter;
   // What nothing holds may be turned by hand, and back again.
   if (sample.moving || !sample.enabled) tracker_.forget_base();
-  if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
-  // Open loop: the overtravel stop at a limit has no ramp (M20). Homing runs onto limits by design.
-  const bool homing = activity_ && activity_->state == AxisState::homing;
-  // Homing that is not ours zeroes the counter; so does one that came and went between two samples (M20).
-  // Where a drive zeroes its counter by homing on the spot, that is ours.
-  const bool homed_by_others = !homing && !rezeroing_ && before && !before->homed && sample.homed;
-  if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
-  if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
-  const bool begun = activity_ && activity_->start.has_begun();
-  if (rezeroing_ || stop_.left_running() || begun) ours_until_ = sample.asked_at + settling();
+  const auto facts = shaft_facts();
+  shaft_.look(sample, facts);
+  if (shaft_.shows_loss(before, sample, facts)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
-  if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();
+  if (before && shaft_.hides_loss(*before, sample, turned_by, facts)) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   watch_speed(SpeedWatch::Event::sampled);
   // What a link that failed kept back was not heard, wherever the drive rests.
@@ -184,26 +177,20 @@ void Axis::on_sample(const DriveSample& sample) {
   sampled_.notify_all();
 }
 
-/// Open loop: a limit and a quick stop end a motion without a ramp, and it may lose steps (M20). What a
-/// terminal started may have begun and ended between two readings.
-bool Axis::ended_abruptly(const DriveSample& before, std::int64_t turned_by) const {
-  const auto& now = *sample_;
-  if (drive_->closed_loop() || now.moving || !(before.moving || turned_by != 0)) return false;
-  if (before.mode == DriveMode::homing || now.mode == DriveMode::homing) return false;
-  const bool positive = before.moving ? last_positive_ : (turned_by > 0) != settings_.scale.invert;
-  return limit_active(positive) || input_active("quick_stop");
-}
-
-/// Homing that a terminal started may have begun and ended between two readings, and left neither its mode
-/// nor a new homed bit: the counter tells of it where nothing of ours can have turned the shaft.
-bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const {
-  const auto& now = *sample_;
-  if (now.asked_at <= ours_until_ || !has_input("homing_start") || before.moving || now.moving) return false;
-  // A shaft that is released and turned is counted as such.
-  const bool held = now.enabled || (before.enabled && !counts_while_released());
-  // Two readings at rest differ by so much (M30).
-  const auto noise = settings_.scale.pulses_per_revolution / 500;
-  return held && std::abs(turned_by) > std::max<std::int64_t>(2 * drive_->position_window(), noise);
+/// What decides with the newest reading whether the position can still be believed.
+ShaftWatch::Facts Axis::shaft_facts() const {
+  return {.inverted = settings_.scale.invert,
+          .closed_loop = drive_->closed_loop(),
+          .counts_released = counts_while_released(),
+          .homes = activity_ && activity_->state == AxisState::homing,
+          .ours = stop_.left_running() || (activity_ && activity_->start.has_begun()),
+          .positive_limit = limit_active(true),
+          .negative_limit = limit_active(false),
+          .quick_stop = input_active("quick_stop"),
+          .homing_terminal = has_input("homing_start"),
+          .window = drive_->position_window(),
+          .noise = settings_.scale.pulses_per_revolution / 500,
+          .settling = settling()};
 }
 
 Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {
@@ -232,7 +219,7 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
   const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
   if (releasing || fault_) return;
   const bool moved = activity_ && activity_->state != AxisState::standstill;
-  if (moved && limit_active(last_positive_)) {
+  if (moved && limit_active(shaft_.positive())) {
     supersede(error(Reason::limit_switch, "a limit switch ended the motion, and the drive released the motor",
                     "move away from it by hand; home the axis"));
   } else {

@@ -36,6 +36,7 @@
 #include "devices/axis/position_tracker.hpp"
 #include "devices/axis/power_machine.hpp"
 #include "devices/axis/settings.hpp"
+#include "devices/axis/shaft_watch.hpp"
 #include "devices/axis/speed_watch.hpp"
 #include "devices/axis/standstill.hpp"
 #include "devices/axis/stop_machine.hpp"
@@ -167,7 +168,7 @@ class Axis {
   Task<Result<void>> settle_found_motion();
   [[nodiscard]] bool found_in_motion() const;
   [[nodiscard]] bool may_have_been_stopped_abruptly() const;
-  void note_unseen_ends();
+  [[nodiscard]] std::vector<std::int64_t> unseen_ends() const;
   [[nodiscard]] bool found_by_terminal() const;
   Task<Result<void>> prove_or_configure();
   [[nodiscard]] std::optional<OffsetRecord> restorable_position();
@@ -256,8 +257,7 @@ class Axis {
   [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;
   [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
-  [[nodiscard]] bool ended_abruptly(const DriveSample& before, std::int64_t turned_by) const;
-  [[nodiscard]] bool homed_unseen(const DriveSample& before, std::int64_t turned_by) const;
+  [[nodiscard]] ShaftWatch::Facts shaft_facts() const;
   void lose_trust();
   void remember_position();
 
@@ -493,12 +493,8 @@ class Axis {
   CommandBuffer buffer_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
-  TimePoint ours_until_{};  ///< what turned the shaft before was told to, or settles after it
-  /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
-  std::optional<std::vector<std::int64_t>> unseen_ends_;
   TerminalMotion terminal_;
-  bool rezeroing_ = false;  ///< the drive's counter is being zeroed
-  bool last_positive_ = true;
+  ShaftWatch shaft_;
   std::optional<Error> fault_;
   boost::shared_ptr<AxisSnapshot> shown_;  ///< the last snapshot
   std::uint64_t revision_ = 0;

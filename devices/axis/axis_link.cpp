@@ -41,7 +41,7 @@ Task<> Axis::connect() {
     if (connected && !link_.is_configured()) continue;             // it was told to begin again meanwhile
     if (connected) {
       link_.connected();
-      unseen_ends_.reset();
+      shaft_.see();
       watch_continuity();
       spdlog::info("{}: online ({} {})", settings_.name, settings_.model,
                    identity_ ? identity_->version : "");
@@ -107,18 +107,19 @@ bool Axis::may_have_been_stopped_abruptly() const {
   // A drive that shows no inputs may have limits all the same.
   const bool by_terminal = descriptor_->inputs.empty() || has_input("positive_limit") ||
                            has_input("negative_limit") || has_input("quick_stop");
-  if (drive_->closed_loop() || !unseen_ends_ || !by_terminal) return false;
+  if (drive_->closed_loop() || shaft_.undisturbed_at(tracker_.counter()) || !by_terminal) return false;
   const bool runs_on =
       sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_.owed();
-  return !runs_on && std::ranges::find(*unseen_ends_, tracker_.counter()) == unseen_ends_->end();
+  return !runs_on;
 }
 
 /// Where the drive may be found at rest, if nothing stops it on its way.
-void Axis::note_unseen_ends() {
-  auto& ends = unseen_ends_.emplace();
+std::vector<std::int64_t> Axis::unseen_ends() const {
+  std::vector<std::int64_t> ends;
   if (sample_ && !sample_->moving) ends.push_back(tracker_.counter());
   if (activity_ && activity_->start.may_run() && activity_->plan.target)
     ends.push_back(activity_->plan.target->counter);
+  return ends;
 }
 
 /// Within homing the motor rests between its phases, and goes on.
@@ -292,7 +293,7 @@ void Axis::go_offline(const Error& cause) {
                      terminal_.moves() || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
   if (moved) stop_.owe();
-  note_unseen_ends();
+  shaft_.lose_sight(unseen_ends());
   if (auto activity = take_activity()) {
     auto unknown = error(Reason::offline, "the drive stopped answering while the command was being executed",
                          "check power and wiring; then reset the axis");

@@ -146,7 +146,7 @@ void Axis::show_sample(AxisSnapshot& shown) const {
   shown.enabled = bits.enabled;
   // The sign of the speed register is not said; the direction register's is.
   const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
-  shown.velocity = last_positive_ || speed == 0 ? speed : -speed;
+  shown.velocity = shaft_.positive() || speed == 0 ? speed : -speed;
   shown.moving = bits.moving;
   shown.in_position = bits.in_position;
   shown.homed = bits.homed;
@@ -185,7 +185,7 @@ void Axis::publish() {
   next->motion_cause = motion_cause();
   if (const auto* lease = env_.leases->find(settings_.name)) next->lease_holder = lease->holder();
   next->revision = ++revision_;
-  next->positive_direction = last_positive_;
+  next->positive_direction = shaft_.positive();
   if (activity_) {
     next->command_id = activity_->command->value().id;
     if (activity_->plan.target) next->target = activity_->plan.target->position;
