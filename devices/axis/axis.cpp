@@ -18,6 +18,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       settings_(std::move(settings)),
       descriptor_(&descriptor),
       scale_(settings_.scale),
+      terminals_(settings_, descriptor),
       planner_(settings_, descriptor, scale_),
       tracker_(scale_),
       drive_(std::move(drive)),
@@ -81,12 +82,13 @@ Error Axis::error(Reason reason, std::string message, std::string remedy) const 
 }
 
 bool Axis::busy() const {
-  return activity_ || stop_.under_way() || stop_.owed() || terminal_.moves() || (sample_ && sample_->moving);
+  return activity_ || stop_.under_way() || stop_.owed() || terminal_motion_.moves() ||
+         (sample_ && sample_->moving);
 }
 
 bool Axis::works() const {
-  const bool only_waits =
-      queues() && !stop_.under_way() && !stop_.owed() && !terminal_.moves() && !(sample_ && sample_->moving);
+  const bool only_waits = queues() && !stop_.under_way() && !stop_.owed() && !terminal_motion_.moves() &&
+                          !(sample_ && sample_->moving);
   return busy() && !only_waits;
 }
 
@@ -97,10 +99,6 @@ bool Axis::at_rest() const {
          !(sample_ && sample_->moving);
 }
 
-bool Axis::has_input(std::string_view function) const {
-  return std::ranges::find(settings_.inputs, function, &TerminalSettings::function) != settings_.inputs.end();
-}
-
 std::int64_t Axis::home_offset() const {
   return scale_.to_pulses(settings_.homing ? settings_.homing->position : 0);
 }
@@ -109,18 +107,8 @@ bool Axis::is_from_home(std::int64_t offset) const {
   return std::abs(offset - home_offset()) <= drive_->position_window();
 }
 
-bool Axis::input_active(std::string_view function) const { return sample_ && active_in(*sample_, function); }
-
-bool Axis::active_in(const DriveSample& sample, std::string_view function) const {
-  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
-    return input.function == function && active_in(sample, input);
-  });
-}
-
-bool Axis::active_in(const DriveSample& sample, const TerminalSettings& input) const {
-  const auto terminal = std::ranges::find(descriptor_->inputs, input.terminal, &TerminalSpec::name);
-  const auto bit = static_cast<unsigned>(terminal - descriptor_->inputs.begin());
-  return terminal != descriptor_->inputs.end() && ((sample.inputs >> bit) & 1U) != 0;
+bool Axis::input_active(std::string_view function) const {
+  return sample_ && terminals_.active(*sample_, function);
 }
 
 bool Axis::counts_while_released() const {
@@ -128,18 +116,7 @@ bool Axis::counts_while_released() const {
 }
 
 bool Axis::terminal_may_void_position() const {
-  return has_input("homing_start") || (has_input("motor_free") && !counts_while_released());
-}
-
-bool Axis::starts_motion(const TerminalSettings& input) const {
-  const auto* function = find_function(descriptor_->input_functions, input.function);
-  return function != nullptr && function->starts_motion;
-}
-
-bool Axis::start_terminal_active(const DriveSample& sample) const {
-  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
-    return starts_motion(input) && active_in(sample, input);
-  });
+  return terminals_.has("homing_start") || (terminals_.has("motor_free") && !counts_while_released());
 }
 
 bool Axis::limit_active(bool positive) const {
@@ -168,7 +145,7 @@ void Axis::on_sample(const DriveSample& sample) {
     observed_.on_sample(sample, busy());
   else
     observed_.interrupted();
-  if (!sample.moving) terminal_.at_rest();
+  if (!sample.moving) terminal_motion_.at_rest();
   if (sample.moving && (!activity_ || queues()) && !stop_.under_way() && link_.online())
     on_unexplained_motion(sample, before);
   release_as_owed();
@@ -187,7 +164,7 @@ ShaftWatch::Facts Axis::shaft_facts() const {
           .positive_limit = limit_active(true),
           .negative_limit = limit_active(false),
           .quick_stop = input_active("quick_stop"),
-          .homing_terminal = has_input("homing_start"),
+          .homing_terminal = terminals_.has("homing_start"),
           .window = drive_->position_window(),
           .noise = settings_.scale.pulses_per_revolution / 500,
           .settling = settling()};
@@ -233,22 +210,21 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
 void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before) {
   // The drive says so itself, or a terminal that starts motions is, or was just now, active.
   const bool segments = sample.mode == DriveMode::multi_position || sample.mode == DriveMode::multi_velocity;
-  const bool homing = sample.mode == DriveMode::homing && has_input("homing_start");
-  const bool started = start_terminal_active(sample) || (before && start_terminal_active(*before));
-  const bool possible = std::ranges::any_of(
-      settings_.inputs, [this](const TerminalSettings& input) { return starts_motion(input); });
+  const bool homing = sample.mode == DriveMode::homing && terminals_.has("homing_start");
+  const bool started = terminals_.start_active(sample) || (before && terminals_.start_active(*before));
   using Verdict = TerminalMotion::Verdict;
-  switch (terminal_.judge({.told_to_stop = stop_.owed() || fault_,
-                           .terminals_start = possible,
-                           .just_began = before && !before->moving,
-                           .shown = segments || homing || started,
-                           .by_itself = drive_->moves_by_itself()})) {
+  switch (terminal_motion_.judge({.told_to_stop = stop_.owed() || fault_,
+                                  .terminals_start = terminals_.may_start_motion(),
+                                  .just_began = before && !before->moving,
+                                  .shown = segments || homing || started,
+                                  .by_itself = drive_->moves_by_itself()})) {
     case Verdict::known:
       return;
     case Verdict::look_again:
       return wake();
     case Verdict::begins:
-      if (active_in(sample, "homing_start") || (before && active_in(*before, "homing_start"))) lose_trust();
+      if (terminals_.active(sample, "homing_start") || (before && terminals_.active(*before, "homing_start")))
+        lose_trust();
       return;
     case Verdict::nobodys:
       break;
@@ -294,7 +270,7 @@ AxisState Axis::state() const {
   StateSources sources{.fault = fault_.has_value(), .stop = stop_.shown()};
   if (activity_) sources.executed = activity_->state;
   if (sample_) sources.energised = sample_->enabled;
-  if (sample_ && terminal_.moves()) sources.moved_by_terminal = sample_->mode;
+  if (sample_ && terminal_motion_.moves()) sources.moved_by_terminal = sample_->mode;
   return plcopen_state(sources);
 }
 

@@ -41,6 +41,7 @@
 #include "devices/axis/standstill.hpp"
 #include "devices/axis/stop_machine.hpp"
 #include "devices/axis/terminal_motion.hpp"
+#include "devices/axis/terminals.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
@@ -232,8 +233,6 @@ class Axis {
   [[nodiscard]] Result<void> permit_saves(std::uint64_t saves);
   void tell_edges(const DriveSample& before, const DriveSample& now);
   void tell_changes(const AxisSnapshot& before, const AxisSnapshot& now);
-  [[nodiscard]] std::vector<TerminalState> inputs(std::uint32_t bits) const;
-  [[nodiscard]] std::vector<TerminalState> outputs(std::uint32_t bits) const;
   [[nodiscard]] AxisState state() const;
   [[nodiscard]] MotionCause motion_cause() const;
   [[nodiscard]] bool busy() const;
@@ -242,7 +241,6 @@ class Axis {
   /// Its start waits for those of others: its drive rests until then.
   [[nodiscard]] bool queues() const;
   [[nodiscard]] std::int64_t home_offset() const;
-  [[nodiscard]] bool has_input(std::string_view function) const;
   /// This offset of the position is that of home, as far as a reading tells (M30).
   [[nodiscard]] bool is_from_home(std::int64_t offset) const;
   /// The position follows a shaft that is turned while the motor is released: in closed loop only, and where
@@ -252,10 +250,6 @@ class Axis {
   /// shaft be turned uncounted (M20).
   [[nodiscard]] bool terminal_may_void_position() const;
   [[nodiscard]] bool input_active(std::string_view function) const;
-  [[nodiscard]] bool active_in(const DriveSample& sample, const TerminalSettings& input) const;
-  [[nodiscard]] bool active_in(const DriveSample& sample, std::string_view function) const;
-  [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;
-  [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
   [[nodiscard]] ShaftWatch::Facts shaft_facts() const;
   void lose_trust();
@@ -455,6 +449,7 @@ class Axis {
   AxisSettings settings_;
   const DriveDescriptor* descriptor_;
   Scale scale_;
+  Terminals terminals_;
   Planner planner_;
   PositionTracker tracker_;
   std::unique_ptr<Drive> drive_;
@@ -493,7 +488,7 @@ class Axis {
   CommandBuffer buffer_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
-  TerminalMotion terminal_;
+  TerminalMotion terminal_motion_;
   ShaftWatch shaft_;
   std::optional<Error> fault_;
   boost::shared_ptr<AxisSnapshot> shown_;  ///< the last snapshot

@@ -112,7 +112,8 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   const bool proven = readback.state() == State::resting && co_await proven_continuous(activity);
   // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
   // as it began, or the way is too short to be seen.
-  const bool may_end_it = has_input("motor_free") || has_input("stop") || has_input("quick_stop");
+  const bool may_end_it =
+      terminals_.has("motor_free") || terminals_.has("stop") || terminals_.has("quick_stop");
   const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
   if (proven)
     readback.proven(!may_end_it && !(moves_to_a_target && !shows(activity->plan, base)));

@@ -194,9 +194,9 @@ Result<void> Axis::Member::judge(const DriveSample& sample) const {
   const auto& axis = *axis_;
   if (!sample.enabled)
     return axisd::fail(axis.error(Reason::disabled, "the power stage is off", "enable the axis first"));
-  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_.moves())
+  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_motion_.moves())
     return axisd::fail(axis.error(Reason::moving, "the drive moves by itself", "check its terminals"));
-  if (axis.start_terminal_active(sample))
+  if (axis.terminals_.start_active(sample))
     return axisd::fail(
         axis.error(Reason::moving, "a terminal that starts motion is active", "check the terminals"));
   if (activity_->plan.trusted && axis.tracker_.trust() == PositionTrust::unknown)

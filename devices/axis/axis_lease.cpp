@@ -49,8 +49,8 @@ void Axis::lease_lost(const Error& cause) {
   if (command != nullptr && command->kind == CommandKind::disable) return;  // it needs no lease
   const bool motion = activity_ && activity_->state != AxisState::standstill;
   // What a terminal moves was not commanded under the lease.
-  const bool moves =
-      motion || stop_.under_way() || stop_.owed() || (sample_ && sample_->moving && !terminal_.moves());
+  const bool moves = motion || stop_.under_way() || stop_.owed() ||
+                     (sample_ && sample_->moving && !terminal_motion_.moves());
   note_motion_to_stop();
   supersede(error(cause.reason, cause.message, cause.remedy));
   release_as_owed();

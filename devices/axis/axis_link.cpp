@@ -105,8 +105,8 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
 /// loses steps (M20). Not so where it rests at its target, or has not left, or still runs as it did.
 bool Axis::may_have_been_stopped_abruptly() const {
   // A drive that shows no inputs may have limits all the same.
-  const bool by_terminal = descriptor_->inputs.empty() || has_input("positive_limit") ||
-                           has_input("negative_limit") || has_input("quick_stop");
+  const bool by_terminal = descriptor_->inputs.empty() || terminals_.has("positive_limit") ||
+                           terminals_.has("negative_limit") || terminals_.has("quick_stop");
   if (drive_->closed_loop() || shaft_.undisturbed_at(tracker_.counter()) || !by_terminal) return false;
   const bool runs_on =
       sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_.owed();
@@ -253,7 +253,7 @@ Result<std::shared_ptr<void>> Axis::begin_maintenance() {
   if (auto online = check_online(); !online) return fail(online.error());
   if (!maintenance_.expired() || activity_)
     return fail(error(Reason::busy, "something else is being done to the drive", "wait for it"));
-  if (!at_rest() || terminal_.moves())
+  if (!at_rest() || terminal_motion_.moves())
     return fail(error(Reason::moving, "the axis moves", "wait for standstill"));
   if (!sample_ || sample_->enabled)
     return fail(error(Reason::moving, "the power stage is on: what is written could move the motor",
@@ -290,7 +290,7 @@ void Axis::go_offline(const Error& cause) {
   revoke_motion();
   env_.bus->give_up_readings(settings_.node);
   const bool moved = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
-                     terminal_.moves() || (sample_ && sample_->moving);
+                     terminal_motion_.moves() || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
   if (moved) stop_.owe();
   shaft_.lose_sight(unseen_ends());
@@ -304,7 +304,7 @@ void Axis::go_offline(const Error& cause) {
     drop_buffer(unknown);
   }
   tracker_.forget_base();  // nobody sees whether somebody turns it
-  terminal_.lost();
+  terminal_motion_.lost();
   publish();
   sampled_.notify_all();
   wake();

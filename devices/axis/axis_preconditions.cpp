@@ -171,7 +171,7 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
   else if (!sample_->enabled)
     found.block(
         error(Reason::disabled, "the power stage is off", "enable the axis first: " + shell("enable")));
-  if (terminal_.moves())
+  if (terminal_motion_.moves())
     found.block(error(Reason::terminal, "a terminal of the drive moves it",
                       fmt::format("wait, or stop it: {}", shell("stop"))));
   look_at_holding_terminals(holding_functions, found);
@@ -181,7 +181,7 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
 void Axis::look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const {
   if (!sample_ || !link_.online()) return;
   for (const auto& input : settings_.inputs)
-    if (std::ranges::find(functions, input.function) != functions.end() && active_in(*sample_, input))
+    if (std::ranges::find(functions, input.function) != functions.end() && terminals_.active(*sample_, input))
       found.note(error(Reason::terminal,
                        fmt::format("terminal {} ({}) is active: the drive may not start, or stop at once",
                                    input.terminal, input.function),
@@ -219,7 +219,7 @@ void Axis::look_at_direction(bool positive, Obstacles& found) const {
 void Axis::look_at_present_motion(Obstacles& found) const {
   if (found.blocked()) return;
   const bool moves = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
-                     (sample_ && sample_->moving && !terminal_.moves());
+                     (sample_ && sample_->moving && !terminal_motion_.moves());
   const auto executed = activity_ ? fmt::format("{} {}", to_string(activity_->command->value().kind),
                                                 activity_->command->value().id)
                                   : std::string();

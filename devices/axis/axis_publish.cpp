@@ -9,20 +9,6 @@ namespace axisd {
 
 namespace {
 
-std::vector<TerminalState> terminal_states(std::span<const TerminalSpec> terminals,
-                                           const std::vector<TerminalSettings>& settings,
-                                           std::uint32_t bits) {
-  std::vector<TerminalState> states;
-  states.reserve(terminals.size());
-  for (std::size_t i = 0; i < terminals.size(); ++i) {
-    const auto configured = std::ranges::find(settings, terminals[i].name, &TerminalSettings::terminal);
-    states.push_back({.name = std::string(terminals[i].name),
-                      .function = configured == settings.end() ? std::string() : configured->function,
-                      .active = ((bits >> i) & 1U) != 0});
-  }
-  return states;
-}
-
 /// The notes of `now` that `before` does not have: one that comes and goes beside it makes no news of
 /// another.
 std::string new_notes(std::string_view before, std::string_view now) {
@@ -41,19 +27,6 @@ std::string new_notes(std::string_view before, std::string_view now) {
 
 }  // namespace
 
-std::vector<TerminalState> Axis::inputs(std::uint32_t bits) const {
-  auto states = terminal_states(descriptor_->inputs, settings_.inputs, bits);
-  // The drive was given the other level of this one for an inverted axis (drive_setup).
-  if (settings_.scale.invert)
-    for (auto& terminal : states)
-      if (terminal.function == "pv_direction") terminal.active = !terminal.active;
-  return states;
-}
-
-std::vector<TerminalState> Axis::outputs(std::uint32_t bits) const {
-  return terminal_states(descriptor_->outputs, settings_.outputs, bits);
-}
-
 /// M29: the edge lies between the previous sample and this one.
 void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
   if (!env_.event || (before.inputs == now.inputs && before.outputs == now.outputs)) return;
@@ -66,8 +39,8 @@ void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
                                                 .after = env_.clock->wall(before.asked_at),
                                                 .before = env_.clock->wall(now.measured_at)});
   };
-  tell(inputs(before.inputs), inputs(now.inputs));
-  tell(outputs(before.outputs), outputs(now.outputs));
+  tell(terminals_.inputs(before.inputs), terminals_.inputs(now.inputs));
+  tell(terminals_.outputs(before.outputs), terminals_.outputs(now.outputs));
 }
 
 void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
@@ -89,10 +62,10 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
 }
 
 MotionCause Axis::motion_cause() const {
-  if (terminal_.moves()) return MotionCause::terminal;
+  if (terminal_motion_.moves()) return MotionCause::terminal;
   if (!sample_ || !sample_->moving) return MotionCause::none;
   if (activity_ && activity_->state != AxisState::standstill) return MotionCause::command;
-  const bool by_terminal = sample_->mode >= DriveMode::multi_position || start_terminal_active(*sample_);
+  const bool by_terminal = sample_->mode >= DriveMode::multi_position || terminals_.start_active(*sample_);
   return stop_.left_running() && !by_terminal ? MotionCause::command : MotionCause::unknown;
 }
 
@@ -140,8 +113,8 @@ void Axis::show_position(AxisSnapshot& shown) const {
 /// What the drive tells of itself.
 void Axis::show_sample(AxisSnapshot& shown) const {
   const auto bits = sample_.value_or(DriveSample{});
-  shown.inputs = inputs(bits.inputs);
-  shown.outputs = outputs(bits.outputs);
+  shown.inputs = terminals_.inputs(bits.inputs);
+  shown.outputs = terminals_.outputs(bits.outputs);
   if (!sample_) return;
   shown.enabled = bits.enabled;
   // The sign of the speed register is not said; the direction register's is.

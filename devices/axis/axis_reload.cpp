@@ -21,7 +21,7 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
         fmt::format("executes {} {}{}", to_string(command.kind), command.id,
                     buffer_.empty() ? "" : fmt::format(", and {} more wait for it", buffer_.size())),
         "wait for its end, or stop it: " + shell("stop"));
-  } else if ((sample_ && sample_->moving && !stop_.owed()) || terminal_.moves()) {
+  } else if ((sample_ && sample_->moving && !stop_.owed()) || terminal_motion_.moves()) {
     add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + shell("stop"));
   }
   if (stop_.coming()) add(Reason::stopping, "the axis is stopping", "wait for standstill");
