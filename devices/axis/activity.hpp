@@ -1,29 +1,21 @@
-// What an axis is executing, what waits for its end, and its stops.
+// What an axis is executing.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "buses/clock.hpp"
 #include "buses/start_turns.hpp"
 #include "devices/axis/command.hpp"
 #include "devices/axis/command_book.hpp"
+#include "devices/axis/motion_machine.hpp"
 #include "devices/axis/planner.hpp"
 #include "devices/axis/position_tracker.hpp"
+#include "devices/axis/start_machine.hpp"
 #include "devices/drive.hpp"
 
 namespace axisd {
-
-/// What a command is waiting for before its start (M31).
-enum class StartWait : std::uint8_t {
-  halt,   ///< the end of the motion before it (M9)
-  disk,   ///< its durable record, or that of the position
-  turn,   ///< the starts of other axes on its bus that asked before it
-  line,   ///< its frames are with the bus, whose gate decides
-  begun,  ///< nothing any more
-};
 
 /// A command that is being executed.
 struct Activity {
@@ -32,39 +24,19 @@ struct Activity {
   std::uint64_t epoch = 0;
   CommandOptions options;
   Plan plan{};
+  StartMachine start{};
   std::optional<TimePoint> hold_until{};  ///< jog and held velocity: halts at this time
-  bool started = false;                   ///< the drive was seen moving for it
-  bool may_run = false;                   ///< its start may have been sent: its ramps are the drive's
   bool lease_over = false;                ///< goes on without its lease, and starts nothing more
-  bool noted = false;                     ///< durably, or that is under way
   TimePoint start_by = TimePoint::max();  ///< no start frame goes out later (M31)
   TimePoint waits_since{};                ///< the time from which start_by counts
-  StartWait waits_for = StartWait::line;
-  Clock::Timer late{};      ///< at start_by
-  StartTurns::Turn turn{};  ///< of its start, until that was sent
+  Clock::Timer late{};                    ///< at start_by
+  StartTurns::Turn turn{};                ///< of its start, until that was sent
+  std::optional<MotionMachine> motion{};  ///< once its start was acknowledged, and it is followed
 };
 using ActivityPtr = std::shared_ptr<Activity>;
 
 MoveProfile profile_of(const Plan& plan);
 /// A start that fails does not undo what was executed before it: homing backs off first.
 void tell_part(const Activity& activity, Error& cause);
-
-/// Accepted to start when what is before it is done.
-struct Buffered {
-  CommandPtr command;
-  Action action;
-  CommandOptions options;
-  PositionTracker end;  ///< as it will be when this is done
-};
-
-/// Stops in progress; one sequence serves all that arrive meanwhile.
-struct Stopping {
-  bool running = false;
-  StopKind kind = StopKind::none;  ///< strongest requested
-  int requests = 0;                ///< each needs a frame of its own
-  bool from_motion = false;        ///< the first of them found the axis in motion
-  std::vector<CommandPtr> commands;
-  CommandPtr last;
-};
 
 }  // namespace axisd

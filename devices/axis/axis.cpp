@@ -8,6 +8,7 @@
 
 #include "devices/alarm_text.hpp"
 #include "devices/axis/axis_log.hpp"
+#include "devices/axis/plcopen_state.hpp"
 #include "devices/released_position.hpp"
 
 namespace axisd {
@@ -18,20 +19,24 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
       settings_(std::move(settings)),
       descriptor_(&descriptor),
       scale_(settings_.scale),
+      terminals_(settings_, descriptor),
       planner_(settings_, descriptor, scale_),
       tracker_(scale_),
       drive_(std::move(drive)),
       face_(std::move(face)),
       gate_(face_->gate),
       simulated_(simulated),
+      drift_(settings_.drift_check),
+      pace_(settings_.poll_moving, settings_.poll_idle),
       eeprom_budget_(settings_.limits.eeprom_saves_per_day, {}),
       absolute_segments_(settings_.segments && settings_.segments->absolute),
+      stop_(*gate_, env_.holds),
       sampled_(env_.executor, *env_.clock),
       wake_(env_.executor, *env_.clock),
       stopped_(env_.executor, *env_.clock),
       observed_(env_.stop_delays),
       speed_watch_(static_cast<double>(settings_.scale.pulses_per_revolution)) {
-  last_deceleration_ = planner_.braking_time(settings_.limits.velocity, last_deceleration_);
+  stop_.set_deceleration(planner_.braking_time(settings_.limits.velocity, stop_.deceleration()));
   if (env_.persistence != nullptr) {
     const auto& axes = env_.persistence->current().axes;
     if (const auto found = axes.find(settings_.name); found != axes.end()) {
@@ -48,7 +53,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
 Axis::~Axis() = default;
 
 void Axis::start(bool answered) {
-  if (answered) link_ = LinkState::configuring;
+  if (answered) link_.answers();
   take_over();
   launch(run(), "link");
 }
@@ -63,8 +68,8 @@ void Axis::launch(Task<> sequence, const char* name) {
 }
 
 void Axis::close() {
-  closing_ = true;
-  link_ = LinkState::offline;
+  life_.close();
+  link_.close();
   supersede(error(Reason::cancelled, "the daemon ends"));
   publish();
   wake();
@@ -79,24 +84,21 @@ Error Axis::error(Reason reason, std::string message, std::string remedy) const 
 }
 
 bool Axis::busy() const {
-  return activity_ || stopping_.running || stop_owed_ || terminal_motion_ || (sample_ && sample_->moving);
+  return activity_ || stop_.under_way() || stop_.owed() || terminal_motion_.moves() ||
+         (sample_ && sample_->moving);
 }
 
 bool Axis::works() const {
-  const bool only_waits =
-      queues() && !stopping_.running && !stop_owed_ && !terminal_motion_ && !(sample_ && sample_->moving);
+  const bool only_waits = queues() && !stop_.under_way() && !stop_.owed() && !terminal_motion_.moves() &&
+                          !(sample_ && sample_->moving);
   return busy() && !only_waits;
 }
 
-bool Axis::queues() const { return activity_ && activity_->waits_for == StartWait::turn; }
+bool Axis::queues() const { return activity_ && activity_->start.is_queued(); }
 
 bool Axis::at_rest() const {
-  return !stopping_.running && !stop_owed_ && !(activity_ && activity_->state != AxisState::standstill) &&
+  return !stop_.under_way() && !stop_.owed() && !(activity_ && activity_->state != AxisState::standstill) &&
          !(sample_ && sample_->moving);
-}
-
-bool Axis::has_input(std::string_view function) const {
-  return std::ranges::find(settings_.inputs, function, &TerminalSettings::function) != settings_.inputs.end();
 }
 
 std::int64_t Axis::home_offset() const {
@@ -107,18 +109,8 @@ bool Axis::is_from_home(std::int64_t offset) const {
   return std::abs(offset - home_offset()) <= drive_->position_window();
 }
 
-bool Axis::input_active(std::string_view function) const { return sample_ && active_in(*sample_, function); }
-
-bool Axis::active_in(const DriveSample& sample, std::string_view function) const {
-  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
-    return input.function == function && active_in(sample, input);
-  });
-}
-
-bool Axis::active_in(const DriveSample& sample, const TerminalSettings& input) const {
-  const auto terminal = std::ranges::find(descriptor_->inputs, input.terminal, &TerminalSpec::name);
-  const auto bit = static_cast<unsigned>(terminal - descriptor_->inputs.begin());
-  return terminal != descriptor_->inputs.end() && ((sample.inputs >> bit) & 1U) != 0;
+bool Axis::input_active(std::string_view function) const {
+  return sample_ && terminals_.active(*sample_, function);
 }
 
 bool Axis::counts_while_released() const {
@@ -126,18 +118,7 @@ bool Axis::counts_while_released() const {
 }
 
 bool Axis::terminal_may_void_position() const {
-  return has_input("homing_start") || (has_input("motor_free") && !counts_while_released());
-}
-
-bool Axis::starts_motion(const TerminalSettings& input) const {
-  const auto* function = find_function(descriptor_->input_functions, input.function);
-  return function != nullptr && function->starts_motion;
-}
-
-bool Axis::start_terminal_active(const DriveSample& sample) const {
-  return std::ranges::any_of(settings_.inputs, [&](const TerminalSettings& input) {
-    return starts_motion(input) && active_in(sample, input);
-  });
+  return terminals_.has("homing_start") || (terminals_.has("motor_free") && !counts_while_released());
 }
 
 bool Axis::limit_active(bool positive) const {
@@ -149,35 +130,25 @@ void Axis::on_sample(const DriveSample& sample) {
   sample_ = sample;
   if (before) tell_edges(*before, sample);
   const auto counter = tracker_.counter();
-  if (!rezeroing_) tracker_.update(sample.position_pulses, drive_->position_window());
+  if (!shaft_.rezeroes()) tracker_.update(sample.position_pulses, drive_->position_window());
   const auto turned_by = tracker_.counter() - counter;
   // What nothing holds may be turned by hand, and back again.
   if (sample.moving || !sample.enabled) tracker_.forget_base();
-  if (sample.moving) last_positive_ = sample.negative_direction == settings_.scale.invert;
-  // Open loop: the overtravel stop at a limit has no ramp (M20). Homing runs onto limits by design.
-  const bool homing = activity_ && activity_->state == AxisState::homing;
-  // Homing that is not ours zeroes the counter; so does one that came and went between two samples (M20).
-  // Where a drive zeroes its counter by homing on the spot, that is ours.
-  const bool homed_by_others = !homing && !rezeroing_ && before && !before->homed && sample.homed;
-  if ((sample.mode == DriveMode::homing && !homing) || homed_by_others) lose_trust();
-  if (sample.moving && !homing && !drive_->closed_loop() && limit_active(last_positive_)) lose_trust();
-  const bool begun = activity_ && activity_->may_run && activity_->waits_for == StartWait::begun;
-  if (rezeroing_ || left_running_ || begun) ours_until_ = sample.asked_at + settling();
+  const auto facts = shaft_facts();
+  shaft_.look(sample, facts);
+  if (shaft_.shows_loss(before, sample, facts)) lose_trust();
   if (sample.alarm_code != 0) on_alarm(sample);
-  if (before && (ended_abruptly(*before, turned_by) || homed_unseen(*before, turned_by))) lose_trust();
+  if (before && shaft_.hides_loss(*before, sample, turned_by, facts)) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   watch_speed(SpeedWatch::Event::sampled);
   // What a link that failed kept back was not heard, wherever the drive rests.
-  if (!sample.moving && !stopping_.running && link_ == LinkState::online && !bus_loss_)
-    stop_owed_ = left_running_ = false;
-  if (link_ == LinkState::online)
+  if (!sample.moving && link_.online() && !link_.bus_loss()) stop_.seen_at_rest();
+  if (link_.online())
     observed_.on_sample(sample, busy());
   else
     observed_.interrupted();
-  if (terminal_motion_ && !sample.moving) {
-    terminal_motion_ = false;
-  }
-  if (sample.moving && (!activity_ || queues()) && !stopping_.running && link_ == LinkState::online)
+  if (!sample.moving) terminal_motion_.at_rest();
+  if (sample.moving && (!activity_ || queues()) && !stop_.under_way() && link_.online())
     on_unexplained_motion(sample, before);
   release_as_owed();
   publish();
@@ -185,26 +156,20 @@ void Axis::on_sample(const DriveSample& sample) {
   sampled_.notify_all();
 }
 
-/// Open loop: a limit and a quick stop end a motion without a ramp, and it may lose steps (M20). What a
-/// terminal started may have begun and ended between two readings.
-bool Axis::ended_abruptly(const DriveSample& before, std::int64_t turned_by) const {
-  const auto& now = *sample_;
-  if (drive_->closed_loop() || now.moving || !(before.moving || turned_by != 0)) return false;
-  if (before.mode == DriveMode::homing || now.mode == DriveMode::homing) return false;
-  const bool positive = before.moving ? last_positive_ : (turned_by > 0) != settings_.scale.invert;
-  return limit_active(positive) || input_active("quick_stop");
-}
-
-/// Homing that a terminal started may have begun and ended between two readings, and left neither its mode
-/// nor a new homed bit: the counter tells of it where nothing of ours can have turned the shaft.
-bool Axis::homed_unseen(const DriveSample& before, std::int64_t turned_by) const {
-  const auto& now = *sample_;
-  if (now.asked_at <= ours_until_ || !has_input("homing_start") || before.moving || now.moving) return false;
-  // A shaft that is released and turned is counted as such.
-  const bool held = now.enabled || (before.enabled && !counts_while_released());
-  // Two readings at rest differ by so much (M30).
-  const auto noise = settings_.scale.pulses_per_revolution / 500;
-  return held && std::abs(turned_by) > std::max<std::int64_t>(2 * drive_->position_window(), noise);
+/// What decides with the newest reading whether the position can still be believed.
+ShaftWatch::Facts Axis::shaft_facts() const {
+  return {.inverted = settings_.scale.invert,
+          .closed_loop = drive_->closed_loop(),
+          .counts_released = counts_while_released(),
+          .homes = activity_ && activity_->state == AxisState::homing,
+          .ours = stop_.left_running() || (activity_ && activity_->start.has_begun()),
+          .positive_limit = limit_active(true),
+          .negative_limit = limit_active(false),
+          .quick_stop = input_active("quick_stop"),
+          .homing_terminal = terminals_.has("homing_start"),
+          .window = drive_->position_window(),
+          .noise = settings_.scale.pulses_per_revolution / 500,
+          .settling = settling()};
 }
 
 Error Axis::alarm_error(std::uint16_t code, std::string_view what) const {
@@ -229,12 +194,11 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
   // What nothing holds can be turned by hand.
   if (!counts_while_released() && sample.alarm_code == 0 && tracker_.trust() != PositionTrust::unknown)
     lose_trust();
-  if (!enabled_by_us_ && !enabled_before) return;
+  if (!power_.released(enabled_before)) return;
   const bool releasing = activity_ && activity_->command->value().kind == CommandKind::disable;
-  enabled_by_us_ = false;
   if (releasing || fault_) return;
   const bool moved = activity_ && activity_->state != AxisState::standstill;
-  if (moved && limit_active(last_positive_)) {
+  if (moved && limit_active(shaft_.positive())) {
     supersede(error(Reason::limit_switch, "a limit switch ended the motion, and the drive released the motor",
                     "move away from it by hand; home the axis"));
   } else {
@@ -246,24 +210,26 @@ void Axis::on_released(const DriveSample& sample, bool enabled_before) {
 }
 
 void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before) {
-  if (terminal_motion_) return;
   // The drive says so itself, or a terminal that starts motions is, or was just now, active.
   const bool segments = sample.mode == DriveMode::multi_position || sample.mode == DriveMode::multi_velocity;
-  const bool homing = sample.mode == DriveMode::homing && has_input("homing_start");
-  const bool started = start_terminal_active(sample) || (before && start_terminal_active(*before));
-  // Motion and terminals may come in different frames: the terminal shows one sample later at most.
-  const bool possible = std::ranges::any_of(
-      settings_.inputs, [this](const TerminalSettings& input) { return starts_motion(input); });
-  const bool just_began = before && !before->moving;
-  if (!stop_owed_ && !fault_ && possible && just_began && !segments && !homing && !started) {
-    wake();
-    return;
-  }
-  // A motor that was told to stop, and has not confirmed it, is never a terminal's.
-  if (!stop_owed_ && !fault_ && (segments || homing || started || drive_->moves_by_itself())) {
-    terminal_motion_ = true;
-    if (active_in(sample, "homing_start") || (before && active_in(*before, "homing_start"))) lose_trust();
-    return;
+  const bool homing = sample.mode == DriveMode::homing && terminals_.has("homing_start");
+  const bool started = terminals_.start_active(sample) || (before && terminals_.start_active(*before));
+  using Verdict = TerminalMotion::Verdict;
+  switch (terminal_motion_.judge({.told_to_stop = stop_.owed() || fault_,
+                                  .terminals_start = terminals_.may_start_motion(),
+                                  .just_began = before && !before->moving,
+                                  .shown = segments || homing || started,
+                                  .by_itself = drive_->moves_by_itself()})) {
+    case Verdict::known:
+      return;
+    case Verdict::look_again:
+      return wake();
+    case Verdict::begins:
+      if (terminals_.active(sample, "homing_start") || (before && terminals_.active(*before, "homing_start")))
+        lose_trust();
+      return;
+    case Verdict::nobodys:
+      break;
   }
   log_about_axis(spdlog::level::warn, LogKind::moving_without_command, settings_,
                  fmt::format("{}: moving without a command; stopping it", settings_.name));
@@ -304,17 +270,11 @@ void Axis::remember_position() {
 }
 
 AxisState Axis::state() const {
-  if (fault_) return AxisState::error_stop;
-  if (!unheld() || (stopping_.running && stopping_.kind > StopKind::halt)) return AxisState::stopping;
-  if (activity_ && activity_->state != AxisState::standstill) return activity_->state;
-  // MC_Halt shows DiscreteMotion until the axis rests (PLCopen part 1, 3.6).
-  if (stopping_.running && stopping_.from_motion) return AxisState::discrete_motion;
-  if (terminal_motion_ && sample_) {
-    if (sample_->mode == DriveMode::homing) return AxisState::homing;
-    return sample_->mode == DriveMode::multi_velocity ? AxisState::continuous_motion
-                                                      : AxisState::discrete_motion;
-  }
-  return sample_ && sample_->enabled ? AxisState::standstill : AxisState::disabled;
+  StateSources sources{.fault = fault_.has_value(), .stop = stop_.shown()};
+  if (activity_) sources.executed = activity_->state;
+  if (sample_) sources.energised = sample_->enabled;
+  if (sample_ && terminal_motion_.moves()) sources.moved_by_terminal = sample_->mode;
+  return plcopen_state(sources);
 }
 
 }  // namespace axisd

@@ -21,13 +21,27 @@
 #include "devices/axis/activity.hpp"
 #include "devices/axis/axis_environment.hpp"
 #include "devices/axis/axis_face.hpp"
+#include "devices/axis/axis_life.hpp"
+#include "devices/axis/command_buffer.hpp"
+#include "devices/axis/continuity.hpp"
+#include "devices/axis/drift_watch.hpp"
+#include "devices/axis/earlier_run.hpp"
 #include "devices/axis/eeprom_budget.hpp"
+#include "devices/axis/homing_machine.hpp"
+#include "devices/axis/link_machine.hpp"
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
 #include "devices/axis/planner.hpp"
+#include "devices/axis/poll_pace.hpp"
 #include "devices/axis/position_tracker.hpp"
+#include "devices/axis/power_machine.hpp"
 #include "devices/axis/settings.hpp"
+#include "devices/axis/shaft_watch.hpp"
 #include "devices/axis/speed_watch.hpp"
+#include "devices/axis/standstill.hpp"
+#include "devices/axis/stop_machine.hpp"
+#include "devices/axis/terminal_motion.hpp"
+#include "devices/axis/terminals.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
@@ -48,7 +62,7 @@ class Axis {
 
   /// Ends all sequences; they run out on the core thread until closed(). The drive is left as it is.
   void close();
-  [[nodiscard]] bool closed() const { return closing_ && sequences_ == 0; }
+  [[nodiscard]] bool closed() const { return life_.ends() && sequences_ == 0; }
 
   // axis_reload.cpp: for another axis of the same name, or none, to take its place
   /// Why that cannot be now, all reasons, each with what to do; empty: nothing stands against it. Leases are
@@ -59,11 +73,11 @@ class Axis {
   /// Precondition: check_exchange() found nothing.
   void retire(bool position_holds);
   /// From then on.
-  [[nodiscard]] bool retired() const { return reloading_; }
+  [[nodiscard]] bool retired() const { return life_.retired(); }
   /// `on_lease_loss: disable` was not done yet.
-  [[nodiscard]] bool owes_release() const { return release_owed_.has_value(); }
+  [[nodiscard]] bool owes_release() const { return power_.owes_release(); }
   /// Its drive answered when it was retired.
-  [[nodiscard]] bool answered() const { return answered_; }
+  [[nodiscard]] bool answered() const { return life_.answered(); }
   /// Keeps the axis from being exchanged while it lives. Errors: reloading.
   Result<std::shared_ptr<void>> use();
   /// A stop that was accepted for the axis before this one, and not executed.
@@ -83,9 +97,9 @@ class Axis {
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
   /// Nobody holds it in Stopping.
-  [[nodiscard]] bool unheld() const { return env_.holds == nullptr || env_.holds->empty(); }
+  [[nodiscard]] bool unheld() const { return !stop_.held(); }
   /// The newest stop; nullptr: there was none.
-  [[nodiscard]] const CommandPtr& last_stop() const { return stopping_.last; }
+  [[nodiscard]] const CommandPtr& last_stop() const { return stop_.last(); }
   /// Everything that stands in the way of a request now: submit() would refuse it with the first that blocks
   /// (a repeat of an accepted request is never refused, though). Nothing: of motion in general. Only looks.
   [[nodiscard]] std::vector<Obstacle> explain(const std::optional<Action>& action,
@@ -155,9 +169,12 @@ class Axis {
   Task<Result<void>> settle_found_motion();
   [[nodiscard]] bool found_in_motion() const;
   [[nodiscard]] bool may_have_been_stopped_abruptly() const;
-  void note_unseen_ends();
+  [[nodiscard]] std::vector<std::int64_t> unseen_ends() const;
   [[nodiscard]] bool found_by_terminal() const;
   Task<Result<void>> prove_or_configure();
+  [[nodiscard]] std::optional<OffsetRecord> restorable_position();
+  void void_saved_position();
+  Task<Result<void>> configure(std::optional<OffsetRecord> restorable);
   Task<> wait_for_port();
   void go_offline(const Error& cause);
   void on_reboot(const Error& cause);
@@ -175,8 +192,6 @@ class Axis {
   Task<Result<std::optional<DriveSample>>> next_sample(Polling& polling);
   bool seen_again(const DriveSample& sample);
   [[nodiscard]] bool only_watches() const;
-  [[nodiscard]] TimePoint canary_due(TimePoint next_reading) const;
-  [[nodiscard]] TimePoint canary_latest() const;
   void wake();
   void watch_continuity();
   Task<Result<void>> prove_continuity(TransactionClass priority);
@@ -184,7 +199,6 @@ class Axis {
   void poll_fast(TimePoint from, Duration longest);
   void keep_quiet(TimePoint until);
   [[nodiscard]] bool keeps_quiet() const;
-  [[nodiscard]] TimePoint next_poll(TimePoint began) const;
 
   // axis_drift.cpp
   [[nodiscard]] bool drift_is_next() const;
@@ -194,6 +208,7 @@ class Axis {
 
   // axis_journal.cpp: commands over restarts of the daemon
   void take_over();
+  void owe_stop_of_motion();
   Task<Result<void>> settle_earlier();
   void settle_positions_set();
   void settle_as(const Unsettled& earlier, bool continuous);
@@ -212,12 +227,12 @@ class Axis {
   void on_released(const DriveSample& sample, bool enabled_before);
   void on_unexplained_motion(const DriveSample& sample, const std::optional<DriveSample>& before);
   void publish();
+  void show_position(AxisSnapshot& shown) const;
+  void show_sample(AxisSnapshot& shown) const;
   bool note_eeprom_writes();
   [[nodiscard]] Result<void> permit_saves(std::uint64_t saves);
   void tell_edges(const DriveSample& before, const DriveSample& now);
   void tell_changes(const AxisSnapshot& before, const AxisSnapshot& now);
-  [[nodiscard]] std::vector<TerminalState> inputs(std::uint32_t bits) const;
-  [[nodiscard]] std::vector<TerminalState> outputs(std::uint32_t bits) const;
   [[nodiscard]] AxisState state() const;
   [[nodiscard]] MotionCause motion_cause() const;
   [[nodiscard]] bool busy() const;
@@ -226,7 +241,6 @@ class Axis {
   /// Its start waits for those of others: its drive rests until then.
   [[nodiscard]] bool queues() const;
   [[nodiscard]] std::int64_t home_offset() const;
-  [[nodiscard]] bool has_input(std::string_view function) const;
   /// This offset of the position is that of home, as far as a reading tells (M30).
   [[nodiscard]] bool is_from_home(std::int64_t offset) const;
   /// The position follows a shaft that is turned while the motor is released: in closed loop only, and where
@@ -236,13 +250,8 @@ class Axis {
   /// shaft be turned uncounted (M20).
   [[nodiscard]] bool terminal_may_void_position() const;
   [[nodiscard]] bool input_active(std::string_view function) const;
-  [[nodiscard]] bool active_in(const DriveSample& sample, const TerminalSettings& input) const;
-  [[nodiscard]] bool active_in(const DriveSample& sample, std::string_view function) const;
-  [[nodiscard]] bool starts_motion(const TerminalSettings& input) const;
-  [[nodiscard]] bool start_terminal_active(const DriveSample& sample) const;
   [[nodiscard]] bool limit_active(bool positive) const;
-  [[nodiscard]] bool ended_abruptly(const DriveSample& before, std::int64_t turned_by) const;
-  [[nodiscard]] bool homed_unseen(const DriveSample& before, std::int64_t turned_by) const;
+  [[nodiscard]] ShaftWatch::Facts shaft_facts() const;
   void lose_trust();
   void remember_position();
 
@@ -281,6 +290,7 @@ class Axis {
   [[nodiscard]] Result<Plan> plan_behind(const Action& action, const PositionTracker& from) const;
   void start_next();
   void drop_buffer(const Error& cause);
+  void end_waiting(const std::deque<Buffered>& commands, const Error& cause);
   bool cancel_buffered(const CommandPtr& command);
 
   // axis_preconditions.cpp: what does not hold of what each request needs, in the order of refusals
@@ -353,14 +363,24 @@ class Axis {
 
   void end_unsent(Activity& activity, Error cause);
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
+
+  // axis_follow.cpp: from the start to the end
+  Task<bool> read_back(ActivityPtr activity, Error cause, std::int64_t base, TimePoint since);
+  [[nodiscard]] std::optional<StartReadback::Reading> readback_of(std::int64_t base) const;
   void expect_end(const Plan& plan, std::int64_t base, TimePoint since);
+  [[nodiscard]] MotionMachine followed(const Plan& plan, std::int64_t base, TimePoint since) const;
+  [[nodiscard]] MotionMachine::Reading reading_of(const Plan& plan, std::int64_t base) const;
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
+  void end_hold(Activity& activity);
+  void end_motion(Activity& activity, MotionMachine::State state);
+  void end_at_rest(Activity& activity);
   [[nodiscard]] bool shows(const Plan& plan, std::int64_t base) const;
   [[nodiscard]] bool held_back(const Plan& plan) const;
   Task<std::optional<TimePoint>> arrived(ActivityPtr activity, std::int64_t base, TimePoint since);
   Task<bool> is_no_reboot(ActivityPtr activity);
   Task<bool> still_there(ActivityPtr activity);
   Task<bool> proven_continuous(ActivityPtr activity);
+
   /// A measured position comes to its target so late, at most, after the drive has sent its last pulse (M30).
   [[nodiscard]] Duration settling() const;
   /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
@@ -369,7 +389,6 @@ class Axis {
   [[nodiscard]] bool is_at(const PositionTracker::Target& target) const;
   /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
   [[nodiscard]] bool moved_from(std::int64_t counter) const;
-  bool judge_rest(Activity& activity);
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
   Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
   [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;
@@ -389,14 +408,18 @@ class Axis {
   // axis_power.cpp: sequences that move nothing
   void on_turned_by_power(const Error& cause);
   Task<> run_enable(ActivityPtr activity);
+  void end_enable(Activity& activity, EnableMachine::State state);
   Task<> run_disable(ActivityPtr activity);
   Task<> run_reset(ActivityPtr activity);
   Task<> run_set_position(ActivityPtr activity);
 
   // axis_homing.cpp
   Task<> run_home(ActivityPtr activity);
+  Task<> declare_home(ActivityPtr activity);
   Task<bool> back_off(ActivityPtr activity);
+  [[nodiscard]] HomingMachine followed_homing(TimePoint since, bool homed_before) const;
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
+  [[nodiscard]] Error not_homed(HomingMachine::State state) const;
   [[nodiscard]] std::string_view homing_switch() const;
   /// The switch that homing searches for is active; false: not, or the search is the drive's own affair.
   [[nodiscard]] bool on_homing_switch() const;
@@ -417,10 +440,11 @@ class Axis {
   Task<> run_stop();
   void note_stop_sent(TimePoint end, bool answered);
   Task<Result<void>> stop_and_confirm();
-  Task<bool> standstill_by(TimePoint since, TimePoint deadline, int requests);
-  Task<bool> standstill_unpolled(TimePoint deadline, std::optional<int> requests);
+  [[nodiscard]] Error not_stopped(StopMachine::Step step, const Result<void>& sent) const;
+  Task<bool> rests_in_time(bool acknowledged);
+  Task<bool> standstill_by(TimePoint since, TimePoint deadline);
+  Task<bool> standstill_unpolled(TimePoint deadline, bool of_stop);
   void leave_running(const Activity& activity);
-  [[nodiscard]] Duration deceleration_bound() const;
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
   /// "{what} alarm 2 (overvoltage)", with what there is to do.
   [[nodiscard]] Error alarm_error(std::uint16_t code, std::string_view what) const;
@@ -429,6 +453,7 @@ class Axis {
   AxisSettings settings_;
   const DriveDescriptor* descriptor_;
   Scale scale_;
+  Terminals terminals_;
   Planner planner_;
   PositionTracker tracker_;
   std::unique_ptr<Drive> drive_;
@@ -436,22 +461,14 @@ class Axis {
   std::shared_ptr<AxisGate> gate_;  ///< that of the face
   bool simulated_;
 
-  LinkState link_ = LinkState::offline;
-  std::optional<Error> link_error_;
+  LinkMachine link_;
   std::optional<DriveIdentity> identity_;
-  bool configured_ = false;  ///< in this power cycle of the drive
-  bool restore_tried_ = false;
-  bool position_unsettled_ = false;  ///< an earlier run may have changed what the counter means
-  int reboots_ = 0;
-  TimePoint continuity_checked_{}, drift_checked_{};
-  Duration waited_{};  ///< for the line, the longest of the last of what the bus repeats
+  Continuity continuity_;
   Clock::Timer continuity_watch_;
   TimePoint had_turn_{};  ///< the last time that it was its turn to start
-  TimePoint settle_by_{};
-  std::vector<Unsettled> unsettled_;                      ///< of earlier runs of the daemon
-  TimePoint fast_from_{}, fast_until_{};                  ///< of poll_fast()
-  TimePoint quiet_until_{};                               ///< of keep_quiet()
-  std::string drift_;                                     ///< what the drive no longer holds as configured
+  EarlierRun earlier_;
+  DriftWatch drift_;
+  PollPace pace_;
   std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
   std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()
   std::uint64_t eeprom_writes_ = 0;                       ///< registers
@@ -459,40 +476,25 @@ class Axis {
   UnknownOutcomes unknown_starts_;
   bool absolute_segments_ = false;
 
+  AxisLife life_;
+  StopMachine stop_;
+  PowerMachine power_;
+
   std::optional<DriveSample> sample_;
   Signal sampled_;  ///< a new sample, or the link changed
   Signal wake_;     ///< the poll loop has something to look at
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
   int sequences_ = 0;               ///< coroutines that still run
-  TimePoint stop_arrived_{};        ///< at the server: the newest stop, disable or cancel
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
-  bool closing_ = false;
-  bool reloading_ = false;  ///< it was told to make room
-  bool answered_ = false;   ///< until then
 
   ActivityPtr activity_;
-  std::deque<Buffered> buffer_;  ///< nothing waits where nothing is executed
-  CommandPtr next_;              ///< of the buffer, while it is being started
-  Stopping stopping_;
-  /// `on_lease_loss: disable` is not done yet; a sample asked for from then on shows whether it is.
-  std::optional<TimePoint> release_owed_;
+  CommandBuffer buffer_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
-  std::optional<Error> bus_loss_;   ///< not yet acted upon
-  bool stop_owed_ = false;          ///< M4: to a silent node, until standstill is confirmed
-  std::uint64_t failed_stops_ = 0;  ///< tells whether one has failed meanwhile
-  TimePoint ours_until_{};          ///< what turned the shaft before was told to, or settles after it
-  /// Counters at which a drive that fell silent may be found undisturbed; nullopt: it is heard.
-  std::optional<std::vector<std::int64_t>> unseen_ends_;
-  bool left_running_ = false;  ///< a command has ended, and what it began may go on
-  bool enabled_by_us_ = false;
-  bool terminal_motion_ = false;
-  bool rezeroing_ = false;  ///< the drive's counter is being zeroed
-  bool last_positive_ = true;
+  TerminalMotion terminal_motion_;
+  ShaftWatch shaft_;
   std::optional<Error> fault_;
-  /// Of the motion in progress; at first the drive's longest.
-  Duration last_deceleration_ = milliseconds(2000);
   boost::shared_ptr<AxisSnapshot> shown_;  ///< the last snapshot
   std::uint64_t revision_ = 0;
   std::uint64_t sampled_revision_ = 0;  ///< of the snapshot after the last sample

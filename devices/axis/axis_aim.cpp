@@ -43,7 +43,7 @@ bool Axis::looks_restarted(const DriveSample& sample) const {
 /// the canary would show.
 bool Axis::may_move_by_itself() const {
   const bool by_terminal = std::ranges::any_of(settings_.inputs, [this](const TerminalSettings& input) {
-    return starts_motion(input) || input.function == "motor_free";
+    return terminals_.starts_motion(input) || input.function == "motor_free";
   });
   return by_terminal || drive_->moves_by_itself();
 }

@@ -11,9 +11,6 @@ namespace axisd {
 
 namespace {
 
-/// Commands that may wait at one axis.
-constexpr std::size_t most_buffered = 16;
-
 bool can_wait(CommandKind kind) {
   return kind == CommandKind::home || kind == CommandKind::move_absolute ||
          kind == CommandKind::move_relative || kind == CommandKind::move_velocity;
@@ -25,8 +22,8 @@ bool can_wait(CommandKind kind) {
 /// or moves nothing.
 std::optional<PositionTracker> Axis::expected_end() const {
   if (!buffer_.empty()) {
-    if (kind_of(buffer_.back().action) == CommandKind::move_velocity) return std::nullopt;
-    return buffer_.back().end;
+    if (kind_of(buffer_.last().action) == CommandKind::move_velocity) return std::nullopt;
+    return buffer_.last().end;
   }
   const auto& plan = activity_->plan;
   switch (activity_->command->value().kind) {
@@ -93,13 +90,13 @@ void Axis::look_at_buffered(const Action& action, CommandOptions options, Obstac
                              "send it with the buffer mode aborting"));
   if (!activity_) return std::visit([&](const auto& request) { look_at(request, options, found); }, action);
   look_at_motion(options, found);
-  const auto& before = buffer_.empty() ? activity_->command->value() : buffer_.back().command->value();
+  const auto& before = buffer_.empty() ? activity_->command->value() : buffer_.last().command->value();
   const auto from = expected_end();
   if (!from)
     found.block(error(Reason::busy,
                       fmt::format("nothing can wait for {} {}", to_string(before.kind), before.id),
                       "wait for its end, or send this with the buffer mode aborting"));
-  if (buffer_.size() >= most_buffered)
+  if (buffer_.full())
     found.block(error(Reason::busy, fmt::format("{} commands wait already", buffer_.size()),
                       "send it when some of them are done"));
   if (from) found.block_on(plan_behind(action, *from));
@@ -121,21 +118,19 @@ Result<CommandPtr> Axis::accept_buffered(const Action& action, const CommandOpti
     end.set_position(settings_.homing->position, PositionTrust::homed);
   auto command = env_.book->open(settings_.name, action, options);
   command->grant(plan->granted);
-  buffer_.push_back({.command = command, .action = action, .options = options, .end = end});
+  buffer_.push({.command = command, .action = action, .options = options, .end = end});
   return command;
 }
 
 /// What waits next becomes what is executed, if nothing forbids it by now: then it ends, and all behind it.
 void Axis::start_next() {
   if (buffer_.empty() || activity_) return;
-  const auto next = std::move(buffer_.front());
-  buffer_.pop_front();
+  const auto next = buffer_.take_next();
   // Before anything is looked at: a stop that comes meanwhile makes it old.
   accept_epoch_ = gate_->epoch();
-  next_ = next.command;
   const auto begun =
       std::visit([&](const auto& request) { return accept(request, next.options); }, next.action);
-  next_ = nullptr;
+  buffer_.end_start();
   if (begun) return;
   const auto& cause = begun.error();
   const bool overtaken = cause.reason == Reason::expired || cause.reason == Reason::lease_lost ||
@@ -146,8 +141,10 @@ void Axis::start_next() {
 }
 
 /// What was planned from where the command before it ends has no base without it.
-void Axis::drop_buffer(const Error& cause) {
-  for (const auto& waiting : std::exchange(buffer_, {})) {
+void Axis::drop_buffer(const Error& cause) { end_waiting(buffer_.take_all(), cause); }
+
+void Axis::end_waiting(const std::deque<Buffered>& commands, const Error& cause) {
+  for (const auto& waiting : commands) {
     auto told = error(Reason::superseded, "what it waited for was not done: " + cause.message,
                       "send it again, if it is still wanted");
     if (cause.reason == Reason::lease_lost) told.reason = cause.reason;
@@ -158,16 +155,13 @@ void Axis::drop_buffer(const Error& cause) {
 
 /// Ends one that waits, and those behind it. False: it does not wait.
 bool Axis::cancel_buffered(const CommandPtr& command) {
-  const auto found = std::ranges::find(buffer_, command, &Buffered::command);
-  if (found == buffer_.end()) return false;
-  std::deque<Buffered> behind(std::next(found), buffer_.end());
-  buffer_.erase(found, buffer_.end());
+  auto leaving = buffer_.cut(command);
+  if (leaving.empty()) return false;
   auto cause = error(Reason::cancelled, "cancelled by a client");
   cause.outcome = Outcome::not_sent;
-  auto kept = std::exchange(buffer_, std::move(behind));
   command->abort(cause);
-  drop_buffer(cause);
-  buffer_ = std::move(kept);
+  leaving.pop_front();
+  end_waiting(leaving, cause);
   return true;
 }
 

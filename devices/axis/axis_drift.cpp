@@ -10,22 +10,20 @@ namespace axisd {
 /// Soon after the canary was read, if that can be: what a comparison reads would keep the next one waiting.
 bool Axis::drift_is_next() const {
   const auto now = env_.clock->now();
-  const auto due = drift_checked_ + settings_.drift_check;
-  const bool in_good_time = now - continuity_checked_ < continuity_period / 2;
-  return now >= due && maintenance_.expired() && (in_good_time || now >= due + 2 * continuity_period);
+  return maintenance_.expired() && drift_.is_next(now, continuity_.just_proven(now));
 }
 
 /// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
 /// once the drive is released, and forbids motion until then.
 Task<> Axis::look_for_drift() {
-  if (link_ != LinkState::online || busy()) co_return;
+  if (!link_.online() || busy()) co_return;
   if (drift_is_next() && !co_await check_for_drift()) co_return;
-  const bool free = link_ == LinkState::online && !busy() && maintenance_.expired();
-  if (!drift_.empty() && free && sample_ && !sample_->enabled) reconfigure(drift_, false);
+  const bool free = link_.online() && !busy() && maintenance_.expired();
+  if (drift_.drifted() && free && sample_ && !sample_->enabled) reconfigure(drift_.text(), false);
 }
 
 Task<Result<void>> Axis::check_for_drift() {
-  drift_checked_ = env_.clock->now();
+  drift_.checked(env_.clock->now());
   const auto drift = co_await drive_->check_drift(TransactionClass::idle_state);
   if (!drift) co_return fail(drift.error());
   if (drift->scale_changed) lose_trust();
@@ -42,11 +40,10 @@ Task<Result<void>> Axis::check_for_drift() {
 }
 
 void Axis::set_drift(const std::string& text) {
-  if (text == drift_) return;
+  if (!drift_.found(text)) return;
   if (!text.empty())
     log_about_axis(spdlog::level::warn, LogKind::configuration_drifted, settings_,
                    fmt::format("{}: the drive no longer holds its configuration: {}", settings_.name, text));
-  drift_ = text;
   publish();
 }
 

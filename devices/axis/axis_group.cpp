@@ -40,7 +40,7 @@ void Axis::look_at(const GroupMemberRequest& request, const CommandOptions& opti
             found);
   if (activity_ && activity_->state == AxisState::standstill)
     found.block(error(Reason::busy, "another command is being executed", "wait for it"));
-  else if (activity_ || stopping_.running || (sample_ && sample_->moving))
+  else if (activity_ || stop_.under_way() || (sample_ && sample_->moving))
     found.block(
         error(Reason::moving, "a member of a group move has to rest", "wait for standstill, or halt it"));
 }
@@ -76,8 +76,8 @@ void Axis::Member::let_go() {
 }
 
 bool Axis::Member::ready() const {
-  return current() && axis_->link_ == LinkState::online && !axis_->bus_loss_ &&
-         axis_->env_.bus->port().open && !axis_->fault_ && !axis_->drive_->in_trouble() &&
+  return current() && axis_->link_.online() && !axis_->link_.bus_loss() && axis_->env_.bus->port().open &&
+         !axis_->fault_ && !axis_->drive_->in_trouble() &&
          may_send_alone(guard(), axis_->env_.clock->now()) == Verdict::send;
 }
 
@@ -87,7 +87,7 @@ void Axis::Member::wait_for_others(Duration more) {
 }
 
 void Axis::Member::waits_for_turn(bool waits) {
-  activity_->waits_for = waits ? StartWait::turn : StartWait::line;
+  waits ? activity_->start.queue() : activity_->start.has_turn();
   if (!waits) axis_->had_turn_ = axis_->env_.clock->now();
 }
 
@@ -114,7 +114,7 @@ Error Axis::Member::gone() const {
     return axis_->late(*activity_, {});
   if (verdict == Verdict::expired)
     return axis_->error(Reason::expired, "the request's validity has passed", "repeat it");
-  if (axis_->bus_loss_) return *axis_->bus_loss_;
+  if (axis_->link_.bus_loss()) return *axis_->link_.bus_loss();
   if (!axis_->env_.bus->port().open)
     return axis_->error(Reason::bus_down, "the port was lost before the start", "check the adapter");
   return axis_->error(Reason::superseded, "a stop came before the start");
@@ -194,9 +194,9 @@ Result<void> Axis::Member::judge(const DriveSample& sample) const {
   const auto& axis = *axis_;
   if (!sample.enabled)
     return axisd::fail(axis.error(Reason::disabled, "the power stage is off", "enable the axis first"));
-  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_motion_)
+  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_motion_.moves())
     return axisd::fail(axis.error(Reason::moving, "the drive moves by itself", "check its terminals"));
-  if (axis.start_terminal_active(sample))
+  if (axis.terminals_.start_active(sample))
     return axisd::fail(
         axis.error(Reason::moving, "a terminal that starts motion is active", "check the terminals"));
   if (activity_->plan.trusted && axis.tracker_.trust() == PositionTrust::unknown)
@@ -210,7 +210,7 @@ Result<void> Axis::Member::judge(const DriveSample& sample) const {
 Task<Result<void>> Axis::Member::verify() {
   if (!loaded_ || there_) co_return Result<void>{};
   auto verified = co_await loaded_->verify();
-  if (verified) axis_->continuity_checked_ = axis_->env_.clock->now();
+  if (verified) axis_->continuity_.proven(axis_->env_.clock->now());
   co_return verified;
 }
 
@@ -239,9 +239,9 @@ Task<Result<TimePoint>> Axis::Member::trigger() {
 
 void Axis::Member::started(TimePoint at) {
   started_at_ = at;
-  activity_->waits_for = StartWait::begun;
+  activity_->start.begun();
   axis_->watch_speed(SpeedWatch::Event::begun);
-  axis_->continuity_checked_ = axis_->env_.clock->now();  // the canary was part of its start
+  axis_->continuity_.proven(axis_->env_.clock->now());  // the canary was part of its start
   axis_->tracker_.forget_base();
   activity_->command->activate();
   axis_->publish();
@@ -255,9 +255,9 @@ Duration Axis::Member::unseen_for() const {
 
 Task<Result<void>> Axis::Member::look_after() {
   // As often as polling would.
-  if (axis_->env_.clock->now() - axis_->continuity_checked_ >= continuity_period) {
+  if (axis_->continuity_.state(axis_->env_.clock->now()) >= Continuity::State::due) {
     const auto proof = co_await axis_->prove_continuity(TransactionClass::motion);
-    if (!proof && proof.error().reason == Reason::rebooted && axis_->link_ == LinkState::online)
+    if (!proof && proof.error().reason == Reason::rebooted && axis_->link_.online())
       axis_->on_reboot(proof.error());
     if (!current()) co_return axisd::fail(gone());
   }
@@ -265,7 +265,7 @@ Task<Result<void>> Axis::Member::look_after() {
   if (!current()) co_return axisd::fail(gone());
   if (sample)
     axis_->on_sample(*sample);
-  else if (axis_->link_ == LinkState::online)
+  else if (axis_->link_.online())
     axis_->go_offline(sample.error());
   if (!ready()) co_return axisd::fail(gone());
   co_return Result<void>{};
@@ -303,9 +303,9 @@ void Axis::Member::end(Error cause, bool aborted) {
     cause = axis.late(*activity_, cause);
   if (!aborted && own && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
   if (!aborted && own && cause.reason == Reason::terminal) return axis.on_turned_by_power(cause);
-  const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->may_run;
+  const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->start.may_run();
   axis.revoke_motion();
-  if (activity_->may_run) {
+  if (activity_->start.may_run()) {
     // The stop of one that may move goes out whatever is known of its start.
     axis.tracker_.forget_base();
     axis.leave_running(*activity_);

@@ -2,22 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <optional>
 
-#include "buses/seconds.hpp"
 #include "devices/axis/axis.hpp"
 #include "devices/axis/chain.hpp"
 
 namespace axisd {
-
-namespace {
-
-/// Longest that a shaft takes to follow the drive to where it has stopped.
-constexpr Duration home_settling = std::chrono::milliseconds(500);
-
-}  // namespace
 
 bool Axis::on_homing_switch() const {
   return settings_.homing && !settings_.homing->number && input_active(homing_switch());
@@ -52,10 +42,10 @@ Task<> Axis::run_home(ActivityPtr activity) {
   }
 
   // Before it can come true again: homing may end where the saved record says that the axis stood (M20).
-  activity->waits_for = StartWait::disk;
+  activity->start.save();
   auto forgotten = co_await forget_saved_position();
   if (!current(*activity)) co_return;
-  activity->waits_for = StartWait::line;
+  activity->start.saved();
   if (!forgotten) {
     tell_part(*activity, forgotten.error());
     finish(*activity, [&](CommandRecord& command) { command.error(forgotten.error()); });
@@ -75,15 +65,17 @@ Task<> Axis::run_home(ActivityPtr activity) {
       lose_trust();
       homed_before = sample_->homed;
       base = tracker_.counter();
-      activity->started = false;
       result = co_await drive_->start_homing(**profile, guard(*activity));
     }
   }
   result ? activity->turn.done() : activity->turn.leave();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
-  if (!co_await follow_homing(activity, since, homed_before)) co_return;
+  if (co_await follow_homing(activity, since, homed_before)) co_await declare_home(activity);
+}
 
+/// The drive rests at home: the position there is the one that the configuration says.
+Task<> Axis::declare_home(ActivityPtr activity) {
   const auto position = settings_.homing->position;
   // Should the disk fail, the position holds for this run of the daemon; only a restart will not find it.
   const auto counter = counter_at_home();
@@ -150,78 +142,58 @@ Task<bool> Axis::back_off(ActivityPtr activity) {
   co_return false;
 }
 
-/// True: the drive reports home. The bit alone proves nothing, it may be left from the last time: homing mode
-/// must have been seen, and either the bit's rise, or the counter standing where only a completed homing puts
-/// it.
-Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed_before) {
+HomingMachine Axis::followed_homing(TimePoint since, bool homed_before) const {
   const auto& homing = *settings_.homing;
-  auto origin = tracker_.counter();
-  auto previous = origin;
-  auto previous_asked = sample_->asked_at;
   const auto fastest =  // pulses per second
       std::max(std::abs(scale_.velocity_to_rpm(homing.velocity)),
                std::abs(scale_.velocity_to_rpm(homing.search_velocity))) /
       60 * static_cast<double>(settings_.scale.pulses_per_revolution);
-  const auto latest = since + homing.timeout;
-  const auto start_by = since + milliseconds(500);
-  const auto offset = scale_.to_pulses(homing.offset);
-  const auto near = std::max<std::int64_t>(drive_->position_window(), 1);
-  bool mode_seen = false;
-  bool bit_was_low = !homed_before;
-  std::optional<TimePoint> rests_since;
+  return {{.since = since,
+           .timeout = homing.timeout,
+           .homed_before = homed_before,
+           .offset_pulses = scale_.to_pulses(homing.offset),
+           .window = drive_->position_window(),
+           .fastest = fastest,
+           .max_travel = homing.max_travel,
+           .origin = tracker_.counter(),
+           .asked_at = sample_->asked_at},
+          scale_};
+}
+
+/// True: the drive reports home. False: the activity has ended otherwise.
+Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed_before) {
+  using State = HomingMachine::State;
+  auto homing = followed_homing(since, homed_before);
   for (;;) {
-    co_await sampled_.wait_until(std::max(latest, env_.clock->now() + milliseconds(1)));
+    co_await sampled_.wait_until(std::max(homing.latest(), env_.clock->now() + milliseconds(1)));
     if (!current(*activity)) co_return false;
-    const auto now = env_.clock->now();
-    if (sample_->asked_at >= since) {
-      const auto& sample = *sample_;
-      if (!sample.homed) bit_was_low = true;
-      // The bit rose for this homing, however short it was.
-      if (sample.mode == DriveMode::homing || (sample.homed && bit_was_low)) mode_seen = true;
-      if (mode_seen && !sample.moving && sample.mode == DriveMode::positioning) {
-        const bool rose = sample.homed && bit_was_low;
-        // Which of the two it is after a compensation is not said (7.5).
-        const auto counter = std::int64_t{sample.position_pulses};
-        const bool at_home = std::abs(counter) <= near || std::abs(counter - offset) <= near;
-        const bool held_up = input_active("stop") || input_active("quick_stop");
-        // The shaft follows late: what is measured first is still on the way there (M30).
-        if (!rests_since) rests_since = now;
-        if (sample.homed && !at_home && drive_->position_window() > 0 && now < *rests_since + home_settling)
-          continue;
-        if (rose || (sample.homed && at_home && !held_up)) co_return true;
-        fail_with_stop(*activity, error(Reason::not_reached, "homing ended without reaching home",
-                                        "check the switch, limit and stop terminals"));
-        co_return false;
-      }
-      // The drive zeroes its counter at home: a step that the motor cannot make between two samples is no
-      // travel.
-      const auto step = tracker_.counter() - previous;
-      previous = tracker_.counter();
-      const auto seconds = in_seconds(sample.measured_at - previous_asked);
-      previous_asked = sample.asked_at;
-      if (std::abs(static_cast<double>(step)) > static_cast<double>(near) + (1.1 * fastest * seconds))
-        origin += step;
-      const auto travel = std::abs(scale_.to_units(tracker_.counter()) - scale_.to_units(origin));
-      if (homing.max_travel && travel > *homing.max_travel) {
-        fail_with_stop(*activity, error(Reason::not_reached,
-                                        fmt::format("no switch within max_travel of {} {}; stopped",
-                                                    *homing.max_travel, settings_.scale.unit),
-                                        "check the switch and the homing direction"));
-        co_return false;
-      }
-    }
-    // Only who was asked after the window has not started: a silent drive may well run.
-    if (!mode_seen && sample_->asked_at >= start_by) {
-      fail_with_stop(*activity,
-                     error(Reason::did_not_start, "the drive accepted the homing command but does not home",
-                           "check enable, alarm and terminals"));
-      co_return false;
-    }
-    if (now >= latest) {
-      fail_with_stop(*activity, error(Reason::took_too_long, "no switch was found in time; stopped",
-                                      "check the switch, or raise homing: { timeout: ... }"));
-      co_return false;
-    }
+    const bool held_up = input_active("stop") || input_active("quick_stop");
+    const auto state = homing.look({.sample = *sample_, .counter = tracker_.counter(), .held_up = held_up},
+                                   env_.clock->now());
+    if (state == State::home) co_return true;
+    if (state <= State::settling) continue;
+    fail_with_stop(*activity, not_homed(state));
+    co_return false;
+  }
+}
+
+/// Why homing has ended, or was ended, without reaching home.
+Error Axis::not_homed(HomingMachine::State state) const {
+  switch (state) {
+    case HomingMachine::State::did_not_start:
+      return error(Reason::did_not_start, "the drive accepted the homing command but does not home",
+                   "check enable, alarm and terminals");
+    case HomingMachine::State::too_far:
+      return error(Reason::not_reached,
+                   fmt::format("no switch within max_travel of {} {}; stopped",
+                               settings_.homing->max_travel.value_or(0), settings_.scale.unit),
+                   "check the switch and the homing direction");
+    case HomingMachine::State::took_too_long:
+      return error(Reason::took_too_long, "no switch was found in time; stopped",
+                   "check the switch, or raise homing: { timeout: ... }");
+    default:
+      return error(Reason::not_reached, "homing ended without reaching home",
+                   "check the switch, limit and stop terminals");
   }
 }
 

@@ -15,8 +15,6 @@ namespace axisd {
 
 namespace {
 
-/// A drive that was told to start moves within this, or not at all.
-constexpr auto start_window = milliseconds(500);
 /// A drive that cannot be read for so long does not tell any more what became of a command.
 constexpr auto settling_limit = std::chrono::seconds(15);
 
@@ -28,30 +26,35 @@ bool moves(CommandKind kind) {
 
 /// What the run before this one left: a drive that may run, and outcomes that nobody has looked at (M4).
 void Axis::take_over() {
-  unsettled_ = env_.book->take_unsettled(settings_.name);
-  settle_by_ = env_.clock->now() + settling_limit;
-  for (const auto& earlier : unsettled_) {
+  earlier_.take_over(env_.book->take_unsettled(settings_.name), env_.clock->now() + settling_limit);
+  for (const auto& earlier : earlier_.commands()) {
     const auto& command = earlier.command->value();
     log_about_axis(spdlog::level::warn, LogKind::unknown_outcome, settings_,
                    fmt::format("{}: the daemon ended while {} {} was being executed; asking the drive",
                                settings_.name, to_string(command.kind), command.id),
                    command.id);
-    if (moves(command.kind)) stop_owed_ = left_running_ = true;
-    if (command.kind == CommandKind::home) position_unsettled_ = true;
+    if (moves(command.kind)) owe_stop_of_motion();
+    if (command.kind == CommandKind::home) earlier_.doubt();
   }
   if (auto cause = env_.book->take_unknown_outcome(settings_.name)) {
     log_about_axis(spdlog::level::err, LogKind::unknown_outcome, settings_, to_string(*cause));
     fault_ = std::move(cause);
-    stop_owed_ = left_running_ = true;
+    owe_stop_of_motion();
   }
   publish();
 }
 
+/// What runs was begun by a command that has ended.
+void Axis::owe_stop_of_motion() {
+  stop_.owe();
+  stop_.leave_running();
+}
+
 /// Asks a drive that rests what became of what may have been sent to it, before anything in it is changed.
 Task<Result<void>> Axis::settle_earlier() {
-  if (unsettled_.empty()) co_return Result<void>{};
+  if (!earlier_.open()) co_return Result<void>{};
   bool continuous = false;
-  if (const auto& marks = unsettled_.back().note.marks; !marks.empty()) {
+  if (const auto& marks = earlier_.commands().back().note.marks; !marks.empty()) {
     drive_->expect_marks(marks);
     const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
@@ -62,13 +65,13 @@ Task<Result<void>> Axis::settle_earlier() {
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
-  if (closing_) co_return fail(error(Reason::cancelled, "the daemon ends"));
+  if (life_.ends()) co_return fail(error(Reason::cancelled, "the daemon ends"));
   if (found_in_motion()) {
-    stop_owed_ = left_running_ = true;
+    owe_stop_of_motion();
     co_return fail(error(Reason::moving, "it began to move; stopping it", "wait"));
   }
-  for (const auto& earlier : unsettled_) settle_as(earlier, continuous);
-  std::erase_if(unsettled_, [](const Unsettled& earlier) { return earlier.command->has_ended(); });
+  for (const auto& earlier : earlier_.commands()) settle_as(earlier, continuous);
+  earlier_.drop_ended();
   co_return Result<void>{};
 }
 
@@ -121,7 +124,7 @@ void Axis::settle_as(const Unsettled& earlier, bool continuous) {
 
 /// Setting a position sends nothing: it was done if it is what the restart found saved.
 void Axis::settle_positions_set() {
-  for (const auto& earlier : std::exchange(unsettled_, {})) {
+  for (const auto& earlier : earlier_.take_all()) {
     const auto position = earlier.command->value().asked.position.value_or(0);
     const bool kept = tracker_.trust() == PositionTrust::restored;
     if (kept && earlier.tellable && tracker_.offset_for(position) == tracker_.offset())
@@ -134,7 +137,7 @@ void Axis::settle_positions_set() {
 }
 
 void Axis::give_up_settling() {
-  for (const auto& earlier : std::exchange(unsettled_, {}))
+  for (const auto& earlier : earlier_.take_all())
     settle_as_unknown(earlier, "the drive could not be read since");
 }
 
@@ -156,17 +159,14 @@ SendingNote Axis::note_of(const Activity& activity, std::vector<ContinuityMark> 
 /// Makes the command known to a restart, before anything is sent for it that may move. False: the activity
 /// has ended, and nothing was sent.
 Task<bool> Axis::noted(ActivityPtr activity, SendingNote note) {
-  if (std::exchange(activity->noted, true)) co_return true;
-  const bool may_run = std::exchange(activity->may_run, false);  // not before it is known
+  if (!activity->start.note()) co_return true;
   // Shared: the answer may come after this sequence was left.
-  activity->waits_for = StartWait::disk;
   auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
   env_.book->sending(activity->command, std::move(note),
                      [answer](Result<void> result) { answer->set(std::move(result)); });
   const auto durable = co_await answer->get();
   if (!current(*activity)) co_return false;
-  activity->may_run = may_run;
-  activity->waits_for = StartWait::line;
+  activity->start.noted();
   if (durable) co_return true;
   auto cause =
       error(durable.error().reason, "nothing was sent: " + durable.error().message, durable.error().remedy);

@@ -26,13 +26,14 @@ bool may_be_late(CommandKind kind) {
   return kind == CommandKind::disable || kind == CommandKind::reset || kind == CommandKind::set_position;
 }
 
-std::string_view to_string(StartWait wait) {
-  switch (wait) {
-    case StartWait::halt:
+std::string_view to_string(StartMachine::State waits) {
+  switch (waits) {
+    case StartMachine::State::halting:
       return "for the motion before it to end";
-    case StartWait::disk:
+    case StartMachine::State::noting:
+    case StartMachine::State::saving:
       return "for the disk";
-    case StartWait::turn:
+    case StartMachine::State::queued:
       return "for its turn on the line";
     default:
       return "for its line";
@@ -43,20 +44,20 @@ std::string_view to_string(StartWait wait) {
 
 /// It arrived longer ago than it may wait, or its caller has given up. What is buffered may wait.
 bool Axis::too_late(const CommandOptions& options) const {
-  if (options.buffer_mode == BufferMode::buffered && (next_ || activity_)) return false;
+  if (options.buffer_mode == BufferMode::buffered && (buffer_.starts() || activity_)) return false;
   const auto now = env_.clock->now();
   return now > options.call_deadline ||
          (options.arrived != TimePoint{} && now > options.arrived + settings_.start_within);
 }
 
 void Axis::bound_start(const ActivityPtr& activity, bool waited, bool halting) {
-  if (halting) activity->waits_for = StartWait::halt;
+  if (halting) activity->start.wait_for_halt();
   if (may_be_late(activity->command->value().kind)) return;
   const auto& options = activity->options;
   auto since = env_.clock->now();
   if (!waited && options.arrived != TimePoint{}) since = options.arrived;
   auto latest = since + settings_.start_within;
-  if (halting) latest += deceleration_bound() + settings_.stop_margin;
+  if (halting) latest += stop_.deceleration() + settings_.stop_margin;
   if (!waited) latest = std::min(latest, options.call_deadline);
   start_by(activity, since, latest);
 }
@@ -72,7 +73,7 @@ void Axis::start_by(const ActivityPtr& activity, TimePoint since, TimePoint late
 
 /// What is with the bus is ended by its gate.
 void Axis::end_late(Activity& activity) {
-  if (activity.waits_for >= StartWait::line) return;
+  if (!activity.start.waits()) return;
   if (!current(activity)) return;
   revoke_motion();
   auto cause = late(activity, {});
@@ -87,7 +88,7 @@ Error Axis::late(const Activity& activity, Error cause) const {
       error(Reason::expired,
             fmt::format("too late to start: it waited {:.3f} s {}, at most {:.3f} s are allowed "
                         "(start_within{})",
-                        in_seconds(waited), to_string(activity.waits_for),
+                        in_seconds(waited), to_string(activity.start.state()),
                         in_seconds(activity.start_by - activity.waits_since),
                         activity.start_by == activity.options.call_deadline ? ", the call's deadline" : ""),
             "repeat it, if it is still wanted; if it is often so, look at the load of disk and line");

@@ -9,9 +9,6 @@ namespace axisd {
 
 namespace {
 
-/// As long as run_enable() waits for it.
-constexpr auto enable_shows_within = std::chrono::seconds(1);
-
 /// Ends by itself, where its request said.
 bool is_bounded(CommandKind kind) {
   return kind == CommandKind::home || kind == CommandKind::move_absolute ||
@@ -49,13 +46,13 @@ void Axis::lease_lost(const Error& cause) {
   if (policy == LeaseLoss::disable) {
     // An enable may be on its way to the drive, which then shows it some time later.
     const bool enabling = command != nullptr && command->kind == CommandKind::enable;
-    release_owed_ = env_.clock->now() + (enabling ? enable_shows_within : Duration{});
+    power_.owe_release(env_.clock->now() + (enabling ? EnableMachine::shows_within : Duration{}));
   }
   if (command != nullptr && command->kind == CommandKind::disable) return;  // it needs no lease
   const bool motion = activity_ && activity_->state != AxisState::standstill;
   // What a terminal moves was not commanded under the lease.
-  const bool moves =
-      motion || stopping_.running || stop_owed_ || (sample_ && sample_->moving && !terminal_motion_);
+  const bool moves = motion || stop_.under_way() || stop_.owed() ||
+                     (sample_ && sample_->moving && !terminal_motion_.moves());
   note_motion_to_stop();
   supersede(error(cause.reason, cause.message, cause.remedy));
   release_as_owed();
@@ -66,19 +63,16 @@ void Axis::lease_lost(const Error& cause) {
 /// `on_lease_loss: disable` is done once the drive shows that it is released: whatever comes between (a stop,
 /// silence, an enable that was on its way) only puts it off.
 void Axis::release_as_owed() {
-  if (!release_owed_ || link_ != LinkState::online || activity_ || stop_owed_ || !sample_) return;
-  if (sample_->enabled) {
-    accept_epoch_ = gate_->epoch();
-    (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});
-  } else if (sample_->asked_at >= *release_owed_) {
-    release_owed_.reset();
-  }
+  if (!link_.online() || activity_ || stop_.owed() || !sample_) return;
+  if (!power_.has_to_release(*sample_)) return;
+  accept_epoch_ = gate_->epoch();
+  (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});
 }
 
 /// The drive took part, and is not released: trying again and again would help nobody.
 void Axis::give_up_release(const Error& cause) {
-  if (!release_owed_ || cause.outcome == Outcome::unknown) return;
-  release_owed_.reset();
+  if (!power_.owes_release() || cause.outcome == Outcome::unknown) return;
+  power_.give_up();
   log_about_axis(spdlog::level::err, LogKind::axis_fault, settings_,
                  fmt::format("{}: the lease ended, and the drive was not released: {}", settings_.name,
                              to_string(cause)));

@@ -18,7 +18,7 @@ constexpr auto longest_backoff = milliseconds(1000);
 }  // namespace
 
 Task<> Axis::run() {
-  while (!closing_) {
+  while (!life_.ends()) {
     co_await connect();
     co_await poll();
   }
@@ -28,21 +28,21 @@ Task<> Axis::run() {
 Task<> Axis::connect() {
   Duration backoff = first_backoff;
   bool again = false;
-  while (!closing_ && link_ != LinkState::online) {
+  while (!life_.ends() && !link_.online()) {
     co_await wait_for_port();
     // Both would write to the drive's memory.
-    while (!closing_ && !maintenance_.expired()) co_await wake_.wait_until(env_.clock->now() + first_backoff);
-    if (closing_) co_return;
+    while (!life_.ends() && !maintenance_.expired())
+      co_await wake_.wait_until(env_.clock->now() + first_backoff);
+    if (life_.ends()) co_return;
     // The bus sees to it that repeated silence does not cost the neighbours much.
-    const auto failed_stops = failed_stops_;
+    const auto failed_stops = stop_.failures();
     const auto connected = co_await try_connect(TransactionClass::idle_state, std::exchange(again, true));
-    if (closing_) co_return;
-    if (!connected && failed_stops != failed_stops_) continue;  // with that stop, at once
-    if (connected && !configured_) continue;                    // it was told to begin again meanwhile
+    if (life_.ends()) co_return;
+    if (!connected && failed_stops != stop_.failures()) continue;  // with that stop, at once
+    if (connected && !link_.is_configured()) continue;             // it was told to begin again meanwhile
     if (connected) {
-      link_ = LinkState::online;
-      link_error_.reset();
-      unseen_ends_.reset();
+      link_.connected();
+      shaft_.see();
       watch_continuity();
       log_about_axis(spdlog::level::info, LogKind::axis_online, settings_,
                      fmt::format("{}: online ({} {})", settings_.name, settings_.model,
@@ -51,12 +51,10 @@ Task<> Axis::connect() {
     }
     const bool answers =
         connected.error().reason != Reason::no_reply && connected.error().reason != Reason::bus_down;
-    link_ = answers ? LinkState::configuring : LinkState::offline;
-    if (!link_error_ || link_error_->reason != connected.error().reason)
+    if (link_.failed(connected.error(), answers))
       log_about_axis(spdlog::level::warn, answers ? LogKind::axis_trouble : LogKind::axis_offline, settings_,
                      fmt::format("{}: {}", settings_.name, to_string(connected.error())));
-    link_error_ = connected.error();
-    if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
+    if (earlier_.overdue(env_.clock->now())) give_up_settling();
     publish();
     // What the bus holds back goes out as soon as anything of the node is heard: it should be there by then.
     const auto pause = env_.bus->holds_back(settings_.node) ? Duration(first_backoff) : backoff;
@@ -68,11 +66,10 @@ Task<> Axis::connect() {
 }
 
 Task<> Axis::wait_for_port() {
-  while (!closing_ && !env_.bus->port().open) {
-    link_ = LinkState::offline;
-    link_error_ = env_.bus->port().error.value_or(
-        error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists"));
-    if (!unsettled_.empty() && env_.clock->now() >= settle_by_) give_up_settling();
+  while (!life_.ends() && !env_.bus->port().open) {
+    link_.port_closed(env_.bus->port().error.value_or(
+        error(Reason::bus_down, "the port is being opened", "it is opened as soon as it exists")));
+    if (earlier_.overdue(env_.clock->now())) give_up_settling();
     publish();
     co_await env_.bus->port_changed().wait_until(env_.clock->now() + longest_backoff);
   }
@@ -80,25 +77,21 @@ Task<> Axis::wait_for_port() {
 
 Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   // A stop that fails from here on is not the one that is sent here: this attempt is given up for it.
-  const auto failed_stops = failed_stops_;
+  const auto failed_stops = stop_.failures();
   const auto stop_failed = [&]() -> Result<void> {
-    if (failed_stops == failed_stops_) return {};
+    if (failed_stops == stop_.failures()) return {};
     return fail(error(Reason::no_reply, "a stop failed while the drive was being connected",
                       "it is sent before anything else"));
   };
-  if (stop_owed_) {
+  if (stop_.owed()) {
     // Whatever the drive is doing now, the first frame it gets is a stop (M4).
     const auto stopped = co_await (again ? drive_->repeat_stop() : drive_->stop(StopKind::stop));
     if (!stopped) co_return stopped;
   }
   auto identity = co_await drive_->identify(contact);
   if (!identity) co_return fail(identity.error());
-  if (closing_) co_return fail(ending());
-  if (link_ != LinkState::configuring) {
-    link_ = LinkState::configuring;
-    link_error_.reset();
-    publish();
-  }
+  if (life_.ends()) co_return fail(ending());
+  if (link_.answers()) publish();
   identity_ = std::move(*identity);
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
@@ -106,7 +99,7 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
   if (may_have_been_stopped_abruptly()) lose_trust();
   if (auto failed = stop_failed(); !failed) co_return failed;
   if (const auto settled = co_await settle_found_motion(); !settled) co_return settled;
-  if (closing_) co_return fail(ending());
+  if (life_.ends()) co_return fail(ending());
   if (const auto ready = co_await prove_or_configure(); !ready) co_return ready;
   co_return stop_failed();
 }
@@ -115,63 +108,64 @@ Task<Result<void>> Axis::try_connect(TransactionClass contact, bool again) {
 /// loses steps (M20). Not so where it rests at its target, or has not left, or still runs as it did.
 bool Axis::may_have_been_stopped_abruptly() const {
   // A drive that shows no inputs may have limits all the same.
-  const bool by_terminal = descriptor_->inputs.empty() || has_input("positive_limit") ||
-                           has_input("negative_limit") || has_input("quick_stop");
-  if (drive_->closed_loop() || !unseen_ends_ || !by_terminal) return false;
+  const bool by_terminal = descriptor_->inputs.empty() || terminals_.has("positive_limit") ||
+                           terminals_.has("negative_limit") || terminals_.has("quick_stop");
+  if (drive_->closed_loop() || shaft_.undisturbed_at(tracker_.counter()) || !by_terminal) return false;
   const bool runs_on =
-      sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_owed_;
-  return !runs_on && std::ranges::find(*unseen_ends_, tracker_.counter()) == unseen_ends_->end();
+      sample_->moving && sample_->mode == DriveMode::positioning && !may_move_by_itself() && stop_.owed();
+  return !runs_on;
 }
 
 /// Where the drive may be found at rest, if nothing stops it on its way.
-void Axis::note_unseen_ends() {
-  auto& ends = unseen_ends_.emplace();
+std::vector<std::int64_t> Axis::unseen_ends() const {
+  std::vector<std::int64_t> ends;
   if (sample_ && !sample_->moving) ends.push_back(tracker_.counter());
-  if (activity_ && activity_->may_run && activity_->plan.target)
+  if (activity_ && activity_->start.may_run() && activity_->plan.target)
     ends.push_back(activity_->plan.target->counter);
+  return ends;
 }
 
 /// Within homing the motor rests between its phases, and goes on.
 bool Axis::found_in_motion() const { return sample_->moving || sample_->mode == DriveMode::homing; }
 
 bool Axis::found_by_terminal() const {
-  return !stop_owed_ && (sample_->mode >= DriveMode::multi_position || drive_->moves_by_itself() ||
-                         (sample_->mode == DriveMode::homing && input_active("homing_start")));
+  return !stop_.owed() && (sample_->mode >= DriveMode::multi_position || drive_->moves_by_itself() ||
+                           (sample_->mode == DriveMode::homing && input_active("homing_start")));
 }
 
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
-  std::string_view found = stop_owed_ ? "the stop that was owed to it was sent, and it came to rest" : "";
+  std::string_view found = stop_.owed() ? "the stop that was owed to it was sent, and it came to rest" : "";
   if (found_in_motion() && !found_by_terminal()) {
-    if (!stop_owed_ && sample_->moving) {  // else it may rest between the phases of homing, or for good
+    if (!stop_.owed() && sample_->moving) {  // else it may rest between the phases of homing, or for good
       log_about_axis(spdlog::level::warn, LogKind::moving_without_command, settings_,
                      fmt::format("{}: found moving; stopping it", settings_.name));
       found = "it was found moving, was stopped, and came to rest";
     }
-    stop_owed_ = true;
+    stop_.owe();
     bool rests = false;
     for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
       const auto sent = co_await drive_->stop(kind);
       const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
       if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
       if (!sent) co_return sent;
-      const auto deadline = env_.clock->now() + deceleration_bound() + settings_.stop_margin;
-      rests = co_await standstill_unpolled(deadline, std::nullopt);
+      const auto deadline = env_.clock->now() + stop_.deceleration() + settings_.stop_margin;
+      rests = co_await standstill_unpolled(deadline, false);
       if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
         co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",
                              "check power and wiring"));
-      if (rests || closing_) break;
+      if (rests || life_.ends()) break;
     }
     if (!rests) {
-      if (settings_.stop_escalation_release && !closing_) co_await drive_->disable({});
+      if (settings_.stop_escalation_release && !life_.ends()) co_await drive_->disable({});
       co_return fail(error(Reason::not_confirmed, "found moving, and it does not stop",
                            "look at the machine; cut its power if it moves"));
     }
   }
-  stop_owed_ = left_running_ = false;
+  stop_.pay();
   if (!found.empty()) {
     spdlog::info("{}: {}", settings_.name, found);
-    if (env_.event) env_.event(settings_.name, LinkChange{.to = link_, .detail = std::string(found)});
+    if (env_.event) env_.event(settings_.name, LinkChange{.to = link_.shown(), .detail = std::string(found)});
   }
   co_return Result<void>{};
 }
@@ -181,58 +175,24 @@ Error Axis::ending() const { return error(Reason::cancelled, "the axis is being 
 
 Task<Result<void>> Axis::prove_or_configure() {
   if (const auto settled = co_await settle_earlier(); !settled) co_return settled;
-  std::optional<OffsetRecord> stored;
-  if (!configured_ && !restore_tried_ && env_.persistence != nullptr) {
-    const auto& axes = env_.persistence->current().axes;
-    if (const auto found = axes.find(settings_.name); found != axes.end()) stored = found->second.offset;
-  }
-  bool restorable = false;
-  if (stored) {
-    const auto& record = *stored;
-    restorable = !position_unsettled_ && !terminal_may_void_position() &&
-                 record.trust != PositionTrust::unknown && record.invert == settings_.scale.invert &&
-                 record.pulses_per_revolution == settings_.scale.pulses_per_revolution &&
-                 !moved_from(tracker_.counter() - sample_->position_pulses + record.last_position_pulses) &&
-                 (sample_->enabled || counts_while_released());
-    if (restorable) drive_->expect_marks({record.canary});
-  }
-  const auto void_record = [this] {  // what it says may come true again by chance, but never by right
-    restore_tried_ = true;
-    env_.persistence->forget_offset(settings_.name, {});
-  };
-  if (stored && !restorable) void_record();
-  if (configured_ || restorable) {
+  auto restorable = restorable_position();
+  if (link_.is_configured() || restorable) {
     const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
-    if (!proof && configured_) on_reboot(proof.error());
-    if (!proof && restorable) void_record();
-    if (!proof) restorable = false;
-    if (closing_) co_return fail(ending());
+    if (!proof && link_.is_configured()) on_reboot(proof.error());
+    if (!proof && restorable) void_saved_position();
+    if (!proof) restorable.reset();
+    if (life_.ends()) co_return fail(ending());
   }
-  if (!configured_) {
-    // A terminal's motion is not disturbed by writing parameters under it.
-    if (sample_->moving || (found_in_motion() && found_by_terminal()))
-      co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
-    const auto configured = co_await drive_->configure();
-    if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
-    if (!configured) co_return configured;
-    if (closing_) co_return fail(ending());
-    configured_ = true;
-    continuity_checked_ = env_.clock->now();
-    restore_tried_ = true;
-    drift_checked_ = env_.clock->now();
-    set_drift({});
-    if (restorable) {
-      tracker_.restore(stored->offset_pulses);
-      remember_position();
-    }
+  if (!link_.is_configured()) {
+    if (const auto configured = co_await configure(restorable); !configured) co_return configured;
   } else if (const auto checked = co_await check_for_drift(); !checked) {
     co_return checked;  // somebody may have changed it while it was out of reach
   }
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   // Where replies are lost all this may have taken long, and the drive may have been restarted meanwhile.
-  if (sample->asked_at - continuity_checked_ > continuity_forgotten) {
+  if (continuity_.forgotten(sample->asked_at)) {
     const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason == Reason::rebooted) on_reboot(proof.error());
     if (!proof) co_return proof;
@@ -242,11 +202,62 @@ Task<Result<void>> Axis::prove_or_configure() {
   co_return Result<void>{};
 }
 
+/// The position that an earlier run of the daemon saved, if it still holds should the drive prove that it
+/// kept its memory since. Else it is voided.
+std::optional<OffsetRecord> Axis::restorable_position() {
+  using Position = EarlierRun::Position;
+  if (link_.is_configured() || earlier_.position() == Position::tried || env_.persistence == nullptr)
+    return std::nullopt;
+  const auto& axes = env_.persistence->current().axes;
+  const auto found = axes.find(settings_.name);
+  const auto record = found == axes.end() ? std::nullopt : found->second.offset;
+  if (!record) return std::nullopt;
+  const bool restorable =
+      earlier_.position() == Position::saved && !terminal_may_void_position() &&
+      record->trust != PositionTrust::unknown && record->invert == settings_.scale.invert &&
+      record->pulses_per_revolution == settings_.scale.pulses_per_revolution &&
+      !moved_from(tracker_.counter() - sample_->position_pulses + record->last_position_pulses) &&
+      (sample_->enabled || counts_while_released());
+  if (!restorable) {
+    void_saved_position();
+    return std::nullopt;
+  }
+  drive_->expect_marks({record->canary});
+  return record;
+}
+
+/// What it says may come true again by chance, but never by right.
+void Axis::void_saved_position() {
+  earlier_.tried();
+  env_.persistence->forget_offset(settings_.name, {});
+}
+
+/// `restorable`: takes that position over.
+Task<Result<void>> Axis::configure(std::optional<OffsetRecord> restorable) {
+  // A terminal's motion is not disturbed by writing parameters under it.
+  if (sample_->moving || (found_in_motion() && found_by_terminal()))
+    co_return fail(error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
+  const auto configured = co_await drive_->configure();
+  if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
+  if (!configured) co_return configured;
+  if (life_.ends()) co_return fail(ending());
+  link_.configured();
+  continuity_.proven(env_.clock->now());
+  earlier_.tried();
+  drift_.checked(env_.clock->now());
+  set_drift({});
+  if (restorable) {
+    tracker_.restore(restorable->offset_pulses);
+    remember_position();
+  }
+  co_return Result<void>{};
+}
+
 Result<std::shared_ptr<void>> Axis::begin_maintenance() {
   if (auto online = check_online(); !online) return fail(online.error());
   if (!maintenance_.expired() || activity_)
     return fail(error(Reason::busy, "something else is being done to the drive", "wait for it"));
-  if (!at_rest() || terminal_motion_)
+  if (!at_rest() || terminal_motion_.moves())
     return fail(error(Reason::moving, "the axis moves", "wait for standstill"));
   if (!sample_ || sample_->enabled)
     return fail(error(Reason::moving, "the power stage is on: what is written could move the motor",
@@ -258,9 +269,7 @@ Result<std::shared_ptr<void>> Axis::begin_maintenance() {
 
 void Axis::reconfigure(const std::string& why, bool position_lost) {
   spdlog::info("{}: applying the configuration again: {}", settings_.name, why);
-  configured_ = false;
-  link_ = LinkState::configuring;
-  link_error_ = error(Reason::configuring, "the configuration is applied again: " + why, "wait");
+  link_.reconfigure(error(Reason::configuring, "the configuration is applied again: " + why, "wait"));
   if (position_lost) {
     lose_trust();
     tracker_.forget_base();
@@ -271,27 +280,25 @@ void Axis::reconfigure(const std::string& why, bool position_lost) {
 }
 
 void Axis::bus_lost(Error cause) {
-  if (link_ != LinkState::online) return;  // whatever is under way fails by itself, and is repeated
-  bus_loss_ = std::move(cause);
+  if (!link_.bus_lost(std::move(cause))) return;
   // The others of its group look at its gate.
   if (activity_ && activity_->state == AxisState::synchronized_motion) gate_->raise();
   wake();
 }
 
 void Axis::go_offline(const Error& cause) {
-  bus_loss_.reset();
+  link_.forget_bus_loss();
   if (terminal_may_void_position()) lose_trust();
   log_about_axis(spdlog::level::warn, LogKind::axis_offline, settings_,
                  fmt::format("{}: offline: {}", settings_.name, to_string(cause)));
-  link_ = LinkState::offline;
-  link_error_ = cause;
+  link_.lost(cause);
   revoke_motion();
   env_.bus->give_up_readings(settings_.node);
-  const bool moved = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
-                     terminal_motion_ || (sample_ && sample_->moving);
+  const bool moved = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
+                     terminal_motion_.moves() || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
-  if (moved) stop_owed_ = true;
-  note_unseen_ends();
+  if (moved) stop_.owe();
+  shaft_.lose_sight(unseen_ends());
   if (auto activity = take_activity()) {
     auto unknown = error(Reason::offline, "the drive stopped answering while the command was being executed",
                          "check power and wiring; then reset the axis");
@@ -302,7 +309,7 @@ void Axis::go_offline(const Error& cause) {
     drop_buffer(unknown);
   }
   tracker_.forget_base();  // nobody sees whether somebody turns it
-  terminal_motion_ = false;
+  terminal_motion_.lost();
   publish();
   sampled_.notify_all();
   wake();
@@ -311,15 +318,12 @@ void Axis::go_offline(const Error& cause) {
 void Axis::on_reboot(const Error& cause) {
   log_about_axis(spdlog::level::warn, LogKind::axis_rebooted, settings_,
                  fmt::format("{}: {}", settings_.name, to_string(cause)));
-  ++reboots_;
-  configured_ = false;
-  enabled_by_us_ = false;
-  link_ = LinkState::configuring;
-  link_error_ = cause;
+  link_.restarted(cause);
+  power_.restarted();
   auto told = cause;
-  if (activity_ && activity_->may_run) told.outcome = Outcome::unknown;  // it may have started before
+  if (activity_ && activity_->start.may_run()) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);
-  left_running_ = false;
+  stop_.restarted();
   lose_trust();
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();

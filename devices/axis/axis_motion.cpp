@@ -13,26 +13,6 @@
 
 namespace axisd {
 
-namespace {
-
-/// A drive that was told to start is expected to move within this.
-constexpr auto start_window = milliseconds(500);
-/// Beyond the predicted time: the prediction is exact for the profile, the drive's own latency is unknown.
-constexpr auto overrun_margin = std::chrono::seconds(1);
-/// So long after the predicted end it is looked for as fast as the bus can.
-constexpr auto end_window = milliseconds(300);
-/// And from so long before, at most, and a part of the way's time: a drive has a clock of its own.
-constexpr Duration longest_end_lead = milliseconds(10);
-constexpr int end_lead_share = 32;
-/// So long after a start nothing is asked, at most, so that canaries come in time (M7).
-constexpr Duration longest_quiet = milliseconds(100);
-/// So long a proof at the target may take before its axis is read again.
-constexpr Duration proof_patience = milliseconds(20);
-/// A motion that no sample can tell from noise is over so long after its predicted end.
-constexpr auto unseen_margin = milliseconds(100);
-
-}  // namespace
-
 bool Axis::current(const Activity& activity) const {
   return activity_.get() == &activity && gate_->epoch() == activity.epoch;
 }
@@ -114,7 +94,7 @@ void Axis::enter_error_stop(const Error& cause) {
 Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience) {
   const auto deadline = env_.clock->now() + patience;
   wake();
-  while (env_.clock->now() < deadline && link_ != LinkState::offline) {
+  while (env_.clock->now() < deadline && !link_.offline()) {
     if (sample_ && sample_->asked_at >= since) co_return *sample_;
     co_await sampled_.wait_until(deadline);
   }
@@ -123,14 +103,13 @@ Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience)
 
 /// Lets a halt in progress end. False: no longer current.
 Task<bool> Axis::reach_standstill(ActivityPtr activity) {
-  while (stopping_.running && current(*activity)) co_await stopped_.wait();
+  while (stop_.under_way() && current(*activity)) co_await stopped_.wait();
   if (!current(*activity)) co_return false;
   if (fault_) {
     finish(*activity, [this](CommandRecord& command) { command.error(*fault_); });
     co_return false;
   }
-  activity->may_run = true;
-  activity->waits_for = StartWait::line;
+  activity->start.standstill();
   co_return true;
 }
 
@@ -165,14 +144,12 @@ bool Axis::may_start(Activity& activity) {
 Task<bool> Axis::take_turn(ActivityPtr activity) {
   auto* turns = env_.bus->start_turns();
   if (turns == nullptr) co_return true;
-  const bool may_run = std::exchange(activity->may_run, false);
-  activity->waits_for = StartWait::turn;
+  activity->start.queue();
   if (!activity->turn) activity->turn = turns->announce();
   co_await turns->take(activity->turn);
   if (!current(*activity)) co_return false;
   had_turn_ = env_.clock->now();
-  activity->may_run = may_run;
-  activity->waits_for = StartWait::line;
+  activity->start.has_turn();
   co_return true;
 }
 
@@ -221,69 +198,8 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   co_return (co_await arrived(activity, base, since)).has_value();
 }
 
-/// When a motion was read at rest at its target, and not too fast, by the drive that began it. Nothing: the
-/// activity has ended otherwise.
-Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t base, TimePoint since) {
-  for (;;) {
-    if (!co_await follow(activity, base, since)) co_return std::nullopt;
-    const auto when = sample_->measured_at;
-    if (!co_await is_no_reboot(activity)) co_return std::nullopt;
-    // While its proof was waited for a terminal may have begun another motion.
-    if (sample_->moving || sample_->mode != DriveMode::positioning || !is_at(*activity->plan.target))
-      continue;
-    if (watch_speed(SpeedWatch::Event::arrived)) co_return std::nullopt;
-    co_return when;
-  }
-}
-
 bool Axis::is_at(const PositionTracker::Target& target) const {
   return std::abs(tracker_.counter() - target.counter) <= target_tolerance();
-}
-
-/// A drive that was restarted, on the way or before, shows the counter 0: only where the reading at the
-/// target could be that, too, it has to prove that it is the same one.
-Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
-  if (sample_ && drive_->rules_out_restart(*sample_)) co_return true;
-  keep_quiet(env_.clock->now() + std::min<Duration>(settings_.poll_moving, proof_patience));
-  co_return co_await proven_continuous(activity);
-}
-
-/// Nothing was sent, as the axis rested at its target when it was read: what a terminal did since is looked
-/// for before it is called Done. False: the activity has ended.
-Task<bool> Axis::still_there(ActivityPtr activity) {
-  if (!may_move_by_itself()) co_return true;
-  const auto since = env_.clock->now();
-  while (!sample_ || sample_->asked_at < since) {
-    wake();
-    co_await sampled_.wait_until(env_.clock->now() + milliseconds(50));
-    if (!current(*activity)) co_return false;  // offline, too
-  }
-  if (!found_in_motion() && is_at(*activity->plan.target)) co_return true;
-  auto cause = error(Reason::moving, "the shaft was moved while the axis rested at its target",
-                     "see what moves it; then repeat the move");
-  cause.outcome = Outcome::not_executed;
-  tell_part(*activity, cause);
-  finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
-  co_return false;
-}
-
-/// The drive was not restarted since its parameters were last written: the canary is read until it answers.
-/// False: the activity has ended.
-Task<bool> Axis::proven_continuous(ActivityPtr activity) {
-  Result<void> proof;
-  do {
-    proof = co_await prove_continuity(TransactionClass::moving_state);
-    if (!current(*activity)) co_return false;  // offline, too
-  } while (!proof && proof.error().reason == Reason::no_reply);
-  if (proof) co_return true;
-  if (proof.error().reason == Reason::rebooted) {
-    on_reboot(proof.error());
-  } else {
-    auto cause = proof.error();
-    cause.outcome = Outcome::unknown;
-    fail_with_stop(*activity, std::move(cause));
-  }
-  co_return false;
 }
 
 Duration Axis::settling() const {
@@ -338,6 +254,7 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
   result ? activity->turn.done() : activity->turn.leave();
   const auto since = env_.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
+  activity->motion = followed(activity->plan, base, since);
   co_await follow(activity, base, since);
 }
 
@@ -352,12 +269,11 @@ void Axis::end_unsent(Activity& activity, Error cause) {
 /// again: the drive is read back until it shows what it did (M8).
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
   if (!current(*activity)) co_return false;
-  if (result || result.error().outcome == Outcome::unknown) activity->waits_for = StartWait::begun;
+  if (result || result.error().outcome == Outcome::unknown) activity->start.begun();
   watch_speed(SpeedWatch::Event::begun);
   if (result) {
     // A proof was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.
-    const auto proven = drive_->proven_at().value_or(since - 2 * settings_.reboot_guard);
-    continuity_checked_ = std::max(continuity_checked_, proven);
+    continuity_.proven(drive_->proven_at().value_or(since - 2 * settings_.reboot_guard));
     activity->command->activate();
     publish();
     co_return true;
@@ -376,162 +292,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
     end_unsent(*activity, cause);
     co_return false;
   }
-  const auto deadline = since + start_window;
-  while (env_.clock->now() < deadline || !sample_ || sample_->asked_at < deadline) {
-    wake();
-    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(50)));
-    if (!current(*activity)) {  // offline, too: then the command has ended as unknown
-      ++unknown_starts_.unresolved;
-      co_return false;
-    }
-    if (sample_->asked_at >= since &&
-        (sample_->moving || moved_from(base) || sample_->mode != DriveMode::positioning)) {
-      ++unknown_starts_.executed;
-      activity->command->activate();
-      publish();
-      co_return true;
-    }
-  }
-  // Its standstill is no proof: a restart would have ended a motion, too.
-  if (!co_await proven_continuous(activity)) {
-    ++unknown_starts_.unresolved;
-    co_return false;
-  }
-  // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
-  // as it began, or the way is too short to be seen.
-  const bool may_end_it = has_input("motor_free") || has_input("stop") || has_input("quick_stop");
-  const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
-  if (may_end_it || (moves_to_a_target && !shows(activity->plan, base))) {
-    ++unknown_starts_.unresolved;
-    fail_with_stop(*activity, std::move(cause));
-    co_return false;
-  }
-  ++unknown_starts_.not_executed;
-  cause.outcome = Outcome::not_executed;
-  cause.message =
-      fmt::format("{}: the start frame {}, and the drive did not move: {}", settings_.name,
-                  cause.reason == Reason::refused ? "was refused" : "got no reply", cause.message);
-  tell_part(*activity, cause);
-  fail_with_stop(*activity, std::move(cause));
-  co_return false;
-}
-
-/// A position tells whether the motion was executed.
-bool Axis::shows(const Plan& plan, std::int64_t base) const {
-  const auto window = drive_->position_window();
-  return window == 0 || std::abs(plan.target->counter - base) > window;
-}
-
-/// At rest, and not at the target.
-bool Axis::held_back(const Plan& plan) const {
-  return limit_active(plan.positive) || input_active("stop") || input_active("quick_stop");
-}
-
-/// When a motion is read that was acknowledged at `since`: its end is to be told at once, and before it has
-/// something to tell the line is left to others.
-void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
-  auto quiet = std::min<Duration>(settings_.poll_moving, longest_quiet);
-  if (!plan.endless) {
-    const auto soonest = planner_.soonest(plan, plan.target->counter - base);
-    const auto lead = std::min(soonest / end_lead_share, longest_end_lead);
-    quiet = std::min(quiet, soonest - lead);
-    poll_fast(since + soonest - lead, plan.predicted - soonest + lead + end_window);
-  }
-  keep_quiet(since + quiet);
-}
-
-/// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended
-/// otherwise.
-Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since) {
-  const auto& plan = activity->plan;
-  const auto latest =
-      plan.endless ? TimePoint::max() : since + plan.predicted + plan.predicted / 4 + overrun_margin;
-  const bool unseen = !plan.endless && !shows(plan, base);
-  std::optional<TimePoint> resting_since;
-  expect_end(plan, base, since);
-  for (;;) {
-    const auto deadline = std::min(activity->hold_until.value_or(latest), latest);
-    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(20)));
-    if (!current(*activity)) co_return false;
-    const auto now = env_.clock->now();
-    if (activity->hold_until && now >= *activity->hold_until) {
-      note_motion_to_stop();
-      revoke_motion();
-      leave_running(*activity);
-      begin_stop(StopKind::halt, nullptr);
-      auto cause =
-          error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");
-      finish(*activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
-      co_return false;
-    }
-    if (sample_ && sample_->asked_at >= since) {
-      const auto& sample = *sample_;
-      if (!activity->started && (sample.moving || moved_from(base))) {
-        activity->started = true;
-        resting_since.reset();  // what rested before it began says nothing of its settling
-      }
-      // Its motion was acknowledged, and may have begun and ended between two samples.
-      if (unseen && sample.asked_at >= since + plan.predicted + unseen_margin && !held_back(plan))
-        activity->started = true;
-      if (sample.mode != DriveMode::positioning) {
-        fail_with_stop(*activity, error(Reason::terminal, "a terminal of the drive took over the motion",
-                                        "check the terminals"));
-        co_return false;
-      }
-      if (!sample.moving) {
-        // Before it moved it may rest within the tolerance, too.
-        const bool there = !plan.endless && is_at(*plan.target);
-        if (there && activity->started) co_return true;
-        if (!resting_since) resting_since = sample.asked_at;
-        const bool settles = !held_back(plan) && sample.asked_at - *resting_since < settling();
-        if (activity->started && !settles && judge_rest(*activity)) co_return false;
-      } else {
-        resting_since.reset();
-      }
-    }
-    // Only who was asked after the window and still rests has not started: a silent drive may well run.
-    if (!activity->started && sample_ && sample_->asked_at >= since + start_window) {
-      fail_with_stop(*activity, error(Reason::did_not_start, "the drive accepted the start but does not move",
-                                      "check limit and stop terminals, enable and alarm"));
-      co_return false;
-    }
-    if (sample_ && sample_->asked_at >= latest) {
-      fail_with_stop(*activity,
-                     error(Reason::took_too_long, "the motion takes longer than predicted; stopped",
-                           "check the load, and other masters on the bus"));
-      co_return false;
-    }
-  }
-}
-
-/// The drive rests, but not at the target: says why, and ends the activity.
-bool Axis::judge_rest(Activity& activity) {
-  const auto positive = activity.plan.positive;
-  if (limit_active(positive)) {
-    if (!drive_->closed_loop()) lose_trust();  // the overtravel stop has no ramp (M20)
-    abort_at_rest(activity, error(Reason::limit_switch,
-                                  fmt::format("the {} limit switch ended the motion",
-                                              positive ? "positive" : "negative"),
-                                  "move away from it; home the axis"));
-    return true;
-  }
-  const bool terminal = input_active("stop") || input_active("quick_stop");
-  // Without a ramp an open loop may have lost steps (M20). A short pulse at a terminal, or another master,
-  // leaves nothing by which to tell the kind of stop.
-  if (!drive_->closed_loop() && !input_active("stop")) lose_trust();
-  auto cause =
-      terminal
-          ? error(Reason::terminal, "a stop terminal of the drive ended the motion", "check the terminals")
-          : error(
-                Reason::not_reached,
-                fmt::format("the drive came to rest at {:.6g} {}", tracker_.position(), settings_.scale.unit),
-                "check terminals, and other masters on the bus");
-  if (terminal) {
-    abort_at_rest(activity, std::move(cause));
-  } else {
-    fail_with_stop(activity, std::move(cause));
-  }
-  return true;
+  co_return co_await read_back(activity, std::move(cause), base, since);
 }
 
 }  // namespace axisd

@@ -9,38 +9,19 @@ namespace axisd {
 namespace {
 
 constexpr int attempts_before_offline = 3;
-constexpr auto continuity_latest = milliseconds(950);
-/// M7.
-constexpr auto continuity_every = milliseconds(1000);
-/// At rest nothing is lost where it is asked for in good time: something else may need the line just then.
-constexpr auto continuity_latest_at_rest = milliseconds(850);
-/// Sooner it is not asked for, however well it would fit between two readings.
-constexpr auto continuity_soonest = milliseconds(700);
-/// However long others have kept the line.
-constexpr auto continuity_soonest_of_all = milliseconds(200);
-/// So long after its reply, at most, a bus tells of a reading that it repeats: others are carried out behind
-/// it, and the last of them may have no answer.
-constexpr auto told_late = milliseconds(140);
-/// So long a drive may fail to prove that it was not restarted. What it tells of its position is shown as
-/// trusted meanwhile.
-constexpr auto continuity_longest = milliseconds(2500);
-/// How soon the watch looks again at an axis that is beyond it, but is being asked.
-constexpr auto continuity_look = milliseconds(50);
-/// At multiples of this the watch looks at all axes whose time is not near: they wake the core together.
-constexpr Duration continuity_grid = milliseconds(500);
 
 }  // namespace
 
 Task<> Axis::poll() {
   Polling polling;
-  while (link_ == LinkState::online) {
+  while (link_.online()) {
     if (chains_ > 0) {
       co_await wake_.wait();
       continue;
     }
-    if (bus_loss_) co_return go_offline(Error(*bus_loss_));
+    if (link_.bus_loss()) co_return go_offline(Error(*link_.bus_loss()));
     if (keeps_quiet()) {
-      co_await wake_.wait_until(quiet_until_);
+      co_await wake_.wait_until(pace_.quiet_until());
       continue;
     }
     const auto began = env_.clock->now();
@@ -50,44 +31,36 @@ Task<> Axis::poll() {
     if (works()) {
       // Whoever waits for this sample goes first: it may be the last one that is wanted.
       co_await let_others_run(env_.executor, *env_.clock);
-      if (link_ != LinkState::online || bus_loss_ || chains_ > 0) continue;
+      if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
     const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
-    const auto canary = works() ? continuity_checked_ + continuity_latest : canary_latest();
-    const auto next = std::min(next_poll(asked), canary);
+    const auto next = std::min(pace_.next(asked, works()), continuity_.latest(works()));
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }
 }
 
 /// What was started is not read before. Where starts need no turns a reading costs no other axis anything.
 void Axis::keep_quiet(TimePoint until) {
-  if (env_.bus->start_turns() != nullptr) quiet_until_ = until;
+  if (env_.bus->start_turns() != nullptr) pace_.keep_quiet(until);
 }
 
 /// Whatever stops it is looked after at once.
 bool Axis::keeps_quiet() const {
-  const bool begun = activity_ && activity_->waits_for == StartWait::begun;
-  return begun && !stopping_.running && !stop_owed_ && env_.clock->now() < quiet_until_;
+  const bool begun = activity_ && activity_->start.has_begun();
+  return begun && !stop_.under_way() && !stop_.owed() &&
+         pace_.state(env_.clock->now()) == PollPace::State::quiet;
 }
 
 void Axis::poll_fast(TimePoint from, Duration longest) {
-  fast_from_ = from;
-  fast_until_ = from + longest;
+  pace_.expect(from, longest);
   wake();
-}
-
-TimePoint Axis::next_poll(TimePoint began) const {
-  if (!works()) return began + settings_.poll_idle;
-  if (began >= fast_from_ && began < fast_until_) return began + fastest_poll;
-  const auto next = began + settings_.poll_moving;
-  return began < fast_from_ ? std::min(next, fast_from_) : next;
 }
 
 /// The drive was not restarted since its parameters were last written.
 Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
   auto proof = co_await drive_->check_continuity(priority);
-  if (proof) continuity_checked_ = env_.clock->now();
-  waited_ = waited_ * 3 / 4;  // nobody measures it while the bus repeats nothing
+  if (proof) continuity_.proven(env_.clock->now());
+  continuity_.forget_waits();
   co_return proof;
 }
 
@@ -97,11 +70,10 @@ Task<bool> Axis::poll_once(Polling& polling) {
   Result<void> result;
   const auto now = env_.clock->now();
   // Where an end is awaited the canary waits as long as it may.
-  const bool urgent = now >= fast_from_ && now < fast_until_ && works();
-  const bool asked_in_vain = !urgent && now >= polling.proof_due && continuity_checked_ < polling.proof_due;
-  const bool late = !works() && now >= canary_latest();
-  if (asked_in_vain || late ||
-      now - continuity_checked_ >= (urgent ? continuity_latest : continuity_period)) {
+  const bool urgent = pace_.is_fast(now) && works();
+  using Pace = Continuity::Pace;
+  const auto pace = urgent ? Pace::awaiting_end : works() ? Pace::moving : Pace::at_rest;
+  if (continuity_.is_due(now, pace, polling.proof_due)) {
     result =
         co_await prove_continuity(works() ? TransactionClass::moving_state : TransactionClass::idle_state);
     if (!result && result.error().reason == Reason::rebooted) {
@@ -112,23 +84,23 @@ Task<bool> Axis::poll_once(Polling& polling) {
   if (result) {
     const auto sample = co_await next_sample(polling);
     polling.woken = sample && !*sample;
-    if (polling.woken) co_return link_ == LinkState::online;
+    if (polling.woken) co_return link_.online();
     if (!sample) result = fail(sample.error());
     // Its node was held back: what was proven before that says nothing of it.
-    else if ((*sample)->asked_at - continuity_checked_ > continuity_forgotten)
+    else if (continuity_.forgotten((*sample)->asked_at))
       result = co_await prove_continuity(TransactionClass::moving_state);
     if (result && !seen_again(**sample)) on_sample(**sample);
     if (!result && result.error().reason == Reason::rebooted) {
-      if (link_ == LinkState::online) on_reboot(result.error());
+      if (link_.online()) on_reboot(result.error());
       co_return false;
     }
   }
-  if (link_ != LinkState::online) co_return false;  // a sequence found the reboot first
+  if (!link_.online()) co_return false;  // a sequence found the reboot first
   if (result) {
     polling.failures = 0;
     co_return true;
   }
-  const bool unproven = env_.clock->now() - continuity_checked_ >= continuity_longest;
+  const bool unproven = continuity_.lost(env_.clock->now());
   if (result.error().reason == Reason::bus_down || ++polling.failures >= attempts_before_offline ||
       unproven) {
     go_offline(result.error());
@@ -149,18 +121,18 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
     return goes_on;
   };
   watch.proof_due = [this, &polling](TimePoint next, Duration waited) {
-    waited_ = std::max(waited, waited_ * 3 / 4);  // a canary waits less, a reading behind others' longer
-    return polling.proof_due = canary_due(next);
+    continuity_.waited(waited);
+    return polling.proof_due = continuity_.due_beside(next, settings_.poll_idle);
   };
-  watch.proven = [this](TimePoint at) { continuity_checked_ = std::max(continuity_checked_, at); };
+  watch.proven = [this](TimePoint at) { continuity_.proven(at); };
   co_return co_await drive_->watch_state(std::move(watch));
 }
 
 /// The drive is as it was, and nothing has changed about the axis since it was looked at with that state:
 /// then only the time at which that is known has.
 bool Axis::seen_again(const DriveSample& sample) {
-  if (sample.asked_at - continuity_checked_ > continuity_forgotten) return false;  // to be proven first
-  if (link_ != LinkState::online || revision_ != sampled_revision_ || busy() || release_owed_ || !sample_ ||
+  if (continuity_.forgotten(sample.asked_at)) return false;  // to be proven first
+  if (!link_.online() || revision_ != sampled_revision_ || busy() || power_.owes_release() || !sample_ ||
       note_eeprom_writes() || shown_->link_note != drive_->link_note() ||
       shown_->start_note != drive_->no_common_start())
     return false;
@@ -175,47 +147,30 @@ bool Axis::seen_again(const DriveSample& sample) {
   return true;
 }
 
-/// At rest, so that M7 holds though a reading goes first that waits for the line: twice as long as others did
-/// where all axes ask for their canaries just then, and the canary behind those.
-TimePoint Axis::canary_latest() const {
-  return continuity_checked_ + std::clamp<Duration>(continuity_every - told_late - 3 * waited_,
-                                                    continuity_soonest_of_all, continuity_latest_at_rest);
-}
-
-/// With the last reading that is in time, or between two where they are rare.
-TimePoint Axis::canary_due(TimePoint next_reading) const {
-  const auto latest = canary_latest();
-  if (next_reading > latest) return latest;
-  const bool last_in_time = next_reading + settings_.poll_idle > latest;
-  return last_in_time && next_reading >= continuity_checked_ + continuity_soonest ? next_reading
-                                                                                  : TimePoint::max();
-}
-
 /// The poll loop has nothing to do but to read the state and the canary.
-bool Axis::only_watches() const { return chains_ == 0 && !bus_loss_ && drift_.empty() && !drift_is_next(); }
+bool Axis::only_watches() const {
+  return chains_ == 0 && !link_.bus_loss() && !drift_.drifted() && !drift_is_next();
+}
 
 /// The poll loop has something to look at.
 void Axis::wake() {
   env_.bus->end_repetition(settings_.node);
   // A reading that came due since the stop began is waited for like those before.
-  if (stopping_.running) env_.bus->hasten(settings_.node, TransactionClass::moving_state);
+  if (stop_.under_way()) env_.bus->hasten(settings_.node, TransactionClass::moving_state);
   wake_.notify_all();
 }
 
 /// While its node is held back no request fails, as none is sent: nothing else would tell that nobody has
 /// heard of the drive for so long.
 void Axis::watch_continuity() {
-  if (link_ != LinkState::online) return;
+  if (!link_.online()) return;
   const auto now = env_.clock->now();
-  const auto limit = continuity_checked_ + continuity_longest;
-  if (now >= limit && env_.bus->holds_back(settings_.node)) {
+  if (continuity_.lost(now) && env_.bus->holds_back(settings_.node)) {
     go_offline(error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
                      "check power, wiring, address and baud rate of the node"));
     return;
   }
-  const auto on_grid = limit - limit.time_since_epoch() % continuity_grid;
-  const auto next = on_grid > now ? on_grid : std::max(limit, now + continuity_look);
-  continuity_watch_ = env_.clock->call_at(next, [this] { watch_continuity(); });
+  continuity_watch_ = env_.clock->call_at(continuity_.next_look(now), [this] { watch_continuity(); });
 }
 
 }  // namespace axisd

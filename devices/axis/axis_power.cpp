@@ -19,7 +19,7 @@ constexpr auto sample_patience = std::chrono::seconds(5);
 /// M1, M23: power, or the end of a halt, never moves. Whatever this is, it ends here.
 void Axis::on_turned_by_power(const Error& cause) {
   enter_error_stop(cause);
-  left_running_ = true;
+  stop_.leave_running();
   begin_stop(StopKind::stop, nullptr);
   publish();
 }
@@ -49,31 +49,28 @@ Task<> Axis::run_enable(ActivityPtr activity) {
     co_return;
   }
   activity->command->activate();
-  auto deadline = env_.clock->now() + std::chrono::seconds(1);
+  EnableMachine enable(env_.clock->now(), settings_.brake.release_time);
   const auto before = tracker_.counter();
-  std::optional<TimePoint> open;  // when the drive's brake is (M2)
-  while (env_.clock->now() < deadline) {
+  while (enable.goes_on()) {
     const auto sample = co_await sample_after(env_.clock->now(), sample_patience);
     if (!current(*activity)) co_return;
-    if (!sample) break;
-    if (sample->moving || moved_from(before)) {
-      on_turned_by_power(error(Reason::terminal, "the drive moved when it was enabled",
-                               "check terminals that start motion; then reset the axis"));
-      co_return;
-    }
-    if (sample->enabled) {
-      // The drive opens its brake now; until it is open nothing else is accepted, and nothing may move.
-      if (!open) {
-        open = env_.clock->now() + settings_.brake.release_time;
-        deadline = *open + std::chrono::seconds(1);
-      }
-      if (env_.clock->now() < *open) continue;
-      enabled_by_us_ = true;
-      finish(*activity, [](CommandRecord& command) { command.done(); });
-      co_return;
-    }
+    if (sample)
+      enable.look(*sample, moved_from(before), env_.clock->now());
+    else
+      enable.silent();
   }
-  finish(*activity, [&](CommandRecord& command) {
+  end_enable(*activity, enable.state());
+}
+
+void Axis::end_enable(Activity& activity, EnableMachine::State state) {
+  if (state == EnableMachine::State::turned)
+    return on_turned_by_power(error(Reason::terminal, "the drive moved when it was enabled",
+                                    "check terminals that start motion; then reset the axis"));
+  if (state == EnableMachine::State::on) {
+    power_.enabled();
+    return finish(activity, [](CommandRecord& command) { command.done(); });
+  }
+  finish(activity, [&](CommandRecord& command) {
     command.error(error(Reason::not_confirmed, "the drive does not report its power stage as on",
                         "check terminals with the function motor_free, and alarms"));
   });
@@ -82,9 +79,9 @@ Task<> Axis::run_enable(ActivityPtr activity) {
 Task<> Axis::run_disable(ActivityPtr activity) {
   activity->command->activate();
   // A fault does not stand in the way of releasing: only the motion has to have ended.
-  while (stopping_.running && current(*activity)) co_await stopped_.wait();
+  while (stop_.under_way() && current(*activity)) co_await stopped_.wait();
   if (!current(*activity)) co_return;
-  if (stop_owed_) {
+  if (stop_.owed()) {
     finish(*activity, [&](CommandRecord& command) {
       command.error(error(Reason::not_confirmed, "not released: standstill was not confirmed",
                           "look at the machine; cut its power if it moves"));

@@ -69,12 +69,12 @@ void Axis::look_at_holds(const CommandOptions& options, Obstacles& found) const 
 }
 
 void Axis::look_at_link(Obstacles& found) const {
-  if (reloading_) return found.block(reloading());
-  if (link_ == LinkState::configuring) {
+  if (life_.retired()) return found.block(reloading());
+  if (!link_.online() && !link_.offline()) {
     auto cause = error(Reason::configuring, "the drive is being identified and configured", "wait");
-    if (link_error_) {
-      cause = *link_error_;
-      cause.message = fmt::format("{}: not configured: {}", settings_.name, link_error_->message);
+    if (link_.error()) {
+      cause = *link_.error();
+      cause.message = fmt::format("{}: not configured: {}", settings_.name, link_.error()->message);
       const bool lasting = cause.reason == Reason::wrong_model || cause.reason == Reason::misconfigured ||
                            cause.reason == Reason::eeprom_budget;
       if (!lasting) cause.reason = Reason::configuring;
@@ -82,12 +82,12 @@ void Axis::look_at_link(Obstacles& found) const {
     }
     found.block(std::move(cause));
   }
-  if (link_ != LinkState::offline) return;
+  if (!link_.offline()) return;
   auto silent = error(Reason::offline, "offline", "check power and wiring");
-  if (link_error_) {
-    silent.message += ": " + bare_text(*link_error_, settings_.name);
+  if (const auto& why = link_.error()) {
+    silent.message += ": " + bare_text(*why, settings_.name);
     // Whoever saw it knows best what to do: one remedy, not two.
-    if (!link_error_->remedy.empty()) silent.remedy = link_error_->remedy;
+    if (!why->remedy.empty()) silent.remedy = why->remedy;
   }
   silent.remedy += "; it is retried by itself";
   found.block(std::move(silent));
@@ -108,7 +108,7 @@ void Axis::look_at_link(Obstacles& found) const {
         fmt::format("check its power, address and serial settings; look who answers: axisctl bus scan {}",
                     settings_.bus)));
   }
-  if (stop_owed_)
+  if (stop_.owed())
     found.note(error(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
                      "look at the machine; the stop is the first that the drive gets when it answers"));
 }
@@ -142,24 +142,24 @@ void Axis::look_at_maintenance(Obstacles& found) const {
 }
 
 void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
-  if (reloading_) return found.block(reloading());
+  if (life_.retired()) return found.block(reloading());
   look_at_options(options, found);
   // Stops overtake what waits for the core: their order is that in which they arrived (M14).
-  if (options.arrived != TimePoint{} && options.arrived < stop_arrived_)
+  if (stop_.overtook(options.arrived))
     found.block(
         error(Reason::superseded, "a stop that arrived later was served first", "send a new request"));
   // A stop that the core has not seen yet comes before everything that is accepted now.
   look_at_holds(options, found);
-  if (unheld() && (gate_->stop_pending() || (stopping_.running && stopping_.kind > StopKind::halt)))
+  if (unheld() && stop_.forbids_motion())
     found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   look_at_fault(found);
   look_at_maintenance(found);
-  if (release_owed_)
+  if (power_.owes_release())
     found.block(error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
   found.block_on(check_journal());
-  if (!drift_.empty())
+  if (drift_.drifted())
     found.block(error(
-        Reason::misconfigured, "the drive no longer holds its configuration: " + drift_,
+        Reason::misconfigured, "the drive no longer holds its configuration: " + drift_.text(),
         fmt::format("disable the axis ({}): the configuration is then applied again", shell("disable"))));
   look_at_link(found);
 }
@@ -184,7 +184,7 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
   else if (!sample_->enabled)
     found.block(
         error(Reason::disabled, "the power stage is off", "enable the axis first: " + shell("enable")));
-  if (terminal_motion_)
+  if (terminal_motion_.moves())
     found.block(error(Reason::terminal, "a terminal of the drive moves it",
                       fmt::format("wait, or stop it: {}", shell("stop"))));
   look_at_holding_terminals(holding_functions, found);
@@ -192,9 +192,9 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
 
 /// The drive decides what an active terminal does to a start: worth knowing, but not refused for.
 void Axis::look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const {
-  if (!sample_ || link_ != LinkState::online) return;
+  if (!sample_ || !link_.online()) return;
   for (const auto& input : settings_.inputs)
-    if (std::ranges::find(functions, input.function) != functions.end() && active_in(*sample_, input))
+    if (std::ranges::find(functions, input.function) != functions.end() && terminals_.active(*sample_, input))
       found.note(error(Reason::terminal,
                        fmt::format("terminal {} ({}) is active: the drive may not start, or stop at once",
                                    input.terminal, input.function),
@@ -234,8 +234,8 @@ void Axis::look_at_direction(bool positive, Obstacles& found) const {
 /// M9: a start that is accepted waits for the end of what moves.
 void Axis::look_at_present_motion(Obstacles& found) const {
   if (found.blocked()) return;
-  const bool moves = (activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
-                     (sample_ && sample_->moving && !terminal_motion_);
+  const bool moves = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
+                     (sample_ && sample_->moving && !terminal_motion_.moves());
   const auto executed = activity_ ? fmt::format("{} {}", to_string(activity_->command->value().kind),
                                                 activity_->command->value().id)
                                   : std::string();
@@ -252,7 +252,7 @@ void Axis::look_at_present_motion(Obstacles& found) const {
 /// before.
 void Axis::look_at_line(Obstacles& found) const {
   const auto* turns = env_.bus->start_turns();
-  if (turns == nullptr || next_ || found.blocked()) return;
+  if (turns == nullptr || buffer_.starts() || found.blocked()) return;
   const auto wait = turns->expected_wait();
   const bool lately = env_.clock->now() - had_turn_ < settings_.start_within;
   const auto most = lately ? settings_.start_within / 2 : settings_.start_within * 3 / 4;
@@ -287,7 +287,7 @@ void Axis::look_at(const EnableRequest& /*request*/, const CommandOptions& optio
 /// Also while the drive is not configured: some of its configuration is only written while it is released.
 void Axis::look_at(const DisableRequest& /*request*/, const CommandOptions& /*options*/,
                    Obstacles& found) const {
-  if (link_ == LinkState::offline) look_at_link(found);
+  if (link_.offline()) look_at_link(found);
 }
 
 void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
@@ -332,7 +332,7 @@ void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& opt
   const bool number = std::isfinite(request.distance);
   if (!number)
     found.block(error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
-  if ((activity_ && activity_->state != AxisState::standstill) || stopping_.running ||
+  if ((activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
       (sample_ && sample_->moving))
     found.block(error(Reason::moving, "a relative move needs standstill: its base would be uncertain",
                       "wait for standstill, or move to an absolute position"));
@@ -390,7 +390,7 @@ void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& option
   look_at_options(options, found);
   look_at_link(found);
   look_at_maintenance(found);
-  if (stopping_.running) found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
+  if (stop_.under_way()) found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   if (activity_) found.block(error(Reason::busy, "another command is being executed", "wait for it"));
   if (!sample_ || sample_->alarm_code == 0) return;
   // All others may have lost their cause and wait for this: the drive says whether they have.
@@ -401,7 +401,7 @@ void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& option
 
 void Axis::look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const {
   look_at_readiness(options, found);
-  if (activity_ || stopping_.running || (sample_ && sample_->moving))
+  if (activity_ || stop_.under_way() || (sample_ && sample_->moving))
     found.block(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
   const bool number = scale_.checked_pulses(request.position).has_value();
   if (number && absolute_segments_ && !is_from_home(tracker_.offset_for(request.position)))

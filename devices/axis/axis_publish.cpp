@@ -9,20 +9,6 @@ namespace axisd {
 
 namespace {
 
-std::vector<TerminalState> terminal_states(std::span<const TerminalSpec> terminals,
-                                           const std::vector<TerminalSettings>& settings,
-                                           std::uint32_t bits) {
-  std::vector<TerminalState> states;
-  states.reserve(terminals.size());
-  for (std::size_t i = 0; i < terminals.size(); ++i) {
-    const auto configured = std::ranges::find(settings, terminals[i].name, &TerminalSettings::terminal);
-    states.push_back({.name = std::string(terminals[i].name),
-                      .function = configured == settings.end() ? std::string() : configured->function,
-                      .active = ((bits >> i) & 1U) != 0});
-  }
-  return states;
-}
-
 /// The notes of `now` that `before` does not have: one that comes and goes beside it makes no news of
 /// another.
 std::string new_notes(std::string_view before, std::string_view now) {
@@ -41,19 +27,6 @@ std::string new_notes(std::string_view before, std::string_view now) {
 
 }  // namespace
 
-std::vector<TerminalState> Axis::inputs(std::uint32_t bits) const {
-  auto states = terminal_states(descriptor_->inputs, settings_.inputs, bits);
-  // The drive was given the other level of this one for an inverted axis (drive_setup).
-  if (settings_.scale.invert)
-    for (auto& terminal : states)
-      if (terminal.function == "pv_direction") terminal.active = !terminal.active;
-  return states;
-}
-
-std::vector<TerminalState> Axis::outputs(std::uint32_t bits) const {
-  return terminal_states(descriptor_->outputs, settings_.outputs, bits);
-}
-
 /// M29: the edge lies between the previous sample and this one.
 void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
   if (!env_.event || (before.inputs == now.inputs && before.outputs == now.outputs)) return;
@@ -66,8 +39,8 @@ void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
                                                 .after = env_.clock->wall(before.asked_at),
                                                 .before = env_.clock->wall(now.measured_at)});
   };
-  tell(inputs(before.inputs), inputs(now.inputs));
-  tell(outputs(before.outputs), outputs(now.outputs));
+  tell(terminals_.inputs(before.inputs), terminals_.inputs(now.inputs));
+  tell(terminals_.outputs(before.outputs), terminals_.outputs(now.outputs));
 }
 
 void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
@@ -89,11 +62,11 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
 }
 
 MotionCause Axis::motion_cause() const {
-  if (terminal_motion_) return MotionCause::terminal;
+  if (terminal_motion_.moves()) return MotionCause::terminal;
   if (!sample_ || !sample_->moving) return MotionCause::none;
   if (activity_ && activity_->state != AxisState::standstill) return MotionCause::command;
-  const bool by_terminal = sample_->mode >= DriveMode::multi_position || start_terminal_active(*sample_);
-  return left_running_ && !by_terminal ? MotionCause::command : MotionCause::unknown;
+  const bool by_terminal = sample_->mode >= DriveMode::multi_position || terminals_.start_active(*sample_);
+  return stop_.left_running() && !by_terminal ? MotionCause::command : MotionCause::unknown;
 }
 
 /// False: nothing was written since the last look. Else the next sample is published, whatever it says.
@@ -120,6 +93,42 @@ Result<void> Axis::permit_saves(std::uint64_t saves) {
   return permitted;
 }
 
+void Axis::show_position(AxisSnapshot& shown) const {
+  shown.position = tracker_.position();
+  if (sample_ && sample_->commanded_pulses) {
+    const auto ahead = static_cast<std::int32_t>(static_cast<std::uint32_t>(*sample_->commanded_pulses) -
+                                                 static_cast<std::uint32_t>(sample_->position_pulses));
+    shown.commanded_position = scale_.to_units(tracker_.counter() + tracker_.offset() + ahead);
+    shown.following_error = *shown.commanded_position - shown.position;
+  }
+  if (settings_.scale.modulo) {
+    const auto into_turn = [turn = *settings_.scale.modulo](double position) {
+      return position - std::floor(position / turn) * turn;
+    };
+    shown.position = into_turn(shown.position);
+    if (shown.commanded_position) shown.commanded_position = into_turn(*shown.commanded_position);
+  }
+}
+
+/// What the drive tells of itself.
+void Axis::show_sample(AxisSnapshot& shown) const {
+  const auto bits = sample_.value_or(DriveSample{});
+  shown.inputs = terminals_.inputs(bits.inputs);
+  shown.outputs = terminals_.outputs(bits.outputs);
+  if (!sample_) return;
+  shown.enabled = bits.enabled;
+  // The sign of the speed register is not said; the direction register's is.
+  const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
+  shown.velocity = shaft_.positive() || speed == 0 ? speed : -speed;
+  shown.moving = bits.moving;
+  shown.in_position = bits.in_position;
+  shown.homed = bits.homed;
+  shown.alarm_code = bits.alarm_code;
+  const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*descriptor_, bits.alarm_code);
+  if (alarm != nullptr) shown.alarm_name = alarm->name;
+  shown.sampled.set(bits.asked_at, bits.measured_at, env_.clock->wall(bits.measured_at));
+}
+
 void Axis::publish() {
   note_eeprom_writes();
   auto next = boost::make_shared<AxisSnapshot>();
@@ -131,58 +140,30 @@ void Axis::publish() {
   next->unit = settings_.scale.unit;
   next->simulated = simulated_;
   next->state = state();
-  next->link = link_;
-  next->link_error = link_error_;
+  next->link = link_.shown();
+  next->link_error = link_.error();
   next->link_note = drive_->link_note();
   next->start_note = drive_->no_common_start();
   next->fault = fault_;
   if (env_.holds != nullptr) next->holds = env_.holds->all();
   next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
-  next->enabled_by_us = enabled_by_us_;
+  next->enabled_by_us = power_.enabled_by_us();
   next->trust = tracker_.trust();
   next->position_source = descriptor_->capabilities.position_source;
-  next->position = tracker_.position();
-  if (sample_ && sample_->commanded_pulses) {
-    const auto ahead = static_cast<std::int32_t>(static_cast<std::uint32_t>(*sample_->commanded_pulses) -
-                                                 static_cast<std::uint32_t>(sample_->position_pulses));
-    next->commanded_position = scale_.to_units(tracker_.counter() + tracker_.offset() + ahead);
-    next->following_error = *next->commanded_position - next->position;
-  }
-  if (settings_.scale.modulo) {
-    const auto into_turn = [turn = *settings_.scale.modulo](double position) {
-      return position - std::floor(position / turn) * turn;
-    };
-    next->position = into_turn(next->position);
-    if (next->commanded_position) next->commanded_position = into_turn(*next->commanded_position);
-  }
+  show_position(*next);
   next->identity = identity_;
-  next->reboots = reboots_;
-  next->drift = drift_;
+  next->reboots = link_.restarts();
+  next->drift = drift_.text();
   next->eeprom_writes = eeprom_writes_;
   next->motion_cause = motion_cause();
   if (const auto* lease = env_.leases->find(settings_.name)) next->lease_holder = lease->holder();
   next->revision = ++revision_;
-  next->positive_direction = last_positive_;
+  next->positive_direction = shaft_.positive();
   if (activity_) {
     next->command_id = activity_->command->value().id;
     if (activity_->plan.target) next->target = activity_->plan.target->position;
   }
-  const auto bits = sample_.value_or(DriveSample{});
-  next->inputs = inputs(bits.inputs);
-  next->outputs = outputs(bits.outputs);
-  if (sample_) {
-    next->enabled = bits.enabled;
-    // The sign of the speed register is not said; the direction register's is.
-    const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
-    next->velocity = last_positive_ || speed == 0 ? speed : -speed;
-    next->moving = bits.moving;
-    next->in_position = bits.in_position;
-    next->homed = bits.homed;
-    next->alarm_code = bits.alarm_code;
-    const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*descriptor_, bits.alarm_code);
-    if (alarm != nullptr) next->alarm_name = alarm->name;
-    next->sampled.set(bits.asked_at, bits.measured_at, env_.clock->wall(bits.measured_at));
-  }
+  show_sample(*next);
   shown_ = next;
   const auto before = face_->snapshot.load();
   face_->snapshot.store(next);

@@ -14,32 +14,32 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
   const auto add = [&](Reason reason, std::string message, std::string remedy) {
     found.push_back(error(reason, std::move(message), std::move(remedy)));
   };
-  if (reloading_ || closing_) add(Reason::reloading, "it is being reloaded already", "wait for it");
+  if (life_.ends()) add(Reason::reloading, "it is being reloaded already", "wait for it");
   if (activity_) {
     const auto& command = activity_->command->value();
     add(activity_->state == AxisState::standstill ? Reason::busy : Reason::moving,
         fmt::format("executes {} {}{}", to_string(command.kind), command.id,
                     buffer_.empty() ? "" : fmt::format(", and {} more wait for it", buffer_.size())),
         "wait for its end, or stop it: " + shell("stop"));
-  } else if ((sample_ && sample_->moving && !stop_owed_) || terminal_motion_) {
+  } else if ((sample_ && sample_->moving && !stop_.owed()) || terminal_motion_.moves()) {
     add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + shell("stop"));
   }
-  if (stopping_.running || gate_->stop_pending())
-    add(Reason::stopping, "the axis is stopping", "wait for standstill");
-  if (stop_owed_ && !stopping_.running)
+  if (stop_.coming()) add(Reason::stopping, "the axis is stopping", "wait for standstill");
+  if (stop_.owed() && !stop_.under_way())
     add(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
         "look at the machine; the stop is the first that the drive gets when it answers");
-  if (release_owed_) add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
+  if (power_.owes_release())
+    add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
   if (!maintenance_.expired() || users_.use_count() > 1)
     add(Reason::busy, "the drive's parameters, segments or memory are being worked on", "wait for it");
-  if (!unsettled_.empty())
+  if (earlier_.open())
     add(Reason::busy, "what became of a command of before the daemon's start is not known yet",
         "wait until the drive has been asked");
   // Nobody would look after a drive that is left, and one that stays is not configured under power (M1).
-  if (sample_ && sample_->enabled && (!energised || !drift_.empty()))
+  if (sample_ && sample_->enabled && (!energised || drift_.drifted()))
     add(Reason::busy,
-        link_ == LinkState::online ? "its power stage is on" : "its power stage was on when it was last seen",
-        link_ == LinkState::online
+        link_.online() ? "its power stage is on" : "its power stage was on when it was last seen",
+        link_.online()
             ? "disable it first: " + shell("disable")
             : "look at the machine and let the drive answer; or restart the service with this configuration");
   if (fault_)  // whoever comes after would know nothing of it
@@ -52,9 +52,8 @@ Error Axis::reloading() const {
 }
 
 void Axis::retire(bool position_holds) {
-  reloading_ = true;
-  answered_ = link_ != LinkState::offline;
-  link_error_ = reloading();
+  life_.retire(!link_.offline());
+  link_.explain(reloading());
   if (terminal_may_void_position() || !position_holds) lose_trust();
   if (!position_holds && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
   remember_position();
@@ -63,7 +62,7 @@ void Axis::retire(bool position_holds) {
 }
 
 Result<std::shared_ptr<void>> Axis::use() {
-  if (reloading_) return fail(reloading());
+  if (life_.retired()) return fail(reloading());
   return users_;
 }
 

@@ -31,7 +31,7 @@ Result<CommandPtr> Axis::submit(const Action& action, const CommandOptions& opti
   // Stops and disables are never deduplicated: each one is executed.
   if (std::holds_alternative<StopRequest>(action) || std::holds_alternative<DisableRequest>(action)) {
     gate_->stop_served();
-    stop_arrived_ = std::max(stop_arrived_, options.arrived);
+    stop_.arrived(options.arrived);
     auto always = options;
     always.request_id.clear();
     return std::visit([&](const auto& request) { return accept(request, always); }, action);
@@ -76,8 +76,8 @@ Result<void> Axis::permit(const Request& request, const CommandOptions& options)
 /// Enters a command and makes it the one that is executed; whatever was executed before is aborted and
 /// halted.
 ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan) {
-  const bool waited = next_ != nullptr;
-  auto command = waited ? std::exchange(next_, nullptr) : env_.book->open(settings_.name, action, options);
+  const bool waited = buffer_.starts();
+  auto command = waited ? buffer_.take_starting() : env_.book->open(settings_.name, action, options);
   const auto replaced = activity_;
   const bool moving = (replaced && replaced->state != AxisState::standstill) || (sample_ && sample_->moving);
   note_motion_to_stop();
@@ -85,7 +85,7 @@ ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, Axi
     supersede(error(Reason::superseded,
                     fmt::format("replaced by {} {}", to_string(kind_of(action)), command->value().id)));
   // M9: what a start in motion does is not in the manuals, so the motion is ended first.
-  if (moving && !stopping_.running) begin_stop(StopKind::halt, nullptr);
+  if (moving && !stop_.under_way()) begin_stop(StopKind::halt, nullptr);
   command->grant(plan.granted);
   activity_ = std::make_shared<Activity>(Activity{.command = std::move(command),
                                                   .state = state,
@@ -93,7 +93,7 @@ ActivityPtr Axis::begin(const Action& action, const CommandOptions& options, Axi
                                                   .options = options,
                                                   .plan = std::move(plan)});
   const bool by_own_wish = waited && options.buffer_mode == BufferMode::buffered;
-  bound_start(activity_, by_own_wish, moving || stopping_.running);
+  bound_start(activity_, by_own_wish, moving || stop_.under_way());
   // A group has one for all its members.
   auto* turns = env_.bus->start_turns();
   if (turns != nullptr && state != AxisState::standstill && state != AxisState::synchronized_motion)
@@ -276,7 +276,7 @@ void Axis::execute_stop(const StopRequest& request, const CommandOptions& option
                   fmt::format("{} {} by {}", to_string(command->value().kind), command->value().id,
                               options.client.empty() ? "the daemon" : options.client)));
   // The drive keeps the deceleration that was set before the motion: the answer says which (M12).
-  if (request.kind != StopKind::quick_stop) command->grant({.deceleration_time = deceleration_bound()});
+  if (request.kind != StopKind::quick_stop) command->grant({.deceleration_time = stop_.deceleration()});
   if (options.arrived != TimePoint{}) observed_.stop_requested(options.arrived, request.all);
   begin_stop(request.kind, std::move(command));
   publish();
@@ -300,7 +300,7 @@ Result<CommandPtr> Axis::cancel(const CommandPtr& command, TimePoint arrived) {
   if (cancel_buffered(command)) {
     publish();
   } else if (activity_ && activity_->command == command) {
-    stop_arrived_ = std::max(stop_arrived_, arrived);
+    stop_.arrived(arrived);
     note_motion_to_stop();
     supersede(error(Reason::cancelled, "cancelled by a client"));
     begin_stop(StopKind::halt, nullptr);

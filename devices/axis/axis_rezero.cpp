@@ -18,22 +18,22 @@ constexpr auto zeroing_poll = milliseconds(5);
 Task<Result<void>> Axis::make_room(ActivityPtr activity) {
   if (planner_.reachable(activity->plan.target->counter)) co_return Result<void>{};
   // After it the saved record speaks of another zero, and would fit again where the counter comes by (M20).
-  activity->waits_for = StartWait::disk;
+  activity->start.save();
   if (auto forgotten = co_await forget_saved_position(); !forgotten) co_return forgotten;
   if (!current(*activity)) co_return fail(error(Reason::superseded, "superseded"));
-  activity->waits_for = StartWait::line;
+  activity->start.saved();
   // Not before: who waits for the disk is looked after meanwhile.
   const Chain chain(*this);
   // A sample that was asked for meanwhile may show either counter: none is taken for a motion.
-  rezeroing_ = true;
+  shaft_.begin_rezeroing();
   auto cleared = co_await drive_->clear_position(guard(*activity));
   // Without a reply it may have been cleared: the counter tells, and clearing it twice changes nothing.
   if (!cleared && cleared.error().outcome != Outcome::unknown) {
-    rezeroing_ = false;
+    shaft_.end_rezeroing();
     co_return cleared;
   }
   const bool zero = co_await counter_shows_zero();
-  rezeroing_ = false;
+  shaft_.end_rezeroing();
   if (zero) {
     tracker_.rezero(0);
     activity->plan.target = tracker_.again(*activity->plan.target);

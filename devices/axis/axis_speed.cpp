@@ -46,7 +46,7 @@ bool Axis::watch_speed(SpeedWatch::Event event) {
                                     .measured_at = sample_->measured_at,
                                     .pulses = sample_->position_pulses,
                                     .moving = sample_->moving};
-  const bool under_way = activity_ && activity_->waits_for == StartWait::begun;
+  const bool under_way = activity_ && activity_->start.has_begun();
   if (!under_way) {
     speed_watch_.rest(reading);
     return false;

@@ -13,11 +13,12 @@ namespace axisd {
 
 namespace {
 
-/// A stop without a reply is repeated at once, this often before the motor's state decides.
-constexpr int stop_attempts = 3;
-/// Standstill that no stop was acknowledged before is looked at so often, with further attempts each time:
-/// what rests by itself is not what was asked for. After that the drive simply does not acknowledge.
-constexpr int unacknowledged_rounds = 4;
+StopMachine::Answer answer_of(const Result<void>& sent) {
+  using Answer = StopMachine::Answer;
+  if (sent) return Answer::acknowledged;
+  if (sent.error().reason == Reason::refused) return Answer::refused;
+  return sent.error().reason == Reason::no_reply ? Answer::no_reply : Answer::failed;
+}
 
 }  // namespace
 
@@ -33,34 +34,32 @@ void Axis::supersede(const Error& cause) {
   if (auto activity = take_activity()) {
     leave_running(*activity);
     auto told = cause;
-    const bool enabling = activity->noted && activity->command->value().kind == CommandKind::enable;
-    if (activity->may_run || enabling) told.outcome = Outcome::unknown;  // its start may be under way
+    const bool enabling =
+        activity->start.is_noted() && activity->command->value().kind == CommandKind::enable;
+    if (activity->start.may_run() || enabling) told.outcome = Outcome::unknown;  // its start may be under way
     activity->command->abort(std::move(told));
     drop_buffer(cause);
   }
 }
 
 void Axis::note_motion_to_stop() {
-  if (activity_ && activity_->state != AxisState::standstill) stopping_.from_motion = true;
+  if (activity_ && activity_->state != AxisState::standstill) stop_.found_in_motion();
 }
 
 void Axis::begin_stop(StopKind kind, CommandPtr command) {
-  stopping_.kind = std::max(stopping_.kind, kind);
-  ++stopping_.requests;
+  stop_.ask(kind);
   if (command) {
     command->activate();
-    stopping_.last = command;
-    stopping_.commands.push_back(std::move(command));
+    stop_.serve(std::move(command));
   }
   env_.bus->hasten(settings_.node, TransactionClass::moving_state);
-  if (!stopping_.running) {
-    stopping_.running = true;
+  if (stop_.begin()) {
     launch(run_stop(), "stop");
   } else {
     // The running sequence sends this one, too. It may wait for a reading that is held back, or will be,
     // because the node does not answer.
-    const bool held = link_ != LinkState::online && env_.bus->holds_back(settings_.node);
-    if (link_ == LinkState::offline || held) env_.bus->give_up_readings(settings_.node);
+    const bool held = !link_.online() && env_.bus->holds_back(settings_.node);
+    if (link_.offline() || held) env_.bus->give_up_readings(settings_.node);
     sampled_.notify_all();
   }
 }
@@ -68,36 +67,28 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
 /// What the drive may go on with after its command has ended. A command that never started leaves the ramps
 /// of the motion before it in force.
 void Axis::leave_running(const Activity& activity) {
-  if (!activity.may_run) return;
+  if (!activity.start.may_run()) return;
   const auto& plan = activity.plan;
-  last_deceleration_ = std::max(plan.deceleration_time, plan.granted.deceleration_time.value_or(Duration{}));
-  left_running_ = left_running_ || activity.state != AxisState::standstill;
+  stop_.set_deceleration(
+      std::max(plan.deceleration_time, plan.granted.deceleration_time.value_or(Duration{})));
+  if (activity.state != AxisState::standstill) stop_.leave_running();
 }
-
-/// What a stop may take: the drive keeps the deceleration time that was set before the motion (7.6.2).
-Duration Axis::deceleration_bound() const { return last_deceleration_; }
 
 Task<> Axis::run_stop() {
   const auto confirmed = co_await stop_and_confirm();
-  auto commands = std::exchange(stopping_.commands, {});
-  stopping_.running = false;
-  stopping_.kind = StopKind::none;
-  stopping_.from_motion = false;
+  const auto commands = confirmed ? stop_.confirmed() : stop_.failed();
   if (confirmed) {
     observed_.standstill_confirmed(env_.clock->now());
-    stop_owed_ = left_running_ = false;
     remember_position();
     for (const auto& command : commands) command->done();
   } else {
     observed_.stop_failed();
-    stop_owed_ = true;
     // Whether it arrived is not known: the drive is connected anew, which begins with a stop (M4).
     if (confirmed.error().outcome == Outcome::unknown) bus_lost(confirmed.error());
-    ++failed_stops_;
     if (!fault_) fault_ = confirmed.error();
     log_about_axis(spdlog::level::err, LogKind::stop_unconfirmed, settings_, to_string(confirmed.error()));
     for (const auto& command : commands) {
-      if (link_ == LinkState::offline)
+      if (link_.offline())
         command->unknown(confirmed.error());
       else
         command->error(confirmed.error());
@@ -119,85 +110,76 @@ void Axis::note_stop_sent(TimePoint end, bool answered) {
                   settings_.name, in_ms(late->seen), in_ms(late->expected), settings_.bus));
 }
 
+Error Axis::not_stopped(StopMachine::Step step, const Result<void>& sent) const {
+  auto cause = error(Reason::not_confirmed, "standstill was not confirmed",
+                     "look at the machine; cut its power if it moves; then reset the axis");
+  if (step == StopMachine::Step::not_confirmed) return cause;
+  cause = error(Reason::not_confirmed,
+                step == StopMachine::Step::unreachable && !sent
+                    ? "the stop was not acknowledged: " + to_string(sent.error())
+                    : "the drive fell silent before its standstill was confirmed",
+                "look at the machine; a stop is sent as soon as the drive answers");
+  cause.outcome = Outcome::unknown;
+  return cause;
+}
+
 Task<Result<void>> Axis::stop_and_confirm() {
-  bool released = false;
-  int silent = 0;  // replies in a row that did not come
-  int rounds = 0;  // of attempts without any
+  using Step = StopMachine::Step;
   for (;;) {
-    const auto requests = stopping_.requests;
-    const auto kind = stopping_.kind;
+    const auto kind = stop_.next_attempt();
     const auto sent = co_await drive_->stop(kind);
     // Open loop: a stop without a ramp may have lost steps (M12), also one of which only the reply was lost.
     const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
     if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
     wake();
     if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out, sent.has_value());
-    const bool no_reply = !sent && sent.error().reason == Reason::no_reply;
-    if (no_reply && link_ != LinkState::offline && ++silent < stop_attempts) continue;
-    silent = 0;
-    // Replies may be lost where the stop itself is not: what counts is the motor, so go on and look at it.
-    if (!sent && sent.error().reason != Reason::refused && (!no_reply || link_ == LinkState::offline)) {
-      if (requests != stopping_.requests) continue;  // each gets a frame of its own, also by a silent node
-      auto cause = error(Reason::not_confirmed, "the stop was not acknowledged: " + to_string(sent.error()),
-                         "look at the machine; a stop is sent as soon as the drive answers");
-      cause.outcome = Outcome::unknown;
-      co_return fail(std::move(cause));
+    auto step = stop_.sent(answer_of(sent), link_.offline());
+    if (step == Step::look) {
+      const bool rests = co_await rests_in_time(sent.has_value());
+      step = stop_.looked(rests, link_.offline(), settings_.stop_escalation_release);
     }
-    const auto since = env_.clock->now();
-    const auto patience =
-        settings_.stop_margin + (kind == StopKind::quick_stop ? Duration{0} : deceleration_bound());
-    poll_fast(since, patience);
-    // Only an axis that is online is polled.
-    const bool polled = link_ == LinkState::online;
-    const bool rests = polled ? co_await standstill_by(since, since + patience, requests)
-                              : (sent || link_ != LinkState::offline) &&
-                                    co_await standstill_unpolled(since + patience, requests);
-    if (requests != stopping_.requests) continue;  // each gets a frame of its own
-    if (rests && no_reply && ++rounds < unacknowledged_rounds) continue;
-    if (rests) co_return Result<void>{};
-    if (link_ == LinkState::offline) {
-      auto cause = error(Reason::not_confirmed, "the drive fell silent before its standstill was confirmed",
-                         "look at the machine; a stop is sent as soon as the drive answers");
-      cause.outcome = Outcome::unknown;
-      co_return fail(std::move(cause));
-    }
-    if (kind != StopKind::quick_stop) {
-      log_about_axis(spdlog::level::warn, LogKind::stop_escalated, settings_,
-                     fmt::format("{}: standstill not confirmed in time; quick stop", settings_.name));
-      stopping_.kind = StopKind::quick_stop;
-    } else if (settings_.stop_escalation_release && !released) {
-      log_about_axis(spdlog::level::warn, LogKind::stop_escalated, settings_,
-                     fmt::format("{}: standstill not confirmed after a quick stop; releasing the power stage",
-                                 settings_.name));
-      released = true;
-      if (const auto off = co_await drive_->disable({}); !off) spdlog::error("{}", to_string(off.error()));
-    } else {
-      co_return fail(error(Reason::not_confirmed, "standstill was not confirmed",
-                           "look at the machine; cut its power "
-                           "if it moves; then reset the axis"));
+    switch (step) {
+      case Step::send:
+      case Step::look:
+        break;
+      case Step::quicken:
+        log_about_axis(spdlog::level::warn, LogKind::stop_escalated, settings_,
+                       fmt::format("{}: standstill not confirmed in time; quick stop", settings_.name));
+        break;
+      case Step::release:
+        log_about_axis(
+            spdlog::level::warn, LogKind::stop_escalated, settings_,
+            fmt::format("{}: standstill not confirmed after a quick stop; releasing the power stage",
+                        settings_.name));
+        if (const auto off = co_await drive_->disable({}); !off) spdlog::error("{}", to_string(off.error()));
+        break;
+      case Step::rests:
+        co_return Result<void>{};
+      case Step::unreachable:
+      case Step::fell_silent:
+      case Step::not_confirmed:
+        co_return fail(not_stopped(step, sent));
     }
   }
 }
 
-/// Standstill counts once it was measured after `since`. Within homing the motor rests between its phases, so
-/// there it must have rested at one place for a while. Not in time is only what a sample from after
-/// `deadline` shows moving: on a slow line the sample may come late, and a silent node goes offline.
-Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests) {
-  constexpr auto rest = milliseconds(150);
-  std::optional<TimePoint> resting_since;
-  std::int64_t resting_at = 0;
-  while (link_ != LinkState::offline && requests == stopping_.requests) {
-    if (sample_ && sample_->asked_at >= since) {
-      const bool settled = resting_since && !moved_from(resting_at);
-      const bool rested = settled && sample_->asked_at - *resting_since >= rest;
-      if (!sample_->moving && (sample_->mode != DriveMode::homing || rested)) co_return true;
-      if (sample_->moving) {
-        resting_since.reset();
-      } else if (!settled) {
-        resting_since = sample_->asked_at;
-        resting_at = tracker_.counter();
-      }
-      if (sample_->asked_at >= deadline + (resting_since ? rest : Duration{0})) co_return false;
+/// After a stop frame, which was acknowledged or not.
+Task<bool> Axis::rests_in_time(bool acknowledged) {
+  const auto since = env_.clock->now();
+  const auto patience = stop_.patience(settings_.stop_margin);
+  poll_fast(since, patience);
+  // Only an axis that is online is polled.
+  if (link_.online()) co_return co_await standstill_by(since, since + patience);
+  if (!acknowledged && link_.offline()) co_return false;
+  co_return co_await standstill_unpolled(since + patience, true);
+}
+
+Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline) {
+  StandstillWatch watch(since, deadline);
+  while (!link_.offline() && !stop_.overtaken()) {
+    if (sample_) {
+      const auto found = watch.look(*sample_, tracker_.counter(), drive_->position_window());
+      if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
     }
     co_await sampled_.wait();
   }
@@ -205,26 +187,18 @@ Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline, int requests
 }
 
 /// The same for a node that nobody polls, because it is not (or not yet) online. What its samples tell beside
-/// the standstill is heard nowhere else (M5). `requests`: another stop than that of them ends it.
-Task<bool> Axis::standstill_unpolled(TimePoint deadline, std::optional<int> requests) {
+/// the standstill is heard nowhere else (M5). `of_stop`: another stop than the one under way ends it.
+Task<bool> Axis::standstill_unpolled(TimePoint deadline, bool of_stop) {
   constexpr auto pause = milliseconds(30);
-  constexpr int resting_in_homing = 6;  // samples; between its phases the motor rests, too
-  const auto another = [&] { return requests && *requests != stopping_.requests; };
-  int resting = 0, silent = 0;
-  std::int64_t resting_at = 0;
+  const auto another = [&] { return of_stop && stop_.overtaken(); };
+  UnpolledStandstill watch(deadline);
   for (;;) {
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
     if (sample) on_sample(*sample);
-    if (another() || (!sample && ++silent == stop_attempts)) co_return false;
-    if (sample) {
-      silent = 0;
-      const bool rests = !sample->moving && (resting == 0 || !moved_from(resting_at));
-      if (resting == 0) resting_at = tracker_.counter();
-      resting = rests ? resting + 1 : 0;
-      if (resting > 0 && sample->mode != DriveMode::homing) co_return true;
-      if (resting >= resting_in_homing) co_return true;
-      if (sample->asked_at >= deadline && resting == 0) co_return false;
-    }
+    if (another()) co_return false;
+    const auto found =
+        sample ? watch.look(*sample, tracker_.counter(), drive_->position_window()) : watch.silence();
+    if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
     // Samples of somebody else who looks do not shorten it.
     for (const auto until = env_.clock->now() + pause; !another() && env_.clock->now() < until;)
       co_await sampled_.wait_until(until);

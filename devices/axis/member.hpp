@@ -53,9 +53,9 @@ class Axis::Member {
   [[nodiscard]] const std::string& start_note() const { return start_note_; }
   Task<Result<void>> verify();
   /// From now on its start may have been sent.
-  void about_to_start() { activity_->may_run = true; }
+  void about_to_start() { activity_->start.about_to_start(); }
   /// It is known that it was not.
-  void not_started() { activity_->may_run = false; }
+  void not_started() { activity_->start.not_started(); }
   /// Starts that by SYNC are bound until then: shortly after a reading, where something else could have
   /// turned the shaft; max() elsewhere. Errors: of look().
   Task<Result<TimePoint>> look_again();
@@ -71,7 +71,7 @@ class Axis::Member {
   /// What the drive has to be told after its start.
   Task<> follow_up();
 
-  [[nodiscard]] bool may_run() const { return activity_->may_run; }
+  [[nodiscard]] bool may_run() const { return activity_->start.may_run(); }
   [[nodiscard]] const std::optional<TimePoint>& started_at() const { return started_at_; }
   /// When it was first seen at rest at its target.
   [[nodiscard]] const std::optional<TimePoint>& arrived_at() const { return *arrived_; }

@@ -1,0 +1,268 @@
+// From the acknowledged start of a motion to its end: MotionMachine and StartReadback judge the readings, and
+// what follows from that is done here.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "devices/axis/axis.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// So long after the predicted end it is looked for as fast as the bus can.
+constexpr auto end_window = milliseconds(300);
+/// And from so long before, at most, and a part of the way's time: a drive has a clock of its own.
+constexpr Duration longest_end_lead = milliseconds(10);
+constexpr int end_lead_share = 32;
+/// So long after a start nothing is asked, at most, so that canaries come in time (M7).
+constexpr Duration longest_quiet = milliseconds(100);
+/// So long a proof at the target may take before its axis is read again.
+constexpr Duration proof_patience = milliseconds(20);
+
+void count(UnknownOutcomes& outcomes, StartReadback::State state) {
+  if (state == StartReadback::State::executed)
+    ++outcomes.executed;
+  else if (state == StartReadback::State::not_executed)
+    ++outcomes.not_executed;
+  else
+    ++outcomes.unresolved;
+}
+
+}  // namespace
+
+/// When a motion was read at rest at its target, and not too fast, by the drive that began it. Nothing: the
+/// activity has ended otherwise.
+Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t base, TimePoint since) {
+  activity->motion = followed(activity->plan, base, since);
+  for (;; activity->motion->go_on()) {
+    if (!co_await follow(activity, base, since)) co_return std::nullopt;
+    const auto when = sample_->measured_at;
+    if (!co_await is_no_reboot(activity)) co_return std::nullopt;
+    // While its proof was waited for a terminal may have begun another motion.
+    if (sample_->moving || sample_->mode != DriveMode::positioning || !is_at(*activity->plan.target))
+      continue;
+    if (watch_speed(SpeedWatch::Event::arrived)) co_return std::nullopt;
+    co_return when;
+  }
+}
+
+/// A drive that was restarted, on the way or before, shows the counter 0: only where the reading at the
+/// target could be that, too, it has to prove that it is the same one.
+Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
+  if (sample_ && drive_->rules_out_restart(*sample_)) co_return true;
+  keep_quiet(env_.clock->now() + std::min<Duration>(settings_.poll_moving, proof_patience));
+  co_return co_await proven_continuous(activity);
+}
+
+/// Nothing was sent, as the axis rested at its target when it was read: what a terminal did since is looked
+/// for before it is called Done. False: the activity has ended.
+Task<bool> Axis::still_there(ActivityPtr activity) {
+  if (!may_move_by_itself()) co_return true;
+  const auto since = env_.clock->now();
+  while (!sample_ || sample_->asked_at < since) {
+    wake();
+    co_await sampled_.wait_until(env_.clock->now() + milliseconds(50));
+    if (!current(*activity)) co_return false;  // offline, too
+  }
+  if (!found_in_motion() && is_at(*activity->plan.target)) co_return true;
+  auto cause = error(Reason::moving, "the shaft was moved while the axis rested at its target",
+                     "see what moves it; then repeat the move");
+  cause.outcome = Outcome::not_executed;
+  tell_part(*activity, cause);
+  finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+  co_return false;
+}
+
+/// The drive was not restarted since its parameters were last written: the canary is read until it answers.
+/// False: the activity has ended.
+Task<bool> Axis::proven_continuous(ActivityPtr activity) {
+  Result<void> proof;
+  do {
+    proof = co_await prove_continuity(TransactionClass::moving_state);
+    if (!current(*activity)) co_return false;  // offline, too
+  } while (!proof && proof.error().reason == Reason::no_reply);
+  if (proof) co_return true;
+  if (proof.error().reason == Reason::rebooted) {
+    on_reboot(proof.error());
+  } else {
+    auto cause = proof.error();
+    cause.outcome = Outcome::unknown;
+    fail_with_stop(*activity, std::move(cause));
+  }
+  co_return false;
+}
+
+/// What became of a trigger that was sent, and got no reply that says so. True: it was executed.
+Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base, TimePoint since) {
+  using State = StartReadback::State;
+  StartReadback readback(since);
+  while (readback.state() == State::reading) {
+    wake();
+    co_await sampled_.wait_until(std::max(readback.deadline(), env_.clock->now() + milliseconds(50)));
+    if (!current(*activity)) {  // offline, too: then the command has ended as unknown
+      readback.superseded();
+      break;
+    }
+    readback.look(readback_of(base), env_.clock->now());
+  }
+  // Its standstill is no proof: a restart would have ended a motion, too.
+  const bool proven = readback.state() == State::resting && co_await proven_continuous(activity);
+  // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
+  // as it began, or the way is too short to be seen.
+  const bool may_end_it =
+      terminals_.has("motor_free") || terminals_.has("stop") || terminals_.has("quick_stop");
+  const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
+  if (proven)
+    readback.proven(!may_end_it && !(moves_to_a_target && !shows(activity->plan, base)));
+  else if (readback.state() == State::resting)
+    readback.superseded();
+  count(unknown_starts_, readback.state());
+  if (readback.state() == State::executed) {
+    activity->command->activate();
+    publish();
+    co_return true;
+  }
+  if (!proven) co_return false;
+  if (readback.state() == State::not_executed) {
+    cause.outcome = Outcome::not_executed;
+    cause.message =
+        fmt::format("{}: the start frame {}, and the drive did not move: {}", settings_.name,
+                    cause.reason == Reason::refused ? "was refused" : "got no reply", cause.message);
+    tell_part(*activity, cause);
+  }
+  fail_with_stop(*activity, std::move(cause));
+  co_return false;
+}
+
+/// What the newest reading says of a start from `base`.
+std::optional<StartReadback::Reading> Axis::readback_of(std::int64_t base) const {
+  if (!sample_) return std::nullopt;
+  return StartReadback::Reading{
+      .asked_at = sample_->asked_at,
+      .shows_it = sample_->moving || moved_from(base) || sample_->mode != DriveMode::positioning};
+}
+
+/// A position tells whether the motion was executed.
+bool Axis::shows(const Plan& plan, std::int64_t base) const {
+  const auto window = drive_->position_window();
+  return window == 0 || std::abs(plan.target->counter - base) > window;
+}
+
+/// At rest, and not at the target.
+bool Axis::held_back(const Plan& plan) const {
+  return limit_active(plan.positive) || input_active("stop") || input_active("quick_stop");
+}
+
+/// When a motion is read that was acknowledged at `since`: its end is to be told at once, and before it has
+/// something to tell the line is left to others.
+void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
+  auto quiet = std::min<Duration>(settings_.poll_moving, longest_quiet);
+  if (!plan.endless) {
+    const auto soonest = planner_.soonest(plan, plan.target->counter - base);
+    const auto lead = std::min(soonest / end_lead_share, longest_end_lead);
+    quiet = std::min(quiet, soonest - lead);
+    poll_fast(since + soonest - lead, plan.predicted - soonest + lead + end_window);
+  }
+  keep_quiet(since + quiet);
+}
+
+/// A motion by that plan, which was acknowledged at `since`.
+MotionMachine Axis::followed(const Plan& plan, std::int64_t base, TimePoint since) const {
+  return MotionMachine({.since = since,
+                        .predicted = plan.predicted,
+                        .endless = plan.endless,
+                        .unseen = !plan.endless && !shows(plan, base),
+                        .settling = settling()});
+}
+
+/// What the newest reading says of a motion by that plan, from `base`. Precondition: there is one.
+MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) const {
+  return {.asked_at = sample_->asked_at,
+          .positioning = sample_->mode == DriveMode::positioning,
+          .moving = sample_->moving,
+          .elsewhere = moved_from(base),
+          .at_target = !plan.endless && is_at(*plan.target),
+          .held_back = held_back(plan)};
+}
+
+/// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended
+/// otherwise. Precondition: the activity has a motion.
+Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since) {
+  using State = MotionMachine::State;
+  const auto& plan = activity->plan;
+  auto& motion = *activity->motion;
+  expect_end(plan, base, since);
+  for (;;) {
+    const auto deadline = std::min(activity->hold_until.value_or(motion.latest()), motion.latest());
+    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(20)));
+    if (!current(*activity)) co_return false;
+    if (activity->hold_until && env_.clock->now() >= *activity->hold_until) {
+      end_hold(*activity);
+      co_return false;
+    }
+    if (!sample_) continue;
+    const auto state = motion.look(reading_of(plan, base));
+    if (state == State::arrived) co_return true;
+    if (state <= State::settling) continue;
+    end_motion(*activity, state);
+    co_return false;
+  }
+}
+
+/// Nobody has renewed the hold of a jog, or of a held velocity.
+void Axis::end_hold(Activity& activity) {
+  note_motion_to_stop();
+  revoke_motion();
+  leave_running(activity);
+  begin_stop(StopKind::halt, nullptr);
+  auto cause =
+      error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");
+  finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
+}
+
+/// It has not arrived.
+void Axis::end_motion(Activity& activity, MotionMachine::State state) {
+  switch (state) {
+    case MotionMachine::State::taken_over:
+      return fail_with_stop(activity, error(Reason::terminal, "a terminal of the drive took over the motion",
+                                            "check the terminals"));
+    case MotionMachine::State::did_not_start:
+      return fail_with_stop(activity,
+                            error(Reason::did_not_start, "the drive accepted the start but does not move",
+                                  "check limit and stop terminals, enable and alarm"));
+    case MotionMachine::State::took_too_long:
+      return fail_with_stop(activity,
+                            error(Reason::took_too_long, "the motion takes longer than predicted; stopped",
+                                  "check the load, and other masters on the bus"));
+    default:
+      return end_at_rest(activity);
+  }
+}
+
+/// The drive rests, but not at the target: says why, and ends the activity.
+void Axis::end_at_rest(Activity& activity) {
+  const auto positive = activity.plan.positive;
+  if (limit_active(positive)) {
+    if (!drive_->closed_loop()) lose_trust();  // the overtravel stop has no ramp (M20)
+    return abort_at_rest(activity, error(Reason::limit_switch,
+                                         fmt::format("the {} limit switch ended the motion",
+                                                     positive ? "positive" : "negative"),
+                                         "move away from it; home the axis"));
+  }
+  const bool terminal = input_active("stop") || input_active("quick_stop");
+  // Without a ramp an open loop may have lost steps (M20). A short pulse at a terminal, or another master,
+  // leaves nothing by which to tell the kind of stop.
+  if (!drive_->closed_loop() && !input_active("stop")) lose_trust();
+  if (terminal)
+    return abort_at_rest(activity, error(Reason::terminal, "a stop terminal of the drive ended the motion",
+                                         "check the terminals"));
+  fail_with_stop(activity, error(Reason::not_reached,
+                                 fmt::format("the drive came to rest at {:.6g} {}", tracker_.position(),
+                                             settings_.scale.unit),
+                                 "check terminals, and other masters on the bus"));
+}
+
+}  // namespace axisd

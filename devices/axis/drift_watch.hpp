@@ -1,0 +1,49 @@
+// When the drive's configuration is to be compared again, and what was found.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "buses/clock.hpp"
+#include "devices/axis/settings.hpp"
+
+namespace axisd {
+
+/// Pure. Thread: core.
+///
+///   as_configured -- found(), something --> drifted
+///   drifted -- found(), nothing ----------> as_configured
+class DriftWatch {
+ public:
+  enum class State : std::uint8_t { as_configured, drifted };
+
+  /// `period`: from one comparison to the next.
+  explicit DriftWatch(Duration period) : period_(period) {}
+
+  /// A comparison has begun, or the configuration was applied.
+  void checked(TimePoint at) { checked_ = at; }
+  /// What the drive no longer holds as configured; empty: nothing. True: that is news.
+  bool found(const std::string& text) {
+    if (text == text_) return false;
+    text_ = text;
+    return true;
+  }
+  /// It is time for a comparison. `just_proven`: that the drive was not restarted; what a comparison reads
+  /// would keep the next proof waiting, so it waits for one, but not for ever.
+  [[nodiscard]] bool is_next(TimePoint now, bool just_proven) const {
+    const auto due = checked_ + period_;
+    return now >= due && (just_proven || now >= due + 2 * continuity_period);
+  }
+
+  [[nodiscard]] State state() const { return text_.empty() ? State::as_configured : State::drifted; }
+  [[nodiscard]] bool drifted() const { return !text_.empty(); }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  Duration period_;
+  TimePoint checked_{};
+  std::string text_;
+};
+
+}  // namespace axisd

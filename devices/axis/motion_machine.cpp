@@ -1,0 +1,71 @@
+#include "devices/axis/motion_machine.hpp"
+
+namespace axisd {
+
+namespace {
+
+/// Beyond the predicted time: the prediction is exact for the profile, the drive's own latency is unknown.
+constexpr Duration overrun_margin = std::chrono::seconds(1);
+/// A motion that no sample can tell from noise is over so long after its predicted end.
+constexpr Duration unseen_margin = std::chrono::milliseconds(100);
+
+}  // namespace
+
+TimePoint MotionMachine::latest() const {
+  if (motion_.endless) return TimePoint::max();
+  return motion_.since + motion_.predicted + motion_.predicted / 4 + overrun_margin;
+}
+
+void MotionMachine::go_on() {
+  if (state_ == State::arrived) state_ = State::running;
+  rests_since_.reset();
+}
+
+MotionMachine::State MotionMachine::look(const Reading& reading) {
+  if (state_ > State::settling || reading.asked_at < motion_.since) return state_;
+  if (state_ == State::starting && (reading.moving || reading.elsewhere)) {
+    state_ = State::running;
+    rests_since_.reset();  // what rested before it began says nothing of its settling
+  }
+  // Its motion was acknowledged, and may have begun and ended between two samples.
+  const bool unseen_end = motion_.unseen && !reading.held_back &&
+                          reading.asked_at >= motion_.since + motion_.predicted + unseen_margin;
+  if (state_ == State::starting && unseen_end) state_ = State::running;
+  if (!reading.positioning) return state_ = State::taken_over;
+  if (reading.moving) {
+    rests_since_.reset();
+    if (state_ == State::settling) state_ = State::running;
+  } else {
+    state_ = judge_rest(reading);
+    if (state_ > State::settling) return state_;
+  }
+  // Only who was asked after the window and still rests has not started: a silent drive may well run.
+  if (state_ == State::starting && reading.asked_at >= motion_.since + start_window)
+    return state_ = State::did_not_start;
+  if (reading.asked_at >= latest()) state_ = State::took_too_long;
+  return state_;
+}
+
+MotionMachine::State MotionMachine::judge_rest(const Reading& reading) {
+  const bool begun = state_ != State::starting;
+  // Before it moved it may rest within the tolerance, too.
+  if (reading.at_target && begun) return State::arrived;
+  if (!rests_since_) rests_since_ = reading.asked_at;
+  if (!begun) return State::starting;
+  const bool settles = !reading.held_back && reading.asked_at - *rests_since_ < motion_.settling;
+  return settles ? State::settling : State::rests_elsewhere;
+}
+
+StartReadback::State StartReadback::look(const std::optional<Reading>& reading, TimePoint now) {
+  if (state_ != State::reading || !reading) return state_;
+  if (reading->asked_at >= since_ && reading->shows_it) return state_ = State::executed;
+  if (now >= deadline() && reading->asked_at >= deadline()) state_ = State::resting;
+  return state_;
+}
+
+StartReadback::State StartReadback::proven(bool tellable) {
+  if (state_ == State::resting) state_ = tellable ? State::not_executed : State::unresolved;
+  return state_;
+}
+
+}  // namespace axisd

@@ -1,0 +1,109 @@
+// Following a motion from its acknowledged start to its end (M10), and finding out whether one began (M8).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "buses/clock.hpp"
+
+namespace axisd {
+
+/// A drive that was told to start is expected to move within this.
+inline constexpr Duration start_window = std::chrono::milliseconds(500);
+
+/// Judges the readings of a motion that was started. It counts what a reading from after the start shows,
+/// and nothing older. Pure. Thread: core.
+///
+///   starting -- moves, or is elsewhere than it was ------------------------> running
+///   starting -- cannot be told from noise, and its time is over, at rest --> running
+///   starting -- rests, by a reading from after the start window -----------> did_not_start
+///   running  -- at rest elsewhere than at the target ----------------------> settling
+///   running, settling -- at rest at the target ----------------------------> arrived
+///   settling -- moves -----------------------------------------------------> running
+///   running, settling -- held back, or longer than a shaft settles --------> rests_elsewhere
+///   arrived  -- go_on(): something has moved it since ---------------------> running
+///   starting, running, settling -- another mode of the drive --------------> taken_over
+///   starting, running, settling -- far longer than predicted --------------> took_too_long
+class MotionMachine {
+ public:
+  enum class State : std::uint8_t {
+    starting,  ///< acknowledged, and not seen yet
+    running,
+    settling,  ///< at rest, and not at its target
+    arrived,
+    // It has ended otherwise:
+    rests_elsewhere,
+    taken_over,
+    did_not_start,
+    took_too_long,
+  };
+  struct Motion {
+    TimePoint since{};     ///< its start was acknowledged
+    Duration predicted{};  ///< from start to standstill
+    bool endless = false;  ///< it has no target
+    bool unseen = false;   ///< its way is too short for a reading to show it
+    Duration settling{};   ///< a measured position comes to its target so late, at most (M30)
+  };
+  struct Reading {
+    TimePoint asked_at{};
+    bool positioning = true;  ///< the mode of the drive
+    bool moving = false;
+    bool elsewhere = false;  ///< than where it started
+    bool at_target = false;  ///< of a motion that has one
+    bool held_back = false;  ///< by a limit or a stop terminal
+  };
+
+  explicit MotionMachine(const Motion& motion) : motion_(motion) {}
+
+  State look(const Reading& reading);
+  /// It is looked at again, after it had arrived.
+  void go_on();
+
+  [[nodiscard]] State state() const { return state_; }
+  /// By then it has ended, or takes too long.
+  [[nodiscard]] TimePoint latest() const;
+
+ private:
+  [[nodiscard]] State judge_rest(const Reading& reading);
+
+  Motion motion_;
+  State state_ = State::starting;
+  /// At rest since this reading, whether it has begun or not.
+  std::optional<TimePoint> rests_since_;
+};
+
+/// What became of a start whose trigger was sent and got no reply that says so (M8). Pure. Thread: core.
+///
+///   reading -- moves, is elsewhere, or in another mode ------------> executed
+///   reading -- rests, by a reading from after the start window ----> resting
+///   resting -- proven(): not restarted, and a reading would tell --> not_executed
+///   resting -- proven(): a reading would not tell ----------------> unresolved
+///   reading, resting -- superseded() ------------------------------> unresolved
+class StartReadback {
+ public:
+  enum class State : std::uint8_t { reading, resting, executed, not_executed, unresolved };
+  struct Reading {
+    TimePoint asked_at{};
+    bool shows_it = false;  ///< it moves, is elsewhere than it was, or does something else
+  };
+
+  /// `since`: when its trigger had been sent.
+  explicit StartReadback(TimePoint since) : since_(since) {}
+
+  /// What is read at `now`, if anything was.
+  State look(const std::optional<Reading>& reading, TimePoint now);
+  /// The drive was not restarted since: that rest is no consequence of it. `tellable`: a motion of that kind
+  /// would show in the position, and nothing can have ended it as it began.
+  State proven(bool tellable);
+  /// The command has ended otherwise, or the proof failed.
+  State superseded() { return state_ = State::unresolved; }
+
+  [[nodiscard]] State state() const { return state_; }
+  [[nodiscard]] TimePoint deadline() const { return since_ + start_window; }
+
+ private:
+  TimePoint since_;
+  State state_ = State::reading;
+};
+
+}  // namespace axisd

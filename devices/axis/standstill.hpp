@@ -1,0 +1,67 @@
+// Does the axis rest after a stop? By readings alone.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "buses/clock.hpp"
+#include "devices/drive.hpp"
+
+namespace axisd {
+
+/// What a reading says.
+enum class RestVerdict : std::uint8_t { undecided, rests, moves };
+
+/// Judges the readings of a drive that is polled. RestVerdict counts once it was measured after `since`.
+/// Within homing the motor rests between its phases, so there it must have rested at one place for a while.
+/// Not in time is only what a reading from after `deadline` shows moving: on a slow line it may come late,
+/// and a silent node goes offline. Pure. Thread: core.
+///
+///   moving  -- at rest, not within homing --------------> rests
+///   moving  -- at rest within homing -------------------> resting
+///   resting -- at rest at the same place for so long ---> rests
+///   resting -- at rest elsewhere -----------------------> resting, from then on
+///   resting -- moves -----------------------------------> moving
+///   any     -- read after the deadline (while resting: so much later) --> moves
+class StandstillWatch {
+ public:
+  enum class State : std::uint8_t { moving, resting };
+  static constexpr Duration rest = milliseconds(150);
+
+  StandstillWatch(TimePoint since, TimePoint deadline) : since_(since), deadline_(deadline) {}
+  /// `counter`: where the reading has the shaft. `window`: pulses within which that wavers.
+  [[nodiscard]] RestVerdict look(const DriveSample& sample, std::int64_t counter, std::int64_t window);
+  [[nodiscard]] State state() const { return resting_since_ ? State::resting : State::moving; }
+
+ private:
+  TimePoint since_, deadline_;
+  std::optional<TimePoint> resting_since_;  ///< set: resting
+  std::int64_t resting_at_ = 0;
+};
+
+/// The same for a node that nobody polls: each reading is asked for here. Between the phases of homing the
+/// motor rests for some readings. Pure. Thread: core.
+///
+///   moving  -- at rest, not within homing ---------> rests
+///   moving  -- at rest within homing --------------> resting
+///   resting -- at the same place, several times ---> rests
+///   resting -- moves, or rests elsewhere ----------> moving
+///   moving  -- read after the deadline ------------> moves
+///   any     -- no reply, several times in a row ---> moves, as far as is known
+class UnpolledStandstill {
+ public:
+  static constexpr int resting_in_homing = 6;  ///< readings
+  static constexpr int longest_silence = 3;    ///< readings
+
+  explicit UnpolledStandstill(TimePoint deadline) : deadline_(deadline) {}
+  [[nodiscard]] RestVerdict look(const DriveSample& sample, std::int64_t counter, std::int64_t window);
+  [[nodiscard]] RestVerdict silence();
+
+ private:
+  TimePoint deadline_;
+  int resting_ = 0;  ///< readings in a row; 0: moving
+  int silent_ = 0;   ///< readings in a row
+  std::int64_t resting_at_ = 0;
+};
+
+}  // namespace axisd

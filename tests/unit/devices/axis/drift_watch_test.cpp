@@ -1,0 +1,38 @@
+#include "devices/axis/drift_watch.hpp"
+
+#include <gtest/gtest.h>
+
+namespace axisd {
+namespace {
+
+using namespace std::chrono_literals;
+using State = DriftWatch::State;
+
+constexpr TimePoint checked{10s};
+constexpr auto period = 5s;
+
+TEST(DriftWatch, WhatIsFoundIsNewsOnce) {
+  DriftWatch drift(period);
+  EXPECT_FALSE(drift.found(""));
+  EXPECT_EQ(drift.state(), State::as_configured);
+  EXPECT_TRUE(drift.found("X0"));
+  EXPECT_EQ(drift.state(), State::drifted);
+  EXPECT_FALSE(drift.found("X0"));
+  EXPECT_TRUE(drift.found("X0, X1"));
+  EXPECT_EQ(drift.text(), "X0, X1");
+  EXPECT_TRUE(drift.found(""));
+  EXPECT_EQ(drift.state(), State::as_configured);
+}
+
+TEST(DriftWatch, AComparisonWaitsForAProofButNotForEver) {
+  DriftWatch drift(period);
+  drift.checked(checked);
+  EXPECT_FALSE(drift.is_next(checked + period - 1ms, true));
+  EXPECT_TRUE(drift.is_next(checked + period, true));
+  EXPECT_FALSE(drift.is_next(checked + period, false));
+  EXPECT_FALSE(drift.is_next(checked + period + 2 * continuity_period - 1ms, false));
+  EXPECT_TRUE(drift.is_next(checked + period + 2 * continuity_period, false));
+}
+
+}  // namespace
+}  // namespace axisd

@@ -1,0 +1,189 @@
+#include "devices/axis/motion_machine.hpp"
+
+#include <gtest/gtest.h>
+
+namespace axisd {
+namespace {
+
+using namespace std::chrono_literals;
+using State = MotionMachine::State;
+
+constexpr TimePoint started{10s};
+constexpr auto predicted = 400ms;
+constexpr auto settling = 300ms;
+
+MotionMachine::Motion motion() { return {.since = started, .predicted = predicted, .settling = settling}; }
+
+/// Readings by the time since the start.
+struct Followed {
+  explicit Followed(const MotionMachine::Motion& how = motion()) : machine(how) {}
+  State moves(Duration at) {
+    return machine.look({.asked_at = started + at, .moving = true, .elsewhere = true});
+  }
+  State rests(Duration at, MotionMachine::Reading reading = {}) {
+    reading.asked_at = started + at;
+    return machine.look(reading);
+  }
+  State arrives(Duration at) { return rests(at, {.elsewhere = true, .at_target = true}); }
+
+  MotionMachine machine;
+};
+
+TEST(MotionMachine, WhatWasReadBeforeTheStartCountsForNothing) {
+  Followed followed;
+  EXPECT_EQ(followed.moves(-1ms), State::starting);
+  EXPECT_EQ(followed.moves(0ms), State::running);
+}
+
+TEST(MotionMachine, AMotionBeginsWhenItIsSeen) {
+  Followed by_motion, by_place;
+  EXPECT_EQ(by_motion.rests(10ms), State::starting);
+  EXPECT_EQ(by_motion.machine.look({.asked_at = started + 20ms, .moving = true}), State::running);
+  EXPECT_EQ(by_place.rests(10ms, {.elsewhere = true}), State::settling) << "it has begun, and rests already";
+}
+
+TEST(MotionMachine, ItArrivesAtRestAtItsTarget) {
+  Followed followed;
+  followed.moves(10ms);
+  EXPECT_EQ(followed.machine.look({.asked_at = started + 20ms, .moving = true, .at_target = true}),
+            State::running)
+      << "it still moves";
+  EXPECT_EQ(followed.arrives(30ms), State::arrived);
+  EXPECT_EQ(followed.moves(40ms), State::arrived) << "until it is looked at again";
+}
+
+TEST(MotionMachine, RestAtTheTargetBeforeItBeganIsNoArrival) {
+  Followed followed;
+  EXPECT_EQ(followed.rests(10ms, {.at_target = true}), State::starting);
+}
+
+TEST(MotionMachine, ItSettlesBeforeItArrives) {
+  Followed followed;
+  followed.moves(10ms);
+  EXPECT_EQ(followed.rests(20ms), State::settling);
+  EXPECT_EQ(followed.rests(20ms + settling - 1ms), State::settling);
+  EXPECT_EQ(followed.arrives(20ms + settling), State::arrived);
+}
+
+TEST(MotionMachine, AMotionBetweenTwoRestsSettlesAnew) {
+  Followed followed;
+  followed.moves(10ms);
+  EXPECT_EQ(followed.rests(20ms), State::settling);
+  EXPECT_EQ(followed.moves(250ms), State::running);
+  EXPECT_EQ(followed.rests(400ms), State::settling);
+  EXPECT_EQ(followed.rests(690ms), State::settling);
+}
+
+TEST(MotionMachine, RestElsewhereForLongerThanAShaftSettlesEndsIt) {
+  Followed followed;
+  followed.moves(10ms);
+  followed.rests(20ms);
+  EXPECT_EQ(followed.rests(20ms + settling), State::rests_elsewhere);
+}
+
+TEST(MotionMachine, WhatATerminalHoldsBackDoesNotSettle) {
+  Followed followed;
+  followed.moves(10ms);
+  EXPECT_EQ(followed.rests(20ms, {.held_back = true}), State::rests_elsewhere);
+}
+
+TEST(MotionMachine, WhatRestedBeforeItBeganHasNotSettledYet) {
+  Followed followed;
+  followed.rests(10ms);
+  EXPECT_EQ(followed.rests(400ms, {.elsewhere = true}), State::settling);
+}
+
+TEST(MotionMachine, AMotionThatNoReadingCanShowHasBegunWhenItsTimeIsOver) {
+  auto unseen = motion();
+  unseen.unseen = true;
+  Followed followed(unseen);
+  EXPECT_EQ(followed.rests(10ms, {.at_target = true}), State::starting);
+  EXPECT_EQ(followed.rests(predicted + 99ms, {.at_target = true}), State::starting);
+  EXPECT_EQ(followed.rests(predicted + 100ms, {.at_target = true}), State::arrived);
+}
+
+TEST(MotionMachine, AMotionThatNoReadingCanShowHasNotBegunWhereATerminalHoldsItBack) {
+  auto unseen = motion();
+  unseen.unseen = true;
+  Followed followed(unseen);
+  EXPECT_EQ(followed.rests(predicted + 100ms, {.at_target = true, .held_back = true}), State::did_not_start);
+}
+
+TEST(MotionMachine, RestByAReadingFromAfterTheStartWindowIsNoStart) {
+  Followed followed;
+  EXPECT_EQ(followed.rests(start_window - 1ms), State::starting);
+  EXPECT_EQ(followed.rests(start_window), State::did_not_start);
+}
+
+TEST(MotionMachine, AnotherModeOfTheDriveEndsIt) {
+  Followed starting, running;
+  EXPECT_EQ(starting.rests(10ms, {.positioning = false}), State::taken_over);
+  running.moves(10ms);
+  EXPECT_EQ(running.rests(20ms, {.positioning = false, .moving = true}), State::taken_over);
+}
+
+TEST(MotionMachine, AMotionFarLongerThanPredictedEnds) {
+  Followed followed;
+  const auto latest = predicted + predicted / 4 + 1s;
+  EXPECT_EQ(followed.machine.latest(), started + latest);
+  EXPECT_EQ(followed.moves(latest - 1ms), State::running);
+  EXPECT_EQ(followed.moves(latest), State::took_too_long);
+}
+
+TEST(MotionMachine, AnEndlessMotionTakesAsLongAsItLikes) {
+  auto endless = motion();
+  endless.endless = true;
+  Followed followed(endless);
+  EXPECT_EQ(followed.machine.latest(), TimePoint::max());
+  EXPECT_EQ(followed.moves(24h), State::running);
+}
+
+TEST(MotionMachine, WhatMovedAfterItHadArrivedIsFollowedOn) {
+  Followed followed;
+  followed.moves(10ms);
+  ASSERT_EQ(followed.arrives(20ms), State::arrived);
+  followed.machine.go_on();
+  EXPECT_EQ(followed.machine.state(), State::running);
+  EXPECT_EQ(followed.rests(400ms), State::settling);
+  EXPECT_EQ(followed.arrives(600ms), State::arrived);
+}
+
+using Readback = StartReadback::State;
+
+Readback read(StartReadback& readback, Duration at, bool shows_it) {
+  return readback.look(StartReadback::Reading{.asked_at = started + at, .shows_it = shows_it},
+                       started + at + 5ms);
+}
+
+TEST(StartReadback, WhatMovesWasExecuted) {
+  StartReadback readback(started);
+  EXPECT_EQ(readback.look(std::nullopt, started + 1ms), Readback::reading);
+  EXPECT_EQ(read(readback, -1ms, true), Readback::reading) << "that was before the trigger";
+  EXPECT_EQ(read(readback, 10ms, false), Readback::reading);
+  EXPECT_EQ(read(readback, 20ms, true), Readback::executed);
+  EXPECT_EQ(readback.superseded(), Readback::unresolved);
+}
+
+TEST(StartReadback, WhatRestsAfterTheStartWindowWasNotExecutedIfThatWouldShow) {
+  StartReadback readback(started);
+  EXPECT_EQ(read(readback, start_window - 1ms, false), Readback::reading);
+  EXPECT_EQ(readback.proven(true), Readback::reading) << "there is nothing to be proven yet";
+  EXPECT_EQ(read(readback, start_window, false), Readback::resting);
+  EXPECT_EQ(readback.proven(true), Readback::not_executed);
+}
+
+TEST(StartReadback, WhatWouldNotShowIsUnresolved) {
+  StartReadback readback(started);
+  read(readback, start_window, false);
+  EXPECT_EQ(readback.proven(false), Readback::unresolved);
+}
+
+TEST(StartReadback, WhatIsSupersededOrNotProvenIsUnresolved) {
+  StartReadback reading(started), resting(started);
+  EXPECT_EQ(reading.superseded(), Readback::unresolved);
+  read(resting, start_window, false);
+  EXPECT_EQ(resting.superseded(), Readback::unresolved);
+}
+
+}  // namespace
+}  // namespace axisd

@@ -1,0 +1,49 @@
+#include "devices/axis/poll_pace.hpp"
+
+#include <gtest/gtest.h>
+
+namespace axisd {
+namespace {
+
+using namespace std::chrono_literals;
+using State = PollPace::State;
+
+constexpr TimePoint now{10s};
+
+PollPace pace() { return {20ms, 200ms}; }
+
+TEST(PollPace, UsuallyItFollowsTheSettings) {
+  EXPECT_EQ(pace().state(now), State::usual);
+  EXPECT_EQ(pace().next(now, true), now + 20ms);
+  EXPECT_EQ(pace().next(now, false), now + 200ms);
+}
+
+TEST(PollPace, WhereSomethingIsAboutToBeSeenItIsAsFastAsTheBusCan) {
+  auto fast = pace();
+  fast.expect(now, 100ms);
+  EXPECT_EQ(fast.state(now), State::fast);
+  EXPECT_EQ(fast.next(now, true), now + fastest_poll);
+  EXPECT_EQ(fast.next(now, false), now + 200ms) << "an axis at rest has nothing to tell";
+  EXPECT_EQ(fast.state(now + 100ms), State::usual);
+  EXPECT_EQ(fast.next(now + 100ms, true), now + 120ms);
+}
+
+TEST(PollPace, NoReadingIsLaterThanWhatIsExpected) {
+  auto later = pace();
+  later.expect(now + 15ms, 100ms);
+  EXPECT_EQ(later.state(now), State::usual);
+  EXPECT_EQ(later.next(now, true), now + 15ms);
+  EXPECT_EQ(later.next(now - 10ms, true), now + 10ms);
+}
+
+TEST(PollPace, QuietEndsAtItsTimeAndGoesBeforeFast) {
+  auto quiet = pace();
+  quiet.expect(now, 100ms);
+  quiet.keep_quiet(now + 50ms);
+  EXPECT_EQ(quiet.state(now), State::quiet);
+  EXPECT_EQ(quiet.quiet_until(), now + 50ms);
+  EXPECT_EQ(quiet.state(now + 50ms), State::fast);
+}
+
+}  // namespace
+}  // namespace axisd
