@@ -168,15 +168,19 @@ Task<bool> Axis::rests_in_time(bool acknowledged) {
   const auto since = env_.clock->now();
   const auto patience = stop_.patience(settings_.stop_margin);
   poll_fast(since, patience);
-  // Only an axis that is online is polled.
-  if (link_.online()) co_return co_await standstill_by(since, since + patience);
-  if (!acknowledged && link_.offline()) co_return false;
+  // Only an axis that is online is polled: not one whose drive was restarted meanwhile.
+  if (link_.online()) {
+    const bool rests = co_await standstill_by(since, since + patience);
+    if (rests || link_.shown() != LinkState::configuring || stop_.overtaken()) co_return rests;
+  } else if (!acknowledged && link_.offline()) {
+    co_return false;
+  }
   co_return co_await standstill_unpolled(since + patience, true);
 }
 
 Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline) {
   StandstillWatch watch(since, deadline);
-  while (!link_.offline() && !stop_.overtaken()) {
+  while (link_.online() && !stop_.overtaken()) {
     if (sample_) {
       const auto found = watch.look(*sample_, tracker_.counter(), drive_->position_window());
       if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
