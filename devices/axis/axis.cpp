@@ -148,7 +148,8 @@ void Axis::on_sample(const DriveSample& sample) {
   else
     observed_.interrupted();
   if (!sample.moving) terminal_motion_.at_rest();
-  if (sample.moving && (!activity_ || queues()) && !stop_.under_way() && link_.online())
+  const bool explained = activity_ && !activity_->start.sends_nothing();
+  if (sample.moving && !explained && !stop_.under_way() && link_.online())
     on_unexplained_motion(sample, before);
   release_as_owed();
   publish();
@@ -233,7 +234,7 @@ void Axis::on_unexplained_motion(const DriveSample& sample, const std::optional<
   }
   log_about_axis(spdlog::level::warn, LogKind::moving_without_command, settings_,
                  fmt::format("{}: moving without a command; stopping it", settings_.name));
-  if (queues()) supersede(moved_before_start());
+  if (activity_) supersede(moved_before_start());
   begin_stop(StopKind::stop, nullptr);
 }
 

@@ -160,8 +160,10 @@ Task<> Axis::run_set_position(ActivityPtr activity) {
   // Journalled before it is used (M20): a restart must never meet a newer position with an older offset.
   const auto counter = tracker_.counter();
   const auto offset = tracker_.offset_for(position);
+  activity->start.save();
   const auto saved = co_await journal_offset(offset, PositionTrust::set);
   if (!current(*activity)) co_return correct_saved_position();
+  activity->start.saved();
   if (!saved || moved_from(counter)) {
     finish(*activity, [&](CommandRecord& command) {
       command.error(saved ? error(Reason::moving, "the axis moved meanwhile", "repeat it at standstill")

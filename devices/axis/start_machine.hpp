@@ -47,6 +47,10 @@ class StartMachine {
   [[nodiscard]] bool may_run() const { return state_ >= State::saving; }
   [[nodiscard]] bool has_begun() const { return state_ == State::begun; }
   [[nodiscard]] bool is_queued() const { return state_ == State::queued; }
+  /// Nothing of it is with its bus before it has what it waits for: what moves meanwhile is not of it.
+  [[nodiscard]] bool sends_nothing() const {
+    return state_ == State::noting || state_ == State::queued || state_ == State::saving;
+  }
   /// It is known to a restart, or that is under way.
   [[nodiscard]] bool is_noted() const { return noted_; }
   /// For something else than its line, whose gate ends what is late.

@@ -36,6 +36,36 @@ TEST(SlowDisk, WhatBeganToMoveMeanwhileIsNotStarted) {
   EXPECT_EQ(rig.triggers(), 0);
 }
 
+/// Another master starts a motion at a constant velocity.
+TEST(M04, MotionThatNobodyAskedForIsStoppedWhileTheDiskIsWaitedFor) {
+  const Action actions[] = {MoveAbsoluteRequest{.position = 100}, SetPositionRequest{.position = 5}};
+  for (const auto& action : actions) {
+    for (const bool journal : {true, false}) {
+      SCOPED_TRACE(fmt::format("{} {}", to_string(kind_of(action)), journal));
+      Rig rig({.limits = false, .persistence = true, .journal = true});
+      rig.ready();
+      // A move waits for its record alone, a position for being saved, too.
+      if (!journal && kind_of(action) != CommandKind::set_position) continue;
+      (journal ? rig.journal.slow : rig.store.slow) = true;
+      const auto command = rig.submit(action, {.client = "a", .request_id = "r"});
+      rig.run(100ms);
+      rig.line->forget_wire();
+      rig.write_behind(0x0023, 60);
+      rig.write_behind(0x0027, 2);
+      rig.run(1s);
+      EXPECT_GE(rig.writes_of(0x0028), 1);
+      EXPECT_FALSE(rig.drive->shaft_moving());
+      EXPECT_EQ(command->value().state, CommandState::aborted) << describe(command->value());
+      EXPECT_EQ(command->value().cause->reason, Reason::moving);
+      rig.journal.release();
+      rig.store.release();
+      rig.run(1s);
+      EXPECT_EQ(rig.triggers(), 0);
+      EXPECT_EQ(rig.state()->state, AxisState::standstill);
+    }
+  }
+}
+
 TEST(SlowDisk, WhatLostItsPositionMeanwhileIsNotStarted) {
   auto options = homed_by_a_terminal();
   options.adjust = [base = options.adjust](AxisSettings& axis) {

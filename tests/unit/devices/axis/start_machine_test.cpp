@@ -107,6 +107,18 @@ TEST(StartMachine, SavingSomethingElseLeavesOpenWhatMayRun) {
   EXPECT_EQ(member.state(), State::accepted);
 }
 
+TEST(StartMachine, NothingIsSentWhileItWaitsForTheDiskOrItsTurn) {
+  auto noting = ready(), queued = ready(), saving = ready(), halting = StartMachine();
+  EXPECT_TRUE(noting.note());
+  EXPECT_TRUE(noting.sends_nothing());
+  queued.queue();
+  EXPECT_TRUE(queued.sends_nothing());
+  saving.save();
+  EXPECT_TRUE(saving.sends_nothing());
+  halting.wait_for_halt();
+  for (const auto& start : {StartMachine(), halting, ready(), begun()}) EXPECT_FALSE(start.sends_nothing());
+}
+
 TEST(StartMachine, WhatHasBegunWaitsForNothing) {
   EXPECT_TRUE(begun().has_begun());
   EXPECT_TRUE(begun().may_run());
