@@ -20,14 +20,14 @@ struct Buffered {
   PositionTracker end;  ///< as it will be when this is done
 };
 
-/// In the order in which they start. Nothing waits where nothing is executed. Who leaves it is ended by the
-/// caller. Pure. Thread: core.
+/// In the order in which they start. Nothing waits where nothing is executed. The caller ends the commands
+/// that leave it otherwise than by their start. Pure. Thread: core.
 ///
-///   empty    -- push() -----------------------------> waiting
-///   waiting  -- take_next(): its command -----------> starting, while it is looked at once more
-///   starting -- take_starting(): it is executed ----> waiting, or empty
-///   starting -- end_start(): it cannot be ----------> waiting, or empty
-///   waiting  -- take_all(), cut() the first --------> empty
+///   empty    -- push() ----------------------------> waiting
+///   waiting  -- take_next() -----------------------> starting: it is looked at once more
+///   starting -- take_starting(): it is executed ---> waiting, or empty
+///   starting -- end_start(): it is refused --------> waiting, or empty
+///   waiting  -- take_all(), cut() of the first ----> empty
 class CommandBuffer {
  public:
   enum class State : std::uint8_t { empty, waiting, starting };
@@ -39,6 +39,7 @@ class CommandBuffer {
   Buffered take_next();
   /// The command that is being started; nullptr: none is.
   CommandPtr take_starting() { return std::exchange(starting_, nullptr); }
+  /// Nothing is being started any more, whether that was executed or not.
   void end_start() { starting_ = nullptr; }
   std::deque<Buffered> take_all() { return std::exchange(waiting_, {}); }
   /// That command and those behind it; none, if it does not wait here.

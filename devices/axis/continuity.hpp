@@ -19,9 +19,9 @@ class Continuity {
 
   /// A proof that was asked for then, or answered, succeeded.
   void proven(TimePoint at);
-  /// A reading that the bus repeats waited for the line so long.
+  /// A reading that the bus repeats has waited for the line for that time.
   void waited(Duration time);
-  /// Nobody measures that wait while the bus repeats nothing.
+  /// The waits count less: nobody measures them while the bus repeats nothing.
   void forget_waits() { waited_ = waited_ * 3 / 4; }
 
   [[nodiscard]] State state(TimePoint now) const;
@@ -38,21 +38,23 @@ class Continuity {
     moving,
     awaiting_end,  ///< of a motion: the canary waits as long as it may
   };
-  /// The poll loop has to prove it now. `asked`: when it should have been, beside a reading by the bus.
+  /// The poll loop has to prove it now. `asked`: when the bus was told to prove it beside a reading, as
+  /// due_beside() said; max(): it was not told to.
   [[nodiscard]] bool is_due(TimePoint now, Pace pace, TimePoint asked) const;
   /// The poll loop proves it by then.
   [[nodiscard]] TimePoint latest(bool moving) const;
-  /// When the bus proves it that repeats the reading, the next one being asked for then: with the last one
-  /// that is in time, or between two where they are rare. Later than that one: not yet.
+  /// When the bus has to prove it. It repeats the reading every `period`, the next time at `next_reading`:
+  /// with that one, if the one after it would be too late; before it, if it is too late itself; max(): not
+  /// yet.
   [[nodiscard]] TimePoint due_beside(TimePoint next_reading, Duration period) const;
-  /// When somebody has to look whether it is lost, on a grid that all axes share as long as it is not near.
+  /// When to look whether it is lost: at times that all axes share, and more exactly when it is about to be.
   [[nodiscard]] TimePoint next_look(TimePoint now) const;
 
  private:
   [[nodiscard]] TimePoint latest_at_rest() const;
 
   TimePoint checked_{};
-  Duration waited_{};  ///< for the line, the longest of the last of what the bus repeats
+  Duration waited_{};  ///< the longest that one of the last repeated readings has waited for the line
 };
 
 }  // namespace axisd

@@ -27,7 +27,7 @@ class EarlierRun {
   enum class State : std::uint8_t { settled, open };
   enum class Position : std::uint8_t { saved, doubtful, tried };
 
-  /// `settle_by`: a drive that cannot be read until then does not tell any more what became of them.
+  /// `settle_by`: what cannot be read from the drive by then is not waited for any longer.
   void take_over(std::vector<Unsettled> commands, TimePoint settle_by) {
     commands_ = std::move(commands);
     settle_by_ = settle_by;

@@ -15,7 +15,7 @@ inline constexpr Duration start_window = std::chrono::milliseconds(500);
 /// and nothing older. Pure. Thread: core.
 ///
 ///   starting -- moves, or is elsewhere than it was ------------------------> running
-///   starting -- cannot be told from noise, and its time is over, at rest --> running
+///   starting -- its way is too short to be seen, and its time is over -----> running
 ///   starting -- rests, by a reading from after the start window -----------> did_not_start
 ///   running  -- at rest elsewhere than at the target ----------------------> settling
 ///   running, settling -- at rest at the target ----------------------------> arrived
@@ -23,7 +23,7 @@ inline constexpr Duration start_window = std::chrono::milliseconds(500);
 ///   running, settling -- held back, or longer than a shaft settles --------> rests_elsewhere
 ///   arrived  -- go_on(): something has moved it since ---------------------> running
 ///   starting, running, settling -- another mode of the drive --------------> taken_over
-///   starting, running, settling -- far longer than predicted --------------> took_too_long
+///   running, settling -- far longer than predicted ------------------------> took_too_long
 class MotionMachine {
  public:
   enum class State : std::uint8_t {

@@ -9,11 +9,12 @@
 
 namespace axisd {
 
-/// What decides the state of an axis, the strongest first.
+/// What decides the state of an axis, the strongest first; but a command that is executed shows its own state
+/// while the motion before it is halted (StopMachine::Shown::ended_motion).
 struct StateSources {
   bool fault = false;
   StopMachine::Shown stop = StopMachine::Shown::nothing;
-  AxisState executed = AxisState::standstill;    ///< what the command shows; standstill: none, or no motion
+  AxisState executed = AxisState::standstill;    ///< of the command; standstill: none, or it moves nothing
   std::optional<DriveMode> moved_by_terminal{};  ///< the mode in which the drive moves by itself
   bool energised = false;                        ///< by the newest reading
 };

@@ -34,7 +34,7 @@ class PowerMachine {
 
   /// A reading that is asked for from `since` on shows whether it is done.
   void owe_release(TimePoint since) { release_since_ = since; }
-  /// True: it has to be released now.
+  /// The newest reading. True: a release is owed, and not done.
   [[nodiscard]] bool has_to_release(const DriveSample& sample);
   void give_up() { release_since_.reset(); }
 

@@ -11,8 +11,8 @@
 
 namespace axisd {
 
-/// Finds by the readings what costs the position its trust, also where it began and ended between two of
-/// them. Pure. Thread: core.
+/// Finds in the readings what costs the position its trust, also what began and ended between two of them.
+/// Pure. Thread: core.
 ///
 ///   seen   -- lose_sight(): the drive fell silent --> unseen
 ///   unseen -- see(): it is online again ------------> seen
@@ -35,21 +35,21 @@ class ShaftWatch {
     Duration settling{};           ///< how late a measured position comes to its target
   };
 
-  /// A reading, before it is asked what it means.
+  /// The newest reading. The two questions below follow it.
   void look(const DriveSample& now, const Facts& facts);
   /// It shows that the position is not to be believed: homing that is not ours zeroes the counter, and in
   /// open loop the overtravel stop at a limit has no ramp. Homing runs onto limits by design.
   [[nodiscard]] bool shows_loss(const std::optional<DriveSample>& before, const DriveSample& now,
                                 const Facts& facts) const;
-  /// Something that ended between the two readings, in which the shaft turned by so many pulses, leaves it
-  /// open.
+  /// Between the two readings something may have ended that costs the position its trust, and neither of them
+  /// shows it. `turned_by`: pulses, from one to the other.
   [[nodiscard]] bool hides_loss(const DriveSample& before, const DriveSample& now, std::int64_t turned_by,
                                 const Facts& facts) const;
 
   /// The drive's counter is being zeroed: what is read meanwhile may show either counter.
   void begin_rezeroing() { rezeroing_ = true; }
   void end_rezeroing() { rezeroing_ = false; }
-  /// `ends`: counters at which it may be found undisturbed.
+  /// `ends`: counters at which the shaft may come to rest if nothing disturbs it.
   void lose_sight(std::vector<std::int64_t> ends);
   void see() { state_ = State::seen; }
 
@@ -57,7 +57,7 @@ class ShaftWatch {
   [[nodiscard]] bool rezeroes() const { return rezeroing_; }
   /// Direction of the axis in which it moved last.
   [[nodiscard]] bool positive() const { return positive_; }
-  /// It was out of sight, and nothing needs to have disturbed a shaft that is found there.
+  /// A shaft that is found there was not out of sight, or needs not have been disturbed meanwhile.
   [[nodiscard]] bool undisturbed_at(std::int64_t counter) const;
 
  private:

@@ -12,20 +12,22 @@ namespace axisd {
 /// What a reading says.
 enum class RestVerdict : std::uint8_t { undecided, rests, moves };
 
-/// Judges the readings of a drive that is polled. RestVerdict counts once it was measured after `since`.
-/// Within homing the motor rests between its phases, so there it must have rested at one place for a while.
-/// Not in time is only what a reading from after `deadline` shows moving: on a slow line it may come late,
-/// and a silent node goes offline. Pure. Thread: core.
+/// Judges the readings of a drive that is polled. A reading counts if it was asked for at `since` or later.
+/// Within homing the motor rests between the phases, so there it must have rested at one place for a while.
+/// It moves on (RestVerdict::moves) only where a reading from after `deadline` shows that: on a slow line
+/// that reading may come late, and a silent node goes offline. Pure. Thread: core.
 ///
-///   moving  -- at rest, not within homing --------------> rests
-///   moving  -- at rest within homing -------------------> resting
-///   resting -- at rest at the same place for so long ---> rests
-///   resting -- at rest elsewhere -----------------------> resting, from then on
-///   resting -- moves -----------------------------------> moving
-///   any     -- read after the deadline (while resting: so much later) --> moves
+///   moving  -- at rest, not within homing -----------> verdict: rests
+///   moving  -- at rest within homing ----------------> resting
+///   resting -- at the same place, for `rest` --------> verdict: rests
+///   resting -- at rest elsewhere --------------------> resting, from then on
+///   resting -- in motion ----------------------------> moving
+///   moving  -- read after the deadline --------------> verdict: moves
+///   resting -- read `rest` after the deadline -------> verdict: moves
 class StandstillWatch {
  public:
   enum class State : std::uint8_t { moving, resting };
+  /// So long it rests within homing before that is no pause between two phases.
   static constexpr Duration rest = milliseconds(150);
 
   StandstillWatch(TimePoint since, TimePoint deadline) : since_(since), deadline_(deadline) {}
@@ -39,15 +41,15 @@ class StandstillWatch {
   std::int64_t resting_at_ = 0;
 };
 
-/// The same for a node that nobody polls: each reading is asked for here. Between the phases of homing the
-/// motor rests for some readings. Pure. Thread: core.
+/// The same for a node that nobody polls: whoever uses this asks for each reading. Between the phases of
+/// homing the motor rests for some readings. Pure. Thread: core.
 ///
-///   moving  -- at rest, not within homing ---------> rests
+///   moving  -- at rest, not within homing ---------> verdict: rests
 ///   moving  -- at rest within homing --------------> resting
-///   resting -- at the same place, several times ---> rests
-///   resting -- moves, or rests elsewhere ----------> moving
-///   moving  -- read after the deadline ------------> moves
-///   any     -- no reply, several times in a row ---> moves, as far as is known
+///   resting -- at the same place, several times ---> verdict: rests
+///   resting -- in motion, or at rest elsewhere ----> moving
+///   moving  -- read after the deadline ------------> verdict: moves
+///   any     -- no reply, several times in a row ---> verdict: moves, as far as is known
 class UnpolledStandstill {
  public:
   static constexpr int resting_in_homing = 6;  ///< readings

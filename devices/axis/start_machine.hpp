@@ -5,17 +5,21 @@
 
 namespace axisd {
 
-/// The way of a command to its start. Pure. Thread: core.
+/// The way of a command to its start. A command of its own goes from `accepted` to `ready` with standstill(),
+/// a member of a group with about_to_start(), and one that starts no motion never does. Homing that backs off
+/// goes its way twice: its first motion has begun when it saves again. Pure. Thread: core.
 ///
-///   accepted -- wait_for_halt() -------------------> halting
-///   accepted, halting, begun -- standstill() ------> ready
-///   accepted, ready -- note() ---------------------> noting; noted() leads back
-///   accepted, ready, begun -- queue() -------------> queued; has_turn() leads back to ready or accepted
-///   accepted -- save() ----------------------------> noting; saved() leads back
-///   ready, begun -- save() ------------------------> saving; saved() leads to ready
-///   accepted -- about_to_start() ------------------> ready
-///   ready -- not_started() ------------------------> accepted
-///   any -- begun() --------------------------------> begun
+///   accepted -- wait_for_halt() ----------------> halting
+///   accepted, halting, ready -- standstill() ---> ready
+///   accepted, halting -- note() ----------------> noting;  noted() leads to accepted
+///   ready -- note() ----------------------------> noting;  noted() leads to ready
+///   accepted -- save() -------------------------> noting;  saved() leads to accepted
+///   ready, begun -- save() ---------------------> saving;  saved() leads to ready
+///   accepted -- queue() ------------------------> queued;  has_turn() leads to accepted
+///   ready, begun -- queue() --------------------> queued;  has_turn() leads to ready
+///   accepted -- about_to_start() ---------------> ready
+///   ready -- not_started() ---------------------> accepted
+///   ready -- begun() ---------------------------> begun
 class StartMachine {
  public:
   enum class State : std::uint8_t {
@@ -53,7 +57,7 @@ class StartMachine {
   }
   /// It is known to a restart, or that is under way.
   [[nodiscard]] bool is_noted() const { return noted_; }
-  /// For something else than its line, whose gate ends what is late.
+  /// It waits for something else than its line, whose gate ends what is late.
   [[nodiscard]] bool waits() const {
     return state_ != State::accepted && state_ != State::ready && state_ != State::begun;
   }
@@ -66,7 +70,7 @@ class StartMachine {
   void go_back() { state_ = may_run_after_ ? State::ready : State::accepted; }
 
   State state_ = State::accepted;
-  bool may_run_after_ = false;  ///< what it waits for
+  bool may_run_after_ = false;  ///< may_run(), once it has what it waits for
   bool noted_ = false;
 };
 

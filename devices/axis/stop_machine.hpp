@@ -38,7 +38,8 @@ namespace axisd {
 ///   motion         -- restarted() ------> none
 ///   stop_of_motion -- restarted() ------> stop
 ///   any            -- failed() ---------> as owe()
-///   any            -- confirmed(), pay() > none
+///   any            -- confirmed() -----> none
+///   any            -- pay() -----------> none
 ///   any            -- seen_at_rest() ---> none, unless a stop is under way
 class StopMachine {
  public:
@@ -152,8 +153,8 @@ class StopMachine {
 
   /// A stop without a reply is repeated at once, this often before the motor's state decides.
   static constexpr int attempts = 3;
-  /// Standstill that no stop was acknowledged before is looked at so often, with further attempts each time:
-  /// what rests by itself is not what was asked for. After that the drive simply does not acknowledge.
+  /// A drive at rest that has acknowledged no stop gets further attempts, so many rounds in all: that it
+  /// rests does not tell that a stop has arrived. After the last round it is one that does not acknowledge.
   static constexpr int unacknowledged_rounds = 4;
 
  private:
@@ -173,7 +174,7 @@ class StopMachine {
   int requests_ = 0;                ///< each needs a frame of its own
   Attempt attempt_;                 ///< the last
   int silent_ = 0;                  ///< replies in a row that did not come
-  int rounds_ = 0;                  ///< of attempts without any
+  int rounds_ = 0;                  ///< of attempts without any reply
   bool released_ = false;           ///< the last resort was tried
   bool of_motion_ = false;          ///< the first of them found the axis in motion
   std::vector<CommandPtr> commands_;

@@ -162,6 +162,26 @@ TEST(HomingMachine, ACounterThatTheDriveSetsIsNoTravel) {
   EXPECT_EQ(followed.searches(2020ms, 1010), State::too_far) << "the way before it counts";
 }
 
+TEST(HomingMachine, WhatIsNoHomingGoesNoFurtherEither) {
+  Followed followed;
+  const auto moves = [&](Duration at, std::int32_t counter) {
+    return followed.read(at, DriveMode::positioning, true, false, counter);
+  };
+  EXPECT_EQ(moves(0ms, 50'000), State::starting);
+  EXPECT_EQ(moves(400ms, 50'300), State::starting);
+  auto short_of_it = homing();
+  short_of_it.max_travel = 0.25;
+  Followed shorter(short_of_it);
+  EXPECT_EQ(shorter.read(400ms, DriveMode::positioning, true, false, 50'300), State::too_far);
+}
+
+TEST(HomingMachine, ADriveThatTellsNothingSinceItsStartEndsWhenItsTimeIsOver) {
+  Followed followed;
+  const DriveSample old{.asked_at = started - 10ms, .measured_at = started - 8ms};
+  EXPECT_EQ(followed.machine.look({.sample = old}, started + 5s - 1ms), State::starting);
+  EXPECT_EQ(followed.machine.look({.sample = old}, started + 5s), State::took_too_long);
+}
+
 TEST(HomingMachine, ItEndsWhenItsTimeIsOver) {
   auto endless = homing();
   endless.max_travel.reset();

@@ -122,6 +122,21 @@ TEST(MotionMachine, AnotherModeOfTheDriveEndsIt) {
   EXPECT_EQ(running.rests(20ms, {.positioning = false, .moving = true}), State::taken_over);
 }
 
+TEST(MotionMachine, AnotherModeEndsItWhileItSettles) {
+  Followed followed;
+  followed.moves(10ms);
+  ASSERT_EQ(followed.rests(20ms), State::settling);
+  EXPECT_EQ(followed.rests(30ms, {.positioning = false}), State::taken_over);
+}
+
+TEST(MotionMachine, ItDoesNotSettleBeyondItsTime) {
+  Followed followed;
+  const auto latest = predicted + predicted / 4 + 1s;
+  followed.moves(latest - 20ms);
+  ASSERT_EQ(followed.rests(latest - 1ms), State::settling);
+  EXPECT_EQ(followed.rests(latest), State::took_too_long);
+}
+
 TEST(MotionMachine, AMotionFarLongerThanPredictedEnds) {
   Followed followed;
   const auto latest = predicted + predicted / 4 + 1s;

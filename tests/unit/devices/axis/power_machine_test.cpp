@@ -111,6 +111,13 @@ TEST(EnableMachine, WhatTurnsWasTurnedByPower) {
   }
 }
 
+TEST(EnableMachine, ADriveThatCannotBeReadWhileItsBrakeOpensShowsNothing) {
+  EnableMachine enable(now, brake);
+  ASSERT_EQ(read(enable, 10ms, true), State::opening);
+  enable.silent();
+  EXPECT_EQ(enable.state(), State::not_shown);
+}
+
 TEST(EnableMachine, ADriveThatCannotBeReadShowsNothing) {
   EnableMachine enable(now, brake);
   enable.silent();

@@ -44,6 +44,21 @@ TEST(StartMachine, NothingOfItMayRunBeforeItIsNoted) {
   EXPECT_EQ(start.state(), State::ready);
 }
 
+TEST(StartMachine, WhatIsNotedDuringAHaltIsAcceptedAfterIt) {
+  StartMachine start;
+  start.wait_for_halt();
+  EXPECT_TRUE(start.note());
+  EXPECT_EQ(start.state(), State::noting);
+  start.noted();
+  EXPECT_EQ(start.state(), State::accepted);
+}
+
+TEST(StartMachine, StandstillIsLookedForTwiceWhereHomingBacksOff) {
+  auto start = ready();
+  start.standstill();
+  EXPECT_EQ(start.state(), State::ready);
+}
+
 TEST(StartMachine, ItIsNotedOnce) {
   auto start = begun();
   ASSERT_TRUE(start.note());
