@@ -64,7 +64,7 @@ void Axis::lease_lost(const Error& cause) {
 /// silence, an enable that was on its way) only puts it off.
 void Axis::release_as_owed() {
   if (!link_.online() || activity_ || stop_.owed() || !sample_) return;
-  if (!power_.has_to_release(*sample_)) return;
+  if (!power_.look(*sample_)) return;
   accept_epoch_ = gate_->epoch();
   (void)accept(DisableRequest{}, {.client = "axisd, as on_lease_loss says"});
 }

@@ -60,7 +60,7 @@ void Axis::poll_fast(TimePoint from, Duration longest) {
 Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
   auto proof = co_await drive_->check_continuity(priority);
   if (proof) continuity_.proven(env_.clock->now());
-  continuity_.forget_waits();
+  continuity_.fade_waits();
   co_return proof;
 }
 

@@ -22,7 +22,7 @@ class Continuity {
   /// A reading that the bus repeats has waited for the line for that time.
   void waited(Duration time);
   /// The waits count less: nobody measures them while the bus repeats nothing.
-  void forget_waits() { waited_ = waited_ * 3 / 4; }
+  void fade_waits() { waited_ = waited_ * 3 / 4; }
 
   [[nodiscard]] State state(TimePoint now) const;
   /// A reading that was asked for then is too far from the last proof to mean anything by itself.

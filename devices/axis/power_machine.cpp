@@ -8,7 +8,7 @@ bool PowerMachine::released(bool enabled_before) {
   return std::exchange(state_, State::found) == State::ours || enabled_before;
 }
 
-bool PowerMachine::has_to_release(const DriveSample& sample) {
+bool PowerMachine::look(const DriveSample& sample) {
   if (!release_since_) return false;
   if (!sample.enabled && sample.asked_at >= *release_since_) release_since_.reset();
   return sample.enabled;

@@ -35,7 +35,7 @@ class PowerMachine {
   /// A reading that is asked for from `since` on shows whether it is done.
   void owe_release(TimePoint since) { release_since_ = since; }
   /// The newest reading. True: a release is owed, and not done.
-  [[nodiscard]] bool has_to_release(const DriveSample& sample);
+  [[nodiscard]] bool look(const DriveSample& sample);
   void give_up() { release_since_.reset(); }
 
   [[nodiscard]] State state() const { return state_; }

@@ -73,7 +73,7 @@ TEST(Continuity, AWaitIsForgottenByAndBy) {
   continuity.waited(10ms);
   EXPECT_EQ(continuity.latest(false), proof + 635ms);
   continuity.waited(200ms);
-  continuity.forget_waits();
+  continuity.fade_waits();
   EXPECT_EQ(continuity.latest(false), proof + 410ms);
 }
 

@@ -37,14 +37,14 @@ TEST(PowerMachine, AReleaseIsNewsOnce) {
 
 TEST(PowerMachine, AReleaseIsOwedUntilAReadingFromThenOnShowsIt) {
   PowerMachine power;
-  EXPECT_FALSE(power.has_to_release(reading(now, true)));
+  EXPECT_FALSE(power.look(reading(now, true)));
   power.owe_release(now);
   EXPECT_TRUE(power.owes_release());
-  EXPECT_FALSE(power.has_to_release(reading(now - 1ms, false)));
+  EXPECT_FALSE(power.look(reading(now - 1ms, false)));
   EXPECT_TRUE(power.owes_release()) << "an enable may be on its way";
-  EXPECT_TRUE(power.has_to_release(reading(now + 1ms, true)));
+  EXPECT_TRUE(power.look(reading(now + 1ms, true)));
   EXPECT_TRUE(power.owes_release()) << "until it shows";
-  EXPECT_FALSE(power.has_to_release(reading(now + 2ms, false)));
+  EXPECT_FALSE(power.look(reading(now + 2ms, false)));
   EXPECT_EQ(power.release(), PowerMachine::Release::none);
 }
 
@@ -53,7 +53,7 @@ TEST(PowerMachine, AReleaseThatFailsIsGivenUp) {
   power.owe_release(now);
   power.give_up();
   EXPECT_EQ(power.release(), PowerMachine::Release::none);
-  EXPECT_FALSE(power.has_to_release(reading(now, true)));
+  EXPECT_FALSE(power.look(reading(now, true)));
 }
 
 using State = EnableMachine::State;
