@@ -111,12 +111,15 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   // Its standstill is no proof: a restart would have ended a motion, too.
   const bool proven = readback.state() == State::resting && co_await proven_continuous(activity);
   // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
-  // as it began, or the way is too short to be seen.
+  // as it began, or it rests where it would have arrived.
   const bool may_end_it =
       terminals_.has("motor_free") || terminals_.has("stop") || terminals_.has("quick_stop");
   const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
+  const auto is_at_target = [&] {
+    return std::abs(tracker_.counter() - activity->plan.target->counter) <= drive_->position_window();
+  };
   if (proven)
-    readback.proven(!may_end_it && !(moves_to_a_target && !shows(activity->plan, base)));
+    readback.proven(!may_end_it && !(moves_to_a_target && is_at_target()));
   else if (readback.state() == State::resting)
     readback.superseded();
   count(unknown_starts_, readback.state());
@@ -145,10 +148,11 @@ std::optional<StartReadback::Reading> Axis::readback_of(std::int64_t base) const
       .shows_it = sample_->moving || moved_from(base) || sample_->mode != DriveMode::positioning};
 }
 
-/// A position tells whether the motion was executed.
+/// A position tells that the motion was executed. Where its drive takes it for arrived it may still be that
+/// window short of its target (M30).
 bool Axis::shows(const Plan& plan, std::int64_t base) const {
   const auto window = drive_->position_window();
-  return window == 0 || std::abs(plan.target->counter - base) > window;
+  return window == 0 || std::abs(plan.target->counter - base) > 2 * window;
 }
 
 /// At rest, and not at the target.

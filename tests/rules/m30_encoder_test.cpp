@@ -11,6 +11,7 @@ namespace axisd::test {
 namespace {
 
 using namespace std::chrono_literals;
+using simulation::FaultKind;
 
 constexpr double pulses_per_mm = 1000;
 constexpr std::string_view closed_loops[] = {"ssd2608pr", "ess42-r"};
@@ -118,6 +119,52 @@ TEST(M30, MovesSmallerThanTheWindowAreMade) {
     }
     for (int i = 11; i >= 0; --i) expect_done(rig.complete(MoveRelativeRequest{.distance = -0.002}));
     EXPECT_NEAR(load_of(rig, options) - zero, 0, 0.0061);
+  });
+}
+
+/// A shaft may rest a window short of where it was sent: as near to its start as one that never began (M8).
+TEST(M30, AShortMoveIsNotTakenForOneThatNeverBegan) {
+  on_each([](const RigOptions& options) {
+    for (int pulses = 20; pulses <= 60; ++pulses) {
+      for (const bool answered : {true, false}) {
+        for (const bool positive : {true, false}) {
+          SCOPED_TRACE(fmt::format("{} pulses, {}", positive ? pulses : -pulses, answered));
+          Rig rig(options);
+          rig.ready();
+          expect_done(rig.complete(MoveAbsoluteRequest{.position = 1}));
+          const auto starts = rig.drive->starts();
+          // Nor do the readings that would show it moving.
+          if (!answered) {
+            rig.fault({.kind = FaultKind::drop_reply, .register_address = 0x0027});
+            rig.line->set_on_bind([&](const WireEntry& entry) {
+              if (entry.is_write() && entry.address() == 0x0027)
+                rig.fault({.kind = FaultKind::drop_reply, .function = 0x03, .count = 2});
+            });
+          }
+          const auto moved =
+              rig.complete(MoveRelativeRequest{.distance = (positive ? pulses : -pulses) / pulses_per_mm});
+          ASSERT_EQ(rig.drive->starts(), starts + 1);
+          if (answered) expect_done(moved);
+          if (moved.cause) EXPECT_EQ(moved.cause->outcome, Outcome::unknown) << describe(moved);
+        }
+      }
+    }
+  });
+}
+
+/// One that rests where it was, and further from its target than a window, never began.
+TEST(M30, AMoveThatNeverBeganIsToldWhereThePositionTells) {
+  on_each([](const RigOptions& options) {
+    for (const int pulses : {40, 80}) {
+      SCOPED_TRACE(pulses);
+      Rig rig(options);
+      rig.ready();
+      rig.fault({.kind = FaultKind::drop_request, .register_address = 0x0027});
+      const auto moved = rig.complete(MoveRelativeRequest{.distance = pulses / pulses_per_mm});
+      ASSERT_EQ(rig.drive->starts(), 0);
+      ASSERT_TRUE(moved.cause) << describe(moved);
+      EXPECT_EQ(moved.cause->outcome, Outcome::not_executed);
+    }
   });
 }
 
