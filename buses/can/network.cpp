@@ -89,7 +89,8 @@ void Network::finish() {
   free_since_ = at;
   ++frames_;
   arbitrate(at);  // first, so that whatever the receivers send now has not begun before it
-  if (const auto found = participants_.find(sender); found != participants_.end()) {
+  if (const auto found = participants_.find(sender);
+      found != participants_.end() && !ended.fault.unconfirmed) {
     const auto receiver = found->second.receiver;  // it may leave
     receiver(frame, at, true);
   }
@@ -135,7 +136,9 @@ void NetworkPort::leave() {
 void NetworkPort::set_up(bool up) {
   present_ = true;
   wanted_up_ = up;
-  if (!open_) return;
+  const auto link = tracker().state().link;
+  const bool is_up = link != LinkState::down && link != LinkState::removed;
+  if (!open_ || (up && is_up)) return;
   leave();
   if (up) {
     id_ = network_->join([this](const Frame& frame, TimePoint at, bool own) {

@@ -24,10 +24,11 @@ class Network {
   /// A frame ended, at `at` on the wire. `own`: it is the participant's, which is thereby confirmed.
   using Receiver = std::function<void(const Frame& frame, TimePoint at, bool own)>;
 
-  /// What happens to one frame; its sender sees it confirmed all the same.
+  /// What happens to one frame.
   struct Fault {
-    bool drop = false;  ///< nobody receives it
-    Duration delay{};   ///< it is received later by this; others may overtake it
+    bool drop = false;         ///< nobody receives it; its sender sees it confirmed all the same
+    Duration delay{};          ///< it is received later by this; others may overtake it
+    bool unconfirmed = false;  ///< its sender does not see it confirmed
   };
 
   Network(Clock& clock, std::uint32_t bitrate) : clock_(&clock), bitrate_(bitrate) {}
@@ -43,6 +44,10 @@ class Network {
   /// Empties the participant's queue; a frame on the wire ends.
   void flush(Id participant);
   [[nodiscard]] std::size_t waiting(Id participant) const;
+  /// A frame of the participant's waits, or is on the wire.
+  [[nodiscard]] bool holds_frame_of(Id participant) const {
+    return waiting(participant) > 0 || (on_wire_ && on_wire_->sender == participant);
+  }
 
   /// Asked for each frame when it begins; none: no faults.
   void set_fault(std::function<Fault(const Frame&)> fault) { fault_ = std::move(fault); }
@@ -96,7 +101,7 @@ class NetworkPort : public PortCore {
   NetworkPort(Clock& clock, PortSettings settings, Network& network);
   ~NetworkPort() override { shut(); }
 
-  /// The interface was set down or up; down empties its queue.
+  /// The interface was set down or up; down empties its queue. Up changes nothing where it is up.
   void set_up(bool up);
   /// The interface was removed; set_up() creates it anew.
   void remove();
@@ -113,6 +118,7 @@ class NetworkPort : public PortCore {
   void open() final;
   void shut() final;
   void catch_up() override { network_->catch_up(clock().now()); }
+  bool drained() override { return !network_->holds_frame_of(id_); }
   void leave();
 
   static constexpr std::size_t interface_queue = 10;  ///< as txqueuelen of a CAN interface

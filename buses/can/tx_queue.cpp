@@ -99,6 +99,8 @@ TxQueue::Lane* TxQueue::first_lane() {
 const Frame* TxQueue::next(TimePoint now) {
   if (unconfirmed_.size() >= window_ || now < retry_at_) return nullptr;
   while (auto* lane = first_lane()) {
+    // Else the kernel might never be seen without a frame.
+    if (lane != &lanes_.front() && overdue(now)) return nullptr;
     const auto verdict = judge(lane->front(), now);
     if (verdict == SendStatus::sent) return &lane->front().frame;
     end(take(lane->begin()).completion, {.status = verdict});
@@ -152,6 +154,25 @@ void TxQueue::drained(TimePoint now) {
   }
 }
 
+TimePoint TxQueue::oldest() const {
+  const auto found = std::ranges::find_if(unconfirmed_, [](const Unconfirmed& each) { return !each.echoed; });
+  return found == unconfirmed_.end() ? TimePoint::max() : found->handed_over;
+}
+
+bool TxQueue::overdue(TimePoint now) const {
+  const auto since = oldest();
+  return since != TimePoint::max() && now >= since + stall_timeout_;
+}
+
+void TxQueue::give_up_overdue(TimePoint now) {
+  looked_at_ = now;
+  std::erase_if(unconfirmed_, [&](Unconfirmed& each) {
+    if (each.echoed || now < each.handed_over + stall_timeout_) return false;
+    end(std::move(each.completion), {.status = SendStatus::unknown, .handed_over = each.handed_over});
+    return true;
+  });
+}
+
 bool TxQueue::awaits_drain() const { return std::ranges::any_of(unconfirmed_, &Unconfirmed::echoed); }
 
 /// Nobody asks for room any more.
@@ -188,6 +209,7 @@ void TxQueue::end_all() {
 TimePoint TxQueue::stalls_at() const {
   auto at = TimePoint::max();
   if (!unconfirmed_.empty()) at = progress_ + stall_timeout_;
+  if (const auto since = oldest(); since != TimePoint::max()) at = std::min(at, since + 2 * stall_timeout_);
   if (refused_since_) at = std::min(at, *refused_since_ + stall_timeout_);
   return at;
 }
@@ -197,6 +219,8 @@ bool TxQueue::stalled(TimePoint now) const { return now >= stalls_at(); }
 TimePoint TxQueue::next_event() const {
   auto at = stalls_at();
   if (awaits_drain()) at = std::min(at, looked_at_ + drain_interval);
+  if (const auto since = oldest(); since != TimePoint::max())
+    at = std::min(at, std::max(since + stall_timeout_, looked_at_ + drain_interval));
   const bool waits = queued() > 0;
   if (waits && unconfirmed_.size() < window_ && retry_at_ > TimePoint{}) at = std::min(at, retry_at_);
   // The deadline itself is still in time.

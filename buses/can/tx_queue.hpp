@@ -30,8 +30,8 @@ class TxQueue {
 
   /// Queues a frame; at once `invalid` or `queue_full` where it cannot be.
   void push(const Frame& frame, const SendOptions& options, Completion completion);
-  /// The frame to hand over now, or none (nothing waits, the window is full, or the kernel was full just
-  /// before). Valid until the next call.
+  /// The frame to hand over now, or none (nothing waits, the window is full, the kernel was full just before,
+  /// or a frame is overdue and no stop waits). Valid until the next call.
   const Frame* next(TimePoint now);
   /// The kernel took what next() gave.
   void handed_over(TimePoint now);
@@ -46,6 +46,11 @@ class TxQueue {
   void drained(TimePoint now);
   /// Something came back that is no proof: ask the kernel whether it still holds frames.
   [[nodiscard]] bool awaits_drain() const;
+  /// A frame has not come back for stall_timeout, though others may have: ask the kernel, too.
+  [[nodiscard]] bool overdue(TimePoint now) const;
+  /// The kernel holds no frame of ours any more, and all that came back was seen: what is overdue will not
+  /// come back. It ends as `unknown`: its echo was lost, or the controller lost the frame.
+  void give_up_overdue(TimePoint now);
 
   /// Ends queued frames whose deadline or validity has passed.
   void reap(TimePoint now);
@@ -54,7 +59,8 @@ class TxQueue {
   /// The port cannot send any more: queued frames end as `port_down`, unconfirmed ones as `unknown`.
   void end_all();
 
-  /// Neither a confirmation nor room in the kernel's queue for stall_timeout.
+  /// Neither a confirmation nor room in the kernel's queue for stall_timeout, or a frame that the kernel
+  /// still holds after twice that time.
   [[nodiscard]] bool stalled(TimePoint now) const;
   /// When next(), reap(), stalled() or awaits_drain() should be looked at again; TimePoint::max(): no need.
   [[nodiscard]] TimePoint next_event() const;
@@ -83,6 +89,8 @@ class TxQueue {
   Lane* first_lane();
   Waiting take(Place place);
   void forget_refusal();
+  /// When the frame that waits for its echo for longest was handed over; TimePoint::max(): none waits.
+  [[nodiscard]] TimePoint oldest() const;
   [[nodiscard]] TimePoint stalls_at() const;
 
   std::size_t window_;

@@ -75,7 +75,7 @@ class Plant {
   bool strike(Station& station, test::VirtualLine& line);
   void handed_over(const can::Frame& frame);
   bool strike(Station& station, const can::Frame& frame, const Telegram& telegram);
-  void strike_network();
+  void strike_network(const can::Frame& frame);
   void mend_network();
 
   Dice dice_;

@@ -122,7 +122,7 @@ void Plant::handed_over(const can::Frame& frame) {
 
 bool Plant::strike(Station& station, const can::Frame& frame, const Telegram& telegram) {
   auto& nodes = nodes_->nodes();
-  if (dice_.chance(0.0002)) strike_network();
+  if (dice_.chance(0.0002)) strike_network(frame);
   if (frame.id != sync_id && !dice_.chance(share_)) return false;
   auto fault =
       frame.id - sdo_request == station.node ? draw(on_can_requests, dice_) : draw(on_can_commands, dice_);
@@ -137,12 +137,13 @@ bool Plant::strike(Station& station, const can::Frame& frame, const Telegram& te
   return true;
 }
 
-/// The network as a whole: the cable, the controller, the interface, nobody who acknowledges.
-void Plant::strike_network() {
+/// The network as a whole: the cable, the controller, the interface, nobody who acknowledges; and a
+/// controller or a kernel that loses the frame, or its echo.
+void Plant::strike_network(const can::Frame& frame) {
   const auto later = [this](Duration longest, auto mend) {
     mendings_.push_back(world.clock().call_at(world.now() + dice_.up_to(longest), mend));
   };
-  switch (dice_.pick(4)) {
+  switch (dice_.pick(5)) {
     case 0:
       nodes_->nodes().set_connected(false);
       later(1500ms, [this] { nodes_->nodes().set_connected(true); });
@@ -154,6 +155,13 @@ void Plant::strike_network() {
     case 2:
       later({}, [this] { port_->set_up(false); });
       later(1500ms, [this] { port_->set_up(true); });
+      break;
+    case 3:
+      network_->set_fault([frame, lost = dice_.pick(2) == 0, over = false](const can::Frame& each) mutable {
+        if (over || each != frame) return can::Network::Fault{};
+        over = true;
+        return can::Network::Fault{.drop = lost, .unconfirmed = true};
+      });
       break;
     default:
       network_->set_stalled(true);

@@ -137,6 +137,34 @@ TEST(CanPort, InAStallAllEndsAndNothingIsSentLater) {
   EXPECT_EQ(bench.port.counters().stalls, 1U);
 }
 
+TEST(CanPort, AFrameThatVanishesEndsAsUnknownAndTheRestGoesOn) {
+  Bench bench;
+  bench.network.set_fault(
+      [](const Frame& frame) { return Network::Fault{.drop = frame.id == 1, .unconfirmed = frame.id == 1}; });
+  bench.send(1);
+  for (std::uint32_t id = 2; id < 22; ++id) {
+    bench.send(id);
+    bench.world.run_for(10ms);
+  }
+  EXPECT_EQ(std::ranges::count(bench.endings.texts(), "1:unknown"), 1);
+  EXPECT_EQ(bench.endings.texts().size(), 21U);
+  EXPECT_EQ(bench.others.size(), 20U);
+  EXPECT_EQ(bench.states, States{LinkState::up}) << "no stall";
+}
+
+/// As `ip link set can0 up` on a link that is up.
+TEST(CanPort, ToSetItUpTwiceLosesNothing) {
+  Bench bench;
+  for (std::uint32_t id = 1; id <= 3; ++id) bench.send(id);
+  bench.port.set_up(true);
+  bench.world.run_for(10ms);
+  EXPECT_EQ(bench.endings.texts(), (Texts{"1:sent", "2:sent", "3:sent"}));
+  bench.port.report(Controller::bus_off);
+  bench.port.set_up(true);
+  bench.world.run_for(10ms);
+  EXPECT_EQ(bench.states.back(), LinkState::bus_off) << "it has to go down first";
+}
+
 TEST(CanNetwork, ALateHostMakesTheWireNoSlower) {
   Bench bench;
   const auto begin = bench.world.now();

@@ -182,6 +182,46 @@ TEST(TxQueue, StallsWhenNothingIsConfirmedForTheTimeout) {
   EXPECT_EQ(bench.ended(), (Texts{"1:sent", "2:unknown"}));
 }
 
+/// Its echo was lost with what the daemon read too late, or the controller lost the frame.
+TEST(TxQueue, WhatDoesNotComeBackIsGivenUpOnceTheKernelHoldsNothing) {
+  Bench bench;
+  bench.push(1);
+  bench.hand_over();
+  const auto begin = bench.now;
+  for (; bench.now < begin + 100ms; bench.now += 10ms) {  // others come back all the time
+    EXPECT_FALSE(bench.queue.overdue(bench.now));
+    bench.push(2);
+    EXPECT_EQ(bench.hand_over(), Ids{2});
+    bench.queue.echo(frame_of(2), bench.now, bench.now);
+  }
+  EXPECT_TRUE(bench.queue.overdue(bench.now));
+  EXPECT_FALSE(bench.queue.stalled(bench.now));
+  bench.push(3);
+  bench.push(4, options_of(Class::stop));
+  EXPECT_EQ(bench.hand_over(), Ids{4}) << "nothing but stops, so that the kernel is seen empty";
+  bench.queue.give_up_overdue(bench.now);
+  EXPECT_FALSE(bench.queue.overdue(bench.now));
+  EXPECT_EQ(bench.hand_over(), Ids{3});
+  EXPECT_EQ(bench.ended().back(), "1:unknown");
+  EXPECT_EQ(bench.queue.unconfirmed(), 2U) << "the stop and the frame behind it";
+}
+
+/// It would be sent whenever the controller likes: the link has to go down.
+TEST(TxQueue, StallsWhereTheKernelKeepsAFrameThatOthersOvertake) {
+  Bench bench;
+  bench.push(1);
+  bench.hand_over();
+  const auto begin = bench.now;
+  for (; bench.now < begin + 200ms; bench.now += 10ms) {
+    EXPECT_FALSE(bench.queue.stalled(bench.now));
+    EXPECT_LE(bench.queue.next_event(), begin + 200ms);
+    bench.push(2, options_of(Class::stop));
+    EXPECT_EQ(bench.hand_over(), Ids{2});
+    bench.queue.echo(frame_of(2), bench.now, bench.now);
+  }
+  EXPECT_TRUE(bench.queue.stalled(bench.now));
+}
+
 TEST(TxQueue, SilenceBeforeTheFirstFrameIsNoStall) {
   Bench bench;
   bench.push(1);
