@@ -111,15 +111,15 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   // Its standstill is no proof: a restart would have ended a motion, too.
   const bool proven = readback.state() == State::resting && co_await proven_continuous(activity);
   // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
-  // as it began, or it rests where it would have arrived.
-  const bool may_end_it =
-      terminals_.has("motor_free") || terminals_.has("stop") || terminals_.has("quick_stop");
+  // as it began, or took the shaft back, or it rests where it would have arrived.
+  const bool terminals_may_hide_it = terminals_.may_start_motion() || terminals_.has("motor_free") ||
+                                     terminals_.has("stop") || terminals_.has("quick_stop");
   const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
   const auto is_at_target = [&] {
     return std::abs(tracker_.counter() - activity->plan.target->counter) <= drive_->position_window();
   };
   if (proven)
-    readback.proven(!may_end_it && !(moves_to_a_target && is_at_target()));
+    readback.proven(!terminals_may_hide_it && !(moves_to_a_target && is_at_target()));
   else if (readback.state() == State::resting)
     readback.superseded();
   count(unknown_starts_, readback.state());

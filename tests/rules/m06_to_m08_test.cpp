@@ -170,6 +170,20 @@ TEST(M06, ATimeoutInTheChainRestartsIt) {
   }
 }
 
+/// It may have taken the shaft back to where it was, between two readings.
+TEST(M08, AStandstillProvesNothingWhereATerminalStartsMotions) {
+  for (const bool starts : {true, false}) {
+    Rig rig({.switches = {{"enabled_at_power_up", false}}, .adjust = [starts](AxisSettings& axis) {
+               if (starts) axis.inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+             }});
+    rig.ready();
+    rig.fault({.kind = FaultKind::drop_request, .register_address = 0x0027});
+    const auto move = rig.complete(MoveAbsoluteRequest{.position = 30});
+    ASSERT_TRUE(move.cause);
+    EXPECT_EQ(move.cause->outcome, starts ? Outcome::unknown : Outcome::not_executed) << describe(move);
+  }
+}
+
 /// A pulse at a terminal ends a motion as it begins, between two readings: the drive rests, and did start.
 TEST(M08, AStandstillProvesNothingWhereATerminalMayHaveEndedTheMotion) {
   for (const auto* function : {"motor_free", "stop", "quick_stop"}) {
