@@ -1,5 +1,6 @@
 # What deploy/install.sh and deploy/package.sh install, below the prefix /usr. Configuration and state are the
 # administrator's.
+set(AXISD_PAGE ${CMAKE_SOURCE_DIR}/build/web CACHE PATH "The page of axisd-web, as npm has built it (api/web/README.md)")
 if(AXISD_GRPC)
   install(TARGETS axisd axisctl axisd-sim axisd-web RUNTIME DESTINATION bin)
   install(TARGETS axisd-link RUNTIME DESTINATION lib/axisd)
@@ -11,7 +12,9 @@ if(AXISD_GRPC)
   install(FILES deploy/README.md DESTINATION share/doc/axisd)
   install(DIRECTORY config/examples DESTINATION share/doc/axisd)
   install(FILES deploy/80-axisd-can.network deploy/80-axisd-can.link deploy/axisd-networks.conf
-                deploy/axisd.yaml deploy/web.yaml DESTINATION share/doc/axisd/examples)
+                deploy/axisd.yaml DESTINATION share/doc/axisd/examples)
+  # Whoever installs it has built it; tests that stage an installation need not.
+  install(DIRECTORY ${AXISD_PAGE}/ DESTINATION share/axisd-web OPTIONAL)
   set(made ${CMAKE_BINARY_DIR}/api/axisctl)
   install(FILES ${made}/axisctl.1 deploy/man/axisd-sim.1 DESTINATION share/man/man1)
   install(FILES ${made}/axisd.yaml.5 DESTINATION share/man/man5)

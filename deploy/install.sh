@@ -1,7 +1,7 @@
 #!/bin/bash
 # Builds axisd and installs it on this computer as a systemd service, where it is not Debian with deploy/package.sh's
-# packages: daemon, axisctl, axisd-sim, axisd-link, manual pages, completion, documentation, the Python client. Starts
-# nothing and restarts nothing: a running axisd keeps its axes until the administrator restarts it.
+# packages: daemon, axisctl, axisd-sim, axisd-link, axisd-web and its page, manual pages, completion, documentation, the
+# Python client. Starts nothing and restarts nothing: a running axisd keeps its axes until the administrator restarts it.
 #   sudo deploy/install.sh                 into /usr
 #   sudo deploy/install.sh --uninstall     removes what it installed; configuration and state stay
 #   DESTDIR=DIR deploy/install.sh          into DIR/usr, for packaging: users and services are left alone
@@ -50,7 +50,7 @@ if [ "${1:-}" = --uninstall ]; then
   exit 0
 fi
 
-packaged=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' axisd axisctl python3-axisd axisd-doc 2>/dev/null |
+packaged=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' axisd axisctl axisd-web python3-axisd axisd-doc 2>/dev/null |
   sed -n 's/^installed //p' | xargs) || true
 [ -n "$staged" ] || [ -z "$packaged" ] ||
   die "packages of axisd are installed: remove them first (apt remove $packaged), or make newer ones (deploy/package.sh)"
@@ -62,6 +62,7 @@ else
 fi
 cmake --preset release
 cmake --build --preset release --target axisd axisctl axisd-sim axisd-link axisd-web api_reference axisctl_manual
+deploy/page.sh build/web
 rm -f build/release/install_manifest.txt
 cmake --install build/release --prefix /usr --strip
 

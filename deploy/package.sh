@@ -1,5 +1,6 @@
 #!/bin/bash
-# Makes the Debian packages of the last commit: axisd, axisctl, python3-axisd, axisd-doc, and -dbgsym of the first two.
+# Makes the Debian packages of the last commit: axisd, axisctl, axisd-web, python3-axisd, axisd-doc, and -dbgsym of the first
+# three.
 #   deploy/package.sh [DIRECTORY]      default: build/package
 # The same commit gives the same bytes, wherever it is built. A commit with the tag vVERSION is that version, one before
 # it VERSION~gitTIME.COMMIT, one after it VERSION+gitTIME.COMMIT, so that later commits upgrade earlier ones. JOBS=N builds
@@ -45,6 +46,11 @@ mkdir "$tree/axisd"
 git archive HEAD | tar -x -C "$tree/axisd"
 cd "$tree/axisd"
 cp -r deploy/debian .
+# A build of packages has no network, and npm needs one: the page is built before, and is part of the source that debhelper
+# gets. What Node.js compresses depends on its version; what Debian's gzip does not.
+deploy/page.sh page
+rm -rf api/web/node_modules api/web/generated
+find page -name '*.gz' | while read -r file; do gzip -9nc "${file%.gz}" >"$file"; done
 # The entry of a version that is not released: made from the commit, as what is in the packages depends on its time.
 maintainer=$(dpkg-parsechangelog --show-field Maintainer)
 when=$(git -C "$clone" log -1 --format=%cD)

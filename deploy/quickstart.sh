@@ -66,9 +66,7 @@ if ! { cmake --preset release && cmake --build --preset release --target axisd a
   tail -n 60 "$scratch/build.log" >&2
   die "the build failed"
 fi
-deploy/install-packages.sh page
-(cd api/web && { [ -d node_modules/esbuild ] || npm ci --ignore-scripts --no-audit --no-fund --loglevel=error; } &&
-  npm run --silent build -- "$OLDPWD/build/web") || die "the page of axisd-web was not built"
+deploy/page.sh build/web || die "the page of axisd-web was not built"
 bin=$PWD/build/release
 axisd=$bin/daemon/axisd axisctl=$bin/api/axisctl/axisctl
 printf -v folders '%q:%q' "$bin/daemon" "$bin/api/axisctl"
