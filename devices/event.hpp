@@ -113,10 +113,16 @@ struct CertificateNotice {
   std::string text;    ///< one line, with what to do
 };
 
+/// Registers were saved to the EEPROM of the axis's drive.
+struct EepromWritten {
+  std::uint64_t registers = 0;  ///< since the last event of the kind
+  std::uint64_t total = 0;      ///< since the axis is known on this computer
+};
+
 using EventContent =
     std::variant<TerminalEdge, StateChange, LinkChange, ConfigurationDrift, FlightRecordWritten, LeaseChange,
                  ConfigurationReloaded, StopHoldChange, CommandChange, AxisFault, KeptStateChange,
-                 InhibitChange, CertificateNotice>;
+                 InhibitChange, CertificateNotice, EepromWritten>;
 
 struct Event {
   std::uint64_t sequence = 0;  ///< counts from 1 in each run of the daemon

@@ -50,6 +50,7 @@ void AxisReport::add(const v1::AuditRecord& record) {
       if (record.event().has_command_change()) add(record.event().command_change().command());
       if (record.event().has_axis_fault())
         ++faults_[lower_word(v1::Reason_Name(record.event().axis_fault().cause().reason()), "REASON_")];
+      eeprom_writes_ += record.event().eeprom_written().registers();
       return;
     case v1::AuditRecord::kRecovered:
       return add(record.recovered().command());
@@ -96,12 +97,14 @@ void AxisReport::add_way(const v1::Command& command) {
 std::vector<std::string> AxisReport::lines(std::string_view unit) const {
   auto way = with_unit(distance_, unit) + " from target to target";
   if (not_measured_ > 0) way += fmt::format(", without {} motions of which it is not known", not_measured_);
-  return {fmt::format("{:<18}{}{}", "motions:", sum(motions_), parts(motions_)),
-          fmt::format("{:<18}{}", "distance:", way),
-          fmt::format("{:<18}{}", "stops:", stops_),
-          fmt::format("{:<18}{}{}", "faults:", sum(faults_), parts(faults_)),
-          fmt::format("{:<18}{}", "refused:", refused_),
-          fmt::format("{:<18}{}", "unknown outcomes:", unknown_)};
+  return {
+      fmt::format("{:<18}{}{}", "motions:", sum(motions_), parts(motions_)),
+      fmt::format("{:<18}{}", "distance:", way),
+      fmt::format("{:<18}{}", "stops:", stops_),
+      fmt::format("{:<18}{}{}", "faults:", sum(faults_), parts(faults_)),
+      fmt::format("{:<18}{}", "refused:", refused_),
+      fmt::format("{:<18}{}", "unknown outcomes:", unknown_),
+      fmt::format("{:<18}{} register{}", "EEPROM writes:", eeprom_writes_, eeprom_writes_ == 1 ? "" : "s")};
 }
 
 google::protobuf::Struct AxisReport::values() const {
@@ -120,6 +123,7 @@ google::protobuf::Struct AxisReport::values() const {
   set("stops", stops_);
   set("refused", refused_);
   set("unknown_outcomes", unknown_);
+  set("eeprom_writes", eeprom_writes_);
   return all;
 }
 

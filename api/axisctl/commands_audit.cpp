@@ -108,11 +108,11 @@ void report(Invocation& invocation, const std::string& axis, const std::string& 
   if (invocation.json) {
     auto values = counted.values();
     (*values.mutable_fields())["axis"].set_string_value(axis);
-    (*values.mutable_fields())["eeprom_writes"].set_number_value(static_cast<double>(writes));
+    (*values.mutable_fields())["eeprom_writes_total"].set_number_value(static_cast<double>(writes));
     return print_line(json(values));
   }
   for (const auto& line : counted.lines(unit)) print_line(line);
-  print_line(fmt::format("{:<18}{} registers since the axis was first configured", "EEPROM writes:", writes));
+  print_line(fmt::format("{:<18}{} since the axis was first configured here", "", writes));
   print_line(first ? "since " + audit_line(*first) : "the audit has no record of the axis");
 }
 
@@ -127,8 +127,8 @@ void add_audit(CLI::App& app, Invocation& invocation) {
   command
       ->add_option(
           "--kind", arguments->kinds,
-          "command, refusal, call, fault, lease, stop-hold, inhibit, configuration, state, daemon, gap; "
-          "several with commas")
+          "command, refusal, call, fault, lease, stop-hold, inhibit, configuration, state, daemon, gap, "
+          "eeprom; several with commas")
       ->type_name("KIND,...")
       ->delimiter(',');
   command

@@ -74,17 +74,18 @@ void events(Invocation& invocation, const Arguments& arguments) {
 }  // namespace
 
 void add_event_commands(CLI::App& app, Invocation& invocation) {
-  auto* command =
-      app.add_subcommand("events",
-                         "What happened: terminal edges, states, links, drift, flight records, "
-                         "leases, held stops, commands, faults, the kept state, StopAll, certificates");
+  auto* command = app.add_subcommand(
+      "events",
+      "What happened: terminal edges, states, links, drift, flight records, "
+      "leases, held stops, commands, faults, the kept state, StopAll, certificates, writes to "
+      "EEPROMs");
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("AXIS", arguments->axes, "Names of axes; none: all");
   command
       ->add_option(
           "--kind", arguments->kinds,
           "terminal, state, link, configuration, configuration-reloaded, flight, lease, stop, command, "
-          "axis-fault, kept-state, inhibit, certificate; several with commas")
+          "axis-fault, kept-state, inhibit, certificate, eeprom; several with commas")
       ->type_name("KIND,...")
       ->delimiter(',');
   command->add_flag("--follow", arguments->follow, "Go on with new events until Ctrl-C");

@@ -110,6 +110,11 @@ std::string text_of(const v1::InhibitChange& change) {
 
 std::string text_of(const v1::CertificateNotice& notice) { return notice.text(); }
 
+std::string text_of(const v1::EepromWritten& written) {
+  return fmt::format("{} register{} saved to the drive's EEPROM, {} in all", written.registers(),
+                     written.registers() == 1 ? "" : "s", written.total());
+}
+
 std::string kind_name(v1::EventKind kind) {
   auto name = lower_word(v1::EventKind_Name(kind), "EVENT_KIND_");
   std::ranges::replace(name, ' ', '-');
@@ -146,6 +151,8 @@ std::string content_text(const v1::Event& event) {
       return text_of(event.inhibit_change());
     case v1::Event::kCertificateNotice:
       return text_of(event.certificate_notice());
+    case v1::Event::kEepromWritten:
+      return text_of(event.eeprom_written());
     case v1::Event::CONTENT_NOT_SET:
       break;
   }
@@ -182,7 +189,8 @@ v1::EventKind parse_event_kind(std::string_view text) {
   throw Failure(ExitCode::usage,
                 fmt::format("--kind: '{}' is no kind of event; permitted: terminal, state, link, "
                             "configuration (of a drive), configuration-reloaded, flight, lease, stop "
-                            "(holds), command, axis-fault, kept-state, inhibit (StopAll), certificate",
+                            "(holds), command, axis-fault, kept-state, inhibit (StopAll), certificate, "
+                            "eeprom",
                             text));
 }
 

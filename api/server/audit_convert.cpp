@@ -76,6 +76,7 @@ struct Head {
     to.set_client(change.accepted_by);
     if (!change.accepted_by.empty()) to.set_rpc("SystemService.AcceptState");
   }
+  void operator()(const EepromWritten&) const { to.set_kind(v1::AUDIT_KIND_EEPROM); }
   template <class Other>
   void operator()(const Other&) const {}
 };

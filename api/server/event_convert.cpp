@@ -93,6 +93,12 @@ void fill(const CertificateNotice& from, v1::Event& event) {
   if (from.expires != WallTime{}) to_proto(from.expires, *to.mutable_expires());
   to.set_text(from.text);
 }
+
+void fill(const EepromWritten& from, v1::Event& event) {
+  auto& to = *event.mutable_eeprom_written();
+  to.set_registers(from.registers);
+  to.set_total(from.total);
+}
 static_assert(std::to_underlying(CertificateNotice::What::not_replaced) + 1 ==
               v1::CERTIFICATE_NOTICE_KIND_NOT_REPLACED);
 static_assert(std::to_underlying(InhibitChange::What::not_durable) + 1 ==
@@ -119,6 +125,7 @@ v1::EventKind kind_of(const Event& event) {
     v1::EventKind operator()(const KeptStateChange&) const { return v1::EVENT_KIND_KEPT_STATE_CHANGE; }
     v1::EventKind operator()(const InhibitChange&) const { return v1::EVENT_KIND_INHIBIT_CHANGE; }
     v1::EventKind operator()(const CertificateNotice&) const { return v1::EVENT_KIND_CERTIFICATE_NOTICE; }
+    v1::EventKind operator()(const EepromWritten&) const { return v1::EVENT_KIND_EEPROM_WRITTEN; }
   };
   return std::visit(Kind{}, event.content);
 }

@@ -16,6 +16,7 @@ struct IsAudited {
   bool operator()(const InhibitChange&) const { return true; }
   bool operator()(const ConfigurationReloaded&) const { return true; }
   bool operator()(const KeptStateChange&) const { return true; }
+  bool operator()(const EepromWritten&) const { return true; }
   // What the machine does by itself: of these the newest are in the events.
   bool operator()(const TerminalEdge&) const { return false; }
   bool operator()(const StateChange&) const { return false; }

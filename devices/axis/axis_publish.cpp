@@ -78,6 +78,8 @@ bool Axis::note_eeprom_writes() {
   eeprom_budget_.count(written.saves, env_.clock->wall(env_.clock->now()));
   if (env_.persistence != nullptr)
     env_.persistence->count_eeprom_writes(settings_.name, written.registers, eeprom_budget_.record(), {});
+  if (written.registers > 0)
+    env_.event(settings_.name, EepromWritten{.registers = written.registers, .total = eeprom_writes_});
   return true;
 }
 

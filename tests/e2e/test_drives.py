@@ -69,6 +69,21 @@ class Drives(Scenario):
             machine.client.wait_online("ykd")
             done = save()
 
+    def test_what_an_eeprom_took_is_reported_with_its_time(self):
+        machine = self.machine({"ykd": drive("ykd2405pr", 1)}).start()
+
+        def report(*since):
+            return json.loads(machine.axisctl("--json", "report", "ykd", *since).stdout)
+        before = report()["eeprom_writes_total"]
+        newest = json.loads(machine.axisctl("--json", "audit", "--last", "1").stdout)["number"]
+        self.assertEqual(machine.axisctl("drive", "save", "ykd", "--confirm", "ykd").returncode, 0)
+        whole = wait_for(lambda: next((found for found in [report()] if found["eeprom_writes"] > before), None),
+                         "the writes are in the audit")
+        self.assertEqual(whole["eeprom_writes"], whole["eeprom_writes_total"])
+        self.assertEqual(report("--since", newest)["eeprom_writes"], whole["eeprom_writes_total"] - before)
+        self.assertRegex(machine.axisctl("audit", "ykd", "--kind", "eeprom").stdout,
+                         r"ykd  -  \d+ registers? saved to the drive's EEPROM, \d+ in all\n")
+
     def test_another_address_counts_after_a_power_cycle(self):
         machine = self.machine({"ssd": drive("ssd2608pr", 40, simulated="dip=0")}).start()
         done = machine.axisctl("drive", "readdress", "ssd", "41", "--confirm", "ssd")

@@ -10,8 +10,8 @@ from .v1 import audit_service_pb2
 
 @dataclasses.dataclass(frozen=True)
 class AuditRecord:
-    """`kind`: "command", "refusal", "call", "fault", "lease", "stop_hold", "inhibit", "configuration", "state", "daemon" or
-    "gap". `command`: of a command that was accepted, has ended or was refused (then without an id). `recovered`: the
+    """`kind`: "command", "refusal", "call", "fault", "lease", "stop_hold", "inhibit", "configuration", "state", "daemon",
+    "gap" or "eeprom". `command`: of a command that was accepted, has ended or was refused (then without an id). `recovered`: the
     command journal told of it after the daemon was killed. `error`: why it was refused, or failed. `peer`, `role`: where the
     client called from, and what it might do there; empty: not known. `axis`, `group`, `bus`: what it concerns; all empty: the
     machine. The rest is in `raw`."""

@@ -295,9 +295,16 @@ class CertificateNotice:
     text: str
 
 
+@dataclasses.dataclass(frozen=True)
+class EepromWritten:
+    """Registers were saved to the EEPROM of the axis's drive: since the last such event, and since the axis is known there."""
+    registers: int
+    total: int
+
+
 Content = (TerminalEdge | StateChange | LinkChange | ConfigurationDrift | FlightRecordWritten | LeaseChange
            | ConfigurationReloaded | StopHoldChange | CommandChange | AxisFault | KeptStateChange
-           | InhibitChange | CertificateNotice)
+           | InhibitChange | CertificateNotice | EepromWritten)
 
 
 def _content(raw: event_service_pb2.Event) -> Content | None:
@@ -336,6 +343,8 @@ def _content(raw: event_service_pb2.Event) -> Content | None:
         name = event_service_pb2.CertificateNoticeKind.Name(content.kind)
         return CertificateNotice(name.removeprefix("CERTIFICATE_NOTICE_KIND_").lower(), content.path,
                                  _optional_time(content, "expires"), content.text)
+    if kind == "eeprom_written":
+        return EepromWritten(content.registers, content.total)
     if kind == "stop_hold_change":
         name = event_service_pb2.StopHoldChangeKind.Name(content.kind)
         return StopHoldChange(name.removeprefix("STOP_HOLD_CHANGE_KIND_").lower(), content.holder, content.request_id,

@@ -162,6 +162,17 @@ TEST(AuditLines, WhoDidWhatToStopAllAndLeases) {
   EXPECT_EQ(expired.client(), "hmi-2");
 }
 
+TEST(AuditLines, WhatWasSavedToAnEeprom) {
+  const auto record = server::audit_record(
+      line_of({.content = Event{.axis = "feeder", .content = EepromWritten{.registers = 3, .total = 40}}}));
+  ASSERT_TRUE(record);
+  EXPECT_EQ(record->kind(), v1::AUDIT_KIND_EEPROM);
+  EXPECT_EQ(record->axis(), "feeder");
+  EXPECT_EQ(record->client(), "") << "whoever asked for it has a record of the call";
+  EXPECT_EQ(record->event().eeprom_written().registers(), 3U);
+  EXPECT_EQ(record->event().eeprom_written().total(), 40U);
+}
+
 /// In memory.
 class FakeAudit final : public AuditAccess, public AuditSink {
  public:

@@ -131,12 +131,17 @@ TEST(AxisReport, CountsWhatTheAuditTells) {
   auto refused = record();
   refused.mutable_refused()->set_left_out(2);
   report.add(refused);
+  for (const auto registers : {3, 1}) {
+    auto saved = record();
+    saved.mutable_event()->mutable_eeprom_written()->set_registers(registers);
+    report.add(saved);
+  }
   EXPECT_THAT(report.lines("mm"),
               testing::ElementsAre(
                   "motions:          6: 5 done, 1 unknown",
                   "distance:         31 mm from target to target, without 2 motions of which it is not known",
                   "stops:            1", "faults:           1: 1 alarm", "refused:          3",
-                  "unknown outcomes: 1"));
+                  "unknown outcomes: 1", "EEPROM writes:    4 registers"));
   EXPECT_EQ(report.values().fields().at("distance").number_value(), 31);
 }
 

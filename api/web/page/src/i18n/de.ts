@@ -241,6 +241,7 @@ export const de: Texts = {
   'event.inhibit-released': '{who} hat STOPP ALLE gelöst',
   'event.inhibit-stands': 'STOPP ALLE von {who} steht noch',
   'event.inhibit-not-durable': 'STOPP ALLE ist nicht auf der Platte',
+  'event.eeprom': '{registers} Register ins EEPROM des Antriebs gespeichert, {total} insgesamt',
   'people.you': 'Sie',
   'people.name': 'Name',
   'people.role': 'Rolle',

@@ -240,6 +240,7 @@ export const en = {
   'event.inhibit-released': '{who} released STOP ALL',
   'event.inhibit-stands': 'STOP ALL of {who} still stands',
   'event.inhibit-not-durable': 'STOP ALL is not on the disk',
+  'event.eeprom': '{registers} registers saved to the EEPROM of the drive, {total} in all',
   'people.you': 'You',
   'people.name': 'Name',
   'people.role': 'Role',

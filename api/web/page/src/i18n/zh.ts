@@ -241,6 +241,7 @@ export const zh: Texts = {
   'event.inhibit-released': '{who} 解除了全部停止',
   'event.inhibit-stands': '{who} 的全部停止仍然有效',
   'event.inhibit-not-durable': '全部停止未写入磁盘',
+  'event.eeprom': '已向驱动器 EEPROM 保存 {registers} 个寄存器，累计 {total} 个',
   'people.you': '您',
   'people.name': '名称',
   'people.role': '角色',

@@ -47,6 +47,8 @@ export function eventText({ content }: Event): string {
       return t('event.inhibit', { who: by });
     }
     case 'certificateNotice': return content.value.text;
+    case 'eepromWritten':
+      return t('event.eeprom', { registers: String(content.value.registers), total: String(content.value.total) });
     case 'commandChange': return '';
     default: return '?';
   }
