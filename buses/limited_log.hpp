@@ -11,7 +11,7 @@
 
 namespace axisd {
 
-/// Writes "WHO: TEXT", unless there are many of this kind by the same (LineLimit); then tell_left_out() says
+/// Writes "WHO: TEXT", unless there are many of this kind by the same (Ration); then tell_left_out() says
 /// "WHO: KIND: 12 more like this in the last 10 s". For what somebody can cause as often as he likes, also
 /// without any right. `text` is made in any case. Never waits for the log, and for other threads only while
 /// they look up an origin. `about` and `subject`: as of log_about(). Thread: any.

@@ -23,7 +23,7 @@ class Refusals {
   const Machine* machine_;
   AuditSink* sink_;
   std::mutex mutex_;
-  AuditRation ration_{AuditRation::refusals};  ///< under mutex_
+  Ration ration_{audit_ration::refusals};  ///< of identities; under mutex_
 };
 
 }  // namespace axisd::server

@@ -62,7 +62,7 @@ bool AuditTrail::is_within_ration(const Event& event) {
   if (change != nullptr && ended(change->command->state)) return untold_.erase(change->command->id) == 0;
   const auto* who = std::visit(WhoStops{}, event.content);
   if (who == nullptr) return true;
-  const auto left_out = stops_.take(*who, clock_->now());
+  const auto left_out = stops_.take(identity_of(*who), clock_->now());
   if (left_out.value_or(0) > 0)
     add(AuditGap{.left_out = *left_out, .client = std::string(identity_of(*who))});
   if (!left_out && change != nullptr) untold_.insert(change->command->id);
@@ -72,7 +72,7 @@ bool AuditTrail::is_within_ration(const Event& event) {
 void AuditTrail::refused(const std::string& axis, const Action& action, const CommandOptions& options,
                          Error cause, std::string group) {
   if (!kept()) return;
-  const auto left_out = refusals_.take(options.client, clock_->now());
+  const auto left_out = refusals_.take(identity_of(options.client), clock_->now());
   if (!left_out) return;
   const auto arrived = options.arrived == TimePoint{} ? clock_->now() : options.arrived;
   add(RefusedCommand{.command = {.id = {},

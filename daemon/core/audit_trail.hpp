@@ -30,7 +30,7 @@ class AuditTrail {
 
   Clock* clock_;
   AuditSink* sink_;
-  AuditRation refusals_{AuditRation::refusals}, stops_{AuditRation::stops};
+  Ration refusals_{audit_ration::refusals}, stops_{audit_ration::stops};  ///< of identities
   std::set<std::string> untold_;  ///< ids of stops that have not ended
 };
 

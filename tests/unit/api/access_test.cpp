@@ -346,7 +346,7 @@ TEST_F(AccessCalls, WhatIsDeniedIsToldWithWhoAndFromWhere) {
   EXPECT_THAT(denied[0].origin->peer, StartsWith("unix:"));
   EXPECT_EQ(denied[1].client, "shift-a via " + own_name());
   for (int i = 0; i < 100; ++i) (void)enable({{"axisd-user", "p" + std::to_string(i)}});
-  EXPECT_EQ(told_.denied().size(), AuditRation::refusals) << "of one identity in a minute";
+  EXPECT_EQ(told_.denied().size(), audit_ration::refusals.most) << "of one identity in a minute";
 }
 
 TEST_F(AccessCalls, WhatIsDeniedNamesItsGroupOrBus) {

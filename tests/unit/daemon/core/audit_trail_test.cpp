@@ -105,12 +105,19 @@ TEST_F(Audited, ManyRefusalsOfOneClientAreCounted) {
   };
   for (int i = 0; i < 100; ++i) ask("loud");
   ask("calm");
-  EXPECT_THAT(all<RefusedCommand>(), SizeIs(AuditRation::refusals + 1));
+  EXPECT_THAT(all<RefusedCommand>(), SizeIs(audit_ration::refusals.most + 1));
   world_.run_for(61s);
   ask("loud");
-  EXPECT_EQ(all<RefusedCommand>().back().left_out, 100 - AuditRation::refusals);
+  EXPECT_EQ(all<RefusedCommand>().back().left_out, 100 - audit_ration::refusals.most);
   ask("loud");
   EXPECT_EQ(all<RefusedCommand>().back().left_out, 0U);
+}
+
+TEST_F(Audited, WhomADelegateSpeaksForShareItsRation) {
+  for (std::uint64_t i = 0; i < 2 * audit_ration::refusals.most; ++i)
+    EXPECT_FALSE(machine_->submit("a1", MoveAbsoluteRequest{.position = 5},
+                                  {.client = "p" + std::to_string(i) + " via web", .request_id = "r"}));
+  EXPECT_THAT(all<RefusedCommand>(), SizeIs(audit_ration::refusals.most));
 }
 
 /// Nobody needs a role to stop: a crowd of stops writes nobody else out of the files either.
@@ -125,10 +132,10 @@ TEST_F(Audited, ManyStopsOfOneIdentityAreCounted) {
     }
   };
   const auto before = entries.size();
-  for (std::uint64_t i = 0; i < AuditRation::stops + 10; ++i) stop("loud");
+  for (std::uint64_t i = 0; i < audit_ration::stops.most + 10; ++i) stop("loud");
   stop("p1 via loud");
   stop("calm");
-  EXPECT_EQ(entries.size() - before, 2 * (AuditRation::stops + 1)) << "each with its end";
+  EXPECT_EQ(entries.size() - before, 2 * (audit_ration::stops.most + 1)) << "each with its end";
   world_.run_for(61s);
   EXPECT_THAT(all<AuditGap>(), IsEmpty());
   stop("loud");
