@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -291,8 +292,10 @@ int Doors::serve(int port) {
   wait_until([this] { return ask_core(ground_.loop, [this] { return machine_.buses_reported(); }); },
              std::chrono::seconds(1));
   served_.keep_copy();
+  auto knocks = server_.knocks();
+  std::ranges::copy(stop_lane_.knocks(), std::back_inserter(knocks));
   server::DoorCheck doors([this] { return server_.connect_inside(); },
-                          [this] { return stop_lane_.connect_inside(); });
+                          [this] { return stop_lane_.connect_inside(); }, std::move(knocks));
   doors.ask();  // its connections are there before anybody else's
   log_about(spdlog::level::info, LogKind::daemon_serves, {},
             fmt::format("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration_.machine,

@@ -60,6 +60,12 @@ void AcceptLoop::stop() {
   entries_.clear();
 }
 
+std::vector<Knock*> AcceptLoop::knocks() const {
+  std::vector<Knock*> all;
+  for (const auto& entry : entries_) all.push_back(entry.socket.knock.get());
+  return all;
+}
+
 void AcceptLoop::run() {
   std::vector<pollfd> polled;
   std::vector<PeerBudgets::Id> watched;
@@ -120,6 +126,7 @@ bool AcceptLoop::accept_one(const Entry& entry) {
     if (code == EMFILE || code == ENFILE) return turn_away(entry);
     return code != ENOBUFS && code != ENOMEM;  // the rest concerns one connection that is gone already
   }
+  if (entry.socket.knock->let_in(connection.get())) return true;
   const auto address = address_of_peer(connection.get());
   FileDescriptor watched(fcntl(connection.get(), F_DUPFD_CLOEXEC, 0));
   const bool none_left = watched.get() < 0 || watched.get() >= first_refused_descriptor_;
@@ -152,6 +159,7 @@ bool AcceptLoop::turn_away(const Entry& entry) {
   reserve_ = {};
   FileDescriptor surplus(accept4(entry.socket.fd.get(), nullptr, nullptr, SOCK_CLOEXEC));
   const bool closed = surplus.get() >= 0;
+  if (closed) (void)entry.socket.knock->let_in(surplus.get());
   surplus = {};
   reserve_ = FileDescriptor(open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (!closed) return false;  // somebody else took the reserve meanwhile

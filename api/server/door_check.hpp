@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "api/server/knock.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
 
@@ -13,13 +14,15 @@ namespace axisd::server {
 
 /// Asks at both doors: a GroupStop that names nothing, through the stop lane down to the core and back, and
 /// GetInfo through the main server. Each has a connection of its own, which is there from the start: whoever
-/// keeps others from connecting must not be able to have the daemon taken for dead. Thread: one at a time.
+/// keeps others from connecting must not be able to have the daemon taken for dead. That others can connect
+/// at all is tried apart from that, at each port (Knock). Thread: one at a time.
 class DoorCheck {
  public:
   /// As Server::connect_inside() and StopLane::connect_inside(): a new connection.
   using Connect = std::function<FileDescriptor()>;
 
-  DoorCheck(Connect main_server, Connect stop_lane);
+  /// `knocks` outlive this: of all addresses.
+  DoorCheck(Connect main_server, Connect stop_lane, std::vector<Knock*> knocks);
   /// Waits a moment for questions that are on their way, which are cancelled.
   ~DoorCheck();
   DoorCheck(const DoorCheck&) = delete;
@@ -32,6 +35,7 @@ class DoorCheck {
  private:
   class Door;
   std::vector<std::shared_ptr<Door>> doors_;
+  std::vector<Knock*> knocks_;
 };
 
 }  // namespace axisd::server

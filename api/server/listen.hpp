@@ -1,10 +1,12 @@
 // Listening sockets.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "api/server/knock.hpp"
 #include "buses/error.hpp"
 #include "buses/file_descriptor.hpp"
 
@@ -13,8 +15,9 @@ namespace axisd::server {
 /// One listening socket. A unix socket's file is removed with it.
 struct ListeningSocket {
   FileDescriptor fd;
-  int port = 0;           ///< of TCP
-  std::string unix_path;  ///< empty: TCP
+  int port = 0;                  ///< of TCP
+  std::string unix_path;         ///< empty: TCP
+  std::unique_ptr<Knock> knock;  ///< whoever accepts tells it of everybody
 
   ListeningSocket() = default;
   ListeningSocket(ListeningSocket&&) = default;

@@ -260,6 +260,8 @@ std::vector<std::string> Server::services() const {
   return names;
 }
 
+std::vector<Knock*> Server::knocks() const { return parts_->accept.knocks(); }
+
 TimePoint Server::last_progress() const { return parts_->accept.last_progress(); }
 
 std::uint64_t Server::batches_serialised() const { return parts_->hub->batches_serialised(); }

@@ -8,6 +8,7 @@
 
 #include "api/server/access.hpp"
 #include "api/server/admission.hpp"
+#include "api/server/knock.hpp"
 #include "api/server/peer_budgets.hpp"
 #include "api/tls/live.hpp"
 #include "buses/clock.hpp"
@@ -67,6 +68,9 @@ class Server {
 
   /// Full names of the services of ours that it serves. Thread: any.
   [[nodiscard]] std::vector<std::string> services() const;
+
+  /// Of each address that it listens on, between start() and shutdown(); on their thread.
+  [[nodiscard]] std::vector<Knock*> knocks() const;
 
   /// When its accept loop last came round: it lets in who connects. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;

@@ -90,6 +90,11 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
     }
     eventfd_write(wake_.get(), 1);
   }
+  [[nodiscard]] std::vector<Knock*> knocks() const {
+    std::vector<Knock*> all;
+    for (const auto& socket : sockets_) all.push_back(socket.knock.get());
+    return all;
+  }
   [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
 
  private:
@@ -226,6 +231,7 @@ void StopLane::Loop::accept_from(const ListeningSocket& socket) {
       if (none_left && !leaves) full_until_ = monotonic_now() + when_full;
       return close(leaves);
     }
+    if (socket.knock->let_in(connection.get())) continue;
     if (socket.unix_path.empty()) {
       const int on = 1, patience_ms = 10'000;
       setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
@@ -384,6 +390,8 @@ FileDescriptor StopLane::connect_inside() {
   if (ours.get() >= 0) loop_->join(std::move(theirs));
   return std::move(ours);
 }
+
+std::vector<Knock*> StopLane::knocks() const { return loop_->knocks(); }
 
 TimePoint StopLane::last_progress() const { return loop_ ? loop_->last_progress() : monotonic_now(); }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/server/access.hpp"
+#include "api/server/knock.hpp"
 #include "api/server/lane/places.hpp"
 #include "api/tls/live.hpp"
 #include "buses/file_descriptor.hpp"
@@ -54,6 +55,9 @@ class StopLane {
   /// A connection of the daemon to itself, which has the place of a client of its own. Nothing open
   /// (get() < 0): out of descriptors. Precondition: listen(). Thread: any.
   [[nodiscard]] FileDescriptor connect_inside();
+
+  /// As Server::knocks(), between listen() and stop().
+  [[nodiscard]] std::vector<Knock*> knocks() const;
 
   /// When its thread last came round, at most 200 ms apart. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;

@@ -26,8 +26,10 @@ class DoorCheck : public Serving {
         machine_, server::StopLaneOptions{.listen = "unix:" + (directory_ / "stops.sock"), .limits = limits});
     ASSERT_TRUE(lane_->listen());
     lane_->serve();
+    auto knocks = server_->knocks();
+    for (auto* each : lane_->knocks()) knocks.push_back(each);
     check_ = std::make_unique<server::DoorCheck>([this] { return server_->connect_inside(); },
-                                                 [this] { return lane_->connect_inside(); });
+                                                 [this] { return lane_->connect_inside(); }, knocks);
   }
   /// Those that owe an answer.
   [[nodiscard]] std::vector<std::string> silent() const { return check_->silent_since(TimePoint::max()); }
