@@ -16,6 +16,7 @@ from figures import cpu_seconds, spread, table
 from rtu_cell import METRICS, Cell, Line
 
 NODES = 16  # of a line
+SCRAPED_BY = "axisd-metrics"  # the thread that makes the text and sends it
 POLL = "200 ms"  # the default
 
 
@@ -35,13 +36,14 @@ def resident_mib(pid):
 
 
 def cpu_percent(pid, seconds, each_second):
-    """Of a core, by a process, while `each_second` is called each second."""
-    cpu, begin = cpu_seconds(pid), time.monotonic()
+    """Of a core, by a process and by its thread SCRAPED_BY, while `each_second` is called each second."""
+    cpu, by_thread, begin = cpu_seconds(pid), cpu_seconds(pid, SCRAPED_BY), time.monotonic()
     end = begin + seconds
     while (now := time.monotonic()) < end:
         each_second()
         time.sleep(max(0, min(now + 1, end) - time.monotonic()))
-    return (cpu_seconds(pid) - cpu) / (time.monotonic() - begin) * 100
+    took = time.monotonic() - begin
+    return (cpu_seconds(pid) - cpu) / took * 100, (cpu_seconds(pid, SCRAPED_BY) - by_thread) / took * 100
 
 
 def scrape():
@@ -68,9 +70,10 @@ def measure(build, axes, off, seconds, scraped):
             cell.wait_online(process)
             online = time.monotonic() - begin
             time.sleep(2)
-            found = {"ready": ready * 1e3, "online": online, "cpu": cpu_percent(process.pid, seconds, lambda: None)}
+            found = {"ready": ready * 1e3, "online": online, "cpu": cpu_percent(process.pid, seconds, lambda: None)[0]}
             if scraped:
-                found |= {"scraped": cpu_percent(process.pid, seconds, scrape), "page": scrape() / 1024}
+                whole, thread = cpu_percent(process.pid, seconds, scrape)
+                found |= {"scraped": whole, "thread": thread, "page": scrape() / 1024}
             return found | {"rss": resident_mib(process.pid)}
 
 
@@ -87,14 +90,15 @@ def main():
     rows = [["axes", "of them off", "start to READY, ms", "to all online, s", "CPU, % of a core", "per axis",
              "memory, MiB"]]
     if given.scrape:
-        rows[0] += ["CPU scraped each second", "page, KiB"]
+        rows[0] += ["CPU scraped each second", "of that thread", "page, KiB"]
     for axes, off in cases:
         found = [measure(build, axes, off, given.seconds, given.scrape) for _ in range(given.rounds)]
         rows.append([str(axes), str(off), spread([each["ready"] for each in found]),
                      spread([each["online"] for each in found], 1), spread([each["cpu"] for each in found], 1),
                      spread([each["cpu"] / axes for each in found], 3), spread([each["rss"] for each in found], 1)])
         if given.scrape:
-            rows[-1] += [spread([each[key] for each in found], 1) for key in ("scraped", "page")]
+            rows[-1] += [spread([each[key] for each in found], digits)
+                         for key, digits in (("scraped", 1), ("thread", 3), ("page", 0))]
         print(".", end="", file=sys.stderr, flush=True)
     print(f"\naxes on RS-485 lines of {NODES} at 115200 bit/s, refreshed each {POLL}; min / median / max of the rounds")
     table(rows)
