@@ -26,7 +26,7 @@ clean_up() {
     [ ! -s "$root/run/$unit.pid" ] || kill -KILL "$(cat "$root/run/$unit.pid")" 2>/dev/null || true
   done
   [ -z "$holder" ] || kill "$holder"
-  for mounted in proc dev; do mountpoint -q "$root/$mounted" && umount -l "$root/$mounted"; done
+  for mounted in proc dev/pts dev; do mountpoint -q "$root/$mounted" && umount -l "$root/$mounted"; done
   rm -rf --one-file-system "$scratch"
   exit "$status"
 }
@@ -77,17 +77,21 @@ conffiles() { dpkg-deb -I "$(one "$1")" conffiles | sort | xargs; }
 
 step "a Debian 12"
 needed=$(for package in axisd axisctl axisd-web python3-axisd; do dpkg-deb -f "$(one "$package")" Depends | tr ',' '\n' |
-  sed 's/[ (|].*//; s/^ *//; /^axis/d; /^$/d'; done | sort -u | paste -sd,)
+  sed 's/^ *//; s/[ (|].*//; /^axis/d; /^$/d'; done | sort -u | paste -sd,)
 sources=/etc/apt/sources.list.d/debian.sources
 [ -f "$sources" ] || sources=/etc/apt/sources.list
 mmdebstrap --quiet --variant=minbase --include="$needed,openssl,procps" bookworm "$root" "$sources"
 unshare --net sleep infinity &
 holder=$!
-until nsenter "--net=/proc/$holder/ns/net" ip link set lo up 2>/dev/null; do sleep 0.1; done
+while [ "$(readlink "/proc/$holder/ns/net")" = "$(readlink /proc/self/ns/net)" ]; do sleep 0.1; done
+nsenter "--net=/proc/$holder/ns/net" ip link set lo up
 echo '127.0.0.1 localhost' >"$root/etc/hosts"
 mount --bind /dev "$root/dev"
+mount --make-private "$root/dev"
+mount --bind /dev/pts "$root/dev/pts"  # the simulated drive's line
 mount -t proc proc "$root/proc"
 mkdir -p "$root/run/systemd/system" "$root/packages"
+install -d -m 711 "$root/var/lib/private"  # systemd keeps it to itself, and mounts what is in it for each service
 cp "$packages"/*.deb "$root/packages"
 for program in systemctl deb-systemd-invoke; do
   cat >"$root/usr/local/bin/$program" <<'EOF'
@@ -101,7 +105,6 @@ unit() {  # VERB NAME
     case $name in
       axisd) setpriv --reuid axisd --regid axisd --init-groups /usr/bin/axisd --config /etc/axisd/axisd.yaml >>/var/tmp/log 2>&1 & ;;
       axisd-web)  # its user and its state directory, as DynamicUser= makes them
-        mkdir -p /var/lib/private
         install -d -o 61184 -g 61184 -m 700 /var/lib/private/axisd-web
         ln -sfn private/axisd-web /var/lib/axisd-web
         setpriv --reuid 61184 --regid 61184 --clear-groups /usr/bin/axisd-web >>/var/tmp/web-log 2>&1 &
@@ -144,7 +147,15 @@ ctl() { inside axisctl --timeout 20s "${trusted[@]}" "$@"; }
 service() { inside systemctl "$1" "${2:-axisd}.service"; }
 pid_of() { cat "$root/run/$1.pid"; }
 running() { kill -0 "$(pid_of "${1:-axisd}")" 2>/dev/null; }
-eventually() { for _ in $(seq 300); do "$@" >/dev/null 2>&1 && return 0; sleep 0.1; done; die "in vain: $*"; }
+eventually() {
+  for _ in $(seq 300); do
+    "$@" >"$scratch/last" 2>&1 && return 0
+    sleep 0.1
+  done
+  cat "$scratch/last" >&2
+  tail -n 20 "$root"/var/tmp/*log >&2
+  die "in vain: $*"
+}
 
 snapshot >"$scratch/before"
 step "installing"
@@ -279,12 +290,15 @@ said 'axisctl state accept' "nothing was said of what comes next"
 service start
 eventually ctl list
 as shift-a
-refused=$(ctl enable feeder --wait && ctl home feeder --wait 2>&1) && die "the axis moves before somebody has accepted the state"
+refused=$(ctl move feeder 10mm 2>&1) && die "the axis moves before somebody has accepted the state"
+grep -q 'axisctl state accept' <<<"$refused" || die "that says not what to do: $refused"
 as service-1
 ctl state accept
 ctl release-stop --all
-ready
-ctl move feeder 10mm --wait
+as shift-a
+refused=$(ctl enable feeder 2>&1) && die "what may have been executed before was executed again"
+grep -q 'in [0-9]* s or later is new' <<<"$refused" || die "that says not until when: $refused"
+ctl stop feeder --wait || die "stops have to wait, too"
 
 step "removing, and installing again"
 inside dpkg -r axisd axisd-web python3-axisd >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -r failed"; }
@@ -301,7 +315,6 @@ inside dpkg -P axisd axisctl axisd-web python3-axisd >"$scratch/log" 2>&1 || { c
 ! running && ! running axisd-web || die "it still runs"
 rm -f "$root"/run/axisd.pid "$root"/run/axisd-web.pid
 ! inside getent passwd axisd >/dev/null || die "the user is left"
-rmdir "$root/var/lib/private" || die "purging left the users of the page"
 # What others have put there is theirs.
 rm -r "$root/etc/axisd/tls"
 rmdir "$root/etc/axisd"
