@@ -39,6 +39,24 @@ std::string terminals(const google::protobuf::RepeatedPtrField<v1::TerminalCapab
   return text;
 }
 
+/// "home_positive, positive_limit, -128 to -1, 1 to 37": numbers come in order, and may be many.
+std::string homing_methods(const google::protobuf::RepeatedPtrField<std::string>& methods) {
+  const auto follows = [&](int i) {
+    if (i >= methods.size()) return false;
+    const auto before = config::parse_decimal(methods[i - 1]), number = config::parse_decimal(methods[i]);
+    return before && number && number->numerator == before->numerator + 1;
+  };
+  std::string text;
+  for (int first = 0; first < methods.size();) {
+    int last = first;
+    while (follows(last + 1)) ++last;
+    text += (text.empty() ? "" : ", ") + methods[first];
+    if (last > first) text += " to " + methods[last];
+    first = last + 1;
+  }
+  return text;
+}
+
 std::string remedy_of(v1::AlarmReset reset) {
   switch (reset) {
     case v1::ALARM_RESET_POWER_CYCLE:
@@ -97,7 +115,7 @@ std::string drive_details(const v1::GetDriveResponse& drive) {
   text += line("limits",
                fmt::format("{} r/min, {} pulses/s", drive.maximum_rpm(), drive.maximum_pulse_rate_hz()));
   text += line("pulses/rev", fmt::format("{}", fmt::join(drive.pulses_per_revolution(), ", ")));
-  text += line("homing", fmt::format("{}", fmt::join(drive.homing_methods(), ", ")));
+  text += line("homing", homing_methods(drive.homing_methods()));
   text += line("segments", std::to_string(drive.maximum_segments()));
   text += line("inputs", terminals(drive.inputs()));
   text += line("outputs", terminals(drive.outputs()));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "api/server/convert.hpp"
@@ -10,9 +11,15 @@
 namespace axisd::server {
 namespace {
 
-// Every model so far has all four.
+// Every model that homes has all four.
 constexpr const char* homing_methods[] = {"home_positive", "home_negative", "positive_limit",
                                           "negative_limit"};
+
+void add_homing_methods(const Capabilities& capabilities, v1::GetDriveResponse& to) {
+  if (!capabilities.homing) return;
+  for (const auto* method : homing_methods) to.add_homing_methods(method);
+  for (const auto& one : capabilities.homing_numbers) to.add_homing_methods(std::to_string(int{one.number}));
+}
 
 /// The functions in the order of the drive's codes, as the contract promises.
 void add_terminals(std::span<const TerminalSpec> terminals, std::span<const TerminalFunctionSpec> functions,
@@ -94,8 +101,7 @@ void to_proto(std::string_view axis, const DriveInfo& from, v1::GetDriveResponse
     to.set_version(from.identity->version);
   }
   to_proto(model.capabilities, to);
-  if (model.capabilities.homing)
-    for (const auto* method : homing_methods) to.add_homing_methods(method);
+  add_homing_methods(model.capabilities, to);
   add_terminals(model.inputs, model.input_functions, *to.mutable_inputs());
   add_terminals(model.outputs, model.output_functions, *to.mutable_outputs());
   for (const auto& alarm : model.alarms) to_proto(alarm, *to.add_alarms());

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "tests/conformance/scenario.hpp"
 
@@ -266,6 +268,16 @@ std::string save_and_restore(const Setup& setup) {
   return "yes";
 }
 
+/// Of the homing methods that the YAML may name by their number.
+std::vector<std::int64_t> numbers_of(const Manual& manual) {
+  if (!manual.has("homing_numbers")) return {};
+  const auto [first, last] = manual.range("homing_numbers");
+  std::vector<std::int64_t> numbers;
+  for (auto number = first; number <= last; ++number)
+    if (number != 0) numbers.push_back(number);
+  return numbers;
+}
+
 /// What the API says of the model is what its manual says.
 std::string description(const Setup& setup) {
   Bench bench(setup);
@@ -280,7 +292,11 @@ std::string description(const Setup& setup) {
   EXPECT_EQ(drive.maximum_rpm(), manual.number("max_rpm"));
   EXPECT_EQ(drive.maximum_pulse_rate_hz(), manual.number("pulse_rate_hz"));
   EXPECT_EQ(drive.maximum_segments(), manual.number("pt_segments"));
-  EXPECT_EQ(static_cast<std::size_t>(drive.homing_methods_size()), manual.list("homing_modes").size());
+  const auto numbers = numbers_of(manual);
+  EXPECT_EQ(static_cast<std::size_t>(drive.homing_methods_size()),
+            manual.list("homing_modes").size() + numbers.size());
+  for (const auto number : numbers)
+    EXPECT_EQ(std::ranges::count(drive.homing_methods(), std::to_string(number)), 1) << number;
   EXPECT_FALSE(drive.communication_watchdog());
   EXPECT_FALSE(drive.version().empty());
   bool known_code = false;

@@ -11,6 +11,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 std::string failure(auto&& action) {
   try {
@@ -51,6 +52,16 @@ TEST(DriveDetails, TerminalsHaveTheSameFunctionsOrTheirOwn) {
   EXPECT_THAT(drive_details(drive), HasSubstr("X0 X1: home, stop\n"));
   drive.mutable_inputs(1)->set_functions(0, "positive_limit");
   EXPECT_THAT(drive_details(drive), HasSubstr("X0: home, stop; X1: positive_limit, stop\n"));
+}
+
+TEST(DriveDetails, NumbersOfHomingMethodsAreRanges) {
+  v1::GetDriveResponse drive;
+  for (const auto* method : {"home_positive", "negative_limit", "-3", "-2", "-1", "1", "17", "18", "37"})
+    drive.add_homing_methods(method);
+  EXPECT_THAT(drive_details(drive),
+              HasSubstr("homing:       home_positive, negative_limit, -3 to -1, 1, 17 to 18, 37\n"));
+  drive.clear_homing_methods();
+  EXPECT_THAT(drive_details(drive), Not(HasSubstr("homing:")));
 }
 
 TEST(Patterns, ArePartsOfNamesOrShellPatterns) {
