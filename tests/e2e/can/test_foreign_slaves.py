@@ -109,6 +109,7 @@ class ForeignSlaves(CanScenario):
         state = client.wait_state("slide", lambda s: s.alarm_code == 0x2310, "the alarm is shown")
         self.assert_state(state, "ERROR_STOP")
         self.rests(machine, slave, before + 1)
+        client.to_done("Stop", "slide")  # ends with the one that the alarm began
         slave.hand("mend")
         client.to_done("Reset", "slide")
         state = client.state("slide")
