@@ -1,5 +1,8 @@
 """axisd against drives that nobody of this project wrote: a CANopen library from npm with data sheets of makers, and CiA 402
 by its text (tests/foreign). What these drives do is compared with their own shafts."""
+import pathlib
+import re
+import shutil
 import unittest
 
 from harness import Axis, CanScenario, error_pb, pb
@@ -162,6 +165,39 @@ class ForeignSlaves(CanScenario):
         """Of those that are part of the project: runs everywhere."""
         self.everything("trinamic-tmcm-1636.eds", 4096, velocity=1 / 4096, acceleration=1 / 4096,
                         drive="velocity_unit: pulses_per_second")
+
+    def test_never_seen_before(self):
+        """As docs/any-drive.md says: scan, what the scan prints, the maker's file as it is, check, reload, move."""
+        machine = self.machine({}, networks={"can0": {"interface": "vcan0", "sync_period": "50 ms"}})
+        sheet = makers_file("trinamic-tmcm-1636.eds")
+        slave = ForeignSlave(machine.directory, "vcan0", NODE, sheet, 4096, 1 / 4096, 1 / 4096, LIMITS)
+        self.addCleanup(slave.close)
+        machine.start_daemon()
+        scan = self.done(machine, "bus", "scan", "can0", "--yaml")
+        self.assertIn("node: 5\n    model: cia402\n", scan)
+        name = re.search(r"eds: (\S+)", scan)[1]
+        shutil.copy(sheet, machine.path(name))
+        config = pathlib.Path(machine.config)
+        config.write_text(config.read_text() + scan.replace("4000 pulses/rev", "4096 pulses/rev"))
+        missing = machine.axisctl("check", machine.config)
+        self.assertEqual(missing.returncode, 2, missing)
+        self.assertIn("velocity_unit", missing.stderr)
+        config.write_text(config.read_text().replace("# velocity_unit: UNIT", "velocity_unit: pulses_per_second"))
+        self.done(machine, "check", machine.config)
+        self.done(machine, "config", "reload")
+        machine.client.wait_online("axis-5")
+        self.assertIn("axis-5", self.done(machine, "list"))
+        self.done(machine, "enable", "axis-5", "--wait")
+        self.done(machine, "move", "axis-5", "--relative", "2.5rev", "--velocity", "1rev/s", "--wait")
+        slave.wait(lambda shaft: not shaft["moving"], "the shaft rests")
+        self.assertAlmostEqual(slave.shaft["turns"], 2.5, delta=0.01)
+        self.assertEqual(slave.shaft["starts"], 1)
+
+    def done(self, machine, *words):
+        """What axisctl printed; it has to succeed."""
+        done = machine.axisctl(*words)
+        self.assertEqual(done.returncode, 0, done)
+        return done.stdout
 
 
 if __name__ == "__main__":
