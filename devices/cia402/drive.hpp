@@ -141,11 +141,11 @@ class Cia402Drive final : public Drive {
   // drive_connection.cpp
   /// What one of two nodes with the same node-ID says is not what the other does.
   [[nodiscard]] Result<void> check_alone() const;
-  /// The drive counts as the axis was planned; else misconfigured.
-  Task<Result<void>> check_units();
-  Task<Result<std::optional<UnitConflict>>> unit_conflict(SdoOptions options);
-  /// It brakes at least as hard as its data sheet says, where that is fixed; else misconfigured.
-  Task<Result<void>> check_deceleration();
+  /// The drive counts and brakes as the axis was planned; else misconfigured.
+  Task<Result<void>> check_plan();
+  Task<Result<std::optional<PlanConflict>>> unit_conflict(SdoOptions options);
+  /// Where the drive cannot be told how to brake, and does it softer than its data sheet says.
+  Task<Result<std::optional<PlanConflict>>> deceleration_conflict(SdoOptions options);
   Task<Result<void>> set_emergency_id();
   Task<Result<void>> set_heartbeat();
   Task<Result<void>> set_pdos();

@@ -193,9 +193,12 @@ Task<Result<Drift>> Cia402Drive::check_drift(TransactionClass transaction_class)
   }
   const auto units = co_await unit_conflict({.transaction_class = transaction_class});
   if (!units) co_return fail(units.error());
-  if (!*units) co_return drift;
-  drift.text += (drift.text.empty() ? "" : "; ") + (*units)->message;
-  drift.scale_changed = true;
+  const auto braking = co_await deceleration_conflict({.transaction_class = transaction_class});
+  if (!braking) co_return fail(braking.error());
+  for (const auto* conflict : {&*units, &*braking})
+    if (*conflict) drift.text += (drift.text.empty() ? "" : "; ") + (*conflict)->message;
+  drift.scale_changed = drift.scale_changed || units->has_value();
+  drift.limits_changed = drift.limits_changed || braking->has_value();
   co_return drift;
 }
 

@@ -177,8 +177,7 @@ Task<Result<void>> Cia402Drive::configure() {
   expected_.clear();
   if (const auto marked = co_await write_canary(distinct(fresh_neutral_block()), patiently()); !marked)
     co_return marked;
-  if (const auto fitting = co_await check_units(); !fitting) co_return fitting;
-  if (const auto fitting = co_await check_deceleration(); !fitting) co_return fitting;
+  if (const auto fitting = co_await check_plan(); !fitting) co_return fitting;
   if (model_->objects.loop_mode && !found_closed_) {
     const auto mode = co_await read_object(*model_->objects.loop_mode, patiently());
     if (!mode) co_return fail(mode.error());
@@ -204,15 +203,16 @@ Task<Result<void>> Cia402Drive::configure() {
 }
 
 /// Within the canary: what a power-up may have changed is read in the power cycle that it counts for.
-Task<Result<void>> Cia402Drive::check_units() {
-  const auto conflict = co_await unit_conflict(patiently());
+Task<Result<void>> Cia402Drive::check_plan() {
+  auto conflict = co_await unit_conflict(patiently());
+  if (conflict && !*conflict) conflict = co_await deceleration_conflict(patiently());
   if (!conflict) co_return fail(conflict.error());
   if (!*conflict) co_return Result<void>{};
   co_return fail(
       error_at(Reason::misconfigured, (*conflict)->object, (*conflict)->message, (*conflict)->remedy));
 }
 
-Task<Result<std::optional<UnitConflict>>> Cia402Drive::unit_conflict(SdoOptions options) {
+Task<Result<std::optional<PlanConflict>>> Cia402Drive::unit_conflict(SdoOptions options) {
   Values values;
   for (const auto object : model_->unit_objects) {
     const auto value = co_await read_object(object, options);
@@ -228,25 +228,25 @@ Task<Result<std::optional<UnitConflict>>> Cia402Drive::unit_conflict(SdoOptions 
 }
 
 /// The file has the value that the drive left the factory with; each bound of a stop is made of it.
-Task<Result<void>> Cia402Drive::check_deceleration() {
+Task<Result<std::optional<PlanConflict>>> Cia402Drive::deceleration_conflict(SdoOptions options) {
   const auto planned = model_->descriptor->capabilities.fixed_deceleration;
-  if (planned <= 0) co_return Result<void>{};
+  if (planned <= 0) co_return std::nullopt;
   const auto none = fmt::format("drive: {{ objects: {{ {} }} }}", without(object::deceleration));
-  const auto held = co_await read_object(object::deceleration, patiently());
+  const auto held = co_await read_object(object::deceleration, std::move(options));
   if (!held) {
     auto error = held.error();
     if (error.outcome == Outcome::refused) error.remedy = "where the drive does not have it, add " + none;
     co_return fail(std::move(error));
   }
   const bool times = model_->meaning.units.ramps == Ramps::times;
-  if (times ? *held <= planned : *held >= planned) co_return Result<void>{};
-  co_return fail(error_at(
-      Reason::misconfigured, object::deceleration,
+  if (times ? *held <= planned : *held >= planned) co_return std::nullopt;
+  co_return PlanConflict{
+      object::deceleration,
       fmt::format("it brakes for longer than its data sheet says: 6084h is {} instead of {}", *held, planned),
       *held > 0 ? fmt::format("write drive: {{ objects: {{ 6084h: {{ default: {} }} }} }}, or set the drive "
                               "with its own tool",
                               *held)
-                : "set the drive with its own tool; where 6084h means nothing, add " + none));
+                : "set the drive with its own tool; where 6084h means nothing, add " + none};
 }
 
 Task<Result<void>> Cia402Drive::set_emergency_id() {

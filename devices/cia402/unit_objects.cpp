@@ -157,11 +157,11 @@ std::string remedy_without(Object object) {
                      without(object));
 }
 
-std::optional<UnitConflict> polarity_conflict(const Values& values) {
+std::optional<PlanConflict> polarity_conflict(const Values& values) {
   constexpr std::int64_t position_bit = 0x80, velocity_bit = 0x40;
   const auto value = find(values, polarity).value_or(0);
   if (((value & position_bit) != 0) == ((value & velocity_bit) != 0)) return std::nullopt;
-  return UnitConflict{
+  return PlanConflict{
       .object = polarity,
       .message = fmt::format("it turns positions or velocities round, and not both ({} is {:02X}h)",
                              short_name(polarity), value & 0xFF),
@@ -171,7 +171,7 @@ std::optional<UnitConflict> polarity_conflict(const Values& values) {
           remedy_without(polarity)};
 }
 
-std::optional<UnitConflict> velocity_conflict(const Units& planned, const Values& values) {
+std::optional<PlanConflict> velocity_conflict(const Units& planned, const Values& values) {
   const auto told = told_velocity(values);
   const bool by_key = planned.velocity_source == UnitSource::configuration;
   switch (told.kind) {
@@ -179,7 +179,7 @@ std::optional<UnitConflict> velocity_conflict(const Units& planned, const Values
       return std::nullopt;
     case UnitTold::Kind::unclear:
       if (by_key) return std::nullopt;
-      return UnitConflict{.object = told.object,
+      return PlanConflict{.object = told.object,
                           .message = fmt::format("what its velocities count is not clear: {}; {} {}",
                                                  told.what, source_text(planned), text_of(planned.velocity)),
                           .remedy = "say what the drive's manual says: drive: { velocity_unit: UNIT }"};
@@ -188,7 +188,7 @@ std::optional<UnitConflict> velocity_conflict(const Units& planned, const Values
   }
   if (told.unit == planned.velocity) return std::nullopt;
   const auto name = name_of(told.unit);
-  return UnitConflict{
+  return PlanConflict{
       .object = told.object,
       .message = fmt::format("its velocities count {} ({}), and {} {}", text_of(told.unit), told.what,
                              source_text(planned), text_of(planned.velocity)),
@@ -198,7 +198,7 @@ std::optional<UnitConflict> velocity_conflict(const Units& planned, const Values
                             remedy_without(told.object))};
 }
 
-std::optional<UnitConflict> acceleration_conflict(const Units& planned, const Values& values) {
+std::optional<PlanConflict> acceleration_conflict(const Units& planned, const Values& values) {
   const auto told = told_acceleration(values);
   if (told.kind == UnitTold::Kind::nothing) return std::nullopt;
   const bool rates = planned.ramps == Ramps::rates;
@@ -206,7 +206,7 @@ std::optional<UnitConflict> acceleration_conflict(const Units& planned, const Va
   const bool by_key = planned.acceleration_source == UnitSource::configuration;
   if (told.kind == UnitTold::Kind::unclear && (by_key || !rates)) return std::nullopt;
   const auto seconds = [](Rate unit) { return text_of(unit) + " per second"; };
-  return UnitConflict{
+  return PlanConflict{
       .object = told.object,
       .message = fmt::format("its ramps count {} ({}), and the axis is planned with {}",
                              told.kind == UnitTold::Kind::unit ? seconds(told.unit) : "something unclear",
@@ -217,10 +217,10 @@ std::optional<UnitConflict> acceleration_conflict(const Units& planned, const Va
           remedy_without(told.object)};
 }
 
-std::optional<UnitConflict> revolution_conflict(std::int64_t pulses_per_revolution, const Values& values) {
+std::optional<PlanConflict> revolution_conflict(std::int64_t pulses_per_revolution, const Values& values) {
   const auto told = told_revolution(values);
   if (!told || told->fits(pulses_per_revolution)) return std::nullopt;
-  return UnitConflict{
+  return PlanConflict{
       .object = told->object,
       .message = fmt::format("a revolution has {} counts ({}), and scale.microstep says {} pulses/rev",
                              told->revolutions == 1 ? fmt::to_string(told->counts)
@@ -286,7 +286,7 @@ std::optional<RevolutionTold> told_revolution(const Values& values) {
       text_of_ratio(values, encoder) + (turned ? ", " + text_of_ratio(values, gear) : std::string())};
 }
 
-std::optional<UnitConflict> find_conflict(const Units& planned,
+std::optional<PlanConflict> find_conflict(const Units& planned,
                                           std::optional<std::int64_t> pulses_per_revolution,
                                           const Values& values) {
   if (auto conflict = polarity_conflict(values)) return conflict;

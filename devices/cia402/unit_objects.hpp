@@ -46,14 +46,14 @@ struct RevolutionTold {
 /// they say nothing, or are as templates have them (1 for 1), or a factor (6093h) scales positions.
 std::optional<RevolutionTold> told_revolution(const Values& values);
 
-/// The drive does not count as the axis was planned.
-struct UnitConflict {
+/// The drive does not count, or brake, as the axis was planned.
+struct PlanConflict {
   canopen::Object object;
   std::string message, remedy;
 };
 /// The first contradiction between what was planned and what objects hold. `pulses_per_revolution`: nothing
 /// leaves positions out.
-std::optional<UnitConflict> find_conflict(const Units& planned,
+std::optional<PlanConflict> find_conflict(const Units& planned,
                                           std::optional<std::int64_t> pulses_per_revolution,
                                           const Values& values);
 

@@ -209,7 +209,9 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
     model_.objects.restore = cia402::MemoryCommand{object::restore_all, load};
   model_.meaning.units = conventions.units;
   model_.unit_objects = unit_objects_;
-  can_transactions = cia402::transactions_of(model_, static_cast<std::uint8_t>(unit_objects_.size()));
+  const std::size_t braking = capabilities.fixed_deceleration > 0 ? 1 : 0;
+  can_transactions =
+      cia402::transactions_of(model_, static_cast<std::uint8_t>(unit_objects_.size() + braking));
 }
 
 Result<std::shared_ptr<const DriveDescriptor>> specialise(

@@ -250,7 +250,7 @@ constexpr Units planned(UnitSource source) {
           .velocity_source = source};
 }
 
-TEST(UnitConflicts, NameBothValuesAndTheKey) {
+TEST(PlanConflicts, NameBothValuesAndTheKey) {
   const auto from_file = find_conflict(planned(UnitSource::data_sheet), 1000, {{si_velocity, 0x00B44700}});
   ASSERT_TRUE(from_file);
   EXPECT_EQ(from_file->message,
@@ -268,7 +268,7 @@ TEST(UnitConflicts, NameBothValuesAndTheKey) {
   EXPECT_FALSE(find_conflict(planned(UnitSource::configuration), std::nullopt, {{si_position, 0xFF410000}}));
 }
 
-TEST(UnitConflicts, AKeySettlesWhatIsUnclear) {
+TEST(PlanConflicts, AKeySettlesWhatIsUnclear) {
   const Values metres{{si_velocity, 0x00010300}};
   EXPECT_TRUE(find_conflict(planned(UnitSource::data_sheet), 1000, metres));
   EXPECT_FALSE(find_conflict(planned(UnitSource::configuration), 1000, metres));
@@ -278,7 +278,7 @@ TEST(UnitConflicts, AKeySettlesWhatIsUnclear) {
   }
 }
 
-TEST(UnitConflicts, RampsAndPolarity) {
+TEST(PlanConflicts, RampsAndPolarity) {
   auto units = planned(UnitSource::configuration);
   EXPECT_TRUE(find_conflict(units, 1000, {{si_acceleration, 0x00C00300}}));
   EXPECT_TRUE(find_conflict(units, 1000, {{si_acceleration, 0x00B45700}})) << "unclear";

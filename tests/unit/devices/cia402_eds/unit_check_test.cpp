@@ -264,6 +264,30 @@ TEST(UnitCheck, AUnitThatIsChangedLaterIsFound) {
   EXPECT_TRUE(drift->scale_changed);
 }
 
+/// Its 6084h is in each bound of a stop, and the maker's tool sets it whenever it likes.
+TEST(UnitCheck, ADecelerationThatIsChangedLaterIsFound) {
+  constexpr std::uint32_t deceleration = 0x608400;
+  auto settings = with_objects({}, "pulses_per_second");
+  settings["objects.6084h:00.access"] = std::string("ro");
+  settings["objects.6084h:00.default"] = std::int64_t{5000};
+  UnitBench bench(settings, {{deceleration, 5000}});
+  ASSERT_TRUE(bench.bring_up());
+  const auto look = [&] { return bench.run(bench.drive().check_drift(TransactionClass::parameters)); };
+  for (const std::uint32_t good : {5000U, 6000U}) {
+    bench.answers()[deceleration] = good;
+    const auto none = look();
+    ASSERT_TRUE(none) << to_string(none.error());
+    EXPECT_EQ(none->text, "");
+    EXPECT_FALSE(none->limits_changed);
+  }
+  bench.answers()[deceleration] = 4999;
+  const auto drift = look();
+  ASSERT_TRUE(drift) << to_string(drift.error());
+  EXPECT_THAT(drift->text, HasSubstr("it brakes for longer than its data sheet says"));
+  EXPECT_TRUE(drift->limits_changed);
+  EXPECT_FALSE(drift->scale_changed) << "its positions mean what they did";
+}
+
 TEST(UnitCheck, WhoWritesParametersLeavesUnitsAlone) {
   UnitBench bench(
       with_objects({{"607Eh:00", 0}, {"60A8h:00", 0}, {"60A9h:00", in_pulses}, {"60AAh:00", 0}}, ""),
