@@ -180,6 +180,7 @@ class Cia402Drive final : public Drive {
   DriveSample judge(const Reading& reading, bool of_one_moment);
   /// A motion may be slower than its velocity shows: than noise, or than one count of it.
   [[nodiscard]] bool known_by_way() const;
+  [[nodiscard]] bool halted_in(const Reading& reading) const;
   void judge_motion(DriveSample& sample, const Reading& reading);
   void note_direction(const DriveSample& sample);
   Task<> leave_homing(SdoOptions options);

@@ -187,17 +187,24 @@ bool Cia402Drive::known_by_way() const {
          decode_velocity(*model_, setup_.pulses_per_revolution, 1) > velocity_noise_rpm;
 }
 
+/// The drive held halt when it was asked.
+bool Cia402Drive::halted_in(const Reading& reading) const {
+  const bool by_ours = halt_ && reading.asked_at >= halt_->since;
+  const bool as_found = control_ && (*control_ & control::halt) != 0 && reading.asked_at >= control_at_;
+  return by_ours || as_found;
+}
+
 /// What is measured wavers: a little of it is no motion, and has no direction. Where positions are exact they
 /// know better than the drive's own word, which may be that it is near its target.
 void Cia402Drive::judge_motion(DriveSample& sample, const Reading& reading) {
   if (known_by_way()) {
     const auto window = position_window();
-    sample.moving =
-        standstill_.moves({.at = sample.asked_at,
-                           .position = sample.position_pulses,
-                           .velocity_rpm = sample.velocity_rpm,
-                           .told = window > 0 ? told_motion(*model_, reading.values) : std::nullopt},
-                          {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution});
+    sample.moving = standstill_.moves(
+        {.at = sample.asked_at,
+         .position = sample.position_pulses,
+         .velocity_rpm = sample.velocity_rpm,
+         .told = window > 0 ? told_motion(*model_, reading.values, halted_in(reading)) : std::nullopt},
+        {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution});
     if (!sample.moving) sample.velocity_rpm = 0;
   }
   note_direction(sample);

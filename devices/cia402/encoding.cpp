@@ -139,7 +139,7 @@ int decode_velocity(const Model& model, std::int64_t pulses_per_revolution, std:
   return rpm_of(model.meaning.units.velocity, pulses_per_revolution, value);
 }
 
-std::optional<bool> told_motion(const Model& model, const Values& values) {
+std::optional<bool> told_motion(const Model& model, const Values& values, bool halted) {
   const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
   if (model.status.moving != 0 || model.objects.moving)
     return (word & model.status.moving) != 0 || value_of(values, model.objects.moving) != 0;
@@ -149,10 +149,12 @@ std::optional<bool> told_motion(const Model& model, const Values& values) {
     case OperationMode::profile_velocity:
       rests = (word & status::mode_specific) != 0;
       break;
-    case OperationMode::profile_position:  // bit 10 under halt, in any mode: the velocity is 0
+    case OperationMode::profile_position:
     case OperationMode::homing:
-    case OperationMode::none:
       rests = (word & status::target_reached) != 0;
+      break;
+    case OperationMode::none:  // there is no target: the change to this mode may have set it, too
+      rests = halted && (word & status::target_reached) != 0;
       break;
   }
   return rests ? std::optional(false) : std::nullopt;

@@ -52,8 +52,9 @@ CanTransactionSet transactions_of(const Model& model, std::uint8_t watched);
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
                          ActiveLow active_low = {}, bool measured = false);
 /// Whether it moves, by the drive's own word: the maker's bits and objects, else those of CiA 402, which
-/// depend on the mode of operation and tell rest alone. Nothing: it does not say.
-std::optional<bool> told_motion(const Model& model, const Values& values);
+/// depend on the mode of operation and tell rest alone. Nothing: it does not say. `halted`: it holds halt
+/// (control word bit 8).
+std::optional<bool> told_motion(const Model& model, const Values& values, bool halted);
 /// r/min of an object that holds a velocity.
 int decode_velocity(const Model& model, std::int64_t pulses_per_revolution, std::int64_t value);
 /// The bit that says "homed", alone: CiA 402's bit 12 means that in homing mode only. Nothing: neither bit

@@ -79,6 +79,7 @@ void StandardDrive::restart(bool counter_lost) {
   mode_ = supports(dictionary_.get(0x6060)) ? static_cast<int>(dictionary_.get(0x6060)) : 0;
   fault_ = last_fault_ = 0;
   reached_ = acknowledged_ = limited_ = attained_ = homing_error_ = homing_interrupted_ = false;
+  mode_changed_ = false;
   activity_ = Activity::none;
   stopping_ = velocity_held_ = false;
   inputs_.settle(motor_.shaft(), {.functions = {negative_limit, positive_limit, home_switch}});

@@ -171,6 +171,7 @@ class StandardDrive final : public simulation::SimulatedCanNode {
   int last_fault_ = 0;
   int starts_ = 0;
   bool reached_ = false, acknowledged_ = false, limited_ = false;
+  bool mode_changed_ = false;                            ///< since the last start or halt
   TimePoint acknowledgement_due_{}, homing_bits_due_{};  ///< see late_bits_event()
   std::optional<TimePoint> in_window_since_;             ///< after a motion that ended at its target
   bool attained_ = false, homing_error_ = false, homing_interrupted_ = false;

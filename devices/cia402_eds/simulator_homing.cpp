@@ -22,7 +22,7 @@ void StandardDrive::start_homing() {
   constexpr int current_position = 35, current_position_too = 37;
   const auto code = dictionary_.get(0x6098);
   if (motor_.moving()) return;
-  attained_ = homing_error_ = homing_interrupted_ = false;
+  attained_ = homing_error_ = homing_interrupted_ = mode_changed_ = false;
   if (code == current_position || code == current_position_too) {
     homing_done();
     return;

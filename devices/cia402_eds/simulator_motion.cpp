@@ -103,7 +103,7 @@ void StandardDrive::begin(Plan plan) {
     }
     plan.direction = distance < 0 ? -1 : 1;
   }
-  reached_ = false;
+  reached_ = mode_changed_ = false;
   limited_ = plan.shortened && plan.activity == Activity::position;
   if (plan.rates.cruise <= 0 || limit_active(plan.direction)) {
     velocity_held_ = !behaviour_.velocity_resumes_after_limit;

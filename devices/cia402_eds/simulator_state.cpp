@@ -123,6 +123,7 @@ void StandardDrive::on_halt(bool halted) {
                                  .rates = rates(profile_speed()),
                                  .shortened = limited_};
   if (activity_ == Activity::homing) homing_interrupted_ = true;
+  mode_changed_ = false;
   stop_motion(ramp(value(0x605D, 1) == 1 ? 0x6084 : 0x6085));
 }
 
@@ -145,6 +146,7 @@ void StandardDrive::on_start_bit(bool set) {
 void StandardDrive::set_mode(int mode) {
   if (mode == mode_ || (mode == 0 && behaviour_.no_mode_changes_nothing)) return;
   mode_ = mode;
+  mode_changed_ = true;
   acknowledged_ = velocity_held_ = limited_ = false;
   suspended_.reset();
   buffered_.reset();
@@ -173,6 +175,7 @@ std::uint16_t StandardDrive::state_bits() const {
 
 bool StandardDrive::target_reached() const {
   if (state_ != State::operation) return false;
+  if (mode_changed_ && behaviour_.mode_change_is_target_reached) return true;
   if (halted()) return !motor_.moving();
   if (mode_ == position_mode) return in_position();
   if (mode_ == homing_mode)

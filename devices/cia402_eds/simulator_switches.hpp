@@ -12,7 +12,7 @@ struct Behaviour {
   bool halt_release_drops, halt_release_keeps_velocity_at_0, set_point_in_halt_refused;
   bool homing_attained_forgotten, homing_goes_on_without_start_bit, homing_pauses;
   bool homing_attained_early, homing_attained_late;
-  bool no_mode_changes_nothing;
+  bool no_mode_changes_nothing, mode_change_is_target_reached;
   bool acknowledges_late, acknowledgement_ends_with_motion, set_points_change_at_once;
   bool error_code_kept, velocity_wavers_at_rest, settles_over_30_counts;
   bool velocity_resumes_after_limit, limit_stops_on_ramp, segmented_uploads;

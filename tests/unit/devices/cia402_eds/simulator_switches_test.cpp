@@ -55,6 +55,27 @@ TEST(StandardDriveSwitches, NoModeIsAModeOrLeavesTheOneBefore) {
   }
 }
 
+TEST(StandardDriveSwitches, AChangeOfTheModeIsATargetReachedOrNot) {
+  for (const bool on : {false, true}) {
+    auto bench = with("mode_change_is_target_reached", on);
+    bench.enable(3);
+    bench.write(0x60FF, 4, 10'000);
+    bench.run(20ms);
+    EXPECT_EQ(bench.write(0x6060, 1, 0), 0U);
+    bench.run(1ms);
+    EXPECT_TRUE(bench.drive().shaft_moving());
+    EXPECT_EQ(bench.bit(10), on) << "though it moves";
+    bench.control(0x10F);
+    EXPECT_FALSE(bench.bit(10)) << "it brakes under a halt";
+    bench.run(2s);
+    EXPECT_TRUE(bench.bit(10));
+    EXPECT_EQ(bench.write(0x6060, 1, 1), 0U);
+    bench.control(0x0F);
+    bench.move(5'000);
+    EXPECT_FALSE(bench.bit(10)) << "a new target";
+  }
+}
+
 TEST(StandardDriveSwitches, ASetPointIsAcknowledgedAtOnceOrLate) {
   for (const bool late : {false, true}) {
     auto bench = with("acknowledges_late", late);
