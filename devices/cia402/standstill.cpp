@@ -16,21 +16,41 @@ Duration time_of(std::int64_t band, std::int64_t pulses_per_revolution) {
   return std::clamp(time, milliseconds(20), milliseconds(1000));
 }
 
+/// Up to this a velocity may be noise and the last of a settling, for so many readings in a row.
+constexpr int settling_rpm = 3 * velocity_noise_rpm, settling_readings = 5;
+
+/// How far readings of a shaft that rests are apart at most.
+std::int64_t band_of(const Standstill::Gauge& gauge) {
+  return gauge.window > 0 ? std::max<std::int64_t>(gauge.window / 2, 1) : 0;
+}
+
 }  // namespace
 
+bool Standstill::settles(const Look& look, const Gauge& gauge) const {
+  const bool rests = since_ && !moves_ && look.told == false;
+  return rests && std::abs(look.velocity_rpm) <= settling_rpm && unsettled_ < settling_readings &&
+         std::abs(way_between(since_->position, look.position)) <= band_of(gauge);
+}
+
 bool Standstill::moves(const Look& look, const Gauge& gauge) {
-  if (std::abs(look.velocity_rpm) > velocity_noise_rpm) return note(look, true);
+  if (std::abs(look.velocity_rpm) > velocity_noise_rpm) {
+    if (!settles(look, gauge)) return note(look, true);
+    ++unsettled_;
+    return false;
+  }
   if (look.told) return note(look, *look.told);
   if (!since_) return note(look, moves_);
-  const auto least = std::max<std::int64_t>(gauge.window / 2, 1);
-  const auto band = gauge.window > 0 ? least : 0;
+  const auto band = band_of(gauge);
   if (std::abs(way_between(since_->position, look.position)) > band) return note(look, true);
-  if (moves_ && look.at - since_->at >= time_of(least, gauge.pulses_per_revolution)) return note(look, false);
+  const auto proof = time_of(std::max<std::int64_t>(band, 1), gauge.pulses_per_revolution);
+  if (moves_ && look.at - since_->at >= proof) return note(look, false);
+  unsettled_ = 0;
   return moves_;
 }
 
 bool Standstill::note(const Look& look, bool moves) {
   since_ = look;
+  unsettled_ = 0;
   return moves_ = moves;
 }
 

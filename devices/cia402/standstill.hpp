@@ -19,6 +19,10 @@ constexpr std::int64_t way_between(std::int32_t from, std::int32_t to) {
 /// Pure. A velocity beyond its noise is a motion. Below, the drive's own word counts; where it has none, the
 /// position does: at rest it stays within half of the in-position window, or where it is, if it is exact. How
 /// long it must do so after a motion follows from the slowest one, 1 r/min.
+///
+/// What settles still turns a little where the drive takes it for in position, and its noise comes on top: a
+/// shaft that was at rest, and is by the drive's own word, goes on resting for some readings that are little
+/// faster than noise, as long as its position stays.
 class Standstill {
  public:
   struct Look {
@@ -43,9 +47,11 @@ class Standstill {
 
  private:
   bool note(const Look& look, bool moves);
+  [[nodiscard]] bool settles(const Look& look, const Gauge& gauge) const;
 
   std::optional<Look> since_;  ///< it was there, and as it is
   bool moves_ = false;
+  int unsettled_ = 0;  ///< readings in a row that settles() was asked about
 };
 
 }  // namespace axisd::cia402

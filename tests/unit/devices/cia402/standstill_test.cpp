@@ -45,6 +45,40 @@ TEST(Standstill, AVelocityBeyondItsNoiseIsAMotionWhateverTheDriveSays) {
   }
 }
 
+/// In position by its own word it still turns a little, and noise comes on top.
+TEST(Standstill, TheLastOfASettlingIsNoMotion) {
+  Standstill standstill;
+  EXPECT_TRUE(standstill.moves(look(0ms, 0, 40, false), gauge));
+  EXPECT_TRUE(standstill.moves(look(10ms, 6, 2, false), gauge)) << "it was not at rest yet";
+  EXPECT_FALSE(standstill.moves(look(20ms, 7, 1, false), gauge));
+  EXPECT_FALSE(standstill.moves(look(30ms, 7, 2, false), gauge));
+  EXPECT_FALSE(standstill.moves(look(40ms, 8, 3, false), gauge));
+  EXPECT_FALSE(standstill.moves(look(50ms, 8, 0, false), gauge));
+  EXPECT_TRUE(standstill.moves(look(60ms, 8, 4, false), gauge)) << "that is more than both";
+}
+
+TEST(Standstill, WhatGoesOnIsAMotionThoughTheDriveDeniesIt) {
+  for (const int rpm : {2, 3, -2, -3}) {
+    Standstill standstill;
+    EXPECT_FALSE(standstill.moves(look(0ms, 0, 0, false), gauge));
+    int rested = 0;
+    for (int i = 1; i <= 20 && !standstill.moves(look(10ms * i, 0, rpm, false), gauge); ++i) ++rested;
+    EXPECT_EQ(rested, 5) << "by its velocity";
+    Standstill slowly_read;
+    EXPECT_FALSE(slowly_read.moves(look(0ms, 0, 0, false), gauge));
+    EXPECT_TRUE(slowly_read.moves(look(200ms, rpm > 0 ? 6 : -6, rpm, false), gauge)) << "by its way";
+  }
+}
+
+TEST(Standstill, WithoutTheDrivesWordALittleMoreThanNoiseIsAMotion) {
+  Standstill standstill;
+  EXPECT_FALSE(standstill.moves(look(0ms, 0, 0, false), gauge));
+  EXPECT_TRUE(standstill.moves(look(10ms, 0, 2), gauge)) << "as where a move has begun";
+  Standstill told;
+  EXPECT_FALSE(told.moves(look(0ms, 0, 0, false), gauge));
+  EXPECT_TRUE(told.moves(look(10ms, 0, 2, true), gauge));
+}
+
 TEST(Standstill, BelowItTheDrivesOwnWordCountsAtOnce) {
   Standstill standstill;
   EXPECT_TRUE(standstill.moves(look(0ms, 0, 0, true), gauge)) << "its motor turns, slowly";
