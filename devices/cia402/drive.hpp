@@ -389,6 +389,7 @@ class Cia402Drive final : public Drive {
   std::optional<std::int32_t> direction_from_;  ///< where the direction was told last
   bool last_moving_ = false;
   bool negative_ = false;
+  TimePoint fault_left_at_{};        ///< by a reset of ours, or as its EMCY told
   std::uint16_t pending_alarm_ = 0;  ///< told by EMCY, and not reported yet: it may be gone already (M5)
 
   /// What the motion block may hold: one entry, two after a write whose reply was lost.

@@ -361,7 +361,10 @@ Task<Result<void>> Cia402Drive::clear_alarm(MotionGuard guard) {
     if (const auto reset = co_await reset_fault(options); !reset) co_return reset;
     const auto now = co_await read_status(options);
     if (!now) co_return fail(now.error());
-    if (*now != State::fault) co_return Result<void>{};
+    if (*now != State::fault) {
+      fault_left_at_ = clock_->now();
+      co_return Result<void>{};
+    }
   }
   // What is no fault to CiA 402, or was not reset by bit 7.
   if (!model_->objects.alarm_clear) co_return Result<void>{};

@@ -55,6 +55,7 @@ void Cia402Drive::on_emergency(const canopen::Emergency& emergency) {
   const auto group = emergency.code >> 8U;
   const bool of_communication = group == 0x81 || group == 0x82;
   if (!emergency.is_reset() && !of_communication) pending_alarm_ = alarm_of(*model_, emergency.code);
+  if (emergency.is_reset()) fault_left_at_ = clock_->now();
   give_up_common_start();
   news_.notify_all();
   if (attention_) attention_();
@@ -166,8 +167,11 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
   // A chain that starts something does not wait for a PDO, unless the objects come later still.
   const bool slow = answer_time_ > slow_answer;
   auto sample = co_await look(slow || transaction_class != TransactionClass::motion, options);
+  // A fault that was left while the objects were read is none any more: its code is gone already, too.
+  const bool over = sample && sample->alarm_code != 0 && sample->asked_at < fault_left_at_;
   // The drive may have been reset between its status word and 603Fh: neither comes with the other.
-  if (sample && sample->alarm_code == alarm_without_code) sample = co_await look(false, options);
+  const bool torn = sample && sample->alarm_code == alarm_without_code && has(*model_, object::error_code);
+  if (over || torn) sample = co_await look(false, options);
   // What a drive does with a change of its mode in motion is not said.
   const bool rests = sample && !sample->moving && stopping_ == 0 && sample->asked_at >= stopped_at_;
   if (leave_homing_ && rests && !rebooted_) {
