@@ -116,7 +116,8 @@ Skipped skipped_by(const Sheet& sheet) {
   if (!sheet.has(0x60FD))
     skip(skipped,
          {"run_into_limits", "limits_at_standstill", "levels_and_edges", "conflicts", "on_the_switch",
-          "released_by_terminal", "stop_terminals", "outputs", "drift", "stopped_from_outside"},
+          "released_by_terminal", "stop_terminals", "outputs", "drift", "stopped_from_outside", "positions",
+          "velocities"},
          "no 60FDh: the drive shows no inputs");
   if (!sheet.homes())
     skip(skipped,
@@ -130,11 +131,13 @@ Skipped skipped_by(const Sheet& sheet) {
          "no 60FFh, or no bit 2 of 6502h: the drive has no profile velocity mode");
   const auto braking = sheet.value(0x6084);
   if (sheet.has(0x6084) && !sheet.can_write(0x6084) && braking > 0 &&
-      braking < turns_per_second * sheet.counts())
-    skip(skipped, {"jogging", "stop"},
-         fmt::format(
-             "6084h is read-only: the drive brakes for {:.1f} s, and the scenario does not wait so long",
-             static_cast<double>(turns_per_second * sheet.counts()) / static_cast<double>(braking)));
+      braking < turns_per_second * sheet.counts()) {
+    const auto why = fmt::format(
+        "6084h is read-only: the drive brakes for {:.1f} s, and the scenario does not wait so long",
+        static_cast<double>(turns_per_second * sheet.counts()) / static_cast<double>(braking));
+    skip(skipped, {"jogging", "stop"}, why);
+    if (!sheet.can_write(0x605D)) skip(skipped, {"quick_stop"}, why + "; nor can 605Dh be written");
+  }
   return skipped;
 }
 
@@ -169,6 +172,7 @@ Manual manual_of_sheet(const std::filesystem::path& file) {
   if (!sheet.has(0x60FD)) changed["inputs"] = "";
   if (!sheet.homes()) changed["homing_modes"] = "";
   if (!sheet.can_write(0x6084)) changed["one_ramp"] = "yes";
+  if (!sheet.can_write(0x605D)) changed["one_halt"] = "yes";
   // One of each class: the codes are those of CiA 402, whatever the file says.
   constexpr int some[] = {0x2310, 0x3210, 0x8611};
   for (const auto& [code, rule] : standard.alarms())

@@ -77,6 +77,16 @@ const std::vector<Row>& table() {
   return rows;
 }
 
+/// 605Dh is missing, or only read: one more warning says what that means for QuickStop.
+constexpr std::string_view halt_in_one_way[] = {
+    "faulhaber-327-3150-1.eds", "faulhaber-605-3150-67-b.eds", "maxon-epos-70-10.eds",
+    "maxon-epos4.eds",          "pilz-prbt-0-1.dcf",           "schunk-prl120.eds",
+    "technosoft-isd860.eds",    "trinamic-tmcc-160.eds",       "trinamic-tmcm-1270.eds"};
+
+std::size_t warnings_about(const Row& row) {
+  return row.warnings + (std::ranges::find(halt_in_one_way, row.file) != std::end(halt_in_one_way) ? 1 : 0);
+}
+
 Result<std::shared_ptr<const DriveDescriptor>> made(const std::filesystem::path& path,
                                                     std::string_view unit = {}) {
   const auto* model = find_drive_model("cia402");
@@ -109,7 +119,7 @@ TEST_P(MakersFile, IsTakenOrRefusedAsTheTableSays) {
   if (row.refused_for.empty()) {
     const auto with_key = made(path, row.unit.empty() ? "0.1rpm" : row.unit);
     ASSERT_TRUE(with_key) << to_string(with_key.error());
-    EXPECT_THAT((*with_key)->warnings, SizeIs(row.warnings));
+    EXPECT_THAT((*with_key)->warnings, SizeIs(warnings_about(row)));
     ASSERT_EQ(drive.has_value(), !row.unit.empty()) << "no unit may be guessed";
     if (drive) {
       EXPECT_EQ(cia402::name_of(units_of(**drive).velocity), row.unit);
