@@ -23,6 +23,10 @@ struct Job {
   Variant variant;
 };
 
+/// What each data sheet of a maker is run with in a sample.
+constexpr std::string_view of_each_make[] = {"enable_and_disable", "absolute_moves", "velocity_moves",
+                                             "quick_stop", "all_methods"};
+
 /// Each of them takes as long as twenty others.
 constexpr std::string_view long_ones[] = {"every_alarm", "thousand_moves"};
 
@@ -61,7 +65,7 @@ std::vector<Job> all_jobs(const std::vector<Manual>& manuals, std::string_view n
 }
 
 /// Long ones come first, so that guests side by side have one each.
-std::vector<Job> sample_of_jobs(const std::vector<Manual>& manuals) {
+std::vector<Job> sample_of_jobs(const std::vector<Manual>& manuals, const std::vector<Manual>& makes) {
   std::vector<Job> sample, short_ones;
   std::size_t turn = 0;
   for (const auto& subject : subjects())
@@ -79,6 +83,12 @@ std::vector<Job> sample_of_jobs(const std::vector<Manual>& manuals) {
         short_ones.push_back(able[turn++ % able.size()]);
     }
   sample.insert(sample.end(), short_ones.begin(), short_ones.end());
+  for (const auto& make : makes)
+    for (const auto& subject : subjects())
+      for (const auto& scenario : subject.scenarios)
+        if (std::ranges::find(of_each_make, scenario.name) != std::end(of_each_make) &&
+            make.skipped(scenario.name) == nullptr)
+          sample.push_back({.scenario = &scenario, .manual = &make, .variant = {}});
   return sample;
 }
 
@@ -112,8 +122,8 @@ bool run_vcan_suite(const Programs& programs, std::string_view named) {
 }
 
 bool run_vcan_sample(const Programs& programs, const Part& part) {
-  const auto manuals = manuals_on_can();
-  return run(sample_of_jobs(manuals), part, programs);
+  const auto manuals = manuals_on_can(), of_makers = makes();
+  return run(sample_of_jobs(manuals, of_makers), part, programs);
 }
 
 }  // namespace axisd::conformance
