@@ -1,4 +1,5 @@
 // Parts of requests as anybody may send them to axisd-web.
+#include "api/grpc_text/grpc_text.hpp"
 #include "api/web/gateway/grpc_web.hpp"
 #include "api/web/gateway/http_answer.hpp"
 #include "api/web/gateway/http_rules.hpp"
@@ -16,13 +17,13 @@ void run(Input input) {
     expect(message->size() + frame_head_size == rest.size(), "one frame is the whole body");
   if (const auto request = parse_lane_request(rest))
     expect(request->method.size() + request->message.size() + 10 == rest.size(), "nothing is lost");
-  const auto timeout = timeout_of(some);
+  const auto timeout = grpc_text::timeout_of(some);
   expect(!timeout || *timeout >= Duration::zero(), "time does not go back");
   if (const auto cookie = cookie_of(rest, "axisd"))
     expect(cookie->find(';') == std::string_view::npos, "a cookie ends");
   const CallStatus status{.code = kind, .message = std::string(some), .details = std::string(rest)};
   const auto trailers = trailers_frame(status);
-  expect(percent_encoded(some).find_first_of("\r\n") == std::string::npos, "no line is forged");
+  expect(grpc_text::percent_encoded(some).find_first_of("\r\n") == std::string::npos, "no line is forged");
   expect(trailers.size() > frame_head_size, "there are trailers");
   const auto quoted = json_text(some);
   expect(quoted.find_first_of("\r\n") == std::string::npos, "no line is forged in JSON");

@@ -6,11 +6,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstddef>
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "api/grpc_text/grpc_text.hpp"
 
 namespace axisd::server::lane {
 
@@ -22,45 +23,6 @@ constexpr int invalid_argument = 3, unimplemented = 12;
 
 void check(int result, const char* what) {
   if (result != 0) throw std::runtime_error(fmt::format("{}: {}", what, nghttp2_strerror(result)));
-}
-
-/// gRPC's percent encoding of grpc-message.
-std::string percent_encoded(std::string_view text) {
-  std::string encoded;
-  encoded.reserve(text.size());
-  for (const char c : text) {
-    if (c >= ' ' && c <= '~' && c != '%')
-      encoded += c;
-    else
-      encoded += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  }
-  return encoded;
-}
-
-/// "250m": a number of at most 8 digits and its unit, hours and minutes up to a day. nullopt: anything else.
-std::optional<Duration> timeout_of(std::string_view text) {
-  if (text.size() < 2 || text.size() > 9) return std::nullopt;
-  std::int64_t number = 0;
-  const auto* end = text.end() - 1;
-  if (const auto read = std::from_chars(text.begin(), end, number);
-      read.ec != std::errc{} || read.ptr != end || number < 0)
-    return std::nullopt;
-  switch (text.back()) {
-    case 'H':
-      return std::chrono::hours(std::min<std::int64_t>(number, 24));
-    case 'M':
-      return std::chrono::minutes(std::min<std::int64_t>(number, 24L * 60));
-    case 'S':
-      return std::chrono::seconds(number);
-    case 'm':
-      return std::chrono::milliseconds(number);
-    case 'u':
-      return std::chrono::microseconds(number);
-    case 'n':
-      return std::chrono::nanoseconds(number);
-    default:
-      return std::nullopt;
-  }
 }
 
 nghttp2_nv field(std::string_view name, std::string_view value) {
@@ -149,7 +111,7 @@ struct Http2::Callbacks {
     } else if (key == "content-type") {
       stream->is_grpc = text.starts_with("application/grpc");
     } else if (key == "grpc-timeout") {
-      stream->patience = timeout_of(text);
+      stream->patience = grpc_text::timeout_of(text);
     } else if (key == "grpc-encoding") {
       stream->compressed = text != "identity";
     } else if (key == user_key) {
@@ -299,7 +261,7 @@ void Http2::submit_answer(std::int32_t id, Stream& stream) {
     (void)nghttp2_submit_response(session_.get(), id, fields.data(), fields.size(), &provider);
     return;
   }
-  const auto code = fmt::format("{}", said.code), text = percent_encoded(said.error);
+  const auto code = fmt::format("{}", said.code), text = grpc_text::percent_encoded(said.error);
   const auto details = absl::Base64Escape(said.details);
   fields.push_back(field("grpc-status", code));
   fields.push_back(field("grpc-message", text));

@@ -11,6 +11,7 @@
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <utility>
 
+#include "api/grpc_text/grpc_text.hpp"
 #include "api/web/gateway/http_rules.hpp"
 #include "api/web/gateway/lane_message.hpp"
 #include "api/web/gateway/lane_socket.hpp"
@@ -282,7 +283,7 @@ void Connection::start_call() {
     return answer(refused_call(400, message.error()));
   }
   head_sent_ = false;
-  auto timeout = timeout_of(header("grpc-timeout"));
+  auto timeout = grpc_text::timeout_of(header("grpc-timeout"));
   if (stopping_)
     timeout = std::min<Duration>(timeout.value_or(Duration::max()), LaneState::patience_of_stops);
   call_ = gateway_.upstream->start(

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 
+#include "api/grpc_text/grpc_text.hpp"
 #include "api/web/gateway/big_endian.hpp"
 
 namespace axisd::web {
@@ -52,48 +52,12 @@ std::string message_head(std::size_t size) {
 
 std::string trailers_frame(const CallStatus& status) {
   auto text = fmt::format("grpc-status: {}\r\n", status.code);
-  if (!status.message.empty()) text += fmt::format("grpc-message: {}\r\n", percent_encoded(status.message));
+  if (!status.message.empty())
+    text += fmt::format("grpc-message: {}\r\n", grpc_text::percent_encoded(status.message));
   if (!status.details.empty()) text += fmt::format("grpc-status-details-bin: {}\r\n", base64(status.details));
   auto frame = message_head(text.size());
   frame.front() = trailers;
   return frame + text;
-}
-
-std::optional<Duration> timeout_of(std::string_view text) {
-  if (text.size() < 2 || text.size() > 9) return std::nullopt;
-  std::int64_t number = 0;
-  const auto digits = text.substr(0, text.size() - 1);
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-  if (error != std::errc() || end != digits.data() + digits.size() || number < 0) return std::nullopt;
-  switch (text.back()) {
-    case 'H':
-      // 99,999,999 hours are more than a Duration holds.
-      return std::chrono::hours(std::min<std::int64_t>(number, 24L * 365));
-    case 'M':
-      return std::chrono::minutes(number);
-    case 'S':
-      return std::chrono::seconds(number);
-    case 'm':
-      return std::chrono::milliseconds(number);
-    case 'u':
-      return std::chrono::microseconds(number);
-    case 'n':
-      return std::chrono::nanoseconds(number);
-    default:
-      return std::nullopt;
-  }
-}
-
-std::string percent_encoded(std::string_view text) {
-  std::string encoded;
-  encoded.reserve(text.size());
-  for (const char c : text) {
-    if (c >= ' ' && c <= '~' && c != '%')
-      encoded += c;
-    else
-      encoded += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  }
-  return encoded;
 }
 
 std::string base64(std::string_view bytes) {

@@ -4,11 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <expected>
-#include <optional>
 #include <string>
 #include <string_view>
-
-#include "buses/clock.hpp"
 
 namespace axisd::web {
 
@@ -38,11 +35,7 @@ inline constexpr std::size_t frame_head_size = 5;
 [[nodiscard]] std::string message_head(std::size_t size);
 /// The last frame of an answer.
 [[nodiscard]] std::string trailers_frame(const CallStatus& status);
-/// "grpc-timeout": up to 8 digits and one of H M S m u n. Nothing: it is none.
-[[nodiscard]] std::optional<Duration> timeout_of(std::string_view text);
 
-/// As grpc-message has it: printable ASCII without '%'; every other byte is %XX.
-[[nodiscard]] std::string percent_encoded(std::string_view text);
 /// With padding.
 [[nodiscard]] std::string base64(std::string_view bytes);
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "api/grpc_text/grpc_text.hpp"
+
 namespace axisd::web {
 namespace {
 
@@ -92,7 +94,7 @@ Answer json(int status, std::string body) {
 Answer refused_call(int status, const CallStatus& why) {
   auto answer = plain(status, why.message);
   answer.headers.emplace_back("grpc-status", std::to_string(why.code));
-  answer.headers.emplace_back("grpc-message", percent_encoded(why.message));
+  answer.headers.emplace_back("grpc-message", grpc_text::percent_encoded(why.message));
   return answer;
 }
 
