@@ -25,7 +25,6 @@ namespace http = boost::beast::http;
 
 namespace {
 
-constexpr std::uint32_t most_header_bytes = 16 * 1024;
 /// Read ahead while a request is answered.
 constexpr std::size_t most_ahead = 4096;
 /// How long, and how much, is read of a request that was refused before it was read: else the answer may get
@@ -119,8 +118,7 @@ void Connection::read_head() {
   since_ = gateway_.clock.now();
   limit(gateway_.settings.limits.request);
   parser_.emplace();
-  parser_->header_limit(most_header_bytes);
-  parser_->body_limit(static_cast<std::uint64_t>(gateway_.settings.limits.body) * 1024);
+  limit_request(*parser_, static_cast<std::uint64_t>(gateway_.settings.limits.body) * 1024);
   keep_alive_ = false;
   http::async_read_header(
       transport_, buffer_, *parser_, [self = shared_from_this()](Error error, std::size_t) {

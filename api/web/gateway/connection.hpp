@@ -2,8 +2,6 @@
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http/parser.hpp>
-#include <boost/beast/http/string_body.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -14,6 +12,7 @@
 #include "api/web/gateway/call.hpp"
 #include "api/web/gateway/gateway.hpp"
 #include "api/web/gateway/http_answer.hpp"
+#include "api/web/gateway/request_parser.hpp"
 #include "api/web/gateway/shares.hpp"
 #include "api/web/gateway/transport.hpp"
 #include "buses/clock.hpp"
@@ -41,7 +40,6 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
 
  private:
   enum class Phase : std::uint8_t { handshake, waiting, reading, working, ending, closed };
-  using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
   using Error = boost::system::error_code;
 
   // Reading.
@@ -100,7 +98,7 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
   Clock::Timer deadline_;
   std::string certificate_;
   boost::beast::flat_buffer buffer_;
-  std::optional<Parser> parser_;
+  std::optional<RequestParser> parser_;
   bool watching_ = false, keep_alive_ = false, head_sent_ = false, ever_known_ = false;
   Known known_{};
   bool acting_ = false;    ///< a call is read or carried out
