@@ -40,8 +40,18 @@ void FakeMachine::post(Job job) {
   {
     const std::lock_guard lock(mutex_);
     (holding_ ? held_ : jobs_).push_back(std::move(job));
+    if (holding_) return;
   }
   wake_.notify_one();
+}
+
+void FakeMachine::run_held() {
+  std::vector<Job> jobs;
+  do {
+    for (auto& job : jobs) job();
+    const std::lock_guard lock(mutex_);
+    jobs = std::exchange(held_, {});
+  } while (!jobs.empty());
 }
 
 void FakeMachine::publish(AxisSnapshot snapshot) {

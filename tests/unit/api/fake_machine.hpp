@@ -36,6 +36,8 @@ class FakeMachine final : public Machine {
   /// Keeps callbacks back until let_go().
   void hold();
   void let_go();
+  /// Runs those that are kept back, and what they bring, on this thread, in place of the core's.
+  void run_held();
   /// A change of command "c-1" for those who watch it.
   void change(const Command& command);
   void set_now(TimePoint now) { now_ = now; }
