@@ -19,6 +19,8 @@ namespace {
 
 constexpr auto newest = "journal.v1";
 constexpr auto unfinished = "journal.v1.new";
+constexpr auto mark_name = "journal-mark.v1";
+constexpr std::size_t largest_mark = 256;
 /// Many times what any journal comes to (id_files.hpp); anything longer is not ours.
 constexpr std::size_t largest_journal = std::size_t{256} << 20U;
 
@@ -72,6 +74,20 @@ class FileDisk final : public JournalDisk {
     return {};
   }
 
+  Result<FoundFile> read_mark() override {
+    auto found = find_file(directory_.get(), mark_name, largest_mark);
+    if (found.kind == FoundFile::Kind::unreadable) return failed("read", mark_name, found.error);
+    return found;
+  }
+
+  Result<void> mark(std::string_view text) override {
+    if (mark_.get() < 0) mark_ = FileDescriptor(create_anew(directory_.get(), mark_name, 0));
+    if (mark_.get() < 0) return failed("create", mark_name, errno);
+    if (pwrite(mark_.get(), text.data(), text.size(), 0) != std::ssize(text))
+      return failed("write", mark_name, errno);
+    return {};
+  }
+
   Result<void> append_ids(std::uint32_t number, std::uint64_t offset, std::string_view bytes) override {
     const auto name = ids_name(number);
     const int at = directory_.get();
@@ -115,7 +131,7 @@ class FileDisk final : public JournalDisk {
   }
 
   std::filesystem::path path_;
-  FileDescriptor directory_, file_;
+  FileDescriptor directory_, file_, mark_;
 };
 
 }  // namespace

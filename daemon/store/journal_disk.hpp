@@ -29,6 +29,12 @@ class JournalDisk {
   /// Keeps the present file, whatever it is, by another name: a person may want to look at it.
   [[nodiscard]] virtual Result<void> keep_damaged() = 0;
 
+  /// What mark() left; absent or damaged: nobody knows. Errors: storage.
+  [[nodiscard]] virtual Result<FoundFile> read_mark() = 0;
+  /// Writes into a small file beside it, over what was there: survives the end of the daemon, not surely that
+  /// of the computer. Errors: storage.
+  [[nodiscard]] virtual Result<void> mark(std::string_view text) = 0;
+
   // Files beside it, by number.
   /// Durably writes behind the first `offset` bytes; what was there is gone. Errors: storage: what is there
   /// is not known.

@@ -11,6 +11,8 @@
 #include <utility>
 #include <variant>
 
+#include "buses/limited_log.hpp"
+#include "daemon/store/journal_mark.hpp"
 #include "daemon/store/thread.hpp"
 
 namespace axisd::store {
@@ -253,7 +255,16 @@ std::string JournalFile::numbered(const JournalLine& line) {
   return encode_line(last_number_, line);
 }
 
+/// A journal that has lost lines since is told by it. It is not synced: a power failure may leave an older
+/// one, which convicts nobody.
+void JournalFile::mark() {
+  const auto pair = model_.state() ? model_.state()->pair : std::string();
+  if (const auto marked = disk_->mark(encode_mark({.pair = pair, .line = last_number_})); !marked)
+    log_limited(spdlog::level::warn, "store", "journal mark", to_string(marked.error()));
+}
+
 void JournalFile::all_is_synced() {
+  mark();
   durable_line_ = last_number_;  // first: who sees the fact sees a line that is not before it
   durable_fact_ = last_fact_;
   sync_by_.reset();

@@ -96,6 +96,7 @@ class JournalFile final : public CommandJournal, public StateWitness {
   [[nodiscard]] Result<void> write(const std::vector<Pending>& batch);
   [[nodiscard]] Result<void> append(const std::vector<Pending>& batch);
   [[nodiscard]] std::string numbered(const JournalLine& line);
+  void mark();
   void all_is_synced();
   [[nodiscard]] Result<void> rewrite();
   void tell(const std::optional<Error>& trouble);

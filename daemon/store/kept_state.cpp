@@ -32,9 +32,12 @@ Result<std::unique_ptr<KeptState>> KeptState::open(const std::filesystem::path& 
   if (!disk) return fail(disk.error());
   auto journal = (*disk)->read();
   if (!journal) return fail(journal.error());
+  auto mark = (*disk)->read_mark();
+  if (!mark) return fail(mark.error());
   auto verdict = judge({.state = std::move(files->newest),
                         .previous = std::move(files->previous),
-                        .journal = *std::move(journal)},
+                        .journal = *std::move(journal),
+                        .mark = *std::move(mark)},
                        new_pair(), now);
   if (!verdict) return fail(verdict.error());
   for (const auto& conviction : verdict->fresh)

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/store/change.hpp"
+#include "daemon/store/journal_mark.hpp"
 
 namespace axisd::store {
 namespace {
@@ -131,6 +132,16 @@ class Court {
            (state == nullptr || state->journal.pair == line()->pair || state->journal.pair.empty());
   }
 
+  /// Until there the journal was on the disk, as its mark says. 0: that is of another one, or says nothing.
+  [[nodiscard]] std::uint64_t marked() const {
+    const auto mark = found_.mark.regular() ? decode_mark(found_.mark.text) : std::nullopt;
+    const auto* state = newest();
+    const auto pair = state != nullptr    ? state->journal.pair
+                      : line() != nullptr ? line()->pair
+                                          : std::string();
+    return mark && !pair.empty() && mark->pair == pair ? mark->line : 0;
+  }
+
   /// By a start that convicted, and was killed before it began a journal anew: neither the journal nor the
   /// generation before is at fault.
   [[nodiscard]] static bool begun_anew(const Generation* state) {
@@ -143,6 +154,7 @@ class Court {
     for (const auto* each : {state_ ? &*state_ : nullptr, previous_ ? &*previous_ : nullptr})
       if (each != nullptr && each->journal.pair == state->journal.pair)
         expected = std::max(expected, each->journal.line);
+    expected = std::max(expected, marked());
     verdict_.seen.journal = {.found = journal_ ? journal_->last_number : 0, .expected = expected};
     const bool anew = begun_anew(state);
     if (anew) verdict_.doubt = "it was to be begun anew";

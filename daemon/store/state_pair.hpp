@@ -23,6 +23,7 @@ StateLine line_of(const Generation& generation);
 
 struct FoundFiles {
   FoundFile state{}, previous{}, journal{};
+  FoundFile mark{};  ///< convicts the journal, and is convicted by nobody: it may be older, or gone
 };
 
 /// What the daemon goes on with.

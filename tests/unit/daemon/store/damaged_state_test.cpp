@@ -24,6 +24,7 @@ namespace {
 
 constexpr std::array<const char*, 3> names = {"state.v1", "state.v1.previous", "journal.v1"};
 constexpr std::size_t state = 0, previous = 1, journal = 2;
+constexpr auto mark_name = "journal-mark.v1";
 using Files = std::array<std::string, names.size()>;
 
 /// Disks are slow, and what is durable is not what is tested here.
@@ -119,6 +120,7 @@ class Owners {
 /// A machine's life: as its files were at each moment, and what it had given out by then.
 struct Moment {
   Files files;
+  std::string mark;  ///< of the journal
   Given given;
   bool end_of_run = false;
   std::size_t run = 0;
@@ -131,6 +133,7 @@ std::vector<Moment> life() {
   const auto look = [&](std::size_t run, bool end) {
     moments.push_back({.given = given, .end_of_run = end, .run = run});
     for (std::size_t i = 0; i < names.size(); ++i) moments.back().files.at(i) = directory.read(names.at(i));
+    moments.back().mark = directory.read(mark_name);
   };
   for (std::size_t run = 0; run < 8; ++run) {
     {
@@ -166,13 +169,14 @@ class Generator {
   [[nodiscard]] const Moment& moment() {
     return life_->at(life_->size() / 2 + random_() % (life_->size() - life_->size() / 2));
   }
-  Damages damages() {
+  /// `marked`: the journal's mark is as it was.
+  Damages damages(bool marked) {
     Damages all{};
     for (auto& damage : all)
       if (random_() % 2 == 0) damage = static_cast<Damage>(random_() % 10);
-    // Old copies of all three are as good as what they were copied from; so is a journal cut to its old
+    // Old copies of all files are as good as what they were copied from; so is a journal cut to its old
     // length.
-    if (all[state] == Damage::old && all[previous] == Damage::old)
+    if (!marked && all[state] == Damage::old && all[previous] == Damage::old)
       if (all[journal] == Damage::old || all[journal] == Damage::truncated) all[journal] = Damage::missing;
     // Without any file it is a first start.
     if (std::ranges::count(all, Damage::missing) == std::ssize(all)) all[journal] = Damage::none;
@@ -240,14 +244,14 @@ void put(const test::TemporaryDirectory& directory, const Moment& moment, const 
   if (generator.below(4) == 0) std::filesystem::create_symlink("elsewhere", directory / "journal.v1.new");
 }
 
-/// A journal that lost its last line, or got another version of its format, may be whole all the same.
-bool certainly_noticed(Damage damage, std::size_t file) {
-  if (file == journal)
-    return damage != Damage::none && damage != Damage::truncated && damage != Damage::flipped;
-  return damage != Damage::none;
+/// A journal that got another version of its format may be whole all the same; so may one without its last
+/// lines, unless its mark tells of them.
+bool certainly_noticed(Damage damage, std::size_t file, bool marked) {
+  if (file == journal && damage == Damage::truncated) return marked;
+  return damage != Damage::none && (file != journal || damage != Damage::flipped);
 }
 
-void judge_start(Owners& owners, const Moment& moment, const Damages& damages) {
+void judge_start(Owners& owners, const Moment& moment, const Damages& damages, bool marked) {
   const auto& given = moment.given;
   const auto& loaded = owners.loaded();
   EXPECT_FALSE(given.starts.contains(loaded.start_count)) << loaded.start_count << ": ids of commands repeat";
@@ -256,7 +260,7 @@ void judge_start(Owners& owners, const Moment& moment, const Damages& damages) {
   if (given.latched) EXPECT_TRUE(loaded.inhibit.active) << "the latch is lost";
   if (given.held) EXPECT_TRUE(owners.held() || loaded.inhibit.active) << "the hold is lost";
   for (std::size_t i = 0; i < names.size(); ++i)
-    if (certainly_noticed(damages.at(i), i)) EXPECT_FALSE(loaded.convictions.empty()) << names.at(i);
+    if (certainly_noticed(damages.at(i), i, marked)) EXPECT_FALSE(loaded.convictions.empty()) << names.at(i);
 }
 
 TEST(DamagedState, NothingIsGivenOutTwiceAndNoLatchIsLost) {
@@ -267,11 +271,13 @@ TEST(DamagedState, NothingIsGivenOutTwiceAndNoLatchIsLost) {
   int started = 0, refused = 0, convicted = 0;
   for (int number = 0; number < 2'000 && !testing::Test::HasFailure(); ++number) {
     const auto& moment = generator.moment();
-    const auto damages = generator.damages();
+    const bool marked = generator.below(4) != 0;
+    const auto damages = generator.damages(marked);
     SCOPED_TRACE(fmt::format("{}: run {}, damages {} {} {}", number, moment.run, int(damages[0]),
                              int(damages[1]), int(damages[2])));
     const test::TemporaryDirectory directory(memory());
     put(directory, moment, damages, generator);
+    if (marked) directory.write(mark_name, moment.mark);
     std::uint64_t first = 0;
     {
       Owners owners(directory.path());
@@ -284,7 +290,7 @@ TEST(DamagedState, NothingIsGivenOutTwiceAndNoLatchIsLost) {
       }
       ++started;
       first = owners.loaded().start_count;
-      judge_start(owners, moment, damages);
+      judge_start(owners, moment, damages, marked);
       if (!owners.loaded().convictions.empty()) {
         ++convicted;
         owners.accept();
@@ -295,7 +301,7 @@ TEST(DamagedState, NothingIsGivenOutTwiceAndNoLatchIsLost) {
     ASSERT_FALSE(again.refusal) << to_string(*again.refusal);
     EXPECT_EQ(to_string(again.loaded().convictions), "") << "accepted, and a restart is no conviction";
     EXPECT_EQ(again.loaded().start_count, first + 1);
-    judge_start(again, moment, {});
+    judge_start(again, moment, {}, marked);
   }
   spdlog::set_level(spdlog::level::info);
   EXPECT_GT(convicted, 1'000);

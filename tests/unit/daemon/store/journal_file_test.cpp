@@ -41,6 +41,8 @@ class FaultyDisk final : public JournalDisk {
     return faults_->replace ? full() : disk_->replace(text);
   }
   Result<void> keep_damaged() override { return disk_->keep_damaged(); }
+  Result<FoundFile> read_mark() override { return disk_->read_mark(); }
+  Result<void> mark(std::string_view text) override { return faults_->append ? full() : disk_->mark(text); }
   Result<void> append_ids(std::uint32_t file, std::uint64_t offset, std::string_view bytes) override {
     return faults_->replace ? full() : disk_->append_ids(file, offset, bytes);
   }

@@ -1,6 +1,7 @@
 // How far the journal had come is known to the state file, so that a start recognises one that was cut.
 #include <gmock/gmock.h>
 
+#include <array>
 #include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -12,6 +13,7 @@
 namespace axisd::store {
 namespace {
 
+using testing::IsEmpty;
 using testing::SizeIs;
 
 Command command(const std::string& id) { return {.id = id, .axis = "x", .request_id = id, .client = "c"}; }
@@ -85,6 +87,30 @@ TEST_F(KnownJournalTest, AJournalThatWasCutAfterTheEndIsRecognised) {
       EXPECT_THAT(open()->state().loaded().convictions, SizeIs(1)) << size;
     }
   }
+}
+
+/// Also right after it was written, when the state file does not know of it: what a kill left, and somebody
+/// cut.
+TEST_F(KnownJournalTest, AJournalThatWasCutRightAfterAKillIsRecognised) {
+  std::array<std::string, 4> left;
+  const std::array names{"state.v1", "state.v1.previous", "journal-mark.v1", "journal.v1"};
+  {
+    const auto kept = open();
+    kept->journal().accepted(command("1"), "d");
+    kept->journal().sending(command("1"), {}, record());
+    wait_for(1);
+    for (std::size_t i = 0; i < names.size(); ++i) left.at(i) = temporary_.read(names.at(i));
+  }
+  const auto put_back = [&](const std::string& journal) {
+    for (std::size_t i = 0; i + 1 < names.size(); ++i) temporary_.write(names.at(i), left.at(i));
+    temporary_.write("journal.v1", journal);
+  };
+  put_back(left.back());
+  EXPECT_THAT(open()->state().loaded().convictions, IsEmpty());
+  const auto accepted = left.back().find(" accepted id=1 ");
+  ASSERT_NE(accepted, std::string::npos);
+  put_back(left.back().substr(0, left.back().rfind('\n', accepted) + 1));
+  EXPECT_THAT(open()->state().loaded().convictions, SizeIs(1));
 }
 
 /// A journal that others write to as well.

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "daemon/store/journal_mark.hpp"
+
 namespace axisd::store {
 namespace {
 
@@ -123,6 +125,19 @@ TEST(StatePair, EachFileConvictsTheOther) {
       "state.v1 was rolled back: it has generation 12, but there was generation 39; journal.v1 was rolled "
       "back: it has line 31, but there was line 100")
       << "old copies of both";
+}
+
+TEST(StatePair, TheMarkTellsOfLinesThatTheStateDoesNotKnowYet) {
+  const auto marked = [](std::uint64_t line, const std::string& pair) {
+    return with(&FoundFiles::mark, file(encode_mark({.pair = pair, .line = line})));
+  };
+  EXPECT_EQ(found(marked(121, "p")), "journal.v1 was rolled back: it has line 120, but there was line 121");
+  EXPECT_EQ(found(marked(120, "p")), "") << "as it is";
+  EXPECT_EQ(found(marked(7, "p")), "") << "a power failure left an older one";
+  EXPECT_EQ(found(marked(121, "q")), "") << "of another journal";
+  for (const auto* text : {"", "axisd-mark 1", "axisd-mark 1 pair=p journal_line=121 crc32=00000000\n"})
+    EXPECT_EQ(found(with(&FoundFiles::mark, file(text))), "") << text;
+  EXPECT_EQ(found(with(&FoundFiles::mark, not_regular())), "");
 }
 
 TEST(StatePair, SwappedFilesAreReadAsWhatTheyAre) {
