@@ -33,6 +33,8 @@ ninja -C build/fuzz --quiet "${targets[@]/#/fuzz_}"
 symbolizer=$(command -v llvm-symbolizer-19)
 export ASAN_OPTIONS="external_symbolizer_path=$symbolizer"
 export UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1:$ASAN_OPTIONS"
+# By the clock on the wall: on a computer that is busy with other things, too, an input may take seconds.
+patience=60
 found=build/fuzz/found
 mkdir -p "$found"
 fuzz_one() {
@@ -42,7 +44,7 @@ fuzz_one() {
     "build/fuzz/tests/fuzz_$target" -merge=1 -max_len=1024 "$seeds" "$grown" 2>"$found/$target.log"
     return
   fi
-  if ! "build/fuzz/tests/fuzz_$target" "$limit" -max_len=4096 -timeout=10 -rss_limit_mb=2048 \
+  if ! "build/fuzz/tests/fuzz_$target" "$limit" -max_len=4096 -timeout="$patience" -rss_limit_mb=2048 \
     -print_final_stats=1 -artifact_prefix="$found/$target-" "$grown" "$seeds" 2>"$found/$target.log"; then
     echo "$target: FAILED: $found/$target.log"
     return 1
@@ -55,5 +57,5 @@ fuzz_one() {
   fi
 }
 export -f fuzz_one
-export what limit executions found
+export what limit executions found patience
 printf '%s\n' "${targets[@]}" | xargs -P "$(nproc)" -I{} bash -euc 'fuzz_one {}'
