@@ -48,7 +48,9 @@ bool Connection::fill() {
     return true;
   }
   if (tls_->established() && !tls_->send(http_.take_output())) return false;
-  out_ += tls_->take_output();
+  const auto output = tls_->take_output();
+  greeted_ = greeted_ || (!output.empty() && !over_);
+  out_ += output;
   return true;
 }
 

@@ -25,6 +25,8 @@ class Connection {
   [[nodiscard]] bool wants_to_write() const { return !out_.empty(); }
   /// The peer is who its certificate says, or needs none.
   [[nodiscard]] bool identified() const { return !tls_ || tls_->established(); }
+  /// Its handshake has begun: it got an answer.
+  [[nodiscard]] bool greeted() const { return !tls_ || greeted_; }
   /// tls::Session::certificate(); nothing: there is no TLS. Precondition: identified().
   [[nodiscard]] std::optional<std::string> certificate() const {
     return tls_ ? std::optional(tls_->certificate()) : std::nullopt;
@@ -46,7 +48,8 @@ class Connection {
   FileDescriptor socket_;
   std::optional<tls::Session> tls_;
   Http2 http_;
-  std::string out_;    ///< for the socket
+  std::string out_;  ///< for the socket
+  bool greeted_ = false;
   bool over_ = false;  ///< once out_ is sent
 };
 

@@ -33,12 +33,21 @@ std::map<std::string, int> Places::count(bool known, Of of) const {
 }
 
 template <class May>
-std::optional<Places::Id> Places::oldest_stranger(Id but, May may) const {
-  const Entry* oldest = nullptr;
+std::optional<Places::Id> Places::least_of_strangers(Id but, May may) const {
+  const Entry* least = nullptr;
+  const auto order = [](const Place& place) { return std::tuple(place.greeted, place.since); };
   for (const auto& entry : all_) {
     if (entry.first == but || entry.second.known || !may(entry.second)) continue;
-    if (oldest == nullptr || entry.second.since < oldest->second.since) oldest = &entry;
+    if (least == nullptr || order(entry.second) < order(least->second)) least = &entry;
   }
+  return least == nullptr ? std::nullopt : std::optional(least->first);
+}
+
+std::optional<Places::Id> Places::oldest_stranger() const {
+  const Entry* oldest = nullptr;
+  for (const auto& entry : all_)
+    if (!entry.second.known && (oldest == nullptr || entry.second.since < oldest->second.since))
+      oldest = &entry;
   return oldest == nullptr ? std::nullopt : std::optional(oldest->first);
 }
 
@@ -61,13 +70,13 @@ std::optional<Places::Id> Places::enter(Id id, Origin origin, TimePoint now) {
               .since = now,
               .used = now};
   if (count(false, &Place::address).at(origin.address) > limits_.strangers_per_address)
-    return oldest_stranger(id, [&](const Place& place) { return place.address == origin.address; });
+    return least_of_strangers(id, [&](const Place& place) { return place.address == origin.address; });
   const auto strangers = count(false, &Place::network);
   if (total(strangers) > limits_.strangers) {
     // Where each network has one, the oldest goes, whatever its network is.
     const auto most = most_of(strangers);
     const bool any = strangers.at(most) == 1;
-    return oldest_stranger(id, [&](const Place& place) { return any || place.network == most; });
+    return least_of_strangers(id, [&](const Place& place) { return any || place.network == most; });
   }
   if (std::cmp_less_equal(all_.size(), limits_.connections)) return std::nullopt;
   return idlest(most_of(count(true, &Place::identity)), id);
@@ -90,18 +99,18 @@ void Places::used(Id id, TimePoint now, int waiting) {
 }
 
 std::optional<Places::Id> Places::overdue(TimePoint now) const {
-  const auto oldest = oldest_stranger(Id{}, anybody);
+  const auto oldest = oldest_stranger();
   if (!oldest || all_.at(*oldest).since + limits_.introduction > now) return std::nullopt;
   return oldest;
 }
 
 std::optional<Places::Id> Places::least_needed() const {
-  if (const auto stranger = oldest_stranger(Id{}, anybody)) return stranger;
+  if (const auto stranger = least_of_strangers(Id{}, anybody)) return stranger;
   return idlest(most_of(count(true, &Place::identity)), Id{});
 }
 
 TimePoint Places::next_due() const {
-  const auto oldest = oldest_stranger(Id{}, anybody);
+  const auto oldest = oldest_stranger();
   return oldest ? all_.at(*oldest).since + limits_.introduction : TimePoint::max();
 }
 

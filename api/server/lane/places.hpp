@@ -12,10 +12,11 @@
 namespace axisd::server::lane {
 
 /// The newest connection always gets a place: whoever wants to stop connects now. What makes room is a
-/// stranger (not identified yet) from an address that has too many of them, or from the network with most, or
-/// a connection of the identity with most of them: first one on which nothing was ever asked, then the one
-/// that is idle for longest. So an identity with one connection loses it last of all, and nobody takes
-/// another's place by opening many. Thread: one at a time.
+/// stranger (not identified yet) from an address that has too many of them, or from the network with most,
+/// one that has not begun to identify itself before one that has; or a connection of the identity with most
+/// of them: first one on which nothing was ever asked, then the one that is idle for longest. So an identity
+/// with one connection loses it last of all, and nobody takes another's place by opening many. Thread: one at
+/// a time.
 class Places {
  public:
   using Id = std::uint64_t;
@@ -41,6 +42,8 @@ class Places {
   [[nodiscard]] std::optional<Id> identify(Id id, const std::string& identity, bool local, TimePoint now);
   /// It carried a complete request.
   void asked(Id id) { all_.at(id).asked = true; }
+  /// It has begun to identify itself.
+  void greeted(Id id) { all_.at(id).greeted = true; }
   /// It carried something. `waiting`: calls on it that wait for their answers; such a one goes last.
   void used(Id id, TimePoint now, int waiting);
   void leave(Id id) { all_.erase(id); }
@@ -56,7 +59,7 @@ class Places {
  private:
   struct Place {
     std::string address, network, identity;
-    bool known = false, asked = false;
+    bool known = false, greeted = false, asked = false;
     TimePoint since{}, used{};
     int waiting = 0;
   };
@@ -64,7 +67,8 @@ class Places {
   template <class Of>
   [[nodiscard]] std::map<std::string, int> count(bool known, Of of) const;
   template <class May>
-  [[nodiscard]] std::optional<Id> oldest_stranger(Id but, May may) const;
+  [[nodiscard]] std::optional<Id> least_of_strangers(Id but, May may) const;
+  [[nodiscard]] std::optional<Id> oldest_stranger() const;
   [[nodiscard]] std::optional<Id> idlest(const std::string& identity, Id but) const;
 
   Limits limits_;

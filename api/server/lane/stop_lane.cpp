@@ -39,8 +39,9 @@ namespace {
 constexpr Duration when_full = std::chrono::milliseconds(100);
 /// Until it is looked again whether a client may be read from that had too many stops waiting.
 constexpr Duration when_crowded = std::chrono::milliseconds(5);
-/// Accepted at once, before those who are there are served again.
-constexpr int most_accepted = 32;
+/// Accepted at once, before those who are there are served again: half of what an address may have of
+/// strangers, so that whoever comes is listened to before he may have to make room.
+constexpr int most_accepted = 4;
 
 /// As gRPC writes it.
 std::string text_of(const sockaddr_storage& address, socklen_t size) {
@@ -292,6 +293,7 @@ void StopLane::Loop::serve(Id id) {
   auto& client = found->second;
   const auto now = monotonic_now();
   if (!(is_crowded(client) ? client.connection->write() : client.connection->read(now))) return close(id);
+  if (client.connection->greeted()) places_.greeted(id);
   if (!client.peer && client.connection->identified()) identify(id, client);
   places_.used(id, now, client.connection->waiting());
 }

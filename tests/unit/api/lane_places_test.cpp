@@ -43,6 +43,18 @@ TEST_F(StopPlaces, StrangersOfOneAddressTakeEachOthersPlace) {
   EXPECT_EQ(places_.enter(3, {"a", "a"}, at(3ms)), 1U);
 }
 
+TEST_F(StopPlaces, AStrangerInMidHandshakeGoesAfterSilentOnes) {
+  EXPECT_FALSE(places_.enter(1, {"a", "a"}, at(1ms)));
+  places_.greeted(1);
+  EXPECT_FALSE(places_.enter(2, {"a", "a"}, at(3ms)));
+  for (Places::Id id = 3; id <= 9; ++id) {
+    EXPECT_EQ(places_.enter(id, {"a", "a"}, at(id * 1ms)), id - 1)
+        << "whoever is about to say who it is stays";
+    places_.leave(id - 1);
+  }
+  EXPECT_EQ(places_.overdue(at(3001ms)), 1U) << "not for ever";
+}
+
 TEST_F(StopPlaces, StrangersInAllTakeThatOfTheNetworkWithMost) {
   for (Places::Id id = 1; id <= 2; ++id) EXPECT_FALSE(places_.enter(id, {"a", "a"}, at(id * 1ms)));
   EXPECT_FALSE(places_.enter(3, {"b", "b"}, at(3ms)));
