@@ -68,8 +68,8 @@ constexpr KeySpec limit_keys[] = {
                  const Value& v) { t.configuration->server.limits.streams = static_cast<int>(v.integer); }},
     {.key = "connections",
      .kind = Kind::integer,
-     .description = "Connections of all clients together; those beyond are closed at once. One address has "
-                    "three quarters of them at most.",
+     .description = "Connections of all clients together; those beyond are closed at once, or take the "
+                    "place of one that says nothing. One address has three quarters of them at most.",
      .example = "32",
      .default_value = "256",
      .minimum = 4,

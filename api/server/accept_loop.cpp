@@ -130,8 +130,12 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   const auto address = address_of_peer(connection.get());
   FileDescriptor watched(fcntl(connection.get(), F_DUPFD_CLOEXEC, 0));
   const bool none_left = watched.get() < 0 || watched.get() >= first_refused_descriptor_;
-  const auto place =
-      none_left ? PeerBudgets::Entry::full : budgets_->enter(++last_id_, address, monotonic_now());
+  const auto now = monotonic_now();
+  const bool counted = entry.socket.unix_path.empty();
+  auto place = none_left ? PeerBudgets::Entry::full : budgets_->enter(++last_id_, address, now, counted);
+  if (!none_left && place != PeerBudgets::Entry::granted && place != PeerBudgets::Entry::address_floods &&
+      make_room(address, now))
+    place = budgets_->enter(last_id_, address, now, counted);
   if (place != PeerBudgets::Entry::granted) {
     refuse(place, address);
     return true;
@@ -143,6 +147,23 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   }
   entry.hand_over(std::move(connection));
   return true;
+}
+
+bool AcceptLoop::make_room(const std::string& address, TimePoint now) {
+  // What was counted is some time old: those that have begun to speak since then stay.
+  for (int look = 0; look < 8; ++look) {
+    const auto id = budgets_->gives_way(address, now);
+    if (!id) return false;
+    const auto& connection = connections_.at(*id);
+    if (!budgets_->still_gives_way(*id, traffic_of(connection.get()), now)) continue;
+    if (std::has_single_bit(++gave_way_))
+      spdlog::info("an idle connection from {} gives way to a new one from {} ({} since start)",
+                   address_of_peer(connection.get()), address, gave_way_);
+    ::shutdown(connection.get(), SHUT_RDWR);
+    close(*id);
+    return true;
+  }
+  return false;
 }
 
 void AcceptLoop::refuse(PeerBudgets::Entry why, const std::string& address) {

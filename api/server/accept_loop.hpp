@@ -49,6 +49,8 @@ class AcceptLoop {
   /// False: nothing could be accepted, and trying again at once would spin.
   bool accept_one(const Entry& entry);
   bool turn_away(const Entry& entry);
+  /// Ends a connection that gives way to one from `address`. False: there is none.
+  bool make_room(const std::string& address, TimePoint now);
   void refuse(PeerBudgets::Entry why, const std::string& address);
   /// Cuts off who floods, by what the kernel has counted.
   void count_traffic(TimePoint now);
@@ -61,7 +63,7 @@ class AcceptLoop {
   std::map<PeerBudgets::Id, FileDescriptor> connections_;  ///< of each that gRPC has, one of our own
   PeerBudgets::Id last_id_ = 0;
   TimePoint counted_{};
-  std::uint64_t cut_off_ = 0;
+  std::uint64_t cut_off_ = 0, gave_way_ = 0;
   std::atomic<std::uint64_t> refused_{0};
   std::atomic<TimePoint> progress_{monotonic_now()};
   std::atomic<bool> stopping_{false};

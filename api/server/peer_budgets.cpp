@@ -20,15 +20,54 @@ void PeerBudgets::forget_idle(TimePoint now) {
   });
 }
 
-PeerBudgets::Entry PeerBudgets::enter(Id id, const std::string& address, TimePoint now) {
+int PeerBudgets::most_of_one() const { return std::max(1, limits_.connections * 3 / 4); }
+
+PeerBudgets::Entry PeerBudgets::enter(Id id, const std::string& address, TimePoint now, bool counted) {
   forget_idle(now);
-  if (std::cmp_greater_equal(connections_.size(), limits_.connections)) return Entry::full;
   auto& from = addresses_.try_emplace(address, Address{.bucket = {.since = now}}).first->second;
-  if (from.connections >= std::max(1, limits_.connections * 3 / 4)) return Entry::address_full;
+  // First: who floods must not take the places of others.
   if (level_of(from.bucket, now) > limits_.burst / 2) return Entry::address_floods;
+  if (std::cmp_greater_equal(connections_.size(), limits_.connections)) return Entry::full;
+  if (from.connections >= most_of_one()) return Entry::address_full;
   ++from.connections;
-  connections_.emplace(id, Connection{.address = address, .bucket = {.since = now}});
+  connections_.emplace(
+      id, Connection{
+              .address = address, .may_go = counted, .bucket = {.since = now}, .begun = now, .active = now});
   return Entry::granted;
+}
+
+std::optional<PeerBudgets::Id> PeerBudgets::gives_way(const std::string& address, TimePoint now) const {
+  const auto own = addresses_.find(address);
+  const bool has_all = own != addresses_.end() && own->second.connections >= most_of_one();
+  const auto most =
+      std::ranges::max_element(addresses_, {}, [](const auto& entry) { return entry.second.connections; });
+  const auto& from = has_all || most == addresses_.end() ? address : most->first;
+  // Silent ones first, the oldest of them; then the one that has been idle for longest.
+  const auto rank = [](const Connection& connection) {
+    return std::pair(connection.said_hello, connection.said_hello ? connection.active : connection.begun);
+  };
+  const std::pair<const Id, Connection>* found = nullptr;
+  for (const auto& entry : connections_) {
+    const auto& [id, connection] = entry;
+    if (connection.address != from || !connection.may_go) continue;
+    if (connection.said_hello && now - connection.active < limits_.idle) continue;
+    if (found == nullptr || rank(connection) < rank(found->second)) found = &entry;
+  }
+  return found == nullptr ? std::nullopt : std::optional(found->first);
+}
+
+void PeerBudgets::look(Connection& connection, const Traffic& total, TimePoint now) {
+  const auto& before = connection.counted;
+  if (total.received - before.received + total.sent - before.sent > quiet) connection.active = now;
+  connection.said_hello = total.received >= hello;
+}
+
+bool PeerBudgets::still_gives_way(Id id, const Traffic& total, TimePoint now) {
+  const auto found = connections_.find(id);
+  if (found == connections_.end()) return false;
+  auto& connection = found->second;
+  look(connection, total, now);
+  return !connection.said_hello || now - connection.active >= limits_.idle;
 }
 
 void PeerBudgets::leave(Id id) {
@@ -45,6 +84,7 @@ std::vector<PeerBudgets::Id> PeerBudgets::count(const std::map<Id, Traffic>& tra
     if (found == connections_.end()) continue;
     auto& connection = found->second;
     auto& address = addresses_.at(connection.address);
+    look(connection, total, now);
     const auto before = std::exchange(connection.counted, total);
     const auto one_sided = static_cast<double>(total.received - before.received) -
                            limits_.proportion * static_cast<double>(total.sent - before.sent);

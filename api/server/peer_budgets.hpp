@@ -1,9 +1,11 @@
 // What clients of one address may take of the main address. Pure.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,31 +13,44 @@
 
 namespace axisd::server {
 
-/// Places: an address has three quarters of them at most. Bytes: who asks gets answers, so that what is sent
-/// is in proportion to what comes back; a flood (rapid reset, half-open streams, CONTINUATION) brings nothing
-/// back. What an address sends beyond `proportion` times what it gets runs into a bucket that empties at
-/// `rate`. Where it is above `burst` those connections that filled it most are to be cut off, and no further
-/// one is let in until it is down to half of that. Thread: one at a time.
+/// Places: an address has three quarters of them at most. Where it has them all, or nobody has one left, a
+/// new connection gets the place of one that has not said hello yet, else of one on which nothing has gone on
+/// for a while. Bytes: who asks gets answers, so that what is sent is in proportion to what comes back; a
+/// flood (rapid reset, half-open streams, CONTINUATION) brings nothing back. What an address sends beyond
+/// `proportion` times what it gets runs into a bucket that empties at `rate`. Where it is above `burst` those
+/// connections that filled it most are to be cut off, and no further one is let in until it is down to half
+/// of that. Thread: one at a time.
 class PeerBudgets {
  public:
   using Id = std::uint64_t;
   struct Limits {
     int connections = 256;  ///< in all
     double proportion = 4;
-    double rate = 256 * 1024;        ///< bytes per second
-    double burst = 2 * 1024 * 1024;  ///< bytes: several of the longest messages
-    double longest_penalty = 10;     ///< seconds until a bucket is empty, at most
+    double rate = 256 * 1024;                 ///< bytes per second
+    double burst = 2 * 1024 * 1024;           ///< bytes: several of the longest messages
+    double longest_penalty = 10;              ///< seconds until a bucket is empty, at most
+    Duration idle = std::chrono::seconds(5);  ///< from then on it gives way
   };
   /// Since the connection began, as the kernel counts it.
   struct Traffic {
     std::uint64_t received = 0, sent = 0;  ///< bytes
   };
+  /// Of HTTP/2: its preface and an empty frame of settings.
+  static constexpr std::uint64_t hello = 33;
+  /// Pings, with TLS around them, are no more in the time between two counts; a call is more.
+  static constexpr std::uint64_t quiet = 100;
   enum class Entry : std::uint8_t { granted, full, address_full, address_floods };
 
   explicit PeerBudgets(Limits limits) : limits_(limits) {}
 
-  /// A new connection from `address`; it is known from then on if it is granted.
-  [[nodiscard]] Entry enter(Id id, const std::string& address, TimePoint now);
+  /// A new connection from `address`; it is known from then on if it is granted. `counted`: its traffic is;
+  /// it never gives way otherwise.
+  [[nodiscard]] Entry enter(Id id, const std::string& address, TimePoint now, bool counted = true);
+  /// Who has to leave so that a connection from `address` is let in that was not, as far as is counted.
+  /// Nothing: nobody has to.
+  [[nodiscard]] std::optional<Id> gives_way(const std::string& address, TimePoint now) const;
+  /// False: by what it has sent and got by now it does not have to leave.
+  [[nodiscard]] bool still_gives_way(Id id, const Traffic& total, TimePoint now);
   void leave(Id id);
   /// Takes over what was counted by now. Those to cut off, which are to leave then.
   [[nodiscard]] std::vector<Id> count(const std::map<Id, Traffic>& traffic, TimePoint now);
@@ -54,9 +69,14 @@ class PeerBudgets {
   };
   struct Connection {
     std::string address;
-    Traffic counted;
-    Bucket bucket;
+    bool may_go = true;
+    Traffic counted{};
+    Bucket bucket{};
+    TimePoint begun{}, active{};
+    bool said_hello = false;
   };
+  [[nodiscard]] int most_of_one() const;
+  static void look(Connection& connection, const Traffic& total, TimePoint now);
   [[nodiscard]] double level_of(const Bucket& bucket, TimePoint now) const;
   void fill(Bucket& bucket, double more, TimePoint now) const;
   void forget_idle(TimePoint now);

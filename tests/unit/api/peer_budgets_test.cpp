@@ -53,6 +53,57 @@ TEST_F(PeerBudgetsTest, OneAddressLeavesPlacesToOthers) {
   EXPECT_EQ(budgets_.connections(), 8U);
 }
 
+TEST_F(PeerBudgetsTest, SilentConnectionsGiveWayToNewOnes) {
+  for (PeerBudgets::Id id = 1; id <= 6; ++id) ASSERT_EQ(enter(id, "a", now_ += 1ms), Entry::granted);
+  traffic_[1] = traffic_[3] = {.received = PeerBudgets::hello, .sent = 60};
+  EXPECT_THAT(budgets_.count(traffic_, at(now_)), IsEmpty());
+  ASSERT_EQ(enter(7, "a", now_), Entry::address_full);
+  EXPECT_EQ(budgets_.gives_way("a", at(now_)), 2) << "the oldest that has not said hello";
+  EXPECT_TRUE(budgets_.still_gives_way(2, {.received = 7, .sent = 60}, at(now_)));
+  EXPECT_FALSE(budgets_.still_gives_way(2, {.received = 500, .sent = 60}, at(now_))) << "it has just done so";
+  EXPECT_EQ(budgets_.gives_way("a", at(now_)), 4);
+  budgets_.leave(4);
+  EXPECT_EQ(enter(7, "a", now_), Entry::granted);
+}
+
+TEST_F(PeerBudgetsTest, IdleConnectionsGiveWayAndBusyOnesDoNot) {
+  for (PeerBudgets::Id id = 1; id <= 6; ++id) {
+    ASSERT_EQ(enter(id, "a"), Entry::granted);
+    traffic_[id] = {.received = 200, .sent = 200};
+  }
+  ASSERT_THAT(budgets_.count(traffic_, at(now_)), IsEmpty());
+  EXPECT_EQ(budgets_.gives_way("a", at(now_)), std::nullopt) << "all have just begun";
+  // Keepalive is no activity, a call is.
+  for (int i = 0; i < 40; ++i) {
+    now_ += 250ms;
+    for (PeerBudgets::Id id = 1; id <= 6; ++id) {
+      const bool calls = id == 2 || (id == 1 && i < 10);
+      traffic_[id].received += calls ? 80 : 39;
+      traffic_[id].sent += calls ? 80 : 39;
+    }
+    ASSERT_THAT(budgets_.count(traffic_, at(now_)), IsEmpty());
+  }
+  std::vector<PeerBudgets::Id> left;
+  while (const auto id = budgets_.gives_way("a", at(now_))) {
+    left.push_back(*id);
+    budgets_.leave(*id);
+  }
+  EXPECT_THAT(left, ElementsAre(3, 4, 5, 6, 1)) << "the one that was busy last goes last";
+}
+
+TEST_F(PeerBudgetsTest, WhereAllPlacesAreTakenTheAddressWithMostGivesWay) {
+  for (PeerBudgets::Id id = 1; id <= 5; ++id) ASSERT_EQ(enter(id, "a", now_ += 1ms), Entry::granted);
+  for (PeerBudgets::Id id = 6; id <= 8; ++id) ASSERT_EQ(enter(id, "b", 0ms), Entry::granted);
+  ASSERT_EQ(enter(9, "c", now_), Entry::full);
+  EXPECT_EQ(budgets_.gives_way("c", at(now_)), 1);
+}
+
+TEST_F(PeerBudgetsTest, WhoseTrafficIsNotCountedStays) {
+  for (PeerBudgets::Id id = 1; id <= 6; ++id)
+    ASSERT_EQ(budgets_.enter(id, "anna", at(0ms), false), Entry::granted);
+  EXPECT_EQ(budgets_.gives_way("anna", at(1h)), std::nullopt);
+}
+
 TEST_F(PeerBudgetsTest, WhoGetsAnswersMaySendWhatHeLikes) {
   ASSERT_EQ(enter(1, "a"), Entry::granted);
   EXPECT_THAT(run(1, 1'000'000, 250'000, 60s), IsEmpty());

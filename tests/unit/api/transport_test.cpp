@@ -128,7 +128,7 @@ TEST_F(Transport, SurvivesRunningOutOfDescriptors) {
 }
 
 TEST_F(Transport, ConnectionsAreBounded) {
-  const auto port = start({.listen = {"127.0.0.1:0"}, .peers = {.connections = 8}});
+  const auto port = start({.listen = {"127.0.0.1:0"}, .peers = {.connections = 8, .idle = 1h}});
   ASSERT_TRUE(port);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -136,16 +136,38 @@ TEST_F(Transport, ConnectionsAreBounded) {
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   std::vector<FileDescriptor> clients;
   // Surplus connections are closed without a word; gRPC greets the others with its settings.
+  constexpr std::string_view hello("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0",
+                                   server::PeerBudgets::hello);
   bool turned_away = false;
   for (int i = 0; i < 200 && !turned_away; ++i) {
     auto& client = clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
     ASSERT_EQ(connect(client.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    (void)send(client.get(), hello.data(), hello.size(), MSG_NOSIGNAL);
     char byte = 0;
     turned_away = recv(client.get(), &byte, 1, 0) <= 0;
   }
   EXPECT_TRUE(turned_away);
+  EXPECT_EQ(clients.size(), 7U) << "an address has six of eight";
   clients.clear();
   EXPECT_TRUE(eventually([&] { return stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok(); }));
+}
+
+TEST_F(Transport, SilentConnectionsMakeRoom) {
+  const auto port = start({.listen = {"127.0.0.1:0"}, .peers = {.connections = 8}});
+  ASSERT_TRUE(port);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(*port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const auto before = connect("127.0.0.1:" + std::to_string(*port));
+  ASSERT_TRUE(stop(before).first.ok());
+  std::vector<FileDescriptor> crowd;
+  for (int i = 0; i < 100; ++i) {
+    auto& client = crowd.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    ASSERT_EQ(connect(client.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  }
+  EXPECT_TRUE(stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok()) << "whoever comes behind them";
+  EXPECT_TRUE(stop(before).first.ok()) << "and whoever was there before";
 }
 
 /// HTTP/2 rapid reset: requests that are taken back at once (CVE-2023-44487).
