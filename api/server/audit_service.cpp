@@ -66,7 +66,7 @@ grpc::ServerUnaryReactor* AuditServiceImpl::ListAudit(Context* context, const v1
                                       .permitted = Range{.minimum = 0, .maximum = most_records}}));
   const auto from = since(*request);
   if (!from) return answer(context, to_status(from.error()));
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.audit == nullptr)
     return answer(context, to_status({.reason = Reason::not_supported,

@@ -53,7 +53,7 @@ AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request&
   submission->options.origin = caller.origin;
   if (const auto patience = patience_of(*context))
     submission->options.call_deadline = services_.machine.now() + *patience;
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return refuse(context, client, what, ticket.error());
   return submit(context, request.axis(), *std::move(action), *std::move(submission), *std::move(ticket),
                 command);

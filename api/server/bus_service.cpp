@@ -49,7 +49,7 @@ BusServiceImpl::BusServiceImpl(const Services& services) : BoundedService(servic
 
 BusServiceImpl::Reactor* BusServiceImpl::ListBuses(Context* context, const v1::ListBusesRequest*,
                                                    v1::ListBusesResponse* response) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     services_.machine.buses([call, response](std::vector<BusStatus> buses) {
@@ -63,7 +63,7 @@ BusServiceImpl::Reactor* BusServiceImpl::ListBuses(Context* context, const v1::L
 
 BusServiceImpl::Reactor* BusServiceImpl::GetBudget(Context* context, const v1::GetBudgetRequest* request,
                                                    v1::GetBudgetResponse* response) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     services_.machine.budgets([call, response, bus = request->bus()](std::vector<BusBudgetReport> budgets) {
@@ -95,7 +95,7 @@ BusServiceImpl::Reactor* BusServiceImpl::WriteDevice(Context* context, const v1:
     return answer(context, to_status(valid.error()));
   const auto caller = who_asks(*context, *request);
   const auto& client = caller.name;
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     const auto text = fmt::format("{} {} = {}", request->device(), request->register_(), request->value());
@@ -119,7 +119,7 @@ BusServiceImpl::Reactor* BusServiceImpl::transact_object(Context* context, const
   if (!transfer) return answer(context, to_status(transfer.error()));
   const auto caller = who_asks(*context, *request);
   const auto& client = caller.name;
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     auto fill = [response, reads = request->has_read_object(),
@@ -150,7 +150,7 @@ BusServiceImpl::Reactor* BusServiceImpl::Transact(Context* context, const v1::Tr
   if (!transaction) return answer(context, to_status(transaction.error()));
   const auto caller = who_asks(*context, *request);
   const auto& client = caller.name;
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     auto fill = [response](const Words& words) {

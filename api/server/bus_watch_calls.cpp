@@ -20,7 +20,7 @@ BusServiceImpl::Reactor* BusServiceImpl::GetBusStatistics(Context* context,
                                                           const v1::GetBusStatisticsRequest* request,
                                                           v1::GetBusStatisticsResponse* response) {
   using All = std::vector<BusStatistics>;
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     services_.machine.bus_watch().statistics(request->bus(),
@@ -80,7 +80,7 @@ BusServiceImpl::Reactor* BusServiceImpl::ListFlightRecords(Context* context,
                                                            const v1::ListFlightRecordsRequest*,
                                                            v1::ListFlightRecordsResponse* response) {
   using All = std::vector<FlightRecord>;
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     services_.machine.bus_watch().flight_records(reply_with_value<All>(call, [response](const All& all) {
@@ -92,7 +92,7 @@ BusServiceImpl::Reactor* BusServiceImpl::ListFlightRecords(Context* context,
 BusServiceImpl::Reactor* BusServiceImpl::GetFlightRecord(Context* context,
                                                          const v1::GetFlightRecordRequest* request,
                                                          v1::GetFlightRecordResponse* response) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     services_.machine.bus_watch().flight_record(
@@ -105,7 +105,7 @@ BusServiceImpl::Reactor* BusServiceImpl::WriteFlightRecord(Context* context,
                                                            const v1::WriteFlightRecordRequest* request,
                                                            v1::WriteFlightRecordResponse* response) {
   const auto client = client_of(*context);
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), [&](const Call& call) {
     services_.machine.bus_watch().write_flight_record(

@@ -39,7 +39,7 @@ grpc::ServerUnaryReactor* CommandServiceImpl::ListCommands(Context* context,
                                       .message = fmt::format("limit is {}", request->limit()),
                                       .remedy = "ask for fewer; WatchEvents tells of each command",
                                       .permitted = Range{.minimum = 0, .maximum = most_commands}}));
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
@@ -59,7 +59,7 @@ grpc::ServerUnaryReactor* CommandServiceImpl::GetCommand(Context* context,
                                                          v1::GetCommandResponse* response) {
   if (const auto valid = check_command_id(request->id()); !valid)
     return answer(context, to_status(valid.error()));
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   auto* command = response->mutable_command();
   return PendingCall::start(

@@ -50,9 +50,9 @@ DriveServiceImpl::Reactor* DriveServiceImpl::refuse(Context* context, std::strin
   return answer(context, to_status(error));
 }
 
-DriveServiceImpl::Reactor* DriveServiceImpl::begin(Context* context,
+DriveServiceImpl::Reactor* DriveServiceImpl::begin(Context* context, Admission::Kind kind,
                                                    const std::function<void(const Call&)>& ask) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), kind);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket), ask);
 }
@@ -62,7 +62,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::GetDrive(Context* context, const v1
   const auto& axis = request->axis();
   if (auto known = find_axis(services_.machine, axis); !known)
     return answer(context, to_status(known.error()));
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::read, [&](const Call& call) {
     services_.machine.drive_access().drive_info(
         axis, reply_with_value<DriveInfo>(
                   call, [axis, response](const DriveInfo& info) { to_proto(axis, info, *response); }));
@@ -74,7 +74,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::ListParameters(Context* context,
                                                             v1::ListParametersResponse* response) {
   if (auto known = find_axis(services_.machine, request->axis()); !known)
     return answer(context, to_status(known.error()));
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::read, [&](const Call& call) {
     services_.machine.drive_access().drive_info(
         request->axis(),
         reply_with_value<DriveInfo>(call, [response](const DriveInfo& info) { to_proto(info, *response); }));
@@ -88,7 +88,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::ReadParameters(Context* context,
   if (!drive) return answer(context, to_status(drive.error()));
   const auto addresses = parameters_to_read(*request, *drive);
   if (!addresses) return answer(context, to_status(addresses.error()));
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::read, [&](const Call& call) {
     services_.machine.drive_access().read_parameters(
         request->axis(), *addresses,
         reply_with_value<Values>(call, [response, model = drive->model](const Values& values) {
@@ -104,7 +104,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteParameters(Context* context,
   if (!drive) return refuse(context, "write_parameters", drive.error());
   const auto values = parameters_to_write(*request, *drive);
   if (!values) return refuse(context, "write_parameters", values.error());
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::motion, [&](const Call& call) {
     std::string what = entry(client_of(*context), request->axis(), "write_parameters");
     for (const auto& value : request->values()) what += fmt::format(" {}={}", value.name(), value.value());
     services_.machine.drive_access().write_parameters(
@@ -126,7 +126,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::SaveParameters(Context* context,
     return refuse(context, "save_parameters", known.error());
   if (auto confirmed = check_confirmed(axis, request->confirm()); !confirmed)
     return refuse(context, "save_parameters", confirmed.error());
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::motion, [&](const Call& call) {
     services_.machine.drive_access().save_parameters(
         axis, requester(who_asks(*context, *request), *request),
         reply_with_value<void>(call, [] {}, entry(client_of(*context), axis, "save_parameters")));
@@ -141,7 +141,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::RestoreFactory(Context* context,
     return refuse(context, "restore_factory", known.error());
   if (auto confirmed = check_confirmed(axis, request->confirm()); !confirmed)
     return refuse(context, "restore_factory", confirmed.error());
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::motion, [&](const Call& call) {
     services_.machine.drive_access().restore_factory(
         axis, requester(who_asks(*context, *request), *request),
         reply_with_value<std::string>(
@@ -155,7 +155,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::ReadSegments(Context* context,
                                                           v1::ReadSegmentsResponse* response) {
   if (auto known = find_axis(services_.machine, request->axis()); !known)
     return answer(context, to_status(known.error()));
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::read, [&](const Call& call) {
     services_.machine.drive_access().read_segments(
         request->axis(), reply_with_value<SegmentSettings>(call, [response](const SegmentSettings& segments) {
           to_proto(segments, *response->mutable_segments());
@@ -176,7 +176,7 @@ DriveServiceImpl::Reactor* DriveServiceImpl::WriteSegments(Context* context,
                    .remedy = "set it; an empty table clears the drive's"});
   const auto segments = segments_to_write(request->segments(), *drive);
   if (!segments) return refuse(context, "write_segments", segments.error());
-  return begin(context, [&](const Call& call) {
+  return begin(context, Admission::Kind::motion, [&](const Call& call) {
     services_.machine.drive_access().write_segments(
         request->axis(), *segments, requester(who_asks(*context, *request), *request),
         reply_with_value<SegmentSettings>(

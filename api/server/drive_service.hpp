@@ -41,7 +41,8 @@ class DriveServiceImpl final : public BoundedService<v1::DriveService::CallbackS
 
  private:
   /// Counts the call and asks; `ask` must arrange for the call to be completed.
-  Reactor* begin(Context* context, const std::function<void(const std::shared_ptr<PendingCall>&)>& ask);
+  Reactor* begin(Context* context, Admission::Kind kind,
+                 const std::function<void(const std::shared_ptr<PendingCall>&)>& ask);
   Reactor* refuse(Context* context, std::string_view what, const Error& error);
   template <class Response, class Request>
   grpc::ServerWriteReactor<Response>* change_serial(Context* context, const Request& request);

@@ -44,7 +44,7 @@ GroupServiceImpl::Reactor* GroupServiceImpl::MoveGroup(Context* context, const v
   submission->options.origin = caller.origin;
   if (const auto patience = patience_of(*context))
     submission->options.call_deadline = services_.machine.now() + *patience;
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
@@ -60,7 +60,7 @@ GroupServiceImpl::Reactor* GroupServiceImpl::GetGroupMove(Context* context,
                                                           const v1::GetGroupMoveRequest* request,
                                                           v1::GetGroupMoveResponse* response) {
   if (auto valid = check_command_id(request->id()); !valid) return answer(context, to_status(valid.error()));
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {

@@ -81,7 +81,7 @@ LeaseServiceImpl::Reactor* LeaseServiceImpl::AcquireLease(Context* context,
   const auto client = client_of(*context);
   auto wanted = lease_request(*request, client, services_.machine);
   if (!wanted) return answer(context, to_status(wanted.error()));
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
@@ -120,7 +120,7 @@ LeaseServiceImpl::Reactor* LeaseServiceImpl::ReleaseLease(Context* context,
 
 LeaseServiceImpl::Reactor* LeaseServiceImpl::ListLeases(Context* context, const v1::ListLeasesRequest*,
                                                         v1::ListLeasesResponse* response) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket),
                             [&](const std::shared_ptr<PendingCall>& call) {

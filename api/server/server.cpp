@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 #include <grpc/support/log.h>
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
-#include <grpcpp/impl/server_builder_option.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server_posix.h>
 #include <spdlog/spdlog.h>
@@ -23,7 +21,9 @@
 #include "api/server/event_hub.hpp"
 #include "api/server/event_service.hpp"
 #include "api/server/group_service.hpp"
+#include "api/server/health_service.hpp"
 #include "api/server/lease_service.hpp"
+#include "api/server/reflection_service.hpp"
 #include "api/server/status.hpp"
 #include "api/server/system_service.hpp"
 #include "api/server/tls.hpp"
@@ -46,13 +46,9 @@ void limit_transport(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 1000);
-  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 5000);
-  // Only reflection uses gRPC's synchronous threads, one per open call: a handful is enough. Near this much
-  // memory gRPC reads less and takes no new connections; stops have another way.
-  builder.SetResourceQuota(grpc::ResourceQuota("axisd").SetMaxThreads(8).Resize(256U << 20U));
-  builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
-  builder.SetSyncServerOption(grpc::ServerBuilder::MIN_POLLERS, 1);
-  builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 3000);
+  // Near this much memory gRPC reads less and takes no new connections; stops have another way.
+  builder.SetResourceQuota(grpc::ResourceQuota("axisd").Resize(256U << 20U));
 }
 
 /// What gRPC says goes to the daemon's log. Whoever connects can make it complain, without a certificate,
@@ -65,23 +61,6 @@ void log_of_grpc(gpr_log_func_args* args) {
   log_limited(spdlog::level::warn, "gRPC", fmt::format("{}:{}", file.substr(file.rfind('/') + 1), args->line),
               text);
 }
-
-/// gRPC would serve reflection in every server of a process, or in none.
-class ReflectionOption final : public grpc::ServerBuilderOption {
- public:
-  explicit ReflectionOption(bool served) : served_(served) {}
-  void UpdateArguments(grpc::ChannelArguments* /*arguments*/) override {}
-  void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
-    using grpc::reflection::ProtoServerReflectionPlugin;
-    std::erase_if(*plugins, [](const auto& plugin) {
-      return dynamic_cast<const ProtoServerReflectionPlugin*>(plugin.get()) != nullptr;
-    });
-    if (served_) plugins->push_back(std::make_unique<ProtoServerReflectionPlugin>());
-  }
-
- private:
-  bool served_;
-};
 
 }  // namespace
 
@@ -114,7 +93,9 @@ struct Server::Parts {
         event(services),
         lease(services),
         group(services),
-        audit(services) {}
+        audit(services),
+        health(services),
+        reflection(services) {}
 
   std::shared_ptr<ReplyThread> reply;
   std::shared_ptr<OpenCalls> calls;
@@ -133,6 +114,8 @@ struct Server::Parts {
   LeaseServiceImpl lease;
   GroupServiceImpl group;
   AuditServiceImpl audit;
+  HealthService health;
+  ReflectionService reflection;
   /// Of TCP. A unix socket is given to gRPC by its number, which then is the name of the connection.
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
@@ -199,11 +182,18 @@ Result<int> Server::start() {
   }
 
   gpr_set_log_function(log_of_grpc);
-  grpc::EnableDefaultHealthCheckService(true);
+  grpc::EnableDefaultHealthCheckService(false);
   grpc::ServerBuilder builder;
   limit_transport(builder);
-  builder.SetOption(std::make_unique<ReflectionOption>(options_.reflection));
   for (const auto& each : parts_->served()) builder.RegisterService(each.service);
+  parts_->health.serve(services());
+  builder.RegisterService(&parts_->health);
+  if (options_.reflection) {
+    auto told = services();
+    told.emplace_back(HealthService::name);
+    parts_->reflection.serve(std::move(told));
+    builder.RegisterService(&parts_->reflection);
+  }
   constexpr auto from_fd = grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD;
   parts_->acceptor = builder.experimental().AddExternalConnectionAcceptor(from_fd, tcp_credentials);
   parts_->server = builder.BuildAndStart();
@@ -225,9 +215,6 @@ Result<int> Server::start() {
   }
   if (auto accepting = parts_->accept.start(std::move(entries), options_.peers); !accepting)
     return fail(std::move(accepting).error());
-  auto* health = parts_->server->GetHealthCheckService();
-  health->SetServingStatus(true);
-  for (const auto& each : parts_->served()) health->SetServingStatus(each.name, true);
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,
                  options_.tls && !address.starts_with("unix:") ? "mutual TLS" : "plaintext, local");
@@ -236,11 +223,10 @@ Result<int> Server::start() {
 
 void Server::shutdown(Duration deadline) {
   if (!std::exchange(parts_->serving, false)) return;
-  if (auto* health = parts_->server->GetHealthCheckService()) health->Shutdown();
+  parts_->health.end();
   parts_->accept.stop();
   parts_->calls->close_all(shutting_down(), monotonic_now() + deadline);
-  // What is left are watchers of gRPC's own health and reflection services, which never end by themselves:
-  // with the whole deadline, Shutdown() would wait for all of it.
+  // What is left has not been closed in time.
   parts_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(50));
   parts_->reply->stop();
   (void)tell_left_out(TimePoint::max());

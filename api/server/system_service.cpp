@@ -122,7 +122,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::ReleaseStopAll(Context* context,
                                                             const v1::ReleaseStopAllRequest*,
                                                             v1::ReleaseStopAllResponse*) {
   const auto client = client_of(*context);
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
@@ -140,7 +140,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::ReleaseStopAll(Context* context,
 
 grpc::ServerUnaryReactor* SystemServiceImpl::GetState(Context* context, const v1::GetStateRequest*,
                                                       v1::GetStateResponse* response) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(services_, context, *std::move(ticket),
                             [&](const std::shared_ptr<PendingCall>& call) {
@@ -156,7 +156,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetState(Context* context, const v1
 grpc::ServerUnaryReactor* SystemServiceImpl::AcceptState(Context* context, const v1::AcceptStateRequest*,
                                                          v1::AcceptStateResponse* response) {
   const auto client = client_of(*context);
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
@@ -171,7 +171,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::AcceptState(Context* context, const
 grpc::ServerUnaryReactor* SystemServiceImpl::BackUpState(Context* context, const v1::BackUpStateRequest*,
                                                          v1::BackUpStateResponse* response) {
   const auto client = client_of(*context);
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.state_copies == nullptr)
     return answer(context, to_status({.reason = Reason::not_supported,
@@ -196,7 +196,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::Explain(Context* context, const v1:
     return answer(context, to_status(axis.error()));
   auto question = question_of(*request, client, services_.machine);
   if (!question) return answer(context, to_status(question.error()));
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
@@ -214,7 +214,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::Explain(Context* context, const v1:
 
 grpc::ServerUnaryReactor* SystemServiceImpl::GetConfig(Context* context, const v1::GetConfigRequest*,
                                                        v1::GetConfigResponse* response) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
   const auto served = services_.configuration->served();
@@ -232,7 +232,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::GetConfig(Context* context, const v
 grpc::ServerUnaryReactor* SystemServiceImpl::CheckConfig(Context* context,
                                                          const v1::CheckConfigRequest* request,
                                                          v1::CheckConfigResponse* response) {
-  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::call);
+  auto ticket = services_.admission.admit(client_of(*context), Admission::Kind::read);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
   return PendingCall::start(
@@ -251,7 +251,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::ReloadConfig(Context* context,
                                                           const v1::ReloadConfigRequest* request,
                                                           v1::ReloadConfigResponse* response) {
   const auto client = client_of(*context);
-  auto ticket = services_.admission.admit(client, Admission::Kind::call);
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   if (services_.configuration == nullptr) return answer(context, to_status(no_configuration()));
   return PendingCall::start(
@@ -267,7 +267,7 @@ grpc::ServerUnaryReactor* SystemServiceImpl::SetLogLevel(Context* context,
                                                          const v1::SetLogLevelRequest* request,
                                                          v1::SetLogLevelResponse* response) {
   const auto caller = who_asks(*context, *request);
-  auto ticket = services_.admission.admit(caller.name, Admission::Kind::call);
+  auto ticket = services_.admission.admit(caller.name, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));
   const auto before = log_level();
   const auto after = request->level() == v1::LOG_LEVEL_UNSPECIFIED ? before : request->level();

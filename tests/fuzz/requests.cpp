@@ -8,6 +8,7 @@
 #include "api/server/event_validate.hpp"
 #include "api/server/group_convert.hpp"
 #include "api/server/hold_validate.hpp"
+#include "api/server/reflection_service.hpp"
 #include "api/server/validate.hpp"
 #include "tests/fuzz/target.hpp"
 #include "tests/unit/api/fake_machine.hpp"
@@ -99,6 +100,14 @@ void parameters(std::span<const std::uint8_t> bytes) {
   (void)server::serial_change(parsed<v1::SetSerialRequest>(bytes), *drive);
 }
 
+void reflection(std::span<const std::uint8_t> bytes) {
+  server::ReflectionMessage question;
+  if (!question.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
+  const auto answer = server::reflect(question, {"axisd.v1.AxisService"});
+  expect(answer.GetReflection()->GetUnknownFields(answer).field_count() == 2,
+         "there is one answer to one question");
+}
+
 constexpr void (*kinds[])(std::span<const std::uint8_t>) = {
     move_absolute,
     move_relative,
@@ -118,6 +127,7 @@ constexpr void (*kinds[])(std::span<const std::uint8_t>) = {
     watches,
     transact,
     parameters,
+    reflection,
 };
 
 }  // namespace

@@ -117,7 +117,7 @@ void jog(Context context) {
   submission->options.origin = context.caller.origin;
   if (context.call.patience)
     submission->options.call_deadline = context.machine.now() + *context.call.patience;
-  auto ticket = context.admission.admit(client, Admission::Kind::call);
+  auto ticket = context.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return refuse(context.done, ticket.error());
   const auto reply =
       std::make_shared<LaneReply<v1::JogResponse>>(std::move(context.done), *std::move(ticket));

@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "api/server/reflection_service.hpp"
 #include "axisd/v1/bus_service.grpc.pb.h"
 #include "axisd/v1/command_service.grpc.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
@@ -392,6 +393,25 @@ TEST_F(Calls, HealthAndReflectionAreServed) {
             "\x08\x01");
   const auto services = generic_call(channel_, reflection_path, list_services).text;
   for (const auto& name : server_->services()) EXPECT_THAT(services, HasSubstr(name));
+}
+
+/// What a tool asks for until it knows the contract.
+TEST_F(Calls, ReflectionTellsOfTheWholeContract) {
+  serve({.reflection = true});
+  const auto ask = [&](char field, std::string_view text, const std::string& path) {
+    return generic_call(channel_, path, std::string{field, static_cast<char>(text.size())}.append(text)).text;
+  };
+  for (const auto* path : server::ReflectionService::paths) {
+    const auto file = ask('\x22', "axisd.v1.AxisService", path);  // file_containing_symbol
+    EXPECT_THAT(file, HasSubstr("axisd/v1/axis_service.proto"));
+    EXPECT_THAT(file, HasSubstr("MoveAbsoluteRequest"));
+    EXPECT_THAT(ask('\x1a', "axisd/v1/error.proto", path), HasSubstr("ErrorDetail"));  // file_by_filename
+    EXPECT_THAT(ask('\x1a', "nowhere.proto", path), HasSubstr("there is no such file"));
+    EXPECT_THAT(ask('\x22', "axisd.v1.Nobody", path), HasSubstr("there is no such file"));
+    EXPECT_THAT(ask('\x32', "axisd.v1.Axis", path), HasSubstr("not told"));  // all_extension_numbers_of_type
+    EXPECT_THAT(generic_call(channel_, path, "").text, HasSubstr("not told"));
+    EXPECT_THAT(generic_call(channel_, path, list_services).text, HasSubstr("grpc.health.v1.Health"));
+  }
 }
 
 /// Also in a process that has served it already.

@@ -385,17 +385,17 @@ TEST(Validate, WatchedAxesAreInOneOrderAndPeriodIsBounded) {
 
 TEST(Admission, CountsPerClientAndGivesBack) {
   Admission admission({.calls = 1, .streams = 1});
-  auto first = admission.admit("a", Admission::Kind::call);
+  auto first = admission.admit("a", Admission::Kind::motion);
   ASSERT_TRUE(first);
-  const auto second = admission.admit("a", Admission::Kind::call);
+  const auto second = admission.admit("a", Admission::Kind::motion);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().reason, Reason::busy);
-  EXPECT_TRUE(admission.admit("b", Admission::Kind::call));
+  EXPECT_TRUE(admission.admit("b", Admission::Kind::motion));
   EXPECT_TRUE(admission.admit("a", Admission::Kind::stream));
   auto moved = *std::move(first);
   moved.release();
   moved.release();
-  EXPECT_TRUE(admission.admit("a", Admission::Kind::call));
+  EXPECT_TRUE(admission.admit("a", Admission::Kind::motion));
 }
 
 TEST(Peer, IdentityHasNoPort) {
