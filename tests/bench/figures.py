@@ -35,6 +35,12 @@ def cpu_seconds(pid, thread=None):
     return sum(int((task / "schedstat").read_text(encoding="ascii").split()[0]) for task in tasks) / 1e9
 
 
+def cpu_seconds_by_ticks(pid):
+    """The same, of threads that have ended, too; by the kernel's ticks."""
+    words = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def spread(values, digits=0):
     """Minimum, median and maximum of the rounds."""
     return " / ".join(f"{value:.{digits}f}" for value in (min(values), statistics.median(values), max(values)))
@@ -57,6 +63,9 @@ def percentile(values, share):
 
 
 def table(rows):
+    print(table_text(rows))
+
+
+def table_text(rows):
     widths = [max(map(len, column)) for column in zip(*rows)]
-    for row in rows:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
+    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
