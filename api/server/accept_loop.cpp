@@ -1,6 +1,7 @@
 #include "api/server/accept_loop.hpp"
 
 #include <fcntl.h>
+#include <malloc.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -9,10 +10,13 @@
 #include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
+#include <cstdio>
 #include <system_error>
 #include <utility>
 
@@ -24,8 +28,23 @@ namespace {
 
 // Kept free for serial ports that come back, state files and the like.
 constexpr int kept_descriptors = 64;
-/// A flood of requests lasts no longer before it is noticed; that it is looked for costs some microseconds.
-constexpr Duration count_every = heartbeat;
+/// A flood of requests lasts no longer before it is noticed: gRPC takes 100,000 a second, of some 10 KiB
+/// each. That it is looked for costs a microsecond for each connection.
+constexpr Duration count_every = std::chrono::milliseconds(50);
+/// What has come and was not read yet cannot be taken back from gRPC. It is half of the longest message.
+constexpr int receive_buffer = 128 * 1024;
+constexpr Duration memory_every = heartbeat, trim_every = std::chrono::seconds(2);
+constexpr std::size_t worth_trimming = std::size_t{16} * 1024 * 1024;
+
+/// Of this process, bytes; 0: the system does not say.
+std::size_t resident() {
+  const FileDescriptor file(open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
+  std::array<char, 128> text{};
+  if (file.get() < 0 || ::read(file.get(), text.data(), text.size() - 1) <= 0) return 0;
+  unsigned long size = 0, pages = 0;
+  if (std::sscanf(text.data(), "%lu %lu", &size, &pages) != 2) return 0;
+  return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
 
 int descriptor_limit() {
   rlimit limit{};
@@ -45,6 +64,8 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   // The kernel gives out the lowest free number, so the number of a new descriptor tells how many are open.
   first_refused_descriptor_ = std::max(reserve_.get() + 1, descriptor_limit() - kept_descriptors);
   budgets_.emplace(limits);
+  memory_limit_ = limits.memory;
+  resident_when_trimmed_ = resident();
   entries_ = std::move(entries);
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "axisd-accept");
@@ -79,7 +100,8 @@ void AcceptLoop::run() {
       watched.push_back(id);
     }
     progress_.store(monotonic_now(), std::memory_order_relaxed);
-    constexpr auto pause = std::chrono::ceil<std::chrono::milliseconds>(heartbeat);
+    const auto pause =
+        std::chrono::ceil<std::chrono::milliseconds>(connections_.empty() ? heartbeat : count_every);
     if (poll(polled.data(), polled.size(), static_cast<int>(pause.count())) < 0 && errno != EINTR) {
       spdlog::error("accept loop: poll: {}", std::generic_category().message(errno));
       return;
@@ -92,6 +114,7 @@ void AcceptLoop::run() {
     if (const auto now = monotonic_now(); now - counted_ >= count_every) {
       counted_ = now;
       count_traffic(now);
+      look_at_memory(now);
     }
     // The system is short of memory or descriptors: the connection waits in the backlog.
     if (!fine) poll(polled.data(), 1, 100);
@@ -108,15 +131,31 @@ void AcceptLoop::close(PeerBudgets::Id connection) {
 void AcceptLoop::count_traffic(TimePoint now) {
   std::map<PeerBudgets::Id, PeerBudgets::Traffic> traffic;
   for (const auto& [id, connection] : connections_) traffic.emplace(id, traffic_of(connection.get()));
-  for (const auto id : budgets_->count(traffic, now)) {
-    const auto& connection = connections_.at(id);
-    if (std::has_single_bit(++cut_off_))
-      spdlog::warn(
-          "a client at {} sends floods of requests that it wants no answers to: cut off ({} since start)",
-          address_of_peer(connection.get()), cut_off_);
-    ::shutdown(connection.get(), SHUT_RDWR);
-    close(id);
-  }
+  for (const auto id : budgets_->count(traffic, now)) cut_off(id);
+}
+
+void AcceptLoop::cut_off(PeerBudgets::Id id) {
+  const int connection = connections_.at(id).get();
+  if (std::has_single_bit(++cut_off_))
+    spdlog::warn(
+        "a client at {} sends floods of requests that it wants no answers to: cut off ({} since start)",
+        address_of_peer(connection), cut_off_);
+  ::shutdown(connection, SHUT_RDWR);
+  // Else gRPC still reads it.
+  while (recv(connection, nullptr, receive_buffer, MSG_DONTWAIT | MSG_TRUNC) > 0) continue;
+  close(id);
+}
+
+void AcceptLoop::look_at_memory(TimePoint now) {
+  if (now - looked_ < memory_every) return;
+  looked_ = now;
+  const auto bytes = resident();
+  if (bytes > memory_limit_)
+    if (const auto most = budgets_->most_one_sided()) cut_off(*most);
+  if (bytes < resident_when_trimmed_ + worth_trimming || now - trimmed_ < trim_every) return;
+  malloc_trim(0);
+  trimmed_ = now;
+  resident_when_trimmed_ = resident();
 }
 
 bool AcceptLoop::accept_one(const Entry& entry) {
@@ -144,6 +183,7 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   if (entry.socket.unix_path.empty()) {
     const int on = 1;
     setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    setsockopt(connection.get(), SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
   }
   entry.hand_over(std::move(connection));
   return true;

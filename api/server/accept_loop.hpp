@@ -54,6 +54,9 @@ class AcceptLoop {
   void refuse(PeerBudgets::Entry why, const std::string& address);
   /// Cuts off who floods, by what the kernel has counted.
   void count_traffic(TimePoint now);
+  /// Gives back to the system what is free, and cuts off who made it necessary.
+  void look_at_memory(TimePoint now);
+  void cut_off(PeerBudgets::Id id);
   void close(PeerBudgets::Id connection);
 
   std::vector<Entry> entries_;
@@ -62,7 +65,8 @@ class AcceptLoop {
   std::optional<PeerBudgets> budgets_;
   std::map<PeerBudgets::Id, FileDescriptor> connections_;  ///< of each that gRPC has, one of our own
   PeerBudgets::Id last_id_ = 0;
-  TimePoint counted_{};
+  TimePoint counted_{}, looked_{}, trimmed_{};
+  std::size_t memory_limit_ = 0, resident_when_trimmed_ = 0;  ///< bytes
   std::uint64_t cut_off_ = 0, gave_way_ = 0;
   std::atomic<std::uint64_t> refused_{0};
   std::atomic<TimePoint> progress_{monotonic_now()};

@@ -77,6 +77,13 @@ void PeerBudgets::leave(Id id) {
   connections_.erase(connection);
 }
 
+std::optional<PeerBudgets::Id> PeerBudgets::most_one_sided() const {
+  const auto most =
+      std::ranges::max_element(connections_, {}, [](const auto& entry) { return entry.second.one_sided; });
+  if (most == connections_.end() || most->second.one_sided <= limits_.suspect) return std::nullopt;
+  return most->first;
+}
+
 std::vector<PeerBudgets::Id> PeerBudgets::count(const std::map<Id, Traffic>& traffic, TimePoint now) {
   std::map<std::string, std::vector<std::pair<double, Id>>> by_address;
   for (const auto& [id, total] : traffic) {
@@ -90,6 +97,7 @@ std::vector<PeerBudgets::Id> PeerBudgets::count(const std::map<Id, Traffic>& tra
                            limits_.proportion * static_cast<double>(total.sent - before.sent);
     // An answer may come later than its request was counted. What one connection gets excuses no other.
     fill(connection.bucket, one_sided, now);
+    connection.one_sided = std::max(0.0, connection.one_sided + one_sided);
     fill(address.bucket, std::max(0.0, one_sided), now);
     by_address[connection.address].emplace_back(connection.bucket.level, id);
   }

@@ -27,9 +27,12 @@ class PeerBudgets {
     int connections = 256;  ///< in all
     double proportion = 4;
     double rate = 256 * 1024;                 ///< bytes per second
-    double burst = 2 * 1024 * 1024;           ///< bytes: several of the longest messages
+    double burst = 1024 * 1024;               ///< bytes: several of the longest messages
     double longest_penalty = 10;              ///< seconds until a bucket is empty, at most
     Duration idle = std::chrono::seconds(5);  ///< from then on it gives way
+    double suspect = 128 * 1024;              ///< bytes: see most_one_sided()
+    /// Of the process, in bytes: above it the most one-sided connections end.
+    std::size_t memory = std::size_t{192} * 1024 * 1024;
   };
   /// Since the connection began, as the kernel counts it.
   struct Traffic {
@@ -54,6 +57,9 @@ class PeerBudgets {
   void leave(Id id);
   /// Takes over what was counted by now. Those to cut off, which are to leave then.
   [[nodiscard]] std::vector<Id> count(const std::map<Id, Traffic>& traffic, TimePoint now);
+  /// Who has sent most without getting anything for it since it began: streams that never end take memory
+  /// however slowly they are begun. Nothing: nobody has sent more than `suspect`.
+  [[nodiscard]] std::optional<Id> most_one_sided() const;
   [[nodiscard]] std::size_t connections() const { return connections_.size(); }
   /// That are remembered: with connections, or a bucket that is not empty yet.
   [[nodiscard]] std::size_t addresses() const { return addresses_.size(); }
@@ -74,6 +80,7 @@ class PeerBudgets {
     Bucket bucket{};
     TimePoint begun{}, active{};
     bool said_hello = false;
+    double one_sided = 0;  ///< bytes since it began
   };
   [[nodiscard]] int most_of_one() const;
   static void look(Connection& connection, const Traffic& total, TimePoint now);

@@ -159,6 +159,20 @@ TEST_F(PeerBudgetsTest, ManyThatFloodALittleAreCutOffTogether) {
   EXPECT_FALSE(cut.empty());
 }
 
+TEST_F(PeerBudgetsTest, TheMostOneSidedIsKnownHoweverSlowItIs) {
+  for (PeerBudgets::Id id = 1; id <= 3; ++id) ASSERT_EQ(enter(id, "a"), Entry::granted);
+  for (int i = 0; i < 4000; ++i) {
+    now_ += 250ms;
+    traffic_[1].received += 200, traffic_[1].sent += 100;
+    traffic_[2].received += 40;
+    traffic_[3].received += 30;
+    ASSERT_THAT(budgets_.count(traffic_, at(now_)), IsEmpty()) << i;
+  }
+  EXPECT_EQ(budgets_.most_one_sided(), 2);
+  budgets_.leave(2);
+  EXPECT_EQ(budgets_.most_one_sided(), std::nullopt) << "so little is nobody's fault";
+}
+
 TEST_F(PeerBudgetsTest, AnAddressIsForgottenWhenItIsGone) {
   ASSERT_EQ(enter(1, "a"), Entry::granted);
   ASSERT_THAT(run(1, 20'000, 0, 1s), ElementsAre(1));
