@@ -3,13 +3,13 @@
 #include <memory>
 #include <vector>
 
+#include "api/exposition/http_server.hpp"
 #include "api/tls/live.hpp"
 #include "config/configuration.hpp"
 #include "daemon/core/core_loop.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "daemon/core/machine_service.hpp"
 #include "daemon/core/meter.hpp"
-#include "daemon/metrics/http_server.hpp"
 #include "daemon/metrics/metrics.hpp"
 #include "daemon/store/kept_state.hpp"
 

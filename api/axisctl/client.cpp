@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "api/axisctl/address.hpp"
+#include "api/transport/channel.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -45,25 +46,6 @@ std::shared_ptr<grpc::ChannelCredentials> credentials(const Connection& connecti
     options.pem_private_key = read_pem(connection.tls_key, "--tls-key");
   }
   return grpc::SslCredentials(options);
-}
-
-grpc::ChannelArguments arguments() {
-  grpc::ChannelArguments arguments;
-  // The daemon permits one ping per second; faster ones are answered with GOAWAY.
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 2000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 1000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // A machine is on the local network; an http_proxy of the environment must not redirect its commands.
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  // A call that failed is reported, never sent again behind the user's back: only stops are (repetition.hpp).
-  arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
-  // A daemon that is being restarted is found again soon; gRPC's own pauses grow to two minutes.
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
-  // Without this, two channel objects of one process share one connection.
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return arguments;
 }
 
 using Metadata = std::multimap<std::string, std::string>;
@@ -105,11 +87,11 @@ Metadata metadata_for(const std::string& person) {
 std::shared_ptr<grpc::Channel> channel_to(const std::string& address,
                                           const std::shared_ptr<grpc::ChannelCredentials>& trusted,
                                           const std::string& person) {
-  if (person.empty()) return grpc::CreateCustomChannel(address, trusted, arguments());
+  if (person.empty()) return grpc::CreateCustomChannel(address, trusted, transport::client_arguments());
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> speakers;
   speakers.push_back(std::make_unique<Speakers>(metadata_for(person)));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, trusted, arguments(),
-                                                                 std::move(speakers));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(
+      address, trusted, transport::client_arguments(), std::move(speakers));
 }
 
 }  // namespace

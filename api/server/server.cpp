@@ -4,7 +4,6 @@
 #include <grpc/support/log.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
-#include <grpcpp/resource_quota.h>
 #include <grpcpp/server_posix.h>
 #include <spdlog/spdlog.h>
 
@@ -12,7 +11,6 @@
 #include <array>
 #include <utility>
 
-#include "api/server/accept_loop.hpp"
 #include "api/server/audit_service.hpp"
 #include "api/server/axis_service.hpp"
 #include "api/server/bus_service.hpp"
@@ -26,30 +24,14 @@
 #include "api/server/reflection_service.hpp"
 #include "api/server/status.hpp"
 #include "api/server/system_service.hpp"
-#include "api/server/tls.hpp"
 #include "api/server/watch_hub.hpp"
+#include "api/transport/accept_loop.hpp"
+#include "api/transport/server_credentials.hpp"
+#include "api/transport/server_limits.hpp"
 #include "buses/limited_log.hpp"
 
 namespace axisd::server {
 namespace {
-
-void limit_transport(grpc::ServerBuilder& builder) {
-  builder.SetMaxReceiveMessageSize(256 * 1024);
-  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 8 * 1024);
-  // Far above what Admission lets one client open: its streams must never keep its Stop waiting.
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 2048);
-  // A vanished client is noticed within 12 s instead of minutes. Not sooner: a gRPC client without calls
-  // looks at its connection every 5 s only. With less patience, the Stop of a client that was idle met a
-  // connection that was cut off, and failed.
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 2000);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 1000);
-  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 3000);
-  // Near this much memory gRPC reads less and takes no new connections; stops have another way.
-  builder.SetResourceQuota(grpc::ResourceQuota("axisd").Resize(256U << 20U));
-}
 
 /// What gRPC says goes to the daemon's log. Whoever connects can make it complain, without a certificate,
 /// too: each place in its sources is an origin of its own.
@@ -119,7 +101,7 @@ struct Server::Parts {
   /// Of TCP. A unix socket is given to gRPC by its number, which then is the name of the connection.
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
-  AcceptLoop accept;
+  transport::AcceptLoop accept;
   bool serving = false;
 
   struct Served {
@@ -143,7 +125,7 @@ struct Server::Parts {
     callers.enter(connection.get());
     grpc::AddInsecureChannelFromFd(server.get(), connection.release());
   }
-  AcceptLoop::HandOver way_in(const ListeningSocket& socket) {
+  transport::AcceptLoop::HandOver way_in(const transport::ListeningSocket& socket) {
     if (!socket.unix_path.empty())
       return [this](FileDescriptor connection) { take_local(std::move(connection)); };
     return [this, listener = socket.fd.get()](FileDescriptor connection) {
@@ -171,12 +153,12 @@ Server::~Server() { shutdown(); }
 Result<int> Server::start() {
   std::shared_ptr<grpc::ServerCredentials> tcp_credentials = grpc::InsecureServerCredentials();
   if (options_.tls) {
-    tcp_credentials = tls_credentials(options_.tls);
+    tcp_credentials = transport::tls_credentials(options_.tls);
     parts_->callers.trust(options_.tls);
   }
-  std::vector<ListeningSocket> sockets;
+  std::vector<transport::ListeningSocket> sockets;
   for (const auto& address : options_.listen) {
-    auto opened = listen_on(address, options_.tls != nullptr);
+    auto opened = transport::listen_on(address, options_.tls != nullptr);
     if (!opened) return fail(std::move(opened).error());
     std::ranges::move(*opened, std::back_inserter(sockets));
   }
@@ -184,7 +166,7 @@ Result<int> Server::start() {
   gpr_set_log_function(log_of_grpc);
   grpc::EnableDefaultHealthCheckService(false);
   grpc::ServerBuilder builder;
-  limit_transport(builder);
+  transport::limit(builder, "axisd");
   for (const auto& each : parts_->served()) builder.RegisterService(each.service);
   parts_->health.serve(services());
   builder.RegisterService(&parts_->health);
@@ -207,7 +189,7 @@ Result<int> Server::start() {
   });
 
   int port = 0;
-  std::vector<AcceptLoop::Entry> entries;
+  std::vector<transport::AcceptLoop::Entry> entries;
   for (auto& socket : sockets) {
     if (port == 0) port = socket.port;
     entries.push_back({.socket = std::move(socket), .hand_over = {}});
@@ -234,7 +216,7 @@ void Server::shutdown(Duration deadline) {
 }
 
 FileDescriptor Server::connect_inside() {
-  auto [ours, theirs] = connected_pair();
+  auto [ours, theirs] = transport::connected_pair();
   if (ours.get() < 0) return {};
   parts_->take_local(std::move(theirs));
   return std::move(ours);

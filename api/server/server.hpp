@@ -9,8 +9,8 @@
 #include "api/server/access.hpp"
 #include "api/server/admission.hpp"
 #include "api/server/knock.hpp"
-#include "api/server/peer_budgets.hpp"
 #include "api/tls/live.hpp"
+#include "api/transport/peer_budgets.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
 #include "devices/audit.hpp"
@@ -28,7 +28,7 @@ struct ServerOptions {
   /// gRPC's reflection; without it its clients get UNIMPLEMENTED.
   bool reflection = false;
   Admission::Limits limits{};
-  PeerBudgets::Limits peers{};
+  transport::PeerBudgets::Limits peers{};
   /// A stream whose reader has not read for so long is cancelled.
   Duration stalled_reader_limit = std::chrono::seconds(2);
   /// Who may do what. nullptr: everybody everything.

@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 #include <openssl/err.h>
-#include <openssl/sha.h>
 #include <openssl/x509.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 
+#include "api/tls/digest.hpp"
 #include "api/tls/pem.hpp"
 
 namespace axisd::tls {
@@ -55,15 +54,6 @@ std::string text_of(const Authority& authority) {
   return authority.shares_its_name ? '\0' + authority.name + authority.key : authority.name;
 }
 
-/// 16 digits of a SHA-256: nobody finds another text with the same ones.
-std::string hash_of(std::string_view text) {
-  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
-  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest.data());
-  std::string digits;
-  for (std::size_t i = 0; i < 8; ++i) digits += fmt::format("{:02x}", digest.at(i));
-  return digits;
-}
-
 /// Can stand for its client as it is: nothing else that is named here or by the server looks like it.
 bool is_plain(std::string_view name) {
   const bool printable = std::ranges::all_of(name, [](char c) { return c >= ' ' && c < '~'; });
@@ -94,18 +84,18 @@ Identities::Identities(const std::string& client_ca) {
 
 std::string Identities::of(const std::string& pem) const {
   const auto all = certificates("the client's certificate", pem);
-  if (!all) return "unnamed:" + hash_of(pem);
+  if (!all) return "unnamed:" + digest_of(pem);
   auto* certificate = all->front().get();
   auto name = common_name(certificate);
   if (const auto others = alternatives_of(certificate); name.empty() && !others.empty())
     name = others.front();
   ERR_clear_error();
-  if (name.empty()) return "unnamed:" + hash_of(encoded(certificate, i2d_X509));
+  if (name.empty()) return "unnamed:" + digest_of(encoded(certificate, i2d_X509));
   const auto issuer = text_of(issuer_of_first(*all, authorities_));
   const bool first = !authorities_.empty() && issuer == text_of(authorities_.front());
   if (first && is_plain(name)) return name;
   // What stands for the issuer says how long it is: no two pairs make the same text.
-  return fmt::format("{}~{}", beginning_of(name), hash_of(issuer + name));
+  return fmt::format("{}~{}", beginning_of(name), digest_of(issuer + name));
 }
 
 }  // namespace axisd::tls

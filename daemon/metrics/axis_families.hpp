@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "api/exposition/exposition.hpp"
 #include "daemon/core/meter.hpp"
-#include "daemon/metrics/exposition.hpp"
 #include "devices/bus_access.hpp"
 
 namespace axisd::metrics {

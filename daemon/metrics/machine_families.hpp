@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "api/exposition/exposition.hpp"
 #include "daemon/core/meter.hpp"
-#include "daemon/metrics/exposition.hpp"
 #include "devices/budget.hpp"
 
 namespace axisd::metrics {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "api/exposition/exposition.hpp"
 #include "daemon/core/meter.hpp"
-#include "daemon/metrics/exposition.hpp"
 #include "devices/budget.hpp"
 #include "devices/machine.hpp"
 

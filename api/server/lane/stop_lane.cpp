@@ -20,11 +20,11 @@
 
 #include "api/server/lane/connection.hpp"
 #include "api/server/lane/stop_calls.hpp"
-#include "api/server/listen.hpp"
 #include "api/server/local_peer.hpp"
 #include "api/server/peer.hpp"
-#include "api/server/peer_socket.hpp"
 #include "api/server/status.hpp"
+#include "api/transport/listen.hpp"
+#include "api/transport/peer_socket.hpp"
 #include "buses/heartbeat.hpp"
 
 namespace axisd::server {
@@ -77,7 +77,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
     if (wake_.get() < 0) throw std::bad_alloc();
   }
 
-  void open(std::vector<ListeningSocket> sockets) { sockets_ = std::move(sockets); }
+  void open(std::vector<transport::ListeningSocket> sockets) { sockets_ = std::move(sockets); }
 
   void run();
   void stop() {
@@ -115,7 +115,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   bool serve_once();
   [[nodiscard]] bool is_crowded(const Client& client) const;
   void serve_in_turn(std::vector<Id> ids);
-  void accept_from(const ListeningSocket& socket);
+  void accept_from(const transport::ListeningSocket& socket);
   void let_in_from_inside();
   void enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& address);
   void serve(Id id);
@@ -130,7 +130,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   Machine* machine_;
   StopCalls calls_;
   Places places_;
-  std::vector<ListeningSocket> sockets_;
+  std::vector<transport::ListeningSocket> sockets_;
   const std::shared_ptr<const tls::Live> tls_;  ///< nullptr: there is none
   std::map<Id, Client> clients_;
   Id last_ = 0;
@@ -219,7 +219,7 @@ void StopLane::Loop::serve_in_turn(std::vector<Id> ids) {
   for (const auto id : ids) serve(id);
 }
 
-void StopLane::Loop::accept_from(const ListeningSocket& socket) {
+void StopLane::Loop::accept_from(const transport::ListeningSocket& socket) {
   for (int i = 0; i < most_accepted; ++i) {
     sockaddr_storage address{};
     socklen_t size = sizeof address;
@@ -261,7 +261,7 @@ void StopLane::Loop::let_in_from_inside() {
 void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& address) {
   const auto id = ++last_;
   const auto now = monotonic_now();
-  auto network = address_of_peer(socket.get());
+  auto network = transport::address_of_peer(socket.get());
   auto acceptor = peer ? nullptr : tls_->served()->acceptor;
   auto& client = clients_[id];
   client.host = peer_host(address);
@@ -367,7 +367,7 @@ StopLane::StopLane(Machine& machine, StopLaneOptions options)
 StopLane::~StopLane() { stop(); }
 
 Result<int> StopLane::listen() {
-  auto sockets = listen_on(options_.listen, options_.tls != nullptr);
+  auto sockets = transport::listen_on(options_.listen, options_.tls != nullptr);
   if (!sockets) return fail(std::move(sockets).error());
   const int port = sockets->front().port;
   loop_ = std::make_shared<Loop>(machine_, options_);
@@ -388,7 +388,7 @@ void StopLane::stop() {
 }
 
 FileDescriptor StopLane::connect_inside() {
-  auto [ours, theirs] = connected_pair();
+  auto [ours, theirs] = transport::connected_pair();
   if (ours.get() >= 0) loop_->join(std::move(theirs));
   return std::move(ours);
 }

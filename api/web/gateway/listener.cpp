@@ -9,6 +9,7 @@
 #include <boost/system/errc.hpp>
 #include <utility>
 
+#include "api/transport/address.hpp"
 #include "api/web/gateway/connection.hpp"
 #include "api/web/gateway/transport.hpp"
 
@@ -79,7 +80,7 @@ Result<std::unique_ptr<Listener>> Listener::open(Gateway& gateway, std::unique_p
 }
 
 Result<void> Listener::listen() {
-  const auto address = host_and_port(gateway_.settings.listen);
+  const auto address = transport::host_and_port(gateway_.settings.listen);
   if (!address) return fail(Reason::invalid_argument, "no address to listen on", "write listen: HOST:PORT");
   Error_code error;
   const auto found =

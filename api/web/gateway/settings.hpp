@@ -56,17 +56,6 @@ struct LoadedSettings {
 [[nodiscard]] LoadedSettings load_settings(const std::string& path);
 [[nodiscard]] LoadedSettings read_settings(std::string_view text, const std::string& file_name);
 
-/// Host and port of "localhost:7480" or "[::1]:7480". Nothing: it is neither.
-struct HostAndPort {
-  std::string host, port;
-};
-[[nodiscard]] std::optional<HostAndPort> host_and_port(std::string_view address);
-/// Whether only this computer reaches it.
-[[nodiscard]] bool is_loopback(const HostAndPort& address);
-/// Where a daemon takes stops, unless its configuration says otherwise (stop_service.proto); empty: `server`
-/// is no address with a port.
-[[nodiscard]] std::string stop_lane_next_to(const std::string& server);
-
 /// Keys of the file, as "limits.body": for the test that each has an effect.
 [[nodiscard]] std::vector<std::string_view> setting_keys();
 

@@ -4,51 +4,13 @@
 #include <grpcpp/create_channel.h>
 
 #include <boost/asio/post.hpp>
-#include <fstream>
-#include <iterator>
 #include <utility>
+
+#include "api/transport/address.hpp"
+#include "api/transport/channel.hpp"
 
 namespace axisd::web {
 namespace {
-
-Result<std::string> read_pem(const std::string& path) {
-  if (path.empty()) return std::string();
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file || text.empty())
-    return fail(Reason::invalid_argument, fmt::format("{}: cannot be read", path), "check axisd.tls");
-  return text;
-}
-
-Result<std::shared_ptr<grpc::ChannelCredentials>> credentials(const DaemonSettings& settings) {
-  if (settings.ca.empty()) return grpc::InsecureChannelCredentials();
-  grpc::SslCredentialsOptions options;
-  for (const auto& [path, text] : {std::pair(&settings.ca, &options.pem_root_certs),
-                                   std::pair(&settings.certificate, &options.pem_cert_chain),
-                                   std::pair(&settings.key, &options.pem_private_key)}) {
-    auto read = read_pem(*path);
-    if (!read) return fail(std::move(read).error());
-    *text = *std::move(read);
-  }
-  return grpc::SslCredentials(options);
-}
-
-grpc::ChannelArguments arguments() {
-  grpc::ChannelArguments arguments;
-  // The daemon permits one ping per second; faster ones are answered with GOAWAY.
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 2000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 1000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // An http_proxy of the environment must not redirect commands to a machine.
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  // A call that failed is reported, never sent again behind somebody's back: only stops are.
-  arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return arguments;
-}
 
 std::vector<std::pair<std::string, std::string>> metadata_of(const Person& person) {
   if (person.how == How::loopback) return {};
@@ -64,7 +26,8 @@ bool is_for_another(const CallStatus& status) {
 
 Result<std::unique_ptr<Upstream>> Upstream::make(boost::asio::any_io_executor executor, const Clock& clock,
                                                  const DaemonSettings& settings) {
-  auto trusted = credentials(settings);
+  auto trusted = transport::client_credentials(
+      {.ca = settings.ca, .certificate = settings.certificate, .key = settings.key}, "axisd.tls");
   if (!trusted) return fail(std::move(trusted).error());
   return std::unique_ptr<Upstream>(new Upstream(std::move(executor), clock, settings, *trusted));
 }
@@ -72,9 +35,9 @@ Result<std::unique_ptr<Upstream>> Upstream::make(boost::asio::any_io_executor ex
 Upstream::Upstream(boost::asio::any_io_executor executor, const Clock& clock, const DaemonSettings& settings,
                    const std::shared_ptr<grpc::ChannelCredentials>& trusted)
     : executor_(std::move(executor)), clock_(clock), settings_(settings) {
-  if (settings_.stop_server.empty()) settings_.stop_server = stop_lane_next_to(settings_.server);
+  if (settings_.stop_server.empty()) settings_.stop_server = transport::stop_lane_next_to(settings_.server);
   const auto connect = [&](Link& link, const std::string& address) {
-    link.channel = grpc::CreateCustomChannel(address, trusted, arguments());
+    link.channel = grpc::CreateCustomChannel(address, trusted, transport::client_arguments());
     link.stub = std::make_unique<grpc::GenericStub>(link.channel);
   };
   connect(main_, settings_.server);

@@ -95,7 +95,7 @@ TEST_F(Identity, LooksLikeNobodyElses) {
 }
 
 TEST(LocalPeer, IsTheUserAndTheProgram) {
-  const auto peer = server::local_peer(server::connected_pair().first.get());
+  const auto peer = server::local_peer(transport::connected_pair().first.get());
   EXPECT_THAT(peer.name, MatchesRegex("unix:[A-Za-z0-9._+-]+"));
   EXPECT_THAT(peer.program, MatchesRegex("[A-Za-z0-9._+-]+"));
 }

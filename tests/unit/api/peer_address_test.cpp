@@ -3,12 +3,12 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 
-#include "api/server/peer_socket.hpp"
+#include "api/transport/peer_socket.hpp"
 
 namespace axisd::testing {
 namespace {
 
-using server::counted_address;
+using transport::counted_address;
 
 std::string of_ipv4(const char* text) {
   sockaddr_storage peer{};

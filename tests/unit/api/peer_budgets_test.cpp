@@ -1,5 +1,5 @@
 // What clients of one address may take of the main address.
-#include "api/server/peer_budgets.hpp"
+#include "api/transport/peer_budgets.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,9 +11,9 @@ namespace axisd::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using server::PeerBudgets;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using transport::PeerBudgets;
 using Entry = PeerBudgets::Entry;
 
 class PeerBudgetsTest : public ::testing::Test {

@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "api/server/listen.hpp"
 #include "api/server/local_peer.hpp"
 #include "api/server/server.hpp"
+#include "api/transport/listen.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/error.pb.h"
 #include "tests/unit/api/fake_machine.hpp"
@@ -44,7 +44,7 @@ class TemporaryDirectory {
 
 /// Who a client in this process is, on a unix socket.
 inline const std::string& own_name() {
-  static const auto name = server::local_peer(server::connected_pair().first.get()).name;
+  static const auto name = server::local_peer(transport::connected_pair().first.get()).name;
   return name;
 }
 

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "api/transport/address.hpp"
+
 namespace axisd::web {
 namespace {
 
@@ -86,11 +88,11 @@ TEST(Settings, ServeOthersOnlyWithTls) {
 }
 
 TEST(Settings, FindTheStopLane) {
-  EXPECT_EQ(stop_lane_next_to("localhost:7443"), "localhost:7444");
-  EXPECT_EQ(stop_lane_next_to("[::1]:7443"), "[::1]:7444");
-  EXPECT_EQ(stop_lane_next_to("unix:/run/axisd.sock"), "unix:/run/axisd.sock.stop");
-  EXPECT_EQ(stop_lane_next_to("localhost:65535"), "");
-  EXPECT_EQ(stop_lane_next_to("localhost"), "");
+  EXPECT_EQ(transport::stop_lane_next_to("localhost:7443"), "localhost:7444");
+  EXPECT_EQ(transport::stop_lane_next_to("[::1]:7443"), "[::1]:7444");
+  EXPECT_EQ(transport::stop_lane_next_to("unix:/run/axisd.sock"), "unix:/run/axisd.sock.stop");
+  EXPECT_EQ(transport::stop_lane_next_to("localhost:65535"), "");
+  EXPECT_EQ(transport::stop_lane_next_to("localhost"), "");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "daemon/metrics/exposition.hpp"
+#include "api/exposition/exposition.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // The page's server, over loopback.
-#include "daemon/metrics/http_server.hpp"
+#include "api/exposition/http_server.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-#include "daemon/metrics/http_server.hpp"
+#include "api/exposition/http_server.hpp"
 
 #include <pthread.h>
 #include <spdlog/spdlog.h>
@@ -96,7 +96,7 @@ class HttpServer::Session : public std::enable_shared_from_this<Session> {
 
 Result<std::unique_ptr<HttpServer>> HttpServer::open(const std::string& listen, bool remote, Page page,
                                                      Limits limits) {
-  auto sockets = server::listen_on(listen, remote);
+  auto sockets = transport::listen_on(listen, remote);
   if (!sockets) {
     auto error = std::move(sockets).error();
     error.remedy = "check server.metrics.listen, and that nothing else listens there";
@@ -105,7 +105,7 @@ Result<std::unique_ptr<HttpServer>> HttpServer::open(const std::string& listen, 
   return std::unique_ptr<HttpServer>(new HttpServer(*std::move(sockets), std::move(page), limits));
 }
 
-HttpServer::HttpServer(std::vector<server::ListeningSocket> sockets, Page page, Limits limits)
+HttpServer::HttpServer(std::vector<transport::ListeningSocket> sockets, Page page, Limits limits)
     : page_(std::move(page)), limits_(limits), port_(sockets.front().port) {
   for (auto& socket : sockets) {
     listeners_.push_back(std::make_unique<Listener>(

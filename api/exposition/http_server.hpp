@@ -8,10 +8,10 @@
 #include <thread>
 #include <vector>
 
-#include "api/server/listen.hpp"
+#include "api/exposition/exposition.hpp"
+#include "api/transport/listen.hpp"
 #include "buses/asio_clock.hpp"
 #include "buses/error.hpp"
-#include "daemon/metrics/exposition.hpp"
 
 namespace axisd::metrics {
 
@@ -30,7 +30,7 @@ class HttpServer {
   };
 
   /// Listens on "HOST:PORT"; without `remote` on loopback addresses only. Errors: those of
-  /// server::listen_on().
+  /// transport::listen_on().
   static Result<std::unique_ptr<HttpServer>> open(const std::string& listen, bool remote, Page page,
                                                   Limits limits);
   /// Cuts all connections.
@@ -45,7 +45,7 @@ class HttpServer {
     boost::asio::posix::stream_descriptor socket;
     Clock::Timer pause{};
   };
-  HttpServer(std::vector<server::ListeningSocket> sockets, Page page, Limits limits);
+  HttpServer(std::vector<transport::ListeningSocket> sockets, Page page, Limits limits);
   void wait(Listener& listener);
   void let_in(Listener& listener);
   void run();

@@ -1,4 +1,4 @@
-#include "api/server/tls.hpp"
+#include "api/transport/server_credentials.hpp"
 
 #include <grpc/grpc.h>
 #include <grpc/grpc_security.h>
@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace axisd::server {
+namespace axisd::transport {
 namespace {
 
 /// Of one port only: what was handed over is remembered here, and a second port would be told that nothing is
@@ -58,4 +58,4 @@ std::shared_ptr<grpc::ServerCredentials> tls_credentials(std::shared_ptr<const t
   return std::make_shared<LiveCredentials>(std::move(live));
 }
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

@@ -1,5 +1,5 @@
 // https://prometheus.io/docs/instrumenting/exposition_formats/ and the OpenMetrics specification 1.0.0.
-#include "daemon/metrics/exposition.hpp"
+#include "api/exposition/exposition.hpp"
 
 #include <fmt/format.h>
 

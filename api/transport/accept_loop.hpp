@@ -9,10 +9,10 @@
 #include <thread>
 #include <vector>
 
-#include "api/server/listen.hpp"
-#include "api/server/peer_budgets.hpp"
+#include "api/transport/listen.hpp"
+#include "api/transport/peer_budgets.hpp"
 
-namespace axisd::server {
+namespace axisd::transport {
 
 /// Accepts connections and hands them to gRPC. gRPC 1.51's own listener never accepts again after one EMFILE
 /// (CVE-2023-4785); this one keeps a descriptor in reserve, turns the surplus connection away and goes on.
@@ -74,4 +74,4 @@ class AcceptLoop {
   std::thread thread_;
 };
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

@@ -11,7 +11,7 @@
 
 #include "buses/clock.hpp"
 
-namespace axisd::server {
+namespace axisd::transport {
 
 /// Places: an address has three quarters of them at most. Where it has them all, or nobody has one left, a
 /// new connection gets the place of one that has not said hello yet, else of one on which nothing has gone on
@@ -93,4 +93,4 @@ class PeerBudgets {
   std::map<std::string, Address> addresses_;
 };
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

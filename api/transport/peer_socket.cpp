@@ -1,4 +1,4 @@
-#include "api/server/peer_socket.hpp"
+#include "api/transport/peer_socket.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -10,7 +10,7 @@
 #include <array>
 #include <cstdint>
 
-namespace axisd::server {
+namespace axisd::transport {
 
 std::string counted_address(const sockaddr_storage& peer) {
   constexpr std::uint8_t loopback = 127;  // the first byte of 16 million addresses
@@ -47,4 +47,4 @@ PeerBudgets::Traffic traffic_of(int connection) {
   return {.received = info.tcpi_bytes_received, .sent = info.tcpi_bytes_sent};
 }
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

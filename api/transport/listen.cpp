@@ -1,4 +1,4 @@
-#include "api/server/listen.hpp"
+#include "api/transport/listen.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -17,7 +17,7 @@
 
 #include "buses/port_number.hpp"
 
-namespace axisd::server {
+namespace axisd::transport {
 namespace {
 
 /// As many as the system allows: a unix socket whose backlog is full refuses at once.
@@ -178,4 +178,4 @@ std::pair<FileDescriptor, FileDescriptor> connected_pair() {
   return {FileDescriptor(ends[0]), FileDescriptor(ends[1])};
 }
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

@@ -1,4 +1,4 @@
-#include "api/server/accept_loop.hpp"
+#include "api/transport/accept_loop.hpp"
 
 #include <fcntl.h>
 #include <malloc.h>
@@ -20,10 +20,10 @@
 #include <system_error>
 #include <utility>
 
-#include "api/server/peer_socket.hpp"
+#include "api/transport/peer_socket.hpp"
 #include "buses/heartbeat.hpp"
 
-namespace axisd::server {
+namespace axisd::transport {
 namespace {
 
 // Kept free for serial ports that come back, state files and the like.
@@ -231,4 +231,4 @@ bool AcceptLoop::turn_away(const Entry& entry) {
   return true;
 }
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

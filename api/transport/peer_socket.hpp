@@ -5,9 +5,9 @@
 
 #include <string>
 
-#include "api/server/peer_budgets.hpp"
+#include "api/transport/peer_budgets.hpp"
 
-namespace axisd::server {
+namespace axisd::transport {
 
 /// The address by which a peer is counted: an IPv4 address, the first 64 bit of an IPv6 address, "localhost"
 /// for all by which a computer reaches itself, or the user at the other end of a unix socket.
@@ -17,4 +17,4 @@ namespace axisd::server {
 /// What the kernel has counted on it; nothing for unix sockets.
 [[nodiscard]] PeerBudgets::Traffic traffic_of(int connection);
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

@@ -1,9 +1,9 @@
-#include "api/server/peer_budgets.hpp"
+#include "api/transport/peer_budgets.hpp"
 
 #include <algorithm>
 #include <utility>
 
-namespace axisd::server {
+namespace axisd::transport {
 
 double PeerBudgets::level_of(const Bucket& bucket, TimePoint now) const {
   const auto seconds = std::chrono::duration<double>(now - bucket.since).count();
@@ -116,4 +116,4 @@ std::vector<PeerBudgets::Id> PeerBudgets::count(const std::map<Id, Traffic>& tra
   return cut;
 }
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

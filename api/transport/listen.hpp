@@ -10,7 +10,7 @@
 #include "buses/error.hpp"
 #include "buses/file_descriptor.hpp"
 
-namespace axisd::server {
+namespace axisd::transport {
 
 /// One listening socket. A unix socket's file is removed with it.
 struct ListeningSocket {
@@ -34,4 +34,4 @@ struct ListeningSocket {
 /// Two ends of one connection within the daemon; both closed: out of descriptors. Non-blocking.
 [[nodiscard]] std::pair<FileDescriptor, FileDescriptor> connected_pair();
 
-}  // namespace axisd::server
+}  // namespace axisd::transport
