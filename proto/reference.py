@@ -1,8 +1,9 @@
 """Writes the reference documentation of the API: one HTML page with everything that proto/ says, from its comments.
 
-    reference.py DESCRIPTORS PAGE [--check]
+    reference.py DESCRIPTORS PAGE [--package axisd.cell.v1] [--check]
 
 DESCRIPTORS: protoc --include_source_info --include_imports --descriptor_set_out=DESCRIPTORS axisd/v1/*.proto
+--package: what the page is about; else axisd.v1. Types of other packages are named without a link.
 --check: an error if anything is not described, a field of a request has no bound (bounds.proto), or a call no role
 (access.proto). What speaks for itself needs no comment: a request or response (its RPC says it), the zero of an enum, a field whose type is one of ours
 (that is described), and the names in OBVIOUS.
@@ -36,7 +37,15 @@ OBVIOUS = {
 UNSPECIFIED = "Not said."
 SCALARS = {number: name.removeprefix("TYPE_").lower()
            for name, number in descriptor_pb2.FieldDescriptorProto.Type.items()}
-PACKAGE = ".axisd.v1."
+#: Package -> what its page begins with.
+INTRODUCTIONS = {
+    "axisd.v1": """The API of axisd, generated from the comments of <code>proto/axisd/v1</code>. Values are in the unit of their axis,
+velocities per second. The gRPC status speaks of the call; what became of a motion is in <a href="#Command">Command</a>.
+Errors carry an <a href="#ErrorDetail">ErrorDetail</a> in the trailer <code>grpc-status-details-bin</code>, with what to do.""",
+    "axisd.cell.v1": """The API of a cell, generated from the comments of <code>proto/axisd/cell/v1</code>: what an entrance
+serves itself. Everything else it passes on to a machine, whose API is <a href="api.html">axisd.v1</a>.""",
+}
+PACKAGE = ".axisd.v1."  # of the page
 
 # Numbers of fields in descriptor.proto, of which the paths of comments are made.
 FILE_MESSAGE, FILE_ENUM, FILE_SERVICE = 4, 5, 6
@@ -185,11 +194,11 @@ class Options:
 
 
 def read(descriptors):
-    """The files of axisd.v1, in the order of their names."""
+    """The files of the package, in the order of their names."""
     files = descriptor_pb2.FileDescriptorSet.FromString(descriptors).file
     options = Options(files)
     return [Reader(file, options).file for file in sorted(files, key=lambda file: file.name)
-            if file.package == "axisd.v1"]
+            if f".{file.package}." == PACKAGE]
 
 
 def exchanged(name):
@@ -365,7 +374,7 @@ class Page:
 
 TEMPLATE = """<!DOCTYPE html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>axisd.v1</title>
+<title>{package}</title>
 <style>
 :root {{ color-scheme: light dark; --line: #8884; --dim: #888; }}
 body {{ margin: 0; font: 15px/1.5 system-ui, sans-serif; display: grid; grid-template-columns: 17em minmax(0, 60em); }}
@@ -387,10 +396,8 @@ td {{ border-top: 1px solid var(--line); padding: 0.25em 0.8em 0.25em 0; vertica
 @media (max-width: 50em) {{ body {{ display: block; }} nav {{ display: none; }} main {{ padding: 0 1em; }} }}
 </style>
 <nav>{navigation}</nav>
-<main><h1>axisd.v1</h1>
-<p>The API of axisd, generated from the comments of <code>proto/axisd/v1</code>. Values are in the unit of their axis,
-velocities per second. The gRPC status speaks of the call; what became of a motion is in <a href="#Command">Command</a>.
-Errors carry an <a href="#ErrorDetail">ErrorDetail</a> in the trailer <code>grpc-status-details-bin</code>, with what to do.
+<main><h1>{package}</h1>
+<p>{introduction}
 {body}</main></html>
 """
 
@@ -398,15 +405,20 @@ Errors carry an <a href="#ErrorDetail">ErrorDetail</a> in the trailer <code>grpc
 def page(files):
     """The whole page."""
     one = Page(files)
-    return TEMPLATE.format(navigation=one.navigation(), body=one.body())
+    package = PACKAGE.strip(".")
+    return TEMPLATE.format(package=package, introduction=INTRODUCTIONS[package], navigation=one.navigation(),
+                           body=one.body())
 
 
 def main():
     parser = argparse.ArgumentParser(description="Writes the reference documentation of the API.")
     parser.add_argument("descriptors", type=pathlib.Path)
     parser.add_argument("page", type=pathlib.Path)
+    parser.add_argument("--package", choices=INTRODUCTIONS, default="axisd.v1")
     parser.add_argument("--check", action="store_true", help="an error if anything is not described or bounded, or has no role")
     arguments = parser.parse_args()
+    global PACKAGE
+    PACKAGE = f".{arguments.package}."
     files = read(arguments.descriptors.read_bytes())
     arguments.page.write_text(page(files), encoding="utf-8")
     silent = list(missing(files)) if arguments.check else []

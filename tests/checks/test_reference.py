@@ -76,12 +76,30 @@ message Cell {
 '''
 
 
-def descriptors(folder):
+def descriptors(folder, package="axisd/v1"):
     with tempfile.NamedTemporaryFile() as out:
-        files = sorted(path.relative_to(folder) for path in folder.glob("axisd/v1/*.proto"))
+        files = sorted(path.relative_to(folder) for path in folder.glob(f"{package}/*.proto"))
         subprocess.run(["protoc", f"-I{folder}", "--include_source_info", "--include_imports",
                         f"--descriptor_set_out={out.name}", *files], cwd=folder, check=True)
         return Path(out.name).read_bytes()
+
+
+class ContractOfTheCell(unittest.TestCase):
+    def setUp(self):
+        reference.PACKAGE, before = ".axisd.cell.v1.", reference.PACKAGE
+        self.addCleanup(setattr, reference, "PACKAGE", before)
+        self.files = reference.read(descriptors(PROTO, "axisd/cell/v1"))
+
+    def test_everything_has_a_comment_a_bound_and_a_role(self):
+        self.assertEqual([file.name for file in self.files], ["axisd/cell/v1/cell_service.proto"])
+        for look in (reference.missing, reference.unbounded, reference.without_role):
+            self.assertEqual(list(look(self.files)), [])
+
+    def test_links_lead_somewhere(self):
+        page = reference.page(self.files)
+        shown = set(re.findall(r'id="([^"]+)"', page))
+        self.assertEqual(set(re.findall(r'href="#([^"]+)"', page)) - shown, set())
+        self.assertIn("CellService.StopAll", shown)
 
 
 class Contract(unittest.TestCase):
