@@ -67,11 +67,11 @@ def turntable(node=5, bus="can0", simulated="", **keys):
 class Machine:
     """Not started by itself: start_lines() and start_daemon(), or start(). `networks`: the buses that are CAN
     networks, with their YAML keys; `link_helper`: the socket of axisd-link; `turnaround`: how late drives on lines may
-    answer."""
+    answer. `name`: of the machine."""
 
     def __init__(self, axes, baud=115200, serial_format="8N1", server=None, networks=None, link_helper=None,
-                 turnaround="1 s"):
-        self.axes, self.turnaround = axes, turnaround
+                 turnaround="1 s", name="e2e"):
+        self.axes, self.turnaround, self.name = axes, turnaround, name
         self.networks = networks or {}
         self.baud, self.serial_format = baud, serial_format
         # In memory where possible, so that a busy disk does not hold up simulators, which log.
@@ -100,7 +100,7 @@ class Machine:
         return [bus for bus in self.buses() if bus not in self.networks]
 
     def write_config(self):
-        text = f"machine: e2e\nstate_directory: {self.state_directory}\nserver: {self.server}\nbuses:\n"
+        text = f"machine: {self.name}\nstate_directory: {self.state_directory}\nserver: {self.server}\nbuses:\n"
         for bus, keys in self.networks.items():
             text += f"  {bus}:\n    canopen: {{ {', '.join(f'{key}: {value}' for key, value in keys.items())} }}\n"
         for bus in self.lines_used():

@@ -1,0 +1,57 @@
+#include "api/cell/callers.hpp"
+
+#include <grpc/grpc_security_constants.h>
+
+#include <chrono>
+
+#include "api/cell/names.hpp"
+
+namespace axisd::cell {
+namespace {
+
+/// The peer's own, and behind it those that it came with; empty: it has shown none.
+std::string certificates_of(const grpc::ServerContextBase& context) {
+  std::string pem;
+  const auto auth = context.auth_context();
+  if (!auth) return pem;
+  for (const auto* property : {GRPC_X509_PEM_CERT_PROPERTY_NAME, GRPC_X509_PEM_CERT_CHAIN_PROPERTY_NAME})
+    for (const auto& value : auth->FindPropertyValues(property)) pem.append(value.data(), value.size());
+  return pem;
+}
+
+constexpr std::string_view entrance_prefix = "cell.";
+
+}  // namespace
+
+Caller Callers::of(const grpc::ServerContextBase& context) const {
+  if (!live_) return {.name = "local", .local = true};
+  const auto shown = certificates_of(context);
+  if (shown.empty())
+    return {.name = "unnamed",
+            .refusal = Error{.reason = Reason::unauthenticated,
+                             .message = "no certificate was shown",
+                             .remedy = "connect with one"}};
+  auto client = live_->served()->clients.of(shown, std::chrono::system_clock::now());
+  const auto role = role_of(settings_, client.name);
+  return {.name = std::move(client.name), .role = role, .refusal = std::move(client.refusal)};
+}
+
+bool Callers::is_entrance(const Caller& caller) {
+  return caller.local || (caller.name.starts_with(entrance_prefix) &&
+                          is_machine_name(std::string_view(caller.name).substr(entrance_prefix.size())));
+}
+
+std::optional<Metadata> Callers::metadata_for(const Caller& caller) {
+  if (caller.local) return Metadata();
+  if (!is_user_name(caller.name)) return std::nullopt;
+  return Metadata{{"axisd-user", caller.name}, {"axisd-role", std::string(to_string(caller.role))}};
+}
+
+std::optional<std::string_view> metadata_of(const grpc::ServerContextBase& context, std::string_view key) {
+  const auto& all = context.client_metadata();
+  const auto found = all.find({key.data(), key.size()});
+  if (found == all.end()) return std::nullopt;
+  return std::string_view(found->second.data(), found->second.size());
+}
+
+}  // namespace axisd::cell

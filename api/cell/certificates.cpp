@@ -1,0 +1,97 @@
+#include "api/cell/certificates.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "api/transport/channel.hpp"
+
+namespace axisd::cell {
+namespace {
+
+constexpr Duration look_period = std::chrono::seconds(1);
+
+std::vector<std::string> paths_of(const Settings& settings) {
+  std::vector<std::string> paths;
+  const auto add = [&](const std::string& path) {
+    if (!path.empty()) paths.push_back(path);
+  };
+  if (settings.tls)
+    for (const auto& path :
+         {settings.tls->certificate, settings.tls->key, settings.tls->client_ca, settings.tls->crl})
+      add(path);
+  for (const auto& files : {settings.axisd.tls, settings.etcd.tls})
+    for (const auto& path : {files.ca, files.certificate, files.key}) add(path);
+  return paths;
+}
+
+/// What a look has found: on the disk's thread.
+struct Found {
+  std::optional<Trust> trust{};
+  std::optional<Error> error{};
+};
+
+}  // namespace
+
+Certificates::Certificates(const Settings& settings, std::shared_ptr<tls::Live> live, Trust trust)
+    : settings_(&settings),
+      live_(std::move(live)),
+      trust_(std::move(trust)),
+      watch_(std::make_shared<tls::FileWatch>(paths_of(settings))) {
+  (void)watch_->settled();
+  (void)watch_->settled();
+}
+
+Result<Trust> Certificates::trust_of(const Settings& settings) {
+  auto machines = transport::client_credentials(settings.axisd.tls, "axisd.tls");
+  if (!machines) return fail(std::move(machines).error());
+  auto etcd = transport::client_credentials(settings.etcd.tls, "etcd.tls");
+  if (!etcd) return fail(std::move(etcd).error());
+  return Trust{.machines = *std::move(machines), .etcd = *std::move(etcd)};
+}
+
+Result<Certificates> Certificates::read(const Settings& settings) {
+  std::shared_ptr<tls::Live> live;
+  if (settings.tls) {
+    auto opened = tls::Live::open(*settings.tls);
+    if (!opened) return fail(std::move(opened).error());
+    live = *std::move(opened);
+  }
+  auto trust = trust_of(settings);
+  if (!trust) return fail(std::move(trust).error());
+  return Certificates(settings, std::move(live), *std::move(trust));
+}
+
+void Certificates::keep(Clock& clock, Cell& cell) {
+  clock_ = &clock;
+  cell_ = &cell;
+  if (!paths_of(*settings_).empty()) look();
+}
+
+void Certificates::look() {
+  timer_ = clock_->call_at(clock_->now() + look_period, [this] { look(); });
+  const auto found = std::make_shared<Found>();
+  cell_->disk().run(
+      [found, watch = watch_, live = live_, settings = settings_] {
+        if (!watch->settled()) return;
+        if (live) {
+          if (auto read = live->reload(); !read) found->error = read.error();
+        }
+        auto trust = trust_of(*settings);
+        if (trust)
+          found->trust = *std::move(trust);
+        else
+          found->error = trust.error();
+      },
+      [found, cell = cell_] {
+        if (found->error)
+          spdlog::error("certificates: {}; what was used before stays", to_string(*found->error));
+        if (!found->trust) return;
+        if (!found->error) spdlog::info("certificates were read again");
+        cell->trust(*found->trust);
+      });
+}
+
+}  // namespace axisd::cell

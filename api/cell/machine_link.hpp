@@ -1,0 +1,83 @@
+// The warm connections to one machine: its axisd, its axisd's stop lane, its entrance.
+#pragma once
+
+#include <grpcpp/channel.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/security/credentials.h>
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "api/cell/ask.hpp"
+#include "api/cell/peer_machine.hpp"
+#include "axisd/cell/v1/cell_service.pb.h"
+#include "axisd/v1/system_service.pb.h"
+#include "buses/clock.hpp"
+
+namespace axisd::cell {
+
+/// Where a machine is. Empty: not known.
+struct Addresses {
+  std::string axisd, stop, cell;
+  friend bool operator==(const Addresses&, const Addresses&) = default;
+};
+
+/// What gRPC's threads need to pass a call on. Thread: any.
+struct Way {
+  std::shared_ptr<grpc::Channel> main, lane;
+  [[nodiscard]] bool lane_is_ready() const { return lane && lane->GetState(true) == GRPC_CHANNEL_READY; }
+};
+
+/// Thread: core.
+class MachineLink {
+ public:
+  /// What came of a question.
+  struct Answer {
+    enum class Kind : std::uint8_t { good, late, failed } kind;
+    PeerAnswer said{};  ///< of good
+    std::string why{};  ///< of the others
+  };
+
+  MachineLink(boost::asio::any_io_executor core, std::shared_ptr<grpc::ChannelCredentials> trusted,
+              Addresses addresses);
+
+  /// Other addresses, or other certificates: everything is connected anew.
+  void move_to(Addresses addresses, std::shared_ptr<grpc::ChannelCredentials> trusted);
+  [[nodiscard]] const Addresses& addresses() const { return addresses_; }
+
+  /// Asks the axisd who it is. `anew`: over another connection. An answer to an earlier question is not told.
+  void ask_who(bool anew, std::function<void(Answer)> done);
+  /// A connection that was there has ended since the last call of this. To be looked at a few times a second.
+  [[nodiscard]] bool has_been_lost();
+  /// Keeps the stop lane connected.
+  void warm_lane();
+
+  [[nodiscard]] Way way() const { return {.main = main_, .lane = lane_}; }
+
+  using Stopped = std::function<void(const grpc::Status&, const axisd::v1::StopAllResponse&)>;
+  /// StopAll, by the stop lane, and where that does not take it, by the main address. `metadata`: whom for.
+  void stop_all(const Metadata& metadata, Duration timeout, Stopped done);
+  void release_stop_all(const Metadata& metadata, Duration timeout,
+                        std::function<void(const grpc::Status&)> done);
+  using Exchanged = std::function<void(const grpc::Status&, const v1::ExchangeStopAllResponse&)>;
+  /// With its entrance.
+  void exchange(const v1::ExchangeStopAllRequest& request, Duration timeout, Exchanged done);
+
+ private:
+  void connect_main();
+  void connect_others();
+  [[nodiscard]] std::shared_ptr<grpc::ChannelCredentials> trusted_at(const std::string& address) const;
+
+  boost::asio::any_io_executor core_;
+  std::shared_ptr<grpc::ChannelCredentials> trusted_;
+  Addresses addresses_;
+  std::shared_ptr<grpc::Channel> main_, lane_, cell_;
+  /// Counts connections of main_; what an earlier one says is of no use.
+  std::shared_ptr<int> turn_ = std::make_shared<int>();
+  bool was_ready_ = false, warming_ = false;
+};
+
+}  // namespace axisd::cell

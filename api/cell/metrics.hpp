@@ -1,0 +1,42 @@
+// The metrics of an entrance.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "api/cell/routes.hpp"
+#include "api/exposition/exposition.hpp"
+#include "axisd/cell/v1/cell_service.pb.h"
+#include "buses/clock.hpp"
+#include "buses/latency_histogram.hpp"
+
+namespace axisd::cell {
+
+/// What there is to tell at one moment.
+struct Reading {
+  struct MachineReading {
+    std::string name;
+    v1::MachineState state;
+    std::optional<Duration> round_trip;
+    bool stop_all;
+  };
+  std::string cell, machine;
+  v1::RegistryState registry{};
+  std::optional<Duration> registry_age;  ///< since etcd was last heard of
+  std::vector<MachineReading> machines;
+  std::map<std::string, std::shared_ptr<RouteTally>> tallies;
+  std::uint64_t births = 0, deaths = 0, told_again = 0, refused = 0, too_many = 0;
+  std::size_t stops_standing = 0;
+  bool durable = true;
+  int open_calls = 0;
+  LatencyHistogram durations;
+};
+
+/// As Prometheus reads it. Labels have names of machines and constants of this program. Pure.
+[[nodiscard]] std::string render(const Reading& reading, metrics::Format format);
+
+}  // namespace axisd::cell
