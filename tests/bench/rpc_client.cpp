@@ -2,7 +2,8 @@
 // in ns.
 //   bench_rpc_client TARGET fetch FILE      writes the answer of ListAxes
 //   bench_rpc_client TARGET get SECONDS     GetAxis, one after the other; prints how long each took
-//   bench_rpc_client TARGET watch N SECONDS N streams, a batch each 10 ms; prints when each came, by stream
+//   bench_rpc_client TARGET watch N SECONDS [PERIOD_MS]
+//                                           N streams, a batch each 10 ms; prints when each came, by stream
 //   bench_rpc_client TARGET stall N SECONDS the same, but after its first batch nobody reads
 //   bench_rpc_client TARGET stop N          Stop at random moments, of the axes that are online in turn;
 //   prints
@@ -73,9 +74,9 @@ void get(Stub& stub, std::chrono::seconds duration) {
 /// One stream; `limit` batches are read, then none any more.
 class Watcher final : public grpc::ClientReadReactor<v1::WatchAxesResponse> {
  public:
-  Watcher(Stub& stub, std::size_t limit) : limit_(limit) {
+  Watcher(Stub& stub, int period_ms, std::size_t limit) : limit_(limit) {
     v1::WatchAxesRequest request;
-    request.mutable_period()->set_nanos(10'000'000);
+    request.mutable_period()->set_nanos(period_ms * 1'000'000);
     stub.async()->WatchAxes(&context_, &request, this);
     StartRead(&batch_);
     AddHold();
@@ -102,10 +103,10 @@ class Watcher final : public grpc::ClientReadReactor<v1::WatchAxesResponse> {
   std::atomic<bool> done_ = false;
 };
 
-void watch(Stub& stub, int streams, std::chrono::seconds duration, std::size_t limit) {
+void watch(Stub& stub, int streams, std::chrono::seconds duration, int period_ms, std::size_t limit) {
   std::vector<std::unique_ptr<Watcher>> watchers;
   watchers.reserve(static_cast<std::size_t>(streams));
-  for (int i = 0; i < streams; ++i) watchers.push_back(std::make_unique<Watcher>(stub, limit));
+  for (int i = 0; i < streams; ++i) watchers.push_back(std::make_unique<Watcher>(stub, period_ms, limit));
   std::this_thread::sleep_for(duration);
   for (const auto& watcher : watchers) watcher->end();
   for (std::size_t i = 0; i < watchers.size(); ++i)
@@ -168,10 +169,10 @@ int main(int argc, char** argv) {
     fetch(*stub, argv[3]);
   else if (command == "get")
     get(*stub, seconds(argv[3]));
-  else if (command == "watch" && argc == 5)
-    watch(*stub, std::atoi(argv[3]), seconds(argv[4]), SIZE_MAX);
+  else if (command == "watch" && (argc == 5 || argc == 6))
+    watch(*stub, std::atoi(argv[3]), seconds(argv[4]), argc == 6 ? std::atoi(argv[5]) : 10, SIZE_MAX);
   else if (command == "stall" && argc == 5)
-    watch(*stub, std::atoi(argv[3]), seconds(argv[4]), 1);
+    watch(*stub, std::atoi(argv[3]), seconds(argv[4]), 10, 1);
   else if (command == "stop")
     stop(*stub, std::atoi(argv[3]));
   else if (command == "stop-all")

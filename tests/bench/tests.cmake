@@ -31,7 +31,7 @@ if(AXISD_GRPC)
   target_link_libraries(bench_full_journal PRIVATE axisd_core)
   add_custom_target(bench_programs DEPENDS bench_can bench_index bench_bare_loop bench_bare_waits bench_modbus_loop bench_untimed_line bench_rpc_client
                                            bench_command_client bench_full_journal bench_bare_server bench_index_client
-                                           bench_index_loop bench_sync_counter axisd axisd-sim axisctl)
+                                           bench_index_loop bench_sync_counter axisd axisd-sim axisctl axisd-cell)
   set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
   set(text "")
   foreach(command bring-up core)
@@ -62,6 +62,8 @@ if(AXISD_GRPC)
     "--baud 115200 --lines 2/2 --rounds 1 --seconds 1 --report-only)\n"
     "add_test(bench.rpc /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/rpc_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
     "--seconds 1)\n"
+    "add_test(bench.cell /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/cell_bench.py ${CMAKE_BINARY_DIR} --rounds 1 "
+    "--seconds 1)\n"
     "add_test(bench.machine /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/machine_bench.py ${CMAKE_BINARY_DIR} "
     "--rounds 1 --seconds 1 --axes 1)\n"
     "add_test(bench.admission /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/admission_bench.py ${CMAKE_BINARY_DIR} "
@@ -72,7 +74,7 @@ if(AXISD_GRPC)
     "--only nobody --only \"rapid reset\" --only \"10,000 silent connections\" --report-only)\n"
     "add_test(bench.hang /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/hang_bench.py ${CMAKE_BINARY_DIR} --hangs 2 --axes 2 --patience 5 "
     "--report-only)\n"
-    "set_tests_properties(bench.rtu bench.stop_all bench.index bench.rpc bench.machine bench.admission bench.siege bench.siege_kill bench.hang PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
+    "set_tests_properties(bench.rtu bench.stop_all bench.index bench.rpc bench.cell bench.machine bench.admission bench.siege bench.siege_kill bench.hang PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
     "set_tests_properties(bench.bring-up bench.core bench.index_on_can bench.groups_on_can bench.virtual_rates bench.virtual_stops bench.virtual_done "
     "bench.virtual_groups bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"
     "set_tests_properties(bench.sync_in_guest PROPERTIES RESOURCE_LOCK guest COST 100)\n")
