@@ -84,6 +84,11 @@ Metadata metadata_for(const std::string& person) {
   return metadata;
 }
 
+/// CellService is the entrance's own.
+bool is_for_the_entrance(const google::protobuf::Message& request) {
+  return request.GetDescriptor()->file()->package() == "axisd.cell.v1";
+}
+
 std::shared_ptr<grpc::Channel> channel_to(const std::string& address,
                                           const std::shared_ptr<grpc::ChannelCredentials>& trusted,
                                           const std::string& person) {
@@ -96,18 +101,59 @@ std::shared_ptr<grpc::Channel> channel_to(const std::string& address,
 
 }  // namespace
 
+std::string Connection::address() const {
+  return through_entrance() ? with_port(cell, usual_cell_port) : with_port(server, usual_port);
+}
+
 Client::Client(Connection connection) : connection_(std::move(connection)) {
-  connection_.server = with_port(connection_.server, usual_port);
+  if (!connection_.machine.empty()) {
+    if (!connection_.through_entrance())
+      throw Failure(ExitCode::usage, "--machine names one of a cell: --cell says where its entrance is");
+    check_machine_name(connection_.machine);
+  }
   connection_.stop_server = with_port(connection_.stop_server, usual_stop_port);
   // Errors are one line on standard error; gRPC's own log would add to it. GRPC_VERBOSITY brings it back.
   if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
   const auto trusted = credentials(connection_);
   const auto& person = connection_.speaks_for;
-  channel_ = channel_to(connection_.server, trusted, person);
-  stop_channel_ = channel_to(connection_.server, trusted, person);
-  const auto lane =
-      connection_.stop_server.empty() ? stop_lane_of(connection_.server) : connection_.stop_server;
+  const auto address = connection_.address();
+  channel_ = channel_to(address, trusted, person);
+  stop_channel_ = channel_to(address, trusted, person);
+  if (connection_.through_entrance()) {
+    // What is asked of StopService there is passed on to the machine's lane.
+    lane_channel_ = stop_channel_;
+    return;
+  }
+  const auto lane = connection_.stop_server.empty() ? stop_lane_of(address) : connection_.stop_server;
   if (!lane.empty()) lane_channel_ = channel_to(lane, trusted, person);
+}
+
+Client::Client(const Client& other, const std::string& machine)
+    : connection_(other.connection_),
+      channel_(other.channel_),
+      stop_channel_(other.stop_channel_),
+      lane_channel_(other.lane_channel_) {
+  connection_.machine.clear();
+  connection_.only_machine = machine;
+}
+
+Client Client::at(const std::string& machine) const { return {*this, machine}; }
+
+Client::Way Client::way_of(google::protobuf::Message& request) const {
+  if (!connection_.through_entrance() || is_for_the_entrance(request)) return {};
+  const auto named = take_machine(request);
+  if (!named.machine.empty() && !named.bare) return {.machine = named.machine, .shown = true};
+  if (!connection_.machine.empty() && named.machine.empty()) return {.machine = connection_.machine};
+  if (named.bare)
+    throw Failure(ExitCode::usage,
+                  fmt::format("'{0}' names no machine of the cell; write {1}/{0}", *named.bare,
+                              named.machine.empty() ? "MACHINE" : named.machine));
+  if (!connection_.only_machine.empty()) return {.machine = connection_.only_machine, .shown = true};
+  throw Failure(ExitCode::usage, "this is asked of one machine of the cell; name it with --machine");
+}
+
+void Client::set(grpc::ClientContext& context, const Way& way) {
+  if (!way.machine.empty()) context.AddMetadata("axisd-machine", way.machine);
 }
 
 bool Client::lane_is_reachable() const {
@@ -127,7 +173,8 @@ void Client::wait_for_connection(Lane lane, std::chrono::milliseconds limit) con
 }
 
 Failure Client::failure(const grpc::Status& status, std::string_view subject) const {
-  return failure_of(status, subject, connection_.server, !connection_.tls_ca.empty());
+  return failure_of(status, subject, connection_.address(), !connection_.tls_ca.empty(),
+                    connection_.through_entrance() ? Asked::entrance : Asked::daemon);
 }
 
 std::string random_uuid() {

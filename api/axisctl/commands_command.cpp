@@ -32,12 +32,11 @@ void watch(Invocation& invocation, const std::string& id) {
   request.set_id(id);
   grpc::ClientContext context;
   const Interrupt interrupt([&context] { context.TryCancel(); });
-  Stub stub(invocation.client().channel());
-  const auto stream = stub.WatchCommand(&context, request);
+  auto stream = invocation.client().stream(context, &Stub::WatchCommand, request);
   v1::WatchCommandResponse change;
-  while (!ended(change.command()) && stream->Read(&change)) show(invocation, change.command());
+  while (!ended(change.command()) && stream.read(change)) show(invocation, change.command());
   if (ended(change.command())) context.TryCancel();
-  const auto status = stream->Finish();
+  const auto status = stream.finish();
   if (ended(change.command())) {
     invocation.status = outcome(change.command());
     return;

@@ -13,6 +13,7 @@
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/interrupt.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/terminal.hpp"
 
@@ -117,7 +118,9 @@ void commission_axis(Invocation& invocation, const Arguments& arguments) {
   *record.mutable_began_at() = now();
   (void)wishes_of(arguments, state.unit());  // before there is a file
   const RecordFile file(arguments.record.empty()
-                            ? commission::default_file(record.machine(), arguments.axis, record.began_at())
+                            ? commission::default_file(record.machine(),
+                                                       std::string(without_machine(arguments.axis)),
+                                                       record.began_at())
                             : arguments.record);
   carry_out(invocation, arguments, record, file, invocation.json ? STDERR_FILENO : STDOUT_FILENO);
   *record.mutable_ended_at() = now();

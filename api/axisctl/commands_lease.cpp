@@ -117,6 +117,8 @@ void hold(Invocation& invocation, const Arguments& arguments) {
   try {
     child.start(arguments.command, {{"AXISD_LEASE", std::to_string(token)},
                                     {"AXISD_SERVER", invocation.connection.server},
+                                    {"AXISD_CELL", invocation.connection.cell},
+                                    {"AXISD_MACHINE", invocation.connection.machine},
                                     {"AXISD_AS", invocation.connection.speaks_for}});
     status = hold_while(invocation, child, token, ttl_of(response.lease()), lost);
   } catch (...) {

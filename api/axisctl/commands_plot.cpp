@@ -14,6 +14,7 @@
 #include "api/axisctl/follow.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/plot.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -101,7 +102,7 @@ void write(const std::string& path, const std::string& text) {
 }
 
 void plot(Invocation& invocation, const PlotArguments& arguments) {
-  const auto path = arguments.output.empty() ? arguments.axis + ".svg" : arguments.output;
+  const auto path = arguments.output.empty() ? as_file_name(arguments.axis) + ".svg" : arguments.output;
   check_writable(path);
   v1::WatchAxesRequest request;
   request.add_axes(arguments.axis);

@@ -112,10 +112,13 @@ class Script {
   /// The options that the script itself was given.
   [[nodiscard]] std::vector<std::string> inherited() const {
     const auto& connection = invocation_.connection;
-    std::vector<std::string> words{"--server", connection.server, "--timeout", invocation_.timeout};
+    std::vector<std::string> words{"--timeout", invocation_.timeout};
     const auto add = [&](const char* option, const std::string& value) {
       if (!value.empty()) words.insert(words.end(), {option, value});
     };
+    add("--cell", connection.cell);
+    add("--machine", connection.machine);
+    if (!connection.through_entrance()) add("--server", connection.server);
     add("--tls-ca", connection.tls_ca);
     add("--tls-cert", connection.tls_certificate);
     add("--tls-key", connection.tls_key);

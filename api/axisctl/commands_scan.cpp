@@ -9,6 +9,7 @@
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/interrupt.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/table.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -79,17 +80,16 @@ bool run(Invocation& invocation, const Arguments& arguments, Found& found) {
   const auto request = request_of(arguments);
   grpc::ClientContext context;
   const Interrupt interrupt([&context] { context.TryCancel(); });
-  Stub stub(invocation.client().channel());
-  const auto stream = stub.Scan(&context, request);
+  auto stream = invocation.client().stream(context, &Stub::Scan, request);
   v1::ScanResponse last;
   {
     Progress line(!invocation.json && !arguments.yaml && is_terminal(STDOUT_FILENO));
-    for (v1::ScanResponse progress; stream->Read(&progress); last = progress) {
+    for (v1::ScanResponse progress; stream.read(progress); last = progress) {
       found.MergeFrom(progress.found());
       line.show(arguments.bus, progress, found.size());
     }
   }
-  const auto status = stream->Finish();
+  const auto status = stream.finish();
   if (invocation.json && (status.ok() || interrupt.requested())) {
     *last.mutable_found() = found;
     print_line(json(last));
@@ -140,7 +140,8 @@ Table network_found_table(const Found& found) {
 }
 
 FragmentContext context_of(Invocation& invocation, const std::string& bus) {
-  FragmentContext context{.bus = bus};
+  // A configuration is that of one machine: its names have no machine in front.
+  FragmentContext context{.bus = std::string(without_machine(bus))};
   for (const auto& known :
        invocation.client().call(&Stub::ListBuses, v1::ListBusesRequest(), std::string_view()).buses())
     if (known.name() == bus) context.baud = known.baud();
@@ -148,7 +149,7 @@ FragmentContext context_of(Invocation& invocation, const std::string& bus) {
        invocation.client()
            .call(&v1::AxisService::Stub::ListAxes, v1::ListAxesRequest(), std::string_view())
            .axes())
-    context.taken.insert(axis.axis());
+    context.taken.emplace(without_machine(axis.axis()));
   return context;
 }
 

@@ -8,6 +8,7 @@
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/interrupt.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/drive_service.grpc.pb.h"
@@ -47,18 +48,20 @@ std::string phase_line(const std::string& axis, const Response& progress) {
 }
 
 /// Follows the change to its end; says at last what the configuration needs.
-template <class Response, class Reader>
-void follow(Invocation& invocation, const Arguments& arguments, const Reader& open, const std::string& yaml) {
+template <class Response, class Request>
+void follow(Invocation& invocation, const Arguments& arguments,
+            std::unique_ptr<grpc::ClientReader<Response>> (Stub::*method)(grpc::ClientContext*,
+                                                                          const Request&),
+            const Request& request, const std::string& yaml) {
   grpc::ClientContext context;
   const Interrupt interrupt([&context] { context.TryCancel(); });
-  Stub stub(invocation.client().channel());
-  const auto stream = open(stub, context);
+  auto stream = invocation.client().stream(context, method, request);
   bool written = false;
-  for (Response progress; stream->Read(&progress);) {
+  for (Response progress; stream.read(progress);) {
     written = true;
     print_line(invocation.json ? json(progress) : phase_line(arguments.axis, progress));
   }
-  const auto status = stream->Finish();
+  const auto status = stream.finish();
   if (written && !invocation.json)
     print_line(fmt::format("{}: the configuration must say so, too: {}", arguments.axis, yaml));
   if (status.ok()) return;
@@ -70,10 +73,8 @@ void follow(Invocation& invocation, const Arguments& arguments, const Reader& op
 void readdress(Invocation& invocation, const Arguments& arguments) {
   auto request = request_of<v1::ReaddressRequest>(arguments);
   request.set_node(arguments.node);
-  follow<v1::ReaddressResponse>(
-      invocation, arguments,
-      [&](Stub& stub, grpc::ClientContext& context) { return stub.Readdress(&context, request); },
-      fmt::format("'node: {}' under 'axes: {}:'", arguments.node, arguments.axis));
+  follow(invocation, arguments, &Stub::Readdress, request,
+         fmt::format("'node: {}' under 'axes: {}:'", arguments.node, without_machine(arguments.axis)));
 }
 
 void set_serial(Invocation& invocation, const Arguments& arguments) {
@@ -85,11 +86,9 @@ void set_serial(Invocation& invocation, const Arguments& arguments) {
   if (!arguments.format.empty())
     yaml += fmt::format("{}format: {}", yaml.empty() ? "" : ", ", arguments.format);
   if (yaml.empty()) throw Failure(ExitCode::usage, "give --baud, --format or both");
-  follow<v1::SetSerialResponse>(
-      invocation, arguments,
-      [&](Stub& stub, grpc::ClientContext& context) { return stub.SetSerial(&context, request); },
-      fmt::format("'{}' of its bus{}, and every other node of it the same", yaml,
-                  arguments.format.empty() ? " ('bitrate' of a CAN network)" : ""));
+  follow(invocation, arguments, &Stub::SetSerial, request,
+         fmt::format("'{}' of its bus{}, and every other node of it the same", yaml,
+                     arguments.format.empty() ? " ('bitrate' of a CAN network)" : ""));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/interrupt.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/simulation_client.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -43,7 +44,7 @@ void print_done(const Invocation& invocation, const std::string& name, const std
 std::string ask(const SimulationClient& drives, std::string_view kind, const std::string& name,
                 std::string_view command) {
   try {
-    return drives.ask(fmt::format("{} {} {}", kind, name, command));
+    return drives.ask(fmt::format("{} {} {}", kind, without_machine(name), command));
   } catch (const Failure& failure) {
     throw failure.saying(fmt::format("{}: {}", name, failure.what()));
   }

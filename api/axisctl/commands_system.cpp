@@ -73,7 +73,7 @@ void info(Invocation& invocation) {
   print(fmt::format(
       "machine:    {}\naxisd:      {}\naxisctl:    {}\nserver:     {}\ninstance:   {}\nyou:        {}, "
       "{}\nmotion:     {}\n",
-      response.machine(), response.version(), AXISD_VERSION, invocation.connection.server,
+      response.machine(), response.version(), AXISD_VERSION, invocation.connection.address(),
       response.instance_id(), response.client(), roles_of(response),
       held.empty() ? "permitted" : coloured(held, Colour::yellow, use_colour())));
 }

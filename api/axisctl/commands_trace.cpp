@@ -137,10 +137,9 @@ void trace(Invocation& invocation, const Arguments& arguments) {
   if (limit)
     context.set_deadline(std::chrono::system_clock::now() +
                          std::chrono::duration_cast<std::chrono::system_clock::duration>(*limit));
-  v1::BusService::Stub stub(invocation.client().channel());
-  const auto stream = stub.TraceBus(&context, request);
-  for (v1::TraceBusResponse batch; stream->Read(&batch);) sink.take(batch);
-  const auto status = stream->Finish();
+  auto stream = invocation.client().stream(context, &v1::BusService::Stub::TraceBus, request);
+  for (v1::TraceBusResponse batch; stream.read(batch);) sink.take(batch);
+  const auto status = stream.finish();
   const bool over = limit && status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
   if (over || interrupt.requested()) return sink.tell();
   if (status.ok()) throw Failure(ExitCode::unreachable, "the daemon ended the stream");

@@ -94,7 +94,7 @@ struct Walk {
     if (option.get_envname().empty())
       return;  // all that name the daemon have one, and --lease, which does no harm
     const auto name = "--" + option.get_lnames().front();
-    if (name.starts_with("--server") || name.starts_with("--tls-"))
+    if (name == "--server" || name == "--cell" || name == "--machine" || name.starts_with("--tls-"))
       connection.insert(connection.end(), {name, value});
   }
 };

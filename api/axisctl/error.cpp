@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "api/axisctl/format.hpp"
+#include "api/axisctl/machine_names.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -38,18 +39,37 @@ bool cut_off(const grpc::Status& status, const v1::ErrorDetail& detail) {
   return status.error_code() == grpc::StatusCode::UNAVAILABLE && detail.reason() == v1::REASON_CANCELLED;
 }
 
-Failure unreachable(const grpc::Status& status, std::string_view server, bool tls) {
+/// The entrance's word for a machine that does not answer; of a drive the bus and the node are told as well.
+bool is_silent_machine(const grpc::Status& status, const v1::ErrorDetail& detail, Asked asked) {
+  return asked == Asked::entrance && status.error_code() == grpc::StatusCode::UNAVAILABLE &&
+         detail.reason() == v1::REASON_OFFLINE && detail.bus().empty() && !detail.has_node();
+}
+
+std::string_view program(Asked asked) { return asked == Asked::entrance ? "axisd-cell" : "axisd"; }
+
+std::string_view remedy_of(std::string_view reason, bool tls, Asked asked) {
+  const bool refused = reason.contains("refused") || reason.contains("No such file");
+  if (asked == Asked::entrance)
+    return refused ? "is it running there? --cell HOST:PORT or AXISD_CELL names another entrance, --server a "
+                     "machine itself"
+           : tls
+               ? "check the certificates (--tls-ca, --tls-cert, --tls-key) and the address"
+               : "check the address (--cell); an entrance with TLS needs --tls-ca, --tls-cert and --tls-key";
+  return refused ? "is the daemon running there? --server HOST:PORT or AXISD_SERVER names another one"
+         : tls   ? "check the certificates (--tls-ca, --tls-cert, --tls-key) and the address"
+                 : "check the address (--server); a daemon with TLS needs --tls-ca, --tls-cert and --tls-key";
+}
+
+Failure unreachable(const grpc::Status& status, std::string_view server, bool tls, Asked asked) {
   const std::string message = status.error_message();
   const std::string_view reason = innermost(message);
   if (!never_connected(message))
     return {ExitCode::unreachable,
-            fmt::format("lost axisd at {}: {}; what it has done is not known", server, reason)};
-  const bool refused = reason.contains("refused") || reason.contains("No such file");
-  const std::string_view remedy =
-      refused ? "is the daemon running there? --server HOST:PORT or AXISD_SERVER names another one"
-      : tls   ? "check the certificates (--tls-ca, --tls-cert, --tls-key) and the address"
-              : "check the address (--server); a daemon with TLS needs --tls-ca, --tls-cert and --tls-key";
-  return {ExitCode::unreachable, fmt::format("cannot reach axisd at {}: {}; {}", server, reason, remedy),
+            fmt::format("lost {}{} at {}: {}; what it has done is not known",
+                        asked == Asked::entrance ? "the machine, or " : "", program(asked), server, reason)};
+  return {ExitCode::unreachable,
+          fmt::format("cannot reach {} at {}: {}; {}", program(asked), server, reason,
+                      remedy_of(reason, tls, asked)),
           true};
 }
 
@@ -125,8 +145,10 @@ std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status) {
 
 std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
   std::string message = detail.message();
-  if (const std::string lead = fmt::format("{}: ", subject); message.starts_with(lead))
-    message.erase(0, lead.size());
+  // A machine does not know that it is named before its axes.
+  for (const auto& name : {subject, without_machine(subject)})
+    if (const std::string lead = fmt::format("{}: ", name); message.starts_with(lead))
+      message.erase(0, lead.size());
   std::string text;
   if (!detail.bus().empty()) text = detail.bus();
   if (detail.has_node()) text += fmt::format("{}node {}", text.empty() ? "" : " ", detail.node());
@@ -141,16 +163,19 @@ std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
   return text;
 }
 
-Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls) {
+Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls,
+                   Asked asked) {
   const std::string lead = subject.empty() ? "" : fmt::format("{}: ", subject);
-  if (const auto detail = detail_of(status))
-    return {cut_off(status, *detail) ? ExitCode::unreachable : ExitCode::refused,
-            lead + describe(*detail, subject), *detail};
-  if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return unreachable(status, server, tls);
+  if (const auto detail = detail_of(status)) {
+    const bool silent = is_silent_machine(status, *detail, asked);
+    return {silent || cut_off(status, *detail) ? ExitCode::unreachable : ExitCode::refused,
+            lead + describe(*detail, subject), *detail, silent && detail->outcome() == v1::OUTCOME_NOT_SENT};
+  }
+  if (status.error_code() == grpc::StatusCode::UNAVAILABLE) return unreachable(status, server, tls, asked);
   if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
-    return {
-        ExitCode::unreachable,
-        fmt::format("{}no answer from axisd at {} in time; --timeout sets how long to wait", lead, server)};
+    return {ExitCode::unreachable,
+            fmt::format("{}no answer from {} at {} in time; --timeout sets how long to wait", lead,
+                        program(asked), server)};
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED)
     return {ExitCode::refused, fmt::format("{}the daemon at {} does not offer this function: {}; compare the "
                                            "versions of both (axisctl info, axisctl --version)",

@@ -3,6 +3,7 @@
 
 #include <grpcpp/support/status.h>
 
+#include <cstdint>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -29,8 +30,8 @@ class Failure : public std::runtime_error {
   Failure(ExitCode code, const std::string& text, bool nothing_sent = false)
       : std::runtime_error(text), code_(code), nothing_sent_(nothing_sent) {}
   /// With what the daemon said.
-  Failure(ExitCode code, const std::string& text, v1::ErrorDetail detail)
-      : std::runtime_error(text), code_(code), detail_(std::move(detail)) {}
+  Failure(ExitCode code, const std::string& text, v1::ErrorDetail detail, bool nothing_sent = false)
+      : std::runtime_error(text), code_(code), nothing_sent_(nothing_sent), detail_(std::move(detail)) {}
   /// The same failure in other words.
   [[nodiscard]] Failure saying(const std::string& text) const;
   [[nodiscard]] ExitCode code() const { return code_; }
@@ -59,8 +60,12 @@ std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status);
 /// caller names it already.
 std::string describe(const v1::ErrorDetail& detail, std::string_view subject = {});
 
+/// Who was connected to.
+enum class Asked : std::uint8_t { daemon, entrance };
+
 /// What to tell about a call that failed. `subject` (an axis, a command id or empty) leads the line; `server`
 /// names the endpoint for a daemon that cannot be reached; `tls` says whether the connection was encrypted.
-Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls);
+Failure failure_of(const grpc::Status& status, std::string_view subject, std::string_view server, bool tls,
+                   Asked asked = Asked::daemon);
 
 }  // namespace axisd::axisctl

@@ -1,8 +1,6 @@
 // Reading a stream until somebody has had enough of it.
 #pragma once
 
-#include <grpcpp/support/sync_stream.h>
-
 #include <functional>
 #include <memory>
 #include <string_view>
@@ -22,12 +20,11 @@ void follow(const Client& client,
             const std::function<bool(const Response&)>& take) {
   grpc::ClientContext context;
   const Interrupt interrupt([&context] { context.TryCancel(); });
-  Stub stub(client.channel());
-  const auto stream = (stub.*method)(&context, request);
+  auto stream = client.stream(context, method, request);
   bool enough = false;
-  for (Response message; !enough && stream->Read(&message);) enough = !take(message);
+  for (Response message; !enough && stream.read(message);) enough = !take(message);
   if (enough) context.TryCancel();
-  const auto status = stream->Finish();
+  const auto status = stream.finish();
   if (enough || interrupt.requested()) return;
   if (status.ok()) throw Failure(ExitCode::unreachable, "the daemon ended the stream");
   throw client.failure(status, subject);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "api/axisctl/completion.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/tls_trouble.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
@@ -32,7 +33,13 @@ Exit status:
   4    the daemon refused
   130  interrupted while waiting
 
-Environment: AXISD_SERVER, AXISD_STOP_SERVER, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_AS, AXISD_LEASE, NO_COLOR.)";
+A cell of several machines (--cell): axes are named press-2/feeder, and so are groups, buses, devices and commands. What
+names none of these is asked of one machine by --machine press-2; then names need no machine. Without either, list, state,
+watch, events, info, stop --all and release-stop --all are of all machines; list, state, watch and events take machines as
+well: press-2, or press-2/*. An entrance that does not answer: any other one of the cell, or --server with a machine's own
+address, which goes before AXISD_CELL.
+
+Environment: AXISD_SERVER, AXISD_STOP_SERVER, AXISD_CELL, AXISD_MACHINE, AXISD_TLS_CA, AXISD_TLS_CERT, AXISD_TLS_KEY, AXISD_AS, AXISD_LEASE, NO_COLOR.)";
 
 void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_option("--server", invocation.connection.server,
@@ -46,6 +53,14 @@ void add_global_options(CLI::App& app, Invocation& invocation) {
          "path with .stop behind it")
       ->envname("AXISD_STOP_SERVER")
       ->type_name("ADDRESS");
+  app.add_option("--cell", invocation.connection.cell,
+                 "An entrance of a cell (axisd-cell), in place of --server: HOST or HOST:PORT (else 7445)")
+      ->envname("AXISD_CELL")
+      ->type_name("ADDRESS");
+  app.add_option("--machine", invocation.connection.machine,
+                 "With --cell: names without a machine, and what names nothing, are of this one")
+      ->envname("AXISD_MACHINE")
+      ->type_name("MACHINE");
   app.add_option("--tls-ca", invocation.connection.tls_ca,
                  "Use TLS; the daemon's certificate is checked with this one")
       ->envname("AXISD_TLS_CA")
@@ -66,6 +81,39 @@ void add_global_options(CLI::App& app, Invocation& invocation) {
   app.add_flag(
       "--json", invocation.json,
       "Print JSON with the names of the proto: one object; of streams, one per line; errors on stderr");
+}
+
+/// Machines that the words of the command line name: of axes "press-1/a,press-1/b", of targets
+/// "press-1/a=5mm".
+void note_machines(Invocation& invocation, const std::string& word) {
+  for (const auto& name : CLI::detail::split(word.substr(0, word.find('=')), ','))
+    if (const auto machine = machine_in(name); !machine.empty()) invocation.machines.emplace(machine);
+}
+
+void note_machines_of(CLI::App& command, Invocation& invocation) {
+  static const std::set<std::string> naming{"AXIS", "GROUP", "TARGET", "BUS", "DEVICE", "ID", "RECORD"};
+  for (auto* option : command.get_options()) {
+    const auto name = option->get_positional() ? option->get_name() : option->get_type_name();
+    if (naming.contains(name))
+      option->each([&invocation](const std::string& word) { note_machines(invocation, word); });
+  }
+  for (auto* part : command.get_subcommands(nullptr)) note_machines_of(*part, invocation);
+}
+
+/// Whoever names a daemon means that one, whatever cell the environment names: it may be the entrance that
+/// does not answer.
+void prefer_server(CLI::App& app, const std::vector<std::string>& words) {
+  const auto end = std::ranges::find(words, "--");
+  const auto given = [&](const std::string& option) {
+    return std::any_of(words.begin(), end, [&option](const std::string& word) {
+      return word == option || word.starts_with(option + "=");
+    });
+  };
+  if (!given("--server")) return;
+  if (given("--cell"))
+    throw Failure(ExitCode::usage, "--server is one machine, --cell several; give one of them");
+  app.get_option("--cell")->envname("");
+  app.get_option("--machine")->envname("");
 }
 
 /// "-.5" becomes "-0.5": CLI11 takes a dash and a digit for a value, a dash and a point for an option.
@@ -126,6 +174,7 @@ Failure usage_error(const CLI::App& app, const CLI::ParseError& error,
 Client& Invocation::client() {
   if (!client_) {
     connection.timeout = parse_duration(timeout, "--timeout");
+    if (machines.size() == 1) connection.only_machine = *machines.begin();
     client_ = std::make_unique<Client>(connection);
   }
   return *client_;
@@ -136,6 +185,13 @@ v1::AxisState Invocation::state(const std::string& axis) {
   request.set_axis(axis);
   return client().call(&v1::AxisService::Stub::GetAxis, request, axis).state();
 }
+
+void Invocation::note_started(const v1::Command& command) {
+  const std::lock_guard lock(started_mutex_);
+  started.push_back(command);
+}
+
+bool Invocation::of_whole_cell() const { return connection.through_entrance() && connection.machine.empty(); }
 
 std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   auto app = std::make_unique<CLI::App>("Commands the axes of a machine through axisd.", "axisctl");
@@ -165,10 +221,12 @@ std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   add_config_commands(*app, invocation);
   add_budget_command(*app, invocation);
   add_offline_commands(*app, invocation);
+  note_machines_of(*app, invocation);
   return app;
 }
 
 void execute(CLI::App& app, const std::vector<std::string>& words) {
+  prefer_server(app, words);
   std::vector<std::string> reversed;  // as CLI11 wants them
   for (const auto& word : words) reversed.insert(reversed.begin(), with_leading_zero(word));
   try {

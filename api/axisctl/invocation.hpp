@@ -2,6 +2,8 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,13 +24,19 @@ struct Invocation {
   ExitCode status = ExitCode::ok;
   bool in_script = false;            ///< Ctrl-C is the script's, which halts what it started
   std::vector<v1::Command> started;  ///< motion commands that this invocation sent
+  std::set<std::string> machines;    ///< of the cell, that names on the command line are of
 
   /// The client, made at first use: offline commands need none.
   Client& client();
   /// The axis's state as the daemon last saw it. Throws Failure.
   v1::AxisState state(const std::string& axis);
+  /// Notes a motion command that was sent. Thread: any.
+  void note_started(const v1::Command& command);
+  /// The whole cell is meant: there is one, and no machine is named.
+  [[nodiscard]] bool of_whole_cell() const;
 
  private:
+  std::mutex started_mutex_;
   std::unique_ptr<Client> client_;
 };
 

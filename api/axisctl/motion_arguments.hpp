@@ -54,8 +54,9 @@ v1::Command send(Invocation& invocation,
                  grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                  const Request& request, Lane lane = Lane::ordinary) {
   try {
-    invocation.started.push_back(invocation.client().call(method, request, request.axis(), lane).command());
-    return invocation.started.back();
+    const auto command = invocation.client().call(method, request, request.axis(), lane).command();
+    invocation.note_started(command);
+    return command;
   } catch (const Failure& failure) {
     if (failure.code() != ExitCode::unreachable || failure.nothing_sent()) throw;
     throw failure.saying(std::string(failure.what()) + "; if the command may have arrived, repeat it with " +

@@ -45,12 +45,11 @@ class Painter {
     v1::WatchAxesRequest request;
     request.add_axes(command_.axis());
     request.mutable_period()->set_nanos(paint_period_ms * 1'000'000);
-    v1::AxisService::Stub stub(client.channel());
-    const auto stream = stub.WatchAxes(&context_, request);
-    for (v1::WatchAxesResponse batch; stream->Read(&batch);)
+    auto stream = client.stream(context_, &v1::AxisService::Stub::WatchAxes, request);
+    for (v1::WatchAxesResponse batch; stream.read(batch);)
       if (batch.axes_size() == 1) paint(batch.axes(0));
     // Progress is a comfort: what became of the command is told by its own stream.
-    stream->Finish();
+    stream.finish();
   }
   void paint(const v1::AxisState& state) {
     const std::lock_guard lock(mutex_);
@@ -144,16 +143,15 @@ ExitCode follow_to_end(Invocation& invocation, const v1::Command& command, const
       painter.emplace(invocation.client(), command, options.start);
     v1::WatchCommandRequest request;
     request.set_id(command.id());
-    v1::CommandService::Stub stub(invocation.client().channel());
     if (!ended(latest)) {
-      const auto stream = stub.WatchCommand(&context, request);
-      for (v1::WatchCommandResponse change; !ended(latest) && stream->Read(&change);) {
+      auto stream = invocation.client().stream(context, &v1::CommandService::Stub::WatchCommand, request);
+      for (v1::WatchCommandResponse change; !ended(latest) && stream.read(change);) {
         latest = change.command();
         if (painter) painter->update(latest);
       }
       // The stream's end is no news once the command has ended.
       if (ended(latest)) context.TryCancel();
-      status = stream->Finish();
+      status = stream.finish();
     }
     painter.reset();
     if (!ended(latest) && interrupt.requested()) return interrupted(invocation, latest, options);

@@ -8,7 +8,6 @@
 #include <optional>
 #include <string>
 
-#include "api/axisctl/address.hpp"
 #include "api/tls/client_check.hpp"
 
 namespace axisd::axisctl {
@@ -37,13 +36,15 @@ std::optional<Error> trouble(const Connection& connection, const std::string& se
 
 Failure with_tls_trouble(const Failure& failure, const Connection& connection) {
   if (failure.code() != ExitCode::unreachable || failure.detail()) return failure;
-  const auto server = with_port(connection.server, usual_port);
+  const auto server = connection.address();
   const auto why = trouble(connection, server);
   if (!why) return failure;
   // What may have been done is said as well: there was a connection then.
   if (!failure.nothing_sent())
     return failure.saying(fmt::format("{}; {}; {}", failure.what(), why->message, why->remedy));
-  return failure.saying(fmt::format("cannot reach axisd at {}: {}; {}", server, why->message, why->remedy));
+  return failure.saying(fmt::format("cannot reach {} at {}: {}; {}",
+                                    connection.through_entrance() ? "axisd-cell" : "axisd", server,
+                                    why->message, why->remedy));
 }
 
 }  // namespace axisd::axisctl

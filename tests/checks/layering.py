@@ -24,7 +24,7 @@ OURS = {
                      "config/quantity.hpp", "config/text.hpp"],
     "api/exposition": ["buses/", "api/transport/listen.hpp", "api/exposition/"],
     "api/server": ["buses/", "devices/", "api/budget/", "api/tls/", "api/grpc_text/", "api/transport/", "api/server/", "axisd/v1/"],
-    "api/axisctl": ["api/budget/", "api/tls/", "api/transport/", "api/axisctl/", "config/", "axisd/v1/"],
+    "api/axisctl": ["api/budget/", "api/tls/", "api/transport/", "api/axisctl/", "config/", "axisd/v1/", "axisd/cell/v1/"],
     "api/examples": ["axisd/v1/"],
     # Nothing of devices and buses but what has no say in motion, each by its name.
     "api/cell": ["api/cell/", "api/settings/", "api/tls/", "api/transport/", "api/exposition/", "axisd/v1/", "axisd/cell/v1/",

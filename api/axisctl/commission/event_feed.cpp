@@ -31,15 +31,14 @@ std::vector<v1::TerminalEdge> EventFeed::take() {
 }
 
 void EventFeed::read(const v1::WatchEventsRequest& request) {
-  v1::EventService::Stub stub(client_.channel());
-  const auto stream = stub.WatchEvents(&context_, request);
-  for (v1::WatchEventsResponse message; stream->Read(&message);) {
+  auto stream = client_.stream(context_, &v1::EventService::Stub::WatchEvents, request);
+  for (v1::WatchEventsResponse message; stream.read(message);) {
     const std::lock_guard lock(mutex_);
     opened_ = true;
     for (const auto& event : message.events()) edges_.push_back(event.terminal_edge());
     opened_changed_.notify_all();
   }
-  const auto status = stream->Finish();
+  const auto status = stream.finish();
   const std::lock_guard lock(mutex_);
   failure_ = status.ok() ? Failure(ExitCode::unreachable, "the daemon ended the stream of events")
                          : client_.failure(status, axis_);

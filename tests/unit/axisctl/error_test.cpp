@@ -133,5 +133,41 @@ TEST(ErrorJson, FailuresOfTheProgramItselfHaveReasonAndRemedy) {
             "OUTCOME_NOT_SENT");
 }
 
+TEST(Failures, OfAMachineOfACellNameItOnce) {
+  auto detail = soft_limit();
+  detail.clear_permitted();
+  detail.set_message("feeder: too far");
+  EXPECT_EQ(describe(detail, "press-2/feeder"), "too far; choose a target inside");
+}
+
+TEST(Failures, ASilentMachineIsUnreachableAndADriveIsNot) {
+  v1::ErrorDetail detail;
+  detail.set_reason(v1::REASON_OFFLINE);
+  detail.set_message("press-2 does not answer");
+  detail.set_outcome(v1::OUTCOME_NOT_SENT);
+  const auto of = [&](Asked asked) {
+    return failure_of(
+        status_with(detail, grpc::StatusCode::UNAVAILABLE, "type.googleapis.com/axisd.v1.ErrorDetail"),
+        "press-2/feeder", "press-1:7445", false, asked);
+  };
+  EXPECT_EQ(of(Asked::entrance).code(), ExitCode::unreachable);
+  EXPECT_TRUE(of(Asked::entrance).nothing_sent());
+  EXPECT_EQ(of(Asked::daemon).code(), ExitCode::refused);
+  detail.set_outcome(v1::OUTCOME_UNKNOWN);
+  EXPECT_FALSE(of(Asked::entrance).nothing_sent());
+  detail.set_bus("line-a");
+  detail.set_node(9);
+  EXPECT_EQ(of(Asked::entrance).code(), ExitCode::refused);
+}
+
+TEST(Failures, AnEntranceThatIsNotThereHasARemedyOfItsOwn) {
+  const grpc::Status status(grpc::StatusCode::UNAVAILABLE,
+                            "failed to connect to all addresses; last error: Connection refused");
+  const Failure failure = failure_of(status, "", "press-1:7445", false, Asked::entrance);
+  EXPECT_THAT(failure.what(), HasSubstr("cannot reach axisd-cell at press-1:7445"));
+  EXPECT_THAT(failure.what(), HasSubstr("--cell HOST:PORT"));
+  EXPECT_TRUE(failure.nothing_sent());
+}
+
 }  // namespace
 }  // namespace axisd::axisctl
