@@ -10,6 +10,7 @@
 #include <string>
 #include <system_error>
 
+#include "api/axisctl/cell_commands.hpp"
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/follow.hpp"
 #include "api/axisctl/format.hpp"
@@ -27,11 +28,20 @@ namespace {
 
 using google::protobuf::util::TimeUtil;
 
-void list(Invocation& invocation, bool names) {
+struct ListArguments {
+  std::vector<std::string> machines;
+  bool names = false;
+};
+
+void list(Invocation& invocation, const ListArguments& arguments) {
+  if (invocation.of_whole_cell()) return list_cell(invocation, arguments.machines, arguments.names);
+  if (!arguments.machines.empty())
+    throw Failure(ExitCode::usage,
+                  "list shows all axes; 'axisctl state AXIS' shows one, --cell other machines");
   const auto response =
       invocation.client().call(&v1::AxisService::Stub::ListAxes, v1::ListAxesRequest(), std::string_view());
-  if (invocation.json && !names) return print_line(json(response));
-  if (names) {
+  if (invocation.json && !arguments.names) return print_line(json(response));
+  if (arguments.names) {
     for (const auto& state : response.axes()) print_line(state.axis());
     return;
   }
@@ -68,16 +78,20 @@ std::string line_of(const v1::KeptFileState& file) {
   return fmt::format("{:<12}{} at the start of the daemon, {}", file.name() + ":", found, expected);
 }
 
-void kept_state(Invocation& invocation) {
-  const auto response =
-      invocation.client().call(&v1::SystemService::Stub::GetState, v1::GetStateRequest(), std::string_view());
-  if (invocation.json) return print_line(json(response));
+void show(const v1::GetStateResponse& response) {
   for (const auto& file : response.files()) print_line(line_of(file));
   print_line(fmt::format("{:<12}{}", "starts:", response.start_count()));
   if (response.convictions().empty()) return print_line("accepted:   yes");
   for (const auto& conviction : response.convictions())
     print_line(coloured(line_of(conviction), Colour::red, use_colour()));
   print_line("motion waits: look at the machine, then 'axisctl state accept'");
+}
+
+void kept_state(Invocation& invocation) {
+  if (invocation.of_whole_cell()) return show_kept_states(invocation, show);
+  const auto response =
+      invocation.client().call(&v1::SystemService::Stub::GetState, v1::GetStateRequest(), std::string_view());
+  invocation.json ? print_line(json(response)) : show(response);
 }
 
 void accept_state(Invocation& invocation) {
@@ -114,6 +128,10 @@ void watch(Invocation& invocation, const WatchArguments& arguments) {
   for (const auto& axis : arguments.axes) request.add_axes(axis);
   for (const auto& field : arguments.fields) request.mutable_fields()->add_paths(field);
   set(*request.mutable_period(), parse_duration(arguments.period, "--period"));
+  if (invocation.of_whole_cell()) {
+    request.clear_axes();
+    return watch_cell(invocation, arguments.axes, request, arguments.count);
+  }
   std::optional<LiveView> live;
   if (!invocation.json && is_terminal(STDOUT_FILENO)) live.emplace();
   std::uint64_t seen = 0;
@@ -133,15 +151,19 @@ void watch(Invocation& invocation, const WatchArguments& arguments) {
 
 void add_state_commands(CLI::App& app, Invocation& invocation) {
   auto* list_command = app.add_subcommand("list", "All axes, one line each");
-  const auto names = std::make_shared<bool>(false);
-  list_command->add_flag("--names", *names, "Names only, for completion")->group("");
-  list_command->callback([&invocation, names] { list(invocation, *names); });
+  const auto listed = std::make_shared<ListArguments>();
+  list_command->add_option("MACHINE", listed->machines,
+                           "With --cell: only those of these; none: all machines");
+  list_command->add_flag("--names", listed->names, "Names only, for completion")->group("");
+  list_command->callback([&invocation, listed] { list(invocation, *listed); });
 
   auto* state_command = app.add_subcommand(
       "state", "Everything known about an axis; without one: what the daemon keeps over restarts");
   const auto axis = std::make_shared<std::string>();
-  state_command->add_option("AXIS", *axis,
-                            "Name of the axis (of one called 'accept' or 'backup': -- accept)");
+  state_command->add_option(
+      "AXIS", *axis,
+      "Name of the axis (of one called 'accept' or 'backup': -- accept); with --cell also "
+      "of a machine");
   auto* accept_command = state_command->add_subcommand(
       "accept", "Take what the daemon remembers as it is: look at the machine first. Motion waits no longer");
   accept_command->callback([&invocation, axis] {
@@ -159,6 +181,7 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
   state_command->callback([&invocation, accept_command, backup_command, axis] {
     if (accept_command->parsed() || backup_command->parsed()) return;
     if (axis->empty()) return kept_state(invocation);
+    if (invocation.of_whole_cell()) return show_cell_axes(invocation, {*axis});
     const auto state = invocation.state(*axis);
     print(invocation.json ? json(state) + "\n" : state_details(state, use_colour()));
   });
@@ -166,7 +189,8 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
   auto* watch_command =
       app.add_subcommand("watch", "Axes as they move: a live table on a terminal, else a line per tick");
   const auto arguments = std::make_shared<WatchArguments>();
-  watch_command->add_option("AXIS", arguments->axes, "Names of axes; none: all");
+  watch_command->add_option("AXIS", arguments->axes,
+                            "Names of axes, with --cell also of machines; none: all");
   watch_command->add_option("--period", arguments->period, "Time between ticks, 10ms to 60s")
       ->type_name("TIME")
       ->capture_default_str();
@@ -176,7 +200,8 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
       ->delimiter(',')
       ->allow_extra_args(false)  // the words behind are axes
       ->type_name("FIELD,...");
-  watch_command->add_option("--count", arguments->count, "End after so many ticks")->type_name("N");
+  watch_command->add_option("--count", arguments->count, "End after so many ticks, of all machines together")
+      ->type_name("N");
   watch_command->callback([&invocation, arguments] { watch(invocation, *arguments); });
 }
 

@@ -9,10 +9,12 @@
 #include <vector>
 
 #include "api/axisctl/bus_commands.hpp"
+#include "api/axisctl/cell_view.hpp"
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/terminal.hpp"
+#include "axisd/cell/v1/cell_service.grpc.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
 
 namespace axisd::axisctl {
@@ -66,7 +68,17 @@ std::string what_holds(const v1::GetInfoResponse& response) {
   return fmt::format("{}", fmt::join(held, "; "));
 }
 
+/// Of a cell and of the entrance that is asked.
+void cell_info(Invocation& invocation) {
+  const auto response = invocation.client().call(&cell::v1::CellService::Stub::GetCell,
+                                                 cell::v1::GetCellRequest(), std::string_view());
+  if (invocation.json) return print_line(json(response));
+  for (const auto& line : cell_details(response, use_colour())) print_line(line);
+  print_line(fmt::format("axisctl:    {}", AXISD_VERSION));
+}
+
 void info(Invocation& invocation) {
+  if (invocation.of_whole_cell()) return cell_info(invocation);
   const auto response = ask(invocation);
   if (invocation.json) return print_line(json(response));
   const auto held = what_holds(response);
@@ -100,7 +112,7 @@ void add_system_commands(CLI::App& app, Invocation& invocation) {
   app.add_subcommand("buses", "The buses and what went over them")->callback([&invocation] {
     list_buses(invocation);
   });
-  app.add_subcommand("info", "Machine, versions, who you are, whether motion is permitted")
+  app.add_subcommand("info", "Machine, or cell, versions, who you are, whether motion is permitted")
       ->callback([&invocation] { info(invocation); });
   app.add_subcommand("whoami", "Who the daemon takes you for, and what you may do")->callback([&invocation] {
     who_am_i(invocation);

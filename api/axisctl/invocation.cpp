@@ -204,6 +204,7 @@ std::unique_ptr<CLI::App> make_app(Invocation& invocation) {
   add_motion_commands(*app, invocation);
   add_jog_command(*app, invocation);
   add_stop_commands(*app, invocation);
+  add_machine_commands(*app, invocation);
   add_command_commands(*app, invocation);
   add_lease_commands(*app, invocation);
   add_group_commands(*app, invocation);

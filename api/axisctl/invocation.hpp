@@ -46,6 +46,7 @@ void add_motion_commands(CLI::App& app,
                          Invocation& invocation);             ///< enable, disable, home, move, velocity, ...
 void add_jog_command(CLI::App& app, Invocation& invocation);  ///< jog
 void add_stop_commands(CLI::App& app, Invocation& invocation);     ///< halt, stop, quick-stop, release-stop
+void add_machine_commands(CLI::App& app, Invocation& invocation);  ///< machines
 void add_command_commands(CLI::App& app, Invocation& invocation);  ///< command get|watch|cancel
 void add_lease_commands(CLI::App& app, Invocation& invocation);    ///< lease acquire|renew|release|list|hold
 void add_group_commands(CLI::App& app, Invocation& invocation);    ///< group list|move|show|halt|stop
