@@ -1,8 +1,10 @@
 // enable, disable, home, move, velocity, reset, set-position.
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 #include <type_traits>
 
+#include "api/axisctl/across.hpp"
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/motion_arguments.hpp"
@@ -103,15 +105,23 @@ template <class Request, class Response>
 void disable(Invocation& invocation, const MotionArguments& arguments,
              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
   check_request_id(arguments);
+  std::vector<std::optional<v1::Command>> answers(arguments.axes.size());
+  std::vector<std::optional<Failure>> refusals(arguments.axes.size());
+  invocation.client();  // made by one thread
+  for_each_machine(arguments.axes, [&](const std::vector<std::size_t>& indices) {
+    for (const auto i : indices) try {
+        answers[i] = send_simple(invocation, arguments, arguments.axes[i], method, Lane::stop);
+      } catch (const Failure& failure) {
+        refusals[i] = failure;
+      }
+  });
   std::vector<v1::Command> commands;
   auto worst = ExitCode::ok;
-  for (const auto& axis : arguments.axes) {
-    try {
-      commands.push_back(send_simple(invocation, arguments, axis, method, Lane::stop));
-    } catch (const Failure& failure) {
-      complain(failure, invocation.json);
-      worst = failure.code();
-    }
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    if (answers[i]) commands.push_back(*answers[i]);
+    if (!refusals[i]) continue;
+    complain(*refusals[i], invocation.json);
+    worst = refusals[i]->code();
   }
   invocation.status = report(invocation, commands, arguments.wait,
                              {.unit = {}, .start = {}, .several = arguments.axes.size() > 1});

@@ -8,13 +8,15 @@
 #include <utility>
 #include <vector>
 
+#include "api/axisctl/across.hpp"
+#include "api/axisctl/cell_commands.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/hold_view.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "api/axisctl/motion_arguments.hpp"
 #include "api/axisctl/progress.hpp"
 #include "api/axisctl/repetition.hpp"
-#include "api/axisctl/table.hpp"
+#include "api/axisctl/stop_results.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/group_service.pb.h"
@@ -38,20 +40,26 @@ void check_axes(const StopArguments& arguments) {
 }
 
 /// What became of the stop of one axis; neither: it has not been answered yet.
-struct Answer {
+struct AxisAnswer {
   std::optional<v1::Command> command;
   std::optional<Failure> refusal;
 };
 
-/// Each axis in turn, whatever becomes of the others: no stop may be missing because of another one's
-/// trouble. Those that did not reach the daemon are repeated, all together.
+/// A silent machine's failure names the axis already.
+std::string with_lead(const std::string& axis, const Failure& failure) {
+  const std::string text = failure.what();
+  return text.starts_with(axis + ": ") ? text : fmt::format("{}: {}", axis, text);
+}
+
+/// Each axis of a machine in turn, whatever becomes of the others: no stop may be missing because of another
+/// one's trouble. Those that did not reach the daemon are repeated, all together.
 template <class Request, class Response>
-std::vector<Answer> ask_each(const Client& client, const std::vector<Request>& requests,
-                             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
-  std::vector<Answer> answers(requests.size());
+void ask_some(const Client& client, const std::vector<Request>& requests,
+              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+              const std::vector<std::size_t>& indices, std::vector<AxisAnswer>& answers) {
   for (Repetition repetition(client.timeout());;) {
     std::optional<Failure> lost;
-    for (std::size_t i = 0; i < requests.size(); ++i) {
+    for (const auto i : indices) {
       auto& answer = answers[i];
       if (answer.command || (answer.refusal && answer.refusal->code() != ExitCode::unreachable)) continue;
       try {
@@ -63,14 +71,26 @@ std::vector<Answer> ask_each(const Client& client, const std::vector<Request>& r
         if (failure.code() == ExitCode::unreachable) lost = failure;
       }
     }
-    if (!lost) return answers;
+    if (!lost) return;
     if (repetition.again(client, *lost)) continue;
-    for (std::size_t i = 0; i < requests.size(); ++i)
+    for (const auto i : indices)
       if (auto& answer = answers[i]; !answer.command && answer.refusal->code() == ExitCode::unreachable)
-        answer.refusal = repetition.in_vain(
-            answer.refusal->saying(fmt::format("{}: {}", requests[i].axis(), answer.refusal->what())));
-    return answers;
+        answer.refusal =
+            repetition.in_vain(answer.refusal->saying(with_lead(requests[i].axis(), *answer.refusal)));
+    return;
   }
+}
+
+template <class Request, class Response>
+std::vector<AxisAnswer> ask_each(const Client& client, const std::vector<std::string>& axes,
+                                 const std::vector<Request>& requests,
+                                 grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                              Response*)) {
+  std::vector<AxisAnswer> answers(requests.size());
+  for_each_machine(axes, [&](const std::vector<std::size_t>& indices) {
+    ask_some(client, requests, method, indices, answers);
+  });
+  return answers;
 }
 
 template <class Request, class Response>
@@ -89,7 +109,7 @@ void stop_each(Invocation& invocation, const StopArguments& arguments,
   }
   std::vector<v1::Command> commands;
   ExitCode worst = ExitCode::ok;
-  for (auto& answer : ask_each(invocation.client(), requests, method)) {
+  for (auto& answer : ask_each(invocation.client(), arguments.axes, requests, method)) {
     if (answer.command) {
       commands.push_back(*std::move(answer.command));
     } else {
@@ -107,6 +127,7 @@ void stop_each(Invocation& invocation, const StopArguments& arguments,
 }
 
 void stop_all(Invocation& invocation, bool wait) {
+  if (invocation.of_whole_cell()) return stop_cell(invocation, wait);
   v1::StopAllRequest request;
   request.set_wait_until(wait ? v1::WAIT_UNTIL_DONE : v1::WAIT_UNTIL_ACCEPTED);
   const auto call = &v1::SystemService::Stub::StopAll;
@@ -114,20 +135,9 @@ void stop_all(Invocation& invocation, bool wait) {
   const auto response =
       repeat_stop(invocation.client(), call, request, "", invocation.client().timeout(), wait);
   if (invocation.json) print_line(json(response));
-  for (const auto& result : response.results()) {
-    const bool failed = result.has_error() || outcome(result.command()) != ExitCode::ok;
-    if (failed) invocation.status = ExitCode::ended_otherwise;
-    if (invocation.json) continue;
-    print_line(result.has_error()
-                   ? coloured(fmt::format("{}: {}", result.axis(), describe(result.error(), result.axis())),
-                              Colour::red, use_colour())
-                   : command_line(result.command(), ""));
-  }
+  print_results(invocation, response, Results::all);
   if (!invocation.json) print_line("all motion is refused until 'axisctl release-stop --all'");
-  if (!response.has_not_durable()) return;
-  complain({ExitCode::ended_otherwise, describe(response.not_durable()), response.not_durable()},
-           invocation.json);
-  invocation.status = ExitCode::ended_otherwise;
+  complain_of_latch(invocation, response);
 }
 
 template <class Request, class Response>
@@ -148,6 +158,7 @@ CLI::App* add(CLI::App& app, Invocation& invocation, const std::shared_ptr<StopA
 }
 
 void release_all(Invocation& invocation) {
+  if (invocation.of_whole_cell()) return release_cell(invocation);
   const auto response = invocation.client().call(&v1::SystemService::Stub::ReleaseStopAll,
                                                  v1::ReleaseStopAllRequest(), std::string_view());
   print_line(invocation.json ? json(response) : "released; every axis needs a new command to move");
@@ -202,7 +213,9 @@ void add_stop_commands(CLI::App& app, Invocation& invocation) {
           "Decelerate; nothing takes over before standstill. An operational stop, without safety rating",
           &Stub::Stop);
   stop->get_option("AXIS")->required(false);
-  stop->add_flag("--all", stopping->all, "Stop every axis and refuse all motion until release-stop --all");
+  stop->add_flag(
+      "--all", stopping->all,
+      "Stop every axis, with --cell of every machine, and refuse all motion until release-stop --all");
   stop->callback([&invocation, stopping] {
     check_axes(*stopping);
     if (stopping->all) return stop_all(invocation, stopping->wait);
