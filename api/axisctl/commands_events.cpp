@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "api/axisctl/cell_events.hpp"
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/event_text.hpp"
 #include "api/axisctl/follow.hpp"
@@ -61,7 +62,29 @@ void show(const Invocation& invocation, const v1::WatchEventsResponse& batch,
     if (event.at() >= from) print_line(invocation.json ? json(event) : event_line(event));
 }
 
+void events_of_cell(Invocation& invocation, const Arguments& arguments) {
+  CellEventQuery query{.words = arguments.axes, .machines = {}, .from = {}, .follow = arguments.follow};
+  query.of_cell = arguments.axes.empty() && arguments.kinds.empty();
+  for (const auto& kind : arguments.kinds) {
+    if (kind == "cell")
+      query.of_cell = true;
+    else
+      query.machines.add_kinds(parse_event_kind(kind));
+  }
+  query.of_machines = arguments.kinds.empty() || !query.machines.kinds().empty();
+  if (arguments.since != "now") query.machines.set_after_sequence(0);
+  if (!arguments.since.empty() && arguments.since != "now") {
+    const auto when = parse_since(arguments.since, "--since");
+    if (when.number)
+      throw Failure(ExitCode::usage,
+                    "--since: each machine counts its own events; give a time, or --machine");
+    set_ahead(query.from, -when.ago);
+  }
+  cell_events(invocation, query);
+}
+
 void events(Invocation& invocation, const Arguments& arguments) {
+  if (invocation.of_whole_cell()) return events_of_cell(invocation, arguments);
   const auto query = query_of(invocation, arguments);
   follow<v1::WatchEventsResponse>(invocation.client(), &v1::EventService::Stub::WatchEvents, query.request,
                                   arguments.axes.size() == 1 ? arguments.axes.front() : "",
@@ -80,12 +103,12 @@ void add_event_commands(CLI::App& app, Invocation& invocation) {
       "leases, held stops, commands, faults, the kept state, StopAll, certificates, writes to "
       "EEPROMs");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("AXIS", arguments->axes, "Names of axes; none: all");
+  command->add_option("AXIS", arguments->axes, "Names of axes, with --cell also of machines; none: all");
   command
       ->add_option(
           "--kind", arguments->kinds,
           "terminal, state, link, configuration, configuration-reloaded, flight, lease, stop, command, "
-          "axis-fault, kept-state, inhibit, certificate, eeprom; several with commas")
+          "axis-fault, kept-state, inhibit, certificate, eeprom, and with --cell cell; several with commas")
       ->type_name("KIND,...")
       ->delimiter(',');
   command->add_flag("--follow", arguments->follow, "Go on with new events until Ctrl-C");
