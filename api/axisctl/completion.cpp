@@ -107,6 +107,7 @@ void complete_names(const CLI::App& command, const std::string& name,
   if (name == "BUS") place.names = Names::buses;
   if (name == "GROUP") place.names = Names::groups;
   if (name == "DEVICE") place.names = Names::devices;
+  if (name == "MACHINE") place.names = Names::machines;
   if (name == "FILE" || name == "PATH") place.names = Names::files;
   const bool assigns = name == "TARGET" || name == "NAME=VALUE";
   if (assigns && place.typed.find('=') != std::string::npos) return;
@@ -125,6 +126,7 @@ void complete_value(const CLI::App& command, const CLI::Option& option,
   if (name == "KIND,...") {
     for (const auto& kind : command.get_name() == "audit" ? audit_kinds() : event_kinds())
       place.words.push_back({kind, ""});
+    if (command.get_name() == "events") place.words.push_back({"cell", ""});
     if (const auto comma = place.typed.rfind(','); comma != std::string::npos) {
       place.before += place.typed.substr(0, comma + 1);
       place.typed.erase(0, comma + 1);

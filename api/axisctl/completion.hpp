@@ -23,6 +23,7 @@ enum class Names : std::uint8_t {
   buses,
   groups,
   devices,
+  machines,
   device_values,  ///< of the device `subject`
   parameters,     ///< of the axis `subject`
   files           ///< by the shell

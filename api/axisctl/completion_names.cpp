@@ -9,7 +9,9 @@
 
 #include "api/axisctl/completion.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/terminal.hpp"
+#include "axisd/cell/v1/cell_service.grpc.pb.h"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/bus_service.grpc.pb.h"
 #include "axisd/v1/drive_service.grpc.pb.h"
@@ -24,6 +26,18 @@ void add_axes(const Client& client, const std::string& behind, std::vector<Candi
   const auto response =
       client.call(&v1::AxisService::Stub::ListAxes, v1::ListAxesRequest(), std::string_view());
   for (const auto& axis : response.axes()) names.push_back({axis.axis() + behind, ""});
+}
+
+/// Of a whole cell: its entrance knows them, and no machine is asked.
+void add_of_cell(const Client& client, const Place& place, std::vector<Candidate>& names) {
+  const auto response = client.call(&cell::v1::CellService::Stub::ListMachines,
+                                    cell::v1::ListMachinesRequest(), std::string_view());
+  for (const auto& machine : response.machines()) {
+    if (place.names == Names::machines) names.push_back({machine.name(), ""});
+    if (place.names == Names::machines) continue;
+    for (const auto& axis : machine.axes())
+      names.push_back({fmt::format("{}/{}{}", machine.name(), axis, place.behind), ""});
+  }
 }
 
 void add_buses(const Client& client, std::vector<Candidate>& names) {
@@ -57,8 +71,25 @@ void add_parameters(const Client& client, const Place& place, std::vector<Candid
     names.push_back({parameter.name() + place.behind, parameter.description()});
 }
 
+/// What is typed names the machine, or nothing does: then only axes and machines are known.
+void add_names(const Client& client, const Place& place, std::vector<Candidate>& names);
+
+void add_names_in_cell(const Client& client, const Place& place, std::vector<Candidate>& names) {
+  const bool of_machines = place.names == Names::machines;
+  if (!of_machines && !client.connection().machine.empty()) return add_names(client, place, names);
+  const bool of_subject = place.names == Names::parameters || place.names == Names::device_values;
+  if (const std::string machine(machine_in(of_subject ? place.subject : place.typed));
+      !of_machines && !machine.empty())
+    return add_names(client.at(machine), place, names);
+  if (of_machines || place.names == Names::axes || place.names == Names::targets ||
+      place.names == Names::axes_and_groups)
+    add_of_cell(client, place, names);
+}
+
 void add_names(const Client& client, const Place& place, std::vector<Candidate>& names) {
   switch (place.names) {
+    case Names::machines:
+      return;
     case Names::none:
     case Names::files:
       return;
@@ -91,9 +122,13 @@ std::optional<std::vector<Candidate>> candidates(const Place& place) {
       Invocation invocation;
       const auto app = make_app(invocation);  // reads the environment, too
       app->require_subcommand(0);
-      app->parse(std::vector<std::string>(place.connection.rbegin(), place.connection.rend()));
+      execute(*app, place.connection);
       invocation.timeout = patience;
-      add_names(invocation.client(), place, names);
+      const auto& client = invocation.client();
+      if (client.connection().through_entrance())
+        add_names_in_cell(client, place, names);
+      else
+        add_names(client, place, names);
     } catch (const std::exception&) {
       names.clear();  // half a list would look like a whole one
     }

@@ -82,6 +82,14 @@ TEST_F(Completion, KeepsWhatSaysWhereTheDaemonIs) {
               ElementsAre("--server", "press-1:7443", "--tls-ca", "ca.crt"));
 }
 
+TEST_F(Completion, KeepsWhichCellAndMachine) {
+  EXPECT_THAT(at({"--cell=press-1", "--machine", "press-2", "move", ""}).connection,
+              ElementsAre("--cell", "press-1", "--machine", "press-2"));
+  EXPECT_EQ(at({"--machine", ""}).names, Names::machines);
+  EXPECT_EQ(at({"list", ""}).names, Names::machines);
+  EXPECT_EQ(at({"move", "press-2/"}).names, Names::axes);
+}
+
 TEST_F(Completion, HasAScriptForEachShell) {
   for (const auto& shell : completion_shells())
     EXPECT_NE(completion_script(shell).find("complete-words"), std::string::npos) << shell;
