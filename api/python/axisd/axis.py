@@ -39,14 +39,17 @@ class Axis:
         self.drive = Drive(machine, name, lease_token)
 
     def __repr__(self) -> str:
-        return f"Axis({self.name!r} at {self._machine.server})"
+        member = self._machine._member
+        return f"Axis({f'{member}/{self.name}' if member else self.name!r} at {self._machine.server})"
 
     async def _command(self, method: Any, request: Any, wait: bool) -> Command:
         request.options.lease_token = self._lease_token
-        return done(Command.of((await self._machine._call(method, request, self.name, wait)).command))
+        answer = await self._machine._call(method, request, self.name, wait)
+        return done(Command.of(answer.command), self._machine._member or "")
 
     async def _stop(self, method: Any, request: Any, wait: bool) -> Command:
-        return done(Command.of((await self._machine._stop_call(method, request, self.name, wait)).command))
+        answer = await self._machine._stop_call(method, request, self.name, wait)
+        return done(Command.of(answer.command), self._machine._member or "")
 
     async def state(self) -> AxisState:
         """The latest state, without touching the bus."""
@@ -272,6 +275,6 @@ class Jog:
         # Three renewals per hold: two may be late or lost before the axis halts.
         while True:
             await asyncio.sleep(self._hold / 3)
-            self.command = done(await self._call())
+            self.command = await self._call()
             if self.command.state.ended:
                 return

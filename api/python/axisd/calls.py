@@ -43,8 +43,8 @@ def command_options(request_id: str | None, wait: bool, buffered: bool = False) 
         buffer_mode=types_pb2.BUFFER_MODE_BUFFERED if buffered else types_pb2.BUFFER_MODE_UNSPECIFIED)
 
 
-def done(command: Command) -> Command:
-    """The command, unless it ended otherwise than Done: then MotionError."""
+def done(command: Command, machine: str = "") -> Command:
+    """The command, unless it ended otherwise than Done: then MotionError. `machine`: of a cell."""
     if command.state.ended and command.state is not CommandState.DONE:
-        raise MotionError(command)
+        raise MotionError(command, machine)
     return command

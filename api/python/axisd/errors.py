@@ -4,7 +4,7 @@ from __future__ import annotations
 import grpc
 import grpc.aio
 
-from .reasons import Reason
+from .reasons import Outcome, Reason
 from .types import Command, ErrorDetail, StopResult
 from .v1 import error_pb2
 
@@ -82,13 +82,15 @@ class LeaseLostError(AxisdError):
 
 
 class MotionError(AxisdError):
-    """A motion was accepted and ended Aborted, Error or Unknown. `command` is how it ended."""
+    """A motion was accepted and ended Aborted, Error or Unknown. `command` is how it ended; `machine`: where, in a cell."""
 
-    def __init__(self, command: Command) -> None:
+    def __init__(self, command: Command, machine: str = "") -> None:
         # The daemon's text may name the axis as well; once is enough.
         cause = ": " + str(command.cause).removeprefix(f"{command.axis}: ") if command.cause else ""
-        super().__init__(f"{command.axis}: {command.kind} {command.state.value}{cause}")
+        axis = f"{machine}/{command.axis}" if machine else command.axis
+        super().__init__(f"{axis}: {command.kind} {command.state.value}{cause}")
         self.command = command
+        self.machine = machine
 
     @property
     def reason(self) -> Reason:
@@ -110,16 +112,32 @@ def detail_of(error: grpc.aio.AioRpcError) -> ErrorDetail | None:
     return None
 
 
-def translate(error: grpc.aio.AioRpcError, subject: str, server: str, request_id: str = "") -> AxisdError:
-    """The error of this package for one of gRPC."""
+def _is_silent_machine(error: grpc.aio.AioRpcError, detail: ErrorDetail) -> bool:
+    """The entrance's word for a machine that does not answer; of a drive the bus and the node are told as well."""
+    return (error.code() is grpc.StatusCode.UNAVAILABLE and detail.reason is Reason.OFFLINE and not detail.bus
+            and detail.node is None)
+
+
+def translate(error: grpc.aio.AioRpcError, subject: str, server: str, request_id: str = "",
+              machine: str | None = None) -> AxisdError:
+    """The error of this package for one of gRPC. `machine`: what was asked through the entrance of a cell; empty: the
+    entrance itself; None: a daemon was asked."""
     detail = detail_of(error)
+    bare = f"{subject}: " if subject else ""
+    if machine:
+        subject = f"{machine}/{subject}" if subject else machine
     lead = f"{subject}: " if subject else ""
     text = error.details() or error.code().name
+    if detail is not None and machine is not None and _is_silent_machine(error, detail):
+        return UnreachableError(f"{lead}{str(detail).removeprefix(lead).removeprefix(f'{machine}: ')}", request_id,
+                                detail.outcome is Outcome.NOT_SENT)
     if detail is None and error.code() in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED):
         unsent = error.code() is grpc.StatusCode.UNAVAILABLE and text.startswith(_NEVER_CONNECTED)
-        return UnreachableError(f"{lead}no answer from axisd at {server}: {text}"
+        asked = "axisd" if machine is None else "axisd-cell"
+        return UnreachableError(f"{lead}no answer from {asked} at {server}: {text}"
                                 + ("; nothing was sent" if unsent else ""), request_id, unsent)
     if detail is not None and detail.reason is Reason.CANCELLED and error.code() is grpc.StatusCode.UNAVAILABLE:
         return UnreachableError(f"{lead}{detail}", request_id)  # the daemon's end cut the call off
-    text = str(detail or error.details()).removeprefix(lead)  # the daemon's text may name the axis as well
+    # The daemon's text may name the axis as well.
+    text = str(detail or error.details()).removeprefix(lead).removeprefix(bare)
     return RefusedError(lead + text, error.code(), detail)

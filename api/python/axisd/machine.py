@@ -53,6 +53,13 @@ _OPTIONS = (
 )
 
 
+def channel_to(address: str, credentials: grpc.ChannelCredentials | None) -> grpc.aio.Channel:
+    """With a connection of its own, made by the first call."""
+    if credentials is None:
+        return grpc.aio.insecure_channel(address, options=_OPTIONS)
+    return grpc.aio.secure_channel(address, credentials, options=_OPTIONS)
+
+
 # Between two attempts of a stop (s).
 _FIRST_PAUSE = 0.05
 _LONGEST_PAUSE = 0.5
@@ -98,12 +105,18 @@ class Machine:
         self._metadata = tuple((key, value) for key, value in claim.items() if value is not None)
         self._channels: list[grpc.aio.Channel] = []
         self._holds = Holds()
+        self._member: str | None = None
+        """Its name in a cell, whose entrance `server` is."""
 
     async def __aenter__(self) -> Machine:
-        ordinary, stops = self._channel(self.server), self._channel(self.server)
+        ordinary, stops = (channel_to(self.server, self._credentials) for _ in range(2))
         address = self.stop_server or stop_lane_of(self.server)
-        lane = self._channel(address) if address is not None else None
+        lane = channel_to(address, self._credentials) if address is not None else None
         self._channels = [channel for channel in (ordinary, stops, lane) if channel is not None]
+        self._use(ordinary, stops, lane)
+        return self
+
+    def _use(self, ordinary: grpc.aio.Channel, stops: grpc.aio.Channel, lane: grpc.aio.Channel | None) -> None:
         self._axes = axis_service_pb2_grpc.AxisServiceStub(ordinary)
         self._commands = command_service_pb2_grpc.CommandServiceStub(ordinary)
         self._buses = bus_service_pb2_grpc.BusServiceStub(ordinary)
@@ -114,17 +127,11 @@ class Machine:
         self._groups = group_service_pb2_grpc.GroupServiceStub(ordinary)
         self._system = system_service_pb2_grpc.SystemServiceStub(ordinary)
         self._stops = StopCalls(StopLane(lane), stops)
-        return self
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
                         traceback: TracebackType | None) -> None:
         for channel in self._channels:
             await channel.close()
-
-    def _channel(self, address: str) -> grpc.aio.Channel:
-        if self._credentials is None:
-            return grpc.aio.insecure_channel(address, options=_OPTIONS)
-        return grpc.aio.secure_channel(address, self._credentials, options=_OPTIONS)
 
     async def _in_words(self, error: UnreachableError, subject: str) -> UnreachableError:
         """The same error, with what is wrong with the certificates where it is that: behind its own words where something
@@ -138,7 +145,8 @@ class Machine:
         if not error.nothing_sent:
             return UnreachableError(f"{error}; {why}", error.request_id)
         lead = f"{subject}: " if subject else ""
-        return UnreachableError(f"{lead}cannot reach axisd at {self.server}: {why}", error.request_id,
+        asked = "axisd" if self._member is None else "axisd-cell"
+        return UnreachableError(f"{lead}cannot reach {asked} at {self.server}: {why}", error.request_id,
                                 error.nothing_sent)
 
     async def _call(self, method: Any, request: Any, subject: str, wait: bool = False,
@@ -155,7 +163,7 @@ class Machine:
         except grpc.aio.AioRpcError as error:
             options = getattr(request, "options", None)
             request_id = options.request_id if options is not None else ""
-            raise translate(error, subject, self.server, request_id) from None
+            raise translate(error, subject, self.server, request_id, self._member) from None
 
     async def _stop_call(self, method: Any, request: Any, subject: str, wait: bool = False) -> Any:
         """A stop: repeated as it is, until one call is answered or `timeout` is over. To stop twice is harmless."""
@@ -186,7 +194,7 @@ class Machine:
             async for message in call:
                 yield message
         except grpc.aio.AioRpcError as error:
-            failure = translate(error, subject, self.server)
+            failure = translate(error, subject, self.server, machine=self._member)
             if isinstance(failure, UnreachableError):
                 failure = await self._in_words(failure, subject)
             raise failure from None
@@ -245,7 +253,7 @@ class Machine:
         async with contextlib.aclosing(self.watch_command(command.id)) as changes:
             async for latest in changes:
                 if latest.state.ended:
-                    return done(latest)
+                    return done(latest, self._member or "")
         raise AxisdError(f"{command.axis}: the daemon ended the stream before command {command.id} had ended")
 
     async def cancel(self, command_id: str) -> Command:
