@@ -1,4 +1,4 @@
-"""Generates the stubs of axisd.v1 with protoc. Used by setup.py and by tests; needs no network."""
+"""Generates the stubs of axisd.v1 and axisd.cell.v1 with protoc. Used by setup.py and by tests; needs no network."""
 import pathlib
 import shutil
 import subprocess
@@ -17,8 +17,9 @@ def program(name: str) -> str:
 
 
 def generate(directory: pathlib.Path) -> None:
-    """Writes axisd/v1/*_pb2.py, *_pb2.pyi and *_pb2_grpc.py below `directory`."""
-    protos = sorted(str(path.relative_to(PROTO)) for path in PROTO.glob("axisd/v1/*.proto"))
+    """Writes axisd/v1/*_pb2.py, *_pb2.pyi and *_pb2_grpc.py below `directory`, and those of axisd/cell/v1."""
+    packages = ("axisd/v1", "axisd/cell/v1")
+    protos = sorted(str(path.relative_to(PROTO)) for package in packages for path in PROTO.glob(f"{package}/*.proto"))
     if not protos:
         raise SystemExit(f"no .proto files below {PROTO}: build inside the repository")
     directory = directory.resolve()  # protoc runs elsewhere
@@ -27,7 +28,8 @@ def generate(directory: pathlib.Path) -> None:
         [program("protoc"), f"-I{PROTO}", f"--python_out={directory}", f"--pyi_out={directory}",
          f"--grpc_out={directory}", f"--plugin=protoc-gen-grpc={program('grpc_python_plugin')}", *protos],
         check=True, cwd=PROTO)
-    (directory / "axisd" / "v1" / "__init__.py").touch()
+    for package in (*packages, "axisd/cell"):
+        (directory / package / "__init__.py").touch()
 
 
 if __name__ == "__main__":

@@ -5,10 +5,17 @@
         await feeder.enable()
         await feeder.home()
         await feeder.move(120, velocity=50)
+
+    async with axisd.connect_cell("press-1:7445") as cell:
+        await cell.axis("press-2/feeder").move(120)
 """
 from .audit import AuditRecord
 from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
+from .cell_lease import CellLease
+from .cell_types import (CellEvent, CellInfo, CellMachine, CellReleased, CellStopped, MachineOutcome, MachineRelease, MachineState,
+                         MachineStop, Registry, StopAllLatch)
+from .cells import Cell, MemberMachine, connect_cell
 from .configuration import ConfigChange, ConfigCheck, ConfigFinding, Configuration, Reload
 from .drive import Drive
 from .drives import (Alarm, AxisFault, CertificateNotice, CommandChange, ConfigurationDrift, ConfigurationReloaded, Cursor, Device, DriveInfo, EepromWritten, Event, FlightRecordWritten, FoundNode,
@@ -29,13 +36,14 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 
 __all__ = [
     "Alarm", "AllStopped", "ArgumentError", "AuditRecord", "Axis", "AxisBudget", "AxisFault", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
+    "Cell", "CellEvent", "CellInfo", "CellLease", "CellMachine", "CellReleased", "CellStopped",
     "CertificateNotice", "ClassStatistics", "Command", "CommandChange", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
     "ConfigurationDrift", "ConfigurationReloaded", "Conviction", "Cursor", "Device", "Drive", "DriveInfo",
     "EepromWritten", "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "InhibitChange", "Jog", "KeptFile", "KeptState", "KeptStateChange", "Latency", "Lease",
-    "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MotionCause", "MotionError",
+    "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MachineOutcome", "MachineRelease", "MachineState", "MachineStop", "MemberMachine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle", "Outcome",
-    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Reload", "Role", "ScanProgress", "Segments",
-    "SerialProgress", "State", "StateChange", "StopBudget", "StopError", "StopHold", "StopHoldChange", "StopResult", "Terminal", "TerminalCapability",
-    "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect",
+    "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Registry", "Reload", "Role", "ScanProgress", "Segments",
+    "SerialProgress", "State", "StateChange", "StopAllLatch", "StopBudget", "StopError", "StopHold", "StopHoldChange", "StopResult", "Terminal", "TerminalCapability",
+    "TerminalEdge", "Tick", "TracedFrame", "Trust", "UnknownOutcomes", "UnreachableError", "VelocitySegment", "connect", "connect_cell",
 ]
