@@ -1,0 +1,210 @@
+"""A cell of fake machines for tests of clients: an entrance that passes calls on as bytes and serves CellService, for what
+real machines do not do when a test wants it: falling silent, answering late, refusing."""
+import asyncio
+import threading
+
+import grpc
+import grpc.aio
+
+import fake_server  # makes axisd importable
+from fake_axis import refuse
+from axisd.cell.v1 import cell_service_pb2 as pb, cell_service_pb2_grpc as rpc
+from axisd.v1 import error_pb2, system_service_pb2 as system_pb
+
+OWN = "press-1"
+
+
+def silence(name):
+    return error_pb2.ErrorDetail(reason=error_pb2.REASON_OFFLINE, message=f"{name}: does not answer: connection refused",
+                                 remedy="look at the machine", outcome=error_pb2.OUTCOME_NOT_SENT)
+
+
+class Forwarder(grpc.GenericRpcHandler):
+    def __init__(self, cell):
+        self._cell = cell
+
+    def service(self, details):
+        if details.method.startswith("/axisd.cell.v1."):
+            return None
+        asked = dict(details.invocation_metadata)
+
+        async def forward(requests, context):
+            name = asked.get("axisd-machine", OWN)
+            self._cell.forwarded.append((name, details.method.rpartition("/")[2]))
+            if name not in self._cell.machines:
+                await refuse(context, grpc.StatusCode.NOT_FOUND, error_pb2.ErrorDetail(
+                    reason=error_pb2.REASON_INVALID_ARGUMENT, message=f"there is no machine '{name}'",
+                    remedy="axisctl machines shows those of the cell"))
+            if (arrived := self._cell.holding.get((name, details.method.rpartition("/")[2]))) is not None:
+                arrived.set()
+                await asyncio.Event().wait()
+            if name in self._cell.silent:
+                await refuse(context, grpc.StatusCode.UNAVAILABLE, silence(name))
+            call = self._cell.channels[name].stream_stream(details.method)(requests)
+            self._cell.open.setdefault(name, []).append(call)
+            try:
+                async for message in call:
+                    yield message
+            except grpc.aio.AioRpcError as error:
+                await context.abort(error.code(), error.details(), tuple(error.trailing_metadata() or ()))
+            except asyncio.CancelledError:
+                if name not in self._cell.silent:
+                    raise
+                await refuse(context, grpc.StatusCode.UNAVAILABLE, silence(name))
+            finally:
+                call.cancel()
+        return grpc.stream_stream_rpc_method_handler(forward)
+
+
+class FakeCell(rpc.CellServiceServicer):
+    """`machines`: FakeMachine by name. `silent`: names of those that do not answer. `forwarded`: (machine, method).
+    `holding`: events by (machine, method) of calls that are never answered, set when one has come."""
+
+    def __init__(self, names):
+        self.machines = {name: fake_server.FakeMachine() for name in names}
+        self.silent, self.forwarded, self.channels, self.open, self.reasons = set(), [], {}, {}, []
+        self.changed = asyncio.Condition()
+        self.changes, self.events, self.latches = [], [], []
+        self.not_shared = None
+        self.holding = {}
+
+    async def serve(self):
+        """Returns the servers, the entrance's first, and its port."""
+        entrance = grpc.aio.server(options=(("grpc.http2.min_recv_ping_interval_without_data_ms", 900),
+                                            ("grpc.http2.max_ping_strikes", 0)))
+        entrance.add_generic_rpc_handlers((Forwarder(self),))
+        rpc.add_CellServiceServicer_to_server(self, entrance)
+        servers = [entrance]
+        for name, machine in self.machines.items():
+            server, port = await fake_server.serve(machine, ["127.0.0.1:0"])
+            servers.append(server)
+            self.channels[name] = grpc.aio.insecure_channel(
+                f"127.0.0.1:{port}", options=(("grpc.use_local_subchannel_pool", 1),))
+        port = entrance.add_insecure_port("127.0.0.1:0")
+        await entrance.start()
+        return servers, port
+
+    def message(self, name):
+        machine = self.machines[name]
+        state = "SILENT" if name in self.silent else "PRESENT"
+        told = pb.Machine(name=name, axisd_address=f"{name}:7443", axes=list(machine.axes), version="0.1.0",
+                          state=f"MACHINE_STATE_{state}", stop_all=machine.inhibited, own=name == OWN,
+                          trouble="connection refused" if name in self.silent else "")
+        told.since.FromSeconds(1_800_000_000)
+        if name not in self.silent:
+            told.round_trip.FromNanoseconds(400_000)
+        return told
+
+    async def fall_silent(self, name):
+        """The machine answers no more, and what is open to it ends."""
+        self.silent.add(name)
+        for call in self.open.pop(name, ()):
+            call.cancel()
+        await self.happen(name, "present -> silent: connection refused")
+
+    async def come_back(self, name):
+        self.silent.discard(name)
+        await self.happen(name, "silent -> present")
+
+    async def happen(self, name, text):
+        event = pb.CellEvent(sequence=len(self.events) + 1, kind=pb.CELL_EVENT_KIND_MACHINE, machine=name, text=text)
+        event.at.GetCurrentTime()
+        self.events.append(event)
+        async with self.changed:
+            self.changes.append(name)
+            self.changed.notify_all()
+
+    async def GetCell(self, request, context):
+        return pb.GetCellResponse(cell="hall-1", machine=OWN, version="0.1.0", instance_id="fake", client="anna",
+                                  registry=pb.REGISTRY_STATE_OK, stop_all=self.latches)
+
+    async def ListMachines(self, request, context):
+        return pb.ListMachinesResponse(machines=[self.message(name) for name in self.machines])
+
+    async def WatchMachines(self, request, context):
+        seen = len(self.changes)  # before the first message: what comes while it is sent counts
+        yield pb.WatchMachinesResponse(machines=[self.message(name) for name in self.machines])
+        while True:
+            async with self.changed:
+                await self.changed.wait_for(lambda: len(self.changes) > seen)
+            names, seen = self.changes[seen:], len(self.changes)
+            yield pb.WatchMachinesResponse(machines=[self.message(name) for name in dict.fromkeys(names)])
+
+    async def StopAll(self, request, context):
+        self.reasons.append(request.reason)
+        self.latches = [pb.StopAllLatch(id="1", by="anna", entrance=OWN, reason=request.reason)]
+        response = pb.StopAllResponse(latch=self.latches[0], not_shared=self.not_shared)
+        for name, machine in self.machines.items():
+            stop = response.machines.add(machine=name)
+            if name in self.silent:
+                stop.outcome = pb.MACHINE_OUTCOME_SILENT
+                stop.error.CopyFrom(silence(name))
+                continue
+            stop.outcome = pb.MACHINE_OUTCOME_DONE
+            stop.took.FromNanoseconds(2_000_000)
+            call = self.channels[name].unary_unary(
+                "/axisd.v1.SystemService/StopAll", request_serializer=system_pb.StopAllRequest.SerializeToString,
+                response_deserializer=system_pb.StopAllResponse.FromString)
+            stop.response.CopyFrom(await call(system_pb.StopAllRequest()))
+            del stop.response.results[2:]  # without those that cannot stop
+        return response
+
+    async def ReleaseStopAll(self, request, context):
+        response = pb.ReleaseStopAllResponse(released=self.latches)
+        self.latches = []
+        for name, machine in self.machines.items():
+            release = response.machines.add(machine=name)
+            if name in self.silent:
+                release.outcome = pb.MACHINE_OUTCOME_SILENT
+                release.error.CopyFrom(silence(name))
+                continue
+            machine.inhibited = False
+            release.outcome = pb.MACHINE_OUTCOME_DONE
+        return response
+
+    async def WatchEvents(self, request, context):
+        cursor = request.after_sequence if request.HasField("after_sequence") else len(self.events)
+        first = True
+        while True:
+            events = self.events[cursor:]
+            if events or first:
+                cursor, first = len(self.events), False
+                yield pb.WatchEventsResponse(instance_id="fake", events=events, cursor=cursor, newest=cursor)
+            await asyncio.sleep(0.01)
+
+
+class ThreadedCell:
+    """The same on a thread of its own."""
+
+    def __init__(self, names):
+        self._names = names
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
+
+    def __enter__(self):
+        self._thread.start()
+        if not self._ready.wait(60):
+            raise RuntimeError("the fake cell did not start")
+        return self
+
+    def __exit__(self, *_):
+        self._loop.call_soon_threadsafe(self._end.set)
+        self._thread.join(30)
+
+    async def _main(self):
+        self._loop = asyncio.get_running_loop()
+        self._end = asyncio.Event()
+        self.cell = FakeCell(self._names)
+        servers, port = await self.cell.serve()
+        self.address = f"127.0.0.1:{port}"
+        self._ready.set()
+        await self._end.wait()
+        for server in servers:
+            await server.stop(0)
+
+    def do(self, coroutine):
+        """On the cell's own thread."""
+        return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(60)
+
+    def calls(self, machine, method):
+        return [request for name, request, _ in self.cell.machines[machine].calls if name == method]
