@@ -58,7 +58,8 @@ class Forwarder(grpc.GenericRpcHandler):
 
 class FakeCell(rpc.CellServiceServicer):
     """`machines`: FakeMachine by name. `silent`: names of those that do not answer. `forwarded`: (machine, method).
-    `holding`: events by (machine, method) of calls that are never answered, set when one has come."""
+    `holding`: events by (machine, method) of calls that are never answered, set when one has come. `readers`:
+    of events of the cell, so far."""
 
     def __init__(self, names):
         self.machines = {name: fake_server.FakeMachine() for name in names}
@@ -66,7 +67,7 @@ class FakeCell(rpc.CellServiceServicer):
         self.changed = asyncio.Condition()
         self.changes, self.events, self.latches = [], [], []
         self.not_shared = None
-        self.holding = {}
+        self.holding, self.readers = {}, 0
 
     async def serve(self):
         """Returns the servers, the entrance's first, and its port."""
@@ -164,6 +165,7 @@ class FakeCell(rpc.CellServiceServicer):
 
     async def WatchEvents(self, request, context):
         cursor = request.after_sequence if request.HasField("after_sequence") else len(self.events)
+        self.readers += 1
         first = True
         while True:
             events = self.events[cursor:]

@@ -210,14 +210,18 @@ class Across(CellTest):
 
     def test_events_as_they_come(self):
         following = self.start("events", "--follow", "--since", "now")
-        while len(self.forwarded("WatchEvents")) < 3:
+        while not self.cell.readers or not all(self.fake.calls(name, "WatchEvents") for name in MACHINES):
             time.sleep(0.01)
-        self.cell.machines["press-2"].happen("feeder", configuration_drift={"drift": "X1 has no function"})
+        self.fake.do(self.drift("press-2"))
         self.assertIn("press-2/feeder", self.read_until(following.stdout, "X1 has no function"))
         self.fake.do(self.cell.fall_silent("press-3"))
         self.read_until(following.stdout, "press-3  present -> silent")
         following.send_signal(signal.SIGINT)
         self.assertEqual(following.wait(LIMIT), 0)
+
+
+    async def drift(self, name):
+        self.cell.machines[name].happen("feeder", configuration_drift={"text": "X1 has no function"})
 
 
 class Machines(CellTest):
