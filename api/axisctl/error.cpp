@@ -145,8 +145,8 @@ std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status) {
 
 std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
   std::string message = detail.message();
-  // A machine does not know that it is named before its axes.
-  for (const auto& name : {subject, without_machine(subject)})
+  // Of an axis of a cell a machine says its own name, and the entrance that of the machine.
+  for (const auto& name : {subject, without_machine(subject), machine_in(subject)})
     if (const std::string lead = fmt::format("{}: ", name); message.starts_with(lead))
       message.erase(0, lead.size());
   std::string text;

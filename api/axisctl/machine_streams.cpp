@@ -70,19 +70,20 @@ void MachineStreams::follow(const std::string& name) {
       open_[name].context = nullptr;
       if (ended_) return;
     }
+    if (failure.code() != ExitCode::unreachable) return refused(name, failure);
     note(name, failure);
-    if (failure.code() != ExitCode::unreachable) {
-      // Of all machines the others go on.
-      if (!selection_.everything()) {
-        const std::lock_guard lock(mutex_);
-        refusal_ = failure;
-      }
-      if (!selection_.everything()) end();
-      return;
-    }
     std::unique_lock lock(mutex_);
     if (changed_.wait_for(lock, pause, [this] { return ended_; })) return;
   }
+}
+
+void MachineStreams::refused(const std::string& name, const Failure& why) {
+  if (selection_.everything()) return note(name, why);  // the others go on
+  {
+    const std::lock_guard lock(mutex_);
+    refusal_ = why;
+  }
+  end();
 }
 
 void MachineStreams::note(const std::string& name, const std::optional<Failure>& trouble) {

@@ -48,6 +48,7 @@ class MachineStreams {
 
   void open(const std::string& name);
   void follow(const std::string& name);
+  void refused(const std::string& name, const Failure& why);
   void note(const std::string& name, const std::optional<Failure>& trouble);
 
   Invocation& invocation_;

@@ -138,6 +138,8 @@ TEST(Failures, OfAMachineOfACellNameItOnce) {
   detail.clear_permitted();
   detail.set_message("feeder: too far");
   EXPECT_EQ(describe(detail, "press-2/feeder"), "too far; choose a target inside");
+  detail.set_message("press-2: no answer");
+  EXPECT_EQ(describe(detail, "press-2/feeder"), "no answer; choose a target inside");
 }
 
 TEST(Failures, ASilentMachineIsUnreachableAndADriveIsNot) {
