@@ -70,22 +70,26 @@ class AxisctlTest(unittest.TestCase):
         self.fail(f"no call of {method}")
 
     def on_terminal(self, *words, interrupt_at=None, env=None):
-        """Runs on a terminal; sends SIGINT, as Ctrl-C does, once the output matches. Returns status and output."""
-        ours, theirs = pty.openpty()
-        # Not pty.fork: a fork of a process with gRPC's threads may hang.
-        axisctl = subprocess.Popen([AXISCTL, "--server", self.server.address, *words], env=environment() | (env or {}),
-                                   stdin=theirs, stdout=theirs, stderr=theirs, close_fds=True)
-        os.close(theirs)
-        self.addCleanup(axisctl.kill)
-        shown, interrupted, deadline = "", False, time.monotonic() + LIMIT
-        while time.monotonic() < deadline:
-            if select.select([ours], [], [], 0.1)[0]:
-                try:
-                    shown += os.read(ours, 65536).decode(errors="replace")
-                except OSError:  # Linux ends a pseudo terminal with EIO
-                    break
-            if interrupt_at is not None and not interrupted and re.search(interrupt_at, shown, re.DOTALL):
-                axisctl.send_signal(signal.SIGINT)
-                interrupted = True
-        os.close(ours)
-        return axisctl.wait(LIMIT), shown
+        return on_terminal(self, [AXISCTL, "--server", self.server.address, *words], interrupt_at, env)
+
+
+def on_terminal(test, command, interrupt_at=None, env=None):
+    """Runs on a terminal; sends SIGINT, as Ctrl-C does, once the output matches. Returns status and output."""
+    ours, theirs = pty.openpty()
+    # Not pty.fork: a fork of a process with gRPC's threads may hang.
+    axisctl = subprocess.Popen(command, env=environment() | (env or {}), stdin=theirs, stdout=theirs, stderr=theirs,
+                               close_fds=True)
+    os.close(theirs)
+    test.addCleanup(axisctl.kill)
+    shown, interrupted, deadline = "", False, time.monotonic() + LIMIT
+    while time.monotonic() < deadline:
+        if select.select([ours], [], [], 0.1)[0]:
+            try:
+                shown += os.read(ours, 65536).decode(errors="replace")
+            except OSError:  # Linux ends a pseudo terminal with EIO
+                break
+        if interrupt_at is not None and not interrupted and re.search(interrupt_at, shown, re.DOTALL):
+            axisctl.send_signal(signal.SIGINT)
+            interrupted = True
+    os.close(ours)
+    return axisctl.wait(LIMIT), shown

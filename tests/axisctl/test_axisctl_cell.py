@@ -10,7 +10,7 @@ import tempfile
 import time
 import unittest
 
-from support import AXISCTL, LIMIT, environment
+from support import AXISCTL, LIMIT, environment, on_terminal
 import fake_cell
 from axisd.v1 import error_pb2
 
@@ -191,6 +191,13 @@ class Across(CellTest):
         self.read_until(watching.stderr, "press-2: does not answer")
         watching.send_signal(signal.SIGINT)
         self.assertEqual(watching.wait(LIMIT), 0)
+
+    def test_watch_on_a_terminal_is_one_table_of_all(self):
+        self.cell.silent.add("press-3")
+        status, shown = on_terminal(self, self.command("watch", "--period", "50ms"),
+                                    interrupt_at=r"press-1/feeder.*press-2/feeder.*press-3: does not answer.*\x1b\[\d+A")
+        self.assertEqual(status, 0, shown)
+        self.assertEqual(on_terminal(self, self.command("machines", "--watch"), interrupt_at="press-3 .*silent")[0], 0)
 
     def test_watch_ends_where_a_machine_that_was_named_refuses(self):
         self.assertIn("no axis 'nobody'", self.fails(4, "watch", "press-2/nobody"))
