@@ -141,6 +141,13 @@ Client Client::at(const std::string& machine) const { return {*this, machine}; }
 
 Client::Way Client::way_of(google::protobuf::Message& request) const {
   if (!connection_.through_entrance() || is_for_the_entrance(request)) return {};
+  auto way = way_to_names(request);
+  if (!connection_.lease_machine.empty() && connection_.lease_machine != way.machine)
+    drop_lease_token(request);
+  return way;
+}
+
+Client::Way Client::way_to_names(google::protobuf::Message& request) const {
   const auto named = take_machine(request);
   if (!named.machine.empty() && !named.bare) return {.machine = named.machine, .shown = true};
   if (!connection_.machine.empty() && named.machine.empty()) return {.machine = connection_.machine};
@@ -148,6 +155,8 @@ Client::Way Client::way_of(google::protobuf::Message& request) const {
     throw Failure(ExitCode::usage,
                   fmt::format("'{0}' names no machine of the cell; write {1}/{0}", *named.bare,
                               named.machine.empty() ? "MACHINE" : named.machine));
+  if (!connection_.lease_machine.empty() && has_lease_token(request))
+    return {.machine = connection_.lease_machine, .shown = true};
   if (!connection_.only_machine.empty()) return {.machine = connection_.only_machine, .shown = true};
   throw Failure(ExitCode::usage, "this is asked of one machine of the cell; name it with --machine");
 }

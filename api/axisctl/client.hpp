@@ -25,6 +25,7 @@ struct Connection {
   std::string cell;                       ///< an entrance, HOST or HOST:PORT, in place of `server`
   std::string machine;                    ///< of the cell: names without a machine are of this one
   std::string only_machine;               ///< the one that the command line's names are of, if it is one
+  std::string lease_machine;              ///< that the token of a lease is of; empty: it was not told
   std::string tls_ca;                     ///< PEM file; TLS is used if it is set
   std::string tls_certificate, tls_key;   ///< PEM files of the client, both or none
   std::string speaks_for;                 ///< USER or USER:ROLE, of a delegate; empty: for itself
@@ -128,8 +129,10 @@ class Client {
     bool shown = false;   ///< the answer's names have it in front
   };
   Client(const Client& other, const std::string& machine);
-  /// Takes the machine off the names in the request.
+  /// Takes the machine off the names in the request, and the token of another machine's lease off it: each
+  /// counts its own, so that it may be that of somebody's lease there.
   [[nodiscard]] Way way_of(google::protobuf::Message& request) const;
+  [[nodiscard]] Way way_to_names(google::protobuf::Message& request) const;
   static void set(grpc::ClientContext& context, const Way& way);
   [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel(Lane lane = Lane::ordinary) const {
     return lane == Lane::stop ? stop_channel_ : channel_;

@@ -11,6 +11,7 @@
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/invocation.hpp"
+#include "api/axisctl/machine_names.hpp"
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/table.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -51,6 +52,13 @@ v1::AcquireLeaseResponse acquire(Invocation& invocation, const Arguments& argume
   for (const auto& lost : response.taken())
     fmt::print(stderr, "taken from {}: {}\n", holder_of(lost), fmt::join(lost.axes(), ", "));
   return response;
+}
+
+/// As commands take it. In a cell the machine is in front, as it is of the axes: each machine counts its own.
+std::string token_text(const v1::AcquireLeaseResponse& response) {
+  const auto axis = response.lease().axes().empty() ? std::string() : response.lease().axes(0);
+  const auto machine = machine_in(axis);
+  return fmt::format("{}{}{}", machine, machine.empty() ? "" : "/", response.lease_token());
 }
 
 v1::RenewLeaseResponse renew(Invocation& invocation, std::uint64_t token, std::chrono::nanoseconds limit) {
@@ -115,7 +123,7 @@ void hold(Invocation& invocation, const Arguments& arguments) {
   bool lost = false;
   int status = 0;
   try {
-    child.start(arguments.command, {{"AXISD_LEASE", std::to_string(token)},
+    child.start(arguments.command, {{"AXISD_LEASE", token_text(response)},
                                     {"AXISD_SERVER", invocation.connection.server},
                                     {"AXISD_CELL", invocation.connection.cell},
                                     {"AXISD_MACHINE", invocation.connection.machine},
@@ -180,7 +188,7 @@ void add_lease_commands(CLI::App& app, Invocation& invocation) {
   add_acquiring(*acquire_command, *acquiring);
   acquire_command->callback([&invocation, acquiring] {
     const auto response = acquire(invocation, *acquiring);
-    print_line(invocation.json ? json(response) : std::to_string(response.lease_token()));
+    print_line(invocation.json ? json(response) : token_text(response));
   });
 
   add_by_token(*group, invocation, "renew", "Its time begins anew", renew_once);

@@ -90,6 +90,18 @@ void note_machines(Invocation& invocation, const std::string& word) {
     if (const auto machine = machine_in(name); !machine.empty()) invocation.machines.emplace(machine);
 }
 
+/// "press-1/4294967297", as lease acquire prints it in a cell: the number.
+std::string lease_token(Invocation& invocation, const std::string& word) {
+  const std::string machine(machine_in(word));
+  if (machine.empty()) return word;
+  if (!invocation.connection.through_entrance())
+    throw CLI::ValidationError("--lease",
+                               fmt::format("'{}' is that of a machine of a cell: --cell is missing", word));
+  check_machine_name(machine);
+  invocation.connection.lease_machine = machine;
+  return std::string(without_machine(word));
+}
+
 void note_machines_of(CLI::App& command, Invocation& invocation) {
   static const std::set<std::string> naming{"AXIS", "GROUP", "TARGET", "BUS", "DEVICE", "ID", "RECORD"};
   for (auto* option : command.get_options()) {
@@ -97,6 +109,9 @@ void note_machines_of(CLI::App& command, Invocation& invocation) {
     if (naming.contains(name))
       option->each([&invocation](const std::string& word) { note_machines(invocation, word); });
   }
+  for (auto* option : command.get_options())
+    if (option->get_envname() == "AXISD_LEASE")
+      option->transform([&invocation](const std::string& word) { return lease_token(invocation, word); }, "");
   for (auto* part : command.get_subcommands(nullptr)) note_machines_of(*part, invocation);
 }
 

@@ -118,6 +118,24 @@ void put_machine(Message& answer, std::string_view machine) {
   });
 }
 
+bool has_lease_token(const Message& request) {
+  const auto& reflection = *request.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection.ListFields(request, &fields);
+  return std::ranges::any_of(fields, [&](const FieldDescriptor* field) {
+    if (field->name() == "lease_token") return true;
+    return field->name() == "options" && has_lease_token(reflection.GetMessage(request, field));
+  });
+}
+
+void drop_lease_token(Message& request) {
+  const auto& reflection = *request.GetReflection();
+  const auto& type = *request.GetDescriptor();
+  if (const auto* token = type.FindFieldByName("lease_token")) reflection.ClearField(&request, token);
+  if (const auto* options = type.FindFieldByName("options"); options && reflection.HasField(request, options))
+    drop_lease_token(*reflection.MutableMessage(&request, options));
+}
+
 void check_machine_name(std::string_view name) {
   const auto fits = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '_';

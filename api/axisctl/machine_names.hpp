@@ -28,6 +28,10 @@ struct Named {
 /// Puts it before all names in an answer.
 void put_machine(google::protobuf::Message& answer, std::string_view machine);
 
+/// Whether it carries the token of a lease.
+[[nodiscard]] bool has_lease_token(const google::protobuf::Message& request);
+void drop_lease_token(google::protobuf::Message& request);
+
 /// Throws Failure (usage) unless it can be a machine's name.
 void check_machine_name(std::string_view name);
 

@@ -119,8 +119,21 @@ class Names(CellTest):
         self.assertEqual((done.returncode, done.stderr), (0, ""), done.stdout)
         self.assertEqual([request.options.lease_token for request in self.fake.calls("press-2", "MoveAbsolute")], [101])
         self.assertEqual(self.forwarded("ReleaseLease"), ["press-2"])
+        self.assertEqual(self.ok("--machine", "press-1", "lease", "acquire", "feeder"), "101\n")
+
+    def test_a_token_is_of_one_machine(self):
         token = self.ok("lease", "acquire", "press-3/feeder").strip()
-        self.assertIn("feeder: leased for another", self.ok("--machine", "press-3", "lease", "renew", token))
+        self.assertEqual(token, "press-3/101")
+        self.assertIn("press-3/feeder: leased for another", self.ok("lease", "renew", token))
+        for name in ("press-2/feeder", "press-3/feeder"):  # press-2 may have given the same number to somebody
+            self.assertEqual(self.run_axisctl("move", name, "3", env={"AXISD_LEASE": token}).returncode, 0)
+        self.assertEqual([self.fake.calls(name, "MoveAbsolute")[0].options.lease_token for name in ("press-2", "press-3")],
+                         [0, 101])
+        self.assertEqual(self.ok("lease", "release", token), "released\n")
+        self.assertEqual(self.forwarded("ReleaseLease"), ["press-3"])
+        alone = subprocess.run([AXISCTL, "--server", "x:1", "lease", "renew", token], env=environment(),
+                               capture_output=True, text=True, timeout=LIMIT, check=False)
+        self.assertIn("--cell is missing", alone.stderr)
 
     def test_lines_for_a_configuration_have_no_machine(self):
         self.assertIn("    bus: line-a\n", self.ok("bus", "scan", "press-2/line-a", "--yaml"))

@@ -96,6 +96,23 @@ TEST(MachineNames, ThatAreMissingAreTold) {
   EXPECT_EQ(take_machine(nothing).bare, std::nullopt);
 }
 
+TEST(MachineNames, TokensOfLeasesAreFoundAndDropped) {
+  v1::MoveGroupRequest move;
+  EXPECT_FALSE(has_lease_token(move));
+  move.mutable_options()->set_request_id("a");
+  EXPECT_FALSE(has_lease_token(move));
+  move.mutable_options()->set_lease_token(7);
+  EXPECT_TRUE(has_lease_token(move));
+  drop_lease_token(move);
+  EXPECT_FALSE(has_lease_token(move));
+  EXPECT_EQ(move.options().request_id(), "a");
+  v1::SaveParametersRequest save;
+  save.set_lease_token(7);
+  EXPECT_TRUE(has_lease_token(save));
+  drop_lease_token(save);
+  EXPECT_EQ(save.lease_token(), 0);
+}
+
 TEST(MachineNames, CannotBeAnything) {
   v1::StopRequest request;
   for (const auto* wrong : {"/feeder", "press-1/", "Press/a", "pr\xC3\xA9sse/a", "1/a", "a b/c"}) {
