@@ -96,7 +96,7 @@ class Reader {
       take(name, batch, true);
       all = batch.cursor() >= batch.newest();
     }
-    context.TryCancel();
+    if (all) context.TryCancel();
     const auto status = stream.finish();
     return all ? std::nullopt : std::optional(ended(client, status, name));
   }

@@ -228,6 +228,14 @@ class Across(CellTest):
         self.assertEqual({event["machine"] for event in told}, {"press-2"})
         self.assertIn("each machine counts its own", self.fails(2, "events", "--since", "7"))
 
+    def test_events_without_a_silent_machine(self):
+        self.cell.silent.add("press-2")
+        for _ in range(5):  # what ends the stream must not be taken for its own end
+            done = self.run_axisctl("events")
+            self.assertEqual((done.returncode, done.stderr),
+                             (3, "axisctl: press-2: does not answer: connection refused; look at the machine\n"))
+            self.assertIn("press-3/", done.stdout)
+
     def test_events_as_they_come(self):
         following = self.start("events", "--follow", "--since", "now")
         while not self.cell.readers or not all(self.fake.calls(name, "WatchEvents") for name in MACHINES):
