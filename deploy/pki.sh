@@ -4,6 +4,7 @@
 #   deploy/pki.sh init [NAME]            a new authority; NAME: what it is called (default: axisd)
 #   deploy/pki.sh server NAME HOST...    a daemon's pair; HOST: each name and address by which clients call it
 #   deploy/pki.sh client NAME            a client's pair; NAME: by which `access:` knows it
+#   deploy/pki.sh peer NAME HOST...      a pair for both ends: a member of etcd among the others (docs/cell.md)
 #   deploy/pki.sh renew NAME             a new pair in the place of the old one, which stays valid until it ends
 #   deploy/pki.sh revoke NAME            takes back all that it has, and writes the CRL
 #   deploy/pki.sh crl                    writes the CRL anew, before it is out of date
@@ -13,7 +14,7 @@ set -euo pipefail
 umask 077
 
 die() { echo "pki.sh: $*" >&2; exit 1; }
-usage() { sed -n '4,11s/^# \{0,3\}//p' "$(readlink -f "$0")" >&2; exit 2; }
+usage() { sed -n '4,12s/^# \{0,3\}//p' "$(readlink -f "$0")" >&2; exit 2; }
 
 dir=${AXISD_PKI:-axisd-pki}
 days=''
@@ -155,6 +156,12 @@ case "$command" in
     authority
     hosts=$(alternatives "${@:2}")
     new_pair "$1" serverAuth "$hosts"
+    ;;
+  peer)
+    [ $# -ge 2 ] || usage
+    authority
+    hosts=$(alternatives "${@:2}")
+    new_pair "$1" serverAuth,clientAuth "$hosts"
     ;;
   client)
     [ $# -eq 1 ] || usage

@@ -24,9 +24,13 @@ refused "an authority is there already" init
 pki server press-1 press-1.local 10.0.0.5 ::1 >/dev/null
 pki client shift-a >/dev/null
 pki client panel >/dev/null
+pki peer etcd-1 10.0.0.1 >/dev/null
 cell=$scratch/cell
 good sslserver "$cell/press-1.crt"
 good sslclient "$cell/shift-a.crt"
+good sslserver "$cell/etcd-1.crt"
+good sslclient "$cell/etcd-1.crt"
+verify -verify_ip 10.0.0.1 "$cell/etcd-1.crt" || die "not for 10.0.0.1"
 ! verify -purpose sslclient "$cell/press-1.crt" || die "the daemon's certificate is good for a client"
 ! verify -purpose sslserver "$cell/shift-a.crt" || die "a client's certificate is good for a daemon"
 verify -verify_hostname press-1.local "$cell/press-1.crt" || die "not for press-1.local"
@@ -65,6 +69,7 @@ revoked "$scratch/before.crt"
 refused "is there already" client panel
 refused "is no usable name" client 'a b'
 refused "give it without a port" server x 10.0.0.5:7443
+refused "is no address" peer x 10.0.0.5 a:b:c:d:x
 refused "is no address" server x a:b:c:d:x
 refused "is not known here" renew nobody
 refused "nothing that could be revoked" revoke nobody
