@@ -1,0 +1,64 @@
+#!/bin/bash
+# Makes every certificate of a cell, by pki.sh; what is there already stays as it is, so that machines can be added later.
+# Whoever has its folder can be anybody in the cell: keep it on a computer that is no machine's (docs/cell.md).
+#   certificates.sh [--dir DIR] [--members NAME,NAME,NAME] CELL MACHINE=HOST[,HOST...] ...
+# CELL: name of the cell. MACHINE: as its axisd calls itself; HOST: each name and address by which it is called.
+# --members: the machines that have a member of etcd each (default: the first three); others, too, that are no machine's.
+# --dir: folder of the authority (default: $AXISD_PKI, else ./axisd-pki).
+# In the folder then, for each machine:
+#   MACHINE.{crt,key}          what its axisd and its axisd-cell show to those that call them
+#   cell.MACHINE.{crt,key}     what its axisd-cell shows to those that it calls: the daemons, the other entrances, etcd
+# for each member of etcd:
+#   etcd.NAME.{crt,key}        what it shows to those that call it
+#   members/NAME.{crt,key}     what it shows to the other members; these have an authority of their own, members/ca.crt
+# and root.{crt,key}, the administrator of etcd.
+set -euo pipefail
+
+die() { echo "certificates.sh: $*" >&2; exit 1; }
+usage() { sed -n '4,7s/^# \{0,3\}//p' "$(readlink -f "$0")" >&2; exit 2; }
+
+here=$(dirname "$(readlink -f "$0")")
+dir=${AXISD_PKI:-axisd-pki} members='' chosen=''
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --dir) [ $# -gt 1 ] || usage; dir=$2; shift 2 ;;
+    --members) [ $# -gt 1 ] || usage; chosen=1 members=$2; shift 2 ;;
+    -*) usage ;;
+    *) break ;;
+  esac
+done
+[ $# -ge 2 ] || usage
+cell=$1
+shift
+
+declare -A hosts=()
+names=()
+for word in "$@"; do
+  [[ $word == ?*=?* ]] || die "'$word' is not of the form MACHINE=HOST[,HOST...]"
+  hosts[${word%%=*}]=${word#*=}
+  names+=("${word%%=*}")
+done
+[ -n "$chosen" ] || members=$(IFS=,; echo "${names[*]:0:3}")
+IFS=, read -r -a member_names <<<"$members"
+for name in "${member_names[@]}"; do
+  [ -n "${hosts[$name]:-}" ] || die "--members names $name: tell its hosts as well ($name=HOST)"
+done
+
+pki() { "$here/../pki.sh" --dir "$1" "${@:2}"; }
+once() {  # DIR KIND NAME [HOST...]
+  [ -e "$1/$3.crt" ] || pki "$@"
+}
+[ -e "$dir/ca.key" ] || pki "$dir" init "$cell"
+[ -z "$members" ] || [ -e "$dir/members/ca.key" ] || pki "$dir/members" init "$cell-members"
+[ -z "$members" ] || once "$dir" client root
+
+for name in "${names[@]}"; do
+  IFS=, read -r -a own <<<"${hosts[$name]}"
+  once "$dir" server "$name" "${own[@]}" localhost 127.0.0.1
+  once "$dir" client "cell.$name"
+done
+for name in "${member_names[@]}"; do
+  IFS=, read -r -a own <<<"${hosts[$name]}"
+  once "$dir" server "etcd.$name" "${own[@]}" localhost 127.0.0.1
+  once "$dir/members" peer "$name" "${own[@]}"
+done
