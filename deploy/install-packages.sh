@@ -14,9 +14,10 @@ build=(
   python3 python3-protobuf
 )
 run=(libabsl20220623 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libsodium23 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
-# prometheus starts a server of its own where there is an init: systemctl disable --now prometheus.
+# prometheus starts a server of its own where there is an init: systemctl disable --now prometheus. So does etcd-server, an
+# open one: its unit is masked below, and nothing else of it is started either.
 test=(
-  can-utils chromium clang-format-19 clang-tidy-19 fish fonts-wqy-microhei groff-base iproute2 libclang-rt-19-dev mypy openssl procps prometheus python3-can
+  can-utils chromium clang-format-19 clang-tidy-19 e2fsprogs etcd-client etcd-server fish fonts-wqy-microhei groff-base iproute2 libclang-rt-19-dev mypy openssl procps prometheus python3-can
   python3-grpcio python3-jsonschema python3-pymodbus python3-serial python3-serial-asyncio
   python3-setuptools python3-venv python3-wheel python3-yaml shellcheck systemd user-mode-linux zsh
 )
@@ -57,5 +58,17 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 echo "installing: ${missing[*]}"
 "${as_root[@]}" apt-get update -qq || die "apt-get update failed: check the network and /etc/apt/sources.list"
+
+# A unit that is masked before it is there is not started; where the init is another one, policy-rc.d says so.
+policy=/usr/sbin/policy-rc.d
+if [[ " ${missing[*]} " == *" etcd-server "* ]]; then
+  "${as_root[@]}" mkdir -p /etc/systemd/system
+  "${as_root[@]}" ln -sfn /dev/null /etc/systemd/system/etcd.service
+  if [ ! -e "$policy" ]; then
+    trap '"${as_root[@]}" rm -f "$policy"' EXIT
+    printf '#!/bin/sh\nexit 101\n' | "${as_root[@]}" tee "$policy" >/dev/null
+    "${as_root[@]}" chmod 755 "$policy"
+  fi
+fi
 "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" \
   >/dev/null || die "apt-get install failed; missing: ${missing[*]}"
