@@ -25,7 +25,9 @@ trap 'rm -f .new .new.part .said' EXIT
 from=''
 for endpoint in "${endpoints[@]}"; do
   rm -f .new .new.part
-  if etcdctl --endpoints "$endpoint" --dial-timeout 5s --command-timeout 60s snapshot save .new >.said 2>&1; then
+  # Asked of a member that is not there, a snapshot is waited for without end.
+  if etcdctl --endpoints "$endpoint" --command-timeout 5s endpoint health >.said 2>&1 &&
+      timeout 300 etcdctl --endpoints "$endpoint" snapshot save .new >.said 2>&1; then
     from=$endpoint
     break
   fi

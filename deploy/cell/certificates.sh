@@ -34,7 +34,7 @@ shift
 declare -A hosts=()
 names=()
 for word in "$@"; do
-  [[ $word == ?*=?* ]] || die "'$word' is not of the form MACHINE=HOST[,HOST...]"
+  [[ $word =~ ^[a-z][a-z0-9_-]*=. ]] || die "'$word' is not of the form MACHINE=HOST[,HOST...]"
   hosts[${word%%=*}]=${word#*=}
   names+=("${word%%=*}")
 done
@@ -44,6 +44,7 @@ for name in "${member_names[@]}"; do
   [ -n "${hosts[$name]:-}" ] || die "--members names $name: tell its hosts as well ($name=HOST)"
 done
 
+[ -x "$here/../pki.sh" ] || die "$here/../pki.sh is missing: it comes with the package axisd"
 pki() { "$here/../pki.sh" --dir "$1" "${@:2}"; }
 once() {  # DIR KIND NAME [HOST...]
   [ -e "$1/$3.crt" ] || pki "$@"

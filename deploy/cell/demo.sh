@@ -140,7 +140,7 @@ copy() {  # FROM TO
 
 make_member() {  # NAME
   local own=$dir/$1/etcd list='' name
-  mkdir -p "$own/data"
+  mkdir -p "$own/disk"
   for name in "${member_names[@]}"; do list+=,$name=${address[$name]}; done
   for end in crt key; do
     copy "etcd.$1.$end" "$own/server.$end"
@@ -150,7 +150,7 @@ make_member() {  # NAME
   copy clients.crl "$own/clients.crl"
   copy members/ca.crt "$own/members.crt"
   copy members/clients.crl "$own/members.crl"
-  "$here/member.sh" --cell "$cell" --name "$1" --members "${list#,}" --print --files "$own" --data "$own" >"$own/member.env"
+  "$here/member.sh" --cell "$cell" --name "$1" --members "${list#,}" --print --files "$own" --data "$own/disk" >"$own/member.env"
   # shellcheck disable=SC2016  # it is expanded there
   run_file "$1" etcd bash -c "'set -a; . \"\$0\"; exec etcd \"\$@\"'" "$own/member.env"
 }
@@ -204,7 +204,8 @@ axisd:
   stop_advertise: ${address[$1]}:7444
   $tls
 state: $own/cell
-metrics: { listen: 0.0.0.0:9465, remote: true }
+metrics: { listen: 0.0.0.0:9465 }
+roles: { shift-a: maintainer }
 END
     if [ "$members" -gt 0 ]; then
       for name in "${member_names[@]}"; do endpoints+=", ${address[$name]}:2379"; done

@@ -29,13 +29,13 @@ while [ $# -gt 0 ]; do
 done
 [ -n "$cell" ] && [ -n "$name" ] && [ -n "$members" ] || usage
 for word in "$cell" "$name"; do
-  [[ $word =~ ^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$ ]] || die "'$word' is no usable name: letters, digits, dots, dashes and underscores"
+  [[ $word =~ ^[a-z][a-z0-9_-]{0,63}$ ]] || die "'$word' is no usable name: lower case letters, digits, dashes and underscores"
 done
 
 own='' cluster=''
 IFS=, read -r -a all <<<"$members"
 for member in "${all[@]}"; do
-  [[ $member =~ ^[A-Za-z0-9][A-Za-z0-9._-]*=[0-9]+(\.[0-9]+){3}$ ]] ||
+  [[ $member =~ ^[a-z][a-z0-9_-]*=[0-9]+(\.[0-9]+){3}$ ]] ||
     die "--members: '$member' is not of the form NAME=ADDRESS, with an IPv4 address"
   cluster+=,${member%%=*}=https://${member#*=}:2380
   [ "${member%%=*}" != "$name" ] || own=${member#*=}

@@ -15,7 +15,7 @@ remove=''
 if [ "${1:-}" = --remove ]; then remove=1; shift; fi
 [ $# -ge 2 ] || usage
 for name in "$@"; do
-  [[ $name =~ ^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$ ]] || die "'$name' is no usable name"
+  [[ $name =~ ^[a-z][a-z0-9_-]{0,63}$ ]] || die "'$name' is no usable name: lower case letters, digits, dashes and underscores"
 done
 cell=$1
 shift

@@ -10,7 +10,7 @@ command -v systemd-analyze >/dev/null ||
 stage=$(mktemp -d "${TMPDIR:-/tmp}/axisd-service.XXXXXX")
 trap 'rm -rf "$stage"' EXIT
 DESTDIR=$stage cmake --install "$build" --prefix /usr >/dev/null
-for program in axisd axisctl axisd-sim axisd-web; do
+for program in axisd axisctl axisd-sim axisd-web axisd-cell; do
   [ -x "$stage/usr/bin/$program" ] || { echo "service.sh: $program is not installed" >&2; exit 1; }
 done
 
@@ -18,11 +18,12 @@ done
 
 # The units name /usr; this computer has the programs elsewhere.
 mkdir "$stage/unit"
-for unit in axisd.service axisd-link.service axisd-link.socket axisd-web.service; do
-  sed "s#/usr/\(bin\|lib/axisd\)/axisd#$stage/usr/\1/axisd#" "$stage/usr/lib/systemd/system/$unit" >"$stage/unit/$unit"
+for unit in axisd.service axisd-link.service axisd-link.socket axisd-web.service axisd-cell.service axisd-etcd.service \
+    axisd-etcd-backup.service axisd-etcd-backup.timer; do
+  sed "s#/usr/\(bin\|lib/axisd\|share/axisd/cell\)/\(axisd\|backup\)#$stage/usr/\1/\2#" "$stage/usr/lib/systemd/system/$unit" >"$stage/unit/$unit"
 done
 complaints=$(systemd-analyze verify --man=no "$stage"/unit/axisd* 2>&1) || { echo "$complaints"; exit 1; }
-if grep -E 'axisd(-link|-web)?\.(service|socket)' <<<"$complaints"; then exit 1; fi
+if grep -E 'axisd(-link|-web|-cell|-etcd|-etcd-backup)?\.(service|socket|timer)' <<<"$complaints"; then exit 1; fi
 
 # 10 is without any protection; beyond 1.6 somebody has opened something. Also with the example of a drop-in.
 mkdir "$stage/unit/axisd.service.d"
@@ -47,7 +48,14 @@ for needed in '^DeviceAllow=char-ttyUSB rw$' '^DeviceAllow=char-ttyACM rw$' '^De
   grep -q "$needed" "$stage/usr/lib/systemd/system/axisd.service" || { echo "axisd.service has no line $needed" >&2; exit 1; }
 done
 
-systemd-analyze security --offline=true --threshold=13 "$stage/unit/axisd-web.service" >"$stage/exposure" ||
-  { cat "$stage/exposure"; exit 1; }
-tail -n 1 "$stage/exposure"
+for unit in axisd-web axisd-cell axisd-etcd axisd-etcd-backup; do
+  systemd-analyze security --offline=true --threshold=13 "$stage/unit/$unit.service" >"$stage/exposure" ||
+    { cat "$stage/exposure"; exit 1; }
+  tail -n 1 "$stage/exposure"
+done
+# axisd needs nothing of the cell, and none of its stops ends with it.
+! grep -q 'axisd-cell\|etcd' "$stage/usr/lib/systemd/system/axisd.service" ||
+  { echo "service.sh: axisd.service names the cell" >&2; exit 1; }
+! grep -Eq '^(Requires|BindsTo|PartOf|Requisite)=' "$stage/unit/axisd-cell.service" ||
+  { echo "service.sh: axisd-cell.service binds itself to another unit" >&2; exit 1; }
 systemd-sysusers --dry-run "$stage/usr/lib/sysusers.d/axisd.conf"

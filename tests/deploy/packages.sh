@@ -22,7 +22,7 @@ inside() {
 }
 clean_up() {
   local status=$?
-  for unit in axisd axisd-web; do
+  for unit in axisd axisd-web axisd-cell; do
     [ ! -s "$root/run/$unit.pid" ] || kill -KILL "$(cat "$root/run/$unit.pid")" 2>/dev/null || true
   done
   [ -z "$holder" ] || kill "$holder"
@@ -64,6 +64,10 @@ has axisd usr/share/axisd/pki.sh usr/bin/axisd usr/bin/axisd-sim usr/lib/axisd/a
   lib/systemd/system/axisd-link.socket usr/lib/sysusers.d/axisd.conf usr/lib/tmpfiles.d/axisd.conf \
   usr/lib/systemd/catalog/axisd.catalog lib/udev/rules.d/99-axisd.rules usr/share/man/man8/axisd.8.gz \
   usr/share/man/man8/axisd-link.8.gz usr/share/man/man1/axisd-sim.1.gz usr/share/man/man5/axisd.yaml.5.gz
+has axisd-cell usr/bin/axisd-cell etc/axisd/cell.yaml lib/systemd/system/axisd-cell.service \
+  lib/systemd/system/axisd-etcd.service lib/systemd/system/axisd-etcd-backup.service lib/systemd/system/axisd-etcd-backup.timer \
+  usr/share/man/man8/axisd-cell.8.gz usr/share/axisd/cell/certificates.sh usr/share/axisd/cell/member.sh \
+  usr/share/axisd/cell/roles.sh usr/share/axisd/cell/backup.sh usr/share/axisd/cell/demo.sh
 has axisctl usr/bin/axisctl usr/share/man/man1/axisctl.1.gz usr/share/bash-completion/completions/axisctl \
   usr/share/zsh/vendor-completions/_axisctl usr/share/fish/vendor_completions.d/axisctl.fish
 has axisd-web usr/bin/axisd-web etc/axisd/web.yaml lib/systemd/system/axisd-web.service usr/share/axisd-web/index.html \
@@ -74,9 +78,10 @@ has axisd-doc usr/share/axisd/proto/axisd/v1/axis_service.proto usr/share/doc/ax
 conffiles() { dpkg-deb -I "$(one "$1")" conffiles | sort | xargs; }
 [ "$(conffiles axisd)" = "/etc/axisd/axisd.yaml /etc/axisd/links" ] || die "conffiles of axisd: $(conffiles axisd)"
 [ "$(conffiles axisd-web)" = /etc/axisd/web.yaml ] || die "conffiles of axisd-web: $(conffiles axisd-web)"
+[ "$(conffiles axisd-cell)" = /etc/axisd/cell.yaml ] || die "conffiles of axisd-cell: $(conffiles axisd-cell)"
 
 step "a Debian 12"
-needed=$(for package in axisd axisctl axisd-web python3-axisd; do dpkg-deb -f "$(one "$package")" Depends | tr ',' '\n' |
+needed=$(for package in axisd axisctl axisd-web axisd-cell python3-axisd; do dpkg-deb -f "$(one "$package")" Depends | tr ',' '\n' |
   sed 's/^ *//; s/[ (|].*//; /^axis/d; /^$/d'; done | sort -u | paste -sd,)
 sources=/etc/apt/sources.list.d/debian.sources
 [ -f "$sources" ] || sources=/etc/apt/sources.list
@@ -109,6 +114,11 @@ unit() {  # VERB NAME
         ln -sfn private/axisd-web /var/lib/axisd-web
         setpriv --reuid 61184 --regid 61184 --clear-groups /usr/bin/axisd-web >>/var/tmp/web-log 2>&1 &
         ;;
+      axisd-cell)
+        install -d -o nobody -m 700 /var/lib/private/axisd-cell
+        ln -sfn private/axisd-cell /var/lib/axisd-cell
+        setpriv --reuid nobody --regid nogroup --clear-groups /usr/bin/axisd-cell --config /etc/axisd/cell.yaml >>/var/tmp/cell-log 2>&1 &
+        ;;
     esac
     echo $! >"$pid"
   }
@@ -132,7 +142,7 @@ verb='' status=0
 for word in "$@"; do
   case $word in
     is-active | is-enabled | show | restart | start | stop) verb=$word ;;
-    axisd.service | axisd-web.service) unit "$verb" "${word%.service}" || status=$? ;;
+    axisd.service | axisd-web.service | axisd-cell.service) unit "$verb" "${word%.service}" || status=$? ;;
   esac
 done
 exit "$status"
@@ -173,6 +183,40 @@ async def main():
     async with axisd.connect("localhost:7443") as machine:
         print((await machine.axis("feeder").state()).position)
 asyncio.run(main())' || die "the Python client does not work"
+
+step "the entrance of a cell"
+inside dpkg -i /packages/axisd-cell_*.deb >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -i failed"; }
+[ ! -e "$root/run/axisd-cell.pid" ] || die "installing it started it"
+inside deb-systemd-invoke start axisd-cell.service
+entrance() { inside axisctl --timeout 20s --server localhost:7445 "$@"; }
+eventually entrance list
+daemon=$(pid_of axisd) first=$(pid_of axisd-cell)
+entrance move feeder 20mm --velocity 20mm/s
+rm -rf "$scratch/later"
+dpkg-deb -R "$(one axisd-cell)" "$scratch/later"
+sed -i "s/^Version: .*/&+later/" "$scratch/later/DEBIAN/control"
+dpkg-deb --root-owner-group -Znone -b "$scratch/later" "$root/packages/later-axisd-cell.deb" >/dev/null
+inside dpkg -i /packages/later-axisd-cell.deb >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "the upgrade failed"; }
+grep -q '^axisd-cell: restarting the entrance' "$scratch/log" || { cat "$scratch/log"; die "the old axisd-cell still runs"; }
+[ "$(pid_of axisd-cell)" != "$first" ] || die "the old axisd-cell still runs"
+[ "$(pid_of axisd)" = "$daemon" ] || die "the upgrade of the entrance restarted axisd"
+eventually entrance list
+second=$(pid_of axisd-cell)
+sed -i 's/^listen: /lisen: /' "$root/etc/axisd/cell.yaml"
+inside dpkg -i /packages/axisd-cell_*.deb >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "the downgrade failed"; }
+grep -q 'goes on running' "$scratch/log" || { cat "$scratch/log"; die "nothing was said of its configuration"; }
+[ "$(pid_of axisd-cell)" = "$second" ] && kill -0 "$second" || die "it was restarted all the same"
+sed -i 's/^lisen: /listen: /' "$root/etc/axisd/cell.yaml"
+inside dpkg -r axisd-cell >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -r failed"; }
+! kill -0 "$second" 2>/dev/null || die "axisd-cell still runs"
+[ -e "$root/etc/axisd/cell.yaml" ] && [ -d "$root/var/lib/private/axisd-cell" ] || die "removing took configuration or state"
+[ "$(pid_of axisd)" = "$daemon" ] && kill -0 "$daemon" || die "removing the entrance ended axisd"
+mkdir -p "$root/var/lib/axisd-etcd/data"
+inside dpkg -P axisd-cell >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -P failed"; }
+rm -f "$root/run/axisd-cell.pid"
+for left in /etc/axisd/cell.yaml /var/lib/axisd-cell /var/lib/private/axisd-cell /var/lib/axisd-etcd; do
+  ! [ -e "$root$left" ] && ! [ -L "$root$left" ] || die "purging axisd-cell left $left"
+done
 
 step "the page"
 look_at_page() {
