@@ -3,6 +3,7 @@ import os
 import pathlib
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -71,12 +72,35 @@ class Cell:
     def start_etcd(self, name):
         return self.start(name, "etcd")
 
-    def start_axisd(self, name):
-        wire = self.path(name, f"wire-{len(self._started)}.log")
-        return self.start(name, "axisd", "--wire-log", wire)
+    def start_axisd(self, name, wait=True):
+        program = self.start(name, "axisd", "--wire-log", self.path(name, f"wire-{len(self._started)}.log"))
+        return self._serving(program, name, 7443) if wait else program
 
-    def start_entrance(self, name):
-        return self.start(name, "cell")
+    def start_entrance(self, name, wait=True):
+        program = self.start(name, "cell")
+        return self._serving(program, name, 7445) if wait else program
+
+    def _serving(self, program, name, port):
+        """The program, once it takes connections."""
+        def connected():
+            if not program.running():
+                raise AssertionError(f"{program.name} ended: {program.log()}")
+            try:
+                socket.create_connection((self.address(name), port), timeout=1).close()
+            except OSError:
+                return False
+            return True
+        wait_for(connected, f"{program.name} takes connections")
+        return program
+
+    def start_all(self):
+        """Everything that there is, until each takes connections."""
+        if self.members:
+            self.etcd.set_up()
+        for what in (self.start_axisd, self.start_entrance):
+            for name in self.machines:
+                what(name)
+        return self
 
     def running(self, name, what):
         program = self.programs.get((name, what))
