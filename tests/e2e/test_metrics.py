@@ -72,7 +72,8 @@ class Metrics(Scenario):
         suffix = {"counter": "_total", "info": "_info"}
         served = Scrape(text.removesuffix("# EOF\n"))
         families = {name + suffix.get(kind, ""): (kind, words) for name, (kind, words) in served.families.items()}
-        rows = ROW.findall((ROOT / "docs" / "metrics.md").read_text())
+        own, _, _ = (ROOT / "docs" / "metrics.md").read_text().partition("\n## A cell\n")
+        rows = ROW.findall(own)
         self.assertEqual({name: (kind, words) for name, kind, _, words in rows}, families)
         for name, kind, labels, _ in rows:
             expected = {label for label in labels.strip().split(", ") if label}

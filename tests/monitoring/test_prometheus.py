@@ -35,7 +35,7 @@ class Prometheus(Scenario):
         directory = pathlib.Path(self.demo.directory)
         config = directory / "prometheus.yml"
         config.write_text(json.dumps({
-            "global": {"scrape_interval": "1s", "evaluation_interval": "1s"}, "rule_files": [str(queries.RULES)],
+            "global": {"scrape_interval": "1s", "evaluation_interval": "1s"}, "rule_files": [str(queries.rules())],
             "scrape_configs": [{"job_name": "axisd", "static_configs": [{"targets": [target]}]}]}))
         self.api = f"http://127.0.0.1:{free_port()}/api/v1"
         self.program = Program("prometheus", [

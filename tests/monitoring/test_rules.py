@@ -19,36 +19,50 @@ def promtool(*words):
 
 
 class Rules(unittest.TestCase):
+    #: What the rules are of, and where their tests are.
+    of = {"axisd": "alerts.yml", "axisd-cell": "cell_alerts.yml"}
+
     def passes(self, *words):
         done = promtool(*words)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
+    def each(self):
+        for what, tests in self.of.items():
+            with self.subTest(what):
+                yield what, HERE / tests
+
     def test_alerts_are_rules(self):
-        self.passes("check", "rules", str(queries.RULES))
+        for what, _ in self.each():
+            self.passes("check", "rules", str(queries.rules(what)))
 
     def test_alerts_fire_where_they_should(self):
-        self.passes("test", "rules", str(HERE / "alerts.yml"))
+        for _, tests in self.each():
+            self.passes("test", "rules", str(tests))
 
     def test_each_alert_is_tried(self):
-        wrong = yaml.safe_load((HERE / "alerts.yml").read_text())["tests"][0]
-        fired = [sample["labels"] for sample in wrong["promql_expr_test"][0]["exp_samples"]]
-        self.assertEqual(sorted(fired), sorted(f'{{alertname="{name}"}}' for name in queries.of_alerts()))
+        for what, tests in self.each():
+            wrong = yaml.safe_load(tests.read_text())["tests"][0]
+            fired = [sample["labels"] for sample in wrong["promql_expr_test"][0]["exp_samples"]]
+            self.assertEqual(sorted(fired), sorted(f'{{alertname="{name}"}}' for name in queries.of_alerts(what)))
 
     def test_each_alert_says_what_to_do(self):
-        (group,) = yaml.safe_load(queries.RULES.read_text())["groups"]
-        for rule in group["rules"]:
-            self.assertIn(rule["labels"]["severity"], ("critical", "warning"), rule["alert"])
-            self.assertEqual(sorted(rule["annotations"]), ["remedy", "summary"], rule["alert"])
+        for what, _ in self.each():
+            (group,) = yaml.safe_load(queries.rules(what).read_text())["groups"]
+            for rule in group["rules"]:
+                self.assertIn(rule["labels"]["severity"], ("critical", "warning"), rule["alert"])
+                self.assertEqual(sorted(rule["annotations"]), ["remedy", "summary"], rule["alert"])
 
     def test_queries_of_the_dashboard_are_queries(self):
-        rules = [{"record": f"panel:{number}", "expr": query} for number, (_, query) in enumerate(queries.of_dashboard())]
-        self.assertGreater(len(rules), 20)
-        for _, query in queries.of_dashboard():
-            self.assertNotIn("$", query)
-        with tempfile.NamedTemporaryFile("w", suffix=".yml") as file:
-            json.dump({"groups": [{"name": "panels", "rules": rules}]}, file)  # which is YAML
-            file.flush()
-            self.passes("check", "rules", file.name)
+        for what, _ in self.each():
+            found = queries.of_dashboard(what)
+            rules = [{"record": f"panel:{number}", "expr": query} for number, (_, query) in enumerate(found)]
+            self.assertGreater(len(rules), 20)
+            for _, query in found:
+                self.assertNotIn("$", query)
+            with tempfile.NamedTemporaryFile("w", suffix=".yml") as file:
+                json.dump({"groups": [{"name": "panels", "rules": rules}]}, file)  # which is YAML
+                file.flush()
+                self.passes("check", "rules", file.name)
 
 
 if __name__ == "__main__":
