@@ -244,7 +244,7 @@ prepare_all() {
   done
   cat >"$dir/desk/env" <<END
 export PATH=$(dirname "$axisctl"):\$PATH
-export AXISD_SERVER=press-1:7445 AXISD_TLS_CA=$dir/pki/ca.crt AXISD_TLS_CERT=$dir/pki/shift-a.crt AXISD_TLS_KEY=$dir/pki/shift-a.key
+export AXISD_CELL=press-1 AXISD_TLS_CA=$dir/pki/ca.crt AXISD_TLS_CERT=$dir/pki/shift-a.crt AXISD_TLS_KEY=$dir/pki/shift-a.key
 export ETCDCTL_ENDPOINTS=$(for name in "${member_names[@]}"; do printf 'https://%s:2379,' "${address[$name]}"; done | sed 's/,$//')
 export ETCDCTL_CACERT=$dir/pki/ca.crt ETCDCTL_CERT=$dir/pki/root.crt ETCDCTL_KEY=$dir/pki/root.key
 END
@@ -285,15 +285,33 @@ for name in "${names[@]}"; do start "$name" axisd; done
 for name in "${names[@]}"; do eventually axisctl --server "$name:7443" list; done
 say "their entrances"
 for name in "${names[@]}"; do start "$name" cell; done
-for name in "${names[@]}"; do eventually axisctl --server "$name:7445" list; done
-desk axisctl list
+step() {  # shows a command as it would be typed, and runs it
+  echo "\$ $*"
+  desk "$@" || die "failed: $*"
+}
+present() { [ "$(desk axisctl --json --cell "$1" machines 2>"$dir/last" | grep -o MACHINE_STATE_PRESENT | wc -l)" -eq "$machines" ]; }
+for name in "${names[@]}"; do
+  for ((i = 1; i <= 150; i++)); do
+    present "$name" && break
+    [ "$i" -lt 150 ] || die "the entrance of $name does not see all machines: $(cat "$dir/last")"
+    sleep 0.2
+  done
+done
+step axisctl machines
+step axisctl list
+far=${names[-1]}
+step axisctl enable "$far/spindle-1" --wait
+step axisctl move "$far/spindle-1" 20mm --relative --velocity 40mm/s --wait
+step axisctl stop --all
+step axisctl release-stop --all
 
 if [ -z "$once" ]; then
   cat <<END
 
 The cell runs until Ctrl-C. To command it from another terminal, as shift-a at a computer beside the machines:
   $dir/desk/shell.run bash
-  axisctl list                                            # of press-1, through its entrance
+  axisctl machines --watch                                # which there are, by the entrance of press-1
+  axisctl move press-2/spindle-2 20mm --relative --wait   # once it is enabled
   etcdctl get --prefix /axisd/ --keys-only                # who is registered
 To cut off a machine, and to join it again:
   ip -n $prefix-wire link set press-2 nomaster
