@@ -13,7 +13,7 @@ build=(
   libyaml-cpp-dev lld-19 llvm-19 ninja-build pkg-config protobuf-compiler protobuf-compiler-grpc
   python3 python3-protobuf
 )
-run=(libabsl20220623 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libsodium23 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
+run=(libabsl20220623 libatomic1 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 libprotobuf32 libsodium23 libspdlog1.10 libsystemd0 libyaml-cpp0.7)
 # prometheus starts a server of its own where there is an init: systemctl disable --now prometheus. So does etcd-server, an
 # open one: its unit is masked below, and nothing else of it is started either.
 test=(
