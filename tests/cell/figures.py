@@ -38,7 +38,7 @@ class Bench:
             died += self.seen("press-3", "SILENT", at)
             self.cell.start_axisd("press-3")
             at = time.monotonic()
-            born += self.seen("press-3", "PRESENT", at - 1)
+            born += [max(0.0, after - 1) for after in self.seen("press-3", "PRESENT", at - 1)]
             at = time.monotonic()
             self.cell.cut("press-2")
             vanished += self.seen("press-2", "SILENT", at)
@@ -46,7 +46,7 @@ class Bench:
             self.cell.heal("press-2")
             healed += self.seen("press-2", "PRESENT", at)
         line("death, the connection is closed", died)
-        line("birth, 1 s before the daemon was seen to take connections", born)
+        line("birth, from when the daemon was seen to take connections", born)
         line("death, the computer vanishes", vanished)
         line("back again after the cable", healed)
 

@@ -18,9 +18,10 @@ class StopAll(CellScenario):
                 client.wait_online(axis)
                 client.to_done("Enable", axis)
                 client.to_done("SetPosition", axis, position=-450.0)
-        client = CellClient(cell, "press-1")
-        wait_for(lambda: client.states() == dict.fromkeys(cell.machines, "PRESENT"), "all are present")
-        client.close()
+        for name in cell.machines:
+            client = CellClient(cell, name)
+            wait_for(lambda c=client: c.states() == dict.fromkeys(cell.machines, "PRESENT"), f"all are present at {name}")
+            client.close()
         return cell
 
     def run_all(self, machines):

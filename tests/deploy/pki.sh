@@ -66,6 +66,20 @@ good sslclient "$cell/shift-a.crt"
 [[ $(pki --days 7 crl) == *"valid for 7 days" ]] || die "no new list"
 revoked "$scratch/before.crt"
 
+# Two that show the same name: each is renewed and revoked alone.
+pki client gate-1 gates >/dev/null
+pki client gate-2 gates >/dev/null
+pki renew gate-1 >/dev/null
+for name in gate-1 gate-2; do
+  good sslclient "$cell/$name.crt"
+  [[ $(openssl x509 -in "$cell/$name.crt" -noout -subject -nameopt compat) == *"/CN=gates/OU=$name" ]] || die "$name does not show gates"
+done
+cp "$cell/gate-1.crt" "$scratch/gate-1.crt"
+[[ $(pki revoke gate-1) == "gate-1: 2 revoked"* ]] || die "not both of gate-1 were revoked"
+revoked "$scratch/gate-1.crt"
+good sslclient "$cell/gate-2.crt"
+[[ $(pki list | grep -c 'gates as gate-') == 3 ]] || die "the list does not show them"
+
 refused "is there already" client panel
 refused "is no usable name" client 'a b'
 refused "give it without a port" server x 10.0.0.5:7443

@@ -98,6 +98,7 @@ for end in crt key; do
   put "etcd.press-1.$end" "etcd/server.$end" 600
   put "members/press-1.$end" "etcd/peer.$end" 600
   put "press-1.$end" "tls/server.$end" 644
+  put "entrance.press-1.$end" "tls/entrance.$end" 600
   put "cell.press-1.$end" "tls/cell.$end" 600
 done
 put ca.crt etcd/clients.crt 644
@@ -134,8 +135,8 @@ sed -i 's/^machine: .*/machine: press-1/; s#^  listen: .*#  listen: 0.0.0.0:7443
   "$root/etc/axisd/axisd.yaml"
 cat >>"$root/etc/axisd/axisd.yaml" <<'END'
 access:
-  roles: { shift-a: maintainer, cell.press-1: viewer }
-  delegates: { cell.press-1: maintainer }
+  roles: { shift-a: maintainer, cell.hall: viewer }
+  delegates: { cell.hall: maintainer }
 END
 inside axisd --check
 inside systemctl start axisd
@@ -159,17 +160,21 @@ tls:
 axisd:
   server: localhost:7443
   advertise: 10.9.0.1:7443
-  tls: { ca: /etc/axisd/tls/clients.crt, certificate: /etc/axisd/tls/cell.crt, key: /run/credentials/axisd-cell.service/cell.key }
+  tls:
+    ca: /etc/axisd/tls/clients.crt
+    certificate: /etc/axisd/tls/entrance.crt
+    key: /run/credentials/axisd-cell.service/entrance.key
 etcd:
   endpoints: [ 10.9.0.1:2379 ]
   tls: { ca: /etc/axisd/tls/clients.crt, certificate: /etc/axisd/tls/cell.crt, key: /run/credentials/axisd-cell.service/cell.key }
 roles: { shift-a: maintainer }
 END
-chmod 644 "$root/etc/axisd/tls/cell.crt"
+chmod 644 "$root"/etc/axisd/tls/*.crt
 mkdir -p "$root/etc/systemd/system/axisd-cell.service.d"
 cat >"$root/etc/systemd/system/axisd-cell.service.d/keys.conf" <<'END'
 [Service]
 LoadCredential=server.key:/etc/axisd/tls/server.key
+LoadCredential=entrance.key:/etc/axisd/tls/entrance.key
 LoadCredential=cell.key:/etc/axisd/tls/cell.key
 END
 inside systemctl daemon-reload

@@ -35,7 +35,7 @@ class _Going(threading.Thread):
 
     def end(self):
         self.ending.set()
-        self.join(60)
+        self.join(120)
         assert not self.is_alive(), f"{self} hangs"
 
 
@@ -62,19 +62,20 @@ class Mover(_Going):
         self.name, self.machine, self.dice = f"mover of {machine}", machine, random.Random(seed)
         self.cell = cell
         self.ways = itertools.cycle([CellClient(cell, entrance, machine) for entrance in cell.machines])
-        self.done, self.asked, self.repeated = 0, 0, 0
+        self.done, self.asked, self.repeated, self.position = 0, 0, 0, -400.0
 
     def make_ready(self):
         client = CellClient(self.cell, self.machine, port=7443)
         client.wait_online(AXIS)
         client.to_done("Enable", AXIS)
-        client.to_done("SetPosition", AXIS, position=-400.0)
+        client.to_done("SetPosition", AXIS, position=self.position)
         return self
 
-    def ask(self, request_id):
+    def ask(self, request_id, distance):
         """The command, however often it takes."""
-        request = axis_pb.MoveRelativeRequest(axis=AXIS, distance=STEP, velocity=100.0,
+        request = axis_pb.MoveRelativeRequest(axis=AXIS, distance=distance, velocity=100.0,
                                               options={"request_id": request_id, "wait_until": DONE})
+        since = None
         while True:
             way = next(self.ways)
             self.asked += 1
@@ -83,26 +84,31 @@ class Mover(_Going):
             except CallFailed as failed:
                 if failed.code.name not in AGAIN:
                     raise
-                if self.ending.is_set():
+                # Also when the test ends, it has to be found out.
+                since = since or time.monotonic()
+                if time.monotonic() - since > 90:
                     raise AssertionError(f"{self.machine}: not known what became of {request_id}: {failed}") from None
                 time.sleep(0.05)
 
     def step(self):
         request_id = str(uuid.UUID(int=self.dice.getrandbits(128)))
-        command = self.ask(request_id)
+        distance = STEP if self.done // 500 % 2 == 0 else -STEP  # to and fro, within its limits
+        command = self.ask(request_id, distance)
         assert command.state == pb.COMMAND_STATE_DONE, command
         self.done += 1
+        self.position += distance
         if self.dice.random() < 0.3:
-            again = self.ask(request_id)
+            again = self.ask(request_id, distance)
             self.repeated += 1
             assert again.id == command.id, f"{command}\nmoved again as\n{again}"
+        self.ending.wait(0.05)
 
     def judge(self, test):
         """After end(): the shaft, the daemon's count and the wire agree with what was answered."""
         client = CellClient(self.cell, self.machine, port=7443)
         test.assertEqual(self.failures, [], self.name)
         test.assertGreater(self.done, 0, self.name)
-        test.assertAlmostEqual(client.state(AXIS).position, -400.0 + self.done * STEP, delta=0.01, msg=self.name)
+        test.assertAlmostEqual(client.state(AXIS).position, self.position, delta=0.01, msg=self.name)
         starts = 0
         for log in self.cell.directory.joinpath(self.machine).glob("wire-*.log"):
             starts += sum(request.node == NODE and request.writes(START) for request in WireLog(str(log)).requests())
