@@ -3,7 +3,7 @@
 # Whoever has its folder can make a client with any name: keep it on a computer that is no machine's.
 #   deploy/pki.sh init [NAME]            a new authority; NAME: what it is called (default: axisd)
 #   deploy/pki.sh server NAME HOST...    a daemon's pair; HOST: each name and address by which clients call it
-#   deploy/pki.sh client NAME            a client's pair; NAME: by which `access:` knows it
+#   deploy/pki.sh client NAME [SHOWN]    a client's pair; NAME: by which `access:` knows it, or SHOWN, which several may show
 #   deploy/pki.sh peer NAME HOST...      a pair for both ends: a member of etcd among the others (docs/cell.md)
 #   deploy/pki.sh renew NAME             a new pair in the place of the old one, which stays valid until it ends
 #   deploy/pki.sh revoke NAME            takes back all that it has, and writes the CRL
@@ -72,6 +72,7 @@ copy_extensions = none
 crl_extensions = of_crl
 [any]
 commonName = supplied
+organizationalUnitName = optional
 [of_crl]
 authorityKeyIdentifier = keyid
 [req]
@@ -92,12 +93,19 @@ write_crl() {
 
 make_key() { quietly openssl genpkey -algorithm EC -pkeyopt ec_paramgen_curve:prime256v1 -out "$1"; }
 
+# What NAME.ext says; before there was anything to say, its name alone.
+subject_of() {  # NAME
+  local said
+  said=$(sed -n 's/^# subject: //p' "$dir/$1.ext" 2>/dev/null) || true
+  echo "${said:-/CN=$1}"
+}
+
 # Signs what NAME.ext asks for. The pair takes its place when both parts are there, the key first: a daemon that reads
 # between the two keeps what it has.
 issue() {  # NAME
   local base=$dir/$1
   make_key "$base.key.new"
-  quietly openssl req -new -config "$dir/openssl.cnf" -key "$base.key.new" -subj "/CN=$1" -out "$base.csr"
+  quietly openssl req -new -config "$dir/openssl.cnf" -key "$base.key.new" -subj "$(subject_of "$1")" -out "$base.csr"
   quietly openssl ca -config "$dir/openssl.cnf" -batch -notext -days "${days:-365}" -extfile "$base.ext" \
     -in "$base.csr" -out "$base.crt.new"
   chmod 644 "$base.crt.new"
@@ -107,7 +115,7 @@ issue() {  # NAME
   echo "$base.crt and .key: valid until $(end_of "$base.crt")"
 }
 
-new_pair() {  # NAME USAGE [SAN]
+new_pair() {  # NAME USAGE [SAN [SHOWN]]
   check_name "$1"
   [ ! -e "$dir/$1.crt" ] || die "$1 is there already: renew it, or choose another name"
   [ "$1" != ca ] || die "ca is the authority itself: choose another name"
@@ -115,6 +123,7 @@ new_pair() {  # NAME USAGE [SAN]
     "$2" >"$dir/$1.ext"
   printf 'subjectKeyIdentifier = hash\nauthorityKeyIdentifier = keyid\n' >>"$dir/$1.ext"
   [ -z "${3:-}" ] || echo "subjectAltName = $3" >>"$dir/$1.ext"
+  [ -z "${4:-}" ] || echo "# subject: /CN=$4/OU=$1" >>"$dir/$1.ext"
   issue "$1"
 }
 
@@ -164,9 +173,10 @@ case "$command" in
     new_pair "$1" serverAuth,clientAuth "$hosts"
     ;;
   client)
-    [ $# -eq 1 ] || usage
+    [ $# -eq 1 ] || [ $# -eq 2 ] || usage
     authority
-    new_pair "$1" clientAuth
+    [ $# -eq 1 ] || check_name "$2"
+    new_pair "$1" clientAuth '' "${2:-}"
     ;;
   renew)
     [ $# -eq 1 ] || usage
@@ -179,10 +189,10 @@ case "$command" in
     [ $# -eq 1 ] || usage
     authority
     check_name "$1"
-    count=0
+    count=0 own=$(subject_of "$1")
     # A renewed certificate does not end the one before.
     while IFS=$'\t' read -r state _ _ serial _ subject; do
-      [ "$state" = V ] && [ "$subject" = "/CN=$1" ] || continue
+      [ "$state" = V ] && [ "$subject" = "$own" ] || continue
       quietly openssl ca -config "$dir/openssl.cnf" -revoke "$dir/certs/$serial.pem"
       count=$((count + 1))
     done < <(sed 's/\t\t/\t-\t/' "$dir/index.txt")
@@ -207,7 +217,8 @@ case "$command" in
         R) state=revoked ;;
         E) state=expired ;;
       esac
-      printf '%-8s until 20%s-%s-%s  %s  %s\n' "$state" "${ends:0:2}" "${ends:2:2}" "${ends:4:2}" "${subject#/CN=}" "$serial"
+      subject=${subject#/CN=}
+      printf '%-8s until 20%s-%s-%s  %s  %s\n' "$state" "${ends:0:2}" "${ends:2:2}" "${ends:4:2}" "${subject/\/OU=/ as }" "$serial"
     done < <(sed 's/\t\t/\t-\t/' "$dir/index.txt")
     ;;
   *) usage ;;

@@ -7,7 +7,9 @@
 # --dir: folder of the authority (default: $AXISD_PKI, else ./axisd-pki).
 # In the folder then, for each machine:
 #   MACHINE.{crt,key}          what its axisd and its axisd-cell show to those that call them
-#   cell.MACHINE.{crt,key}     what its axisd-cell shows to those that it calls: the daemons, the other entrances, etcd
+#   entrance.MACHINE.{crt,key} what its axisd-cell shows to daemons and other entrances: the name cell.CELL, all of them the
+#                              same, so that a request that is repeated through another entrance is the same request
+#   cell.MACHINE.{crt,key}     what its axisd-cell shows to etcd, where each machine writes what is its own
 # for each member of etcd:
 #   etcd.NAME.{crt,key}        what it shows to those that call it
 #   members/NAME.{crt,key}     what it shows to the other members; these have an authority of their own, members/ca.crt
@@ -33,6 +35,7 @@ shift
 
 declare -A hosts=()
 names=()
+[[ $cell =~ ^[a-z][a-z0-9_-]*$ ]] || die "'$cell' is no usable name of a cell: lower case letters, digits, dashes, underscores"
 for word in "$@"; do
   [[ $word =~ ^[a-z][a-z0-9_-]*=. ]] || die "'$word' is not of the form MACHINE=HOST[,HOST...]"
   hosts[${word%%=*}]=${word#*=}
@@ -46,7 +49,7 @@ done
 
 [ -x "$here/../pki.sh" ] || die "$here/../pki.sh is missing: it comes with the package axisd"
 pki() { "$here/../pki.sh" --dir "$1" "${@:2}"; }
-once() {  # DIR KIND NAME [HOST...]
+once() {  # DIR KIND NAME [WORD...]
   [ -e "$1/$3.crt" ] || pki "$@"
 }
 [ -e "$dir/ca.key" ] || pki "$dir" init "$cell"
@@ -56,6 +59,7 @@ once() {  # DIR KIND NAME [HOST...]
 for name in "${names[@]}"; do
   IFS=, read -r -a own <<<"${hosts[$name]}"
   once "$dir" server "$name" "${own[@]}" localhost 127.0.0.1
+  once "$dir" client "entrance.$name" "cell.$cell"
   once "$dir" client "cell.$name"
 done
 for name in "${member_names[@]}"; do

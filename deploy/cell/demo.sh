@@ -156,7 +156,7 @@ make_member() {  # NAME
 }
 
 make_axisd() {  # NAME
-  local own=$dir/$1 name
+  local own=$dir/$1
   {
     cat <<END
 machine: $1
@@ -166,8 +166,8 @@ server:
   tls: { certificate: $own/server.crt, key: $own/server.key, client_ca: $own/ca.crt, crl: $own/clients.crl }
   metrics: { listen: 0.0.0.0:9464, remote: true }
 access:
-  roles: { shift-a: maintainer$(for name in "${names[@]}"; do printf ', cell.%s: viewer' "$name"; done) }
-  delegates: {$(for name in "${names[@]}"; do printf ' cell.%s: maintainer,' "$name"; done) }
+  roles: { shift-a: maintainer, cell.$cell: viewer }
+  delegates: { cell.$cell: maintainer }
 buses:
   line-a: { modbus_rtu: { port: sim, baud: 115200, turnaround_max: 200 ms } }
 axes:
@@ -188,8 +188,7 @@ END
 }
 
 make_entrance() {  # NAME
-  local own=$dir/$1 name endpoints='' tls
-  tls="tls: { ca: $own/ca.crt, certificate: $own/cell.crt, key: $own/cell.key }"
+  local own=$dir/$1 name endpoints=''
   {
     cat <<END
 cell: $cell
@@ -202,14 +201,18 @@ axisd:
   stop_server: localhost:7444
   advertise: ${address[$1]}:7443
   stop_advertise: ${address[$1]}:7444
-  $tls
+  tls: { ca: $own/ca.crt, certificate: $own/entrance.crt, key: $own/entrance.key }
 state: $own/cell
 metrics: { listen: 0.0.0.0:9465 }
 roles: { shift-a: maintainer }
 END
     if [ "$members" -gt 0 ]; then
       for name in "${member_names[@]}"; do endpoints+=", ${address[$name]}:2379"; done
-      printf 'etcd:\n  endpoints: [ %s ]\n  %s\n' "${endpoints#, }" "$tls"
+      cat <<END
+etcd:
+  endpoints: [ ${endpoints#, } ]
+  tls: { ca: $own/ca.crt, certificate: $own/cell.crt, key: $own/cell.key }
+END
     else
       echo "peers:"
       for name in "${names[@]}"; do
@@ -235,6 +238,7 @@ prepare_all() {
   for name in "${names[@]}"; do
     for end in crt key; do
       copy "$name.$end" "$dir/$name/server.$end"
+      copy "entrance.$name.$end" "$dir/$name/entrance.$end"
       copy "cell.$name.$end" "$dir/$name/cell.$end"
     done
     copy ca.crt "$dir/$name/ca.crt"
