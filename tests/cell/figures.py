@@ -2,13 +2,11 @@
     PYTHONPATH=tests/e2e AXISD=... AXISD_SIM=... AXISCTL=... AXISD_CELL=... tests/cell/run.sh /usr/bin/python3 -B tests/cell/figures.py
 """
 import argparse
-import os
-import pathlib
 import statistics
 import time
 
-from harness import axis_pb, wait_for
-from rig import AXIS, Cell, CellClient, MachineWatch, cell_pb
+from harness import wait_for
+from rig import Cell, CellClient, MachineWatch, cell_pb
 
 
 def line(text, values, unit="s"):
@@ -60,54 +58,15 @@ class Bench:
             client.call(client.cell.ReleaseStopAll, cell_pb.ReleaseStopAllRequest(), 10)
         line("StopAll of all machines, answered", took, "ms")
 
-    def forwarding(self, calls):
-        """The same call, by turns: to the daemon, through its own entrance, through another one."""
-        ways = {"direct": CellClient(self.cell, "press-2", port=7443), "own entrance": CellClient(self.cell, "press-2"),
-                "other entrance": CellClient(self.cell, "press-1", "press-2")}
-        took = {name: [] for name in ways}
-        request = axis_pb.GetAxisRequest(axis=AXIS)
-        for number in range(calls + 50):
-            for name, client in ways.items():
-                at = time.perf_counter()
-                client.call(client.axis.GetAxis, request)
-                if number >= 50:
-                    took[name].append(1000 * (time.perf_counter() - at))
-        for name, values in took.items():
-            line(f"GetAxis, {name}", values, "ms")
-
-    def watching(self, seconds):
-        """What streams cost the entrance that passes them on."""
-        client = CellClient(self.cell, "press-1", "press-2")
-        stream = client.axis.WatchAxes(axis_pb.WatchAxesRequest(period={"nanos": 50_000_000}))
-        next(stream)
-        pid = self.cell.programs["press-1", "cell"].process.pid
-        before, at, count = cpu(pid), time.monotonic(), 0
-        for _ in stream:
-            count += 1
-            if time.monotonic() - at > seconds:
-                break
-        used = cpu(pid) - before
-        stream.cancel()
-        print(f"WatchAxes of {len(client.call(client.axis.ListAxes, axis_pb.ListAxesRequest()).axes)} axes, forwarded: {count / seconds:.1f} messages/s, "
-              f"{100 * used / seconds:.1f} % of a core", flush=True)
-
-
-def cpu(pid):
-    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
 
 def main():
     words = argparse.ArgumentParser()
     words.add_argument("--rounds", type=int, default=10)
-    words.add_argument("--calls", type=int, default=2000)
-    words.add_argument("--axes", type=int, default=16)
+    words.add_argument("--axes", type=int, default=8)
     chosen = words.parse_args()
     cell = Cell(axes=chosen.axes)
     try:
         bench = Bench(cell.start_all())
-        bench.forwarding(chosen.calls)
-        bench.watching(10)
         bench.stop_all(chosen.rounds)
         bench.births_and_deaths(chosen.rounds)
         for watch in bench.watches.values():

@@ -18,13 +18,14 @@ if(AXISD_GRPC)
   add_test(NAME checks.service COMMAND ${checks}/service.sh ${CMAKE_BINARY_DIR})
   add_test(NAME checks.hardening COMMAND ${python} ${checks}/hardening.py "${AXISD_HARDENING_PROMISES}"
            $<TARGET_FILE:axisd> $<TARGET_FILE:axisctl> $<TARGET_FILE:axisd-sim> $<TARGET_FILE:axisd-link>
-           $<TARGET_FILE:axisd-web>)
+           $<TARGET_FILE:axisd-web> $<TARGET_FILE:axisd-cell>)
   add_test(NAME checks.hardening_can_fail COMMAND ${python} ${checks}/test_hardening.py ${CMAKE_CXX_COMPILER})
   add_test(NAME checks.manuals COMMAND ${python} ${checks}/manuals.py
            ${CMAKE_SOURCE_DIR}/deploy/man/axisd.8=$<TARGET_FILE:axisd>
            ${CMAKE_SOURCE_DIR}/deploy/man/axisd-sim.1=$<TARGET_FILE:axisd-sim>
            ${CMAKE_SOURCE_DIR}/deploy/man/axisd-link.8=$<TARGET_FILE:axisd-link>
            ${CMAKE_SOURCE_DIR}/deploy/man/axisd-web.8=$<TARGET_FILE:axisd-web>
+           ${CMAKE_SOURCE_DIR}/deploy/man/axisd-cell.8=$<TARGET_FILE:axisd-cell>
            ${CMAKE_BINARY_DIR}/api/axisctl/axisctl.1 ${CMAKE_BINARY_DIR}/api/axisctl/axisd.yaml.5)
   add_test(NAME checks.manuals_can_fail COMMAND ${python} ${checks}/test_manuals.py)
   list(APPEND names manuals manuals_can_fail contract contract_can_fail reference service hardening hardening_can_fail)
