@@ -3,7 +3,8 @@
 # Whoever has its folder can be anybody in the cell: keep it on a computer that is no machine's (docs/cell.md).
 #   certificates.sh [--dir DIR] [--members NAME,NAME,NAME] CELL MACHINE=HOST[,HOST...] ...
 # CELL: name of the cell. MACHINE: as its axisd calls itself; HOST: each name and address by which it is called.
-# --members: the machines that have a member of etcd each (default: the first three); others, too, that are no machine's.
+# --members: those that have a member of etcd each, other computers as well (default: the first three, where there is no member
+# yet); '': none.
 # --dir: folder of the authority (default: $AXISD_PKI, else ./axisd-pki).
 # In the folder then, for each machine:
 #   MACHINE.{crt,key}          what its axisd and its axisd-cell show to those that call them
@@ -17,7 +18,7 @@
 set -euo pipefail
 
 die() { echo "certificates.sh: $*" >&2; exit 1; }
-usage() { sed -n '4,7s/^# \{0,3\}//p' "$(readlink -f "$0")" >&2; exit 2; }
+usage() { sed -n '4,8s/^# \{0,3\}//p' "$(readlink -f "$0")" >&2; exit 2; }
 
 here=$(dirname "$(readlink -f "$0")")
 dir=${AXISD_PKI:-axisd-pki} members='' chosen=''
@@ -41,7 +42,8 @@ for word in "$@"; do
   hosts[${word%%=*}]=${word#*=}
   names+=("${word%%=*}")
 done
-[ -n "$chosen" ] || members=$(IFS=,; echo "${names[*]:0:3}")
+# A machine that is added has no member of etcd, unless that is said.
+[ -n "$chosen" ] || [ -e "$dir/members/ca.key" ] || members=$(IFS=,; echo "${names[*]:0:3}")
 IFS=, read -r -a member_names <<<"$members"
 for name in "${member_names[@]}"; do
   [ -n "${hosts[$name]:-}" ] || die "--members names $name: tell its hosts as well ($name=HOST)"
