@@ -305,6 +305,7 @@ step axisctl machines
 step axisctl list
 far=${names[-1]}
 step axisctl enable "$far/spindle-1" --wait
+step axisctl set-position "$far/spindle-1" 0mm --wait
 step axisctl move "$far/spindle-1" 20mm --relative --velocity 40mm/s --wait
 step axisctl stop --all
 step axisctl release-stop --all
