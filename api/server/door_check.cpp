@@ -131,7 +131,7 @@ class DoorCheck::Door : public std::enable_shared_from_this<Door> {
   std::atomic<TimePoint> owes_since_{TimePoint::max()};
 };
 
-DoorCheck::DoorCheck(Connect main_server, Connect stop_lane, std::vector<Knock*> knocks)
+DoorCheck::DoorCheck(Connect main_server, Connect stop_lane, std::vector<transport::Knock*> knocks)
     : doors_{std::make_shared<Door>("stop lane", std::move(stop_lane), &ask_lane),
              std::make_shared<Door>("main server", std::move(main_server), &ask_main)},
       knocks_(std::move(knocks)) {}

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "api/server/knock.hpp"
+#include "api/transport/knock.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
 
@@ -22,7 +22,7 @@ class DoorCheck {
   using Connect = std::function<FileDescriptor()>;
 
   /// `knocks` outlive this: of all addresses.
-  DoorCheck(Connect main_server, Connect stop_lane, std::vector<Knock*> knocks);
+  DoorCheck(Connect main_server, Connect stop_lane, std::vector<transport::Knock*> knocks);
   /// Waits a moment for questions that are on their way, which are cancelled.
   ~DoorCheck();
   DoorCheck(const DoorCheck&) = delete;
@@ -35,7 +35,7 @@ class DoorCheck {
  private:
   class Door;
   std::vector<std::shared_ptr<Door>> doors_;
-  std::vector<Knock*> knocks_;
+  std::vector<transport::Knock*> knocks_;
 };
 
 }  // namespace axisd::server

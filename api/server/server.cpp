@@ -228,7 +228,7 @@ std::vector<std::string> Server::services() const {
   return names;
 }
 
-std::vector<Knock*> Server::knocks() const { return parts_->accept.knocks(); }
+std::vector<transport::Knock*> Server::knocks() const { return parts_->accept.knocks(); }
 
 TimePoint Server::last_progress() const { return parts_->accept.last_progress(); }
 

@@ -8,7 +8,7 @@
 
 #include "api/server/access.hpp"
 #include "api/server/admission.hpp"
-#include "api/server/knock.hpp"
+#include "api/transport/knock.hpp"
 #include "api/tls/live.hpp"
 #include "api/transport/peer_budgets.hpp"
 #include "buses/clock.hpp"
@@ -70,7 +70,7 @@ class Server {
   [[nodiscard]] std::vector<std::string> services() const;
 
   /// Of each address that it listens on, between start() and shutdown(); on their thread.
-  [[nodiscard]] std::vector<Knock*> knocks() const;
+  [[nodiscard]] std::vector<transport::Knock*> knocks() const;
 
   /// When its accept loop last came round: it lets in who connects. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;

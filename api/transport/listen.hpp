@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "api/server/knock.hpp"
+#include "api/transport/knock.hpp"
 #include "buses/error.hpp"
 #include "buses/file_descriptor.hpp"
 

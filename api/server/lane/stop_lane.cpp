@@ -91,8 +91,8 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
     }
     eventfd_write(wake_.get(), 1);
   }
-  [[nodiscard]] std::vector<Knock*> knocks() const {
-    std::vector<Knock*> all;
+  [[nodiscard]] std::vector<transport::Knock*> knocks() const {
+    std::vector<transport::Knock*> all;
     for (const auto& socket : sockets_) all.push_back(socket.knock.get());
     return all;
   }
@@ -393,7 +393,7 @@ FileDescriptor StopLane::connect_inside() {
   return std::move(ours);
 }
 
-std::vector<Knock*> StopLane::knocks() const { return loop_->knocks(); }
+std::vector<transport::Knock*> StopLane::knocks() const { return loop_->knocks(); }
 
 TimePoint StopLane::last_progress() const { return loop_ ? loop_->last_progress() : monotonic_now(); }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "api/server/access.hpp"
-#include "api/server/knock.hpp"
+#include "api/transport/knock.hpp"
 #include "api/server/lane/places.hpp"
 #include "api/tls/live.hpp"
 #include "buses/file_descriptor.hpp"
@@ -57,7 +57,7 @@ class StopLane {
   [[nodiscard]] FileDescriptor connect_inside();
 
   /// As Server::knocks(), between listen() and stop().
-  [[nodiscard]] std::vector<Knock*> knocks() const;
+  [[nodiscard]] std::vector<transport::Knock*> knocks() const;
 
   /// When its thread last came round, at most 200 ms apart. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;

@@ -1,5 +1,5 @@
 // The daemon connects to its own addresses, to see that clients can.
-#include "api/server/knock.hpp"
+#include "api/transport/knock.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -19,12 +19,12 @@ class Knock : public ::testing::TestWithParam<std::string> {
   void SetUp() override {
     const auto address =
         GetParam() == "unix" ? "unix:" + (directory_ / "a.sock") : GetParam() + std::string(":0");
-    auto sockets = server::listen_on(address, true);
+    auto sockets = transport::listen_on(address, true);
     if (!sockets && GetParam().starts_with('[')) GTEST_SKIP() << "no IPv6 here";
     ASSERT_TRUE(sockets) << to_string(sockets.error());
     socket_ = std::move(sockets->front());
   }
-  [[nodiscard]] server::Knock& knock() { return *socket_.knock; }
+  [[nodiscard]] transport::Knock& knock() { return *socket_.knock; }
   /// Whether the next that waits to be let in was the daemon itself; nothing: nobody waits.
   std::optional<bool> let_in() {
     const FileDescriptor connection(accept4(socket_.fd.get(), nullptr, nullptr, SOCK_CLOEXEC));
@@ -43,7 +43,7 @@ class Knock : public ::testing::TestWithParam<std::string> {
   [[nodiscard]] bool is_answered() { return knock().unanswered_since() == TimePoint::max(); }
 
   TemporaryDirectory directory_;
-  server::ListeningSocket socket_;
+  transport::ListeningSocket socket_;
 };
 
 TEST_P(Knock, IsAnsweredByWhoeverAccepts) {

@@ -7,7 +7,7 @@
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
 
-namespace axisd::server {
+namespace axisd::transport {
 
 /// Whether an address of the daemon still lets clients in, tried as they do it: it connects to itself, and
 /// whoever accepts there knows the connection and closes it. That anybody else is let in is an answer, too:
@@ -40,4 +40,4 @@ class Knock {
   std::atomic<TimePoint> unanswered_since_{TimePoint::max()};
 };
 
-}  // namespace axisd::server
+}  // namespace axisd::transport

@@ -1,4 +1,4 @@
-#include "api/server/knock.hpp"
+#include "api/transport/knock.hpp"
 
 #include <netinet/in.h>
 #include <poll.h>
@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-namespace axisd::server {
+namespace axisd::transport {
 namespace {
 
 /// The system repeats a connection that found nobody with growing pauses; this does not wait for these.
@@ -103,4 +103,4 @@ bool Knock::let_in(int connection) {
 
 TimePoint Knock::unanswered_since() const { return got_in_ ? unanswered_since_.load() : TimePoint::max(); }
 
-}  // namespace axisd::server
+}  // namespace axisd::transport
