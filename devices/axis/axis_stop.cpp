@@ -50,7 +50,9 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
   stop_.ask(kind);
   if (command) {
     command->activate();
-    stop_.serve(std::move(command));
+    if (const auto oldest = stop_.serve(std::move(command)))
+      oldest->abort(error(Reason::superseded, "newer stops of the same client have taken its place",
+                          "wait for the newest one"));
   }
   env_.bus->hasten(settings_.node, TransactionClass::moving_state);
   if (stop_.begin()) {

@@ -1,5 +1,6 @@
 #include "devices/axis/stop_machine.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace axisd {
@@ -9,9 +10,17 @@ void StopMachine::ask(StopKind kind) {
   ++requests_;
 }
 
-void StopMachine::serve(CommandPtr command) {
+CommandPtr StopMachine::serve(CommandPtr command) {
   last_ = command;
+  auto& served = served_[command->value().client];
   commands_.push_back(std::move(command));
+  if (++served <= most_of_one_client) return nullptr;
+  --served;
+  const auto oldest = std::ranges::find(commands_, last_->value().client,
+                                        [](const CommandPtr& each) -> auto& { return each->value().client; });
+  auto ends = *oldest;
+  commands_.erase(oldest);
+  return ends;
 }
 
 bool StopMachine::begin() {
@@ -63,7 +72,10 @@ std::vector<CommandPtr> StopMachine::end() {
   state_ = State::none;
   kind_ = StopKind::none;
   of_motion_ = false;
-  return std::exchange(commands_, {});
+  served_.clear();
+  std::vector<CommandPtr> commands(commands_.begin(), commands_.end());
+  commands_.clear();
+  return commands;
 }
 
 std::vector<CommandPtr> StopMachine::confirmed() {

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <deque>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "buses/clock.hpp"
@@ -82,8 +85,9 @@ class StopMachine {
   void found_in_motion() { of_motion_ = true; }
   /// Another stop, which needs a frame. begin() follows in the same handler.
   void ask(StopKind kind);
-  /// A command that ends with the stop.
-  void serve(CommandPtr command);
+  /// A command that ends with the stop. Returns one that ends now, as newer ones of its client have taken its
+  /// place; nullptr: none does.
+  [[nodiscard]] CommandPtr serve(CommandPtr command);
   /// True: a sequence has to be launched. False: the running one sends this one, too.
   [[nodiscard]] bool begin();
   /// The kind of the frame to be sent now.
@@ -156,6 +160,9 @@ class StopMachine {
   /// A drive at rest that has acknowledged no stop gets further attempts, so many rounds in all: that it
   /// rests does not tell that a stop has arrived. After the last round it is one that does not acknowledge.
   static constexpr int unacknowledged_rounds = 4;
+  /// Commands of one client that wait for the standstill: whoever stops the axis all the time keeps it from
+  /// being confirmed, and must not fill the memory with that.
+  static constexpr int most_of_one_client = 256;
 
  private:
   struct Attempt {
@@ -177,7 +184,8 @@ class StopMachine {
   int rounds_ = 0;                  ///< of attempts without any reply
   bool released_ = false;           ///< the last resort was tried
   bool of_motion_ = false;          ///< the first of them found the axis in motion
-  std::vector<CommandPtr> commands_;
+  std::deque<CommandPtr> commands_;
+  std::map<std::string, int> served_;  ///< of commands_, by their clients
   CommandPtr last_;
   /// Of the motion in progress; at first the drive's longest.
   Duration deceleration_ = milliseconds(2000);

@@ -27,7 +27,9 @@ class StopMachineTest : public testing::Test {
     return kind;
   }
   Step looked(bool rests, bool may_release = false) { return stop_.looked(rests, false, may_release); }
-  CommandPtr command() { return std::make_shared<CommandRecord>(Command{}, world_.clock()); }
+  CommandPtr command(std::string client = {}) {
+    return std::make_shared<CommandRecord>(Command{.client = std::move(client)}, world_.clock());
+  }
 
   test::VirtualWorld world_;
   AxisGate gate_;
@@ -45,6 +47,27 @@ TEST_F(StopMachineTest, TheFirstStopBeginsASequenceAndTheNextJoinsIt) {
   stop_.ask(StopKind::stop);
   EXPECT_FALSE(stop_.begin());
   EXPECT_EQ(stop_.next_attempt(), StopKind::stop) << "the strongest that was asked for";
+}
+
+TEST_F(StopMachineTest, OfOneClientsStopsTheNewestWait) {
+  constexpr auto most = std::size_t{StopMachine::most_of_one_client};
+  begin(StopKind::stop);
+  const auto other = command("b");
+  EXPECT_EQ(stop_.serve(other), nullptr);
+  std::vector<CommandPtr> mine;
+  for (std::size_t i = 0; i < most + 10; ++i) {
+    mine.push_back(command("a"));
+    EXPECT_EQ(stop_.serve(mine.back()), i < most ? nullptr : mine[i - most]) << i;
+  }
+  send();
+  EXPECT_EQ(looked(true), Step::rests);
+  const auto confirmed = stop_.confirmed();
+  ASSERT_EQ(confirmed.size(), most + 1);
+  EXPECT_EQ(confirmed.front(), other) << "that of another is none of its business";
+  EXPECT_EQ(confirmed.back(), mine.back());
+  // Nothing of before counts any more.
+  begin(StopKind::stop);
+  for (std::size_t i = 0; i < most; ++i) EXPECT_EQ(stop_.serve(command("a")), nullptr);
 }
 
 TEST_F(StopMachineTest, AWeakerStopDoesNotWeakenAStrongerOne) {
@@ -108,8 +131,8 @@ TEST_F(StopMachineTest, AStopAskedForWhileAnotherIsConfirmedIsSent) {
 TEST_F(StopMachineTest, StandstillEndsIt) {
   begin(StopKind::stop);
   const auto first = command(), second = command();
-  stop_.serve(first);
-  stop_.serve(second);
+  (void)stop_.serve(first);
+  (void)stop_.serve(second);
   send();
   EXPECT_EQ(looked(true), Step::rests);
   EXPECT_TRUE(stop_.under_way()) << "until the sequence has ended";
