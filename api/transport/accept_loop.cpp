@@ -140,9 +140,10 @@ void AcceptLoop::cut_off(PeerBudgets::Id id) {
     spdlog::warn(
         "a client at {} sends floods of requests that it wants no answers to: cut off ({} since start)",
         address_of_peer(connection), cut_off_);
-  ::shutdown(connection, SHUT_RDWR);
-  // Else gRPC still reads it.
-  while (recv(connection, nullptr, receive_buffer, MSG_DONTWAIT | MSG_TRUNC) > 0) continue;
+  // By a reset, with all that was not read yet. After a shutdown gRPC would still read what comes, for as
+  // long as the peer goes on.
+  const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
+  if (::connect(connection, &nobody, sizeof nobody) != 0) ::shutdown(connection, SHUT_RDWR);
   close(id);
 }
 
@@ -152,9 +153,14 @@ void AcceptLoop::look_at_memory(TimePoint now) {
   const auto bytes = resident();
   if (bytes > memory_limit_)
     if (const auto most = budgets_->most_one_sided()) cut_off(*most);
-  if (bytes < resident_when_trimmed_ + worth_trimming || now - trimmed_ < trim_every) return;
+  // It takes long where there is much, and who floods meanwhile would not be noticed. What is free is used
+  // again first.
+  if (!budgets_->calm(now)) trimmed_ = now;
+  const bool worth_it = bytes >= resident_when_trimmed_ + worth_trimming || cut_off_ != cut_off_when_trimmed_;
+  if (!worth_it || now - trimmed_ < trim_every) return;
   malloc_trim(0);
   trimmed_ = now;
+  cut_off_when_trimmed_ = cut_off_;
   resident_when_trimmed_ = resident();
 }
 

@@ -67,7 +67,7 @@ class AcceptLoop {
   PeerBudgets::Id last_id_ = 0;
   TimePoint counted_{}, looked_{}, trimmed_{};
   std::size_t memory_limit_ = 0, resident_when_trimmed_ = 0;  ///< bytes
-  std::uint64_t cut_off_ = 0, gave_way_ = 0;
+  std::uint64_t cut_off_ = 0, cut_off_when_trimmed_ = 0, gave_way_ = 0;
   std::atomic<std::uint64_t> refused_{0};
   std::atomic<TimePoint> progress_{monotonic_now()};
   std::atomic<bool> stopping_{false};

@@ -77,6 +77,11 @@ void PeerBudgets::leave(Id id) {
   connections_.erase(connection);
 }
 
+bool PeerBudgets::calm(TimePoint now) const {
+  return std::ranges::all_of(
+      addresses_, [&](const auto& entry) { return level_of(entry.second.bucket, now) < limits_.burst / 8; });
+}
+
 std::optional<PeerBudgets::Id> PeerBudgets::most_one_sided() const {
   const auto most =
       std::ranges::max_element(connections_, {}, [](const auto& entry) { return entry.second.one_sided; });

@@ -60,6 +60,8 @@ class PeerBudgets {
   /// Who has sent most without getting anything for it since it began: streams that never end take memory
   /// however slowly they are begun. Nothing: nobody has sent more than `suspect`.
   [[nodiscard]] std::optional<Id> most_one_sided() const;
+  /// Nobody floods now, or has done so lately.
+  [[nodiscard]] bool calm(TimePoint now) const;
   [[nodiscard]] std::size_t connections() const { return connections_.size(); }
   /// That are remembered: with connections, or a bucket that is not empty yet.
   [[nodiscard]] std::size_t addresses() const { return addresses_.size(); }
