@@ -41,7 +41,8 @@ void expect_one_line(const Error& error) {
   expect(!error.message.empty() && error.message.find('\n') == std::string::npos, "an error is one line");
 }
 
-void certificates(const std::string& pem) {
+/// Of who has shown it in a handshake, and behind it those that it came with.
+void client(const std::string& pem) {
   static const tls::Identities identities(authority);
   static const tls::Clients clients({.certificate = {}, .key = {}, .client_ca = authority});
   const auto name = identities.of(pem);
@@ -51,6 +52,9 @@ void certificates(const std::string& pem) {
   expect(client.name == name, "a client has one name");
   expect(client.refusal.has_value(), "whom the authority did not sign for is refused");
   expect_one_line(*client.refusal);
+}
+
+void texts(const std::string& pem) {
   (void)tls::first_expiry(pem);
   const auto read = tls::certificates("f", pem);
   if (!read) return expect_one_line(read.error());
@@ -59,8 +63,14 @@ void certificates(const std::string& pem) {
     (void)tls::alternatives_of(certificate.get());
     (void)tls::time_of(X509_get0_notAfter(certificate.get()));
   }
+}
+
+void own(const std::string& pem) {
   if (const auto why = tls::wrong_with({.ca = pem, .certificate = pem, .key = {}}, now))
     expect_one_line(*why);
+}
+
+void daemons(const std::string& pem) {
   if (const auto why = tls::why_refused({.ca = authority, .certificate = {}, .key = {}},
                                         {.certificates = pem, .accepted = {}}, "localhost", now))
     expect_one_line(*why);
@@ -79,13 +89,15 @@ void revocation_lists(const std::string& pem) {
 }  // namespace
 
 void run(Input input) {
-  const auto kind = input.byte() % 6;
+  const auto first = input.byte();
+  const auto kind = first % 6;
   const auto bytes = input.rest();
   const auto as = [&](const char* name) {
     return kind < 3 ? std::string(text(bytes)) : wrapped(name, bytes);
   };
+  constexpr void (*of_certificates[])(const std::string&) = {client, texts, own, daemons};
   if (kind % 3 == 0)
-    certificates(as("CERTIFICATE"));
+    of_certificates[first / 6 % std::size(of_certificates)](as("CERTIFICATE"));
   else if (kind % 3 == 1)
     revocation_lists(as("X509 CRL"));
   else if (const auto key = tls::private_key("f", as("PRIVATE KEY")); !key)
