@@ -8,8 +8,8 @@
 
 #include "api/server/access.hpp"
 #include "api/server/admission.hpp"
-#include "api/transport/knock.hpp"
 #include "api/tls/live.hpp"
+#include "api/transport/knock.hpp"
 #include "api/transport/peer_budgets.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"

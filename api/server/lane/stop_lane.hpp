@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "api/server/access.hpp"
-#include "api/transport/knock.hpp"
 #include "api/server/lane/places.hpp"
 #include "api/tls/live.hpp"
+#include "api/transport/knock.hpp"
 #include "buses/file_descriptor.hpp"
 #include "devices/audit.hpp"
 #include "devices/machine.hpp"
