@@ -197,8 +197,8 @@ listen: 0.0.0.0:7445
 advertise: ${address[$1]}:7445
 tls: { certificate: $own/server.crt, key: $own/server.key, client_ca: $own/ca.crt, crl: $own/clients.crl }
 axisd:
-  server: localhost:7443
-  stop_server: localhost:7444
+  server: 127.0.0.1:7443
+  stop_server: 127.0.0.1:7444
   advertise: ${address[$1]}:7443
   stop_advertise: ${address[$1]}:7444
   tls: { ca: $own/ca.crt, certificate: $own/entrance.crt, key: $own/entrance.key }

@@ -68,7 +68,10 @@ class Dashboard(CellScenario):
         client = CellClient(self.one, "press-1")
         wait_for(lambda: client.states() == dict.fromkeys(self.one.machines, "PRESENT"), "all are present")
         CellClient(self.one, "press-1", "press-2").info()
-        served = scrape(f"http://{self.one.address('press-1')}:9465/metrics")
+        url = f"http://{self.one.address('press-1')}:9465/metrics"
+        # Its text is made once a second.
+        wait_for(lambda: len(scrape(url).named("axisd_cell_machine_round_trip_seconds")) == 3, "all have answered")
+        served = scrape(url)
         _, _, page = (ROOT / "docs" / "metrics.md").read_text().partition("\n## A cell\n")
         rows = {name: (kind, labels, words) for name, kind, labels, words in ROW.findall(page)}
         self.assertEqual({name: words for name, (_, _, words) in rows.items()},

@@ -27,9 +27,16 @@ class Cells(CellScenario):
         begun = time.monotonic()
         whole = dict.fromkeys(cell.machines, "PRESENT")
         registry = "OK" if cell.members else "BY_HAND"
+
+        def is_whole(name):
+            try:
+                return self.clients[name].states() == whole and self.clients[name].registry() == registry
+            except CallFailed as failed:  # the connection of before, which a cut has ended
+                if failed.code.name != "UNAVAILABLE":
+                    raise
+                return False
         for name in cell.machines:
-            wait_for(lambda n=name: self.clients[n].states() == whole and self.clients[n].registry() == registry,
-                     f"all are present at {name}", limit)
+            wait_for(lambda n=name: is_whole(n), f"all are present at {name}", limit)
         return time.monotonic() - begun
 
     def tell(self, text, seconds=None):
