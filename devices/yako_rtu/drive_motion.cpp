@@ -130,14 +130,14 @@ void YakoRtuDrive::note_proof(TimePoint asked_at) {
 
 /// A proof that stands for the canary of a start (M6): nothing has happened to the node since, and what is
 /// left of reboot_guard is enough for the block, also where the line has something else to do before the
-/// trigger. The gate judges its age again when that is bound.
+/// trigger, a reading at most. The gate judges its age again when that is bound.
 std::optional<TimePoint> YakoRtuDrive::fresh_proof() const {
   if (!proven_at_ || *proven_at_ <= node_.bus().disturbed_at(node_.address())) return std::nullopt;
   const auto& line = node_.bus().settings();
   const auto size = writing(canary_count);
   const auto block =
       2 * modbus_rtu::silence(line) + modbus_rtu::wire_time(line, std::size_t{size.request} + size.reply);
-  const auto left = std::max<Duration>(setup_.reboot_guard / 4, 3 * block);
+  const auto left = std::max<Duration>(setup_.reboot_guard / 4, 2 * block + setup_.reboot_guard / 12);
   return clock_->now() + left <= *proven_at_ + setup_.reboot_guard ? proven_at_ : std::nullopt;
 }
 
