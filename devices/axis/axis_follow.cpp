@@ -52,7 +52,11 @@ Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t 
 /// A drive that was restarted, on the way or before, shows the counter 0: only where the reading at the
 /// target could be that, too, it has to prove that it is the same one.
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
-  if (sample_ && drive_->rules_out_restart(*sample_)) co_return true;
+  if (sample_ && drive_->rules_out_restart(*sample_)) {
+    // Else the canary would seem to be due, and a reading beside it would wait for the next start's place.
+    if (const auto proven = drive_->proven_at()) continuity_.proven(*proven);
+    co_return true;
+  }
   keep_quiet(env_.clock->now() + std::min<Duration>(settings_.poll_moving, proof_patience));
   co_return co_await proven_continuous(activity);
 }

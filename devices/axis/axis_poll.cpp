@@ -33,7 +33,9 @@ Task<> Axis::poll() {
       co_await let_others_run(env_.executor, *env_.clock);
       if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
-    const auto asked = polling.repeated && sample_ ? sample_->asked_at : began;
+    // At rest it counts from the reading itself: on a full line that came long after it was wanted.
+    const bool waited = !works() && env_.bus->start_turns() != nullptr;
+    const auto asked = sample_ && (polling.repeated || waited) ? sample_->asked_at : began;
     const auto next = std::min(pace_.next(asked, works()), continuity_.latest(works()));
     if (next > env_.clock->now()) co_await wake_.wait_until(next);
   }

@@ -30,8 +30,8 @@ struct WithLine {
 /// All axes of one line index.
 class Indexing : public WithLine, public IndexingAxes {
  public:
-  Indexing(int count, int baud)
-      : WithLine(count, baud), IndexingAxes(line.world, line.machine(), std::move(names)) {
+  Indexing(int count, int baud, Duration pause = {})
+      : WithLine(count, baud), IndexingAxes(line.world, line.machine(), std::move(names), {.pause = pause}) {
     make_ready();
     line.line->forget_wire();
   }
@@ -70,6 +70,21 @@ TEST_P(FullLine, NoChainIsTriedTwiceAndNoCommandExpires) {
   EXPECT_LE(per_move, axes == 1 ? 4.1 : baud == 115200 ? 3.3 : 4.3);
   const auto budgets = indexing.line.machine().budgets();
   EXPECT_LE(indexing.longest_wait, budgets.front().predicted.load.at(static_cast<std::size_t>(axes)).start);
+}
+
+/// A client, and the disk, take a moment. Meanwhile the axis rests, but what it is asked at rest must not
+/// come between its block and its trigger, and the proof by its arrival has to last.
+TEST(M06, AClientThatTakesAMomentCostsNoExchange) {
+  for (const auto baud : {115200, 19200}) {
+    Indexing indexing(16, baud, 3ms);
+    indexing.run(20s);
+    EXPECT_EQ(indexing.failures, std::vector<std::string>{});
+    const auto per_move = static_cast<double>(indexing.line.line->wire().size()) / indexing.all_done();
+    fmt::print("16 axes at {} bit/s, after 3 ms: {:.1f} moves a second, {:.2f} exchanges a move\n", baud,
+               indexing.all_done() / 20.0, per_move);
+    // With what the first starts take, which all come at once, and behind a canary.
+    EXPECT_LE(per_move, baud == 115200 ? 3.2 : 3.4);
+  }
 }
 
 /// Starts that could not come in time are told so at once; the line goes on at its own rate.

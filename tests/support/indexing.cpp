@@ -107,7 +107,9 @@ void IndexingAxes::ended(std::size_t index, const Command& move) {
     if (failures.size() < kept_failures) failures.push_back(axis.name + ": " + describe(move));
   }
   if (on_end) on_end(index, move);
-  idle_.push_back(index);
+  if (way_.pause == Duration{}) return idle_.push_back(index);
+  axis.rested =
+      world_->clock().call_at(world_->now() + way_.pause, [this, index] { idle_.push_back(index); });
 }
 
 }  // namespace axisd::test

@@ -21,6 +21,7 @@ class IndexingAxes {
   struct Way {
     double near = 0.2, far = 0.4;
     double spread = 0;  ///< further by up to this, each time, by a fixed seed
+    Duration pause{};   ///< that the client takes between the end of a move and the next
   };
   IndexingAxes(VirtualWorld& world, core::MachineCore& machine, std::vector<std::string> axes, Way way);
   IndexingAxes(VirtualWorld& world, core::MachineCore& machine, std::vector<std::string> axes)
@@ -54,7 +55,8 @@ class IndexingAxes {
     CommandPtr move{}, stop{};
     Doing doing = Doing::moves;
     long done = 0;
-    bool away = false;  ///< where its last move that was done went
+    bool away = false;      ///< where its last move that was done went
+    Clock::Timer rested{};  ///< at the end of the client's pause
   };
   void complete(const std::string& axis, const Action& action);
   void go_on(const std::function<bool()>& enough, TimePoint until);
