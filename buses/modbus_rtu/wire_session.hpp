@@ -72,6 +72,7 @@ class WireSession {
   void end_replied(ExchangeResult& result, Reply reply, const Frame& frame, TimePoint first_byte);
   bool end_damaged(ExchangeResult& result, const Frame& bytes, TimePoint first_byte);
   Wait wait_for_more();
+  [[nodiscard]] ReplyPace& pace_of(const Exchange& exchange);
   void note_pace(const Exchange& exchange, const ExchangeResult& result);
   [[nodiscard]] TimePoint begin_of(const Frame& frame, TimePoint seen) const;
   bool pass_echo(const Exchange& exchange, ExchangeResult& result);
@@ -106,7 +107,7 @@ class WireSession {
   TimePoint looked_;          ///< when the bytes were waited for that were read last; far off: they were not
   PunctualWait silence_;      ///< before a request
   LeastLatency reply_latency_;
-  ReplyPace pace_;
+  ReplyPace read_pace_, write_pace_;
   bool slept_ = false;     ///< before the reply, as its node's pace is known
   bool expected_ = false;  ///< the reply, any moment: nothing else need be looked at for a while
   bool damaged_ = false;   ///< unsound bytes came during the exchange under way

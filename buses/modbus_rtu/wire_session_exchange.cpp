@@ -27,11 +27,11 @@ Reply reply_in(const Exchange& exchange, std::span<const std::uint8_t> bytes) {
   return decode(exchange.request, bytes);
 }
 
-bool is_paced(const Exchange& exchange) {
-  return exchange.request.function == Function::read_holding_registers;
-}
-
 }  // namespace
+
+ReplyPace& WireSession::pace_of(const Exchange& exchange) {
+  return exchange.request.function == Function::read_holding_registers ? read_pace_ : write_pace_;
+}
 
 void WireSession::end(ExchangeResult& result, ExchangeStatus status, int native_error) {
   result.status = status;
@@ -98,9 +98,9 @@ WireSession::Wait WireSession::wait_for_reply(const Exchange& exchange, const Ex
   return wait == Wait::quit && !port_.empty() ? Wait::bytes : wait;
 }
 
-/// No byte of the reply is needed before it is complete, and each piece of it would wake this thread. Only
-/// for reads: a write may take a drive a thousand times as long as the one before. `quiet`: from the end of
-/// the request.
+/// No byte of the reply is needed before it is complete, and each piece of it would wake this thread. A write
+/// may take a drive a thousand times as long as the one before: then it is waited for as if there had been no
+/// sleep. `quiet`: from the end of the request.
 void WireSession::sleep_before_reply(const Exchange& exchange, Duration quiet) {
   if (quiet == Duration::zero()) return;
   const auto now = monotonic_now();
@@ -188,11 +188,13 @@ void WireSession::end_replied(ExchangeResult& result, Reply reply, const Frame& 
 void WireSession::note_pace(const Exchange& exchange, const ExchangeResult& result) {
   const auto node = exchange.request.node;
   const auto after_sleep = looked_ == TimePoint::max() ? Met::ready : Met::awaited;
-  if (result.status != ExchangeStatus::replied)
-    pace_.forget(node);
-  else if (is_paced(exchange) && result.reply.kind == ReplyKind::match)
-    pace_.complete(node, wire_time(serial_, result.reply_frame.size()), result.reply_end - result.request_end,
-                   slept_ ? after_sleep : Met::awake);
+  if (result.status != ExchangeStatus::replied) {
+    read_pace_.forget(node);
+    write_pace_.forget(node);
+  } else if (!exchange.stop && result.reply.kind == ReplyKind::match) {
+    pace_of(exchange).complete(node, wire_time(serial_, result.reply_frame.size()),
+                               result.reply_end - result.request_end, slept_ ? after_sleep : Met::awake);
+  }
 }
 
 /// When a frame began whose last byte has just come: what arrived during the sleep was seen only after it.
@@ -261,9 +263,11 @@ ExchangeResult WireSession::run(const Exchange& exchange) {
   expected_ = false;
   // Before the request, where there is time: a terminal carries its bytes on when this thread sleeps again.
   const auto request_time = wire_time(serial_, exchange.frame.size());
-  const auto quiet = is_paced(exchange) ? pace_.quiet(exchange.request.node,
-                                                      wire_time(serial_, reply_size(exchange.request)))
-                                        : Duration::zero();
+  // The reply to a stop is not slept through: another stop may wait for its end.
+  const auto quiet =
+      exchange.stop
+          ? Duration::zero()
+          : pace_of(exchange).quiet(exchange.request.node, wire_time(serial_, reply_size(exchange.request)));
   result.request_begin = silence_.finish();
   if (const int lost = port_.send(exchange.frame); lost != 0) {
     end(result, ExchangeStatus::io_error, lost);
