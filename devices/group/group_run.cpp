@@ -13,6 +13,9 @@ namespace axisd {
 
 namespace {
 
+/// A member that was started is left alone so long, at most, while others start.
+constexpr auto longest_unseen = std::chrono::milliseconds(100);
+
 /// All members are started within this from the acceptance, or none is. A slow line takes some 150 ms each.
 constexpr auto assembly_limit = std::chrono::seconds(10);
 /// Beyond what a start may wait for alone (M31), for each further member.
@@ -215,14 +218,15 @@ Task<GroupRun::MaybeFailure> GroupRun::start() {
   co_return std::nullopt;
 }
 
-/// Between two starts, the one that nobody has looked at for longest, if that is longer than it would be
-/// alone: on a slow line many starts take seconds.
+/// Between two starts, the one that nobody has looked at for longest, if that is long: on a slow line many
+/// starts take seconds. Each look puts the starts behind it off, and the first look at all that have started.
 Task<GroupRun::MaybeFailure> GroupRun::look_after_the_started() {
   std::size_t member = 0;
   for (std::size_t i = 1; i < members_.size(); ++i)
     if (members_[i]->unseen_for() > members_[member]->unseen_for()) member = i;
   auto& oldest = *members_[member];
-  if (oldest.unseen_for() <= oldest.axis().settings().poll_moving) co_return std::nullopt;
+  if (oldest.unseen_for() <= std::max<Duration>(oldest.axis().settings().poll_moving, longest_unseen))
+    co_return std::nullopt;
   const auto seen = co_await oldest.look_after();
   if (seen || given_up_) co_return std::nullopt;
   co_return attributed(member, seen.error());

@@ -4,6 +4,7 @@
 
 #include "devices/yako_rtu/drive.hpp"
 #include "devices/yako_rtu/registers.hpp"
+#include "devices/yako_rtu/transactions.hpp"
 
 namespace axisd::yako_rtu {
 
@@ -39,8 +40,7 @@ class YakoRtuDrive::Loaded final : public LoadedMove {
   Task<Result<TimePoint>> trigger(TimePoint not_after) override {
     const auto latest = std::min(guard_.not_after, not_after);
     for (int attempt = 1;; ++attempt) {
-      // Half of the guard is left for what the line still has to do before this one.
-      if (drive_->clock_->now() > read_at_ + drive_->setup_.reboot_guard / 2)
+      if (drive_->clock_->now() + time_to_trigger() > read_at_ + drive_->setup_.reboot_guard)
         if (const auto verified = co_await verify(); !verified) co_return fail(verified.error());
       auto fresh = motion();
       fresh.guard.not_after = std::min(latest, read_at_ + drive_->setup_.reboot_guard);
@@ -60,6 +60,14 @@ class YakoRtuDrive::Loaded final : public LoadedMove {
   }
 
  private:
+  /// With what the line may still have to do before it: a reading of another axis.
+  [[nodiscard]] Duration time_to_trigger() const {
+    const auto& line = drive_->node_.bus().settings();
+    const auto reading = transactions.state;
+    const ExchangeSize trigger{};
+    return modbus_rtu::wire_time(line, std::size_t{reading.request} + reading.reply + trigger.request) +
+           2 * modbus_rtu::silence(line) + drive_->setup_.reboot_guard / 10;
+  }
   [[nodiscard]] TransactionOptions motion() const {
     return {.transaction_class = TransactionClass::motion, .guard = guard_};
   }
