@@ -5,7 +5,7 @@ import pathlib
 import re
 import unittest
 
-from harness import HOMING, START, STOP, error_pb, pb, system_pb, wait_for
+from harness import BLOCK, HOMING, START, STOP, error_pb, pb, system_pb, wait_for
 from harness.person import CommissionScenario, Hand, ScriptedOperator
 
 
@@ -17,7 +17,7 @@ class Commission(CommissionScenario):
         self.assert_verdicts(person, identity="PASSED", power_off="NOT_APPLICABLE", switch_X0="PASSED", switch_X1="PASSED",
                              switch_X2="PASSED", power_on="PASSED", jog_positive="PASSED", jog_negative="PASSED",
                              limit_positive="PASSED", limit_negative="PASSED", stop="PASSED", homing="PASSED",
-                             soft_limits="PASSED", power_off_again="PASSED")
+                             soft_limits="PASSED", start_in_one_frame="NOT_APPLICABLE", power_off_again="PASSED")
         record = person.record()
         config = json.loads(machine.axisctl("--json", "config", "show").stdout)
         self.assertEqual((record["verdict"], record["machine"], record["axis"], record["operator"], record["model"]),
@@ -42,6 +42,32 @@ class Commission(CommissionScenario):
         self.assertLess(person.text.index("switch X2: passed"), person.text.index("Switch it on?"))
         asked = len(re.findall(r"(?:Move|Home)\? \[yes/skip/abort\] yes", person.text))
         self.assertEqual(len(machine.wire.writes(START)) + len(machine.wire.writes(HOMING)), asked)
+
+    def jogs_in_one_frame(self, simulated):
+        """Commissioned with starts in one frame, as far as the jogs."""
+        machine = self.cell(drive="{ start_in_one_frame: true }", simulated=simulated)
+        person = self.person(machine, (r"Actuate ", "skip"), (r"Go to the switch [^\]]*\] ", "abort"))
+        person.finish()
+        return machine, person, [frame for frame in machine.wire.writes(START) if frame.address == BLOCK]
+
+    def test_a_drive_that_starts_in_one_frame_keeps_its_key(self):
+        machine, person, starts = self.jogs_in_one_frame("home=-28000:-20000")
+        self.assert_verdicts(person, jog_positive="PASSED", jog_negative="PASSED", start_in_one_frame="PASSED")
+        self.assertIn("axes.feeder.drive.start_in_one_frame stays true", person.step("start in one frame")["reason"])
+        self.assertEqual(len(starts), 2, "both jogs")
+        self.assertEqual(machine.sim.shaft().starts, 2)
+
+    def test_a_drive_that_takes_no_start_in_one_frame_says_so_and_stays(self):
+        for refused in ("off", "on"):
+            machine, person, starts = self.jogs_in_one_frame(
+                f"home=-28000:-20000,switch.one_frame_start=off,switch.one_frame_start_refused={refused}")
+            self.assert_verdicts(person, jog_positive="FAILED", start_in_one_frame="NOT_DONE", stop="NOT_DONE",
+                                 power_off_again="PASSED")
+            step = person.step("jog positive")
+            self.assertIn("the drive does not start in one frame", step["reason"])
+            self.assertIn("remove axes.feeder.drive.start_in_one_frame", step["remedy"])
+            self.assertEqual(machine.sim.shaft(), (0, False, 0), person.text)
+            self.assertGreaterEqual(len(starts), 1)
 
     def test_other_models_and_a_motor_the_other_way_round_pass(self):
         people = [self.person(self.cell(**keys)) for keys in (

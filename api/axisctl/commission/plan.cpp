@@ -57,6 +57,19 @@ std::string unproven_speed(const Record& record) {
   }
 }
 
+/// Why the jogs tell nothing of starts in one frame; empty: they do.
+std::string not_in_one_frame(const std::optional<Settings>& settings) {
+  if (!settings) return "the configuration is not known here";
+  if (!settings->may_start_in_one_frame) return "its starts have more than one frame";
+  if (!settings->starts_in_one_frame)
+    return fmt::format(
+        "axes.{}.drive.start_in_one_frame is false: with true the jogs try whether the drive starts so, "
+        "which "
+        "takes less of the line",
+        settings->axis);
+  return {};
+}
+
 /// Of a move that is to be stopped on its way.
 double stop_seconds(const std::optional<Settings>& settings) {
   const double ramps = settings ? settings->acceleration_time + settings->deceleration_time : 1;
@@ -91,6 +104,7 @@ std::vector<StepPlan> plan_steps(const v1::AxisState& state, const std::optional
   add(StepKind::enable, "power on");
   for (const bool positive : {true, false})
     add(StepKind::jog, positive ? "jog positive" : "jog negative").positive = positive;
+  add(StepKind::one_frame, "start in one frame", not_in_one_frame(settings));
   for (const bool positive : {true, false}) {
     const std::string function = positive ? "positive_limit" : "negative_limit";
     const auto found = std::ranges::find(state.inputs(), function, &v1::Terminal::function);
@@ -119,6 +133,8 @@ std::string obstacle(const StepPlan& step, const std::vector<StepPlan>& steps, c
     case StepKind::jog:
       if (!passed(record, "power on")) return "the power stage is off";
       return record.speed() == SPEED_PROOF_WRONG ? unproven_speed(record) : "";
+    case StepKind::one_frame:
+      return passed(record, "jog positive") || passed(record, "jog negative") ? "" : "no jog has passed";
     case StepKind::limit:
     case StepKind::stop:
     case StepKind::home: {

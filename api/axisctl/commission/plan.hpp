@@ -18,6 +18,7 @@ enum class StepKind : std::uint8_t {
   input,        ///< a terminal actuated by hand
   enable,       ///< power stage on
   jog,          ///< a short move in one direction
+  one_frame,    ///< the jogs were started with parameters and trigger in one frame
   limit,        ///< a move that a limit switch ends
   stop,         ///< a move that a stop ends
   home,         ///< homing

@@ -125,6 +125,8 @@ Judgement Procedure::attempt(const StepPlan& plan, Step& step) {
       return enable(step);
     case StepKind::jog:
       return jog(plan, step);
+    case StepKind::one_frame:
+      return one_frame();
     case StepKind::limit:
       return limit(plan, step);
     case StepKind::stop:

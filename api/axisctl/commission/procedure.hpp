@@ -78,6 +78,7 @@ class Procedure {
   Judgement jog(const StepPlan& plan, Step& step);
   /// By the time of a move from `start`: before it, nothing faster than that is done.
   Judgement prove_speed(const v1::AxisState& start, const Run& run, double distance, Step& step);
+  [[nodiscard]] Judgement one_frame() const;
   Judgement limit(const StepPlan& plan, Step& step);
   /// Stops a move on which another limit switch became active.
   void end_by_stop(Step& step, LimitObservation& seen);

@@ -68,9 +68,14 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
   const bool proves = record_.speed() != SPEED_PROOF_PROVEN;
   const double velocity = proves ? proving_velocity(velocities_, wishes_.velocity, room) : motion_.velocity;
   check_move(distance, velocity);
-  permit(fmt::format("{}{}. Look at the machine; Enter stops it. Move?",
-                     move_text(distance, velocity, before), proves ? ", and its time is measured" : ""),
-         step);
+  const bool in_one_frame = settings_ && settings_->starts_in_one_frame;
+  permit(
+      fmt::format("{}{}.{} Look at the machine; Enter stops it. Move?", move_text(distance, velocity, before),
+                  proves ? ", and its time is measured" : "",
+                  in_one_frame ? " It is started in one frame: a drive that does not take that stays where "
+                                 "it is."
+                               : ""),
+      step);
   const auto start = axis_.state();
   auto run = follow(axis_.move(distance, velocity), step);
   JogObservation seen{.axis = axis_.name(), .command = run.command, .distance = distance};
@@ -82,6 +87,7 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
   seen.invert = settings_ && settings_->invert;
   seen.measured = after.position_source() == v1::POSITION_SOURCE_ENCODER;
   seen.described_by_file = config::is_described_by_file(record_.model());
+  seen.in_one_frame = in_one_frame;
   add_figure(step, "asked", distance, unit);
   add_figure(step, "travelled", seen.travelled, unit);
   add_figure(step, "velocity", seen.command.granted().velocity(), unit + "/s");
@@ -105,6 +111,14 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
                                     : Seen::other_way;
   }
   return judge_jog(seen, unit);
+}
+
+/// Its manual does not say that the drive starts so: now it has.
+Judgement Procedure::one_frame() const {
+  return {.verdict = VERDICT_PASSED,
+          .reason = fmt::format("the drive starts in one frame: axes.{}.drive.start_in_one_frame stays true",
+                                axis_.name()),
+          .remedy = {}};
 }
 
 Judgement Procedure::prove_speed(const v1::AxisState& start, const Run& run, double distance, Step& step) {

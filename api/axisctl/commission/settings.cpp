@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "config/configuration.hpp"
+#include "config/models.hpp"
 
 namespace axisd::axisctl::commission {
 namespace {
@@ -49,6 +50,10 @@ Settings settings_of(const AxisSettings& from) {
     to.homing_velocity = from.homing->velocity;
     to.homing_travel = from.homing->max_travel;
   }
+  to.may_start_in_one_frame = config::may_start_in_one_frame(from);
+  const auto one_frame = from.model_settings.find("start_in_one_frame");
+  to.starts_in_one_frame = to.may_start_in_one_frame && one_frame != from.model_settings.end() &&
+                           one_frame->second == SettingValue(true);
   for (const auto& terminal : from.inputs) {
     Input input;
     input.set_terminal(terminal.terminal);

@@ -24,6 +24,8 @@ struct Settings {
   std::string homing_method;     ///< empty: none is configured
   double homing_velocity = 0;
   std::optional<double> homing_travel;  ///< at most
+  bool may_start_in_one_frame = false;  ///< drive.start_in_one_frame can be true
+  bool starts_in_one_frame = false;     ///< it is
   std::vector<Input> inputs;            ///< those that have a function, in the order of the file
 };
 

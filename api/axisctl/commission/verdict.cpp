@@ -116,6 +116,13 @@ Judgement wrong_polarity(const ExpectedInput& expected) {
 }
 
 Judgement judge_motion(const JogObservation& jog, const std::string& unit) {
+  const auto reason = jog.command.cause().reason();
+  if (jog.in_one_frame && (reason == v1::REASON_DID_NOT_START || reason == v1::REASON_REFUSED))
+    return failed(
+        fmt::format("the drive does not start in one frame: {}", end_of(jog.command)),
+        fmt::format("remove axes.{}.drive.start_in_one_frame; reload the configuration, reset the axis, "
+                    "and try again",
+                    jog.axis));
   if (!done(jog.command))
     return failed(end_of(jog.command), jog.command.cause().reason() == v1::REASON_TOOK_TOO_LONG
                                            ? compare_units(jog.axis, jog.described_by_file)

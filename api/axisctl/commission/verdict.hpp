@@ -43,6 +43,7 @@ struct JogObservation {
   bool invert = false;             ///< as configured
   bool measured = false;           ///< `travelled` is an encoder's
   bool described_by_file = false;  ///< as of SpeedObservation
+  bool in_one_frame = false;       ///< started so, by the configuration
   Seen seen = Seen::as_told;
 };
 /// Of the move itself, before the operator is asked.

@@ -56,9 +56,38 @@ TEST(Settings, AreThoseOfTheFile) {
   EXPECT_DOUBLE_EQ(with_braking(one, 0).deceleration_time, 0.25) << "nothing is published";
   EXPECT_TRUE(one.invert && one.vertical);
   EXPECT_EQ(one.homing_method, "home_negative");
+  EXPECT_TRUE(one.may_start_in_one_frame);
+  EXPECT_FALSE(one.starts_in_one_frame);
   ASSERT_EQ(one.inputs.size(), 2U);
   EXPECT_EQ(one.inputs[0].active(), "high");
   EXPECT_EQ(one.inputs[1].active(), "low");
+}
+
+TEST(Settings, SayWhetherStartsGoInOneFrame) {
+  const auto with = [](const std::string& lines) {
+    return settings_of(yaml + lines, "axisd.yaml", "feeder").settings.value();
+  };
+  const std::string key = "    drive: { start_in_one_frame: true }\n";
+  EXPECT_TRUE(with(key).starts_in_one_frame);
+  auto text = yaml + key;
+  text.replace(text.find("X0: home,"), 9, "X0: home, X2: jog_positive,");
+  const auto started = settings_of(text, "axisd.yaml", "feeder").settings.value();
+  EXPECT_FALSE(started.may_start_in_one_frame) << "a terminal may start it";
+  EXPECT_FALSE(started.starts_in_one_frame);
+}
+
+TEST(Plan, HasAStartInOneFrameWhereTheConfigurationDoes) {
+  const auto reason = [](const std::optional<Settings>& with) {
+    const auto steps = plan_steps(state(), with);
+    return std::ranges::find(steps, StepKind::one_frame, &StepPlan::kind)->not_applicable;
+  };
+  auto one = settings();
+  EXPECT_THAT(reason(one), HasSubstr("axes.feeder.drive.start_in_one_frame is false"));
+  one.starts_in_one_frame = true;
+  EXPECT_EQ(reason(one), "");
+  EXPECT_NE(reason(std::nullopt), "");
+  one.may_start_in_one_frame = false;
+  EXPECT_THAT(reason(one), HasSubstr("more than one frame"));
 }
 
 TEST(Settings, SayWhyThereAreNone) {
@@ -74,8 +103,8 @@ TEST(Plan, HasHandsBeforePowerAndPowerOffAtTheEnd) {
     if (step.not_applicable.empty()) applicable.push_back(step.name);
   }
   EXPECT_THAT(names, ElementsAre("identity", "power off", "switch X0", "switch X1", "power on",
-                                 "jog positive", "jog negative", "limit positive", "limit negative", "stop",
-                                 "homing", "soft limits", "power off again"));
+                                 "jog positive", "jog negative", "start in one frame", "limit positive",
+                                 "limit negative", "stop", "homing", "soft limits", "power off again"));
   EXPECT_THAT(applicable,
               ElementsAre("identity", "switch X0", "switch X1", "power on", "jog positive", "jog negative",
                           "limit positive", "stop", "homing", "soft limits", "power off again"));
@@ -143,7 +172,8 @@ TEST(Obstacle, IsADirectionThatIsWrongOrNotProven) {
   rehearsal.set("jog negative", VERDICT_SKIPPED);
   EXPECT_THAT(rehearsal.forbidden(), IsEmpty());
   rehearsal.set("jog positive", VERDICT_SKIPPED);
-  EXPECT_THAT(rehearsal.forbidden(), ElementsAre("limit positive", "limit negative", "stop", "homing"));
+  EXPECT_THAT(rehearsal.forbidden(),
+              ElementsAre("start in one frame", "limit positive", "limit negative", "stop", "homing"));
 }
 
 TEST(Obstacle, IsASpeedThatIsWrongOrNotProven) {

@@ -318,6 +318,18 @@ TEST(JudgeStop, FailsForEachReason) {
   EXPECT_THAT(reason_after([](auto& s) { s.released = false; }), HasSubstr("not at Standstill"));
 }
 
+TEST(JudgeJog, NamesTheKeyOfADriveThatTakesNoStartInOneFrame) {
+  for (const auto cause : {v1::REASON_DID_NOT_START, v1::REASON_REFUSED}) {
+    JogObservation jog{.axis = "feeder", .command = command(v1::COMMAND_STATE_ERROR, cause), .distance = 5};
+    EXPECT_THAT(judge_motion(jog, "mm").remedy, Not(HasSubstr("start_in_one_frame")));
+    jog.in_one_frame = true;
+    const auto judgement = judge_motion(jog, "mm");
+    EXPECT_EQ(judgement.verdict, VERDICT_FAILED);
+    EXPECT_THAT(judgement.reason, HasSubstr("does not start in one frame"));
+    EXPECT_THAT(judgement.remedy, HasSubstr("remove axes.feeder.drive.start_in_one_frame"));
+  }
+}
+
 TEST(JudgeSoftLimits, NeedsBothRefused) {
   const auto refused = obstacle(v1::REASON_SOFT_LIMIT);
   EXPECT_EQ(judge_soft_limits(refused, refused).verdict, VERDICT_PASSED);
