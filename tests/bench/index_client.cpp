@@ -1,7 +1,7 @@
 // Axes of a server without TLS index: each moves to and fro, and asks for its next move as soon as the last
 // one is done. One connection, one call at a time for each axis; what is refused or expires is asked for
 // again 20 ms later. bench_command_client has made the axes ready.
-//   bench_index_client TARGET COUNT DISTANCE S     the first COUNT axes, for S seconds; prints, a line each:
+//   bench_index_client TARGET COUNT HERE THERE S   the first COUNT axes, for S seconds; prints, a line each:
 //     moves DONE EXPIRED REFUSED OTHERWISE
 //     call MEDIAN P99 MAXIMUM                      of a move that was done, ms
 //     start MEDIAN P99 MAXIMUM                     from its acceptance until the drive was told to start, ms
@@ -78,8 +78,11 @@ class Count {
 
 class Indexing {
  public:
-  Indexing(Stub& stub, Count& count, std::string axis, double distance, Clock::time_point end)
-      : stub_(&stub), count_(&count), axis_(std::move(axis)), distance_(distance), end_(end) {}
+  struct Way {
+    double here = 0, there = 0;
+  };
+  Indexing(Stub& stub, Count& count, std::string axis, Way way, Clock::time_point end)
+      : stub_(&stub), count_(&count), axis_(std::move(axis)), way_(way), end_(end) {}
 
   void begin() {
     if (Clock::now() >= end_) {
@@ -90,7 +93,7 @@ class Indexing {
     request_.Clear();
     response_.Clear();
     request_.set_axis(axis_);
-    request_.set_position(away_ ? 0 : distance_);
+    request_.set_position(away_ ? way_.here : way_.there);
     request_.mutable_acceleration_time()->set_nanos(ramp_ns);
     request_.mutable_options()->set_request_id(run + axis_ + "-" + std::to_string(++number_));
     request_.mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE);
@@ -120,7 +123,7 @@ class Indexing {
   Stub* stub_;
   Count* count_;
   std::string axis_;
-  double distance_;
+  Way way_;
   Clock::time_point end_, begun_, again_;
   v1::MoveAbsoluteRequest request_;
   v1::MoveAbsoluteResponse response_;
@@ -133,8 +136,8 @@ class Indexing {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) {
-    std::fputs("usage: bench_index_client TARGET COUNT DISTANCE S\n", stderr);
+  if (argc != 6) {
+    std::fputs("usage: bench_index_client TARGET COUNT HERE THERE S\n", stderr);
     return 2;
   }
   const auto stub =
@@ -146,13 +149,13 @@ int main(int argc, char** argv) {
     return 1;
   }
   const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                      std::chrono::duration<double>(std::strtod(argv[4], nullptr)));
+                                      std::chrono::duration<double>(std::strtod(argv[5], nullptr)));
+  const Indexing::Way way{.here = std::strtod(argv[3], nullptr), .there = std::strtod(argv[4], nullptr)};
   Count count;
   std::vector<std::unique_ptr<Indexing>> all;
   for (const auto& axis : listed.axes())
     if (all.size() < std::strtoul(argv[2], nullptr, 10))
-      all.push_back(
-          std::make_unique<Indexing>(*stub, count, axis.axis(), std::strtod(argv[3], nullptr), end));
+      all.push_back(std::make_unique<Indexing>(*stub, count, axis.axis(), way, end));
   for (auto& axis : all) axis->begin();
   while (!std::ranges::all_of(all, [](const auto& axis) { return axis->ended(); })) {
     std::this_thread::sleep_for(5ms);

@@ -2,7 +2,7 @@
 import html
 
 WIDTH, HEIGHT, LEFT, TOP, BOTTOM = 460, 300, 50, 40, 50
-COLOURS = ("#c1272d", "#0000a7", "#008176", "#b3902b")
+COLOURS = ("#c1272d", "#d98880", "#0000a7", "#008176", "#b3902b")
 
 
 class Panel:
@@ -57,6 +57,6 @@ def write(path, unit, panels):
     for number, (colour, name) in enumerate(zip(COLOURS, next(iter(panels.values())))):
         parts += [line(LEFT + number * 190, HEIGHT + 8, LEFT + 20 + number * 190, HEIGHT + 8, colour),
                   text(LEFT + 26 + number * 190, HEIGHT + 12, name, "start")]
-    size = f'width="{max(WIDTH * len(panels), LEFT + 4 * 190)}" height="{HEIGHT + 24}"'
+    size = f'width="{max(WIDTH * len(panels), LEFT + len(COLOURS) * 190)}" height="{HEIGHT + 24}"'
     path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="12">'
                     f'<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(parts) + "\n</svg>\n", encoding="utf-8")

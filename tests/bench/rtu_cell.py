@@ -87,10 +87,10 @@ class Client:
 class Cell:
     """axisd with an axis for each drive of some lines."""
 
-    def __init__(self, build, lines, poll, calls=256, metrics=False):
+    def __init__(self, build, lines, poll, calls=256, metrics=False, drive=""):
         """`poll`: the refresh period of each axis, None: the default; `calls`: that one client may have waiting;
-        `metrics`: serves them at METRICS."""
-        self.build, self.lines, self.poll, self.calls, self.metrics = build, lines, poll, calls, metrics
+        `metrics`: serves them at METRICS; `drive`: keys of each axis's drive."""
+        self.build, self.lines, self.poll, self.calls, self.metrics, self.drive = build, lines, poll, calls, metrics, drive
 
     def configuration(self):
         metrics = f", metrics: {{ listen: {METRICS} }}" if self.metrics else ""
@@ -103,11 +103,12 @@ buses:
             text += f"  line-{index}: {{ modbus_rtu: {{ port: {line.port}, baud: {line.baud} }} }}\n"
         text += "axes:\n"
         poll = f", poll: {{ idle: {self.poll}, moving: {self.poll} }}" if self.poll else ""
+        drive = f", drive: {{ {self.drive} }}" if self.drive else ""
         for index, line in enumerate(self.lines):
             for node in range(1, line.nodes + 1):
                 text += f"""  axis-{index}-{node}: {{ bus: line-{index}, node: {node}, model: ykd2405pr, unit: mm,
     scale: {{ microstep: 10000 pulses/rev, travel: 5 mm/rev }},
-    limits: {{ position: [0, 400], velocity: 90 mm/s }}{poll} }}
+    limits: {{ position: [0, 400], velocity: 90 mm/s }}{poll}{drive} }}
 """
         return text
 
