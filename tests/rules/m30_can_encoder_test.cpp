@@ -232,7 +232,7 @@ TEST(M30, OnCanTheLastOfASettlingIsNoMotionOfAnEnable) {
   rig.ready();
   for (int i = 0; i < 60; ++i) {
     SCOPED_TRACE(i);
-    rig.done(MoveRelativeRequest{.distance = i % 2 == 0 ? 2.0 + 0.1 * i : -2.0 - 0.1 * i});
+    rig.done(MoveAbsoluteRequest{.position = i % 2 == 0 ? 60.0 + 0.1 * i : 50.0});
     rig.done(EnableRequest{});  // at once: it is enabled already
     rig.done(DisableRequest{});
     rig.done(EnableRequest{});
