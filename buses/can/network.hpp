@@ -119,6 +119,7 @@ class NetworkPort : public PortCore {
   void shut() final;
   void catch_up() override { network_->catch_up(clock().now()); }
   bool drained() override { return !network_->holds_frame_of(id_); }
+  bool empty_below() override { return drained(); }
   void leave();
 
   static constexpr std::size_t interface_queue = 10;  ///< as txqueuelen of a CAN interface

@@ -131,10 +131,8 @@ void PortCore::settle_later() {
 void PortCore::on_timer() {
   const auto now = clock_->now();  // before what has happened by then is read: the host may be held up here
   if (tracker_.state().can_send()) catch_up();
-  if ((queue_.awaits_drain() || queue_.overdue(now)) && drained()) {
-    queue_.drained(clock_->now());
-    queue_.give_up_overdue(now);
-  }
+  if (queue_.awaits_drain() && drained()) queue_.drained(clock_->now());
+  if (queue_.overdue(now) && empty_below()) queue_.give_up_overdue(now);
   queue_.reap(now);
   if (queue_.stalled(now)) {
     tracker_.stalled();

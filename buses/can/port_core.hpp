@@ -39,8 +39,11 @@ class PortCore : public Port {
   /// Reports what already happened below. Called before a judgement that depends on it: a core that was late
   /// must not take its own lateness for a stall.
   virtual void catch_up() = 0;
-  /// Whether whatever is below holds no frame any more. Asked where echoes are no proof, or do not come.
+  /// Whether the kernel holds no frame any more. Asked where echoes are no proof.
   virtual bool drained() = 0;
+  /// Whether nothing below does, the controller included: what did not come back by then never will. False
+  /// also where nobody can tell.
+  virtual bool empty_below() = 0;
 
   void frame_received(const Frame& frame, TimePoint at);
   /// `now`: when it was seen; `at`: its time stamp.

@@ -309,4 +309,8 @@ bool SocketCanPort::drained() {
          memory.at(SK_MEMINFO_WMEM_ALLOC) == 0;
 }
 
+/// With IFF_ECHO a driver gives the socket's memory back as soon as it has put the frame into a mailbox
+/// (can_put_echo_skb()): there it may wait for ever, for its turn or for somebody who acknowledges.
+bool SocketCanPort::empty_below() { return !echo_is_proof_ && drained(); }
+
 }  // namespace axisd::can

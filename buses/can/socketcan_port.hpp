@@ -38,6 +38,7 @@ class SocketCanPort final : public PortCore {
   Written write(const Frame& frame) override;
   void catch_up() override;
   bool drained() override;
+  bool empty_below() override;
 
   void on_report(const LinkReport& report);
   void on_up(const LinkReport& report);

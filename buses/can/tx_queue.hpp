@@ -48,8 +48,9 @@ class TxQueue {
   [[nodiscard]] bool awaits_drain() const;
   /// A frame has not come back for stall_timeout, though others may have: ask the kernel, too.
   [[nodiscard]] bool overdue(TimePoint now) const;
-  /// The kernel holds no frame of ours any more, and all that came back was seen: what is overdue will not
-  /// come back. It ends as `unknown`: its echo was lost, or the controller lost the frame.
+  /// Neither the kernel nor the controller holds a frame of ours any more, and all that came back was seen:
+  /// what is overdue will not come back. It ends as `unknown`: its echo was lost, or the controller lost the
+  /// frame.
   void give_up_overdue(TimePoint now);
 
   /// Ends queued frames whose deadline or validity has passed.
@@ -59,8 +60,8 @@ class TxQueue {
   /// The port cannot send any more: queued frames end as `port_down`, unconfirmed ones as `unknown`.
   void end_all();
 
-  /// Neither a confirmation nor room in the kernel's queue for stall_timeout, or a frame that the kernel
-  /// still holds after twice that time.
+  /// Neither a confirmation nor room in the kernel's queue for stall_timeout, or a frame that may still be
+  /// held below after twice that time.
   [[nodiscard]] bool stalled(TimePoint now) const;
   /// When next(), reap(), stalled() or awaits_drain() should be looked at again; TimePoint::max(): no need.
   [[nodiscard]] TimePoint next_event() const;

@@ -15,10 +15,11 @@ using test::options_of;
 using Class = TransactionClass;
 using Texts = std::vector<std::string>;
 
-struct Bench {
+template <typename Port>
+struct BenchOf {
   axisd::test::VirtualWorld world;
   Network network{world.clock(), 1'000'000};
-  NetworkPort port{world.clock(), {.bus = "cell", .interface = "sim", .stall_timeout = 100ms}, network};
+  Port port{world.clock(), {.bus = "cell", .interface = "sim", .stall_timeout = 100ms}, network};
   test::Endings endings;
   Texts received;  ///< by the port
   std::vector<LinkState> states;
@@ -30,7 +31,7 @@ struct Bench {
     at.push_back(when);
   });
 
-  Bench() {
+  BenchOf() {
     port.start({.on_frame = [this](const ReceivedFrame& each) { received.push_back(to_string(each.frame)); },
                 .on_state = [this](const PortState& state) { states.push_back(state.link); }});
     world.run_for(1ms);
@@ -39,7 +40,15 @@ struct Bench {
     port.send(frame_of(id), options, endings.of(id));
   }
 };
+using Bench = BenchOf<NetworkPort>;
 using States = std::vector<LinkState>;
+
+/// As an interface with IFF_ECHO: what is in a mailbox of the controller is in no memory of the kernel.
+struct WithMailboxes : NetworkPort {
+  using NetworkPort::NetworkPort;
+  bool drained() override { return true; }
+  bool empty_below() override { return false; }
+};
 
 TEST(CanNetwork, CarriesFramesInTheTimeTheyTake) {
   Bench bench;
@@ -150,6 +159,36 @@ TEST(CanPort, AFrameThatVanishesEndsAsUnknownAndTheRestGoesOn) {
   EXPECT_EQ(bench.endings.texts().size(), 21U);
   EXPECT_EQ(bench.others.size(), 20U);
   EXPECT_EQ(bench.states, States{LinkState::up}) << "no stall";
+}
+
+/// Nobody acknowledges it: it would move a shaft as soon as somebody does (M26).
+TEST(CanPort, AFrameInAMailboxIsNotGivenUpButFlushed) {
+  BenchOf<WithMailboxes> bench;
+  bench.network.set_stalled(true);
+  bench.send(1);
+  bench.world.run_for(101ms);
+  EXPECT_EQ(bench.endings.texts(), Texts{"1:unknown"});
+  EXPECT_EQ(bench.states, (States{LinkState::up, LinkState::stalled}));
+  bench.port.cycle();
+  bench.network.set_stalled(false);
+  bench.world.run_for(100ms);
+  EXPECT_TRUE(bench.others.empty());
+}
+
+/// Whether its echo was lost, or others overtake it, nobody can tell there.
+TEST(CanPort, AFrameThatMayBeInAMailboxIsAStallThoughOthersComeBack) {
+  BenchOf<WithMailboxes> bench;
+  bench.network.set_fault([](const Frame& frame) { return Network::Fault{.unconfirmed = frame.id == 1}; });
+  bench.send(1);
+  for (std::uint32_t id = 2; id < 21; ++id) {
+    bench.send(id, options_of(Class::stop));
+    bench.world.run_for(10ms);
+  }
+  EXPECT_EQ(std::ranges::count(bench.endings.texts(), "1:unknown"), 0);
+  EXPECT_EQ(bench.states, States{LinkState::up});
+  bench.world.run_for(11ms);
+  EXPECT_EQ(std::ranges::count(bench.endings.texts(), "1:unknown"), 1);
+  EXPECT_EQ(bench.states, (States{LinkState::up, LinkState::stalled}));
 }
 
 /// As `ip link set can0 up` on a link that is up.
