@@ -57,8 +57,13 @@ std::optional<PeerBudgets::Id> PeerBudgets::gives_way(const std::string& address
 }
 
 void PeerBudgets::look(Connection& connection, const Traffic& total, TimePoint now) {
-  const auto& before = connection.counted;
-  if (total.received - before.received + total.sent - before.sent > quiet) connection.active = now;
+  const auto& before = connection.noted;
+  const bool goes_on = total.received - before.received + total.sent - before.sent > quiet;
+  if (goes_on) connection.active = now;
+  if (goes_on || now - connection.noted_at >= quiet_for) {
+    connection.noted = total;
+    connection.noted_at = now;
+  }
   connection.said_hello = total.received >= hello;
 }
 

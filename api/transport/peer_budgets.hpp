@@ -40,8 +40,10 @@ class PeerBudgets {
   };
   /// Of HTTP/2: its preface and an empty frame of settings.
   static constexpr std::uint64_t hello = 33;
-  /// Pings, with TLS around them, are no more in the time between two counts; a call is more.
+  /// Pings, with TLS around them, are no more in that time, however often it is counted; a call is more, and
+  /// so are the messages of a stream.
   static constexpr std::uint64_t quiet = 100;
+  static constexpr Duration quiet_for = std::chrono::milliseconds(250);
   enum class Entry : std::uint8_t { granted, full, address_full, address_floods };
 
   explicit PeerBudgets(Limits limits) : limits_(limits) {}
@@ -81,6 +83,8 @@ class PeerBudgets {
     Traffic counted{};
     Bucket bucket{};
     TimePoint begun{}, active{};
+    Traffic noted{};  ///< what is compared with to tell whether something goes on
+    TimePoint noted_at{};
     bool said_hello = false;
     double one_sided = 0;  ///< bytes since it began
   };

@@ -91,6 +91,23 @@ TEST_F(PeerBudgetsTest, IdleConnectionsGiveWayAndBusyOnesDoNot) {
   EXPECT_THAT(left, ElementsAre(3, 4, 5, 6, 1)) << "the one that was busy last goes last";
 }
 
+/// Each message is less than pings may be, and a count sees at most one.
+TEST_F(PeerBudgetsTest, AStreamOfShortMessagesIsNotIdle) {
+  for (PeerBudgets::Id id = 1; id <= 2; ++id) {
+    ASSERT_EQ(enter(id, "a"), Entry::granted);
+    traffic_[id] = {.received = 200, .sent = 200};
+  }
+  for (int i = 0; i < 200; ++i) {
+    now_ += 50ms;
+    if (i % 2 == 0) traffic_[1].sent += 60;
+    if (i % 20 == 0) traffic_[2].sent += 78;  // keepalive
+    ASSERT_THAT(budgets_.count(traffic_, at(now_)), IsEmpty());
+  }
+  EXPECT_EQ(budgets_.gives_way("a", at(now_)), 2);
+  budgets_.leave(2);
+  EXPECT_EQ(budgets_.gives_way("a", at(now_)), std::nullopt);
+}
+
 TEST_F(PeerBudgetsTest, WhereAllPlacesAreTakenTheAddressWithMostGivesWay) {
   for (PeerBudgets::Id id = 1; id <= 5; ++id) ASSERT_EQ(enter(id, "a", now_ += 1ms), Entry::granted);
   for (PeerBudgets::Id id = 6; id <= 8; ++id) ASSERT_EQ(enter(id, "b", 0ms), Entry::granted);
