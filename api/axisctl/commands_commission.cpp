@@ -27,10 +27,11 @@ using commission::RecordFile;
 
 constexpr const char* explanation_and_examples = R"(
 Needs a terminal and somebody at the machine. In order: what is talked to; each switch actuated by hand, without power;
-power on; a short move in each direction, the first at a tenth of the highest velocity and timed, and with that whether the
-drive starts in one frame, if drive.start_in_one_frame is true; each limit switch ends a motion; a stop; homing; soft limits; power off. Nothing moves before "yes" to that very move, which says how far and how
-fast; Enter stops it, and so does Ctrl-C, at any time. Nothing faster than the first move is done before its time was
-seen to be that which was told. What is skipped is asked for a reason. A step that failed may be tried again.
+power on; a short move in each direction, the first at a tenth of the highest velocity and timed, and with that whether
+the drive starts in one frame, if drive.start_in_one_frame is true; each limit switch ends a motion; a stop; homing;
+soft limits; power off. Nothing moves before "yes" to that very move, which says how far and how fast; Enter stops it,
+and so does Ctrl-C, at any time. Nothing faster than the first move is done before its time was seen to be that which
+was told. What is skipped is asked for a reason. A step that failed may be tried again.
 
 The axis is leased meanwhile, so that nobody else moves it. The record is JSON, and written after each step.
 Status 0: every step passed or does not apply; 1: a step failed, was skipped or not done; 130: Ctrl-C.

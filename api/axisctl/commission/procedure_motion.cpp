@@ -69,13 +69,13 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
   const double velocity = proves ? proving_velocity(velocities_, wishes_.velocity, room) : motion_.velocity;
   check_move(distance, velocity);
   const bool in_one_frame = settings_ && settings_->starts_in_one_frame;
-  permit(
-      fmt::format("{}{}.{} Look at the machine; Enter stops it. Move?", move_text(distance, velocity, before),
-                  proves ? ", and its time is measured" : "",
-                  in_one_frame ? " It is started in one frame: a drive that does not take that stays where "
-                                 "it is."
-                               : ""),
-      step);
+  permit(fmt::format("{}{}.{} Look at the machine; Enter stops it. Move?",
+                     move_text(distance, velocity, before), proves ? ", and its time is measured" : "",
+                     in_one_frame
+                         ? " It is started in one frame, of which the drive's manual says nothing: be ready "
+                           "to stop it, should it go elsewhere."
+                         : ""),
+         step);
   const auto start = axis_.state();
   auto run = follow(axis_.move(distance, velocity), step);
   JogObservation seen{.axis = axis_.name(), .command = run.command, .distance = distance};
