@@ -131,7 +131,8 @@ class DoorCheck::Door : public std::enable_shared_from_this<Door> {
   std::atomic<TimePoint> owes_since_{TimePoint::max()};
 };
 
-DoorCheck::DoorCheck(Connect main_server, Connect stop_lane, std::vector<transport::Knock*> knocks)
+DoorCheck::DoorCheck(Connect main_server, Connect stop_lane,
+                     std::vector<std::shared_ptr<transport::Knock>> knocks)
     : doors_{std::make_shared<Door>("stop lane", std::move(stop_lane), &ask_lane),
              std::make_shared<Door>("main server", std::move(main_server), &ask_main)},
       knocks_(std::move(knocks)) {}
@@ -142,14 +143,14 @@ DoorCheck::~DoorCheck() {
 
 void DoorCheck::ask() {
   for (const auto& door : doors_) door->ask();
-  for (auto* each : knocks_) each->knock();
+  for (const auto& each : knocks_) each->knock();
 }
 
 std::vector<std::string> DoorCheck::silent_since(TimePoint when) const {
   std::vector<std::string> silent;
   for (const auto& door : doors_)
     if (door->owes_since() < when) silent.push_back(door->name());
-  for (const auto* each : knocks_)
+  for (const auto& each : knocks_)
     if (each->unanswered_since() < when) silent.push_back("new connections to " + each->name());
   return silent;
 }

@@ -21,8 +21,8 @@ class DoorCheck {
   /// As Server::connect_inside() and StopLane::connect_inside(): a new connection.
   using Connect = std::function<FileDescriptor()>;
 
-  /// `knocks` outlive this: of all addresses.
-  DoorCheck(Connect main_server, Connect stop_lane, std::vector<transport::Knock*> knocks);
+  /// `knocks`: of all addresses.
+  DoorCheck(Connect main_server, Connect stop_lane, std::vector<std::shared_ptr<transport::Knock>> knocks);
   /// Waits a moment for questions that are on their way, which are cancelled.
   ~DoorCheck();
   DoorCheck(const DoorCheck&) = delete;
@@ -35,7 +35,7 @@ class DoorCheck {
  private:
   class Door;
   std::vector<std::shared_ptr<Door>> doors_;
-  std::vector<transport::Knock*> knocks_;
+  std::vector<std::shared_ptr<transport::Knock>> knocks_;
 };
 
 }  // namespace axisd::server

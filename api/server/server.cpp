@@ -228,7 +228,7 @@ std::vector<std::string> Server::services() const {
   return names;
 }
 
-std::vector<transport::Knock*> Server::knocks() const { return parts_->accept.knocks(); }
+std::vector<std::shared_ptr<transport::Knock>> Server::knocks() const { return parts_->accept.knocks(); }
 
 TimePoint Server::last_progress() const { return parts_->accept.last_progress(); }
 

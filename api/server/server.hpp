@@ -70,7 +70,7 @@ class Server {
   [[nodiscard]] std::vector<std::string> services() const;
 
   /// Of each address that it listens on, between start() and shutdown(); on their thread.
-  [[nodiscard]] std::vector<transport::Knock*> knocks() const;
+  [[nodiscard]] std::vector<std::shared_ptr<transport::Knock>> knocks() const;
 
   /// When its accept loop last came round: it lets in who connects. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;

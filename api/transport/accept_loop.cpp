@@ -81,9 +81,9 @@ void AcceptLoop::stop() {
   entries_.clear();
 }
 
-std::vector<Knock*> AcceptLoop::knocks() const {
-  std::vector<Knock*> all;
-  for (const auto& entry : entries_) all.push_back(entry.socket.knock.get());
+std::vector<std::shared_ptr<Knock>> AcceptLoop::knocks() const {
+  std::vector<std::shared_ptr<Knock>> all;
+  for (const auto& entry : entries_) all.push_back(entry.socket.knock);
   return all;
 }
 

@@ -40,7 +40,7 @@ class AcceptLoop {
   /// Connections turned away since the start. Thread: any.
   [[nodiscard]] std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   /// Of each of its addresses. Between start() and stop(). Thread: that of these.
-  [[nodiscard]] std::vector<Knock*> knocks() const;
+  [[nodiscard]] std::vector<std::shared_ptr<Knock>> knocks() const;
   /// When the loop last came round, or was made. Thread: any.
   [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
 

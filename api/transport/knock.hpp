@@ -27,6 +27,8 @@ class Knock {
   /// Since when nobody was let in, though this has knocked; TimePoint::max(): all is well, or it cannot be
   /// told. Thread: any.
   [[nodiscard]] TimePoint unanswered_since() const;
+  /// It was let in once. Thread: any.
+  [[nodiscard]] bool got_in() const { return got_in_; }
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:

@@ -92,7 +92,7 @@ Result<ListeningSocket> listen_tcp(const std::string& name, const addrinfo& info
     return system_error(name, "bind");
   if (listen(result.fd.get(), backlog) != 0) return system_error(name, "listen");
   result.port = bound_port(result.fd.get());
-  result.knock = std::make_unique<Knock>(result.fd.get(), name);
+  result.knock = std::make_shared<Knock>(result.fd.get(), name);
   return result;
 }
 
@@ -154,7 +154,7 @@ Result<std::vector<ListeningSocket>> listen_unix(const std::string& name, const 
   if (chmod(path.c_str(), 0660) != 0)
     return system_error(name, "set the mode of");  // before anyone can connect
   if (listen(result.fd.get(), backlog) != 0) return system_error(name, "listen");
-  result.knock = std::make_unique<Knock>(result.fd.get(), name);
+  result.knock = std::make_shared<Knock>(result.fd.get(), name);
   std::vector<ListeningSocket> sockets;
   sockets.push_back(std::move(result));
   return sockets;

@@ -17,7 +17,7 @@ struct ListeningSocket {
   FileDescriptor fd;
   int port = 0;                  ///< of TCP
   std::string unix_path;         ///< empty: TCP
-  std::unique_ptr<Knock> knock;  ///< whoever accepts tells it of everybody
+  std::shared_ptr<Knock> knock;  ///< whoever accepts tells it of everybody
 
   ListeningSocket() = default;
   ListeningSocket(ListeningSocket&&) = default;

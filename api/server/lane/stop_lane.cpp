@@ -91,9 +91,9 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
     }
     eventfd_write(wake_.get(), 1);
   }
-  [[nodiscard]] std::vector<transport::Knock*> knocks() const {
-    std::vector<transport::Knock*> all;
-    for (const auto& socket : sockets_) all.push_back(socket.knock.get());
+  [[nodiscard]] std::vector<std::shared_ptr<transport::Knock>> knocks() const {
+    std::vector<std::shared_ptr<transport::Knock>> all;
+    for (const auto& socket : sockets_) all.push_back(socket.knock);
     return all;
   }
   [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
@@ -393,7 +393,7 @@ FileDescriptor StopLane::connect_inside() {
   return std::move(ours);
 }
 
-std::vector<transport::Knock*> StopLane::knocks() const { return loop_->knocks(); }
+std::vector<std::shared_ptr<transport::Knock>> StopLane::knocks() const { return loop_->knocks(); }
 
 TimePoint StopLane::last_progress() const { return loop_ ? loop_->last_progress() : monotonic_now(); }
 

@@ -57,7 +57,7 @@ class StopLane {
   [[nodiscard]] FileDescriptor connect_inside();
 
   /// As Server::knocks(), between listen() and stop().
-  [[nodiscard]] std::vector<transport::Knock*> knocks() const;
+  [[nodiscard]] std::vector<std::shared_ptr<transport::Knock>> knocks() const;
 
   /// When its thread last came round, at most 200 ms apart. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;
