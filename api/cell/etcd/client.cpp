@@ -55,6 +55,7 @@ void Client::leave() {
 }
 
 void Client::lose(std::string why) {
+  if (!look_) return;
   auto text = fmt::format("etcd at {}: {}", look_->endpoint, why);
   leave();
   events_.lost(std::move(text));
@@ -62,6 +63,7 @@ void Client::lose(std::string why) {
 
 template <class Response, class Done>
 void Client::ask_endpoint(const char* path, const google::protobuf::MessageLite& request, Done done) {
+  if (!look_) return;  // left meanwhile, as whoever asks is told
   ask<Response>(core_, look_->channel, {.path = path, .timeout = patience, .metadata = with_leader}, request,
                 [this, look = std::weak_ptr(look_), done = std::move(done)](const grpc::Status& status,
                                                                             const Response& response) {
@@ -198,6 +200,7 @@ void Client::on_written(std::int64_t lease, const kept::Registration& own,
 }
 
 void Client::keep_alive(std::int64_t lease) {
+  if (!look_) return;
   etcdserverpb::LeaseKeepAliveRequest request;
   request.set_id(lease);
   if (!look_->lease)
