@@ -1,6 +1,7 @@
 // The files of axisd-web: its configuration and its users.
 #include <algorithm>
 
+#include "api/transport/address.hpp"
 #include "api/web/gateway/settings.hpp"
 #include "api/web/gateway/users.hpp"
 #include "tests/fuzz/target.hpp"
@@ -27,7 +28,7 @@ void settings(std::string_view file) {
   expect(loaded.settings.has_value() == loaded.diagnostics.empty(),
          "a file is served, or it is told why not");
   if (loaded.settings)
-    expect(web::host_and_port(loaded.settings->listen).has_value(), "it listens somewhere");
+    expect(transport::host_and_port(loaded.settings->listen).has_value(), "it listens somewhere");
 }
 
 }  // namespace
@@ -39,7 +40,7 @@ void run(Input input) {
     users(file);
   else
     settings(file);
-  if (const auto address = web::host_and_port(file))
+  if (const auto address = transport::host_and_port(file))
     expect(!address->host.empty() && !address->port.empty(), "an address has both");
 }
 

@@ -137,7 +137,7 @@ TEST_F(Transport, ConnectionsAreBounded) {
   std::vector<FileDescriptor> clients;
   // Surplus connections are closed without a word; gRPC greets the others with its settings.
   constexpr std::string_view hello("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0",
-                                   server::PeerBudgets::hello);
+                                   transport::PeerBudgets::hello);
   bool turned_away = false;
   for (int i = 0; i < 200 && !turned_away; ++i) {
     auto& client = clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
