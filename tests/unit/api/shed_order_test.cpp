@@ -154,6 +154,8 @@ class FullServer : public Serving {
     if constexpr (std::is_same_v<Request, v1::ResetRequest>) {
       pending->request.set_axis("feeder");
       pending->request.mutable_options()->set_request_id("r-" + std::to_string(started_));
+    } else {
+      pending->request.set_id("c-1");
     }
     const auto waiting = machine_.held();
     ++started_;
@@ -201,6 +203,7 @@ TEST_F(FullServer, GivesWayInTheStatedOrder) {
   EXPECT_TRUE(eventually([&] { return machine_.submitted().size() > submitted; }));
   machine_.let_go();
   EXPECT_TRUE(eventually([this] { return ended_.load() == started_; }));
+  machine_.hold();
   EXPECT_TRUE(gets(Kind::read)) << "what has ended has given back its place";
 }
 
