@@ -258,7 +258,7 @@ server::ServerOptions Doors::server_options() {
           .reflection = settings.reflection,
           .limits = {.calls = limits.calls,
                      .streams = limits.streams,
-                     .all = 8 * (limits.calls + limits.streams)},
+                     .all = std::max(1024, 8 * (limits.calls + limits.streams))},
           .peers = {.connections = limits.connections},
           .stalled_reader_limit = limits.stalled_reader,
           .access = access_,

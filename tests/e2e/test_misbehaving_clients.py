@@ -253,7 +253,9 @@ class Misbehaving(Scenario):
         self.assertEqual(many[0].recv(1), b"")
         self.assertLessEqual(self.descriptors(), descriptors + CONNECTIONS + 64)
         client.wait_online("axis0")  # whoever is connected does not notice
-        self.connect("good2").info()  # nor does whoever comes behind them
+        other = self.connect("good2")  # nor does whoever comes behind them
+        other.info()
+        other.close()
         for connection in many:
             connection.close()
         wait_for(lambda: self.descriptors() <= descriptors, "all of them are gone")
