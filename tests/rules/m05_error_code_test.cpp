@@ -79,24 +79,5 @@ TEST(M05, ADriveWithoutAnErrorCodeShowsThatOfItsEmergency) {
   EXPECT_THAT(rig.state()->fault->message, HasSubstr("alarm without a code"));
 }
 
-/// The state is read object by object there, and the reset may fall between them: a fault that is over by the
-/// time it is told, and has lost its code with the EMCY, is not a new one.
-TEST(M05, AResetIsDoneWhateverOfTheStateIsBeingRead) {
-  ModelRig rig({.model = "cia402", .drive_keys = "objects: { 603Fh: { access: none } }"});
-  rig.run(1s);
-  for (int step = 0; step < 60; ++step) {
-    SCOPED_TRACE(step);
-    rig.touch([](auto& node) { node.raise_alarm(following_error); });
-    rig.run(300ms);
-    ASSERT_EQ(rig.state()->state, AxisState::error_stop);
-    ASSERT_EQ(rig.state()->alarm_code, following_error);
-    rig.run(step * 700us);
-    const auto reset = rig.complete(ResetRequest{});
-    ASSERT_EQ(reset.state, CommandState::done) << (reset.cause ? to_string(*reset.cause) : "");
-    rig.run(20ms);
-    ASSERT_FALSE(rig.state()->fault) << to_string(*rig.state()->fault);
-  }
-}
-
 }  // namespace
 }  // namespace axisd::test

@@ -224,21 +224,6 @@ TEST(M30, OnCanOnlyAShaftThatTurnsFurtherThanItsWindowHasMovedWhenItWasEnabled) 
       }
 }
 
-/// It is in position by its own word, turns a little all the same, and its noise comes on top.
-TEST(M30, OnCanTheLastOfASettlingIsNoMotionOfAnEnable) {
-  auto options = measured("cia402", 1);
-  options.sync_period = 10ms;
-  CanRig rig(options);
-  rig.ready();
-  for (int i = 0; i < 60; ++i) {
-    SCOPED_TRACE(i);
-    rig.done(MoveAbsoluteRequest{.position = i % 2 == 0 ? 60.0 + 0.1 * i : 50.0});
-    rig.done(EnableRequest{});  // at once: it is enabled already
-    rig.done(DisableRequest{});
-    rig.done(EnableRequest{});
-  }
-}
-
 /// M23: 3 r/min are less than the window while it is watched, and yet a motion.
 TEST(M30, OnCanASlowTurnOfAnEnabledShaftIsFound) {
   for (const int noise : {0, 1}) {
