@@ -1,6 +1,7 @@
 // The composition root: the whole entrance from top to bottom, torn down in reverse.
 #include <fmt/format.h>
 #include <google/protobuf/stubs/logging.h>
+#include <grpc/grpc.h>
 #include <grpc/support/log.h>
 #include <spdlog/async.h>
 #include <spdlog/sinks/stdout_sinks.h>
@@ -211,7 +212,10 @@ int main(int argc, char** argv) {
     std::cerr << fmt::format("axisd-cell: {}: cannot be made; check 'state'\n", settings.state);
     return failed;
   }
+  grpc_init();
   const int status = serve(settings, options.machine_id_file, *std::move(certificates));
+  // Connections that were being made to machines which do not answer are given up in gRPC's own time.
+  grpc_shutdown_blocking();
   spdlog::shutdown();
   return status;
 }
