@@ -61,7 +61,7 @@ TEST_P(ChaosIndex, NothingMovesTwiceLateOrByItself) {
 TEST_P(ChaosGeneric, NothingMovesTwiceLateOrByItself) {
   const auto outcome = run_episodes(PlantKind::generic, first_seed(), faulted_generic_share);
   EXPECT_GE(outcome.can_faulted, faulted_generic_share);
-  expect_often(outcome, static_cast<int>(faulted_generic_share / 250));
+  expect_often(outcome, static_cast<int>(faulted_generic_share / 500));
 }
 
 INSTANTIATE_TEST_SUITE_P(Share, Chaos, ::testing::Range(0, 3));

@@ -49,7 +49,10 @@ Judge::Judge(Plant& plant) : plant_(&plant) {
     // Who refuses a stop has heard of it; that it rests is looked at all the same.
     if (telegram.stop) ++subjects_.at(station.name).stop_frames;
   };
-  plant.on_hand = [this](const Station& station, const std::string& what) { note(station.name, what); };
+  plant.on_hand = [this](const Station& station, const std::string& what) {
+    note(station.name, what);
+    if (what.starts_with("is turned")) subjects_.at(station.name).turned = plant_->world.now();
+  };
 }
 
 Judge::~Judge() {
@@ -129,7 +132,8 @@ void Judge::on_bind(Station& station, const Telegram& telegram) {
     check_stops(station, subject);
     subject.armed = Armed::told;
   } else if (telegram.waiting == Telegram::Waiting::nothing) {
-    subject.armed = Armed::no;
+    const bool too_late = subject.armed == Armed::released || subject.armed == Armed::withdrawn;
+    subject.armed = too_late ? Armed::withdrawn : Armed::no;
   }
   if (telegram.sync && subject.armed != Armed::no) on_sync(station, subject);
   if (telegram.energise) check_enable(station);
@@ -157,6 +161,10 @@ void Judge::check_stops(Station& station, const Subject& subject) {
 
 /// A drive that lost its SYNC starts with the next one.
 void Judge::on_sync(Station& station, Subject& subject) {
+  if (subject.armed == Armed::withdrawn) {
+    subject.armed = Armed::no;
+    return;
+  }
   if (subject.armed == Armed::released) return check_stops(station, subject);
   subject.armed = Armed::released;
   on_trigger(station, subject, false);
@@ -183,7 +191,7 @@ void Judge::on_executed(Station& station, const Executed& executed) {
   const auto& telegram = executed.telegram;
   if (telegram.stop) ++subject.stop_frames;
   const bool by_sync = telegram.sync && subject.armed != Armed::no;
-  if (by_sync && subject.armed == Armed::released) subject.armed = Armed::no;
+  if (by_sync && subject.armed != Armed::told) subject.armed = Armed::no;
   // What the wire doubles starts once more what is being started, to the same end.
   const bool doubled =
       subject.last_executed == executed.when && std::ranges::equal(subject.last_frame, executed.frame);
@@ -265,6 +273,7 @@ void Judge::check_arrival(Station& station, const Subject& subject, const Judged
   const auto asked = station.axis->snapshot()->sampled.after();
   if (asked - subject.own_start <= reading || asked - station.released_until <= reading) return;
   if (command.asked.distance) {
+    if (subject.turned >= judged.accepted_at) return;
     ++tally_.distances;
     const auto there = station.drive->shaft_pulses();
     // A terminal may have started what was loaded, before the trigger came.

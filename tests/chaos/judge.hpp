@@ -27,7 +27,8 @@ namespace axisd::chaos {
 ///  - a start takes the shaft, from where it really is, as far or to where it was asked to (journey.hpp),
 ///    whatever becomes of it later
 ///  - Done is no lie: the load is where the command says, has moved as far as it says, and rests. What a
-///    terminal began, or let go of, while the drive was read excuses it. Not executed means that nothing
+///    terminal began, or let go of, while the drive was read excuses it, and a hand that brought the load to
+///    its target. Not executed means that nothing
 ///    started; everything else has a cause
 ///  - a confirmed stop reached the drive after it was asked for, and the load rests
 ///  - a trusted position of a resting axis is where the load is
@@ -70,8 +71,9 @@ class Judge {
     TimePoint accepted_at{};
   };
   using JudgedPtr = std::shared_ptr<Judged>;
-  /// What waits in a drive for a SYNC: `told` from when the frame was handed over.
-  enum class Armed : std::uint8_t { no, told, released };
+  /// What waits in a drive for a SYNC: `told` from when the frame was handed over, `withdrawn` where it was
+  /// taken back behind a SYNC that is on its way.
+  enum class Armed : std::uint8_t { no, told, released, withdrawn };
   struct Subject {
     std::deque<JudgedPtr> motions;  ///< that may start something, in the order of their acceptance
     JudgedPtr triggered;            ///< whose trigger was on the wire last
@@ -84,6 +86,7 @@ class Judge {
     std::optional<std::int64_t> origin;    ///< the shaft at position 0, pulses, while it is known
     TimePoint own_start{};                 ///< a terminal started it last
     Stretch own_start_from{};              ///< from there
+    TimePoint turned{};                    ///< by hand, last
   };
 
   void on_bind(Station& station, const Telegram& telegram);
