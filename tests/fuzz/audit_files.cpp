@@ -2,6 +2,7 @@
 #include "daemon/store/audit_files.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -49,8 +50,8 @@ void run(Input input) {
   const auto first = text(input.take(input.byte()));
   const auto second = text(input.rest());
   const auto begin = 1 + lines_of(first);
-  const auto older = folder() / "audit-1.jsonl",
-             newer = folder() / ("audit-" + std::to_string(begin) + ".jsonl");
+  const auto older = folder() / fmt::format("audit-{:012}.jsonl", 1),
+             newer = folder() / fmt::format("audit-{:012}.jsonl", begin);
   if (begin > 1) put(older, first);
   put(newer, second);
 
