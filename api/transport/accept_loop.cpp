@@ -30,7 +30,7 @@ namespace {
 constexpr int kept_descriptors = 64;
 /// A flood of requests lasts no longer before it is noticed: gRPC takes 100,000 a second, of some 10 KiB
 /// each. That it is looked for costs a microsecond for each connection.
-constexpr Duration count_every = std::chrono::milliseconds(50);
+constexpr Duration count_every = std::chrono::milliseconds(20);
 /// What has come and was not read yet cannot be taken back from gRPC. It is half of the longest message.
 constexpr int receive_buffer = 128 * 1024;
 constexpr Duration memory_every = heartbeat, trim_every = std::chrono::seconds(2);
