@@ -56,6 +56,7 @@ std::vector<Answer<Response>> ask_machines(const Client& client, const std::vect
                                            const Request& request, std::chrono::nanoseconds limit) {
   std::vector<Answer<Response>> answers(machines.size());
   std::vector<std::string> names;
+  names.reserve(machines.size());
   for (const auto& machine : machines) names.push_back(machine + "/");
   for_each_machine(names, [&](const std::vector<std::size_t>& indices) {
     for (const auto i : indices) {

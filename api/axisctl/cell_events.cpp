@@ -75,6 +75,7 @@ class Reader {
     if (!query_.of_machines) return;
     const auto names = selected(invocation_, selection_);
     std::vector<std::string> slashed;
+    slashed.reserve(names.size());
     for (const auto& name : names) slashed.push_back(name + "/");
     std::vector<std::optional<Failure>> failures(names.size());
     for_each_machine(slashed, [&](const std::vector<std::size_t>& indices) {
