@@ -236,6 +236,7 @@ LoadedSettings load_settings(const std::string& path) {
 
 std::vector<std::string_view> setting_keys() {
   std::vector<std::string_view> paths;
+  paths.reserve(std::size(keys));
   for (const auto& key : keys) paths.push_back(key.path);
   return paths;
 }

@@ -83,6 +83,7 @@ void AcceptLoop::stop() {
 
 std::vector<std::shared_ptr<Knock>> AcceptLoop::knocks() const {
   std::vector<std::shared_ptr<Knock>> all;
+  all.reserve(entries_.size());
   for (const auto& entry : entries_) all.push_back(entry.socket.knock);
   return all;
 }

@@ -93,6 +93,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   }
   [[nodiscard]] std::vector<std::shared_ptr<transport::Knock>> knocks() const {
     std::vector<std::shared_ptr<transport::Knock>> all;
+    all.reserve(sockets_.size());
     for (const auto& socket : sockets_) all.push_back(socket.knock);
     return all;
   }
