@@ -1,23 +1,12 @@
 #include "api/cell/callers.hpp"
 
-#include <grpc/grpc_security_constants.h>
-
 #include <chrono>
 
 #include "api/cell/names.hpp"
+#include "api/transport/peer_certificates.hpp"
 
 namespace axisd::cell {
 namespace {
-
-/// The peer's own, and behind it those that it came with; empty: it has shown none.
-std::string certificates_of(const grpc::ServerContextBase& context) {
-  std::string pem;
-  const auto auth = context.auth_context();
-  if (!auth) return pem;
-  for (const auto* property : {GRPC_X509_PEM_CERT_PROPERTY_NAME, GRPC_X509_PEM_CERT_CHAIN_PROPERTY_NAME})
-    for (const auto& value : auth->FindPropertyValues(property)) pem.append(value.data(), value.size());
-  return pem;
-}
 
 constexpr std::string_view entrance_prefix = "cell.";
 
@@ -25,7 +14,7 @@ constexpr std::string_view entrance_prefix = "cell.";
 
 Caller Callers::of(const grpc::ServerContextBase& context) const {
   if (!live_) return {.name = "local", .local = true};
-  const auto shown = certificates_of(context);
+  const auto shown = transport::certificates_of(context);
   if (shown.empty())
     return {.name = "unnamed",
             .refusal = Error{.reason = Reason::unauthenticated,

@@ -1,10 +1,6 @@
 // The composition root: the whole entrance from top to bottom, torn down in reverse.
 #include <fmt/format.h>
-#include <google/protobuf/stubs/logging.h>
 #include <grpc/grpc.h>
-#include <grpc/support/log.h>
-#include <spdlog/async.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
 #include <systemd/sd-daemon.h>
@@ -25,6 +21,7 @@
 #include "api/cell/options.hpp"
 #include "api/cell/settings.hpp"
 #include "api/exposition/http_server.hpp"
+#include "api/program/program.hpp"
 #include "api/tls/digest.hpp"
 #include "buses/asio_clock.hpp"
 #include "buses/limited_log.hpp"
@@ -34,33 +31,9 @@ namespace {
 using namespace axisd;
 using namespace axisd::cell;
 
-constexpr int failed = 1, wrong = 2;
-/// Lines that nobody takes; beyond that the oldest get lost.
-constexpr std::size_t log_queue = 8192;
 constexpr Duration end_patience = std::chrono::seconds(3), reading_period = std::chrono::seconds(1);
 
-/// On a thread of its own: whoever does not read the log holds up nothing.
-void start_logging(const std::string& level) {
-  spdlog::init_thread_pool(log_queue, 1);
-  auto logger = spdlog::create_async_nb<spdlog::sinks::stderr_sink_mt>("axisd-cell");
-  logger->flush_on(spdlog::level::warn);
-  logger->set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
-  logger->set_level(spdlog::level::from_str(level == "warn" ? "warning" : level));
-  spdlog::set_default_logger(std::move(logger));
-  if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
-  google::protobuf::SetLogHandler(nullptr);
-}
-
-/// gRPC's threads, and what is open, may still want something of what would be torn down.
-[[noreturn]] void leave_at_once(int status) {
-  spdlog::shutdown();  // with the last lines written
-  std::_Exit(status);
-}
-
-int give_up(const Error& error) {
-  std::cerr << "axisd-cell: " << to_string(error) << '\n';
-  return error.reason == Reason::invalid_argument ? wrong : failed;
-}
+int give_up(const Error& error) { return program::give_up("axisd-cell", error); }
 
 std::string random_id() {
   std::random_device source;
@@ -150,10 +123,10 @@ void end(boost::asio::io_context& io, Clock& clock, Cell& cell, Entrance& entran
   if (!closed) {
     spdlog::warn("something that is open does not end");
     closing.detach();
-    leave_at_once(0);
+    program::leave_at_once(0);
   }
   closing.join();
-  if (open_asks() > 0) leave_at_once(0);
+  if (open_asks() > 0) program::leave_at_once(0);
 }
 
 int serve(const Settings& settings, const std::string& machine_id_file, Certificates read) {
@@ -166,11 +139,11 @@ int serve(const Settings& settings, const std::string& machine_id_file, Certific
             {.instance_id = random_id(), .machine_id = computer_of(machine_id_file)}, routes, calls);
   Entrance entrance(cell, routes, calls, settings, certificates.live());
   const auto port = entrance.open();
-  if (!port) leave_at_once(give_up(port.error()));
+  if (!port) program::leave_at_once(give_up(port.error()));
   cell.start();
   const Pulse pulse(clock, cell);
   auto exposed = serve_metrics(settings, pulse);
-  if (!exposed) leave_at_once(give_up(exposed.error()));
+  if (!exposed) program::leave_at_once(give_up(exposed.error()));
   certificates.keep(clock, cell);
   boost::asio::signal_set signals(io, SIGTERM, SIGINT);
   signals.async_wait([&](const boost::system::error_code& error, int) {
@@ -180,7 +153,7 @@ int serve(const Settings& settings, const std::string& machine_id_file, Certific
                *exposed ? fmt::format("; metrics at port {}", (*exposed)->port()) : std::string());
   sd_notify(0, "READY=1");
   const bool good = run(io);
-  if (!good) leave_at_once(failed);
+  if (!good) program::leave_at_once(program::failed);
   signals.cancel();
   exposed->reset();
   end(io, clock, cell, entrance);
@@ -196,12 +169,12 @@ int main(int argc, char** argv) {
   const auto options = parse_options(argc, argv);
   const auto loaded = load_settings(options.config);
   for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
-  if (!loaded.settings) return wrong;
+  if (!loaded.settings) return program::wrong;
   const auto& settings = *loaded.settings;
   ::signal(SIGPIPE, SIG_IGN);
   // c-ares leaks with each look at "localhost", and knows nothing of what nsswitch.conf says.
   ::setenv("GRPC_DNS_RESOLVER", "native", 0);
-  start_logging(options.log_level);
+  program::start_logging("axisd-cell", options.log_level);
   auto certificates = Certificates::read(settings);
   if (!certificates) return give_up(certificates.error());
   if (options.check) {
@@ -210,7 +183,7 @@ int main(int argc, char** argv) {
   }
   if (::mkdir(settings.state.c_str(), 0700) != 0 && errno != EEXIST) {
     std::cerr << fmt::format("axisd-cell: {}: cannot be made; check 'state'\n", settings.state);
-    return failed;
+    return program::failed;
   }
   grpc_init();
   const int status = serve(settings, options.machine_id_file, *std::move(certificates));

@@ -1,12 +1,12 @@
 #include "api/server/callers.hpp"
 
 #include <fmt/format.h>
-#include <grpc/grpc_security_constants.h>
 
 #include <utility>
 
 #include "api/server/local_peer.hpp"
 #include "api/server/peer.hpp"
+#include "api/transport/peer_certificates.hpp"
 
 namespace axisd::server {
 namespace {
@@ -19,16 +19,6 @@ std::optional<std::string> metadata(const grpc::CallbackServerContext& context, 
   const auto found = context.client_metadata().find({key.data(), key.size()});
   if (found == context.client_metadata().end()) return std::nullopt;
   return std::string(found->second.data(), found->second.size());
-}
-
-/// The peer's own, and behind it those that it came with; empty: it has shown none.
-std::string certificates_of(const grpc::CallbackServerContext& context) {
-  std::string pem;
-  const auto auth = context.auth_context();
-  if (!auth) return pem;
-  for (const auto* property : {GRPC_X509_PEM_CERT_PROPERTY_NAME, GRPC_X509_PEM_CERT_CHAIN_PROPERTY_NAME})
-    for (const auto& value : auth->FindPropertyValues(property)) pem.append(value.data(), value.size());
-  return pem;
 }
 
 Claim claim_of(const grpc::CallbackServerContext& context) {
@@ -49,7 +39,7 @@ void Callers::enter(int connection) {
 }
 
 Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
-  const auto shown = live_ ? certificates_of(context) : std::string();
+  const auto shown = live_ ? transport::certificates_of(context) : std::string();
   if (!shown.empty()) {
     auto client = live_->served()->clients.of(shown, machine_.wall(machine_.now()));
     return {.name = std::move(client.name), .address = context.peer(), .refusal = std::move(client.refusal)};
@@ -69,7 +59,7 @@ Peer Callers::peer_of(const grpc::CallbackServerContext& context) const {
 }
 
 OpenCalls::Judge Callers::judge_of(const grpc::CallbackServerContext& context) const {
-  auto shown = live_ ? certificates_of(context) : std::string();
+  auto shown = live_ ? transport::certificates_of(context) : std::string();
   if (shown.empty()) return {};
   return [live = live_, machine = &machine_, pem = std::move(shown)] {
     return live->served()->clients.of(pem, machine->wall(machine->now())).refusal;

@@ -1,9 +1,5 @@
 // The composition root: the whole gateway from top to bottom, torn down in reverse.
 #include <fmt/format.h>
-#include <google/protobuf/stubs/logging.h>
-#include <grpc/support/log.h>
-#include <spdlog/async.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 
@@ -16,6 +12,7 @@
 #include <iterator>
 #include <utility>
 
+#include "api/program/program.hpp"
 #include "api/web/gateway/gateway.hpp"
 #include "api/web/gateway/listener.hpp"
 #include "api/web/gateway/options.hpp"
@@ -28,35 +25,10 @@ namespace {
 using namespace axisd;
 using namespace axisd::web;
 
-constexpr int failed = 1, wrong = 2;
-/// Lines that nobody takes; beyond that the oldest get lost.
-constexpr std::size_t log_queue = 8192;
 /// For the halts of pages that are still jogging, and their answers.
 constexpr Duration end_patience = std::chrono::seconds(2);
 
-/// On a thread of its own: whoever does not read the log holds up nothing.
-void start_logging(const std::string& level) {
-  spdlog::init_thread_pool(log_queue, 1);
-  auto logger = spdlog::create_async_nb<spdlog::sinks::stderr_sink_mt>("axisd-web");
-  logger->flush_on(spdlog::level::warn);
-  logger->set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
-  logger->set_level(spdlog::level::from_str(level == "warn" ? "warning" : level));
-  spdlog::set_default_logger(std::move(logger));
-  if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
-  // It would tell of every message of a page that is not readable.
-  google::protobuf::SetLogHandler(nullptr);
-}
-
-/// gRPC's threads, and what is open, may still want something of what would be torn down.
-[[noreturn]] void leave_at_once(int status) {
-  spdlog::shutdown();  // with the last lines written
-  std::_Exit(status);
-}
-
-int give_up(const Error& error) {
-  std::cerr << "axisd-web: " << to_string(error) << '\n';
-  return error.reason == Reason::invalid_argument ? wrong : failed;
-}
+int give_up(const Error& error) { return program::give_up("axisd-web", error); }
 
 std::string content_of(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -132,7 +104,7 @@ void end(boost::asio::io_context& io, Gateway& gateway, Listener& listener, int 
   }
   if (gateway.deserted()) return;
   spdlog::warn("something that is open does not end");
-  leave_at_once(status);
+  program::leave_at_once(status);
 }
 
 int serve(const Settings& settings, Ground ground) {
@@ -143,7 +115,7 @@ int serve(const Settings& settings, Ground ground) {
   Gateway gateway(io, clock, settings, std::move(ground.assets), std::move(ground.people),
                   *std::move(upstream), ground.client_ca);
   auto listener = Listener::open(gateway, std::move(ground.tls));
-  if (!listener) leave_at_once(give_up(listener.error()));
+  if (!listener) program::leave_at_once(give_up(listener.error()));
   if (gateway.people.nobody() && !settings.tls)
     spdlog::warn("there are no users: everybody at this computer is let in");
   if (gateway.people.nobody() && settings.tls)
@@ -156,7 +128,7 @@ int serve(const Settings& settings, Ground ground) {
   });
   const Heartbeat heartbeat(clock);
   sd_notify(0, "READY=1");
-  const int status = run(io) ? 0 : failed;
+  const int status = run(io) ? 0 : program::failed;
   end(io, gateway, **listener, status);
   return status;
 }
@@ -167,15 +139,15 @@ int main(int argc, char** argv) {
   const auto options = parse_options(argc, argv);
   const auto loaded = load_settings(options.config);
   for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
-  if (!loaded.settings) return wrong;
+  if (!loaded.settings) return program::wrong;
   const auto& settings = *loaded.settings;
   if (options.user) return run_user_command(*options.user, settings.users);
   if (!start_passwords()) {
     std::cerr << "axisd-web: no random numbers\n";
-    return failed;
+    return program::failed;
   }
   ::signal(SIGPIPE, SIG_IGN);
-  start_logging(options.log_level);
+  program::start_logging("axisd-web", options.log_level);
   auto ground = prepare(settings);
   if (!ground) return give_up(ground.error());
   if (options.check) {
