@@ -89,7 +89,8 @@ void Axis::look_at_link(Obstacles& found) const {
     // Whoever saw it knows best what to do: one remedy, not two.
     if (!why->remedy.empty()) silent.remedy = why->remedy;
   }
-  silent.remedy += "; it is retried by itself";
+  // A port that is not open says so itself.
+  if (env_.bus->port().open) silent.remedy += "; it is retried by itself";
   found.block(std::move(silent));
   if (const auto& port = env_.bus->port(); !port.open) {
     auto cause = port.error.value_or(Error{

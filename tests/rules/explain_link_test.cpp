@@ -39,6 +39,8 @@ TEST(Explain, APortThatIsGoneIsNamed) {
   rig.line->set_open(false);
   ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 5s));
   EXPECT_THAT(rig.reasons(move), ElementsAre("offline", "bus_down"));
+  EXPECT_THAT(rig.text(move, Reason::offline), ::testing::Not(HasSubstr("it is retried by itself")))
+      << "what the port says of that is enough";
 }
 
 TEST(Explain, AnotherModelThanConfiguredIsNamed) {
