@@ -143,7 +143,7 @@ grpc::ServerUnaryReactor* CellServiceImpl::ExchangeStopAll(grpc::CallbackServerC
         if (!Callers::is_entrance(caller))
           return answer(to_status(grpc::StatusCode::PERMISSION_DENIED, axisd::v1::REASON_ACCESS_DENIED,
                                   fmt::format("{} is no entrance of a cell", config::printable(caller.name)),
-                                  "entrances have certificates with the name cell.MACHINE"),
+                                  "all entrances of a cell have certificates with the name cell.CELL"),
                         {});
         if (asked.cell() != settings_.cell)
           return answer(to_status(grpc::StatusCode::FAILED_PRECONDITION, axisd::v1::REASON_INVALID_ARGUMENT,
