@@ -118,7 +118,10 @@ class Script {
     };
     add("--cell", connection.cell);
     add("--machine", connection.machine);
-    if (!connection.through_entrance()) add("--server", connection.server);
+    if (!connection.through_entrance()) {
+      add("--server", connection.server);
+      add("--stop-server", connection.stop_server);
+    }
     add("--tls-ca", connection.tls_ca);
     add("--tls-cert", connection.tls_certificate);
     add("--tls-key", connection.tls_key);

@@ -2,6 +2,7 @@
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import tempfile
 import unittest
@@ -60,6 +61,12 @@ class Run(FileTest):
         path = self.script("enable feeder --wait", "move feeder 20mm")
         self.assertEqual(self.ok("run", "--check", path), f"{path}: ok, 2 commands\n")
         self.assertEqual(self.calls(), [])
+
+    def test_its_lines_stop_at_the_lane_that_it_was_given(self):
+        with socket.create_server(("127.0.0.1", 0)) as lane:
+            lane.settimeout(LIMIT)
+            self.ok("--stop-server", f"127.0.0.1:{lane.getsockname()[1]}", "run", self.script("halt feeder"))
+            lane.accept()[0].close()
 
     def test_from_standard_input(self):
         done = subprocess.run([AXISCTL, "--server", self.server.address, "run", "-"], input="halt feeder\n", text=True,
