@@ -1,8 +1,10 @@
 #include "api/axisctl/across.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <exception>
 #include <mutex>
 #include <ranges>
@@ -13,6 +15,14 @@
 #include "config/text.hpp"
 
 namespace axisd::axisctl {
+namespace {
+
+/// Whoever names a machine is told that it does not answer; of all machines nobody waits for those that left.
+bool is_left_out(const cell::v1::Machine& machine, const Selection& selection) {
+  return selection.everything() && machine.state() == cell::v1::MACHINE_STATE_GONE;
+}
+
+}  // namespace
 
 void for_each_machine(const std::vector<std::string>& names,
                       const std::function<void(const std::vector<std::size_t>&)>& work) {
@@ -71,8 +81,7 @@ Machines machines_of_cell(Invocation& invocation) {
   return machines;
 }
 
-std::vector<std::string> selected(Invocation& invocation, const Selection& selection) {
-  const auto known = machines_of_cell(invocation);
+std::vector<std::string> selected(const Machines& known, const Selection& selection) {
   const auto keys = std::views::keys(known);
   const std::vector<std::string> names(keys.begin(), keys.end());
   for (const auto& name : selection.machines())
@@ -82,9 +91,20 @@ std::vector<std::string> selected(Invocation& invocation, const Selection& selec
                                 did_you_mean(name, names, "'axisctl machines' shows those that it has")));
   std::vector<std::string> machines;
   for (const auto& [name, machine] : known)
-    if (selection.has(name) && (!selection.everything() || machine.state() != cell::v1::MACHINE_STATE_GONE))
-      machines.push_back(name);
+    if (selection.has(name) && !is_left_out(machine, selection)) machines.push_back(name);
   return machines;
+}
+
+void tell_left_out(const Machines& known, const Selection& selection) {
+  std::vector<std::string_view> names;
+  for (const auto& [name, machine] : known)
+    if (is_left_out(machine, selection)) names.push_back(name);
+  if (!names.empty())
+    fmt::print(
+        stderr,
+        "axisctl: left out, as gone: {}; neither registered nor answering, 'axisctl machines' tells since "
+        "when\n",
+        fmt::join(names, ", "));
 }
 
 }  // namespace axisd::axisctl

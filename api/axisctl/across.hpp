@@ -37,8 +37,11 @@ class Selection {
 
 /// Throws Failure.
 [[nodiscard]] Machines machines_of_cell(Invocation& invocation);
-/// Those selected that are not gone. Throws Failure, also (usage) where the cell has no such machine.
-[[nodiscard]] std::vector<std::string> selected(Invocation& invocation, const Selection& selection);
+/// Those selected; of everything those that are not gone. Throws Failure (usage) where the cell has no such
+/// machine.
+[[nodiscard]] std::vector<std::string> selected(const Machines& known, const Selection& selection);
+/// Tells on standard error which machines selected() leaves out, if any.
+void tell_left_out(const Machines& known, const Selection& selection);
 
 /// What became of a question to one machine.
 template <class Response>

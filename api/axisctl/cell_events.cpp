@@ -73,7 +73,9 @@ class Reader {
                                               return batch.cursor() < batch.newest();
                                             });
     if (!query_.of_machines) return;
-    const auto names = selected(invocation_, selection_);
+    const auto known = machines_of_cell(invocation_);
+    const auto names = selected(known, selection_);
+    if (!query_.follow) tell_left_out(known, selection_);  // else it is told where they are followed
     std::vector<std::string> slashed;
     slashed.reserve(names.size());
     for (const auto& name : names) slashed.push_back(name + "/");

@@ -30,8 +30,10 @@ using Axes = std::vector<Answer<v1::ListAxesResponse>>;
 /// Of what was selected, in the order of machines; a single axis is found in its machine's list.
 Axes axes_of_cell(Invocation& invocation, const Selection& selection) {
   const auto& client = invocation.client();
-  auto answers = ask_machines(client, selected(invocation, selection), &v1::AxisService::Stub::ListAxes,
+  const auto known = machines_of_cell(invocation);
+  auto answers = ask_machines(client, selected(known, selection), &v1::AxisService::Stub::ListAxes,
                               v1::ListAxesRequest(), client.timeout());
+  tell_left_out(known, selection);
   for (auto& answer : answers) {
     const auto wanted = selection.axes_of(answer.machine);
     if (!answer.response || wanted.empty()) continue;
@@ -152,9 +154,11 @@ void show_cell_axes(Invocation& invocation, const std::vector<std::string>& word
 
 void show_kept_states(Invocation& invocation, void (*show)(const v1::GetStateResponse&)) {
   const auto& client = invocation.client();
-  const auto answers =
-      ask_machines(client, selected(invocation, Selection({})), &v1::SystemService::Stub::GetState,
-                   v1::GetStateRequest(), client.timeout());
+  const auto known = machines_of_cell(invocation);
+  const Selection everything({});
+  const auto answers = ask_machines(client, selected(known, everything), &v1::SystemService::Stub::GetState,
+                                    v1::GetStateRequest(), client.timeout());
+  tell_left_out(known, everything);
   for (const auto& answer : answers) {
     if (!answer.response) continue;
     if (!invocation.json) {

@@ -24,7 +24,10 @@ MachineStreams::~MachineStreams() {
 
 void MachineStreams::run() {
   const Interrupt interrupt([this] { end(); });
-  for (const auto& name : selected(invocation_, selection_)) open(name);
+  const auto known = machines_of_cell(invocation_);
+  const auto names = selected(known, selection_);
+  tell_left_out(known, selection_);
+  for (const auto& name : names) open(name);
   auto stream = invocation_.client().stream(machines_, &cell::v1::CellService::Stub::WatchMachines,
                                             cell::v1::WatchMachinesRequest());
   for (cell::v1::WatchMachinesResponse change; stream.read(change);)

@@ -57,13 +57,14 @@ class Forwarder(grpc.GenericRpcHandler):
 
 
 class FakeCell(rpc.CellServiceServicer):
-    """`machines`: FakeMachine by name. `silent`: names of those that do not answer. `forwarded`: (machine, method).
+    """`machines`: FakeMachine by name. `silent`: names of those that do not answer; `gone`: of these, those that are not
+    registered either. `forwarded`: (machine, method).
     `holding`: events by (machine, method) of calls that are never answered, set when one has come. `readers`:
     of events of the cell, so far."""
 
     def __init__(self, names):
         self.machines = {name: fake_server.FakeMachine() for name in names}
-        self.silent, self.forwarded, self.channels, self.open, self.reasons = set(), [], {}, {}, []
+        self.silent, self.gone, self.forwarded, self.channels, self.open, self.reasons = set(), set(), [], {}, {}, []
         self.changed = asyncio.Condition()
         self.changes, self.events, self.latches = [], [], []
         self.not_shared = None
@@ -87,7 +88,7 @@ class FakeCell(rpc.CellServiceServicer):
 
     def message(self, name):
         machine = self.machines[name]
-        state = "SILENT" if name in self.silent else "PRESENT"
+        state = "GONE" if name in self.gone else "SILENT" if name in self.silent else "PRESENT"
         told = pb.Machine(name=name, axisd_address=f"{name}:7443", axes=list(machine.axes), version="0.1.0",
                           state=f"MACHINE_STATE_{state}", stop_all=machine.inhibited, own=name == OWN,
                           trouble="connection refused" if name in self.silent else "")

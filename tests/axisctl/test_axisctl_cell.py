@@ -175,6 +175,20 @@ class Across(CellTest):
         self.assertEqual((done.returncode, done.stderr),
                          (3, "axisctl: press-3: does not answer: connection refused; look at the machine\n"))
 
+    def test_a_machine_that_is_gone_is_left_out_and_told_once(self):
+        self.cell.silent.add("press-3")
+        self.cell.gone.add("press-3")
+        told = "axisctl: left out, as gone: press-3; neither registered nor answering, 'axisctl machines' tells since when\n"
+        for words in (("list",), ("state",), ("events",), ("watch", "--period", "20ms", "--count", "2")):
+            done = self.run_axisctl(*words)
+            self.assertEqual((done.returncode, done.stderr), (0, told), words)
+        following = self.start("events", "--follow")
+        self.assertEqual(following.stderr.readline(), told)
+        following.send_signal(signal.SIGINT)
+        self.assertEqual((following.wait(LIMIT), following.stderr.read()), (0, ""))
+        self.assertEqual(self.fails(3, "list", "press-3"),
+                         "press-3: does not answer: connection refused; look at the machine")
+
     def test_state_of_machines(self):
         shown = self.ok("state", "press-2")
         self.assertEqual(re.findall(r"^axis: +(\S+)", shown, re.MULTILINE),
