@@ -65,7 +65,6 @@ Cell::Cell(boost::asio::io_context& io, Clock& clock, const Settings& settings, 
                  .registry = registry_.get(),
                  .disk = disk_,
                  .tell = [this](v1::CellEvent event) { tell(std::move(event)); },
-                 .changed = [] {},
                  .instance_id = identity_.instance_id}),
       registry_since_(clock.now()) {
   remember();

@@ -51,7 +51,6 @@ class CoreStream final : public grpc::ServerWriteReactor<Response> {
     source_ = {};
     this->Finish(status);
   }
-  [[nodiscard]] bool is_over() const { return state_ == State::over; }
 
  private:
   enum class State : std::uint8_t { idle, writing, over };

@@ -21,7 +21,6 @@ class EventLog {
   /// Gives it the next sequence.
   void add(v1::CellEvent event);
   [[nodiscard]] std::uint64_t newest() const { return newest_; }
-  [[nodiscard]] const std::string& instance_id() const { return instance_id_; }
 
   /// Where a reader begins who says this.
   [[nodiscard]] std::uint64_t cursor_of(const v1::WatchEventsRequest& request) const;

@@ -104,7 +104,6 @@ void StopAllKeeper::stop(const Caller& caller, const std::string& reason, Stoppe
            fmt::format("StopAll of the cell by {}: {}", latch.by(), latch.reason()));
   keep(*stopping, stopping);
   spread([] {});
-  parts_.changed();
   stopping->gather->seal();
 }
 
@@ -203,7 +202,6 @@ void StopAllKeeper::release(const Caller& caller, Released done) {
     announce(v1::CELL_EVENT_KIND_STOP_ALL_RELEASED, latch,
              fmt::format("StopAll of the cell by {} was released by {}", latch.by(), latch.released_by()));
   }
-  parts_.changed();
   // An entrance that has not heard of it would stop a machine again that is released before.
   releasing->gather = Gather::begin(parts_.clock, answer_patience, [this, releasing] {
     releasing->gather.reset();
@@ -304,7 +302,6 @@ void StopAllKeeper::take_in(const StopAllMachine::Merged& merged) {
     announce(v1::CELL_EVENT_KIND_STOP_ALL_RELEASED, latch,
              fmt::format("StopAll of the cell by {} was released by {}", latch.by(), latch.released_by()));
   save([](const auto&) {});
-  parts_.changed();
   if (merged.began.empty()) return;
   for (const auto& [name, entry] : parts_.machines.roster().entries())
     if (entry.peer.answers()) seen(name, *entry.peer.last());

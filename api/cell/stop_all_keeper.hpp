@@ -29,8 +29,6 @@ class StopAllKeeper {
     Disk& disk;
     /// What is told of it.
     std::function<void(v1::CellEvent)> tell;
-    /// Latches are otherwise than before.
-    std::function<void()> changed;
     std::string instance_id;
   };
   /// All of them outlive this. Reads the file. Blocks for the disk.

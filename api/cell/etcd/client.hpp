@@ -64,7 +64,6 @@ class Client {
   void revoke(std::int64_t lease, std::function<void()> done);
   /// Replaces the key of StopAll, if it is still as of `revision`.
   void replace_stop_all(std::string value, std::int64_t revision, std::function<void(Replaced)> done);
-  [[nodiscard]] const Keys& keys() const { return keys_; }
 
  private:
   /// Asks the present endpoint. `done` is not called once another one is looked at; errors end it.
