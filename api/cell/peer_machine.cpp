@@ -52,7 +52,7 @@ void PeerMachine::connection_lost(TimePoint now) {
 }
 
 void PeerMachine::moved(TimePoint now) {
-  if (state_ != State::unknown) state_ = is_open() ? State::lost : state_;
+  if (is_open()) state_ = State::lost;
   due_ = now;
   anew_ = true;
 }

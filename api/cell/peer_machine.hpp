@@ -1,11 +1,12 @@
 // Whether one machine's axisd answers. Pure: time and answers come in, what to ask goes out.
 //
-//   unknown ---answer---> answering        unknown ---failed----> silent
+//   unknown ---answer---> answering        unknown ---late, failed-> silent
 //   answering -late-----> late             (the connection stands, a question was not answered in time)
-//   answering -lost-----> lost             (the connection has ended; asked again at once)
+//   answering -lost, moved-> lost          (the connection has ended, or is another one; asked again at once)
+//   answering -failed---> lost             (asked again soon)
 //   late ------answer---> answering        late ------late, failed-> silent
 //   lost ------answer---> answering        lost ------late, failed-> silent
-//   late ------lost-----> lost
+//   late ------lost, moved-> lost
 //   silent ----answer---> answering
 //   any -------an answer of another machine-> silent, with the trouble
 #pragma once
