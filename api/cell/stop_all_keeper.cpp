@@ -36,6 +36,12 @@ axisd::v1::ErrorDetail pending(std::string_view what) {
                    "it goes on; GetCell tells what came of it");
 }
 
+/// "by anna at press-1: why", for a line of the log.
+std::string text_of(const v1::StopAllLatch& latch) {
+  return fmt::format("by {} at {}{}{}", latch.by(), latch.entrance(), latch.reason().empty() ? "" : ": ",
+                     config::printable(latch.reason(), 256));
+}
+
 /// In the order of their names, as they are known.
 template <class Results>
 auto& result_for(Results& results, const std::string& name) {
@@ -69,7 +75,7 @@ StopAllKeeper::StopAllKeeper(Parts parts)
     machine_.restore(record);
   }
   for (const auto& latch : machine_.standing())
-    spdlog::warn("StopAll of the cell by {} stands: {}", latch.by(), config::printable(latch.reason()));
+    spdlog::warn("StopAll of the cell stands, {}", text_of(latch));
   spread_now_and_then();
 }
 
@@ -100,8 +106,7 @@ void StopAllKeeper::stop(const Caller& caller, const std::string& reason, Stoppe
   // First the machines: nothing else is waited for.
   const auto metadata = Callers::metadata_for(caller).value_or(Metadata());
   for (const auto& [name, entry] : parts_.machines.roster().entries()) tell_machine(name, stopping, metadata);
-  announce(v1::CELL_EVENT_KIND_STOP_ALL, latch,
-           fmt::format("StopAll of the cell by {}: {}", latch.by(), latch.reason()));
+  announce(v1::CELL_EVENT_KIND_STOP_ALL, latch, fmt::format("StopAll of the cell {}", text_of(latch)));
   keep(*stopping, stopping);
   spread([] {});
   stopping->gather->seal();
@@ -295,9 +300,7 @@ v1::ExchangeStopAllResponse StopAllKeeper::exchange(const v1::ExchangeStopAllReq
 void StopAllKeeper::take_in(const StopAllMachine::Merged& merged) {
   if (!merged.changed()) return;
   for (const auto& latch : merged.began)
-    announce(v1::CELL_EVENT_KIND_STOP_ALL, latch,
-             fmt::format("StopAll of the cell by {} at {}: {}", latch.by(), latch.entrance(),
-                         config::printable(latch.reason())));
+    announce(v1::CELL_EVENT_KIND_STOP_ALL, latch, fmt::format("StopAll of the cell {}", text_of(latch)));
   for (const auto& latch : merged.ended)
     announce(v1::CELL_EVENT_KIND_STOP_ALL_RELEASED, latch,
              fmt::format("StopAll of the cell by {} was released by {}", latch.by(), latch.released_by()));
