@@ -1,6 +1,7 @@
 #include "api/cell/roster.hpp"
 
 #include <google/protobuf/util/message_differencer.h>
+#include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
 #include <utility>
@@ -8,7 +9,7 @@
 namespace axisd::cell {
 namespace {
 
-constexpr auto nanoseconds_per_second = std::int64_t{1'000'000'000};
+using google::protobuf::util::TimeUtil;
 
 bool same(const kept::Registration& a, const kept::Registration& b) {
   return google::protobuf::util::MessageDifferencer::Equals(a, b);
@@ -17,14 +18,12 @@ bool same(const kept::Registration& a, const kept::Registration& b) {
 }  // namespace
 
 void set_time(google::protobuf::Timestamp& to, WallTime time) {
-  const auto all = std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
-  to.set_seconds(all / nanoseconds_per_second);
-  to.set_nanos(static_cast<std::int32_t>(all % nanoseconds_per_second));
+  to = TimeUtil::NanosecondsToTimestamp(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count());
 }
 
 void set_duration(google::protobuf::Duration& to, Duration duration) {
-  to.set_seconds(duration.count() / nanoseconds_per_second);
-  to.set_nanos(static_cast<std::int32_t>(duration.count() % nanoseconds_per_second));
+  to = TimeUtil::NanosecondsToDuration(duration.count());
 }
 
 Roster::Entry* Roster::enter(const kept::Registration& registration, TimePoint now) {
