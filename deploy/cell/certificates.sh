@@ -39,6 +39,8 @@ names=()
 [[ $cell =~ ^[a-z][a-z0-9_-]*$ ]] || die "'$cell' is no usable name of a cell: lower case letters, digits, dashes, underscores"
 for word in "$@"; do
   [[ $word =~ ^[a-z][a-z0-9_-]*=. ]] || die "'$word' is not of the form MACHINE=HOST[,HOST...]"
+  # Else the name that its machine shows to etcd would be that of all entrances.
+  [ "${word%%=*}" != "$cell" ] || die "the cell and a machine are called '$cell': give one of them another name"
   hosts[${word%%=*}]=${word#*=}
   names+=("${word%%=*}")
 done
