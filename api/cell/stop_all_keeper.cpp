@@ -227,9 +227,8 @@ void StopAllKeeper::release_machines(const std::shared_ptr<Releasing>& releasing
     auto& waiting = *releasing->response.add_machines();
     waiting.set_machine(name);
     waiting.set_outcome(v1::MACHINE_OUTCOME_SILENT);
-    *waiting.mutable_error() =
-        detail_of(axisd::v1::REASON_OFFLINE, fmt::format("{} has not answered", name),
-                  "release it by itself when it has come back: axisctl release-stop-all");
+    *waiting.mutable_error() = detail_of(axisd::v1::REASON_OFFLINE, fmt::format("{} has not answered", name),
+                                         "when it has come back, release it by itself");
     auto* const link = parts_.machines.link(name);
     if (link == nullptr || !entry.peer.is_open()) continue;
     releasing->gather->add();
