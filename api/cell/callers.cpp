@@ -6,12 +6,6 @@
 #include "api/transport/peer_certificates.hpp"
 
 namespace axisd::cell {
-namespace {
-
-constexpr std::string_view entrance_prefix = "cell.";
-
-}  // namespace
-
 Caller Callers::of(const grpc::ServerContextBase& context) const {
   if (!live_) return {.name = "local", .local = true};
   const auto shown = transport::certificates_of(context);
@@ -25,9 +19,8 @@ Caller Callers::of(const grpc::ServerContextBase& context) const {
   return {.name = std::move(client.name), .role = role, .refusal = std::move(client.refusal)};
 }
 
-bool Callers::is_entrance(const Caller& caller) {
-  return caller.local || (caller.name.starts_with(entrance_prefix) &&
-                          is_machine_name(std::string_view(caller.name).substr(entrance_prefix.size())));
+bool Callers::is_entrance(const Caller& caller) const {
+  return caller.local || caller.name == "cell." + settings_.cell;
 }
 
 std::optional<Metadata> Callers::metadata_for(const Caller& caller) {

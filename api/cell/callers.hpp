@@ -31,9 +31,8 @@ class Callers {
       : live_(std::move(live)), settings_(settings) {}
 
   [[nodiscard]] Caller of(const grpc::ServerContextBase& context) const;
-  /// Whether it is an entrance, by the name that all entrances of a cell show: "cell.CELL". Of which cell,
-  /// the message says.
-  [[nodiscard]] static bool is_entrance(const Caller& caller);
+  /// Whether it is an entrance of this cell, by the name that all of them show: "cell.CELL".
+  [[nodiscard]] bool is_entrance(const Caller& caller) const;
   /// What a machine is told of whom a call is for. A name that no axisd takes is nobody's: nothing.
   [[nodiscard]] static std::optional<Metadata> metadata_for(const Caller& caller);
 

@@ -140,10 +140,11 @@ grpc::ServerUnaryReactor* CellServiceImpl::ExchangeStopAll(grpc::CallbackServerC
       context, request, response,
       [this](const Caller& caller, const v1::ExchangeStopAllRequest& asked,
              const Answer<v1::ExchangeStopAllResponse>& answer) {
-        if (!Callers::is_entrance(caller))
+        if (!callers_.is_entrance(caller))
           return answer(to_status(grpc::StatusCode::PERMISSION_DENIED, axisd::v1::REASON_ACCESS_DENIED,
-                                  fmt::format("{} is no entrance of a cell", config::printable(caller.name)),
-                                  "all entrances of a cell have certificates with the name cell.CELL"),
+                                  fmt::format("{} is no entrance of the cell {}",
+                                              config::printable(caller.name), settings_.cell),
+                                  fmt::format("entrances show the name cell.{}", settings_.cell)),
                         {});
         if (asked.cell() != settings_.cell)
           return answer(to_status(grpc::StatusCode::FAILED_PRECONDITION, axisd::v1::REASON_INVALID_ARGUMENT,

@@ -11,8 +11,8 @@ from harness import OWN_NAME, Client, axis_pb, pb, spinner, system_pb, wait_for
 from support import PRESENT, SILENT, CellScenario, cell_pb, cell_service_pb2_grpc
 
 #: The entrance comes by a unix socket, as this user of the computer, and so do the tests themselves.
-ACCESS = f"access: {{ roles: {{ {OWN_NAME}: maintainer, cell.press-1: viewer }}, " \
-         f"delegates: {{ {OWN_NAME}: maintainer, cell.press-1: operator }} }}"
+ACCESS = f"access: {{ roles: {{ {OWN_NAME}: maintainer, cell.hall-1: viewer }}, " \
+         f"delegates: {{ {OWN_NAME}: maintainer, cell.hall-1: operator }} }}"
 
 
 class CertificatesOfCallers(CellScenario):
@@ -21,7 +21,7 @@ class CertificatesOfCallers(CellScenario):
         self.one = self.press(1, start=False)
         self.authority = Certificates(self.one.directory, "authority")
         self.others = Certificates(self.one.directory, "others")
-        for name in ("server", "anna", "boss", "panel", "cell.press-1", "cell.press-2", "two words"):
+        for name in ("server", "anna", "boss", "panel", "cell.hall-1", "cell.hall-2", "two words"):
             self.authority.issue(name)
         self.others.issue("stranger")
         self.one.server += f"\n{ACCESS}"
@@ -120,10 +120,10 @@ class CertificatesOfCallers(CellScenario):
     def test_only_entrances_exchange_what_they_know(self):
         self.begin()
         request = cell_pb.ExchangeStopAllRequest(cell="hall-1")
-        for name in ("anna", "boss"):
+        for name in ("anna", "boss", "cell.hall-2"):  # the last: an entrance of another cell
             client = self.connect(name)
             self.refused("PERMISSION_DENIED", "ACCESS_DENIED", client.call, client.cell.ExchangeStopAll, request)
-        entrance = self.connect("cell.press-2")
+        entrance = self.connect("cell.hall-1")
         entrance.call(entrance.cell.ExchangeStopAll, request)
         self.refused("FAILED_PRECONDITION", "INVALID_ARGUMENT", entrance.call, entrance.cell.ExchangeStopAll,
                      cell_pb.ExchangeStopAllRequest(cell="hall-2"))
@@ -139,7 +139,7 @@ class CertificatesOfCallers(CellScenario):
         lane = re.search(r"stops are taken on port (\d+) as well", daemon.log())[1]
         own = self.one.directory
         for suffix in ("crt", "key"):
-            shutil.copy(self.path(suffix, "cell.press-1"), f"{own}/own.{suffix}")
+            shutil.copy(self.path(suffix, "cell.hall-1"), f"{own}/own.{suffix}")
         self.keys += f"peers: {{ press-2: {{ axisd: localhost:{port}, stop: localhost:{lane} }} }}\n"
         self.here = self.with_certificates(
             f"tls: {{ ca: {self.authority.path('crt')}, certificate: {own}/own.crt, key: {own}/own.key }}")
@@ -147,12 +147,12 @@ class CertificatesOfCallers(CellScenario):
         wait_for(lambda: self.machines(anna).get("press-2") == PRESENT, "press-2 answers")
         for _ in range(2):
             command = self.here.at("press-2", anna.axis.Stop, axis_pb.StopRequest(axis="spinner")).command
-            self.assertEqual(command.client, "anna via cell.press-1")
+            self.assertEqual(command.client, "anna via cell.hall-1")
             self.assertEqual(pb.CommandKind.Name(command.kind), "COMMAND_KIND_STOP")
             # The same again with a certificate that was replaced meanwhile.
-            self.authority.issue("cell.press-1")
+            self.authority.issue("cell.hall-1")
             for suffix in ("key", "crt"):
-                shutil.copy(self.path(suffix, "cell.press-1"), f"{own}/own.{suffix}")
+                shutil.copy(self.path(suffix, "cell.hall-1"), f"{own}/own.{suffix}")
             wait_for(lambda: "certificates were read again" in self.here.program.log(), "they are read again")
             wait_for(lambda: self.machines(anna).get("press-2") == PRESENT, "press-2 answers")
             time.sleep(1.5)
