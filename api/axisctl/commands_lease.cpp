@@ -123,11 +123,16 @@ void hold(Invocation& invocation, const Arguments& arguments) {
   bool lost = false;
   int status = 0;
   try {
+    const auto& connection = invocation.connection;
     child.start(arguments.command, {{"AXISD_LEASE", token_text(response)},
-                                    {"AXISD_SERVER", invocation.connection.server},
-                                    {"AXISD_CELL", invocation.connection.cell},
-                                    {"AXISD_MACHINE", invocation.connection.machine},
-                                    {"AXISD_AS", invocation.connection.speaks_for}});
+                                    {"AXISD_SERVER", connection.server},
+                                    {"AXISD_STOP_SERVER", connection.stop_server},
+                                    {"AXISD_CELL", connection.cell},
+                                    {"AXISD_MACHINE", connection.machine},
+                                    {"AXISD_TLS_CA", connection.tls_ca},
+                                    {"AXISD_TLS_CERT", connection.tls_certificate},
+                                    {"AXISD_TLS_KEY", connection.tls_key},
+                                    {"AXISD_AS", connection.speaks_for}});
     status = hold_while(invocation, child, token, ttl_of(response.lease()), lost);
   } catch (...) {
     // Should the release fail, too, the lease ends by itself; what came first is to be told.

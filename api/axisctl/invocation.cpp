@@ -116,7 +116,7 @@ void note_machines_of(CLI::App& command, Invocation& invocation) {
 }
 
 /// Whoever names a daemon means that one, whatever cell the environment names: it may be the entrance that
-/// does not answer.
+/// does not answer. And whatever stop lane: that of another machine would stop an axis of that name there.
 void prefer_server(CLI::App& app, const std::vector<std::string>& words) {
   const auto end = std::ranges::find(words, "--");
   const auto given = [&](const std::string& option) {
@@ -125,6 +125,7 @@ void prefer_server(CLI::App& app, const std::vector<std::string>& words) {
     });
   };
   if (!given("--server")) return;
+  if (!given("--stop-server")) app.get_option("--stop-server")->envname("");
   if (given("--cell"))
     throw Failure(ExitCode::usage, "--server is one machine, --cell several; give one of them");
   app.get_option("--cell")->envname("");

@@ -68,6 +68,15 @@ class Run(FileTest):
             self.ok("--stop-server", f"127.0.0.1:{lane.getsockname()[1]}", "run", self.script("halt feeder"))
             lane.accept()[0].close()
 
+    def test_a_stop_goes_to_no_lane_of_another_machine(self):
+        with socket.create_server(("127.0.0.1", 0)) as other:
+            other.setblocking(False)
+            subprocess.run([AXISCTL, "--server", self.server.address, "halt", "feeder"], timeout=LIMIT, check=True,
+                           env=environment() | {"AXISD_STOP_SERVER": f"127.0.0.1:{other.getsockname()[1]}"},
+                           capture_output=True)
+            self.assertRaises(BlockingIOError, other.accept)
+        self.assertEqual(self.calls(), ["Halt"])
+
     def test_from_standard_input(self):
         done = subprocess.run([AXISCTL, "--server", self.server.address, "run", "-"], input="halt feeder\n", text=True,
                               capture_output=True, timeout=LIMIT, env=environment(), check=False)

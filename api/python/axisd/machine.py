@@ -72,12 +72,13 @@ def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = No
     """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
     localhost:7443. Connects with the first call. `timeout` limits how long the daemon may take to answer, not how long
     a motion may take. Stops are repeated until then while the daemon cannot be reached. `stop_server`: its stop lane;
-    without it that of $AXISD_STOP_SERVER, else next to `server`. `speak_for`: of a delegate: the person whom
+    without it that of $AXISD_STOP_SERVER if `server` is not given either, else next to `server`. `speak_for`: of a delegate: the person whom
     all calls are made for; `role`: what they may do ("viewer", "operator", "maintainer"), at most what the delegate may."""
     if server is None:
         server = os.environ.get("AXISD_SERVER", "localhost:7443")
-    if stop_server is None:
-        stop_server = os.environ.get("AXISD_STOP_SERVER")
+        # Never beside a server that was named: another machine's lane would stop another machine's axis.
+        if stop_server is None:
+            stop_server = os.environ.get("AXISD_STOP_SERVER")
     return Machine(server, tls_ca, tls_certificate, tls_key, timeout, stop_server, speak_for, role)
 
 
