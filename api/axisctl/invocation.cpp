@@ -188,11 +188,11 @@ Failure usage_error(const CLI::App& app, const CLI::ParseError& error,
 }  // namespace
 
 Client& Invocation::client() {
-  if (!client_) {
+  std::call_once(client_made_, [this] {
     connection.timeout = parse_duration(timeout, "--timeout");
     if (machines.size() == 1) connection.only_machine = *machines.begin();
     client_ = std::make_unique<Client>(connection);
-  }
+  });
   return *client_;
 }
 

@@ -26,7 +26,7 @@ struct Invocation {
   std::vector<v1::Command> started;  ///< motion commands that this invocation sent
   std::set<std::string> machines;    ///< of the cell, that names on the command line are of
 
-  /// The client, made at first use: offline commands need none.
+  /// The client, made at first use: offline commands need none. Thread: any.
   Client& client();
   /// The axis's state as the daemon last saw it. Throws Failure.
   v1::AxisState state(const std::string& axis);
@@ -37,6 +37,7 @@ struct Invocation {
 
  private:
   std::mutex started_mutex_;
+  std::once_flag client_made_;
   std::unique_ptr<Client> client_;
 };
 

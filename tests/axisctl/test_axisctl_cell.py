@@ -55,6 +55,11 @@ class CellTest(unittest.TestCase):
                 return line
         self.fail(f"the output ended without {pattern}")
 
+    def wait_until(self, condition, running):
+        while not condition():
+            self.assertIsNone(running.poll(), "axisctl ended")
+            time.sleep(0.01)
+
     def forwarded(self, method):
         return [machine for machine, name in self.cell.forwarded if name == method]
 
@@ -252,15 +257,14 @@ class Across(CellTest):
 
     def test_events_as_they_come(self):
         following = self.start("events", "--follow", "--since", "now")
-        while not self.cell.readers or not all(self.fake.calls(name, "WatchEvents") for name in MACHINES):
-            time.sleep(0.01)
+        self.wait_until(lambda: self.cell.readers and all(self.fake.calls(name, "WatchEvents") for name in MACHINES),
+                        following)
         self.fake.do(self.drift("press-2"))
         self.assertIn("press-2/feeder", self.read_until(following.stdout, "X1 has no function"))
         self.fake.do(self.cell.fall_silent("press-3"))
         self.read_until(following.stdout, "press-3  present -> silent")
         following.send_signal(signal.SIGINT)
         self.assertEqual(following.wait(LIMIT), 0)
-
 
     async def drift(self, name):
         self.cell.machines[name].happen("feeder", configuration_drift={"text": "X1 has no function"})
@@ -342,15 +346,13 @@ class Stops(CellTest):
     def test_axes_of_several_machines_none_waits_for_another(self):
         self.cell.holding["press-1", "Stop"] = asyncio.Event()
         stopping = self.start("--timeout", "20s", "stop", "press-1/feeder", "press-2/feeder", "press-3/feeder")
-        while not all(self.fake.calls(name, "Stop") for name in ("press-2", "press-3")):
-            time.sleep(0.01)
+        self.wait_until(lambda: all(self.fake.calls(name, "Stop") for name in ("press-2", "press-3")), stopping)
         self.assertIsNone(stopping.poll())  # press-1 has its 20 s still
 
     def test_a_stop_is_repeated_until_the_machine_is_back(self):
         self.cell.silent.add("press-2")
         stopping = self.start("stop", "press-2/feeder", "press-3/feeder")
-        while self.forwarded("Stop").count("press-2") < 2:
-            time.sleep(0.01)
+        self.wait_until(lambda: self.forwarded("Stop").count("press-2") >= 2, stopping)
         self.cell.silent.clear()
         self.assertEqual(stopping.wait(LIMIT), 0)
         self.assertEqual(len(self.fake.calls("press-3", "Stop")), 1)
