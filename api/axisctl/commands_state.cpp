@@ -19,7 +19,7 @@
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/state_view.hpp"
 #include "api/axisctl/terminal.hpp"
-#include "api/axisctl/whole_file.hpp"
+#include "api/program/whole_file.hpp"
 #include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/system_service.grpc.pb.h"
 
@@ -108,7 +108,7 @@ void back_up_state(Invocation& invocation, const std::string& path) {
   const auto response = invocation.client().call(&v1::SystemService::Stub::BackUpState,
                                                  v1::BackUpStateRequest(), std::string_view());
   // For nobody else to read: it names clients.
-  if (const int error = write_whole_file(path, response.state(), S_IRUSR | S_IWUSR); error != 0)
+  if (const int error = program::write_whole_file(path, response.state(), S_IRUSR | S_IWUSR); error != 0)
     throw Failure(ExitCode::usage,
                   fmt::format("{}: cannot be written: {}", path, std::generic_category().message(error)));
   if (invocation.json) return print_line(json(response));

@@ -1,8 +1,6 @@
 #include "api/cell/kept_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -11,7 +9,7 @@
 #include <system_error>
 
 #include "api/cell/kept.pb.h"
-#include "buses/file_descriptor.hpp"
+#include "api/program/whole_file.hpp"
 
 namespace axisd::cell {
 namespace {
@@ -23,23 +21,12 @@ std::uint64_t checksum_of(std::string_view text) {
   return hash;
 }
 
-std::unexpected<Error> system_error(const std::string& path, std::string_view what) {
-  const auto code = errno;
+std::unexpected<Error> system_error(const std::string& path, std::string_view what, int code) {
   Error error{.reason = Reason::storage,
               .message = fmt::format("{}: cannot {}: {}", path, what, std::generic_category().message(code)),
               .remedy = "check the disk, and who owns the folder"};
   error.where.native_code = static_cast<std::uint32_t>(code);
   return fail(std::move(error));
-}
-
-bool write_all(int fd, std::string_view text) {
-  while (!text.empty()) {
-    const auto written = ::write(fd, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return true;
 }
 
 }  // namespace
@@ -48,7 +35,7 @@ Result<std::optional<std::string>> read_kept(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
     if (errno == ENOENT) return std::optional<std::string>();
-    return system_error(path, "be read");
+    return system_error(path, "be read", errno);
   }
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
   kept::KeptFile kept;
@@ -64,17 +51,8 @@ Result<void> write_kept(const std::string& path, const std::string& content) {
   kept::KeptFile kept;
   kept.set_content(content);
   kept.set_checksum(checksum_of(content));
-  const auto fresh = path + ".new";
-  {
-    const FileDescriptor file(::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
-    if (file.get() < 0) return system_error(fresh, "be made");
-    if (!write_all(file.get(), kept.SerializeAsString()) || ::fsync(file.get()) != 0)
-      return system_error(fresh, "be written");
-  }
-  if (std::rename(fresh.c_str(), path.c_str()) != 0) return system_error(path, "be replaced");
-  const FileDescriptor folder(
-      ::open(path.substr(0, path.rfind('/')).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder.get() < 0 || ::fsync(folder.get()) != 0) return system_error(path, "be made durable");
+  const int error = program::write_whole_file(path, kept.SerializeAsString(), 0600);
+  if (error != 0) return system_error(path, "be written", error);
   return {};
 }
 

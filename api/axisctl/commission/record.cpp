@@ -13,7 +13,7 @@
 
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
-#include "api/axisctl/whole_file.hpp"
+#include "api/program/whole_file.hpp"
 
 namespace axisd::axisctl::commission {
 namespace {
@@ -131,7 +131,7 @@ RecordFile::RecordFile(std::string path) : path_(std::move(path)) {
 }
 
 void RecordFile::write(const Record& record) const {
-  if (const int error = write_whole_file(path_, record_text(record, false), 0644); error != 0)
+  if (const int error = program::write_whole_file(path_, record_text(record, false), 0644); error != 0)
     throw cannot_write(path_, error);
 }
 

@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdio>
 #include <system_error>
 #include <utility>
 
+#include "api/program/whole_file.hpp"
 #include "buses/file_descriptor.hpp"
 
 namespace axisd::web {
@@ -19,8 +19,7 @@ namespace {
 
 constexpr std::size_t largest_file = std::size_t{256} * 1024;
 
-std::unexpected<Error> failed(const std::string& path, std::string_view what) {
-  const int why = errno;
+std::unexpected<Error> failed(const std::string& path, std::string_view what, int why = errno) {
   return fail(Reason::storage,
               fmt::format("{}: cannot be {}: {}", path, what, std::generic_category().message(why)),
               why == ENOENT                   ? "start axisd-web once, which makes the directory: systemctl "
@@ -46,16 +45,6 @@ Result<User> parse_user(std::string_view line, const std::string& path, std::siz
   if (!user.hash.empty() && !user.hash.starts_with("$argon2id$"))
     return wrong(path, number, "no hash of argon2id");
   return user;
-}
-
-bool write_all(int file, std::string_view text) {
-  while (!text.empty()) {
-    const auto count = ::write(file, text.data(), text.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(count));
-  }
-  return true;
 }
 
 }  // namespace
@@ -124,19 +113,8 @@ Result<Users> load_users(const std::string& path) {
 }
 
 Result<void> save_users(const std::string& path, const Users& users) {
-  const auto fresh = path + ".new";
-  FileDescriptor file(::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600));
-  if (file.get() < 0) return failed(fresh, "made");
-  const auto slash = path.rfind('/');
-  const auto directory = slash == std::string::npos ? std::string(".") : path.substr(0, slash + 1);
-  struct stat about{};
-  // The service runs as the owner of its directory, and the administrator does not.
-  if (::geteuid() == 0 && ::stat(directory.c_str(), &about) == 0 &&
-      ::fchown(file.get(), about.st_uid, about.st_gid) != 0)
-    return failed(fresh, "given to the owner of its directory");
-  if (::fchmod(file.get(), 0600) != 0 || !write_all(file.get(), to_text(users)) || ::fsync(file.get()) != 0 ||
-      std::rename(fresh.c_str(), path.c_str()) != 0)
-    return failed(path, "written");
+  const int error = program::write_whole_file(path, to_text(users), 0600, program::FileOwner::of_folder);
+  if (error != 0) return failed(path, "written", error);
   return {};
 }
 

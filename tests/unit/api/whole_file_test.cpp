@@ -1,4 +1,4 @@
-#include "api/axisctl/whole_file.hpp"
+#include "api/program/whole_file.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -12,7 +12,7 @@
 
 #include "tests/support/temporary_directory.hpp"
 
-namespace axisd::axisctl {
+namespace axisd::program {
 namespace {
 
 /// Stands for a full disk: no file grows beyond so many bytes.
@@ -72,4 +72,4 @@ TEST_F(WholeFile, WhatCannotBeReplacedStays) {
 }
 
 }  // namespace
-}  // namespace axisd::axisctl
+}  // namespace axisd::program
