@@ -17,6 +17,7 @@
 #include "buses/signal.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/homing_watch.hpp"
+#include "devices/cia402/known_words.hpp"
 #include "devices/cia402/model.hpp"
 #include "devices/cia402/object_setting.hpp"
 #include "devices/cia402/objects.hpp"
@@ -107,14 +108,6 @@ class Cia402Drive final : public Drive {
     Object object;
     std::int64_t value = 0;
   };
-  /// The halt that stands in the drive, by its last edge.
-  struct Halt {
-    TimePoint since;
-    bool quick = false;   ///< without a ramp
-    bool rested = false;  ///< the motor was seen at rest under it
-  };
-  /// What the mode that is set was chosen for.
-  enum class ModeUse : std::uint8_t { motion, neutral };
   /// A motion that was triggered and has not been seen to end.
   struct Live {
     TimePoint since;
@@ -180,7 +173,6 @@ class Cia402Drive final : public Drive {
   DriveSample judge(const Reading& reading, bool of_one_moment);
   /// A motion may be slower than its velocity shows: than noise, or than one count of it.
   [[nodiscard]] bool known_by_way() const;
-  [[nodiscard]] bool halted_in(const Reading& reading) const;
   void judge_motion(DriveSample& sample, const Reading& reading);
   void note_direction(const DriveSample& sample);
   Task<> leave_homing(SdoOptions options);
@@ -210,10 +202,7 @@ class Cia402Drive final : public Drive {
   Task<Result<TimePoint>> prove_block(SdoOptions options);
 
   // drive_stop.cpp
-  /// What is known of the drive's words is forgotten where nothing has proven it lately.
-  void drop_stale_knowledge();
-  void forget_words();
-  void prove_words(TimePoint at);
+  [[nodiscard]] KnownWords::Moment moment(TimePoint at) const;
   void note_knowledge(const Reading& reading);
   /// The control word as the drive holds it.
   Task<Result<std::uint16_t>> held_control(SdoOptions options);
@@ -358,21 +347,8 @@ class Cia402Drive final : public Drive {
   /// One sequence at a time has NMT and what waits for a SYNC: the other would undo what it does.
   enum class SyncWork : std::uint8_t { none, settling, proving } sync_work_ = SyncWork::none;
 
-  // What the drive is known to hold; nothing: unknown.
-  std::optional<std::uint16_t> control_;
-  /// Bits 0 to 3 of it: known for longer, as most words do not change them.
-  std::optional<std::uint16_t> state_bits_;
-  std::uint64_t control_writes_ = 0;
-  int control_writing_ = 0;
-  int triggering_ = 0;               ///< starts that are on their way
-  TimePoint control_at_{};           ///< when a write of it ended last
-  TimePoint proven_at_{};            ///< the drive held what is known here
-  std::uint64_t proven_losses_ = 0;  ///< of the port, until then
-  std::optional<OperationMode> mode_;
-  TimePoint mode_at_ = TimePoint::min();  ///< likewise
-  ModeUse mode_use_ = ModeUse::motion;
-  std::optional<std::int16_t> halt_option_;
-  std::optional<Halt> halt_;
+  KnownWords words_;
+  int triggering_ = 0;  ///< starts that are on their way
   std::uint64_t stops_ = 0;
   int stopping_ = 0;        ///< stops being sent
   TimePoint stopped_at_{};  ///< the last one was sent

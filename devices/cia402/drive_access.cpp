@@ -40,9 +40,9 @@ Error Cia402Drive::lost_memory() const {
 void Cia402Drive::forget_power_cycle() {
   expected_.clear();
   expected_marks_.clear();
-  forget_words();
+  words_.forget();
   unsubscribe();  // its PDOs are what a power-up left of them
-  halt_.reset();
+  words_.forget_halt();
   saving_.reset();
   found_closed_.reset();
   unsaved_.clear();

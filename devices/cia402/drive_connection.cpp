@@ -69,6 +69,7 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
       setup_(std::move(context.setup)),
       active_low_(active_low(model, setup_)),
       news_(context.executor, *context.clock),
+      words_(model.neutral_mode),
       power_up_blocks_{default_block(model)} {
   auto required = required_objects(model, setup_);
   if (required)
@@ -191,7 +192,7 @@ Task<Result<void>> Cia402Drive::configure() {
   if (const auto halting =
           co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());
       halting)
-    halt_option_ = model_->meaning.halt_on_ramp;
+    words_.set_halt_option(model_->meaning.halt_on_ramp);
   // Saved only where everything is: what is in the EEPROM is not written again after the next power-up, and
   // to switch saving off for it would itself be a write to the EEPROM at each start.
   auto switched = co_await save_writes(saves_at_rest());

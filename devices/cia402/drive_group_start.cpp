@@ -102,15 +102,12 @@ class Cia402Drive::Prepared final : public PreparedMove {
   /// Nobody knows the control word until the end.
   void begin() {
     stops_ = drive_->stops_;
-    drive_->control_.reset();
-    ++drive_->control_writes_;
-    ++drive_->control_writing_;
+    (void)drive_->words_.begin_write(std::nullopt);
     ++drive_->triggering_;
   }
   void end() {
-    --drive_->control_writing_;
+    drive_->words_.end_write(drive_->clock_->now());
     --drive_->triggering_;
-    drive_->control_at_ = drive_->clock_->now();
     drive_->give_up_common_start();  // once only
   }
 
@@ -195,7 +192,7 @@ Task<Result<void>> Cia402Drive::confirm_started() {
 }
 
 canopen::Bytes Cia402Drive::neutral_bytes() const {
-  const auto bits = state_bits_.value_or(control_word(Command::enable_operation));
+  const auto bits = words_.state_bits().value_or(control_word(Command::enable_operation));
   return canopen::number_bytes(bits | control::halt, word_bytes);
 }
 
@@ -243,12 +240,9 @@ Task<> Cia402Drive::prove_common_start(MotionGuard unbegun) {
 Task<> Cia402Drive::show_and_judge(std::uint16_t held, SdoOptions options) {
   // Until it has shown all of it, SYNC goes on only after what waits in it was thrown away.
   bus_->set_armed(node_.id(), true);
-  control_.reset();
-  ++control_writes_;
-  ++control_writing_;
+  (void)words_.begin_write(std::nullopt);
   const auto shown = co_await show_common_start(held, options);
-  --control_writing_;
-  control_at_ = clock_->now();
+  words_.end_write(clock_->now());
   if (!shown) {
     no_common_start_ = "not proven yet: " + shown.error().message;
     co_return;

@@ -170,7 +170,7 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
   const auto began = clock_->now();
   const auto stops = stops_;
   const bool by_control = trigger.object == object::control_word;
-  if (mode == OperationMode::homing) mode_use_ = ModeUse::motion;
+  if (mode == OperationMode::homing) words_.use_mode(KnownWords::ModeUse::motion);
   ++triggering_;
   auto pulled = by_control ? co_await write_control(static_cast<std::uint16_t>(trigger.value), options)
                            : co_await write_object(trigger.object, trigger.value, 0, options);

@@ -50,9 +50,9 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
   const auto present = co_await read_object(object::mode_display, options);
   if (!present) co_return fail(present.error());
   if (*present != number_of(mode)) {
-    mode_.reset();
+    words_.leave_mode();
     const auto written = co_await write_object(object::mode, number_of(mode), 1, options);
-    mode_at_ = clock_->now();
+    words_.mode_written(clock_->now());
     if (!written) co_return written;
   }
   const auto fits = [wanted = number_of(mode)](std::int64_t shown) { return shown == wanted; };
@@ -62,10 +62,8 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
     co_return fail(error_at(Reason::refused, object::mode_display,
                             fmt::format("the drive stays in mode {} instead of {}", *shown, number_of(mode)),
                             "check whether another master writes to this drive, and its alarm"));
-  mode_ = mode;
-  mode_at_ = clock_->now();
+  words_.mode_reached(mode, clock_->now());
   if (mode != OperationMode::homing) leave_homing_ = false;
-  if (mode != model_->neutral_mode) mode_use_ = ModeUse::motion;
   co_return Result<void>{};
 }
 
@@ -83,7 +81,7 @@ Task<Result<void>> Cia402Drive::clear_target_velocity(SdoOptions options) {
 Task<Result<void>> Cia402Drive::enter_neutral_mode(SdoOptions options) {
   if (model_->neutral_mode == OperationMode::homing)
     if (auto left = co_await change_mode(OperationMode::profile_position, options); !left) co_return left;
-  mode_use_ = ModeUse::neutral;  // before the drive shows it
+  words_.use_mode(KnownWords::ModeUse::neutral);
   auto entered = co_await change_mode(model_->neutral_mode, std::move(options));
   const bool refused =
       !entered && (entered.error().reason == Reason::refused || entered.error().outcome == Outcome::refused);
@@ -104,15 +102,15 @@ Task<Result<void>> Cia402Drive::neutralise(State state, SdoOptions options) {
   if (*held != word)
     if (const auto written = co_await write_control(word, options); !written) co_return written;
   if (const auto zero = co_await clear_target_velocity(options); !zero) co_return zero;
-  if (halt_option_ != model_->meaning.halt_on_ramp) {
+  if (words_.halt_option() != model_->meaning.halt_on_ramp) {
     // After a quick stop; drives without the object have one way to halt.
-    halt_option_.reset();
+    words_.set_halt_option(std::nullopt);
     const auto ramp = co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, options);
     if (!ramp && ramp.error().outcome != Outcome::refused) co_return ramp;
-    halt_option_ = model_->meaning.halt_on_ramp;
+    words_.set_halt_option(model_->meaning.halt_on_ramp);
   }
   if (const auto mode = co_await enter_neutral_mode(options); !mode) co_return mode;
-  control_.reset();
+  words_.doubt_control();
   const auto now = co_await held_control(options);
   if (!now) co_return fail(now.error());
   const auto speed = co_await read_target_velocity(std::move(options));
@@ -143,7 +141,7 @@ Task<Result<void>> Cia402Drive::make_ready(State state, OperationMode mode, SdoO
 Task<Result<void>> Cia402Drive::leave_halt(State state, OperationMode mode,
                                            std::optional<std::int64_t> position, SdoOptions options) {
   const auto quiet = quiet_word(state);
-  if (!control_ || *control_ != quiet)
+  if (words_.control() != quiet)
     if (const auto written = co_await write_control(quiet, options); !written) co_return written;
   if (position)
     if (const auto rests = co_await watch_standstill(*position, options); !rests) co_return rests;
@@ -318,9 +316,9 @@ Task<Result<void>> Cia402Drive::disable(MotionGuard guard) {
   const SdoOptions options{
       .transaction_class = TransactionClass::stop, .guard = std::move(guard), .attempts = 3};
   co_await wake_if_stopped();
-  drop_stale_knowledge();
+  words_.forget_stale(moment(clock_->now()));
   // 0Fh with a motion under way: that ends first, as far as it can.
-  if (!control_ || (*control_ & control::halt) == 0) (void)co_await stop(StopKind::stop);
+  if ((words_.control().value_or(0) & control::halt) == 0) (void)co_await stop(StopKind::stop);
   // The halt stays until the next enable has found that nothing is behind it.
   const auto shutdown = static_cast<std::uint16_t>(control_word(Command::shutdown) | control::halt);
   if (const auto written = co_await write_control(shutdown, options); !written) co_return written;

@@ -38,7 +38,7 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
       break;
     case Kind::heartbeat_lost:
       heartbeat_lost_ = true;
-      forget_words();
+      words_.forget();
       break;
     case Kind::heartbeat_again:
       heartbeat_lost_ = false;
@@ -113,7 +113,7 @@ Duration Cia402Drive::pdo_patience(TimePoint now) const {
   const auto period = bus_->settings().sync_period;
   const auto wanted = pdos_.late() ? std::max<Duration>(3 * period + reply, longest_pdo_wait)
                                    : std::min<Duration>(2 * period + reply, longest_pdo_wait);
-  const bool stopping = halt_ && !halt_->rested;
+  const bool stopping = words_.halt() == KnownWords::Halt::braking;
   if (!alive(now) || stopping) return wanted;
   return std::max(wanted, std::min<Duration>(cycles_alive * period + reply, longest_pdo_wait_alive));
 }
@@ -191,13 +191,6 @@ bool Cia402Drive::known_by_way() const {
          decode_velocity(*model_, setup_.pulses_per_revolution, 1) > velocity_noise_rpm;
 }
 
-/// The drive held halt when it was asked.
-bool Cia402Drive::halted_in(const Reading& reading) const {
-  const bool by_ours = halt_ && reading.asked_at >= halt_->since;
-  const bool as_found = control_ && (*control_ & control::halt) != 0 && reading.asked_at >= control_at_;
-  return by_ours || as_found;
-}
-
 /// What is measured wavers: a little of it is no motion, and has no direction. Where positions are exact they
 /// know better than the drive's own word, which may be that it is near its target.
 void Cia402Drive::judge_motion(DriveSample& sample, const Reading& reading) {
@@ -207,7 +200,8 @@ void Cia402Drive::judge_motion(DriveSample& sample, const Reading& reading) {
         {.at = sample.asked_at,
          .position = sample.position_pulses,
          .velocity_rpm = sample.velocity_rpm,
-         .told = window > 0 ? told_motion(*model_, reading.values, halted_in(reading)) : std::nullopt},
+         .told = window > 0 ? told_motion(*model_, reading.values, words_.held_halt(reading.asked_at))
+                            : std::nullopt},
         {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution});
     if (!sample.moving) sample.velocity_rpm = 0;
   }
@@ -238,7 +232,7 @@ DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
   last_position_ = sample.position_pulses;
   last_moving_ = sample.moving;
   note_knowledge(reading);
-  if (halt_ && sample.asked_at >= halt_->since && !sample.moving) halt_->rested = true;
+  if (!sample.moving) words_.see_rest(sample.asked_at);
   if (live_ && sample.asked_at >= live_->since) {
     if (sample.moving)
       live_->moved = true;
@@ -280,7 +274,7 @@ Task<> Cia402Drive::leave_homing(SdoOptions options) {
 /// There, and on the way there and back, bit 12 may be that of any homing before.
 bool Cia402Drive::may_be_neutral(const Reading& reading) const {
   if (model_->neutral_mode != OperationMode::homing || homing_.active()) return false;
-  return mode_use_ == ModeUse::neutral || reading.asked_at <= mode_at_;
+  return words_.may_be_neutral(reading.asked_at);
 }
 
 /// 6061h stays as it is when a motion has ended; the contract wants `homing` only while it lasts.
@@ -296,7 +290,7 @@ DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading
   }
   if (leave_homing_) return sample.moving ? DriveMode::homing : DriveMode::positioning;
   if (live_) return DriveMode::positioning;
-  if (mode_ == OperationMode::homing && mode_use_ != ModeUse::neutral && sample.enabled) {
+  if (words_.homes() && sample.enabled) {
     // Found homing: between its phases the motor rests, but bit 4 stands (6.2.6).
     const auto status = reading.values.find(object::status_word.key());
     const bool told = expected_.empty() && status != reading.values.end() &&
