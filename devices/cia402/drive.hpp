@@ -15,6 +15,7 @@
 #include "buses/canopen/canopen_bus.hpp"
 #include "buses/canopen/pdo_configuration.hpp"
 #include "buses/signal.hpp"
+#include "devices/cia402/canary.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/homing_watch.hpp"
 #include "devices/cia402/known_words.hpp"
@@ -61,8 +62,8 @@ class Cia402Drive final : public Drive {
 
   // drive_canary.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
-  [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override;
-  void expect_marks(const std::vector<ContinuityMark>& marks) override;
+  [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override { return canary_.mark(); }
+  void expect_marks(const std::vector<ContinuityMark>& marks) override { canary_.expect_marks(marks); }
   [[nodiscard]] std::vector<ContinuityMark> marks_until(const MoveProfile& start) const override;
   [[nodiscard]] std::vector<ContinuityMark> marks_until(const VelocityProfile& start) const override;
 
@@ -187,18 +188,11 @@ class Cia402Drive final : public Drive {
 
   // drive_canary.cpp
   [[nodiscard]] MotionBlock fresh_neutral_block() const;
-  /// Keeps a block off every content that a power-up could leave.
-  [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
-  [[nodiscard]] std::vector<ContinuityMark> marks_until(const MotionBlock& block) const;
-  /// A content that a power-up may leave: never a canary.
-  void note_power_up_block(const MotionBlock& block);
-  [[nodiscard]] bool is_expected(const MotionBlock& block) const;
   Task<Result<MotionBlock>> read_block(SdoOptions options);
   /// Writes what differs from what is known to stand there, and verifies it.
   Task<Result<void>> write_canary(MotionBlock block, SdoOptions options);
   /// Reads the block and compares it. The time: before the first of it was asked for.
   Task<Result<TimePoint>> read_canary(SdoOptions options);
-  [[nodiscard]] std::vector<MotionObject> telling_objects(const MotionBlock& block) const;
   Task<Result<TimePoint>> prove_block(SdoOptions options);
 
   // drive_stop.cpp
@@ -336,8 +330,6 @@ class Cia402Drive final : public Drive {
   /// What another master told this node, and when: the first of what comes in a row, and the last time.
   std::string foreign_command_;
   TimePoint foreign_at_ = TimePoint::min();
-  /// NodeTraffic::foreign_writes when all of the block was asked for last.
-  std::uint64_t foreign_at_block_ = 0;
 
   // Starts in common with others.
   std::optional<std::uint32_t> start_pdo_{};  ///< takes the control word at the next SYNC
@@ -368,11 +360,7 @@ class Cia402Drive final : public Drive {
   TimePoint fault_left_at_{};        ///< by a reset of ours, or as its EMCY told
   std::uint16_t pending_alarm_ = 0;  ///< told by EMCY, and not reported yet: it may be gone already (M5)
 
-  /// What the motion block may hold: one entry, two after a write whose reply was lost.
-  std::vector<MotionBlock> expected_;
-  std::vector<ContinuityMark> expected_marks_;  ///< of an earlier run of the daemon: one of them
-  std::vector<MotionBlock> power_up_blocks_;    ///< what a power-up may leave; the newest last
-
+  Canary canary_;
   std::optional<bool> saving_;                ///< the EEPROM switch, if it is known
   std::optional<std::int64_t> found_window_;  ///< VendorObjects::position_window, as it was read last
   std::optional<bool> found_closed_;          ///< loop mode as it was before this power cycle's first write

@@ -38,8 +38,7 @@ Error Cia402Drive::lost_memory() const {
 }
 
 void Cia402Drive::forget_power_cycle() {
-  expected_.clear();
-  expected_marks_.clear();
+  canary_.forget();
   words_.forget();
   unsubscribe();  // its PDOs are what a power-up left of them
   words_.forget_halt();

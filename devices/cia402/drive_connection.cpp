@@ -70,7 +70,7 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
       active_low_(active_low(model, setup_)),
       news_(context.executor, *context.clock),
       words_(model.neutral_mode),
-      power_up_blocks_{default_block(model)} {
+      canary_(default_block(model)) {
   auto required = required_objects(model, setup_);
   if (required)
     required_ = std::move(*required);
@@ -167,16 +167,17 @@ Task<Result<void>> Cia402Drive::configure() {
   // The canary goes first and is read last: a restart in between would undo what was found or written.
   const auto block = co_await read_block(patiently());
   if (!block) co_return fail(block.error());
-  const bool known = is_expected(*block);
-  const bool restarted = !known && (!expected_.empty() || !expected_marks_.empty());
+  const bool known = canary_.is_expected(*block);
+  const bool restarted = !known && canary_.expects_anything();
   if (!known) {
     forget_power_cycle();
-    note_power_up_block(*block);
+    canary_.note_power_up(*block);
   }
   // Whatever asked for this: a restart that nobody had noticed must not be overwritten here.
   if (restarted) co_return fail(lost_memory());
-  expected_.clear();
-  if (const auto marked = co_await write_canary(distinct(fresh_neutral_block()), patiently()); !marked)
+  canary_.rewrite();
+  if (const auto marked = co_await write_canary(canary_.distinct(fresh_neutral_block()), patiently());
+      !marked)
     co_return marked;
   if (const auto fitting = co_await check_plan(); !fitting) co_return fitting;
   if (model_->objects.loop_mode && !found_closed_) {

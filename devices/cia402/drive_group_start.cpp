@@ -27,7 +27,7 @@ canopen::SdoOptions urgent() { return {.transaction_class = TransactionClass::mo
 class Cia402Drive::Prepared final : public PreparedMove {
  public:
   Prepared(Cia402Drive& drive, MotionGuard guard, std::uint64_t epoch)
-      : drive_(&drive), block_(drive.expected_.front()), guard_(std::move(guard)), epoch_(epoch) {}
+      : drive_(&drive), block_(drive.canary_.blocks().front()), guard_(std::move(guard)), epoch_(epoch) {}
 
   Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, TimePoint not_after) override {
     auto members = members_of(others);
@@ -172,7 +172,7 @@ Task<Result<TimePoint>> Cia402Drive::check_prepared(MotionBlock block, bool by_s
   const bool listens = nmt == canopen::NmtState::operational || nmt == canopen::NmtState::unknown;
   const bool ready = moving == 0 && *control == control_word(Command::enable_operation) &&
                      *mode == std::to_underlying(OperationMode::profile_position);
-  if (ready && (!by_sync || (listens && start_pdo_)) && expected_.front() == block) co_return canary;
+  if (ready && (!by_sync || (listens && start_pdo_)) && canary_.is(block)) co_return canary;
   co_return fail(
       error_at(Reason::superseded, object::control_word,
                fmt::format("not as it was prepared (control word {:04X}h, mode {}{}{})", *control, *mode,

@@ -16,7 +16,7 @@ class Cia402Drive::Loaded final : public LoadedMove {
  public:
   Loaded(Cia402Drive& drive, MotionGuard guard, std::uint64_t epoch, TimePoint read_at)
       : drive_(&drive),
-        block_(drive.expected_.front()),
+        block_(drive.canary_.blocks().front()),
         guard_(std::move(guard)),
         epoch_(epoch),
         read_at_(read_at) {}

@@ -44,10 +44,10 @@ Task<Result<void>> Cia402Drive::start_velocity(VelocityProfile profile, MotionGu
   if (!has_velocity_mode())
     co_return fail(error_at(Reason::not_supported, object::target_velocity,
                             "the drive has no profile velocity mode", "move to positions"));
-  if (expected_.empty())
+  if (canary_.blocks().empty())
     co_return fail(
         error_at(Reason::configuring, object::target_position, "the drive is not configured yet", "wait"));
-  const auto block = encode(*model_, setup_.pulses_per_revolution, profile, expected_.back());
+  const auto block = encode(*model_, setup_.pulses_per_revolution, profile, canary_.blocks().back());
   const auto velocity = encode_velocity(*model_, setup_.pulses_per_revolution, profile.velocity_rpm);
   if (velocity == 0) co_return fail(too_slow(object::target_velocity));
   co_return co_await start(block, OperationMode::profile_velocity, std::nullopt,
@@ -55,20 +55,21 @@ Task<Result<void>> Cia402Drive::start_velocity(VelocityProfile profile, MotionGu
 }
 
 std::vector<ContinuityMark> Cia402Drive::marks_until(const MoveProfile& start) const {
-  return marks_until(distinct(encode(*model_, setup_.pulses_per_revolution, start)));
+  return canary_.marks_until(canary_.distinct(encode(*model_, setup_.pulses_per_revolution, start)));
 }
 
 std::vector<ContinuityMark> Cia402Drive::marks_until(const VelocityProfile& start) const {
-  if (expected_.empty()) return {};
-  return marks_until(distinct(encode(*model_, setup_.pulses_per_revolution, start, expected_.back())));
+  if (canary_.blocks().empty()) return {};
+  return canary_.marks_until(
+      canary_.distinct(encode(*model_, setup_.pulses_per_revolution, start, canary_.blocks().back())));
 }
 
 Task<Result<void>> Cia402Drive::start_homing(HomingProfile profile, MotionGuard guard) {
   // Homing uses objects of its own; the motion block is only the canary, and keeps what it holds.
-  if (expected_.empty())
+  if (canary_.blocks().empty())
     co_return fail(
         error_at(Reason::configuring, object::target_position, "the drive is not configured yet", "wait"));
-  co_return co_await start(expected_.back(), OperationMode::homing, profile,
+  co_return co_await start(canary_.blocks().back(), OperationMode::homing, profile,
                            {object::control_word, control::start_word}, std::move(guard));
 }
 
@@ -159,7 +160,7 @@ Task<Result<TimePoint>> Cia402Drive::prepare_start(MotionBlock block, OperationM
 
   if (const auto canary = co_await read_canary(motion); !canary) co_return canary;
   if (!homing)
-    if (const auto written = co_await write_canary(distinct(block), motion); !written)
+    if (const auto written = co_await write_canary(canary_.distinct(block), motion); !written)
       co_return fail(written.error());
   co_return co_await prove_block(motion);
 }
@@ -190,7 +191,8 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
 
 void Cia402Drive::note_move_began(TimePoint at) {
   live_ = Live{.since = at};
-  if (last_position_) negative_ = expected_.front()[target] < *last_position_;
+  if (last_position_ && !canary_.blocks().empty())
+    negative_ = canary_.blocks().front()[target] < *last_position_;
 }
 
 /// The drive has taken the set-point: bit 4 goes back, so that nothing is left to take. What fails here does

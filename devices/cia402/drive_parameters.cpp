@@ -146,7 +146,7 @@ Task<Result<void>> Cia402Drive::save_parameters() {
   if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   // What is saved now stands there after the next power-up: nothing that moves or enables (M27).
   if (const auto quiet = co_await quieten(); !quiet) co_return quiet;
-  const auto neutral = distinct(fresh_neutral_block());
+  const auto neutral = canary_.distinct(fresh_neutral_block());
   if (auto written = co_await write_canary(neutral, parameters()); !written) {
     if (written.error().outcome == Outcome::unknown) written.error().outcome = Outcome::not_executed;
     co_return written;
@@ -157,11 +157,11 @@ Task<Result<void>> Cia402Drive::save_parameters() {
     count_save(
         static_cast<std::uint64_t>(std::ranges::count_if(model_->descriptor->parameters, is_writable)));
     // Saved, this block would no longer tell a power-up (M7): whatever comes now, it is no proof any more.
-    note_power_up_block(neutral);
-    const auto fresh = distinct(fresh_neutral_block());
+    canary_.note_power_up(neutral);
+    const auto fresh = canary_.distinct(fresh_neutral_block());
     for (int attempt = 0; attempt < canary_attempts; ++attempt)
       if (co_await write_canary(fresh, parameters())) break;
-    std::erase(expected_, neutral);
+    canary_.distrust(neutral);
   }
   if (!saved) co_return saved;
   co_return co_await check_continuity(TransactionClass::parameters);

@@ -31,7 +31,7 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
   using Kind = canopen::NodeEvent::Kind;
   switch (event.kind) {
     case Kind::booted:
-      rebooted_ = rebooted_ || !expected_.empty() || !expected_marks_.empty();
+      rebooted_ = rebooted_ || canary_.expects_anything();
       forget_power_cycle();
       pending_alarm_ = 0;
       heartbeat_lost_ = false;
@@ -293,7 +293,7 @@ DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading
   if (words_.homes() && sample.enabled) {
     // Found homing: between its phases the motor rests, but bit 4 stands (6.2.6).
     const auto status = reading.values.find(object::status_word.key());
-    const bool told = expected_.empty() && status != reading.values.end() &&
+    const bool told = canary_.blocks().empty() && status != reading.values.end() &&
                       (static_cast<std::uint16_t>(status->second) & model_->status.set_point_mirror) != 0;
     if (sample.moving || (told && !sample.homed)) return DriveMode::homing;
   }
