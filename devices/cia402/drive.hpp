@@ -16,7 +16,9 @@
 #include "buses/canopen/pdo_configuration.hpp"
 #include "buses/signal.hpp"
 #include "devices/cia402/canary.hpp"
+#include "devices/cia402/common_start.hpp"
 #include "devices/cia402/encoding.hpp"
+#include "devices/cia402/foreign_master.hpp"
 #include "devices/cia402/homing_watch.hpp"
 #include "devices/cia402/known_words.hpp"
 #include "devices/cia402/model.hpp"
@@ -83,7 +85,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
   // drive_group_start.cpp
-  [[nodiscard]] std::string_view no_common_start() const override { return no_common_start_; }
+  [[nodiscard]] std::string_view no_common_start() const override { return common_start_.note(); }
   Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
 
@@ -327,17 +329,11 @@ class Cia402Drive final : public Drive {
   int missed_pdos_ = 0;                         ///< readings in a row for which none came in time
   std::optional<std::uint32_t> command_pdo_{};  ///< takes the control word at once
   std::string link_note_;
-  /// What another master told this node, and when: the first of what comes in a row, and the last time.
-  std::string foreign_command_;
-  TimePoint foreign_at_ = TimePoint::min();
+  ForeignMaster foreign_;
 
   // Starts in common with others.
-  std::optional<std::uint32_t> start_pdo_{};  ///< takes the control word at the next SYNC
-  bool proof_due_ = false, disproven_ = false;
-  std::string no_common_start_ = "it is not configured yet";
+  CommonStart common_start_;
   std::shared_ptr<AxisGate> start_gate_ = std::make_shared<AxisGate>();  ///< of what is prepared, or proven
-  /// One sequence at a time has NMT and what waits for a SYNC: the other would undo what it does.
-  enum class SyncWork : std::uint8_t { none, settling, proving } sync_work_ = SyncWork::none;
 
   KnownWords words_;
   int triggering_ = 0;  ///< starts that are on their way

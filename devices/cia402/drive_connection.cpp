@@ -283,9 +283,7 @@ void Cia402Drive::unsubscribe() {
   subscribed_.clear();
   sync_.reset();
   command_pdo_.reset();
-  start_pdo_.reset();
-  proof_due_ = false;
-  no_common_start_ = "it is not configured yet";
+  common_start_.forget();
 }
 
 Task<Result<void>> Cia402Drive::set_pdos() {
@@ -321,26 +319,19 @@ Task<canopen::PdoOutcome> Cia402Drive::set_pdo(canopen::PdoSettings wanted) {
 
 /// Group starts come by another one, with a SYNC (M24). Whether its type counts is proven later.
 Task<> Cia402Drive::set_start_pdo() {
-  start_pdo_.reset();
-  proof_due_ = disproven_ = false;
-  if (bus_->settings().sync_period == Duration{}) {
-    no_common_start_ = "the network has no SYNC (sync_period is 0)";
-    co_return;
-  }
+  const bool has_sync = bus_->settings().sync_period > Duration{};
+  common_start_.refuse(has_sync ? "it is not configured yet" : "the network has no SYNC (sync_period is 0)");
+  if (!has_sync) co_return;
   const canopen::PdoSettings wanted{.direction = PdoDirection::receive,
                                     .number = start_number,
                                     .cob_id = canopen::rpdo_id(start_number, node_.id()),
                                     .transmission_type = with_each_sync,
                                     .mapping = control_alone()};
   const auto outcome = co_await set_pdo(wanted);
-  no_common_start_ = objection(outcome, wanted);
-  if (no_common_start_.empty() && !is_start_pdo(start_number, outcome.state))
-    no_common_start_ =
-        fmt::format("RPDO {} has the identifier {:03X}h", start_number, outcome.state.cob_id());
-  if (!no_common_start_.empty()) co_return;
-  start_pdo_ = outcome.state.cob_id();
-  no_common_start_ = "not proven yet";
-  proof_due_ = true;
+  auto why = objection(outcome, wanted);
+  if (why.empty() && !is_start_pdo(start_number, outcome.state))
+    why = fmt::format("RPDO {} has the identifier {:03X}h", start_number, outcome.state.cob_id());
+  why.empty() ? common_start_.configure(outcome.state.cob_id()) : common_start_.refuse(std::move(why));
 }
 
 bool Cia402Drive::is_start_pdo(std::uint16_t number, const canopen::PdoState& state) const {

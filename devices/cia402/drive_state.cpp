@@ -20,8 +20,6 @@ constexpr auto longest_pdo_wait_alive = milliseconds(100);
 constexpr int missed_in_a_row = 3;
 /// A reading by SDO takes some eight of them: longer than a PDO is waited for.
 constexpr auto slow_answer = milliseconds(10);
-/// After the last command of another master it is no longer a concern of today's.
-constexpr auto foreign_lasts = std::chrono::seconds(10);
 /// A motion that was triggered shows within this, or did not start.
 constexpr auto start_window = milliseconds(500);
 
@@ -61,19 +59,15 @@ void Cia402Drive::on_emergency(const canopen::Emergency& emergency) {
   if (attention_) attention_();
 }
 
-/// Whoever floods the network with such frames is told of once.
 void Cia402Drive::on_foreign_command(const std::string& what) {
-  const bool first = foreign_command_.empty() || clock_->now() - foreign_at_ > foreign_lasts;
-  foreign_at_ = clock_->now();
-  if (!first) return;
-  foreign_command_ = fmt::format("another master {}", what);
-  spdlog::warn("{} node {}: {}", bus_->name(), node_.id(), foreign_command_);
+  if (!foreign_.note(what, clock_->now())) return;
+  spdlog::warn("{} node {}: {}", bus_->name(), node_.id(), foreign_.text());
   if (attention_) attention_();
 }
 
 std::string Cia402Drive::link_note() const {
-  if (foreign_command_.empty() || clock_->now() - foreign_at_ > foreign_lasts) return link_note_;
-  return link_note_.empty() ? foreign_command_ : foreign_command_ + std::string(between_notes) + link_note_;
+  if (!foreign_.concerns(clock_->now())) return link_note_;
+  return link_note_.empty() ? foreign_.text() : foreign_.text() + std::string(between_notes) + link_note_;
 }
 
 /// Of a fault that 603Fh does not name, or of a drive without 603Fh.
