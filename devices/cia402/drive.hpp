@@ -19,12 +19,12 @@
 #include "devices/cia402/common_start.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/foreign_master.hpp"
-#include "devices/cia402/homing_watch.hpp"
+#include "devices/cia402/homing_run.hpp"
 #include "devices/cia402/known_words.hpp"
 #include "devices/cia402/model.hpp"
+#include "devices/cia402/motion_watch.hpp"
 #include "devices/cia402/object_setting.hpp"
 #include "devices/cia402/objects.hpp"
-#include "devices/cia402/standstill.hpp"
 #include "devices/cia402/state_pdos.hpp"
 #include "devices/cia402/status_word.hpp"
 #include "devices/cia402/unit_objects.hpp"
@@ -111,12 +111,6 @@ class Cia402Drive final : public Drive {
     Object object;
     std::int64_t value = 0;
   };
-  /// A motion that was triggered and has not been seen to end.
-  struct Live {
-    TimePoint since;
-    bool moved = false;
-  };
-
   // drive_access.cpp
   /// The object's value, with its sign where its type has one. Learns the object's size.
   Task<Result<std::int64_t>> read_object(Object object, SdoOptions options);
@@ -176,8 +170,6 @@ class Cia402Drive final : public Drive {
   DriveSample judge(const Reading& reading, bool of_one_moment);
   /// A motion may be slower than its velocity shows: than noise, or than one count of it.
   [[nodiscard]] bool known_by_way() const;
-  void judge_motion(DriveSample& sample, const Reading& reading);
-  void note_direction(const DriveSample& sample);
   Task<> leave_homing(SdoOptions options);
   void give_up_leaving();
   [[nodiscard]] DriveMode mode_of(const DriveSample& sample, const Reading& reading);
@@ -342,17 +334,9 @@ class Cia402Drive final : public Drive {
   TimePoint stopped_at_{};  ///< the last one was sent
 
   // What the drive does.
-  HomingWatch homing_;
-  bool leave_homing_ = false;  ///< it has ended, and the drive is to go back to position mode
+  MotionWatch motion_;
+  HomingRun homing_;
   std::shared_ptr<AxisGate> leave_gate_ = std::make_shared<AxisGate>();
-  HomingWatch::Start homing_start_;
-  std::optional<bool> homed_;  ///< how our last homing of this power cycle ended; nothing: as the drive says
-  std::optional<Live> live_;
-  std::optional<std::int32_t> last_position_;
-  Standstill standstill_;
-  std::optional<std::int32_t> direction_from_;  ///< where the direction was told last
-  bool last_moving_ = false;
-  bool negative_ = false;
   TimePoint fault_left_at_{};        ///< by a reset of ours, or as its EMCY told
   std::uint16_t pending_alarm_ = 0;  ///< told by EMCY, and not reported yet: it may be gone already (M5)
 

@@ -45,13 +45,8 @@ void Cia402Drive::forget_power_cycle() {
   saving_.reset();
   found_closed_.reset();
   unsaved_.clear();
-  homing_.end();
-  homed_.reset();
-  leave_homing_ = last_moving_ = false;
-  live_.reset();
-  last_position_.reset();
-  standstill_.forget();
-  direction_from_.reset();
+  homing_.forget();
+  motion_.forget();
   pdos_.forget();
 }
 

@@ -120,7 +120,7 @@ class Cia402Drive::Prepared final : public PreparedMove {
   }
 
   Task<> stop() {
-    drive_->standstill_.doubt();  // it may have started
+    drive_->motion_.doubt();  // it may have started
     (void)co_await drive_->stop(StopKind::stop);
   }
 

@@ -128,7 +128,7 @@ Task<Result<void>> Cia402Drive::start_once(MotionBlock block, OperationMode mode
 /// It may be over before the state is read again, and leave nothing that was not there before: the bit of the
 /// last homing, and the counter at 0.
 Task<> Cia402Drive::see_homing_begin(SdoOptions options) {
-  if (!homing_.active() || homing_start_.was_low) co_return;
+  if (!homing_.active() || homing_.prepared().was_low) co_return;
   const auto begun = [this](std::int64_t shown) {
     const Values values{{object::status_word.key(), shown},
                         {object::mode_display.key(), std::to_underlying(OperationMode::homing)}};
@@ -178,21 +178,17 @@ Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger
   --triggering_;
   triggered = pulled || pulled.error().outcome == Outcome::unknown;
   if (!triggered || stops != stops_) co_return pulled;
-  live_ = Live{.since = began};
-  if (mode == OperationMode::profile_velocity) negative_ = trigger.value < 0;
+  motion_.begin(began);
+  if (mode == OperationMode::profile_velocity) motion_.turns(trigger.value < 0);
   if (mode == OperationMode::profile_position) note_move_began(began);
-  if (mode == OperationMode::homing) {
-    homed_ = false;
-    homing_start_.from = last_position_;
-    homing_.begin(began, homing_start_);
-  }
+  if (mode == OperationMode::homing) homing_.begin(began, motion_.position());
   co_return pulled;
 }
 
 void Cia402Drive::note_move_began(TimePoint at) {
-  live_ = Live{.since = at};
-  if (last_position_ && !canary_.blocks().empty())
-    negative_ = canary_.blocks().front()[target] < *last_position_;
+  motion_.begin(at);
+  if (motion_.position() && !canary_.blocks().empty())
+    motion_.turns(canary_.blocks().front()[target] < *motion_.position());
 }
 
 /// The drive has taken the set-point: bit 4 goes back, so that nothing is left to take. What fails here does
@@ -206,14 +202,14 @@ Task<> Cia402Drive::acknowledge_set_point(SdoOptions options) {
 
 /// In homing mode already, at rest. Compared and not just written: some drives save these.
 Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions options) {
-  homing_start_ = {.offset = profile.offset_pulses,
-                   .braking = braking_pulses(profile, setup_.pulses_per_revolution),
-                   .window = position_window(),
-                   .in_place = is_in_place(profile)};
+  HomingWatch::Start start{.offset = profile.offset_pulses,
+                           .braking = braking_pulses(profile, setup_.pulses_per_revolution),
+                           .window = position_window(),
+                           .in_place = is_in_place(profile)};
   const auto word = co_await read_object(object::status_word, options);
   if (!word) co_return fail(word.error());
   const auto bits = static_cast<std::uint16_t>(*word);
-  homing_start_.tied_to_rest = (bits & status::mode_specific) != 0 && (bits & model_->status.homed) == 0;
+  start.tied_to_rest = (bits & status::mode_specific) != 0 && (bits & model_->status.homed) == 0;
   const auto both = static_cast<std::uint16_t>(status::mode_specific | model_->status.homed);
   for (const auto& [object, value] : encode(*model_, setup_.pulses_per_revolution, profile)) {
     const bool is_speed = object == object::homing_speed || object == object::homing_search_speed;
@@ -224,11 +220,13 @@ Task<Result<void>> Cia402Drive::prepare_homing(HomingProfile profile, SdoOptions
     if (const auto written = co_await write_verified(object, value, options); !written) co_return written;
   }
   if (const auto chosen = co_await write_homing_method(profile, options); !chosen) co_return chosen;
+  homing_.prepare(start);
   if ((bits & both) != 0) co_return Result<void>{};
   // Twice: the bits may follow the mode a cycle late.
   const auto again = co_await read_object(object::status_word, std::move(options));
   if (!again) co_return fail(again.error());
-  homing_start_.was_low = (*again & both) == 0;
+  start.was_low = (*again & both) == 0;
+  homing_.prepare(start);
   co_return Result<void>{};
 }
 
@@ -264,9 +262,7 @@ Task<Result<void>> Cia402Drive::clear_position(MotionGuard guard) {
   if (model_->objects.position_clear || by_homing) {
     const auto cleared = by_homing ? co_await home_here(options)
                                    : co_await write_object(*model_->objects.position_clear, 1, 0, options);
-    // The counter has jumped, and not the shaft.
-    standstill_.forget();
-    direction_from_.reset();
+    motion_.counter_jumped();
     co_return cleared;
   }
   co_return fail(error_at(Reason::not_supported, object::position,

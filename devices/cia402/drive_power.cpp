@@ -63,7 +63,7 @@ Task<Result<void>> Cia402Drive::change_mode(OperationMode mode, SdoOptions optio
                             fmt::format("the drive stays in mode {} instead of {}", *shown, number_of(mode)),
                             "check whether another master writes to this drive, and its alarm"));
   words_.mode_reached(mode, clock_->now());
-  if (mode != OperationMode::homing) leave_homing_ = false;
+  if (mode != OperationMode::homing) homing_.left();
   co_return Result<void>{};
 }
 

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <utility>
 
 #include "devices/cia402/drive.hpp"
@@ -20,8 +19,6 @@ constexpr auto longest_pdo_wait_alive = milliseconds(100);
 constexpr int missed_in_a_row = 3;
 /// A reading by SDO takes some eight of them: longer than a PDO is waited for.
 constexpr auto slow_answer = milliseconds(10);
-/// A motion that was triggered shows within this, or did not start.
-constexpr auto start_window = milliseconds(500);
 
 }  // namespace
 
@@ -168,7 +165,7 @@ Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_c
   if (over || torn) sample = co_await look(false, options);
   // What a drive does with a change of its mode in motion is not said.
   const bool rests = sample && !sample->moving && stopping_ == 0 && sample->asked_at >= stopped_at_;
-  if (leave_homing_ && rests && !rebooted_) {
+  if (homing_.state() == HomingRun::State::leaving && rests && !rebooted_) {
     co_await leave_homing(options);
     sample = co_await look(false, options);
   }
@@ -185,54 +182,23 @@ bool Cia402Drive::known_by_way() const {
          decode_velocity(*model_, setup_.pulses_per_revolution, 1) > velocity_noise_rpm;
 }
 
-/// What is measured wavers: a little of it is no motion, and has no direction. Where positions are exact they
-/// know better than the drive's own word, which may be that it is near its target.
-void Cia402Drive::judge_motion(DriveSample& sample, const Reading& reading) {
-  if (known_by_way()) {
-    const auto window = position_window();
-    sample.moving = standstill_.moves(
-        {.at = sample.asked_at,
-         .position = sample.position_pulses,
-         .velocity_rpm = sample.velocity_rpm,
-         .told = window > 0 ? told_motion(*model_, reading.values, words_.held_halt(reading.asked_at))
-                            : std::nullopt},
-        {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution});
-    if (!sample.moving) sample.velocity_rpm = 0;
-  }
-  note_direction(sample);
-  sample.negative_direction = negative_;
-}
-
-void Cia402Drive::note_direction(const DriveSample& sample) {
-  if (!direction_from_) direction_from_ = sample.position_pulses;
-  const auto way = std::int64_t{sample.position_pulses} - *direction_from_;
-  if (std::abs(way) > position_window() / 2) {
-    negative_ = way < 0;
-    direction_from_ = sample.position_pulses;
-  } else if (sample.velocity_rpm != 0) {
-    negative_ = sample.negative_direction;
-  }
-}
-
 /// `of_one_moment`: all of the reading's positions are.
 DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
   auto sample =
       decode_state(*model_, setup_.pulses_per_revolution, reading.values, active_low_, position_window() > 0);
   sample.asked_at = reading.asked_at;
   sample.measured_at = reading.measured_at;
-  judge_motion(sample, reading);
-  const bool compared = position_window() > 0 && (of_one_moment || !sample.moving);
+  const auto window = position_window();
+  const bool says = window > 0;  // else its positions are exact, and know better
+  motion_.take(
+      sample,
+      {.by_way = known_by_way(),
+       .told = says ? told_motion(*model_, reading.values, words_.held_halt(reading.asked_at)) : std::nullopt,
+       .gauge = {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution}});
+  const bool compared = window > 0 && (of_one_moment || !sample.moving);
   if (!compared) sample.commanded_pulses.reset();
-  last_position_ = sample.position_pulses;
-  last_moving_ = sample.moving;
   note_knowledge(reading);
   if (!sample.moving) words_.see_rest(sample.asked_at);
-  if (live_ && sample.asked_at >= live_->since) {
-    if (sample.moving)
-      live_->moved = true;
-    else if (live_->moved || sample.asked_at - live_->since >= start_window)
-      live_.reset();
-  }
   // Where no bit shows it the state goes on while a terminal has released the motor.
   if (model_->status.enabled == 0 && input_active(sample, {"motor_free"})) sample.enabled = false;
   sample.mode = mode_of(sample, reading);
@@ -240,8 +206,7 @@ DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
   // left in another mode.
   if (may_be_neutral(reading)) sample.homed = false;
   const bool bit_fell = !sample.moving && !home_bit(*model_, reading.values).value_or(false);
-  if (homed_ == false && !homing_.active() && bit_fell) homed_.reset();
-  sample.homed = homed_.value_or(sample.homed);
+  sample.homed = homing_.is_homed(sample.homed, bit_fell);
   return sample;
 }
 
@@ -250,13 +215,13 @@ void Cia402Drive::give_up_leaving() {
   give_up_common_start();
   leave_gate_->raise();
   bus_->purge_superseded(node_.id(), *leave_gate_);
-  leave_homing_ = false;
+  homing_.left();
 }
 
 /// Back to position mode, where bit 13 is the power stage alone, and bit 4 to 0; with the halt, which any
 /// start ends. What fails here is done by the next start.
 Task<> Cia402Drive::leave_homing(SdoOptions options) {
-  leave_homing_ = false;
+  homing_.left();
   options.guard = {.gate = leave_gate_, .epoch = leave_gate_->epoch()};
   const auto held = co_await held_control(options);
   if (!held) co_return;
@@ -277,13 +242,12 @@ DriveMode Cia402Drive::mode_of(const DriveSample& sample, const Reading& reading
     const auto bit = home_bit(*model_, reading.values);
     const bool held_up = input_active(sample, {"stop", "quick_stop"});
     const auto failed = homing_failed(*model_, reading.values);
-    if (homing_.goes_on(sample, {.low = bit == false, .held_up = held_up, .failed = failed}))
+    if (homing_.take(sample, {.low = bit == false, .held_up = held_up, .failed = failed}))
       return DriveMode::homing;
-    homed_ = homing_.reached();
-    leave_homing_ = true;
   }
-  if (leave_homing_) return sample.moving ? DriveMode::homing : DriveMode::positioning;
-  if (live_) return DriveMode::positioning;
+  if (homing_.state() == HomingRun::State::leaving)
+    return sample.moving ? DriveMode::homing : DriveMode::positioning;
+  if (motion_.state() != MotionWatch::State::rest) return DriveMode::positioning;
   if (words_.homes() && sample.enabled) {
     // Found homing: between its phases the motor rests, but bit 4 stands (6.2.6).
     const auto status = reading.values.find(object::status_word.key());

@@ -95,10 +95,8 @@ Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   leave_gate_->raise();
   bus_->purge_superseded(node_.id(), *leave_gate_);
   give_up_common_start();
-  leave_homing_ = leave_homing_ || homing_.active() || words_.homes();
-  if (live_ || triggering_ > 0 || homing_.active()) standstill_.doubt();
-  homing_.end();
-  live_.reset();
+  motion_.stop(triggering_ > 0 || homing_.active());
+  homing_.stop(words_.homes());
   ++stopping_;
   const auto sent = co_await send_stop(kind == StopKind::quick_stop);
   --stopping_;
@@ -172,13 +170,13 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
   const auto bit = model_->status.moving;
   const auto source =
       bit != 0 ? std::optional(object::status_word) : (objects.moving ? objects.moving : objects.velocity);
-  if (!source) co_return last_moving_;
+  if (!source) co_return motion_.moves();
   const auto shown = co_await read_object(*source, std::move(options));
-  if (!shown) co_return last_moving_;
+  if (!shown) co_return motion_.moves();
   if (bit != 0) co_return (*shown & bit) != 0;
   if (objects.moving || !known_by_way()) co_return *shown != 0;
   const auto rpm = decode_velocity(*model_, setup_.pulses_per_revolution, *shown);
-  co_return last_moving_ || std::abs(rpm) > velocity_noise_rpm;
+  co_return motion_.moves() || std::abs(rpm) > velocity_noise_rpm;
 }
 
 /// Under a stop: soon, or not at all. Errors: of change_mode().
