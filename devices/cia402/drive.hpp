@@ -16,7 +16,6 @@
 #include "buses/canopen/pdo_configuration.hpp"
 #include "buses/signal.hpp"
 #include "devices/cia402/canary.hpp"
-#include "devices/cia402/common_start.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/foreign_master.hpp"
 #include "devices/cia402/homing_run.hpp"
@@ -25,6 +24,7 @@
 #include "devices/cia402/motion_watch.hpp"
 #include "devices/cia402/object_setting.hpp"
 #include "devices/cia402/objects.hpp"
+#include "devices/cia402/start_pdo.hpp"
 #include "devices/cia402/state_pdos.hpp"
 #include "devices/cia402/status_word.hpp"
 #include "devices/cia402/unit_objects.hpp"
@@ -85,7 +85,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
   // drive_group_start.cpp
-  [[nodiscard]] std::string_view no_common_start() const override { return common_start_.note(); }
+  [[nodiscard]] std::string_view no_common_start() const override { return start_pdo_.note(); }
   Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
 
@@ -324,7 +324,7 @@ class Cia402Drive final : public Drive {
   ForeignMaster foreign_;
 
   // Starts in common with others.
-  CommonStart common_start_;
+  StartPdo start_pdo_;
   std::shared_ptr<AxisGate> start_gate_ = std::make_shared<AxisGate>();  ///< of what is prepared, or proven
 
   KnownWords words_;

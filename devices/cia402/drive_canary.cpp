@@ -113,8 +113,7 @@ Task<Result<void>> Cia402Drive::check_continuity(TransactionClass transaction_cl
   if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
   // The link, or the node's state, may have been lost in between.
   if (const auto settled = co_await settle(options); !settled) co_return settled;
-  if (const auto started = co_await start_node();
-      !started || common_start_.state() != CommonStart::State::unproven)
+  if (const auto started = co_await start_node(); !started || start_pdo_.state() != StartPdo::State::unproven)
     co_return started;
   co_await prove_common_start(unbegun);
   co_return co_await settle(options);

@@ -283,7 +283,7 @@ void Cia402Drive::unsubscribe() {
   subscribed_.clear();
   sync_.reset();
   command_pdo_.reset();
-  common_start_.forget();
+  start_pdo_.forget();
 }
 
 Task<Result<void>> Cia402Drive::set_pdos() {
@@ -320,7 +320,7 @@ Task<canopen::PdoOutcome> Cia402Drive::set_pdo(canopen::PdoSettings wanted) {
 /// Group starts come by another one, with a SYNC (M24). Whether its type counts is proven later.
 Task<> Cia402Drive::set_start_pdo() {
   const bool has_sync = bus_->settings().sync_period > Duration{};
-  common_start_.refuse(has_sync ? "it is not configured yet" : "the network has no SYNC (sync_period is 0)");
+  start_pdo_.refuse(has_sync ? "it is not configured yet" : "the network has no SYNC (sync_period is 0)");
   if (!has_sync) co_return;
   const canopen::PdoSettings wanted{.direction = PdoDirection::receive,
                                     .number = start_number,
@@ -331,7 +331,7 @@ Task<> Cia402Drive::set_start_pdo() {
   auto why = objection(outcome, wanted);
   if (why.empty() && !is_start_pdo(start_number, outcome.state))
     why = fmt::format("RPDO {} has the identifier {:03X}h", start_number, outcome.state.cob_id());
-  why.empty() ? common_start_.configure(outcome.state.cob_id()) : common_start_.refuse(std::move(why));
+  why.empty() ? start_pdo_.configure(outcome.state.cob_id()) : start_pdo_.refuse(std::move(why));
 }
 
 bool Cia402Drive::is_start_pdo(std::uint16_t number, const canopen::PdoState& state) const {

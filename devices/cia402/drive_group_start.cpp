@@ -92,7 +92,7 @@ class Cia402Drive::Prepared final : public PreparedMove {
       co_return;
     }
     all.parts[index] = {.node = drive.node_.id(),
-                        .cob_id = *drive.common_start_.pdo(),
+                        .cob_id = *drive.start_pdo_.id(),
                         .arm = canopen::number_bytes(control::start_word, word_bytes),
                         .guards = {guard, own()},
                         .neutral = [&drive] { return drive.neutral_bytes(); },
@@ -134,9 +134,9 @@ class Cia402Drive::Prepared final : public PreparedMove {
 Task<Result<std::unique_ptr<PreparedMove>>> Cia402Drive::prepare_move(MoveProfile profile,
                                                                       MotionGuard guard) {
   give_up_leaving();
-  if (common_start_.state() != CommonStart::State::proven)
+  if (start_pdo_.state() != StartPdo::State::proven)
     co_return fail(error_at(Reason::not_supported, object::control_word,
-                            "no start by SYNC: " + common_start_.note(), "start it by itself"));
+                            "no start by SYNC: " + start_pdo_.note(), "start it by itself"));
   const auto epoch = start_gate_->epoch();
   const auto block = encode(*model_, setup_.pulses_per_revolution, profile);
   SdoOptions options = urgent();
@@ -172,7 +172,7 @@ Task<Result<TimePoint>> Cia402Drive::check_prepared(MotionBlock block, bool by_s
   const bool listens = nmt == canopen::NmtState::operational || nmt == canopen::NmtState::unknown;
   const bool ready = moving == 0 && *control == control_word(Command::enable_operation) &&
                      *mode == std::to_underlying(OperationMode::profile_position);
-  if (ready && (!by_sync || (listens && common_start_.pdo())) && canary_.is(block)) co_return canary;
+  if (ready && (!by_sync || (listens && start_pdo_.id())) && canary_.is(block)) co_return canary;
   co_return fail(
       error_at(Reason::superseded, object::control_word,
                fmt::format("not as it was prepared (control word {:04X}h, mode {}{}{})", *control, *mode,
@@ -202,10 +202,9 @@ void Cia402Drive::give_up_common_start() {
 }
 
 Task<> Cia402Drive::follow_waiting(std::uint16_t word) {
-  if (!common_start_.pdo() || !bus_->armed(node_.id())) co_return;
+  if (!start_pdo_.id() || !bus_->armed(node_.id())) co_return;
   const auto quiet = static_cast<std::uint16_t>(word & ~(control::start | control::fault_reset));
-  (void)co_await bus_->send_waiting(node_.id(), *common_start_.pdo(),
-                                    canopen::number_bytes(quiet, word_bytes),
+  (void)co_await bus_->send_waiting(node_.id(), *start_pdo_.id(), canopen::number_bytes(quiet, word_bytes),
                                     {.transaction_class = TransactionClass::stop});
 }
 
@@ -227,14 +226,14 @@ Task<> Cia402Drive::prove_common_start(MotionGuard unbegun) {
     hold = co_await bus_->hold_sync();
     obstacle = co_await obstacle_to_proof(options);
   }
-  if (!obstacle.empty()) co_return common_start_.note_obstacle(obstacle);
-  if (common_start_.state() != CommonStart::State::unproven) co_return;
+  if (!obstacle.empty()) co_return start_pdo_.note_obstacle(obstacle);
+  if (start_pdo_.state() != StartPdo::State::unproven) co_return;
   const auto held = co_await read_object(object::control_word, options);
   const bool begun = may_send(options.guard, clock_->now()) != Verdict::send;
-  if (!held || begun || common_start_.work() != CommonStart::Work::none) co_return;
-  common_start_.begin(CommonStart::Work::proving);
+  if (!held || begun || start_pdo_.work() != StartPdo::Work::none) co_return;
+  start_pdo_.begin(StartPdo::Work::proving);
   co_await show_and_judge(static_cast<std::uint16_t>(*held), options);
-  common_start_.end_work();
+  start_pdo_.end_work();
   news_.notify_all();
 }
 
@@ -244,8 +243,8 @@ Task<> Cia402Drive::show_and_judge(std::uint16_t held, SdoOptions options) {
   (void)words_.begin_write(std::nullopt);
   const auto shown = co_await show_common_start(held, options);
   words_.end_write(clock_->now());
-  if (!shown) co_return common_start_.note_obstacle(shown.error().message);
-  common_start_.judge(*shown);
+  if (!shown) co_return start_pdo_.note_obstacle(shown.error().message);
+  start_pdo_.judge(*shown);
   if (shown->empty()) co_return bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
   (void)co_await write_object(object::control_word, held, word_bytes, std::move(options));
 }
@@ -302,7 +301,7 @@ Task<Result<std::string>> Cia402Drive::show_common_start(std::uint16_t held, Sdo
 }
 
 Task<Result<void>> Cia402Drive::let_wait(std::uint16_t word, SdoOptions options) {
-  const auto pdo = common_start_.pdo();
+  const auto pdo = start_pdo_.id();
   if (!pdo)
     co_return fail(error_at(Reason::superseded, object::control_word, "its PDOs were lost meanwhile",
                             "it is shown again when the drive is configured"));

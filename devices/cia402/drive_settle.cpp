@@ -21,12 +21,11 @@ constexpr auto heartbeat_limit = milliseconds(500);
 
 /// Another master, or an earlier program, may have armed it; and so may a common start that was given up.
 Task<Result<void>> Cia402Drive::settle(SdoOptions options) {
-  while (common_start_.work() != CommonStart::Work::none)
-    co_await news_.wait_until(clock_->now() + nmt_patience);
+  while (start_pdo_.work() != StartPdo::Work::none) co_await news_.wait_until(clock_->now() + nmt_patience);
   if (settled_ && !bus_->armed(node_.id())) co_return Result<void>{};
-  common_start_.begin(CommonStart::Work::settling);
+  start_pdo_.begin(StartPdo::Work::settling);
   auto disarmed = co_await disarm(std::move(options));
-  common_start_.end_work();
+  start_pdo_.end_work();
   news_.notify_all();
   if (!disarmed) co_return disarmed;
   settled_ = true;
@@ -51,10 +50,10 @@ Task<Result<void>> Cia402Drive::disarm(SdoOptions options) {
     const auto state = co_await canopen::read_pdo(node_, PdoDirection::receive, number, options);
     if (!state) co_return failed(state.error());
     const bool ours = bus_->settings().sync_period > Duration{} && is_start_pdo(number, *state);
-    const bool in_use = ours && common_start_.pdo();
+    const bool in_use = ours && start_pdo_.id();
     if (in_use && !bus_->armed(node_.id())) continue;
     any = true;
-    if (!ours || common_start_.state() == CommonStart::State::disproven) armed.push_back(object);
+    if (!ours || start_pdo_.state() == StartPdo::State::disproven) armed.push_back(object);
     if (const auto done = co_await overwrite_waiting(number, *state, options); !done) co_return done;
   }
   if (!any) co_return Result<void>{};

@@ -1,35 +1,35 @@
-#include "devices/cia402/common_start.hpp"
+#include "devices/cia402/start_pdo.hpp"
 
 #include <utility>
 
 namespace axisd::cia402 {
 
-void CommonStart::refuse(std::string why) {
+void StartPdo::refuse(std::string why) {
   state_ = State::absent;
-  pdo_.reset();
+  id_.reset();
   note_ = std::move(why);
 }
 
-void CommonStart::configure(std::uint32_t pdo) {
+void StartPdo::configure(std::uint32_t id) {
   state_ = State::unproven;
-  pdo_ = pdo;
+  id_ = id;
   note_ = "not proven yet";
 }
 
-void CommonStart::forget() {
+void StartPdo::forget() {
   if (state_ != State::disproven) state_ = State::absent;
-  pdo_.reset();
+  id_.reset();
   note_ = "it is not configured yet";
 }
 
-void CommonStart::note_obstacle(const std::string& why) {
+void StartPdo::note_obstacle(const std::string& why) {
   if (state_ == State::unproven) note_ = "not proven yet: " + why;
 }
 
-void CommonStart::judge(std::string differs) {
+void StartPdo::judge(std::string differs) {
   if (state_ != State::unproven) return;
   state_ = differs.empty() ? State::proven : State::disproven;
-  if (state_ == State::disproven) pdo_.reset();
+  if (state_ == State::disproven) id_.reset();
   note_ = std::move(differs);
 }
 

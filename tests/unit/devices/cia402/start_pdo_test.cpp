@@ -1,16 +1,16 @@
-#include "devices/cia402/common_start.hpp"
+#include "devices/cia402/start_pdo.hpp"
 
 #include <gtest/gtest.h>
 
 namespace axisd::cia402 {
 namespace {
 
-using State = CommonStart::State;
+using State = StartPdo::State;
 
 constexpr std::uint32_t pdo = 0x305;
 
-TEST(CommonStart, ThereIsNoneUntilItIsConfigured) {
-  CommonStart start;
+TEST(StartPdo, ThereIsNoneUntilItIsConfigured) {
+  StartPdo start;
   EXPECT_EQ(start.state(), State::absent);
   EXPECT_EQ(start.note(), "it is not configured yet");
   start.refuse("RPDO 2: it is read-only");
@@ -18,11 +18,11 @@ TEST(CommonStart, ThereIsNoneUntilItIsConfigured) {
   EXPECT_EQ(start.note(), "RPDO 2: it is read-only");
 }
 
-TEST(CommonStart, ItHasToBeProven) {
-  CommonStart start;
+TEST(StartPdo, ItHasToBeProven) {
+  StartPdo start;
   start.configure(pdo);
   EXPECT_EQ(start.state(), State::unproven);
-  EXPECT_EQ(start.pdo(), pdo);
+  EXPECT_EQ(start.id(), pdo);
   EXPECT_FALSE(start.note().empty());
   start.note_obstacle("the drive is enabled");
   EXPECT_EQ(start.state(), State::unproven);
@@ -30,33 +30,33 @@ TEST(CommonStart, ItHasToBeProven) {
   start.judge("");
   EXPECT_EQ(start.state(), State::proven);
   EXPECT_TRUE(start.note().empty());
-  EXPECT_EQ(start.pdo(), pdo);
+  EXPECT_EQ(start.id(), pdo);
 }
 
-TEST(CommonStart, ADriveThatDiffersDoesNotStartByIt) {
-  CommonStart start;
+TEST(StartPdo, ADriveThatDiffersDoesNotStartByIt) {
+  StartPdo start;
   start.configure(pdo);
   start.judge("its RPDO acts before the SYNC");
   EXPECT_EQ(start.state(), State::disproven);
-  EXPECT_FALSE(start.pdo());
+  EXPECT_FALSE(start.id());
   EXPECT_EQ(start.note(), "its RPDO acts before the SYNC");
 }
 
-TEST(CommonStart, APowerCycleEndsAProof) {
-  CommonStart start;
+TEST(StartPdo, APowerCycleEndsAProof) {
+  StartPdo start;
   start.configure(pdo);
   start.judge("");
   start.forget();
   EXPECT_EQ(start.state(), State::absent);
-  EXPECT_FALSE(start.pdo());
+  EXPECT_FALSE(start.id());
   start.judge("");
   start.note_obstacle("late");
   EXPECT_EQ(start.state(), State::absent);
   EXPECT_EQ(start.note(), "it is not configured yet");
 }
 
-TEST(CommonStart, WhatDiffersIsKnownUntilItIsConfiguredAnew) {
-  CommonStart start;
+TEST(StartPdo, WhatDiffersIsKnownUntilItIsConfiguredAnew) {
+  StartPdo start;
   start.configure(pdo);
   start.judge("it differs");
   start.forget();
@@ -65,12 +65,12 @@ TEST(CommonStart, WhatDiffersIsKnownUntilItIsConfiguredAnew) {
   EXPECT_EQ(start.state(), State::unproven);
 }
 
-TEST(CommonStart, OneSequenceAtATimeHasTheNode) {
-  CommonStart start;
-  start.begin(CommonStart::Work::proving);
-  EXPECT_EQ(start.work(), CommonStart::Work::proving);
+TEST(StartPdo, OneSequenceAtATimeHasTheNode) {
+  StartPdo start;
+  start.begin(StartPdo::Work::proving);
+  EXPECT_EQ(start.work(), StartPdo::Work::proving);
   start.end_work();
-  EXPECT_EQ(start.work(), CommonStart::Work::none);
+  EXPECT_EQ(start.work(), StartPdo::Work::none);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Whether a drive starts in one SYNC with others, as it has shown (M22, M24).
+// The RPDO by which a drive starts in one SYNC with others, as it has shown that it does (M22, M24).
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace axisd::cia402 {
 
-/// Pure. Thread: core. The control word comes by an RPDO that waits in the drive for a SYNC. That it does is
+/// Pure. Thread: core. The control word that comes by it waits in the drive for a SYNC. That it does is
 /// proven before anything is started by it.
 ///
 ///   any      -- refuse() ------------------------------> absent
@@ -17,7 +17,7 @@ namespace axisd::cia402 {
 ///   unproven, proven -- forget() ----------------------> absent
 ///
 /// Disproven outlives forget(): what such an RPDO was sent may act at any time, until it is configured anew.
-class CommonStart {
+class StartPdo {
  public:
   enum class State : std::uint8_t { absent, unproven, proven, disproven };
   /// One sequence at a time has NMT and what waits for a SYNC: the other would undo what it does.
@@ -25,8 +25,8 @@ class CommonStart {
 
   /// The drive has no such RPDO.
   void refuse(std::string why);
-  /// `pdo`: identifier of the RPDO.
-  void configure(std::uint32_t pdo);
+  /// `id`: its identifier.
+  void configure(std::uint32_t id);
   /// Nothing of it was configured in this power cycle.
   void forget();
   /// It could not be shown yet. Nothing in other states than unproven.
@@ -37,7 +37,7 @@ class CommonStart {
 
   [[nodiscard]] State state() const { return state_; }
   /// Takes the control word at the next SYNC. Nothing: there is none.
-  [[nodiscard]] const std::optional<std::uint32_t>& pdo() const { return pdo_; }
+  [[nodiscard]] const std::optional<std::uint32_t>& id() const { return id_; }
   /// Why the drive does not start by SYNC; empty: it does.
   [[nodiscard]] const std::string& note() const { return note_; }
 
@@ -47,7 +47,7 @@ class CommonStart {
 
  private:
   State state_ = State::absent;
-  std::optional<std::uint32_t> pdo_;
+  std::optional<std::uint32_t> id_;
   std::string note_ = "it is not configured yet";
   Work work_ = Work::none;
 };
