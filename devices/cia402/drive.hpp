@@ -3,10 +3,8 @@
 
 #include <functional>
 #include <initializer_list>
-#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,11 +20,14 @@
 #include "devices/cia402/known_words.hpp"
 #include "devices/cia402/model.hpp"
 #include "devices/cia402/motion_watch.hpp"
+#include "devices/cia402/node_contact.hpp"
 #include "devices/cia402/object_setting.hpp"
 #include "devices/cia402/objects.hpp"
+#include "devices/cia402/seen_objects.hpp"
 #include "devices/cia402/start_pdo.hpp"
 #include "devices/cia402/state_pdos.hpp"
 #include "devices/cia402/status_word.hpp"
+#include "devices/cia402/stops_sent.hpp"
 #include "devices/cia402/unit_objects.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
@@ -60,7 +61,7 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] std::string link_note() const override;
   void on_attention(const std::function<void()>& handler) override { attention_ = handler; }
 
-  [[nodiscard]] bool in_trouble() const override { return rebooted_ || pending_alarm_ != 0; }
+  [[nodiscard]] bool in_trouble() const override { return contact_.rebooted() || contact_.has_alarm(); }
 
   // drive_canary.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
@@ -76,7 +77,7 @@ class Cia402Drive final : public Drive {
 
   // drive_stop.cpp
   Task<Result<void>> stop(StopKind kind) override;
-  [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stop_sent_at_; }
+  [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stops_.frame_at(); }
 
   // drive_motion.cpp
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
@@ -303,18 +304,12 @@ class Cia402Drive final : public Drive {
   std::vector<ObjectSetting> required_;  ///< by the setup; empty if it cannot be had (configure() says why)
   std::optional<Error> setup_error_;
   ActiveLow active_low_;
-  std::map<std::uint32_t, std::uint8_t> sizes_;  ///< of objects, as this drive was seen to have them
-  Duration answer_time_{};                       ///< of its SDO server, the longest of late
-  bool other_homing_codes_ = false;              ///< it refused the first of HomingCode, and took the other
+  SeenObjects seen_;
 
   // The way to the drive.
   Signal news_;  ///< PDOs completed a reading, or something happened to the node
   std::function<void()> attention_;
-  bool rebooted_ = false;        ///< since configure(), and nobody was told yet
-  bool heartbeat_lost_ = false;  ///< its PDOs are not waited for
-  bool settled_ = false;
-  std::optional<TimePoint> silent_since_;  ///< it did not answer to identify()
-  bool node_started_ = false;              ///< it was told to, since the last contact began
+  NodeContact contact_;
   StatePdos pdos_;
   std::vector<std::uint32_t> subscribed_;
   std::shared_ptr<void> sync_;
@@ -327,25 +322,15 @@ class Cia402Drive final : public Drive {
   StartPdo start_pdo_;
   std::shared_ptr<AxisGate> start_gate_ = std::make_shared<AxisGate>();  ///< of what is prepared, or proven
 
+  // What it is known to hold.
   KnownWords words_;
-  int triggering_ = 0;  ///< starts that are on their way
-  std::uint64_t stops_ = 0;
-  int stopping_ = 0;        ///< stops being sent
-  TimePoint stopped_at_{};  ///< the last one was sent
+  Canary canary_;
+  StopsSent stops_;
 
   // What the drive does.
   MotionWatch motion_;
   HomingRun homing_;
   std::shared_ptr<AxisGate> leave_gate_ = std::make_shared<AxisGate>();
-  TimePoint fault_left_at_{};        ///< by a reset of ours, or as its EMCY told
-  std::uint16_t pending_alarm_ = 0;  ///< told by EMCY, and not reported yet: it may be gone already (M5)
-
-  Canary canary_;
-  std::optional<bool> saving_;                ///< the EEPROM switch, if it is known
-  std::optional<std::int64_t> found_window_;  ///< VendorObjects::position_window, as it was read last
-  std::optional<bool> found_closed_;          ///< loop mode as it was before this power cycle's first write
-  std::set<std::uint32_t> unsaved_;           ///< saved objects that did not hold what was written
-  std::optional<TimePoint> stop_sent_at_;
 };
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);

@@ -17,7 +17,7 @@ constexpr auto read_pause = std::chrono::milliseconds(2);
 }  // namespace
 
 std::unexpected<Error> Cia402Drive::failed(Error error) const {
-  if (!rebooted_) return fail(std::move(error));
+  if (!contact_.rebooted()) return fail(std::move(error));
   auto lost = lost_memory();  // whatever the node answered, this is the reason
   lost.outcome = error.outcome;
   return fail(std::move(lost));
@@ -42,9 +42,7 @@ void Cia402Drive::forget_power_cycle() {
   words_.forget();
   unsubscribe();  // its PDOs are what a power-up left of them
   words_.forget_halt();
-  saving_.reset();
-  found_closed_.reset();
-  unsaved_.clear();
+  seen_.forget_power_cycle();
   homing_.forget();
   motion_.forget();
   pdos_.forget();
@@ -53,29 +51,25 @@ void Cia402Drive::forget_power_cycle() {
 Task<Result<std::int64_t>> Cia402Drive::read_object(Object object, SdoOptions options) {
   const auto answer = co_await node_.sdo().upload(node_.id(), object, std::move(options));
   if (!answer) co_return failed(answer.error());
-  answer_time_ = std::max(answer->answered_at - answer->sent_at, answer_time_ * 7 / 8);
+  seen_.note_answer(answer->answered_at - answer->sent_at);
   constexpr std::size_t most = 8;
   const auto type = type_of(*model_, object);
-  const auto known = sizes_.find(object.key());
   auto bytes = std::min(answer->bytes.size(), most);
-  if (!answer->size_indicated)
-    bytes = std::min<std::size_t>(bytes, known == sizes_.end() ? type.bytes : known->second);
+  if (!answer->size_indicated) bytes = std::min<std::size_t>(bytes, seen_.size(object).value_or(type.bytes));
   if (bytes == 0)
     co_return fail(error_at(Reason::refused, object, "it came without data",
                             "check the configured model against the drive's firmware"));
-  if (answer->size_indicated) sizes_[object.key()] = static_cast<std::uint8_t>(bytes);
+  if (answer->size_indicated) seen_.sizes[object.key()] = static_cast<std::uint8_t>(bytes);
   const auto raw = canopen::number_of(std::span(answer->bytes).first(bytes));
   const auto value = type.is_signed ? canopen::sign_extended(raw, static_cast<unsigned>(8 * bytes))
                                     : static_cast<std::int64_t>(raw);
-  if (object == model_->objects.position_window) found_window_ = value;
+  if (object == model_->objects.position_window) seen_.position_window = value;
   co_return value;
 }
 
 Task<Result<void>> Cia402Drive::write_object(Object object, std::int64_t value, std::uint8_t bytes,
                                              SdoOptions options) {
-  const auto known = sizes_.find(object.key());
-  std::uint8_t size = bytes != 0 ? bytes : type_of(*model_, object).bytes;
-  if (known != sizes_.end()) size = known->second;
+  const auto size = seen_.size(object).value_or(bytes != 0 ? bytes : type_of(*model_, object).bytes);
   std::vector<std::uint8_t> sizes{size, 4, 2, 1};
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     if (std::find(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(i), sizes[i]) !=
@@ -83,7 +77,7 @@ Task<Result<void>> Cia402Drive::write_object(Object object, std::int64_t value, 
       continue;
     const auto written = co_await node_.write(object, static_cast<std::uint64_t>(value), sizes[i], options);
     if (written) {
-      sizes_[object.key()] = sizes[i];
+      seen_.sizes[object.key()] = sizes[i];
       co_return Result<void>{};
     }
     if (!canopen::is_wrong_size(written.error()) || i + 1 == sizes.size()) co_return failed(written.error());

@@ -38,12 +38,12 @@ Task<Result<MotionBlock>> Cia402Drive::read_block(SdoOptions options) {
 }
 
 Task<Result<TimePoint>> Cia402Drive::read_canary(SdoOptions options) {
-  if (rebooted_) co_return fail(lost_memory());
+  if (contact_.rebooted()) co_return fail(lost_memory());
   const auto asked = clock_->now();
   const auto foreign = bus_->master().traffic(node_.id()).foreign_writes;
   const auto block = co_await read_block(std::move(options));
   if (!block) co_return fail(block.error());
-  if (rebooted_) co_return fail(lost_memory());
+  if (contact_.rebooted()) co_return fail(lost_memory());
   if (const auto alone = check_alone(); !alone) co_return fail(alone.error());
   if (!canary_.is_expected(*block)) {
     forget_power_cycle();
@@ -68,7 +68,7 @@ Task<Result<TimePoint>> Cia402Drive::prove_block(SdoOptions options) {
   for (const auto& [field, object] : canary_.telling(block, motion_objects(*model_))) {
     const auto value = co_await read_object(object, options);
     if (!value) co_return fail(value.error());
-    if (rebooted_) co_return fail(lost_memory());
+    if (contact_.rebooted()) co_return fail(lost_memory());
     const bool proves = *value == block.at(field) && losses == bus_->losses();
     if (!proves) co_return co_await read_canary(std::move(options));
   }
@@ -83,7 +83,7 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
   for (const auto& one : objects) {
     if (known && present.at(one.field) == block.at(one.field)) continue;
     const auto done = co_await write_object(one.object, block.at(one.field), 0, options);
-    if (rebooted_) co_return fail(lost_memory());
+    if (contact_.rebooted()) co_return fail(lost_memory());
     auto after = present;
     after.at(one.field) = block.at(one.field);
     const bool uncertain = !done && done.error().outcome == Outcome::unknown;

@@ -40,7 +40,7 @@ Task<Result<void>> Cia402Drive::bring_to(std::vector<ObjectSetting> required) {
   if (eeprom_switch) addresses.push_back(eeprom_switch->key());
   auto before = co_await read_values(std::move(addresses), patiently());
   if (!before) co_return fail(before.error());
-  if (eeprom_switch) saving_ = before->at(eeprom_switch->key()) == 0;
+  if (eeprom_switch) seen_.saving = before->at(eeprom_switch->key()) == 0;
   const auto written = co_await write_all(required, *before);
   // Also after a failure: what is written next must not wear the EEPROM.
   const auto restored = co_await save_writes(saves_at_rest());
@@ -52,15 +52,15 @@ Task<Result<void>> Cia402Drive::bring_to(std::vector<ObjectSetting> required) {
 bool Cia402Drive::saves_at_rest() const { return setup_.persist == PersistSettings::all(); }
 
 Task<Result<void>> Cia402Drive::save_writes(bool saved, std::uint64_t then) {
-  if (!model_->objects.eeprom_switch || saving_ == saved) co_return Result<void>{};
+  if (!model_->objects.eeprom_switch || seen_.saving == saved) co_return Result<void>{};
   if (saved)
     if (const auto permitted = permit_saves(1 + then); !permitted) co_return permitted;
-  saving_.reset();
+  seen_.saving.reset();
   const auto written = co_await write_object(*model_->objects.eeprom_switch, saved ? 0 : 1, 0, patiently());
   if (written || written.error().outcome == Outcome::unknown)
     count_save(1);  // whether this object saves itself is not said: counted
   if (!written) co_return written;
-  saving_ = saved;
+  seen_.saving = saved;
   co_return Result<void>{};
 }
 
@@ -68,7 +68,7 @@ Task<Result<void>> Cia402Drive::save_writes(bool saved, std::uint64_t then) {
 /// which each further attempt would turn again, and wear.
 Task<Result<void>> Cia402Drive::prepare_write(const ObjectSetting& setting) {
   // Of what no write saves the switch says nothing, and to turn it is a write itself.
-  const bool turns = can_be_saved(setting.address) && saving_ != setting.saved;
+  const bool turns = can_be_saved(setting.address) && seen_.saving != setting.saved;
   if (setting.starts_motion && turns)
     if (const auto inactive = co_await check_inactive(setting); !inactive) co_return inactive;
   if (turns)
@@ -83,7 +83,7 @@ Task<Result<void>> Cia402Drive::write_all(const std::vector<ObjectSetting>& requ
     const auto held = present.at(setting.address);
     if (setting.holds(held)) continue;  // spares the EEPROM
     // Again and again it would only wear the EEPROM.
-    if (setting.saved && unsaved_.contains(setting.address)) co_return fail(not_held(setting, held));
+    if (setting.saved && seen_.not_held.contains(setting.address)) co_return fail(not_held(setting, held));
     if (const auto ready = co_await prepare_write(setting); !ready) co_return ready;
     const auto written = co_await write_counted(setting.address, setting.applied_to(held), setting.bytes);
     if (!written) co_return written;
@@ -145,7 +145,7 @@ bool Cia402Drive::can_be_saved(std::uint32_t address) const {
 }
 
 bool Cia402Drive::is_saved(std::uint32_t address) const {
-  return can_be_saved(address) && saving_.value_or(true);
+  return can_be_saved(address) && seen_.saving.value_or(true);
 }
 
 void Cia402Drive::count_write(std::uint32_t address) {
@@ -165,7 +165,7 @@ Task<Result<void>> Cia402Drive::verify(const std::vector<ObjectSetting>& require
   if (!after) co_return fail(after.error());
   for (const auto& setting : required)
     if (const auto actual = after->at(setting.address); !setting.holds(actual)) {
-      if (setting.saved) unsaved_.insert(setting.address);
+      if (setting.saved) seen_.not_held.insert(setting.address);
       co_return fail(not_held(setting, actual));
     }
   co_return Result<void>{};

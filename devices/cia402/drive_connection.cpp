@@ -89,9 +89,7 @@ Cia402Drive::~Cia402Drive() {
 }
 
 Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_class) {
-  rebooted_ = false;  // what is known of the power cycle before is forgotten already
-  settled_ = false;
-  node_started_ = false;
+  contact_.begin();
   // A stopped node answers no SDO (CiA 301 table 38); operational alone it does nothing.
   if (bus_->master().nmt().status(node_.id()).state == canopen::NmtState::stopped)
     if (const auto started = co_await start_node(); !started) co_return fail(started.error());
@@ -101,7 +99,7 @@ Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_c
       bus_->set_readiness(node_.id(), CanopenBus::Readiness::absent);
     co_return failed(found.error());
   }
-  silent_since_.reset();
+  contact_.note_answer();
   if (const auto fits = canopen::check_identity(*found, model_->identity); !fits) {
     bus_->set_readiness(node_.id(), CanopenBus::Readiness::absent);  // somebody else's
     co_return fail(error_at(Reason::wrong_model, {0x1018, 0},
@@ -132,16 +130,16 @@ Result<void> Cia402Drive::check_alone() const {
 /// A node that is heard, or was a moment ago, is there, and may hold something for the next SYNC (M24): it is
 /// busy, or answers late.
 bool Cia402Drive::is_silent() {
-  if (!silent_since_) silent_since_ = clock_->now();
+  contact_.note_silence(clock_->now());
   const auto heard = bus_->master().nmt().status(node_.id()).last_heard;
-  return clock_->now() - std::max(*silent_since_, heard.value_or(*silent_since_)) >= silence_of_absent;
+  return contact_.silent_for(clock_->now(), heard) >= silence_of_absent;
 }
 
 bool Cia402Drive::closed_loop() const {
   const auto mode = setup_.model_settings.find("loop_mode");
   const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
   // From when the loop mode counts is not said: a drive that came up open is open.
-  const bool found = !model_->objects.loop_mode || found_closed_.value_or(false);
+  const bool found = !model_->objects.loop_mode || seen_.closed_loop.value_or(false);
   return model_->descriptor->capabilities.closed_loop && !open && found;
 }
 
@@ -150,11 +148,11 @@ bool Cia402Drive::closed_loop() const {
 std::int64_t Cia402Drive::position_window() const {
   const auto mode = setup_.model_settings.find("loop_mode");
   const bool open = mode != setup_.model_settings.end() && mode->second == SettingValue(std::string("open"));
-  if (!model_->descriptor->capabilities.closed_loop || open || !found_closed_.value_or(true)) return 0;
+  if (!model_->descriptor->capabilities.closed_loop || open || !seen_.closed_loop.value_or(true)) return 0;
   // Two readings at rest are as far apart as noise of two counts permits.
   constexpr std::int64_t usual = 10, usual_per_revolution = 1000, least = 4;
   const auto revolution = std::max<std::int64_t>(setup_.pulses_per_revolution, 1);
-  const auto found = found_window_.value_or(0);
+  const auto found = seen_.position_window.value_or(0);
   if (found <= 0 || found > revolution) return std::max(usual, revolution / usual_per_revolution);
   const auto counts = model_->meaning.counts_per_revolution;
   return std::max({least, found, counts == 0 ? found : (found * revolution + counts - 1) / counts});
@@ -180,10 +178,10 @@ Task<Result<void>> Cia402Drive::configure() {
       !marked)
     co_return marked;
   if (const auto fitting = co_await check_plan(); !fitting) co_return fitting;
-  if (model_->objects.loop_mode && !found_closed_) {
+  if (model_->objects.loop_mode && !seen_.closed_loop) {
     const auto mode = co_await read_object(*model_->objects.loop_mode, patiently());
     if (!mode) co_return fail(mode.error());
-    found_closed_ = *mode == 0;
+    seen_.closed_loop = *mode == 0;
   }
   if (const auto window = model_->objects.position_window)
     if (const auto found = co_await read_object(*window, patiently());

@@ -101,18 +101,18 @@ class Cia402Drive::Prepared final : public PreparedMove {
 
   /// Nobody knows the control word until the end.
   void begin() {
-    stops_ = drive_->stops_;
+    stops_ = drive_->stops_.count();
     (void)drive_->words_.begin_write(std::nullopt);
-    ++drive_->triggering_;
+    drive_->stops_.begin_trigger();
   }
   void end() {
     drive_->words_.end_write(drive_->clock_->now());
-    --drive_->triggering_;
+    drive_->stops_.end_trigger();
     drive_->give_up_common_start();  // once only
   }
 
   Task<> follow_up(TimePoint at) {
-    if (stops_ != drive_->stops_) co_return;
+    if (stops_ != drive_->stops_.count()) co_return;
     drive_->note_move_began(at);
     auto options = urgent();
     options.guard = guard_;

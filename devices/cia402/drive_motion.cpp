@@ -99,7 +99,7 @@ Error Cia402Drive::answers_too_late() const {
       Reason::expired, object::control_word,
       fmt::format("nothing was started: the drive takes {:.0f} ms to answer, and the proof that it "
                   "did not restart may be {:.0f} ms old (reboot_guard)",
-                  in_ms(answer_time_), in_ms(setup_.reboot_guard)),
+                  in_ms(seen_.answer_time), in_ms(setup_.reboot_guard)),
       "look at the load of the network; raise reboot_guard up to what the drive needs to boot");
 }
 
@@ -146,7 +146,7 @@ Error Cia402Drive::not_enabled(State state) const {
 
 Task<Result<TimePoint>> Cia402Drive::prepare_start(MotionBlock block, OperationMode mode,
                                                    std::optional<HomingProfile> homing, SdoOptions motion) {
-  if (rebooted_) co_return fail(lost_memory());
+  if (contact_.rebooted()) co_return fail(lost_memory());
   if (mode == OperationMode::profile_position && block[speed] <= 0)
     co_return fail(too_slow(object::profile_velocity));
   if (const auto settled = co_await settle_armed(motion); !settled) co_return fail(settled.error());
@@ -167,17 +167,17 @@ Task<Result<TimePoint>> Cia402Drive::prepare_start(MotionBlock block, OperationM
 
 Task<Result<void>> Cia402Drive::pull_trigger(OperationMode mode, Trigger trigger, SdoOptions options,
                                              bool& triggered) {
-  if (rebooted_) co_return fail(lost_memory());
+  if (contact_.rebooted()) co_return fail(lost_memory());
   const auto began = clock_->now();
-  const auto stops = stops_;
+  const auto stops = stops_.count();
   const bool by_control = trigger.object == object::control_word;
   if (mode == OperationMode::homing) words_.use_mode(KnownWords::ModeUse::motion);
-  ++triggering_;
+  stops_.begin_trigger();
   auto pulled = by_control ? co_await write_control(static_cast<std::uint16_t>(trigger.value), options)
                            : co_await write_object(trigger.object, trigger.value, 0, options);
-  --triggering_;
+  stops_.end_trigger();
   triggered = pulled || pulled.error().outcome == Outcome::unknown;
-  if (!triggered || stops != stops_) co_return pulled;
+  if (!triggered || stops != stops_.count()) co_return pulled;
   motion_.begin(began);
   if (mode == OperationMode::profile_velocity) motion_.turns(trigger.value < 0);
   if (mode == OperationMode::profile_position) note_move_began(began);
@@ -246,13 +246,13 @@ Task<Result<void>> Cia402Drive::write_homing_method(HomingProfile profile, SdoOp
     if (present && *present == value) co_return Result<void>{};
     co_return co_await drive.write_verified(object::homing_method, value, std::move(how));
   };
-  if (!other_homing_codes_) {
+  if (!seen_.other_homing_codes) {
     auto taken = co_await take(*this, code->code, options);
     const bool unknown = !taken && taken.error().reason == Reason::out_of_range;
     if (!unknown || !code->alternative) co_return taken;
   }
   auto taken = co_await take(*this, code->alternative.value_or(code->code), std::move(options));
-  if (taken) other_homing_codes_ = true;
+  if (taken) seen_.other_homing_codes = true;
   co_return taken;
 }
 

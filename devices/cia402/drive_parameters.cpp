@@ -205,9 +205,9 @@ Task<Result<std::string>> Cia402Drive::restore_factory(std::vector<std::uint8_t>
   if (restored || restored.error().outcome == Outcome::unknown) {
     count_save(static_cast<std::uint64_t>(
         std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access)));
-    const auto found_closed = found_closed_;  // of this power cycle, which goes on
-    forget_power_cycle();                     // whatever stands there now, it is not ours
-    found_closed_ = found_closed;
+    const auto closed_loop = seen_.closed_loop;  // of this power cycle, which goes on
+    forget_power_cycle();                        // whatever stands there now, it is not ours
+    seen_.closed_loop = closed_loop;
   }
   if (!restored) co_return fail(restored.error());
   co_return address;

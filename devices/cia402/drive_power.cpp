@@ -360,7 +360,7 @@ Task<Result<void>> Cia402Drive::clear_alarm(MotionGuard guard) {
     const auto now = co_await read_status(options);
     if (!now) co_return fail(now.error());
     if (*now != State::fault) {
-      fault_left_at_ = clock_->now();
+      contact_.note_fault_left(clock_->now());
       co_return Result<void>{};
     }
   }

@@ -22,13 +22,13 @@ constexpr auto heartbeat_limit = milliseconds(500);
 /// Another master, or an earlier program, may have armed it; and so may a common start that was given up.
 Task<Result<void>> Cia402Drive::settle(SdoOptions options) {
   while (start_pdo_.work() != StartPdo::Work::none) co_await news_.wait_until(clock_->now() + nmt_patience);
-  if (settled_ && !bus_->armed(node_.id())) co_return Result<void>{};
+  if (contact_.is_settled() && !bus_->armed(node_.id())) co_return Result<void>{};
   start_pdo_.begin(StartPdo::Work::settling);
   auto disarmed = co_await disarm(std::move(options));
   start_pdo_.end_work();
   news_.notify_all();
   if (!disarmed) co_return disarmed;
-  settled_ = true;
+  contact_.settle();
   bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
   co_return Result<void>{};
 }
@@ -110,7 +110,7 @@ Task<Result<void>> Cia402Drive::leave_operational(bool confirmed) {
 
 Task<Result<void>> Cia402Drive::enter_operational() {
   const auto started = co_await bus_->master().command(node_.id(), canopen::NmtCommand::start);
-  node_started_ = started.has_value();
+  contact_.note_started(started.has_value());
   co_return started;
 }
 
@@ -118,7 +118,7 @@ Task<Result<void>> Cia402Drive::start_node() {
   // A node without heartbeat does not say what it is: then it is started once.
   const auto state = bus_->master().nmt().status(node_.id()).state;
   const bool unsaid = state == canopen::NmtState::unknown;
-  if (state == canopen::NmtState::operational || (unsaid && node_started_)) co_return Result<void>{};
+  if (state == canopen::NmtState::operational || (unsaid && contact_.started())) co_return Result<void>{};
   co_return co_await enter_operational();
 }
 

@@ -26,17 +26,15 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
   using Kind = canopen::NodeEvent::Kind;
   switch (event.kind) {
     case Kind::booted:
-      rebooted_ = rebooted_ || canary_.expects_anything();
+      contact_.booted(canary_.expects_anything());
       forget_power_cycle();
-      pending_alarm_ = 0;
-      heartbeat_lost_ = false;
       break;
     case Kind::heartbeat_lost:
-      heartbeat_lost_ = true;
+      contact_.note_heartbeat(true);
       words_.forget();
       break;
     case Kind::heartbeat_again:
-      heartbeat_lost_ = false;
+      contact_.note_heartbeat(false);
       break;
     case Kind::state_changed:
       break;
@@ -49,8 +47,8 @@ void Cia402Drive::on_event(const canopen::NodeEvent& event) {
 void Cia402Drive::on_emergency(const canopen::Emergency& emergency) {
   const auto group = emergency.code >> 8U;
   const bool of_communication = group == 0x81 || group == 0x82;
-  if (!emergency.is_reset() && !of_communication) pending_alarm_ = alarm_of(*model_, emergency.code);
-  if (emergency.is_reset()) fault_left_at_ = clock_->now();
+  if (!emergency.is_reset() && !of_communication) contact_.note_alarm(alarm_of(*model_, emergency.code));
+  if (emergency.is_reset()) contact_.note_fault_left(clock_->now());
   give_up_common_start();
   news_.notify_all();
   if (attention_) attention_();
@@ -82,7 +80,7 @@ void Cia402Drive::on_pdo(std::size_t index, const can::ReceivedFrame& received) 
 }
 
 bool Cia402Drive::pdos_usable() const {
-  if (subscribed_.empty() || heartbeat_lost_ || rebooted_) return false;
+  if (subscribed_.empty() || contact_.heartbeat_lost() || contact_.rebooted()) return false;
   return !pdos_.synchronous() || bus_->sync_running();
 }
 
@@ -144,10 +142,10 @@ Task<Result<Reading>> Cia402Drive::poll_objects(SdoOptions options) {
 Task<Result<DriveSample>> Cia402Drive::look(bool by_pdo, SdoOptions options) {
   if (by_pdo)
     if (const auto reading = co_await next_pdos()) co_return judge(*reading, true);
-  if (rebooted_) co_return fail(lost_memory());
+  if (contact_.rebooted()) co_return fail(lost_memory());
   const auto polled = co_await poll_objects(options);
   if (!polled) co_return fail(polled.error());
-  if (rebooted_) co_return fail(lost_memory());
+  if (contact_.rebooted()) co_return fail(lost_memory());
   if (missed_pdos_ >= missed_in_a_row && link_note_.empty())
     link_note_ = "state by SDO polling: its TPDOs do not come";
   co_return judge(*polled, false);
@@ -156,24 +154,23 @@ Task<Result<DriveSample>> Cia402Drive::look(bool by_pdo, SdoOptions options) {
 Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class) {
   const SdoOptions options{.transaction_class = transaction_class};
   // A chain that starts something does not wait for a PDO, unless the objects come later still.
-  const bool slow = answer_time_ > slow_answer;
+  const bool slow = seen_.answer_time > slow_answer;
   auto sample = co_await look(slow || transaction_class != TransactionClass::motion, options);
   // A fault that was left while the objects were read is none any more: its code is gone already, too.
-  const bool over = sample && sample->alarm_code != 0 && sample->asked_at < fault_left_at_;
+  const bool over = sample && sample->alarm_code != 0 && contact_.has_left_fault_since(sample->asked_at);
   // The drive may have been reset between its status word and 603Fh: neither comes with the other.
   const bool torn = sample && sample->alarm_code == alarm_without_code && has(*model_, object::error_code);
   if (over || torn) sample = co_await look(false, options);
   // What a drive does with a change of its mode in motion is not said.
-  const bool rests = sample && !sample->moving && stopping_ == 0 && sample->asked_at >= stopped_at_;
-  if (homing_.state() == HomingRun::State::leaving && rests && !rebooted_) {
+  const bool rests = sample && !sample->moving && stops_.is_after(sample->asked_at);
+  if (homing_.state() == HomingRun::State::leaving && rests && !contact_.rebooted()) {
     co_await leave_homing(options);
     sample = co_await look(false, options);
   }
   if (sample && sample->alarm_code == alarm_without_code) sample->alarm_code = alarm_by_emergency();
   // An alarm that has gone already is told once, all the same (M5): with a sample that somebody gets.
   if (sample)
-    if (const auto told = std::exchange(pending_alarm_, 0); sample->alarm_code == 0)
-      sample->alarm_code = told;
+    if (const auto told = contact_.take_alarm(); sample->alarm_code == 0) sample->alarm_code = told;
   co_return sample;
 }
 

@@ -54,7 +54,7 @@ Task<Result<void>> Cia402Drive::write_control(std::uint16_t word, SdoOptions opt
   words_.end_write(ended);
   if (answer || answer.error().outcome == Outcome::unknown) words_.executed(word);
   if (!answer) co_return failed(answer.error());
-  if ((word & control::halt) != 0 && !command_pdo_) stop_sent_at_ = answer->sent_at;
+  if ((word & control::halt) != 0 && !command_pdo_) stops_.note_frame(answer->sent_at);
   if (!words_.is_newest(write)) co_return Result<void>{};  // overtaken by a later one
   if (answer->ambiguous) {
     const auto held = co_await held_control(std::move(options));
@@ -81,7 +81,7 @@ Task<> Cia402Drive::send_control_pdo(std::uint16_t word) {
   if (!command_pdo_) co_return;
   const auto sent = co_await bus_->master().send_pdo(*command_pdo_, canopen::number_bytes(word, word_bytes),
                                                      {.transaction_class = TransactionClass::stop});
-  if (sent && (word & control::halt) != 0) stop_sent_at_ = sent->sent_at;
+  if (sent && (word & control::halt) != 0) stops_.note_frame(sent->sent_at);
 }
 
 /// M12. In a mode that nobody knows it does no harm, and it asks for no knowledge of the control word.
@@ -91,16 +91,14 @@ Task<> Cia402Drive::zero_velocity(SdoOptions options) {
 }
 
 Task<Result<void>> Cia402Drive::stop(StopKind kind) {
-  ++stops_;
+  stops_.begin_stop();
   leave_gate_->raise();
   bus_->purge_superseded(node_.id(), *leave_gate_);
   give_up_common_start();
-  motion_.stop(triggering_ > 0 || homing_.active());
+  motion_.stop(stops_.triggers() || homing_.active());
   homing_.stop(words_.homes());
-  ++stopping_;
   const auto sent = co_await send_stop(kind == StopKind::quick_stop);
-  --stopping_;
-  stopped_at_ = clock_->now();
+  stops_.end_stop(clock_->now());
   co_return sent;
 }
 
