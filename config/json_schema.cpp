@@ -157,6 +157,38 @@ std::vector<std::string_view> model_names() {
   return names;
 }
 
+Object type_of_objects(const KeySpec& spec) {
+  return Object()
+      .text("type", "object")
+      .raw("minProperties", "1")
+      .raw("propertyNames", Object().text("pattern", whole(spec.pattern)).json())
+      .raw("additionalProperties", section(spec.children).json());
+}
+
+Object type_of_choice(const KeySpec& spec) {
+  if (!spec.maximum) return Object().raw("enum", choices_of(spec));
+  Object named, numbered;
+  named.raw("enum", choices_of(spec));
+  numbered.text("type", "integer");
+  add_bounds(numbered, spec);
+  return Object().raw("anyOf", array({named.json(), numbered.json()}));
+}
+
+Object type_of_names(const KeySpec& spec) {
+  return Object()
+      .text("type", "array")
+      .raw("items", Object().text("type", "string").text("pattern", whole(spec.pattern)).json())
+      .raw("minItems", "2")
+      .raw("uniqueItems", "true");
+}
+
+Object type_of_roles(const KeySpec& spec) {
+  return Object()
+      .text("type", "object")
+      .raw("propertyNames", Object().text("pattern", whole(spec.pattern)).json())
+      .raw("additionalProperties", Object().raw("enum", strings(spec.choices)).json());
+}
+
 Object type_of(const KeySpec& spec) {
   Object result;
   switch (spec.kind) {
@@ -170,10 +202,7 @@ Object type_of(const KeySpec& spec) {
     case Kind::model_settings:
       return result.text("type", "object");  // refined per model
     case Kind::model_objects:
-      return result.text("type", "object")
-          .raw("minProperties", "1")
-          .raw("propertyNames", Object().text("pattern", whole(spec.pattern)).json())
-          .raw("additionalProperties", section(spec.children).json());
+      return type_of_objects(spec);
     case Kind::text:
       return result.text("type", "string")
           .text("pattern", whole(spec.pattern))
@@ -188,23 +217,12 @@ Object type_of(const KeySpec& spec) {
       return result.text("type", "number").raw("not", Object().raw("const", "0").json());
     case Kind::boolean:
       return result.text("type", "boolean");
-    case Kind::choice: {
-      if (!spec.maximum) return result.raw("enum", choices_of(spec));
-      Object named, numbered;
-      named.raw("enum", choices_of(spec));
-      numbered.text("type", "integer");
-      add_bounds(numbered, spec);
-      return result.raw("anyOf", array({named.json(), numbered.json()}));
-    }
+    case Kind::choice:
+      return type_of_choice(spec);
     case Kind::names:
-      return result.text("type", "array")
-          .raw("items", Object().text("type", "string").text("pattern", whole(spec.pattern)).json())
-          .raw("minItems", "2")
-          .raw("uniqueItems", "true");
+      return type_of_names(spec);
     case Kind::roles:
-      return result.text("type", "object")
-          .raw("propertyNames", Object().text("pattern", whole(spec.pattern)).json())
-          .raw("additionalProperties", Object().raw("enum", strings(spec.choices)).json());
+      return type_of_roles(spec);
     case Kind::parts:
       return parts_of(spec.choices);
     case Kind::duration:

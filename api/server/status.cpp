@@ -54,6 +54,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::no_reply:
     case Reason::bus_down:
     case Reason::storage:
+    case Reason::reloading:
       return grpc::StatusCode::UNAVAILABLE;
     case Reason::configuring:
     case Reason::wrong_model:
@@ -94,8 +95,6 @@ grpc::StatusCode status_code(Reason reason) {
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case Reason::cancelled:
       return grpc::StatusCode::CANCELLED;
-    case Reason::reloading:
-      return grpc::StatusCode::UNAVAILABLE;
     case Reason::internal:
       return grpc::StatusCode::INTERNAL;
   }
