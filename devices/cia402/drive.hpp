@@ -13,7 +13,6 @@
 #include "buses/canopen/canopen_bus.hpp"
 #include "buses/canopen/pdo_configuration.hpp"
 #include "buses/signal.hpp"
-#include "devices/cia402/canary.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/foreign_master.hpp"
 #include "devices/cia402/homing_run.hpp"
@@ -21,6 +20,7 @@
 #include "devices/cia402/model.hpp"
 #include "devices/cia402/motion_watch.hpp"
 #include "devices/cia402/node_contact.hpp"
+#include "devices/cia402/object_canary.hpp"
 #include "devices/cia402/object_setting.hpp"
 #include "devices/cia402/objects.hpp"
 #include "devices/cia402/seen_objects.hpp"
@@ -324,7 +324,7 @@ class Cia402Drive final : public Drive {
 
   // What it is known to hold.
   KnownWords words_;
-  Canary canary_;
+  ObjectCanary canary_;
   StopsSent stops_;
 
   // What the drive does.

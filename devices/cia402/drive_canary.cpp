@@ -61,7 +61,7 @@ Task<Result<TimePoint>> Cia402Drive::read_canary(SdoOptions options) {
 Task<Result<TimePoint>> Cia402Drive::prove_block(SdoOptions options) {
   const auto asked = clock_->now();
   const bool alone = !canary_.may_be_foreign(bus_->master().traffic(node_.id()).foreign_writes);
-  if (!alive(asked) || canary_.state() != Canary::State::block || !alone)
+  if (!alive(asked) || canary_.state() != ObjectCanary::State::block || !alone)
     co_return co_await read_canary(std::move(options));
   const auto block = canary_.blocks().front();
   const auto losses = bus_->losses();
@@ -77,7 +77,7 @@ Task<Result<TimePoint>> Cia402Drive::prove_block(SdoOptions options) {
 
 Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions options) {
   const auto objects = motion_objects(*model_);
-  const bool known = canary_.state() == Canary::State::block;
+  const bool known = canary_.state() == ObjectCanary::State::block;
   auto present = known ? canary_.blocks().front() : MotionBlock{};
   std::vector<MotionObject> written;
   for (const auto& one : objects) {
@@ -88,9 +88,9 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
     after.at(one.field) = block.at(one.field);
     const bool uncertain = !done && done.error().outcome == Outcome::unknown;
     if (known)
-      canary_.note_write(
-          present, after,
-          done ? Canary::Written::yes : (uncertain ? Canary::Written::unknown : Canary::Written::no));
+      canary_.note_write(present, after,
+                         done ? ObjectCanary::Written::yes
+                              : (uncertain ? ObjectCanary::Written::unknown : ObjectCanary::Written::no));
     if (!done) co_return done;
     present = after;
     written.push_back(one);

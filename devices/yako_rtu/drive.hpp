@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "buses/modbus_rtu/node.hpp"
+#include "devices/canary.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive_access.hpp"
 #include "devices/yako_rtu/codec.hpp"
@@ -41,10 +42,10 @@ class YakoRtuDrive final : public Drive {
   // drive_motion.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override {
-    return expected_.size() == 1 ? std::optional(expected_.front()) : std::nullopt;
+    return canary_.is_known() ? std::optional(canary_.blocks().front()) : std::nullopt;
   }
   void expect_marks(const std::vector<ContinuityMark>& marks) override {
-    expected_ = marks;
+    canary_.expect(marks);
     proven_at_.reset();
   }
   [[nodiscard]] bool rules_out_restart(const DriveSample& sample) const override;
@@ -124,9 +125,8 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> replace_canary(MotionBlock block);
   Task<Result<Answer>> read_canary(TransactionOptions options);
   bool recognise_canary(std::span<const std::uint16_t> registers);
-  [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
-  /// A content that a power-up may leave: never a canary.
-  void note_power_up_block(const MotionBlock& block);
+  /// A block like it that no power-up leaves.
+  [[nodiscard]] MotionBlock distinct(const MotionBlock& block) const;
   /// The drive was switched off and on, and came up with `block`.
   void forget_power_cycle(const MotionBlock& block);
   [[nodiscard]] MotionBlock fresh_neutral_block() const;
@@ -159,14 +159,12 @@ class YakoRtuDrive final : public Drive {
   std::uint16_t first_input_function_;
   std::vector<RegisterSetting> required_;  ///< by the setup; empty if it cannot be had (configure() says why)
   std::optional<Error> setup_error_;
-  /// What the motion block may hold: one entry, two after a block write whose reply was lost.
-  std::vector<MotionBlock> expected_;
+  Canary<MotionBlock> canary_{factory_block};
   /// When the canary, or a reading of the state that no restarted drive shows, was asked for, if it was the
   /// last of both. Kept here, and not by the axis: every answer of the drive and every write that voids a
   /// proof passes through this class, and so does the trigger that rests on it.
   std::optional<TimePoint> proven_at_;
-  std::vector<MotionBlock> power_up_blocks_{factory_block};  ///< what a power-up may leave; the newest last
-  std::optional<bool> saving_;                               ///< 0x0016, if it is known
+  std::optional<bool> saving_;        ///< 0x0016, if it is known
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
   std::optional<std::uint16_t> terminal_move_mode_;  ///< 0x0026, if it is known
   ModeWatch mode_;

@@ -29,7 +29,7 @@ class YakoRtuDrive::Loaded final : public LoadedMove {
         if (error.outcome == Outcome::unknown) error.outcome = Outcome::not_executed;  // only read
         co_return fail(std::move(error));
       }
-      if (drive_->expected_.front() != block_)
+      if (!drive_->canary_.is(block_))
         co_return fail(drive_->error_at(Reason::superseded, reg::start_speed,
                                         "the drive was given another motion meanwhile", "repeat the move"));
       read_at_ = canary->sent_at;

@@ -27,18 +27,10 @@ MotionBlock YakoRtuDrive::fresh_neutral_block() const {
   return {5, 100, static_cast<std::uint16_t>(101 + moment % 61), 60, 0, 0};
 }
 
-void YakoRtuDrive::note_power_up_block(const MotionBlock& block) {
-  constexpr std::size_t most = 8;
-  if (block == factory_block) return;  // it is the first, for ever
-  std::erase(power_up_blocks_, block);
-  power_up_blocks_.push_back(block);
-  if (power_up_blocks_.size() > most) power_up_blocks_.erase(std::next(power_up_blocks_.begin()));
-}
-
 void YakoRtuDrive::forget_power_cycle(const MotionBlock& block) {
-  expected_.clear();
+  canary_.forget();
   proven_at_.reset();
-  note_power_up_block(block);
+  canary_.note_power_up(block);
   found_closed_.reset();
   unsaved_.clear();
 }
@@ -48,21 +40,18 @@ Error YakoRtuDrive::lost_memory() const {
                   "home the axis again, then enable it; nothing resumes by itself");
 }
 
-/// Keeps a block off every content that a power-up could leave.
-MotionBlock YakoRtuDrive::distinct(MotionBlock block) const {
-  while (std::ranges::find(power_up_blocks_, block) != power_up_blocks_.end())
-    block[1] = block[1] < 2000 ? block[1] + 1 : block[1] - 2;
-  return block;
+MotionBlock YakoRtuDrive::distinct(const MotionBlock& block) const {
+  constexpr std::size_t acceleration_time = 1;
+  return canary_.distinct(block, acceleration_time);
 }
 
 Task<Result<void>> YakoRtuDrive::write_canary(MotionBlock block, TransactionOptions options) {
   const auto written = co_await node_.write_block(reg::start_speed, block, std::move(options));
   if (written) {
-    expected_ = {block};
+    canary_.written(block);
     co_return Result<void>{};
   }
-  // Without a reply either content may stand there now.
-  if (written.error().outcome == Outcome::unknown) expected_.push_back(block);
+  if (written.error().outcome == Outcome::unknown) canary_.may_hold(block);
   co_return failed(written.error());
 }
 
@@ -76,8 +65,8 @@ Task<Result<void>> YakoRtuDrive::replace_canary(MotionBlock block) {
     if (!found) co_return failed(found.error());
     MotionBlock present{};
     std::ranges::copy(found->registers, present.begin());
-    const bool known = std::ranges::find(expected_, present) != expected_.end();
-    const bool restarted = !known && !expected_.empty();
+    const bool known = canary_.is_expected(present);
+    const bool restarted = !known && !canary_.blocks().empty();
     if (!known) forget_power_cycle(present);
     if (restarted) co_return fail(lost_memory());
     auto fresh = in(TransactionClass::motion);
@@ -105,8 +94,8 @@ Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions op
 bool YakoRtuDrive::recognise_canary(std::span<const std::uint16_t> registers) {
   MotionBlock found{};
   std::ranges::copy(registers, found.begin());
-  if (std::ranges::find(expected_, found) == expected_.end()) return false;
-  expected_ = {found};
+  if (!canary_.is_expected(found)) return false;
+  canary_.found(found);
   return true;
 }
 
@@ -120,8 +109,8 @@ bool YakoRtuDrive::is_started_by_terminals() const {
 /// Where it rests just where the block in its memory sent it, too: a released shaft may have been turned off
 /// 0 by hand since a restart, but hardly to there. A terminal may well have sent it there again.
 bool YakoRtuDrive::rules_out_restart(const DriveSample& sample) const {
-  if (expected_.size() != 1 || is_started_by_terminals() || !Drive::rules_out_restart(sample)) return false;
-  return std::abs(target_of(expected_.front()) - sample.position_pulses) <= position_window();
+  if (!canary_.is_known() || is_started_by_terminals() || !Drive::rules_out_restart(sample)) return false;
+  return std::abs(target_of(canary_.blocks().front()) - sample.position_pulses) <= position_window();
 }
 
 void YakoRtuDrive::note_proof(TimePoint asked_at) {
@@ -142,7 +131,7 @@ std::optional<TimePoint> YakoRtuDrive::fresh_proof() const {
 }
 
 std::vector<ContinuityMark> YakoRtuDrive::marks_until(const MotionBlock& block) const {
-  auto marks = expected_;
+  std::vector<ContinuityMark> marks(canary_.blocks().begin(), canary_.blocks().end());
   marks.push_back(distinct(block));
   return marks;
 }
@@ -182,10 +171,11 @@ Task<Result<void>> YakoRtuDrive::start_velocity(VelocityProfile profile, MotionG
 
 Task<Result<void>> YakoRtuDrive::start_homing(HomingProfile profile, MotionGuard guard) {
   // Homing uses its own block; the motion block is only the canary, and keeps what it holds.
-  if (expected_.empty())
+  if (canary_.blocks().empty())
     co_return fail(
         error_at(Reason::configuring, reg::start_speed, "the drive is not configured yet", "wait"));
-  co_return co_await start(expected_.back(), encode(profile), {reg::homing_start, 1}, std::move(guard));
+  co_return co_await start(canary_.blocks().back(), encode(profile), {reg::homing_start, 1},
+                           std::move(guard));
 }
 
 Result<void> YakoRtuDrive::check_control_mode() const {
@@ -264,12 +254,12 @@ Task<Result<void>> YakoRtuDrive::start_in_one_frame(MotionBlock block, Trigger t
   frame.push_back(trigger.value);
   const auto written = co_await node_.write_block(reg::start_speed, frame, std::move(options));
   if (written) {
-    expected_ = {block};
+    canary_.written(block);
     co_return Result<void>{};
   }
   auto error = written.error();
   const bool refused = error.outcome == Outcome::refused;
-  if (refused || error.outcome == Outcome::unknown) expected_.push_back(block);
+  if (refused || error.outcome == Outcome::unknown) canary_.may_hold(block);
   error.where.object = trigger.address;
   if (refused) {
     // Refused for one register, the others may have been taken, the trigger among them.

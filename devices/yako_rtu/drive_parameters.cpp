@@ -148,15 +148,15 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
           return parameter.access == Access::rw || parameter.access == Access::rw_saved;
         })));
     // Saved, this block would no longer tell a power-up (M7): whatever comes now, it is no proof any more.
-    note_power_up_block(neutral);
+    canary_.note_power_up(neutral);
   }
   if (saved) {
     const auto fresh = distinct(fresh_neutral_block());
     for (int attempt = 0; attempt < canary_attempts; ++attempt)
       if (co_await write_canary(fresh, parameters())) break;
-    std::erase(expected_, neutral);
+    canary_.distrust(neutral);
   } else if (executed) {
-    expected_.clear();  // since the request it may have been restarted, and come up with what it saved
+    canary_.forget();  // since the request it may have been restarted, and come up with what it saved
   }
   if (!saved) co_return failed(saved.error());
   co_return co_await check_continuity(TransactionClass::parameters);
@@ -182,7 +182,7 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
   if (restored || restored.error().outcome == Outcome::unknown) {
     count_save(static_cast<std::uint64_t>(
         std::ranges::count(model_->descriptor->parameters, Access::rw_saved, &ParameterSpec::access)));
-    expected_.clear();  // whatever stands there now, it is not ours
+    canary_.forget();  // whatever stands there now, it is not ours
     proven_at_.reset();
     terminal_move_mode_.reset();
     saving_.reset();

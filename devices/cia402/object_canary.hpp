@@ -1,4 +1,4 @@
-// The canary: what the motion block of a drive holds, and no power-up leaves there (M6, M7).
+// The canary of a drive whose motion block is several objects, written one after the other (M6, M7).
 #pragma once
 
 #include <cstdint>
@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "devices/canary.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/drive.hpp"
 
@@ -22,7 +23,7 @@ namespace axisd::cia402 {
 ///
 /// Contents that a power-up may leave are no canary: they are kept out of what is written, and of what
 /// counts.
-class Canary {
+class ObjectCanary {
  public:
   enum class State : std::uint8_t {
     nothing,  ///< the drive has to be configured
@@ -33,16 +34,16 @@ class Canary {
   enum class Written : std::uint8_t { yes, no, unknown };
 
   /// `factory`: what a power-up leaves of a drive as the factory sent it.
-  explicit Canary(const MotionBlock& factory) : power_up_{factory} {}
+  explicit ObjectCanary(const MotionBlock& factory) : blocks_(factory) {}
 
   [[nodiscard]] State state() const;
   /// A drive that holds something else has lost its memory.
   [[nodiscard]] bool expects_anything() const { return state() != State::nothing; }
   [[nodiscard]] bool is_expected(const MotionBlock& block) const;
   /// Contents that the drive may hold, the oldest first; none: not known, or known by marks alone.
-  [[nodiscard]] std::span<const MotionBlock> blocks() const { return expected_; }
+  [[nodiscard]] std::span<const MotionBlock> blocks() const { return blocks_.blocks(); }
   /// It holds this one, for certain.
-  [[nodiscard]] bool is(const MotionBlock& block) const;
+  [[nodiscard]] bool is(const MotionBlock& block) const { return blocks_.is(block); }
 
   /// All of it was read, and is_expected(). `foreign_writes`: of other masters, until it was asked for.
   void found(const MotionBlock& block, std::uint64_t foreign_writes);
@@ -54,16 +55,17 @@ class Canary {
   void note_write(const MotionBlock& before, const MotionBlock& after, Written written);
   void written(const MotionBlock& block);
   /// It is written anew, whatever stands there. Marks stay until that is done.
-  void rewrite() { expected_.clear(); }
+  void rewrite() { blocks_.forget(); }
   void forget();
   void expect_marks(std::vector<ContinuityMark> marks);
 
-  /// A power-up may leave this.
-  void note_power_up(const MotionBlock& block);
-  /// To find this one proves nothing any more.
-  void distrust(const MotionBlock& block) { std::erase(expected_, block); }
+  /// As of Canary.
+  void note_power_up(const MotionBlock& block) { blocks_.note_power_up(block); }
+  void distrust(const MotionBlock& block) { blocks_.distrust(block); }
   /// A block like it that no power-up leaves.
-  [[nodiscard]] MotionBlock distinct(MotionBlock block) const;
+  [[nodiscard]] MotionBlock distinct(const MotionBlock& block) const {
+    return blocks_.distinct(block, acceleration);
+  }
   /// The fewest of `objects` whose contents tell the block from each that a power-up may leave.
   [[nodiscard]] std::vector<MotionObject> telling(const MotionBlock& block,
                                                   const std::vector<MotionObject>& objects) const;
@@ -74,11 +76,8 @@ class Canary {
   [[nodiscard]] std::vector<ContinuityMark> marks_until(const MotionBlock& block) const;
 
  private:
-  [[nodiscard]] bool left_by_power_up(const MotionBlock& block) const;
-
-  std::vector<MotionBlock> expected_;
+  Canary<MotionBlock> blocks_;
   std::vector<ContinuityMark> marks_;
-  std::vector<MotionBlock> power_up_;  ///< the factory's, then the newest last
   std::uint64_t foreign_writes_ = 0;
 };
 

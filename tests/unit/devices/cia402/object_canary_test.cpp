@@ -1,12 +1,12 @@
-#include "devices/cia402/canary.hpp"
+#include "devices/cia402/object_canary.hpp"
 
 #include <gtest/gtest.h>
 
 namespace axisd::cia402 {
 namespace {
 
-using State = Canary::State;
-using Written = Canary::Written;
+using State = ObjectCanary::State;
+using Written = ObjectCanary::Written;
 
 constexpr MotionBlock factory = {0, 60, 100, 100, 5};
 constexpr MotionBlock first = {1000, 300, 150, 150, 5}, second = {2000, 300, 150, 150, 5};
@@ -15,14 +15,14 @@ const std::vector<MotionObject> objects = {
     {target, {0x607A, 0}}, {speed, {0x6081, 0}}, {acceleration, {0x6083, 0}}, {deceleration, {0x6084, 0}}};
 
 ContinuityMark mark_of(const MotionBlock& block) {
-  Canary canary(factory);
+  ObjectCanary canary(factory);
   canary.written(block);
   return canary.mark().value_or(ContinuityMark{});
 }
 
 class CanaryTest : public testing::Test {
  protected:
-  Canary canary_{factory};
+  ObjectCanary canary_{factory};
 };
 
 TEST_F(CanaryTest, NothingIsExpectedAtFirst) {
