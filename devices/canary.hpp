@@ -13,10 +13,9 @@ namespace axisd {
 
 /// What the block may hold. Pure. Thread: core. `Block`: an array of numbers.
 ///
-///   nothing -- written() ----------------------> one
-///   any     -- may_hold(): no reply came ------> one more
-///   several -- found() ------------------------> one
-///   any     -- forget() -----------------------> nothing
+///   any -- written(), found() ------------> one
+///   any -- may_hold(): no reply came -----> one more
+///   any -- forget() ----------------------> nothing
 ///
 /// What a power-up may leave is kept apart: the factory's block for ever, and the newest that were found or
 /// saved.
@@ -28,7 +27,7 @@ class Canary {
   /// Contents that it may hold, the oldest first; none: not known.
   [[nodiscard]] std::span<const Block> blocks() const { return expected_; }
   [[nodiscard]] bool is_known() const { return expected_.size() == 1; }
-  /// It holds this one, for certain.
+  /// It holds this one, as far as anything is known.
   [[nodiscard]] bool is(const Block& block) const { return is_known() && expected_.front() == block; }
   [[nodiscard]] bool is_expected(const Block& block) const { return has(expected_, block); }
 
@@ -56,11 +55,10 @@ class Canary {
   [[nodiscard]] bool is_left_by_power_up(const Block& block) const { return has(power_up_, block); }
   /// A block like it that no power-up leaves: its time at `ramp` differs a little.
   [[nodiscard]] Block distinct(Block block, std::size_t ramp) const {
-    constexpr int high = 2000;
-    while (is_left_by_power_up(block)) {
-      auto& time = block.at(ramp);
-      time = static_cast<typename Block::value_type>(time + (time < high ? 1 : -2));
-    }
+    constexpr int high = 2000, room = 16;  // more than there are blocks
+    auto& time = block.at(ramp);
+    const int step = time < high - room ? 1 : -1;
+    while (is_left_by_power_up(block)) time = static_cast<typename Block::value_type>(time + step);
     return block;
   }
 

@@ -72,6 +72,7 @@ Task<Result<TimePoint>> Cia402Drive::prove_block(SdoOptions options) {
     const bool proves = *value == block.at(field) && losses == bus_->losses();
     if (!proves) co_return co_await read_canary(std::move(options));
   }
+  if (!canary_.is(block)) co_return fail(lost_memory());  // another sequence found it so meanwhile
   co_return asked;
 }
 

@@ -245,7 +245,8 @@ Task<> Cia402Drive::show_and_judge(std::uint16_t held, SdoOptions options) {
   words_.end_write(clock_->now());
   if (!shown) co_return start_pdo_.note_obstacle(shown.error().message);
   start_pdo_.judge(*shown);
-  if (shown->empty()) co_return bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
+  if (start_pdo_.state() == StartPdo::State::proven)
+    co_return bus_->set_readiness(node_.id(), CanopenBus::Readiness::settled);
   (void)co_await write_object(object::control_word, held, word_bytes, std::move(options));
 }
 

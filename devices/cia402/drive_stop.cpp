@@ -112,9 +112,12 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   const auto with_halt = [](std::uint16_t bits) { return static_cast<std::uint16_t>(bits | control::halt); };
   // A quick stop first has to say how: 605Dh may be read when bit 8 rises, and a ramp that 60FFh = 0 began
   // may be all that the drive then does.
+  // But what waits for a SYNC goes first: it would undo the halt. It was armed in Operation Enabled; or it is
+  // shown by a released drive, which its bits alone leave so.
+  const bool shown = start_pdo_.work() == StartPdo::Work::proving;
+  if (words_.state_bits() || !shown)
+    co_await follow_waiting(with_halt(words_.state_bits().value_or(control_word(Command::enable_operation))));
   const bool known = words_.state_bits().has_value();
-  // What waits for a SYNC first: it would undo the halt. It was armed in Operation Enabled.
-  co_await follow_waiting(with_halt(words_.state_bits().value_or(control_word(Command::enable_operation))));
   if (known && !quick) co_await send_control_pdo(with_halt(*words_.state_bits()));
   if (!known || !quick) co_await zero_velocity(first);
   const auto option = quick ? model_->meaning.halt_at_once : model_->meaning.halt_on_ramp;

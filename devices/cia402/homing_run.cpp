@@ -3,6 +3,7 @@
 namespace axisd::cia402 {
 
 void HomingRun::begin(TimePoint at, std::optional<std::int32_t> from) {
+  leaving_ = false;
   ended_home_ = false;
   next_.from = from;
   watch_.begin(at, next_);

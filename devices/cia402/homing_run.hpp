@@ -10,11 +10,12 @@ namespace axisd::cia402 {
 
 /// Pure. Thread: core.
 ///
-///   idle    -- begin() ------------------------------------------------> homing
+///   any     -- begin() ------------------------------------------------> homing
 ///   homing  -- take(), it has ended -----------------------------------> leaving
 ///   homing  -- stop() -------------------------------------------------> leaving
 ///   idle    -- stop(), a homing of somebody else was under way --------> leaving
 ///   leaving -- left(): position mode is reached, or a start takes over -> idle
+///   any     -- forget() -----------------------------------------------> idle
 ///
 /// Leaving: the drive is to go back to position mode, where bit 13 is the power stage alone.
 class HomingRun {
@@ -28,7 +29,7 @@ class HomingRun {
   void begin(TimePoint at, std::optional<std::int32_t> from);
   /// The drive was seen to have begun it, between two readings.
   void note_begun() { watch_.note_begun(); }
-  /// True: it goes on.
+  /// True: it goes on. Precondition: active().
   bool take(const DriveSample& sample, HomingWatch::Signs signs);
   /// `found`: the drive homes, and nobody here has begun it.
   void stop(bool found);

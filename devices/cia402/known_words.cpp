@@ -75,7 +75,7 @@ void KnownWords::confirm(std::uint16_t word, Moment at) {
 }
 
 void KnownWords::take_read(std::uint16_t word, Write newest, Moment asked) {
-  if (is_newest(newest)) confirm(word, asked);
+  if (writing_ == 0 && is_newest(newest)) confirm(word, asked);
 }
 
 KnownWords::Control KnownWords::knows() const {

@@ -16,19 +16,19 @@ namespace axisd::cia402 {
 ///
 /// The control word (Control). A state that the drive shows tells bits 0 to 3; most words do not change them.
 ///
-///   any         -- confirm(), take_read() -------------------> whole
-///   whole       -- begin_write() with the same bits 0 to 3 --> state_bits
-///   any         -- begin_write() with others ----------------> unknown
-///   whole       -- see_state(), not that of the word --------> state_bits
-///   state_bits  -- see_state(), not that of the bits --------> unknown
-///   unknown     -- see_state(), Switched On or Enabled ------> state_bits
-///   any         -- forget() ---------------------------------> unknown
+///   any    -- confirm(), take_read() ---------------------------------> whole
+///   whole  -- begin_write(), bits 0 to 3 stay; doubt_control() --------> state_bits
+///   any    -- begin_write() with other bits --------------------------> unknown
+///   any    -- see_state(), Switched On or Enabled, not that of the word -> state_bits
+///   any    -- see_state(), another one than that of word or bits -----> unknown
+///   any    -- take_bits() --------------------------------------------> state_bits, or more
+///   any    -- forget() -----------------------------------------------> unknown
 ///
 /// The halt (bit 8), by its last edge (Halt):
 ///
-///   none    -- halted() -----------------------> braking
-///   braking -- see_rest() ---------------------> rested
-///   any     -- executed(), a word without it --> none
+///   any     -- halted() ---------------------------------------> braking
+///   braking -- see_rest() -------------------------------------> rested
+///   any     -- executed(), a word without it; forget_halt() ---> none
 class KnownWords {
  public:
   enum class Control : std::uint8_t { unknown, state_bits, whole };
@@ -64,7 +64,8 @@ class KnownWords {
   void confirm(std::uint16_t word, Moment at);
   [[nodiscard]] bool is_newest(Write write) const { return write == writes_; }
   [[nodiscard]] Write newest() const { return writes_; }
-  /// What the drive answered; nothing is learned where something was written since `newest`.
+  /// What the drive answered; nothing is learned where something was written since `newest`, or is being
+  /// written.
   void take_read(std::uint16_t word, Write newest, Moment asked);
   /// It has to be read again.
   void doubt_control() { control_.reset(); }

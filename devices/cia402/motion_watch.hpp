@@ -11,7 +11,7 @@ namespace axisd::cia402 {
 
 /// Pure. Thread: core.
 ///
-///   rest  -- begin() ---------------------------------------> begun
+///   any   -- begin() ---------------------------------------> begun
 ///   begun -- a reading shows it ----------------------------> seen
 ///   begun -- not within `start_window` ---------------------> rest: it did not start
 ///   seen  -- a reading at rest -----------------------------> rest

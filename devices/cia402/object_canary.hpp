@@ -14,12 +14,12 @@ namespace axisd::cia402 {
 
 /// Pure. Thread: core.
 ///
-///   nothing -- expect_marks() ------------------------> marks
-///   marks   -- found() -------------------------------> block
-///   any     -- written() -----------------------------> block
-///   block   -- note_write(), its reply was lost ------> either
-///   either  -- found() -------------------------------> block
-///   any     -- forget() ------------------------------> nothing
+///   any   -- expect_marks() ---------------------------------> marks
+///   any   -- found(), written() -----------------------------> block
+///   block -- note_write(), its reply was lost ---------------> either
+///   block -- note_write(), it is as after a power-up now ----> nothing
+///   any   -- rewrite(), distrust() of all that it may hold --> marks, or nothing
+///   any   -- forget() ---------------------------------------> nothing
 ///
 /// Contents that a power-up may leave are no canary: they are kept out of what is written, and of what
 /// counts.
@@ -42,7 +42,7 @@ class ObjectCanary {
   [[nodiscard]] bool is_expected(const MotionBlock& block) const;
   /// Contents that the drive may hold, the oldest first; none: not known, or known by marks alone.
   [[nodiscard]] std::span<const MotionBlock> blocks() const { return blocks_.blocks(); }
-  /// It holds this one, for certain.
+  /// It holds this one, as far as anything is known.
   [[nodiscard]] bool is(const MotionBlock& block) const { return blocks_.is(block); }
 
   /// All of it was read, and is_expected(). `foreign_writes`: of other masters, until it was asked for.

@@ -149,14 +149,37 @@ TEST(M24GroupStart, WithoutSyncThereIsNone) {
   EXPECT_NE(bench.members[0].drive->no_common_start().find("sync_period"), std::string::npos);
 }
 
+/// An object 60xxh.
+void write(simulation::SimulatedCanNode& node, std::uint8_t object, std::uint8_t size, std::uint8_t value) {
+  node.on_frame(can::make_frame(0x600U + node.address(),
+                                std::vector<std::uint8_t>{static_cast<std::uint8_t>(0x23 | (4 - size) << 2),
+                                                          object, 0x60, 0, value, 0, 0, 0}));
+}
+
+/// M1: a stop of a released drive that shows its RPDO just then. Nobody knows its bits.
+TEST(M24GroupStart, AStopDuringTheProofEnergisesNothing) {
+  for (const bool acts_at_once : {true, false})
+    for (auto when = 0us; when < 3000us; when += 170us) {
+      SCOPED_TRACE(testing::Message() << acts_at_once << " " << when.count());
+      GroupBench bench({.drives = 1,
+                        .switches = {{"rpdo_type_ignored", acts_at_once}},
+                        .before_start = [](auto& node) { write(node, 0x40, 2, 0x06); }});
+      auto& member = bench.members.front();
+      ASSERT_TRUE(bench.run_until([&] { return bench.count_of(0x310) > 0; }, 20s));
+      bench.run(when);
+      bench.stop(member);
+      bench.run(400us);
+      bench.put(sync_id, {});  // of somebody else
+      bool energised = false;
+      bench.run_until([&] { return energised = energised || (member.node->peek(0x604100) & 0x04U) != 0; },
+                      2s);
+      EXPECT_FALSE(energised);
+      EXPECT_EQ(member.node->peek(0x604000) & 0x0FU, 0x06U);
+    }
+}
+
 /// M25: what is energised when it is found stays so, and shows nothing until it is released.
 TEST(M24GroupStart, AnEnergisedDriveIsAdoptedAsItIs) {
-  const auto write = [](simulation::SimulatedCanNode& node, std::uint8_t object, std::uint8_t size,
-                        std::uint8_t value) {
-    node.on_frame(can::make_frame(0x600U + node.address(),
-                                  std::vector<std::uint8_t>{static_cast<std::uint8_t>(0x23 | (4 - size) << 2),
-                                                            object, 0x60, 0, value, 0, 0, 0}));
-  };
   GroupBench bench({.before_start = [&](auto& node) {
     write(node, 0x60, 1, 1);
     for (const std::uint8_t word : {0x00, 0x06, 0x07, 0x0F}) write(node, 0x40, 2, word);

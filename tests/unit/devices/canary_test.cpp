@@ -56,7 +56,14 @@ TEST(Canary, NoBlockIsLikeOneThatAPowerUpLeaves) {
 
 TEST(Canary, ALongTimeGetsShorter) {
   Canary<Block> canary({5, 2000, 60});
-  EXPECT_EQ(canary.distinct({5, 2000, 60}, ramp), (Block{5, 1998, 60}));
+  EXPECT_EQ(canary.distinct({5, 2000, 60}, ramp), (Block{5, 1999, 60}));
+}
+
+TEST(Canary, ThereIsAlwaysAnother) {
+  Canary<Block> canary({5, 2000, 60});
+  canary.note_power_up({5, 1999, 60});
+  canary.note_power_up({5, 1998, 60});
+  EXPECT_EQ(canary.distinct({5, 1999, 60}, ramp), (Block{5, 1997, 60}));
 }
 
 TEST(Canary, OfPowerUpsTheFactorysAndTheNewestAreKept) {

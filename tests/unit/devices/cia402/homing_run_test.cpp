@@ -40,6 +40,7 @@ TEST(HomingRun, ATriggerBeginsIt) {
   auto run = under_way();
   EXPECT_EQ(run.state(), State::homing);
   EXPECT_FALSE(run.is_homed(true, false)) << "its bit may be left from an earlier one";
+  EXPECT_FALSE(run.is_homed(true, true)) << "nor does it count that it fell: this one is under way";
 }
 
 TEST(HomingRun, AtHomeTheDriveGoesBackToPositionMode) {
@@ -50,6 +51,33 @@ TEST(HomingRun, AtHomeTheDriveGoesBackToPositionMode) {
   run.left();
   EXPECT_EQ(run.state(), State::idle);
   EXPECT_TRUE(run.is_homed(false, false));
+}
+
+TEST(HomingRun, OneThatIsOverBetweenTwoReadingsIsKnownByItsWay) {
+  HomingRun run;
+  run.prepare({.window = 10});
+  run.begin(start, 800);
+  EXPECT_FALSE(run.take(sample(10ms, 0, false, true), {}));
+  EXPECT_TRUE(run.is_homed(false, false));
+}
+
+TEST(HomingRun, OneThatWasSeenToBeginNeedsNoWay) {
+  HomingRun run;
+  run.prepare({.window = 10});
+  run.begin(start, 0);
+  EXPECT_TRUE(run.take(sample(10ms, 0, false, true), {})) << "its bit may be left from before";
+  run.note_begun();
+  EXPECT_FALSE(run.take(sample(20ms, 0, false, true), {}));
+  EXPECT_TRUE(run.is_homed(false, false));
+}
+
+TEST(HomingRun, AStartTakesOverFromWhatWasToBeLeft) {
+  HomingRun run;
+  run.stop(true);
+  run.begin(start, 800);
+  EXPECT_EQ(run.state(), State::homing);
+  run.forget();
+  EXPECT_EQ(run.state(), State::idle);
 }
 
 TEST(HomingRun, OneThatFailedLeavesItNotHomed) {

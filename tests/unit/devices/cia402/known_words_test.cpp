@@ -151,6 +151,44 @@ TEST_F(Words, AHaltThatWasFoundStandsAsLongAsTheWordIsKnown) {
   EXPECT_FALSE(words_.held_halt(at(5)));
 }
 
+TEST_F(Words, UnderAHaltOfOursItIsHeldFromItsEdgeOn) {
+  words_.halted(at(10), false);
+  EXPECT_FALSE(words_.held_halt(at(9)));
+  EXPECT_TRUE(words_.held_halt(at(10)));
+  words_.see_rest(at(11));
+  words_.halted(at(20), true);
+  EXPECT_EQ(words_.halt(), Halt::braking) << "a second edge";
+}
+
+TEST_F(Words, AHaltThatWasWrittenIsHeldFromTheEndOfTheWriteOn) {
+  write(halted, 10);
+  EXPECT_FALSE(words_.held_halt(at(9)));
+  EXPECT_TRUE(words_.held_halt(at(10)));
+}
+
+TEST_F(Words, WhatIsReadDuringAWriteIsNotKnown) {
+  (void)words_.begin_write(std::nullopt);
+  words_.take_read(enabled, words_.newest(), moment(1));
+  EXPECT_EQ(words_.knows(), Control::unknown);
+  words_.end_write(at(2));
+  words_.take_read(started, words_.newest(), moment(3));
+  EXPECT_EQ(words_.control(), started);
+}
+
+TEST_F(Words, BitsThatWereTakenAreKnown) {
+  words_.take_bits(switched_on);
+  EXPECT_EQ(words_.knows(), Control::state_bits);
+  EXPECT_EQ(words_.state_bits(), switched_on);
+}
+
+TEST_F(Words, AnOlderProofTakesNothingFromANewerOne) {
+  write(enabled, 900);
+  words_.see_state(State::operation_enabled, moment(901));
+  words_.take_read(enabled, words_.newest(), moment(100));
+  words_.forget_stale(moment(1900));
+  EXPECT_EQ(words_.knows(), Control::whole);
+}
+
 TEST_F(Words, OfTheModeTheNewestCounts) {
   words_.mode_reached(OperationMode::profile_position, at(5));
   words_.see_mode(OperationMode::homing, at(5));
@@ -185,9 +223,11 @@ TEST_F(Words, ForgottenIsAllButTheHalt) {
   words_.halted(at(1), false);
   words_.mode_reached(OperationMode::profile_position, at(1));
   words_.set_halt_option(1);
+  words_.use_mode(KnownWords::ModeUse::neutral);
   words_.forget();
   EXPECT_EQ(words_.knows(), Control::unknown);
   EXPECT_FALSE(words_.mode());
+  EXPECT_EQ(words_.mode_use(), KnownWords::ModeUse::motion);
   EXPECT_FALSE(words_.halt_option());
   EXPECT_EQ(words_.halt(), Halt::braking);
   words_.forget_halt();

@@ -86,6 +86,20 @@ TEST_F(Motion, ACounterThatJumpedIsNoWay) {
   EXPECT_FALSE(take(10ms, 0, false).negative_direction);
 }
 
+TEST_F(Motion, ACounterThatJumpedIsNoMotion) {
+  DriveSample sample;
+  const auto look = [&](Duration after, std::int32_t position) {
+    sample = {};
+    sample.asked_at = start + after;
+    sample.position_pulses = position;
+    watch_.take(sample, {.by_way = true, .gauge = {.window = 10, .pulses_per_revolution = 1000}});
+    return sample.moving;
+  };
+  for (int i = 0; i < 50; ++i) (void)look(i * 20ms, 5000);
+  watch_.counter_jumped();
+  EXPECT_FALSE(look(1000ms, 0));
+}
+
 TEST_F(Motion, WhereTheWayTellsNoiseIsNoVelocity) {
   DriveSample sample;
   for (int i = 0; i < 50; ++i) {
@@ -113,6 +127,11 @@ TEST_F(Motion, AfterAStopRestHasToBeShownAnew) {
   EXPECT_FALSE(look(1020ms)) << "nothing was begun";
   watch_.stop(true);
   EXPECT_TRUE(look(1040ms));
+  for (int i = 0; i < 50; ++i) (void)look(1060ms + i * 20ms);
+  ASSERT_FALSE(look(2060ms));
+  watch_.begin(start + 2070ms);
+  watch_.stop(false);
+  EXPECT_TRUE(look(2080ms)) << "what was begun may turn slowly";
 }
 
 }  // namespace

@@ -81,6 +81,14 @@ TEST(StopsSent, AReadingIsAfterTheStopsThatHaveEnded) {
   EXPECT_EQ(stops.count(), 2U);
 }
 
+TEST(StopsSent, TheLastFrameCounts) {
+  StopsSent stops;
+  EXPECT_FALSE(stops.frame_at());
+  stops.note_frame(start);
+  stops.note_frame(start + 1ms);
+  EXPECT_EQ(stops.frame_at(), start + 1ms);
+}
+
 TEST(StopsSent, TriggersMayOverlap) {
   StopsSent stops;
   stops.begin_trigger();

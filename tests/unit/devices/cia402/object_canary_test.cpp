@@ -82,6 +82,15 @@ TEST_F(CanaryTest, AForgottenOneIsNotExpected) {
   canary_.written(first);
   canary_.forget();
   EXPECT_EQ(canary_.state(), State::nothing);
+  canary_.expect_marks({mark_of(first)});
+  canary_.forget();
+  EXPECT_EQ(canary_.state(), State::nothing);
+}
+
+TEST_F(CanaryTest, MarksTakeThePlaceOfABlock) {
+  canary_.written(first);
+  canary_.expect_marks({mark_of(second)});
+  EXPECT_FALSE(canary_.is_expected(first));
 }
 
 TEST_F(CanaryTest, MarksStayUntilTheBlockIsWrittenAnew) {

@@ -55,6 +55,22 @@ TEST(StartPdo, APowerCycleEndsAProof) {
   EXPECT_EQ(start.note(), "it is not configured yet");
 }
 
+TEST(StartPdo, WhatIsRefusedIsNotStartedBy) {
+  StartPdo start;
+  start.configure(pdo);
+  start.judge("");
+  start.refuse("the network has no SYNC");
+  EXPECT_EQ(start.state(), State::absent);
+  EXPECT_FALSE(start.id());
+}
+
+TEST(StartPdo, APowerCycleEndsWhatWasNotProvenYet) {
+  StartPdo start;
+  start.configure(pdo);
+  start.forget();
+  EXPECT_EQ(start.state(), State::absent);
+}
+
 TEST(StartPdo, WhatDiffersIsKnownUntilItIsConfiguredAnew) {
   StartPdo start;
   start.configure(pdo);
