@@ -125,6 +125,13 @@ struct HomingNumber {
   std::int8_t mirror = 0;  ///< what an inverted axis needs instead (M18); 0: there is none
 };
 
+/// How a drive brakes in a quick stop.
+enum class QuickStopRamp : std::uint8_t {
+  none,     ///< at once
+  own,      ///< by a ramp of its own: Drive::quick_stop_time()
+  of_stop,  ///< as in a stop, as far as the drive tells
+};
+
 /// Ranges that hold for every command of this model.
 struct Capabilities {
   std::span<const std::int32_t> pulses_per_revolution;  ///< permitted microstep settings
@@ -136,6 +143,7 @@ struct Capabilities {
   /// The ramp that the drive brakes with whatever it is told, in acceleration_count, or ms where ramps are
   /// times; 0: it brakes as it is told.
   std::int64_t fixed_deceleration = 0;
+  QuickStopRamp quick_stop_ramp = QuickStopRamp::none;
   int minimum_start_rpm = 2, maximum_start_rpm = 300;
   int minimum_time_ms = 0, maximum_time_ms = 2000;
   int minimum_homing_rpm = 5, maximum_homing_rpm = 3000, minimum_search_rpm = 5, maximum_search_rpm = 300;

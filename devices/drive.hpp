@@ -254,8 +254,12 @@ class Drive {
     co_return fail(Reason::not_supported, std::string(no_common_start()), "start it by itself");
   }
 
-  /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop does not) in class `stop`.
+  /// Sends one stop frame of the kind (halt and stop decelerate, quick_stop as QuickStopRamp says) in class
+  /// `stop`.
   virtual Task<Result<void>> stop(StopKind kind) = 0;
+  /// How long a quick stop brakes from so many r/min, by what the drive showed when it was asked last;
+  /// nothing: as long as a stop.
+  [[nodiscard]] virtual std::optional<Duration> quick_stop_time(int /*rpm*/) const { return Duration{}; }
   /// Repeats a stop that is owed to a node which did not answer the last one: where waiting for it costs
   /// others time, not more often than silent nodes are probed, and at once when anything of it is heard.
   virtual Task<Result<void>> repeat_stop() { return stop(StopKind::stop); }

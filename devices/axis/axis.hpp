@@ -442,6 +442,7 @@ class Axis {
   Task<Result<void>> stop_and_confirm();
   [[nodiscard]] Error not_stopped(StopMachine::Step step, const Result<void>& sent) const;
   Task<bool> rests_in_time(bool acknowledged);
+  [[nodiscard]] Duration braking_time(StopKind kind) const;
   Task<bool> standstill_by(TimePoint since, TimePoint deadline);
   Task<bool> standstill_unpolled(TimePoint deadline, bool of_stop);
   void leave_running(const Activity& activity);

@@ -149,7 +149,8 @@ Task<Result<void>> Axis::settle_found_motion() {
       const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
       if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
       if (!sent) co_return sent;
-      const auto deadline = env_.clock->now() + stop_.deceleration() + settings_.stop_margin;
+      const auto braking = std::max(stop_.deceleration(), braking_time(kind));
+      const auto deadline = env_.clock->now() + braking + settings_.stop_margin;
       rests = co_await standstill_unpolled(deadline, false);
       if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
         co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",

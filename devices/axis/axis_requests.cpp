@@ -276,7 +276,9 @@ void Axis::execute_stop(const StopRequest& request, const CommandOptions& option
                   fmt::format("{} {} by {}", to_string(command->value().kind), command->value().id,
                               options.client.empty() ? "the daemon" : options.client)));
   // The drive keeps the deceleration that was set before the motion: the answer says which (M12).
-  if (request.kind != StopKind::quick_stop) command->grant({.deceleration_time = stop_.deceleration()});
+  if (const auto braking = braking_time(request.kind);
+      request.kind != StopKind::quick_stop || braking > Duration{})
+    command->grant({.deceleration_time = braking});
   if (options.arrived != TimePoint{}) observed_.stop_requested(options.arrived, request.all);
   begin_stop(request.kind, std::move(command));
   publish();

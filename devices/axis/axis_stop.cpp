@@ -66,6 +66,14 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
   }
 }
 
+/// How long the drive brakes in such a stop, at most: by the motion in progress, or in a quick stop on a ramp
+/// of the drive's own from limits.velocity.
+Duration Axis::braking_time(StopKind kind) const {
+  if (kind != StopKind::quick_stop) return stop_.deceleration();
+  const auto rpm = std::ceil(std::abs(scale_.velocity_to_rpm(settings_.limits.velocity)));
+  return drive_->quick_stop_time(static_cast<int>(rpm)).value_or(stop_.deceleration());
+}
+
 /// What the drive may go on with after its command has ended. A command that never started leaves the ramps
 /// of the motion before it in force.
 void Axis::leave_running(const Activity& activity) {
@@ -168,7 +176,7 @@ Task<Result<void>> Axis::stop_and_confirm() {
 /// After a stop frame, which was acknowledged or not.
 Task<bool> Axis::rests_in_time(bool acknowledged) {
   const auto since = env_.clock->now();
-  const auto patience = stop_.patience(settings_.stop_margin);
+  const auto patience = stop_.patience(settings_.stop_margin, braking_time(StopKind::quick_stop));
   poll_fast(since, patience);
   // Only an axis that is online is polled: not one whose drive was restarted meanwhile.
   if (link_.online()) {

@@ -147,8 +147,9 @@ class StopMachine {
   [[nodiscard]] bool overtaken() const { return requests_ != attempt_.requests; }
   /// From a stop frame to the standstill, at most.
   [[nodiscard]] Duration deceleration() const { return deceleration_; }
-  [[nodiscard]] Duration patience(Duration margin) const {
-    return margin + (attempt_.kind == StopKind::quick_stop ? Duration{0} : deceleration_);
+  /// `quick`: how long it brakes in a quick stop.
+  [[nodiscard]] Duration patience(Duration margin, Duration quick) const {
+    return margin + (attempt_.kind == StopKind::quick_stop ? quick : deceleration_);
   }
   /// Rises with each stop that failed.
   [[nodiscard]] std::uint64_t failures() const { return failures_; }

@@ -78,6 +78,7 @@ class Cia402Drive final : public Drive {
   // drive_stop.cpp
   Task<Result<void>> stop(StopKind kind) override;
   [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stops_.frame_at(); }
+  [[nodiscard]] std::optional<Duration> quick_stop_time(int rpm) const override;
 
   // drive_motion.cpp
   Task<Result<void>> start_move(MoveProfile profile, MotionGuard guard) override;
@@ -200,6 +201,11 @@ class Cia402Drive final : public Drive {
   Task<> wake_unheard();
   Task<> send_control_pdo(std::uint16_t word);
   Task<> zero_velocity(SdoOptions options);
+  Task<> choose_halt(bool quick, SdoOptions options);
+  /// Of a quick stop, where it has one of its own.
+  Task<Result<void>> read_quick_stop_ramp(SdoOptions options);
+  /// Its own ramp is softer than that of the motion.
+  [[nodiscard]] bool brakes_softer_in_quick_stop() const;
   Task<Result<void>> send_stop(bool quick);
   Task<bool> turns(SdoOptions options);
   Task<Result<void>> choose_mode_soon(OperationMode mode, SdoOptions options);

@@ -195,6 +195,8 @@ Task<Result<Drift>> Cia402Drive::check_drift(TransactionClass transaction_class)
   if (!units) co_return fail(units.error());
   const auto braking = co_await deceleration_conflict({.transaction_class = transaction_class});
   if (!braking) co_return fail(braking.error());
+  if (const auto quick = co_await read_quick_stop_ramp({.transaction_class = transaction_class}); !quick)
+    co_return fail(quick.error());
   for (const auto* conflict : {&*units, &*braking})
     if (*conflict) drift.text += (drift.text.empty() ? "" : "; ") + (*conflict)->message;
   drift.scale_changed = drift.scale_changed || units->has_value();

@@ -207,7 +207,7 @@ Task<Result<void>> Cia402Drive::check_plan() {
   auto conflict = co_await unit_conflict(patiently());
   if (conflict && !*conflict) conflict = co_await deceleration_conflict(patiently());
   if (!conflict) co_return fail(conflict.error());
-  if (!*conflict) co_return Result<void>{};
+  if (!*conflict) co_return co_await read_quick_stop_ramp(patiently());
   co_return fail(
       error_at(Reason::misconfigured, (*conflict)->object, (*conflict)->message, (*conflict)->remedy));
 }

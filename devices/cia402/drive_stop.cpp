@@ -90,6 +90,55 @@ Task<> Cia402Drive::zero_velocity(SdoOptions options) {
   (void)co_await write_object(object::target_velocity, 0, 0, std::move(options));
 }
 
+/// 605Dh. Nothing is written to a drive that halts in one way: it would refuse that, and the halt would go
+/// out later.
+Task<> Cia402Drive::choose_halt(bool quick, SdoOptions options) {
+  if (model_->halts_in_one_way) co_return;
+  const bool at_once = quick && !brakes_softer_in_quick_stop();
+  const auto option = at_once ? model_->meaning.halt_at_once : model_->meaning.halt_on_ramp;
+  if (words_.halt_option() == option) co_return;
+  words_.set_halt_option(std::nullopt);
+  const auto written = co_await write_object(object::halt_option, option, 0, std::move(options));
+  if (written) words_.set_halt_option(option);
+  const bool refused = !written && written.error().outcome == Outcome::refused;
+  if (at_once && refused) seen_.halts_on_ramp_alone = true;
+}
+
+Task<Result<void>> Cia402Drive::read_quick_stop_ramp(SdoOptions options) {
+  if (model_->descriptor->capabilities.quick_stop_ramp != QuickStopRamp::own) co_return Result<void>{};
+  const auto held = co_await read_object(object::quick_stop_deceleration, std::move(options));
+  if (held) co_return Result<void>{};
+  if (held.error().outcome != Outcome::refused) co_return fail(held.error());
+  seen_.quick_stop_ramp.reset();
+  co_return Result<void>{};
+}
+
+bool Cia402Drive::brakes_softer_in_quick_stop() const {
+  const auto& capabilities = model_->descriptor->capabilities;
+  const auto own = seen_.quick_stop_ramp.value_or(0);
+  if (capabilities.quick_stop_ramp != QuickStopRamp::own || own <= 0) return false;
+  auto of_stop = capabilities.fixed_deceleration;
+  if (of_stop == 0 && canary_.blocks().empty()) return false;
+  if (of_stop == 0)
+    of_stop = canary_.blocks().back()[capabilities.own_deceleration ? deceleration : acceleration];
+  const bool times = model_->meaning.units.ramps == Ramps::times;
+  return times ? own > of_stop : own < of_stop;
+}
+
+std::optional<Duration> Cia402Drive::quick_stop_time(int rpm) const {
+  constexpr Duration longest = std::chrono::minutes(1);
+  const auto kind = model_->descriptor->capabilities.quick_stop_ramp;
+  if (kind == QuickStopRamp::none) return Duration{};
+  const auto& ramp = seen_.quick_stop_ramp;
+  const bool own = kind == QuickStopRamp::own && ramp.value_or(0) > 0 && !seen_.halts_on_ramp_alone;
+  if (!own || brakes_softer_in_quick_stop()) return std::nullopt;
+  const auto& units = model_->meaning.units;
+  const auto time = units.ramps == Ramps::times
+                        ? milliseconds(*ramp)
+                        : time_of_ramp(units.acceleration, setup_.pulses_per_revolution, rpm, *ramp);
+  return std::min<Duration>(time, longest);
+}
+
 Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   stops_.begin_stop();
   leave_gate_->raise();
@@ -120,11 +169,7 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   const bool known = words_.state_bits().has_value();
   if (known && !quick) co_await send_control_pdo(with_halt(*words_.state_bits()));
   if (!known || !quick) co_await zero_velocity(first);
-  const auto option = quick ? model_->meaning.halt_at_once : model_->meaning.halt_on_ramp;
-  if (words_.halt_option() != option) {
-    words_.set_halt_option(std::nullopt);
-    if (co_await write_object(object::halt_option, option, 0, first)) words_.set_halt_option(option);
-  }
+  co_await choose_halt(quick, first);
   if (quick && words_.state_bits()) co_await send_control_pdo(with_halt(*words_.state_bits()));
   const auto& word = words_.control();
   bool was_halted = word ? (*word & control::halt) != 0 : words_.halt() != KnownWords::Halt::none;

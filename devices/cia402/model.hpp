@@ -104,6 +104,7 @@ struct Model {
   /// Mode in which nothing goes on that a halt interrupted, and nothing begins (M23): profile velocity with
   /// 60FFh = 0. A drive without that mode: homing, without bit 4 of the control word, else none.
   OperationMode neutral_mode = OperationMode::profile_velocity;
+  bool halts_in_one_way = false;  ///< 605Dh is missing, or cannot be written
   /// The manual prints an EMCY identifier that is another service's: 1014h is set to 80h + node first (M24).
   bool sets_emergency_id = true;
 };

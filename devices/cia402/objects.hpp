@@ -15,8 +15,9 @@ inline constexpr Object emergency_id{0x1014, 0}, heartbeat_time{0x1017, 0};
 inline constexpr Object error_code{0x603F, 0}, control_word{0x6040, 0}, status_word{0x6041, 0},
     halt_option{0x605D, 0}, mode{0x6060, 0}, mode_display{0x6061, 0}, position{0x6064, 0},
     target_position{0x607A, 0}, home_offset{0x607C, 0}, profile_velocity{0x6081, 0}, acceleration{0x6083, 0},
-    deceleration{0x6084, 0}, homing_method{0x6098, 0}, homing_speed{0x6099, 1},
-    homing_search_speed{0x6099, 2}, homing_acceleration{0x609A, 0}, target_velocity{0x60FF, 0};
+    deceleration{0x6084, 0}, quick_stop_deceleration{0x6085, 0}, homing_method{0x6098, 0},
+    homing_speed{0x6099, 1}, homing_search_speed{0x6099, 2}, homing_acceleration{0x609A, 0},
+    target_velocity{0x60FF, 0};
 
 }  // namespace object
 

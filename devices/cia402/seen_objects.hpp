@@ -22,11 +22,16 @@ struct SeenObjects {
   std::optional<bool> closed_loop;   ///< the loop mode, before the first write
   std::optional<bool> saving;        ///< the EEPROM switch; nothing: unknown
   std::set<std::uint32_t> not_held;  ///< saved objects that did not hold what was written
+  /// 6085h, as it was read last; nothing: a quick stop brakes as a stop, as far as is known.
+  std::optional<std::int64_t> quick_stop_ramp;
+  bool halts_on_ramp_alone = false;  ///< it refused another 605Dh
 
   void forget_power_cycle() {
     closed_loop.reset();
     saving.reset();
     not_held.clear();
+    quick_stop_ramp.reset();
+    halts_on_ramp_alone = false;
   }
   /// An answer took so long.
   void note_answer(Duration took) { answer_time = std::max(took, answer_time * 7 / 8); }

@@ -101,6 +101,15 @@ std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Dur
   return std::max(1, whole(counts));
 }
 
+Duration time_of_ramp(Rate unit, std::int64_t pulses_per_revolution, int rpm, std::int64_t counts) {
+  constexpr Duration longest = std::chrono::hours(24);
+  constexpr std::int64_t second = std::chrono::nanoseconds(std::chrono::seconds(1)).count();
+  const auto ratio = rpm_per_count(unit, pulses_per_revolution);
+  const Wide speed = std::abs(std::int64_t{rpm}) * ratio.denominator * second;
+  const Wide per_second = ratio.numerator * std::max<std::int64_t>(counts, 1);
+  return Duration(saturated((speed + per_second - 1) / per_second, longest.count()));
+}
+
 double rpm_of_count(Rate unit) {
   const auto ratio = rpm_per_count(unit, 1);
   return static_cast<double>(ratio.numerator) / static_cast<double>(ratio.denominator);

@@ -67,6 +67,8 @@ enum class RampUse : std::uint8_t {
 /// Counts of an acceleration between rest and `rpm` in `time` (at least 1 ms); at least 1, without which
 /// nothing would move.
 std::int32_t ramp_of(Rate unit, std::int64_t pulses_per_revolution, int rpm, Duration time, RampUse use);
+/// How long such a ramp of so many counts (more than 0) takes between rest and `rpm`; a day at most.
+Duration time_of_ramp(Rate unit, std::int64_t pulses_per_revolution, int rpm, std::int64_t counts);
 /// r/min of one count, of pulses where a revolution has one.
 double rpm_of_count(Rate unit);
 

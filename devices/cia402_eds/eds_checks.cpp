@@ -244,7 +244,7 @@ std::vector<std::string> warnings_of(const Eds& eds, const Overrides& overrides,
   if (!can_write(eds, cia402::object::halt_option))
     lines.push_back(
         fmt::format("{}: object 605Dh cannot be written: the drive halts in one way, and QuickStop brakes "
-                    "as Stop does. Give stop_margin the time of its ramp, or QuickStop ends in ErrorStop",
+                    "as Stop does",
                     path));
   return lines;
 }

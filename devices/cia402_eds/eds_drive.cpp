@@ -129,6 +129,13 @@ std::int64_t fixed_deceleration_of(const Eds& eds) {
   return std::max<std::int64_t>(0, entry->known()->value);
 }
 
+/// 6085h counts where 605Dh can choose it.
+QuickStopRamp quick_stop_ramp_of(const Eds& eds, std::span<const ParameterSpec> rows) {
+  const auto* ramp = find_parameter(rows, cia402::object::quick_stop_deceleration.key());
+  const bool shown = ramp != nullptr && ramp->access != Access::wo;
+  return shown && can_write(eds, cia402::object::halt_option) ? QuickStopRamp::own : QuickStopRamp::of_stop;
+}
+
 /// In the units that axisd plans in: r/min, pulses per second, ms.
 Capabilities capabilities_of(const Capabilities& base, std::span<const ParameterSpec> rows,
                              const Conventions& conventions) {
@@ -186,6 +193,7 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   capabilities.homing_ramp = eds.find(cia402::object::homing_acceleration) != nullptr;
   capabilities.own_deceleration = can_write(eds, cia402::object::deceleration);
   capabilities.fixed_deceleration = fixed_deceleration_of(eds);
+  capabilities.quick_stop_ramp = quick_stop_ramp_of(eds, parameters);
   const bool has_inputs = eds.find(object::inputs_value) != nullptr;
   if (!has_inputs) inputs = {};
   specialise = nullptr;
@@ -209,7 +217,9 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
     model_.objects.restore = cia402::MemoryCommand{object::restore_all, load};
   model_.meaning.units = conventions.units;
   model_.unit_objects = unit_objects_;
-  const std::size_t braking = capabilities.fixed_deceleration > 0 ? 1 : 0;
+  model_.halts_in_one_way = !can_write(eds, cia402::object::halt_option);
+  const std::size_t braking = (capabilities.fixed_deceleration > 0 ? 1 : 0) +
+                              (capabilities.quick_stop_ramp == QuickStopRamp::own ? 1 : 0);
   can_transactions =
       cia402::transactions_of(model_, static_cast<std::uint8_t>(unit_objects_.size() + braking));
 }

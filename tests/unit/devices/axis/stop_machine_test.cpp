@@ -162,11 +162,12 @@ TEST_F(StopMachineTest, StandstillThatNoStopWasAcknowledgedBeforeIsStoppedAgain)
 TEST_F(StopMachineTest, WhatMovesOnIsStoppedQuickly) {
   begin(StopKind::halt);
   send();
-  EXPECT_EQ(stop_.patience(100ms), 2100ms);
+  EXPECT_EQ(stop_.patience(100ms, 50ms), 2100ms);
   EXPECT_EQ(looked(false, true), Step::quicken);
   EXPECT_EQ(stop_.state(), State::sending);
   EXPECT_EQ(send(), StopKind::quick_stop);
-  EXPECT_EQ(stop_.patience(100ms), 100ms) << "it has no ramp";
+  EXPECT_EQ(stop_.patience(100ms, 0ms), 100ms) << "it has no ramp";
+  EXPECT_EQ(stop_.patience(100ms, 50ms), 150ms) << "it has one of its own";
 }
 
 TEST_F(StopMachineTest, WhatMovesAfterAQuickStopIsReleasedOnceWhereThatIsPermitted) {
@@ -324,7 +325,7 @@ TEST_F(StopMachineTest, TheDecelerationIsThatOfTheLastMotion) {
   stop_.set_deceleration(300ms);
   begin(StopKind::stop);
   stop_.next_attempt();
-  EXPECT_EQ(stop_.patience(200ms), 500ms);
+  EXPECT_EQ(stop_.patience(200ms, 0ms), 500ms);
 }
 
 }  // namespace

@@ -41,6 +41,15 @@ TEST(Units, EachNameIsOneUnit) {
   EXPECT_EQ(text_of(pulses_per_second), "pulses/s");
 }
 
+TEST(Units, ARampTakesTheLongerTheFewerItsCounts) {
+  EXPECT_EQ(time_of_ramp(named("rpm"), 4000, 600, 300), 2s);
+  EXPECT_EQ(time_of_ramp(named("rpm"), 4000, -600, 300), 2s);
+  EXPECT_EQ(time_of_ramp(pulses_per_second, 1000, 600, 5000), 2s);
+  EXPECT_EQ(time_of_ramp(named("0.1rev_per_second"), 1, 600, 50), 2s);
+  EXPECT_EQ(time_of_ramp(pulses_per_second, 1000, 600, std::int64_t{0xFFFFFFFF}), 2329ns);
+  EXPECT_EQ(time_of_ramp(pulses_per_second, most, most, 1), std::chrono::hours(24));
+}
+
 /// 120 r/min of a motor with 4000 pulses.
 TEST(Units, EachUnitCountsTheSameMotion) {
   const std::pair<std::string_view, std::int32_t> cases[] = {{"pulses_per_second", 8000},

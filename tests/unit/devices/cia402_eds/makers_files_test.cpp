@@ -83,8 +83,8 @@ constexpr std::string_view halt_in_one_way[] = {
     "maxon-epos4.eds",          "pilz-prbt-0-1.dcf",           "schunk-prl120.eds",
     "technosoft-isd860.eds",    "trinamic-tmcc-160.eds",       "trinamic-tmcm-1270.eds"};
 
-std::size_t warnings_about(const Row& row) {
-  return row.warnings + (std::ranges::find(halt_in_one_way, row.file) != std::end(halt_in_one_way) ? 1 : 0);
+bool halts_in_one_way(const Row& row) {
+  return std::ranges::find(halt_in_one_way, row.file) != std::end(halt_in_one_way);
 }
 
 Result<std::shared_ptr<const DriveDescriptor>> made(const std::filesystem::path& path,
@@ -119,7 +119,9 @@ TEST_P(MakersFile, IsTakenOrRefusedAsTheTableSays) {
   if (row.refused_for.empty()) {
     const auto with_key = made(path, row.unit.empty() ? "0.1rpm" : row.unit);
     ASSERT_TRUE(with_key) << to_string(with_key.error());
-    EXPECT_THAT((*with_key)->warnings, SizeIs(warnings_about(row)));
+    EXPECT_THAT((*with_key)->warnings, SizeIs(row.warnings + (halts_in_one_way(row) ? 1 : 0)));
+    EXPECT_EQ((*with_key)->capabilities.quick_stop_ramp,
+              halts_in_one_way(row) ? QuickStopRamp::of_stop : QuickStopRamp::own);
     ASSERT_EQ(drive.has_value(), !row.unit.empty()) << "no unit may be guessed";
     if (drive) {
       EXPECT_EQ(cia402::name_of(units_of(**drive).velocity), row.unit);

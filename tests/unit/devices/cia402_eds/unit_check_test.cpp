@@ -288,6 +288,40 @@ TEST(UnitCheck, ADecelerationThatIsChangedLaterIsFound) {
   EXPECT_FALSE(drift->scale_changed) << "its positions mean what they did";
 }
 
+/// M13: what the drive holds tells how long a quick stop is waited for. 1000 counts are a revolution.
+TEST(UnitCheck, TheRampOfAQuickStopIsReadFromTheDrive) {
+  using namespace std::chrono_literals;
+  constexpr std::uint32_t quick_stop_ramp = 0x608500;
+  UnitBench bench(with_objects({}, "pulses_per_second"), {{quick_stop_ramp, 5000}});
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "not known yet: as a stop";
+  ASSERT_TRUE(bench.bring_up());
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(2s));
+  const auto look = [&](std::optional<std::uint32_t> held) {
+    bench.answers()[quick_stop_ramp] = held;
+    const auto drift = bench.run(bench.drive().check_drift(TransactionClass::parameters));
+    ASSERT_TRUE(drift) << to_string(drift.error());
+    EXPECT_EQ(drift->text, "");
+  };
+  look(10'000);
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(1s));
+  look(1);
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(1min)) << "nobody waits for hours";
+  look(0);
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "that is no ramp";
+  look(5000);
+  look(std::nullopt);
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "its file lists it, and it has none";
+}
+
+/// Without a 605Dh that can be written 6085h means nothing, and is not asked for.
+TEST(UnitCheck, ADriveThatHaltsInOneWayHasNoRampOfAQuickStop) {
+  auto settings = with_objects({}, "pulses_per_second");
+  settings["objects.605Dh:00.access"] = std::string("ro");
+  UnitBench bench(settings, {{0x608500, 20'000}});
+  ASSERT_TRUE(bench.bring_up());
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt);
+}
+
 TEST(UnitCheck, WhoWritesParametersLeavesUnitsAlone) {
   UnitBench bench(
       with_objects({{"607Eh:00", 0}, {"60A8h:00", 0}, {"60A9h:00", in_pulses}, {"60AAh:00", 0}}, ""),
