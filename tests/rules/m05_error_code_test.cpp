@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/rules/m23_can_rig.hpp"
 #include "tests/rules/model_rig.hpp"
 
 namespace axisd::test {
@@ -77,6 +78,73 @@ TEST(M05, ADriveWithoutAnErrorCodeShowsThatOfItsEmergency) {
   EXPECT_EQ(rig.state()->state, AxisState::error_stop);
   ASSERT_TRUE(rig.state()->fault);
   EXPECT_THAT(rig.state()->fault->message, HasSubstr("alarm without a code"));
+}
+
+/// Without 603Fh, and with its state asked for object by object.
+CanRigOptions asked_for_each_object() {
+  CanRigOptions options{.model = "cia402", .polled = true};
+  options.adjust = [](AxisSettings& axis) {
+    axis.model_settings["objects.603Fh:00.access"] = std::string("none");
+    const auto* model = find_drive_model("cia402");
+    auto made = model->specialise(*model, axis.model_settings);
+    if (!made) throw std::invalid_argument(to_string(made.error()));
+    axis.own_descriptor = *made;
+  };
+  return options;
+}
+
+bool is_reset(const can::Frame& frame) {
+  return frame.id == 0x80U + CanRig::node_id && frame.data[0] == 0 && frame.data[1] == 0;
+}
+
+/// A fault that is over by the time it is told has lost its code with the EMCY, and is no other one: at
+/// whatever point of a reading the reset falls, and also where its EMCY is lost.
+TEST(M05, AResetIsDoneWhateverOfTheStateIsBeingRead) {
+  for (const bool told : {true, false}) {
+    CanRig rig(asked_for_each_object());
+    rig.network.set_fault(
+        [told](const can::Frame& frame) { return can::Network::Fault{.drop = !told && is_reset(frame)}; });
+    for (int step = 0; step < 60; ++step) {
+      SCOPED_TRACE(testing::Message() << (told ? "with its EMCY, " : "without, ") << step);
+      rig.touch([](auto& node) { node.raise_alarm(following_error); });
+      rig.run(300ms);
+      ASSERT_EQ(rig.state()->state, AxisState::error_stop);
+      ASSERT_EQ(rig.state()->alarm_code, following_error);
+      rig.run(step * 700us);
+      const auto reset = rig.complete(ResetRequest{});
+      ASSERT_EQ(reset.state, CommandState::done) << describe(reset);
+      rig.run(20ms);
+      ASSERT_FALSE(rig.state()->fault) << to_string(*rig.state()->fault);
+    }
+  }
+}
+
+/// The same where somebody else resets it, between the status word and the rest of a reading.
+TEST(M05, AFaultThatWasResetWhileItWasReadIsNoOther) {
+  CanRig rig(asked_for_each_object());
+  rig.touch([](auto& node) { node.raise_alarm(following_error); });
+  rig.run(1s);
+  ASSERT_EQ(rig.state()->alarm_code, following_error);
+  std::vector<int> shown;
+  bool struck = false;
+  rig.network.set_fault([&](const can::Frame& frame) {
+    const bool fault_read = frame.id == 0x580U + CanRig::node_id && frame.data[1] == 0x41 &&
+                            frame.data[2] == 0x60 && (frame.data[4] & 0x4FU) == 0x08;
+    if (fault_read && !struck) {
+      struck = true;
+      for (const std::uint8_t word : {0x00, 0x80})
+        rig.drive->on_frame({.id = 0x600U + CanRig::node_id, .size = 8, .data = {0x2B, 0x40, 0x60, 0, word}});
+    }
+    shown.push_back(rig.state()->alarm_code);
+    return can::Network::Fault{};
+  });
+  rig.run(2s);
+  EXPECT_TRUE(struck);
+  EXPECT_THAT(shown, testing::Each(testing::AnyOf(following_error, 0)));
+  EXPECT_EQ(rig.state()->alarm_code, 0);
+  ASSERT_TRUE(rig.state()->fault) << "it latches until it is reset here";
+  EXPECT_THAT(rig.state()->fault->message, HasSubstr("8611h"));
+  EXPECT_EQ(rig.complete(ResetRequest{}).state, CommandState::done);
 }
 
 }  // namespace
