@@ -32,6 +32,10 @@ void to_proto(Duration from, google::protobuf::Duration& to) {
   to.set_nanos(static_cast<std::int32_t>(from.count() % 1'000'000'000));
 }
 
+double seconds_of(const google::protobuf::Duration& from) {
+  return static_cast<double>(from.seconds()) + (from.nanos() / 1e9);
+}
+
 Duration from_proto(const google::protobuf::Timestamp& from) {
   return std::chrono::seconds(from.seconds()) + std::chrono::nanoseconds(from.nanos());
 }

@@ -42,6 +42,7 @@ struct Motion {
 };
 
 void to_proto(Duration from, google::protobuf::Duration& to);
+double seconds_of(const google::protobuf::Duration& from);
 Duration from_proto(const google::protobuf::Timestamp& from);
 
 /// Of one axis. Every call has a deadline in real time that no call comes near.

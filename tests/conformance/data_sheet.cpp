@@ -129,15 +129,6 @@ Skipped skipped_by(const Sheet& sheet) {
          {"velocity_moves", "velocity_to_the_software_limit", "jogging", "jogging_untrusted",
           "run_into_limits", "limits_at_standstill"},
          "no 60FFh, or no bit 2 of 6502h: the drive has no profile velocity mode");
-  const auto braking = sheet.value(0x6084);
-  if (sheet.has(0x6084) && !sheet.can_write(0x6084) && braking > 0 &&
-      braking < turns_per_second * sheet.counts()) {
-    const auto why = fmt::format(
-        "6084h is read-only: the drive brakes for {:.1f} s, and the scenario does not wait so long",
-        static_cast<double>(turns_per_second * sheet.counts()) / static_cast<double>(braking));
-    skip(skipped, {"jogging", "stop"}, why);
-    if (!sheet.can_write(0x605D)) skip(skipped, {"quick_stop"}, why + "; nor can 605Dh be written");
-  }
   return skipped;
 }
 

@@ -112,11 +112,12 @@ std::string jogging(const Setup& setup) {
     bench.pass(200ms);
   }
   expect_state(bench.state(), v1::STATE_CONTINUOUS_MOTION);
-  bench.pass(1s);
+  const auto braking = seconds_of(jog->granted().deceleration_time());
+  bench.pass(1s + std::chrono::milliseconds(std::lround(1000 * braking)));
   expect_command(bench.client.look_up(jog.response), v1::COMMAND_STATE_ABORTED);
   expect_state(bench.state(), v1::STATE_STANDSTILL);
   EXPECT_NEAR(bench.state().position(), bench.shaft().mm, close);
-  EXPECT_NEAR(bench.shaft().mm, 30 * 1.5, 6);
+  EXPECT_NEAR(bench.shaft().mm, 30 * (1.5 + (braking / 2)), 6);
   bench.finish(1);
   return "yes";
 }
