@@ -421,6 +421,7 @@ void AxisChecks::check_homing_number() {
     add("homing.backoff", "'backoff' has no effect with a homing method by its number",
         "leave it out: the drive leaves an active switch by itself");
   if (model_ == nullptr || !model_->capabilities.homing || !usable("homing.method")) return;
+  if (model_->specialise != nullptr) return;  // its data sheet could not be read: which it has is not known
   const auto numbers = model_->capabilities.homing_numbers;
   const int wanted = *axis_.homing->number;
   const auto found = std::ranges::find(numbers, wanted, &HomingNumber::number);
