@@ -50,6 +50,8 @@ simulation::Fault draw(const std::array<Likely, N>& faults, Dice& dice) {
 }
 
 constexpr std::uint32_t nmt_command = 0x000, sync_id = 0x080, sdo_request = 0x600, heartbeat = 0x700;
+/// Of a client: no node answers it, so that what strikes an answer would strike that of the next request.
+constexpr std::uint8_t sdo_abort = 0x80;
 /// TPDO4: a flood there takes the bus, and claims no status word and no position that the node does not have.
 constexpr std::uint16_t flooded = 0x480;
 /// A SYNC goes out a hundred times a second, and no transaction waits for it.
@@ -124,8 +126,8 @@ bool Plant::strike(Station& station, const can::Frame& frame, const Telegram& te
   auto& nodes = nodes_->nodes();
   if (dice_.chance(0.0002)) strike_network(frame);
   if (frame.id != sync_id && !dice_.chance(share_)) return false;
-  auto fault =
-      frame.id - sdo_request == station.node ? draw(on_can_requests, dice_) : draw(on_can_commands, dice_);
+  const bool answered = frame.id - sdo_request == station.node && frame.data[0] != sdo_abort;
+  auto fault = answered ? draw(on_can_requests, dice_) : draw(on_can_commands, dice_);
   fault.node = station.node;
   // What sends by itself has identifiers of its own.
   if (fault.kind == FaultKind::flood)
