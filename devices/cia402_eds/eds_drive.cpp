@@ -247,7 +247,11 @@ Result<std::shared_ptr<const DriveDescriptor>> specialise(
   if (!findings.empty()) return refused(findings, remedy_of(findings));
   const auto conventions = conventions_of(*eds, settings);
   if (!conventions) return refused({{0, conventions.error().message}}, conventions.error().remedy);
-  return std::make_shared<const EdsDrive>(base, *eds, *conventions, warnings_of(*eds, overrides, path));
+  auto warnings = warnings_of(*eds, overrides, path);
+  if (const auto doubt = doubtful_units(*eds, conventions->units))
+    warnings.push_back(fmt::format("{}: {}; a drive that was not set otherwise is refused at bring-up: {}",
+                                   path, doubt->message, doubt->remedy));
+  return std::make_shared<const EdsDrive>(base, *eds, *conventions, std::move(warnings));
 }
 
 }  // namespace axisd::cia402_eds

@@ -79,6 +79,10 @@ Result<cia402::Units> plan_units(const Eds& eds, const std::map<std::string, Set
   return units;
 }
 
+std::optional<cia402::PlanConflict> doubtful_units(const Eds& eds, const cia402::Units& planned) {
+  return cia402::find_conflict(planned, std::nullopt, values_of(eds).all);
+}
+
 std::vector<Object> unit_objects_of(const Eds& eds) {
   std::vector<Object> objects;
   for (const auto object : cia402::unit_objects())

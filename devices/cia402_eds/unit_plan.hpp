@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,10 @@ namespace axisd::cia402_eds {
 /// what the drive cannot change.
 Result<cia402::Units> plan_units(const canopen::Eds& eds,
                                  const std::map<std::string, SettingValue>& settings);
+
+/// Where a key says otherwise than the file's values of what the drive can change: the drive may have been
+/// set so, or is refused at bring-up.
+std::optional<cia402::PlanConflict> doubtful_units(const canopen::Eds& eds, const cia402::Units& planned);
 
 /// The unit objects that the drive has and that can be read.
 std::vector<canopen::Object> unit_objects_of(const canopen::Eds& eds);

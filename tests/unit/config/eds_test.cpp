@@ -178,6 +178,24 @@ TEST(Eds, AKeyThatContradictsTheDriveIsRefused) {
   EXPECT_EQ(said("pulses_per_second", "rw"), "") << "the drive itself is asked";
 }
 
+TEST(Eds, AKeyThatContradictsWhatADriveMayBeSetToIsAWarning) {
+  const auto told = [](const std::string& unit) {
+    const auto result =
+        load({.velocity = "10 mm/s",
+              .more = fmt::format("      objects: {{ 60A9h: {{ type: u32, access: rw, default: {} }} }}\n",
+                                  velocities_in_rpm),
+              .velocity_unit = unit});
+    EXPECT_TRUE(result.configuration) << findings(result);
+    return result.configuration ? file_warnings(*result.configuration) : std::vector<std::string>{"refused"};
+  };
+  EXPECT_THAT(told("rpm"), ::testing::IsEmpty());
+  EXPECT_THAT(told("pulses_per_second"),
+              ElementsAre(AllOf(HasSubstr("its velocities count r/min (60A9h is 00B44700h), and "
+                                          "drive.velocity_unit says pulses/s; a drive that was not set "
+                                          "otherwise is refused at bring-up"),
+                                HasSubstr("write drive: { velocity_unit: rpm }"))));
+}
+
 TEST(Eds, RampsAndPolarityAreLookedAt) {
   const auto said = [](const std::string& object, const std::string& more = {}) {
     return findings(load({.more = "      objects: { " + object + " }\n" + more}));
