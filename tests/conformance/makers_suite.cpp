@@ -69,8 +69,8 @@ TEST_P(MakersDrive, Behaves) {
       }
       for (const bool invert : {false, true}) {
         if (invert && sampled) continue;
-        for (const auto& failure : run_scenario(scenario, manual, {.invert = invert}).failures)
-          ADD_FAILURE() << failure;
+        const Variant variant{.invert = invert, .noise = suite_noise()};
+        for (const auto& failure : run_scenario(scenario, manual, variant).failures) ADD_FAILURE() << failure;
       }
     }
 }
