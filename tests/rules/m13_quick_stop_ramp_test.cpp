@@ -46,12 +46,36 @@ TEST(M13, ARampOfAQuickStopIsReadAtBringUp) {
   rig.drive->poke(quick_stop_ramp, 10'000);  // 10 r/s in 1 s
   rig.stop_daemon();
   rig.start_daemon();
-  run_fast(rig, {.acceleration_time = 100ms});
+  run_fast(rig, {.acceleration_time = 100ms, .deceleration_time = 2s});
   const auto before = rig.load_mm();
   const auto stop = rig.complete(StopRequest{.kind = StopKind::quick_stop});
   expect_rest(rig, stop);
   EXPECT_EQ(stop.granted.deceleration_time, std::optional<Duration>(1s));
   EXPECT_NEAR(rig.load_mm() - before, 50, 3);
+}
+
+/// A quick stop is never softer than a stop, and neither is what a stop escalates to.
+TEST(M13, ASofterRampThanThatOfTheMotionIsNotChosen) {
+  ModelRig rig({.model = "cia402", .limits = false});
+  rig.drive->poke(quick_stop_ramp, 1);  // as templates have it: it would brake for hours
+  rig.stop_daemon();
+  rig.start_daemon();
+  run_fast(rig, {.acceleration_time = 500ms, .deceleration_time = 1s});
+  const auto before = rig.load_mm();
+  const auto stop = rig.complete(StopRequest{.kind = StopKind::quick_stop});
+  expect_rest(rig, stop);
+  EXPECT_EQ(stop.granted.deceleration_time, std::optional<Duration>(1s));
+  EXPECT_NEAR(rig.load_mm() - before, 50, 3);
+}
+
+/// 605Dh chooses how it halts, whatever is known of 6085h.
+TEST(M13, WithoutAKnownRampAQuickStopIsChosenAllTheSame) {
+  ModelRig rig({.model = "cia402", .limits = false, .drive_keys = "objects: { 6085h: { access: none } }"});
+  run_fast(rig, {.acceleration_time = 500ms, .deceleration_time = 2s});
+  expect_rest(rig, rig.complete(StopRequest{.kind = StopKind::quick_stop}));
+  EXPECT_EQ(rig.drive->peek(halt_option) & 0xFFU, 2U);
+  expect_rest(rig, rig.complete(StopRequest{.kind = StopKind::stop}));
+  EXPECT_EQ(rig.drive->peek(halt_option) & 0xFFU, 1U);
 }
 
 /// Nothing of that keeps a drive that does not stop from being found out.

@@ -304,8 +304,12 @@ TEST(UnitCheck, TheRampOfAQuickStopIsReadFromTheDrive) {
   };
   look(10'000);
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(1s));
+  const auto written =
+      bench.run(bench.drive().write_parameters({{.address = quick_stop_ramp, .value = 20'000}}));
+  ASSERT_TRUE(written) << to_string(written.error());
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(500ms)) << "it counts at once";
   look(1);
-  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(1min)) << "nobody waits for hours";
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "softer than a stop: it is not chosen";
   look(0);
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "that is no ramp";
   look(5000);
