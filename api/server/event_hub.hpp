@@ -20,11 +20,14 @@ class EventHub : public std::enable_shared_from_this<EventHub> {
                                                           Admission::Ticket ticket, EventQuery query);
 
   /// There is a new event: only hands over, and once for as many as come before the reply thread looks.
-  /// Thread: any; meant for the core.
+  /// Wakes nobody while there is no stream. Thread: any; meant for the core.
   void happened();
 
  private:
+  void forget_those_that_are_over();
+
   const std::shared_ptr<ReplyThread> reply_;
+  std::atomic<bool> watched_{false};  ///< of streams_: there is one
   std::atomic<bool> handed_over_{false};
   std::vector<std::weak_ptr<EventStream>> streams_;
 };
