@@ -7,7 +7,7 @@
 namespace axisd {
 
 BoundedWorker::BoundedWorker(std::size_t most)
-    : most_(most), thread_(store::start_thread([this] { run(); })) {}
+    : most_(most), thread_(store::start_thread("axisd-files", [this] { run(); })) {}
 
 BoundedWorker::~BoundedWorker() { close(); }
 

@@ -33,7 +33,7 @@ CertificateKeeper::CertificateKeeper(std::shared_ptr<tls::Live> live, Tell tell)
 CertificateKeeper::~CertificateKeeper() { close(); }
 
 void CertificateKeeper::start() {
-  if (live_) thread_ = store::start_thread([this] { run(); });
+  if (live_) thread_ = store::start_thread("axisd-certs", [this] { run(); });
 }
 
 void CertificateKeeper::close() {

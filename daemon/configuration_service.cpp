@@ -81,7 +81,7 @@ ConfigurationService::ConfigurationService(Parts parts)
     : parts_(std::move(parts)),
       served_(served_from(parts_.path, parts_.yaml, parts_.since)),
       looks_(most_looks) {
-  thread_ = store::start_thread([this] { run(); });
+  thread_ = store::start_thread("axisd-config", [this] { run(); });
 }
 
 ConfigurationService::~ConfigurationService() { close(); }

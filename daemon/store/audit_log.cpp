@@ -59,7 +59,7 @@ std::vector<RecoveredCommand> recovered(const JournalContent& content) {
 
 AuditLog::AuditLog(AuditOptions options)
     : options_(std::move(options)), files_(options_.directory, options_.bounds) {
-  thread_ = start_thread([this] { run(); });
+  thread_ = start_thread("axisd-audit", [this] { run(); });
 }
 
 AuditLog::~AuditLog() {

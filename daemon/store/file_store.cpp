@@ -42,7 +42,7 @@ Result<void> FileStore::serve(StateWitness& witness) {
   // The second time: then the generation before knows this start, too, and falling back on it cannot repeat a
   // start count.
   if (auto written = write(durable_.state, durable_.state); !written) return written;
-  thread_ = start_thread([this] { run(); });
+  thread_ = start_thread("axisd-state", [this] { run(); });
   return {};
 }
 

@@ -35,7 +35,7 @@ WallTime written_at(const fs::directory_entry& entry) {
 
 FlightFiles::FlightFiles(fs::path directory, std::size_t keep, Executor core)
     : directory_(std::move(directory)), keep_(keep), core_(std::move(core)) {
-  thread_ = start_thread([this] { run(); });
+  thread_ = start_thread("axisd-flight", [this] { run(); });
 }
 
 FlightFiles::~FlightFiles() {

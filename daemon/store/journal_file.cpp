@@ -41,7 +41,7 @@ Result<std::unique_ptr<JournalFile>> JournalFile::begin(std::unique_ptr<JournalD
   journal->look_at_clock();
   if (journal->options_.state) journal->model_.apply(*journal->options_.state);
   if (auto written = journal->settle(); !written) return fail(written.error());
-  journal->thread_ = start_thread([self = journal.get()] { self->run(); });
+  journal->thread_ = start_thread("axisd-journal", [self = journal.get()] { self->run(); });
   return journal;
 }
 
