@@ -96,15 +96,17 @@ void FileStore::enqueue(Change change, Callback done) {
   const auto now = monotonic_now();
   const bool may_wait = !done && only_moved(*current_, change);
   store::apply(*current_, change);
+  bool sooner = false;
   {
     // Held by the writer only for a swap: the core does not wait for the disk.
     const std::scoped_lock lock(mutex_);
     if (pending_.empty()) save_latest_ = now + delays_.latest;
     save_at_ = may_wait ? std::min(now + delays_.settled, save_latest_) : now;
     if (!may_wait) save_latest_ = now;
+    sooner = save_at_ < waits_until_;
     pending_.push_back({.change = std::move(change), .done = std::move(done)});
   }
-  wake_.notify_one();
+  if (sooner) wake_.notify_one();
 }
 
 void FileStore::wait_for_work(std::unique_lock<std::mutex>& lock) {
@@ -112,7 +114,9 @@ void FileStore::wait_for_work(std::unique_lock<std::mutex>& lock) {
     const auto until = pending_.empty() ? look_at_ : save_at_;
     const auto left = until - monotonic_now();
     if (closing_ || left <= Duration{}) return;
+    waits_until_ = until;
     wake_.wait_for(lock, left);
+    waits_until_ = {};
   }
 }
 

@@ -92,7 +92,8 @@ class FileStore final : public Persistence {
   std::vector<Pending> pending_;  // guarded by mutex_
   TimePoint save_at_{};           // guarded by mutex_: when what is pending is written
   TimePoint save_latest_{};       // guarded by mutex_: not later than this, whatever else comes
-  bool closing_ = false;          // guarded by mutex_
+  TimePoint waits_until_{};  // guarded by mutex_: when the thread wakes by itself; TimePoint{}: it is awake
+  bool closing_ = false;     // guarded by mutex_
   std::thread thread_;
 };
 
