@@ -103,7 +103,9 @@ void FileStore::enqueue(Change change, Callback done) {
     if (pending_.empty()) save_latest_ = now + delays_.latest;
     save_at_ = may_wait ? std::min(now + delays_.settled, save_latest_) : now;
     if (!may_wait) save_latest_ = now;
-    sooner = save_at_ < waits_until_;
+    // What has passed already is waited for still where the computer was suspended: the wait does not count
+    // that.
+    sooner = waits_until_ != TimePoint{} && (save_at_ < waits_until_ || waits_until_ <= now);
     pending_.push_back({.change = std::move(change), .done = std::move(done)});
   }
   if (sooner) wake_.notify_one();
