@@ -81,6 +81,11 @@ int priority_of(spdlog::level::level_enum level) {
   }
 }
 
+/// Where the fields begin; npos: the line has none.
+std::size_t end_of_text(int source_line, std::string_view payload) {
+  return source_line > 0 ? payload.rfind(fields_begin) : std::string_view::npos;
+}
+
 }  // namespace
 
 std::span<const LogKindEntry> log_kinds() { return kinds; }
@@ -112,7 +117,7 @@ void log_about(spdlog::level::level_enum level, LogKind kind, const LogSubject& 
 std::vector<std::string> journal_fields(spdlog::level::level_enum level, int source_line,
                                         std::string_view payload) {
   std::vector<std::string> fields{fmt::format("PRIORITY={}", priority_of(level)), "SYSLOG_IDENTIFIER=axisd"};
-  const auto end = source_line > 0 ? payload.rfind(fields_begin) : std::string_view::npos;
+  const auto end = end_of_text(source_line, payload);
   fields.push_back(fmt::format("MESSAGE={}", payload.substr(0, end)));
   if (end == std::string_view::npos) return fields;
   const auto* entry = std::ranges::find(kinds, source_line,
@@ -127,6 +132,10 @@ std::vector<std::string> journal_fields(spdlog::level::level_enum level, int sou
     left = size == std::string_view::npos ? std::string_view() : left.substr(size + 1);
   }
   return fields;
+}
+
+std::string journal_text(spdlog::level::level_enum level, int source_line, std::string_view payload) {
+  return fmt::format("<{}>{}", priority_of(level), payload.substr(0, end_of_text(source_line, payload)));
 }
 
 }  // namespace axisd

@@ -80,6 +80,9 @@ void set_log_fields(bool taken);
 /// which lines of log_about() are told from others, whatever is in their text.
 [[nodiscard]] std::vector<std::string> journal_fields(spdlog::level::level_enum level, int source_line,
                                                       std::string_view payload);
+/// The same line as text for stderr of a service: its priority as sd-daemon(3) has it, and what it says.
+[[nodiscard]] std::string journal_text(spdlog::level::level_enum level, int source_line,
+                                       std::string_view payload);
 
 /// A line's source location, and its text with the fields behind it, as log_about() hands them to the log.
 [[nodiscard]] int log_source_line(LogKind kind);

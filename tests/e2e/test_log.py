@@ -1,8 +1,15 @@
 """The daemon's log: its level while it runs, and what clients can make of it."""
+import os
+import pathlib
 import re
+import socket
 import unittest
 
 from harness import CallFailed, Scenario, feeder, wait_for
+
+#: A file system of its own, in which a folder of the test is the journal's.
+WITH_JOURNAL_IN = ("mount -t tmpfs none /run && mkdir -p /run/systemd/journal && "
+                   "mount --bind {folder} /run/systemd/journal && exec \"$@\"")
 
 
 class Level(Scenario):
@@ -33,6 +40,40 @@ class Journal(Scenario):
         daemon = machine.start_daemon({"JOURNAL_STREAM": "8:1234567"})
         machine.client.wait_online("feeder")
         wait_for(lambda: " info feeder: online (" in daemon.log(), "it is told")
+        self.assertNotRegex(daemon.log(), "AXISD_|[\x1e\x1f]")
+
+    def test_lines_of_text_while_nobody_takes_them(self):
+        """Standard error is the journal's, and the journal does not run, or not any more."""
+        machine = self.machine({"feeder": feeder()})
+        folder = pathlib.Path(machine.path("journal"))
+        folder.mkdir()
+        machine.start_lines()
+        stderr = pathlib.Path(machine.path("axisd-0.stderr"))
+        stderr.touch()
+        found = stderr.stat()
+        unshare = ["unshare", "--mount", *(() if os.getuid() == 0 else ("--user", "--map-root-user"))]
+        daemon = machine.start_daemon({"JOURNAL_STREAM": f"{found.st_dev}:{found.st_ino}"},
+                                      before=[*unshare, "sh", "-c", WITH_JOURNAL_IN.format(folder=folder), "sh"])
+        machine.client.wait_online("feeder")
+        wait_for(lambda: "<6>feeder: online (" in daemon.log(), "it is told without a journal")
+
+        journal = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.addCleanup(journal.close)
+        journal.bind(str(folder / "socket"))
+        journal.settimeout(60)
+        before = daemon.log()
+        self.assertEqual(machine.axisctl("log-level", "debug").returncode, 0)
+        while b"\nAXISD_EVENT=log_level_changed\n" not in (line := journal.recv(65536)):
+            pass
+        self.assertIn(b"\nMESSAGE_ID=", line)
+        self.assertEqual(daemon.log(), before)
+        self.assertEqual(machine.axisctl("log-level", "info").returncode, 0)
+        while b"the log has level info now" not in journal.recv(65536):
+            pass
+
+        journal.close()
+        self.assertEqual(machine.axisctl("log-level", "debug").returncode, 0)
+        wait_for(lambda: "the log has level debug now" in daemon.log(), "it is told after the journal has gone")
         self.assertNotRegex(daemon.log(), "AXISD_|[\x1e\x1f]")
 
 

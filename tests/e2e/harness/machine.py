@@ -127,11 +127,11 @@ class Machine:
         for bus in self.buses():
             self.start_line(bus)
 
-    def start_daemon(self, environment=None, wait=True, options=()):
-        """Starts axisd; returns once it reports READY."""
+    def start_daemon(self, environment=None, wait=True, options=(), before=()):
+        """Starts axisd; returns once it reports READY. `before`: words of a program that runs it."""
         self.notify.forget()
         daemon = Program(f"axisd-{len(self.daemons)}",
-                         [AXISD, "--config", self.config, "--wire-log", str(self.wire.path), "--link-helper",
+                         [*before, AXISD, "--config", self.config, "--wire-log", str(self.wire.path), "--link-helper",
                           self.link_helper, *options], self.directory,
                          {"NOTIFY_SOCKET": self.notify.path} | (environment or {}))
         self.daemons.append(daemon)

@@ -43,6 +43,13 @@ TEST(JournalFields, AnOrdinaryLineHasNone) {
               ElementsAre("PRIORITY=6", "SYSLOG_IDENTIFIER=axisd", "MESSAGE=line-a: port /dev/x is open"));
 }
 
+TEST(JournalFields, ALineOfTextHasItsPriorityInstead) {
+  const auto payload = log_payload({.axis = "feeder"}, "alarm 2");
+  EXPECT_EQ(journal_text(spdlog::level::warn, log_source_line(LogKind::axis_fault), payload), "<4>alarm 2");
+  EXPECT_EQ(journal_text(spdlog::level::info, 0, "line-a: port /dev/x is open"),
+            "<6>line-a: port /dev/x is open");
+}
+
 /// Texts have names in them that clients chose.
 TEST(JournalFields, NoTextMakesFields) {
   const std::string forged =
