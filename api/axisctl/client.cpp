@@ -7,7 +7,9 @@
 #include <grpcpp/support/client_interceptor.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -24,6 +26,9 @@ namespace {
 
 std::string read_pem(const std::string& path, std::string_view option) {
   std::ifstream file(path, std::ios::binary);
+  if (!file)
+    throw Failure(ExitCode::usage, fmt::format("{}: cannot read '{}': {}; give a PEM file that you may read",
+                                               option, path, std::strerror(errno)));
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file || text.empty())
     throw Failure(ExitCode::usage, fmt::format("{}: cannot read '{}'; it must be a PEM file", option, path));

@@ -403,7 +403,10 @@ class Connecting(AxisctlTest):
         self.assertIn("command c-1 may go on", error)
 
     def test_certificates(self):
-        self.assertIn("cannot read '/nonexistent'", self.fails(2, "--tls-ca", "/nonexistent", "list"))
+        self.assertIn("--tls-ca: cannot read '/nonexistent': No such file or directory; ",
+                      self.fails(2, "--tls-ca", "/nonexistent", "list"))
+        self.assertIn("--tls-ca: cannot read '/dev/null'; it must be a PEM file",
+                      self.fails(2, "--tls-ca", "/dev/null", "list"))
         self.assertIn("belong together", self.fails(2, "--tls-cert", "/nonexistent", "list"))
 
 
