@@ -4,6 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
+#include <ranges>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "api/axisctl/drive_commands.hpp"
 #include "api/axisctl/drive_view.hpp"
@@ -11,6 +15,7 @@
 #include "api/axisctl/lease_option.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/drive_service.grpc.pb.h"
+#include "config/text.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -50,6 +55,18 @@ class Names {
   std::optional<v1::ListParametersResponse> catalogue_;
 };
 
+/// What a pattern that fits nothing was probably meant for: a name, or one of its words.
+std::string meant_by(std::string_view pattern, const v1::ListParametersResponse& catalogue) {
+  std::vector<std::string_view> words;
+  for (const auto& parameter : catalogue.parameters()) {
+    words.emplace_back(parameter.name());
+    for (const auto word : std::views::split(std::string_view(parameter.name()), '_'))
+      words.emplace_back(word);
+  }
+  const auto near = config::nearest(pattern, words);
+  return near.empty() ? "without a pattern all are listed" : fmt::format("did you mean '{}'?", near);
+}
+
 void parameters(Invocation& invocation, const Arguments& arguments) {
   auto catalogue = catalogue_of(invocation, arguments.axis);
   v1::ReadParametersRequest request;
@@ -62,8 +79,9 @@ void parameters(Invocation& invocation, const Arguments& arguments) {
     *shown.add_parameters() = std::move(parameter);
   }
   if (shown.parameters().empty())
-    throw Failure(ExitCode::usage, fmt::format("{}: no parameter of {} fits '{}'", arguments.axis,
-                                               shown.model(), arguments.pattern));
+    throw Failure(ExitCode::usage,
+                  fmt::format("{}: no parameter of {} fits '{}'; {}", arguments.axis, shown.model(),
+                              arguments.pattern, meant_by(arguments.pattern, catalogue)));
   v1::ReadParametersResponse values;
   if (arguments.read && !request.names().empty())
     values = invocation.client().call(&Stub::ReadParameters, request, arguments.axis);

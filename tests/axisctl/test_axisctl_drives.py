@@ -79,8 +79,9 @@ class Drives(AxisctlTest):
         self.assertRegex(lines[2], r"^maximum_speed +0x0023 +-60 +-3000\.\.3000 +60 +read/write +r/min +Speed of")
         self.assertEqual(list(self.server.calls("ReadParameters")[0].names), ["start_speed", "maximum_speed"])
         self.assertEqual(len(self.ok("drive", "parameters", "feeder", "m*").splitlines()), 3)
-        self.assertIn("no parameter of ykd2405pr fits 'xyz'",
+        self.assertIn("no parameter of ykd2405pr fits 'xyz'; without a pattern all are listed",
                       self.fails(2, "drive", "parameters", "feeder", "xyz"))
+        self.assertIn("fits 'sped'; did you mean 'speed'?", self.fails(2, "drive", "parameters", "feeder", "sped"))
         # What cannot be read is not asked for.
         self.ok("drive", "parameters", "feeder", "--read")
         self.assertNotIn("stop", self.server.calls("ReadParameters")[-1].names)
