@@ -91,7 +91,7 @@ class Metrics(Scenario):
                 machine.client.call(machine.client.axis.Stop, axis_pb.StopRequest(axis=f"stranger-{number}"))
 
         with concurrent.futures.ThreadPoolExecutor(8) as threads:
-            list(threads.map(ask, range(1000)))
+            list(threads.map(ask, range(10_000)))
         begun = scrape(url).value("axisd_metrics_scrapes_total")
         time.sleep(2.5)  # the figures of the core, and the text, are a second old at most
         after = scrape(url)
