@@ -1,6 +1,6 @@
 #!/bin/bash
-# Makes the Debian packages of the last commit: axisd, axisctl, axisd-web, python3-axisd, axisd-doc, and -dbgsym of the first
-# three.
+# Makes the Debian packages of the last commit: axisd, axisctl, axisd-web, axisd-cell, python3-axisd, axisd-doc, and -dbgsym of
+# the first four.
 #   deploy/package.sh [DIRECTORY]      default: build/package
 # The same commit gives the same bytes, wherever it is built. A commit with the tag vVERSION is that version, one before
 # it VERSION~gitTIME.COMMIT, one after it VERSION+gitTIME.COMMIT, so that later commits upgrade earlier ones. JOBS=N builds
