@@ -40,6 +40,7 @@ mmdebstrap --quiet --variant=minbase \
 DESTDIR=$root cmake --install "$build" --prefix /usr --strip >/dev/null
 mkdir -p "$root/etc/axisd"
 cp deploy/axisd.yaml deploy/links "$root/etc/axisd"
+echo '127.0.0.1 localhost' >"$root/etc/hosts"
 
 step "booting it"
 cat >"$scratch/boot" <<'END'
