@@ -186,6 +186,7 @@ eventually ctl 7445 list
 registered() { inside "${as_root[@]}" etcdctl get --keys-only /axisd/hall/machines/press-1 | grep -q .; }
 eventually registered
 eventually ctl 7445 enable feeder --wait
+ctl 7445 home feeder --wait
 
 step "each ends alone"
 first=$(process axisd-cell)
