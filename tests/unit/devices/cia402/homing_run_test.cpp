@@ -57,7 +57,8 @@ TEST(HomingRun, OneThatIsOverBetweenTwoReadingsIsKnownByItsWay) {
   HomingRun run;
   run.prepare({.window = 10});
   run.begin(start, 800);
-  EXPECT_FALSE(run.take(sample(10ms, 0, false, true), {}));
+  EXPECT_TRUE(run.take(sample(10ms, 0, false, true), {}));
+  EXPECT_FALSE(run.take(sample(10ms + HomingWatch::longest_rest, 0, false, true), {}));
   EXPECT_TRUE(run.is_homed(false, false));
 }
 
@@ -65,10 +66,10 @@ TEST(HomingRun, OneThatWasSeenToBeginNeedsNoWay) {
   HomingRun run;
   run.prepare({.window = 10});
   run.begin(start, 0);
-  EXPECT_TRUE(run.take(sample(10ms, 0, false, true), {})) << "its bit may be left from before";
+  EXPECT_TRUE(run.take(sample(10ms, 0, false, true), {}));
   run.note_begun();
-  EXPECT_FALSE(run.take(sample(20ms, 0, false, true), {}));
-  EXPECT_TRUE(run.is_homed(false, false));
+  EXPECT_FALSE(run.take(sample(10ms + HomingWatch::longest_rest, 0, false, true), {}));
+  EXPECT_TRUE(run.is_homed(false, false)) << "its bit is not left from before";
 }
 
 TEST(HomingRun, AStartTakesOverFromWhatWasToBeLeft) {
@@ -82,7 +83,8 @@ TEST(HomingRun, AStartTakesOverFromWhatWasToBeLeft) {
 
 TEST(HomingRun, OneThatFailedLeavesItNotHomed) {
   auto run = under_way();
-  EXPECT_FALSE(run.take(sample(20ms, 300, false, false), {.low = true, .failed = true}));
+  EXPECT_TRUE(run.take(sample(20ms, 300, false, false), {.low = true, .failed = true}));
+  EXPECT_FALSE(run.take(sample(80ms, 300, false, false), {.low = true, .failed = true}));
   EXPECT_EQ(run.state(), State::leaving);
   EXPECT_FALSE(run.is_homed(true, false));
   EXPECT_TRUE(run.is_homed(true, true)) << "the drive has forgotten it: its word counts again";
