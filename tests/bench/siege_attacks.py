@@ -1,6 +1,5 @@
 """How clients misbehave, for siege_bench.py. Each attack goes on until a time, and counts what it got through."""
 import contextlib
-import gzip
 import itertools
 import os
 import pathlib
@@ -11,6 +10,7 @@ import ssl
 import struct
 import sys
 import time
+import zlib
 
 import grpc
 
@@ -35,12 +35,20 @@ def literal(name, value):
     return b"\x00" + bytes([len(name)]) + name + bytes([len(value)]) + value
 
 
-def request_to(path):
-    return b"\x83\x86" + literal(b":path", path) + literal(b":authority", b"axisd") + \
-        literal(b"content-type", b"application/grpc") + literal(b"te", b"trailers")
+def kept(name, value):
+    """The same, and both ends keep it in their tables."""
+    return b"\x40" + literal(name, value)[1:]
+
+
+def request_to(path, field=literal):
+    return b"\x83\x86" + field(b":path", path) + field(b":authority", b"axisd") + \
+        field(b"content-type", b"application/grpc") + field(b"te", b"trailers")
 
 
 REQUEST = request_to(b"/axisd.v1.SystemService/GetInfo")
+#: The same in six bytes, after a request whose fields are kept.
+REQUEST_KEPT = request_to(b"/axisd.v1.SystemService/GetInfo", kept)
+REQUEST_AGAIN = b"\x83\x86\xc1\xc0\xbf\xbe"
 WATCH = request_to(b"/grpc.health.v1.Health/Watch")
 REFLECT = request_to(b"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo")
 
@@ -79,13 +87,13 @@ class Door:
 
 
 def flood(make, opening=b""):
-    """Sends what `make` gives as fast as it is taken; connects anew whenever it is cut off."""
+    """Sends what `make` gives for streams from 3 on, as fast as it is taken; connects anew whenever it is cut off."""
     def attack(door, until, count):
         while time.monotonic() < until:
             with contextlib.suppress(OSError), door.enter() as peer:
                 peer.settimeout(0.2)
                 peer.sendall(PREFACE + frame(4, 0, 0) + opening)
-                stream = 1
+                stream = 3
                 while time.monotonic() < until and stream < 2**31 - 2000:
                     peer.sendall(b"".join(make(stream + 2 * i) for i in range(200)))
                     count(200)
@@ -103,6 +111,7 @@ pings = flood(lambda _: frame(6, 0, 0, b"12345678"))
 settings = flood(lambda _: frame(4, 0, 0))
 continuation = flood(lambda _: frame(9, 0, 1, b"\x83" * 100), frame(1, 0, 1, b"\x83"))
 half_open = flood(lambda stream: frame(1, 4, stream, REQUEST))
+short_half_open = flood(lambda stream: frame(1, 4, stream, REQUEST_AGAIN), frame(1, 4, 1, REQUEST_KEPT))
 #: Streams that never end, each with its empty message.
 watchers = flood(lambda stream: frame(1, 4, stream, WATCH) + frame(0, 1, stream, bytes(5)))
 reflections = flood(lambda stream: frame(1, 4, stream, REFLECT) + frame(0, 0, stream, bytes(5)))
@@ -166,21 +175,76 @@ def slow_prefaces(door, until, count):
         peer.close()
 
 
+def zeros(megabytes):
+    """So many of them, as gzip packs them; of one megabyte, and that again and again, which is soon done."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    one = packer.compress(bytes(1_000_000)) + packer.flush(zlib.Z_FULL_FLUSH)
+    check = 0
+    for _ in range(megabytes):
+        check = zlib.crc32(bytes(1_000_000), check)
+    return b"\x1f\x8b\x08" + bytes(7) + one * megabytes + packer.flush() + \
+        struct.pack("<II", check, megabytes * 1_000_000)
+
+
+class Sender:
+    """Sends the messages of streams, as far as the daemon takes them."""
+
+    def __init__(self, peer):
+        self._peer, self._unread = peer, b""
+        self._first, self._window, self._left = 65535, 65535, 0  # of a new stream, of the connection, of this stream
+
+    def send(self, stream, headers, body):
+        """Until all is sent, or the stream has been ended."""
+        self._peer.sendall(frame(1, 4, stream, headers))
+        self._left = self._first
+        while body:
+            size = min(16384, len(body), self._window, self._left)
+            if size > 0:
+                self._peer.sendall(frame(0, size == len(body), stream, body[:size]))
+                body, self._window, self._left = body[size:], self._window - size, self._left - size
+            elif not self._listen(stream):
+                return
+
+    def _listen(self, stream):
+        """To what the daemon says next. False: it wants no more of this stream."""
+        data = self._peer.recv(65536)
+        if not data:
+            raise ConnectionError
+        self._unread += data
+        goes_on = True
+        while len(self._unread) >= 9 + (size := int.from_bytes(self._unread[:3], "big")):
+            kind, flags, whose = self._unread[3], self._unread[4], int.from_bytes(self._unread[5:9], "big")
+            payload, self._unread = self._unread[9:9 + size], self._unread[9 + size:]
+            if kind == 8 and whose == 0:
+                self._window += int.from_bytes(payload, "big")
+            elif kind == 8 and whose == stream:
+                self._left += int.from_bytes(payload, "big")
+            elif kind == 4 and not flags & 1:
+                first = dict(struct.iter_unpack(">HI", payload)).get(4, self._first)
+                self._left += first - self._first
+                self._first = first
+                self._peer.sendall(frame(4, 1, 0))
+            elif kind == 6 and not flags & 1:
+                self._peer.sendall(frame(6, 1, 0, payload))
+            elif whose == stream and (kind == 3 or kind == 1 and flags & 1):
+                goes_on = False
+        return goes_on
+
+
 def compressed(door, until, count):
     """Messages of 200 KB that unpack to 200 MB."""
-    bomb = gzip.compress(bytes(200_000_000))
+    bomb = zeros(200)
     headers = REQUEST + literal(b"grpc-encoding", b"gzip")
     body = b"\x01" + struct.pack(">I", len(bomb)) + bomb
     while time.monotonic() < until:
         with contextlib.suppress(OSError), door.enter() as peer:
             peer.settimeout(2)
             peer.sendall(PREFACE + frame(4, 0, 0))
+            sender = Sender(peer)
             for stream in range(1, 200, 2):
-                peer.sendall(frame(1, 4, stream, headers))
-                for at in range(0, len(body), 16384):
-                    peer.sendall(frame(0, at + 16384 >= len(body), stream, body[at:at + 16384]))
-                    if at % 65536 == 0:
-                        peer.recv(65536)
+                if time.monotonic() >= until:
+                    break
+                sender.send(stream, headers, body)
                 count()
 
 
@@ -258,7 +322,7 @@ ATTACKS = {
     "garbage": Attack(garbage), "garbage, TLS": Attack(garbage, tls=True),
     "garbage inside TLS": Attack(garbage_inside, tls=True),
     "PING flood": Attack(pings), "SETTINGS flood": Attack(settings), "CONTINUATION flood": Attack(continuation),
-    "half-open streams": Attack(half_open),
+    "half-open streams": Attack(half_open), "half-open streams of 15 bytes": Attack(short_half_open),
     "rapid reset": Attack(rapid_reset), "rapid reset, TLS": Attack(rapid_reset, tls=True),
     "health watchers": Attack(watchers, at_lane=False), "reflection streams": Attack(reflections, at_lane=False),
     "group stops": Attack(calls(stop_service_pb2_grpc.StopServiceStub, "GroupStop", stops_of_all), at_main=False,
