@@ -98,6 +98,22 @@ TEST_F(Transport, PlaintextStaysOnTheHostAndAddressesAreChecked) {
     EXPECT_EQ(refused({.listen = {wrong}}), Reason::invalid_argument) << wrong;
 }
 
+TEST_F(Transport, NothingIsUnpacked) {
+  const auto port = start({.listen = {"127.0.0.1:0"}});
+  ASSERT_TRUE(port) << to_string(port.error());
+  const auto axes = v1::AxisService::NewStub(connect("127.0.0.1:" + std::to_string(*port)));
+  for (const auto packed : {GRPC_COMPRESS_GZIP, GRPC_COMPRESS_DEFLATE, GRPC_COMPRESS_NONE}) {
+    Call context;
+    context.set_compression_algorithm(packed);
+    v1::ListAxesRequest request;
+    v1::ListAxesResponse response;
+    const auto status = axes->ListAxes(&context, request, &response);
+    EXPECT_EQ(status.error_code(),
+              packed == GRPC_COMPRESS_NONE ? grpc::StatusCode::OK : grpc::StatusCode::UNIMPLEMENTED)
+        << packed << ": " << status.error_message();
+  }
+}
+
 TEST_F(Transport, SurvivesRunningOutOfDescriptors) {
   const auto port = start({.listen = {"127.0.0.1:0"}});
   ASSERT_TRUE(port);
