@@ -40,8 +40,8 @@ Result<Admission::Ticket> Admission::admit(const std::string& client, Kind kind)
   const auto known = book_->clients.find(client);
   const int used = known == book_->clients.end() ? 0 : known->second.of(kind);
   if (used >= limit) return fail(client_has_all(client, kind, limit));
-  const bool first = used == 0 && kind >= Kind::stream;
-  if (!first && book_->taken >= limits_.all * share.percent / 100)
+  const int own = kind == Kind::motion ? own_calls : kind >= Kind::stream ? 1 : 0;
+  if (used >= own && book_->taken >= limits_.all * share.percent / 100)
     return fail(all_have_too_much(share, book_->taken));
   ++book_->clients[client].of(kind);
   ++book_->taken;

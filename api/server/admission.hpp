@@ -42,6 +42,9 @@ class Admission {
                                                     {Kind::stream, 60, "streams"},
                                                     {Kind::read, 80, "calls that read"},
                                                     {Kind::motion, 100, "calls that change something"}}};
+  /// A client with fewer calls may always make one that changes something: waiting for one axis must not keep
+  /// it from moving the next.
+  static constexpr int own_calls = 16;
 
  private:
   struct Counts {
@@ -81,8 +84,8 @@ class Admission {
   };
 
   explicit Admission(Limits limits) : limits_(limits), book_(std::make_shared<Book>()) {}
-  /// Whoever has no call in progress gets one, and whoever has no stream gets one of our own services,
-  /// however much others have. Errors: busy.
+  /// However much others have, whoever has fewer than `own_calls` gets one that changes something, whoever
+  /// has none gets one that reads, and whoever has no stream gets one of our own services. Errors: busy.
   [[nodiscard]] Result<Ticket> admit(const std::string& client, Kind kind);
 
  private:

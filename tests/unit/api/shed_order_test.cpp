@@ -47,7 +47,7 @@ TEST(ShedOrder, AKindIsLetInUntilItsShareIsTaken) {
   }
 }
 
-TEST(ShedOrder, WhoeverHasNothingGetsOneCallAndOneStream) {
+TEST(ShedOrder, WhoeverHasNothingGetsACallThatReadsAndAStream) {
   Admission admission({.calls = 1000, .streams = 1000, .all = all});
   std::vector<Admission::Ticket> taken;
   for (int i = 0; i < all; ++i) taken.push_back(*admission.admit("busy", Kind::motion));
@@ -59,8 +59,29 @@ TEST(ShedOrder, WhoeverHasNothingGetsOneCallAndOneStream) {
     EXPECT_FALSE(admission.admit("other", kind));
     taken.push_back(*std::move(first));
   }
-  EXPECT_FALSE(admission.admit("other", Kind::motion)) << "a call is a call";
+}
+
+TEST(ShedOrder, WhoeverWaitsForOneMotionMayBeginTheNext) {
+  Admission admission({.calls = 1000, .streams = 1000, .all = all});
+  std::vector<Admission::Ticket> taken;
+  for (int i = 0; i < all; ++i) taken.push_back(*admission.admit("busy", Kind::motion));
+  ASSERT_FALSE(admission.admit("busy", Kind::motion));
+  // All are taken, and another client moves its axes none the less, each with a call that waits for its end.
+  for (int i = 0; i < Admission::own_calls; ++i) {
+    auto next = admission.admit("other", Kind::motion);
+    ASSERT_TRUE(next) << i;
+    taken.push_back(*std::move(next));
+  }
+  EXPECT_FALSE(admission.admit("other", Kind::motion));
+  EXPECT_FALSE(admission.admit("other", Kind::read));
   EXPECT_TRUE(admission.admit("third", Kind::motion));
+}
+
+TEST(ShedOrder, TheLimitOfAClientComesFirst) {
+  Admission admission({.calls = 2, .streams = 1, .all = all});
+  std::vector<Admission::Ticket> taken;
+  for (int i = 0; i < 2; ++i) taken.push_back(*admission.admit("a", Kind::motion));
+  EXPECT_FALSE(admission.admit("a", Kind::motion));
 }
 
 using HealthRequest = google::protobuf::StringValue;
