@@ -223,7 +223,8 @@ void add_stop_commands(CLI::App& app, Invocation& invocation) {
   });
 
   add(app, invocation, fresh(), "quick-stop",
-      "Stop at once, without deceleration; open loop: costs position trust", &Stub::QuickStop);
+      "Stop as hard as the drive does, mostly without deceleration; open loop: costs position trust",
+      &Stub::QuickStop);
 
   add_release(app, invocation);
 }

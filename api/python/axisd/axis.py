@@ -133,7 +133,8 @@ class Axis:
         return await self._stop(self._machine._stops.Stop, request, wait)
 
     async def quick_stop(self, *, hold: bool = False, wait: bool = True, request_id: str | None = None) -> Command:
-        """Stops at once, without deceleration. Open loop: the position is no longer trusted. Otherwise as stop()."""
+        """Stops as hard as the drive does: without deceleration, or on the ramp that it has for it, whose time is granted
+        then. Open loop: the position is no longer trusted. Otherwise as stop()."""
         request = axis_service_pb2.QuickStopRequest(axis=self.name, hold=hold,
                                                     options=self._stop_options(hold, wait, request_id))
         return await self._stop(self._machine._stops.QuickStop, request, wait)
