@@ -40,13 +40,13 @@ class OfAFile(AxisctlTest):
         for bus in self.json("budget", DEMO)[0]["budgets"]:
             self.assertEqual(bus["excess"], [], bus["bus"])
             for stop in bus["stops"]:
-                self.assertLess(seconds(stop["last_frame"]), 0.06, bus["bus"])
-                self.assertLess(seconds(stop["standstill"]), 0.7, bus["bus"])
+                self.assertLess(seconds(stop["last_frame"]), 0.12, bus["bus"])
+                self.assertLess(seconds(stop["standstill"]), 1.2, bus["bus"])
             for row in bus["load"]:
                 if row["moving"] > 0:
-                    self.assertLess(seconds(row["refresh_moving"]), 0.5, bus["bus"])
+                    self.assertLess(seconds(row["refresh_moving"]), 1, bus["bus"])
                 if "refresh_idle" in row:
-                    self.assertLess(seconds(row["refresh_idle"]), 8, bus["bus"])
+                    self.assertLess(seconds(row["refresh_idle"]), 20, bus["bus"])
 
     def test_what_is_refused_has_figures_all_the_same(self):
         text, listed = self.run_axisctl("budget", str(EXCEEDED)), self.run_axisctl("--json", "budget", str(EXCEEDED))

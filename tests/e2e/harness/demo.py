@@ -23,8 +23,8 @@ class Demo:
         # A computer busy with tests is late; nothing else differs from the example.
         patience = "".join(f"\n    {key}: {text}" for key, text in PATIENT.items())
         text = re.sub(r"(?m)^    model: (?!yss-c).*$", lambda line: line[0] + patience, EXAMPLE.read_text())
-        text = text.replace("turnaround_max: 10 ms", "turnaround_max: 200 ms")
-        text = text.replace("sdo_timeout: 25 ms", "sdo_timeout: 500 ms")
+        text = text.replace("turnaround_max: 20 ms", "turnaround_max: 200 ms")
+        text = text.replace("sdo_timeout: 50 ms", "sdo_timeout: 500 ms")
         if metrics:
             text = text.replace("\nserver:\n", "\nserver:\n  metrics: { listen: 127.0.0.1:0 }\n")
         config = self.directory / "demo.yaml"
