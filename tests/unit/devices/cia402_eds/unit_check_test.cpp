@@ -304,6 +304,7 @@ TEST(UnitCheck, TheRampOfAQuickStopIsReadFromTheDrive) {
   };
   look(10'000);
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(1s));
+  bench.answers()[quick_stop_ramp] = 20'000;  // as it is read back
   const auto written =
       bench.run(bench.drive().write_parameters({{.address = quick_stop_ramp, .value = 20'000}}));
   ASSERT_TRUE(written) << to_string(written.error());
