@@ -67,7 +67,7 @@ TEST_P(Loads, NothingIsReadLessOftenThanPredicted) {
   const auto demand = GetParam().demand();
   const auto budget = budget_of(demand);
   const auto& load = budget.load.at(static_cast<std::size_t>(moving));
-  for (unsigned seed = 1; seed <= 3; ++seed) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
     LineLoad line(demand, seed, silent);
     line.begin(moving, true);
     line.world().run_for(40s);

@@ -110,7 +110,11 @@ Task<> LineLoad::poll(LoadedAxis& axis, const AxisDemand& demand) {
     if (answered) {
       if (axis.last_asked)
         axis.longest_refresh = std::max(axis.longest_refresh, answer.sent_at - *axis.last_asked);
-      axis.last_asked = answer.sent_at;
+      // During a start nothing is polled: it looks by itself.
+      if (axis.chains == 0)
+        axis.last_asked = answer.sent_at;
+      else
+        axis.last_asked.reset();
       if (axis.stop_acknowledged && !axis.standstill && answer.sent_at >= *axis.stop_acknowledged)
         axis.standstill = answer.answered_at;
     }
