@@ -1,6 +1,7 @@
 // The canary that every start depends on (M6, M7).
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "devices/cia402/drive.hpp"
@@ -8,22 +9,28 @@
 namespace axisd::cia402 {
 
 MotionBlock Cia402Drive::fresh_neutral_block() const {
-  constexpr int neutral_rpm = 60, neutral_time = 100, lowest_start = 5;
+  constexpr int neutral_rpm = 60, braking_rpm = 1000, lowest_start = 5, most_different = 61;
+  constexpr auto neutral_time = std::chrono::milliseconds(100);
   // One ramp differs a little each time: a record of an earlier power cycle then never fits this one.
   const auto moment = clock_->now().time_since_epoch() / std::chrono::milliseconds(1);
-  const auto differs = 1 + static_cast<std::int32_t>(moment % 61);
-  // The data sheet of a drive may not allow as little.
-  const auto at_least = [this](Object object, std::int32_t value) {
+  const auto differs = 1 + static_cast<std::int32_t>(moment % most_different);
+  // The data sheet of a drive may not allow as little, or as much.
+  const auto within = [this](Object object, std::int64_t value) {
     const auto* known = find_parameter(model_->descriptor->parameters, object.key());
-    return known == nullptr ? value
-                            : static_cast<std::int32_t>(std::max<std::int64_t>(value, known->minimum));
+    if (known != nullptr) value = std::max(std::min(value, known->maximum - most_different), known->minimum);
+    return static_cast<std::int32_t>(value);
   };
-  const auto velocity = encode_velocity(*model_, setup_.pulses_per_revolution, neutral_rpm);
+  const auto pulses = setup_.pulses_per_revolution;
+  // A homing has ramps of its own, but a halt brakes it on these.
+  const auto ramps = encode(
+      *model_, pulses,
+      MoveProfile{
+          .velocity_rpm = braking_rpm, .acceleration_time = neutral_time, .deceleration_time = neutral_time});
   const bool two_ramps = model_->descriptor->capabilities.own_deceleration;
   // Target 0: should a terminal start a relative move, it goes nowhere.
-  return {0, at_least(object::profile_velocity, velocity),
-          at_least(object::acceleration, neutral_time) + (two_ramps ? 0 : differs),
-          two_ramps ? at_least(object::deceleration, neutral_time) + differs : 0,
+  return {0, within(object::profile_velocity, encode_velocity(*model_, pulses, neutral_rpm)),
+          within(object::acceleration, ramps[acceleration]) + (two_ramps ? 0 : differs),
+          two_ramps ? within(object::deceleration, ramps[deceleration]) + differs : 0,
           model_->objects.start_speed ? lowest_start : 0};
 }
 

@@ -54,6 +54,17 @@ TEST(M13, ARampOfAQuickStopIsReadAtBringUp) {
   EXPECT_NEAR(rig.load_mm() - before, 50, 3);
 }
 
+/// Nothing was moved yet, so the ramps that a halt brakes on are those of bring-up.
+TEST(M13, AStopEndsTheFirstHomingWithoutEscalation) {
+  ModelRig rig({.model = "cia402", .switches = {{"homing_goes_on_without_start_bit", true}}});
+  EXPECT_EQ(rig.complete(EnableRequest{}).state, CommandState::done);
+  ASSERT_TRUE(rig.try_submit(HomeRequest{}));
+  rig.run(800ms);
+  ASSERT_TRUE(rig.moving());
+  expect_rest(rig, rig.complete(StopRequest{.kind = StopKind::stop}));
+  EXPECT_EQ(rig.drive->peek(halt_option) & 0xFFU, 1U) << "it took a quick stop";
+}
+
 /// A quick stop is never softer than a stop, and neither is what a stop escalates to.
 TEST(M13, ASofterRampThanThatOfTheMotionIsNotChosen) {
   ModelRig rig({.model = "cia402", .limits = false});

@@ -292,28 +292,28 @@ TEST(UnitCheck, ADecelerationThatIsChangedLaterIsFound) {
 TEST(UnitCheck, TheRampOfAQuickStopIsReadFromTheDrive) {
   using namespace std::chrono_literals;
   constexpr std::uint32_t quick_stop_ramp = 0x608500;
-  UnitBench bench(with_objects({}, "pulses_per_second"), {{quick_stop_ramp, 5000}});
+  UnitBench bench(with_objects({}, "pulses_per_second"), {{quick_stop_ramp, 500'000}});
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "not known yet: as a stop";
   ASSERT_TRUE(bench.bring_up());
-  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(2s));
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(20ms));
   const auto look = [&](std::optional<std::uint32_t> held) {
     bench.answers()[quick_stop_ramp] = held;
     const auto drift = bench.run(bench.drive().check_drift(TransactionClass::parameters));
     ASSERT_TRUE(drift) << to_string(drift.error());
     EXPECT_EQ(drift->text, "");
   };
-  look(10'000);
-  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(1s));
-  bench.answers()[quick_stop_ramp] = 20'000;  // as it is read back
+  look(1'000'000);
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(10ms));
+  bench.answers()[quick_stop_ramp] = 2'000'000;  // as it is read back
   const auto written =
-      bench.run(bench.drive().write_parameters({{.address = quick_stop_ramp, .value = 20'000}}));
+      bench.run(bench.drive().write_parameters({{.address = quick_stop_ramp, .value = 2'000'000}}));
   ASSERT_TRUE(written) << to_string(written.error());
-  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(500ms)) << "it counts at once";
+  EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(5ms)) << "it counts at once";
   look(1);
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "softer than a stop: it is not chosen";
   look(0);
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "that is no ramp";
-  look(5000);
+  look(500'000);
   look(std::nullopt);
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::nullopt) << "its file lists it, and it has none";
 }
