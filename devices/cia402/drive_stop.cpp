@@ -18,6 +18,14 @@ constexpr auto urgent_mode_limit = milliseconds(20);
 constexpr auto urgent_reply_limit = milliseconds(20);
 constexpr std::size_t word_bytes = 2;
 
+/// Of a write that could not be proven. Whatever is wrong with the reading that should prove it: it is no
+/// refusal of the write, which may never have reached the drive.
+Error unproven(Error reading) {
+  reading.reason = Reason::no_reply;
+  reading.outcome = Outcome::unknown;
+  return reading;
+}
+
 }  // namespace
 
 KnownWords::Moment Cia402Drive::moment(TimePoint at) const { return {.at = at, .losses = bus_->losses()}; }
@@ -58,7 +66,7 @@ Task<Result<void>> Cia402Drive::write_control(std::uint16_t word, SdoOptions opt
   if (!words_.is_newest(write)) co_return Result<void>{};  // overtaken by a later one
   if (answer->ambiguous) {
     const auto held = co_await held_control(std::move(options));
-    if (!held) co_return fail(held.error());
+    if (!held) co_return fail(unproven(held.error()));
     if (*held != word)
       co_return fail(
           error_at(Reason::no_reply, object::control_word,

@@ -47,6 +47,34 @@ TEST(Cia402Alarms, AResetBetweenTwoObjectsOfOneReadingIsNoOtherAlarm) {
   EXPECT_EQ(sample->alarm_code, 0);
 }
 
+/// A late reply to an earlier stop may answer the next one, which was lost. What is read back to prove it is
+/// refused then: that is no refusal of the stop.
+TEST(Cia402Stops, ARefusedProofIsNoRefusalOfTheStop) {
+  using simulation::FaultKind;
+  using std::chrono::milliseconds;
+  constexpr std::uint16_t control_word = 0x6040, halt_option = 0x605D, target_velocity = 0x60FF;
+  bool proven_by_reading = false;
+  for (auto delay = milliseconds(110); delay <= milliseconds(260); delay += milliseconds(10)) {
+    SCOPED_TRACE(delay.count());
+    DriveBench bench;
+    bench.bring_up();
+    ASSERT_TRUE(bench.run(bench.drive().stop(StopKind::stop)));
+    for (const auto object : {halt_option, target_velocity})
+      bench.nodes().add_fault({.kind = FaultKind::drop_reply, .count = -1, .object = object});
+    bench.nodes().add_fault({.kind = FaultKind::delay_reply, .delay = delay, .object = control_word});
+    (void)bench.run(bench.drive().stop(StopKind::stop));
+    bench.nodes().add_fault({.kind = FaultKind::drop_request, .object = control_word});
+    bench.nodes().add_fault(
+        {.kind = FaultKind::abort, .count = -1, .object = control_word, .code = 0x08000000});
+    const auto lost = bench.run(bench.drive().stop(StopKind::stop));
+    ASSERT_FALSE(lost);
+    EXPECT_EQ(lost.error().reason, Reason::no_reply) << to_string(lost.error());
+    EXPECT_EQ(lost.error().outcome, Outcome::unknown);
+    proven_by_reading |= lost.error().where.native_code.has_value();
+  }
+  EXPECT_TRUE(proven_by_reading) << "no late reply has answered the second stop";
+}
+
 /// What a busy network brings late is waited for: asking by SDO as well would only make it busier. But what
 /// waits is told with the age that it has, and a node that is not heard any more is asked.
 TEST(Cia402State, LatePdosOfALivingNodeAreWaitedForAndThoseOfASilentOneAreNot) {
