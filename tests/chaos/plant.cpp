@@ -85,6 +85,9 @@ void Plant::add_line(config::Configuration& configuration, const std::string& na
 void Plant::add_network(config::Configuration& configuration, std::span<const std::string_view> sheets) {
   network_ = std::make_unique<can::Network>(world.clock(), bitrate);
   nodes_ = std::make_unique<simulation::NetworkNodes>(world.clock(), *network_);
+  nodes_->nodes().set_observer([this](TimePoint, bool received, const can::Frame& frame) {
+    if (!received) answered(frame);
+  });
   configuration.networks.push_back({.name = "can0", .interface = "sim", .sync_period = 10ms});
   for (std::uint8_t node = 1; const auto sheet : sheets) {
     add_axis(configuration, {.name = "c-" + std::to_string(node),

@@ -48,7 +48,7 @@ class Plant {
   std::function<void(Station&, const Telegram&)> on_bind;
   std::function<void(Station&, const Executed&)> on_executed;
   std::function<void(Station&)> on_own_start;
-  /// The drive will refuse this one: it is reached, and does nothing.
+  /// The drive has refused this one: it was reached, and did nothing.
   std::function<void(Station&, const Telegram&)> on_refused;
   /// Somebody did something at the machine.
   std::function<void(const Station&, const std::string&)> on_hand;
@@ -74,8 +74,9 @@ class Plant {
   void bound(const std::string& line, const test::WireEntry& entry);
   bool strike(Station& station, test::VirtualLine& line);
   void handed_over(const can::Frame& frame);
-  bool strike(Station& station, const can::Frame& frame, const Telegram& telegram);
+  bool strike(Station& station, const can::Frame& frame);
   void strike_network(const can::Frame& frame);
+  void answered(const can::Frame& frame);
   void mend_network();
 
   Dice dice_;
@@ -85,6 +86,7 @@ class Plant {
   std::unique_ptr<can::Network> network_;
   std::unique_ptr<simulation::NetworkNodes> nodes_;
   WatchedPort* port_ = nullptr;
+  std::map<std::uint8_t, Telegram> asked_by_sdo_;  ///< of each node: the last request
   Traffic on_lines_, on_can_;
   std::vector<Clock::Timer> mendings_;
 };

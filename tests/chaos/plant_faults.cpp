@@ -49,7 +49,8 @@ simulation::Fault draw(const std::array<Likely, N>& faults, Dice& dice) {
   return {.kind = chosen->kind, .delay = dice.up_to(chosen->longest_delay)};
 }
 
-constexpr std::uint32_t nmt_command = 0x000, sync_id = 0x080, sdo_request = 0x600, heartbeat = 0x700;
+constexpr std::uint32_t nmt_command = 0x000, sync_id = 0x080, sdo_reply = 0x580, sdo_request = 0x600,
+                        heartbeat = 0x700;
 /// Of a client: no node answers it, so that what strikes an answer would strike that of the next request.
 constexpr std::uint8_t sdo_abort = 0x80;
 /// TPDO4: a flood there takes the bus, and claims no status word and no position that the node does not have.
@@ -112,17 +113,19 @@ void Plant::handed_over(const can::Frame& frame) {
     if (!station.on_can()) continue;
     const auto telegram = read_frame(frame, station.drive->drive());
     if (on_bind) on_bind(station, telegram);
+    if (frame.id == sdo_request + station.node && frame.data[0] != sdo_abort)
+      asked_by_sdo_[station.node] = telegram;
     const bool own = frame.id == nmt_command ? frame.data[1] == station.node
                                              : frame.id != sync_id && (frame.id & 0x7FU) == station.node;
     if (own) ++on_can_.transactions;
     const bool may_be_struck = own || (frame.id == sync_id && dice_.chance(sync_share));
-    if (!faulty_ || !may_be_struck || !strike(station, frame, telegram)) continue;
+    if (!faulty_ || !may_be_struck || !strike(station, frame)) continue;
     ++on_can_.faulted;
     if (!own) ++on_can_.transactions;
   }
 }
 
-bool Plant::strike(Station& station, const can::Frame& frame, const Telegram& telegram) {
+bool Plant::strike(Station& station, const can::Frame& frame) {
   auto& nodes = nodes_->nodes();
   if (dice_.chance(0.0002)) strike_network(frame);
   if (frame.id != sync_id && !dice_.chance(share_)) return false;
@@ -135,8 +138,15 @@ bool Plant::strike(Station& station, const can::Frame& frame, const Telegram& te
   else if (fault.kind != FaultKind::emcy)
     fault.cob = static_cast<std::uint16_t>(frame.id);
   nodes.add_fault(fault);
-  if (fault.kind == FaultKind::abort && on_refused) on_refused(station, telegram);
   return true;
+}
+
+/// A drawn abort strikes the next request that is heard: later than drawn, where a node is silent.
+void Plant::answered(const can::Frame& frame) {
+  if (frame.id <= sdo_reply || frame.id >= sdo_request || frame.data[0] != sdo_abort || !on_refused) return;
+  for (auto& station : stations)
+    if (station.on_can() && frame.id == sdo_reply + station.node)
+      on_refused(station, asked_by_sdo_[station.node]);
 }
 
 /// The network as a whole: the cable, the controller, the interface, nobody who acknowledges; and a
