@@ -72,6 +72,7 @@ class ForeignSlaves(CanScenario):
         self.assertEqual((slave.shaft["starts"], slave.shaft["state"]), (0, "disabled"))
         self.homed(machine, slave, 0)
         self.moves_and_stops(machine, slave)
+        self.another_master(machine, slave)
         self.faults(machine, slave)
         self.restarts(machine, slave)
 
@@ -99,6 +100,33 @@ class ForeignSlaves(CanScenario):
         state = client.state("slide")
         self.assertAlmostEqual(self.true_position(slave), state.position, delta=1)
 
+    def another_master(self, machine, slave):
+        """What it starts is stopped, and both it and the stop are events."""
+        client = machine.client
+        if not client.state("slide").enabled:  # a quick stop may end with a released shaft
+            client.to_done("Enable", "slide")
+        client.to_done("MoveAbsolute", "slide", position=100.0, velocity=60.0)
+        before = slave.shaft["starts"]
+        client.wait_state("slide", lambda s: not s.moving, "it is known to rest")
+        self.write(0x607A, (0).to_bytes(4, "little"))
+        self.write(0x6040, (0x1F).to_bytes(2, "little"))
+        slave.wait(lambda shaft: shaft["starts"] == before + 1, "the other master starts it")
+        self.rests(machine, slave, before + 1)
+        self.assertGreater(self.true_position(slave), HOME_AT + 20, "it was left to go on")
+        told = self.done(machine, "events", "slide")
+        self.assertRegex(told, "another master writes [0-9A-F]{4}h:00 by SDO")
+        # The drive does not hold what axisd wrote: it counts as restarted.
+        state = client.wait_state(
+            "slide", lambda s: s.trust == pb.POSITION_TRUST_UNKNOWN and s.link == pb.LINK_STATE_ONLINE, "it is set up anew")
+        if state.state == pb.STATE_ERROR_STOP:
+            client.to_done("Reset", "slide")
+        self.homed(machine, slave, before + 1)
+
+    def write(self, index, value):
+        """By SDO, as another master: expedited, sub-index 0."""
+        command = 0x23 | (4 - len(value)) << 2
+        self.peer().send(0x600 + NODE, bytes([command, index & 0xFF, index >> 8, 0]) + value.ljust(4, b"\0"))
+
     def faults(self, machine, slave):
         client = machine.client
         if not client.state("slide").enabled:  # a quick stop may end with a released shaft
@@ -123,15 +151,16 @@ class ForeignSlaves(CanScenario):
     def restarts(self, machine, slave):
         """By another master in mid-move, and by its supply at rest: it stays as it is until a client enables it."""
         client = machine.client
+        before = client.state("slide").drive_reboots
         move = client.motion("MoveAbsolute", "slide", position=300.0, velocity=60.0)
         slave.wait(lambda shaft: shaft["moving"], "it moves")
         self.peer().send(0x000, bytes([0x81, NODE]))
         self.ended(machine, move)
-        self.new_life(machine, slave, reboots=1)
+        self.new_life(machine, slave, reboots=before + 1)
         slave.cut()
         self.offline(machine, "slide")
         slave.start()
-        self.new_life(machine, slave, reboots=2)
+        self.new_life(machine, slave, reboots=before + 2)
 
     def new_life(self, machine, slave, reboots):
         state = machine.client.wait_state(
