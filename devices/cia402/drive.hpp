@@ -169,6 +169,9 @@ class Cia402Drive final : public Drive {
   Task<std::optional<Reading>> next_pdos();
   Task<Result<Reading>> poll_objects(SdoOptions options);
   Task<Result<DriveSample>> look(bool by_pdo, SdoOptions options);
+  /// r/min up to which a measured velocity may be noise: by 606Fh, where the drive has it.
+  [[nodiscard]] int velocity_noise() const;
+  [[nodiscard]] DriveSample decoded(const Values& values) const;
   DriveSample judge(const Reading& reading, bool of_one_moment);
   /// A motion may be slower than its velocity shows: than noise, or than one count of it.
   [[nodiscard]] bool known_by_way() const;

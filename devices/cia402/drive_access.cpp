@@ -64,6 +64,7 @@ Task<Result<std::int64_t>> Cia402Drive::read_object(Object object, SdoOptions op
   const auto value = type.is_signed ? canopen::sign_extended(raw, static_cast<unsigned>(8 * bytes))
                                     : static_cast<std::int64_t>(raw);
   if (object == model_->objects.position_window) seen_.position_window = value;
+  if (object == model_->objects.velocity_threshold) seen_.velocity_threshold = value;
   if (object == object::quick_stop_deceleration) seen_.quick_stop_ramp = value;
   co_return value;
 }

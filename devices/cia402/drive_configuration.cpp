@@ -119,8 +119,7 @@ Task<Result<void>> Cia402Drive::check_inactive(const ObjectSetting& setting) {
   if (model_->objects.moving) addresses.push_back(model_->objects.moving->key());
   const auto values = co_await read_values(std::move(addresses), patiently());
   if (!values) co_return fail(values.error());
-  const auto state =
-      decode_state(*model_, setup_.pulses_per_revolution, *values, active_low_, position_window() > 0);
+  const auto state = decoded(*values);
   if (state.enabled || state.moving || (state.inputs & setting.input_bits) != 0)
     co_return fail(error_at(
         Reason::misconfigured, Object::of(setting.address),

@@ -158,6 +158,12 @@ std::int64_t Cia402Drive::position_window() const {
   return std::max({least, found, counts == 0 ? found : (found * revolution + counts - 1) / counts});
 }
 
+int Cia402Drive::velocity_noise() const {
+  const auto found =
+      decode_velocity(*model_, setup_.pulses_per_revolution, seen_.velocity_threshold.value_or(0));
+  return std::clamp(found, velocity_noise_rpm, most_velocity_noise_rpm);
+}
+
 Task<Result<void>> Cia402Drive::configure() {
   if (setup_error_) co_return failed(*setup_error_);
   // Before anything else: an EMCY with the identifier 80h would be a SYNC to the others (M24).
@@ -183,10 +189,13 @@ Task<Result<void>> Cia402Drive::configure() {
     if (!mode) co_return fail(mode.error());
     seen_.closed_loop = *mode == 0;
   }
-  if (const auto window = model_->objects.position_window)
-    if (const auto found = co_await read_object(*window, patiently());
-        !found && found.error().reason != Reason::refused)  // some list it, and do not have it
-      co_return fail(found.error());
+  for (const auto& window : {model_->objects.position_window, model_->objects.velocity_threshold}) {
+    if (!window) continue;
+    const auto found = co_await read_object(*window, patiently());
+    const bool missing =
+        !found && found.error().reason == Reason::refused;  // some list it, and do not have it
+    if (!found && !missing) co_return fail(found.error());
+  }
   if (const auto done = co_await bring_to(required_); !done) co_return done;
   if (const auto halting =
           co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());

@@ -169,7 +169,7 @@ Task<Result<std::optional<std::int64_t>>> Cia402Drive::read_turning(SdoOptions o
   if (!shown) co_return fail(shown.error());
   if (objects.moving) co_return *shown == 0 ? std::optional<std::int64_t>(0) : std::nullopt;
   const auto rpm = decode_velocity(*model_, setup_.pulses_per_revolution, *shown);
-  co_return std::abs(rpm) > velocity_noise_rpm ? rpm : 0;
+  co_return std::abs(rpm) > velocity_noise() ? rpm : 0;
 }
 
 /// Power is on, or a halt is released, and nothing was started: the shaft stays where it is, or is stopped.

@@ -179,10 +179,14 @@ bool Cia402Drive::known_by_way() const {
          decode_velocity(*model_, setup_.pulses_per_revolution, 1) > velocity_noise_rpm;
 }
 
+DriveSample Cia402Drive::decoded(const Values& values) const {
+  const auto noise = position_window() > 0 ? velocity_noise() : 0;  // else its velocities are exact, too
+  return decode_state(*model_, setup_.pulses_per_revolution, values, active_low_, noise);
+}
+
 /// `of_one_moment`: all of the reading's positions are.
 DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
-  auto sample =
-      decode_state(*model_, setup_.pulses_per_revolution, reading.values, active_low_, position_window() > 0);
+  auto sample = decoded(reading.values);
   sample.asked_at = reading.asked_at;
   sample.measured_at = reading.measured_at;
   const auto window = position_window();
@@ -191,7 +195,9 @@ DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
       sample,
       {.by_way = known_by_way(),
        .told = says ? told_motion(*model_, reading.values, words_.held_halt(reading.asked_at)) : std::nullopt,
-       .gauge = {.window = window, .pulses_per_revolution = setup_.pulses_per_revolution}});
+       .gauge = {.window = window,
+                 .pulses_per_revolution = setup_.pulses_per_revolution,
+                 .noise_rpm = velocity_noise()}});
   const bool compared = window > 0 && (of_one_moment || !sample.moving);
   if (!compared) sample.commanded_pulses.reset();
   note_knowledge(reading);

@@ -230,7 +230,7 @@ Task<bool> Cia402Drive::turns(SdoOptions options) {
   if (bit != 0) co_return (*shown & bit) != 0;
   if (objects.moving || !known_by_way()) co_return *shown != 0;
   const auto rpm = decode_velocity(*model_, setup_.pulses_per_revolution, *shown);
-  co_return motion_.moves() || std::abs(rpm) > velocity_noise_rpm;
+  co_return motion_.moves() || std::abs(rpm) > velocity_noise();
 }
 
 /// Under a stop: soon, or not at all. Errors: of change_mode().

@@ -27,6 +27,7 @@ constexpr auto standard_types = std::to_array<StandardType>({
     {object::position, {4, true}},
     {{0x6067, 0}, {4, false}},
     {{0x606C, 0}, {4, true}},
+    {{0x606F, 0}, {2, false}},
     {object::target_position, {4, true}},
     {object::home_offset, {4, true}},
     {object::profile_velocity, {4, false}},
@@ -161,7 +162,7 @@ std::optional<bool> told_motion(const Model& model, const Values& values, bool h
 }
 
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
-                         ActiveLow active_low, bool measured) {
+                         ActiveLow active_low, int velocity_noise) {
   const auto word = static_cast<std::uint16_t>(value_of(values, object::status_word));
   const auto is = [word](std::uint16_t bits) { return (word & bits) != 0; };
   const auto& bits = model.status;
@@ -175,7 +176,7 @@ DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution,
   sample.velocity_rpm = decode_velocity(model, pulses_per_revolution, velocity);
   sample.negative_direction = velocity < 0;
   // The manual shows motion in three places (6.2.2 bit 14, 2001h, 2002h): any one is enough to be careful.
-  const bool turns = measured ? std::abs(sample.velocity_rpm) > velocity_noise_rpm : velocity != 0;
+  const bool turns = velocity_noise > 0 ? std::abs(sample.velocity_rpm) > velocity_noise : velocity != 0;
   sample.moving = is(bits.moving) || turns || value_of(values, model.objects.moving) != 0;
   const auto mode = static_cast<OperationMode>(value_of(values, object::mode_display));
   // In homing the appendix (MC_HOME) reads the maker's bit as "homing failed": there the state tells.

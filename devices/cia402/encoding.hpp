@@ -47,10 +47,10 @@ inline constexpr std::uint8_t stop_transfers = 4;
 /// What the driver asks of the network for such a drive; `watched`: objects that are looked at for drift.
 CanTransactionSet transactions_of(const Model& model, std::uint8_t watched);
 
-/// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's. `measured`:
-/// velocities are, so that a small one is no motion.
+/// What state_objects() held, and 2001h where it was read. Times and `mode` are the caller's.
+/// `velocity_noise`: r/min that are no motion; 0: velocities are exact, and any is.
 DriveSample decode_state(const Model& model, std::int64_t pulses_per_revolution, const Values& values,
-                         ActiveLow active_low = {}, bool measured = false);
+                         ActiveLow active_low = {}, int velocity_noise = 0);
 /// Whether it moves, by the drive's own word: the maker's bits and objects, else those of CiA 402, which
 /// depend on the mode of operation and tell rest alone. Nothing: it does not say. `halted`: it holds halt
 /// (control word bit 8).

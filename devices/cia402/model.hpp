@@ -47,15 +47,17 @@ struct VendorObjects {
   /// Where the drive wants the shaft now (6062h); in pulses, as 6064h. One that a PDO can carry.
   std::optional<canopen::Object> commanded_position{};
   std::optional<canopen::Object> position_window{};  ///< in which it takes a target for reached (6067h)
-  std::optional<canopen::Object> inputs{};           ///< levels, bit per terminal in the descriptor's order
-  std::optional<canopen::Object> outputs{};          ///< likewise
-  std::optional<canopen::Object> start_speed{};      ///< of each ramp, r/min
-  std::optional<canopen::Object> microstep{};        ///< index into CanIdentification::microstep_codes
-  std::optional<canopen::Object> loop_mode{};        ///< 0 closed loop, 1 open loop
-  std::optional<canopen::Object> eeprom_switch{};    ///< 0: writes are saved, 1: they are not
-  std::optional<MemoryCommand> save{};               ///< everything, to the EEPROM
-  std::optional<MemoryCommand> restore{};            ///< the factory settings
-  std::optional<canopen::Object> alarm_clear{};      ///< 1 clears the alarm
+  /// Up to which it takes a velocity for 0 (606Fh), in the unit of velocities.
+  std::optional<canopen::Object> velocity_threshold{};
+  std::optional<canopen::Object> inputs{};         ///< levels, bit per terminal in the descriptor's order
+  std::optional<canopen::Object> outputs{};        ///< likewise
+  std::optional<canopen::Object> start_speed{};    ///< of each ramp, r/min
+  std::optional<canopen::Object> microstep{};      ///< index into CanIdentification::microstep_codes
+  std::optional<canopen::Object> loop_mode{};      ///< 0 closed loop, 1 open loop
+  std::optional<canopen::Object> eeprom_switch{};  ///< 0: writes are saved, 1: they are not
+  std::optional<MemoryCommand> save{};             ///< everything, to the EEPROM
+  std::optional<MemoryCommand> restore{};          ///< the factory settings
+  std::optional<canopen::Object> alarm_clear{};    ///< 1 clears the alarm
   /// 1 zeroes the position. Absent: homing method 35 does, where the drive has it.
   std::optional<canopen::Object> position_clear{};
   std::optional<canopen::Object> hardware_version{}, software_version{};  ///< numbers

@@ -17,7 +17,8 @@ struct SeenObjects {
   std::map<std::uint32_t, std::uint8_t> sizes;  ///< in bytes, as it takes or reports them
   Duration answer_time{};                       ///< of its SDO server, the longest of late
   bool other_homing_codes = false;              ///< it refused the first of HomingCode, and took the other
-  std::optional<std::int64_t> position_window;  ///< VendorObjects::position_window, as it was read last
+  /// VendorObjects::position_window and velocity_threshold, as they were read last.
+  std::optional<std::int64_t> position_window, velocity_threshold;
   // Of this power cycle.
   std::optional<bool> closed_loop;   ///< the loop mode, before the first write
   std::optional<bool> saving;        ///< the EEPROM switch; nothing: unknown

@@ -16,8 +16,8 @@ Duration time_of(std::int64_t band, std::int64_t pulses_per_revolution) {
   return std::clamp(time, milliseconds(20), milliseconds(1000));
 }
 
-/// Up to this a velocity may be noise and the last of a settling, for so many readings in a row.
-constexpr int settling_rpm = 3 * velocity_noise_rpm, settling_readings = 5;
+/// Up to so many times its noise a velocity may be the last of a settling, for so many readings in a row.
+constexpr int settling_factor = 3, settling_readings = 5;
 
 /// How far readings of a shaft that rests are apart at most.
 std::int64_t band_of(const Standstill::Gauge& gauge) {
@@ -28,17 +28,19 @@ std::int64_t band_of(const Standstill::Gauge& gauge) {
 
 bool Standstill::settles(const Look& look, const Gauge& gauge) const {
   const bool rests = since_ && !moves_ && look.told == false;
-  return rests && std::abs(look.velocity_rpm) <= settling_rpm && unsettled_ < settling_readings &&
+  return rests && std::abs(look.velocity_rpm) <= settling_factor * gauge.noise_rpm &&
+         unsettled_ < settling_readings &&
          std::abs(way_between(since_->position, look.position)) <= band_of(gauge);
 }
 
 bool Standstill::moves(const Look& look, const Gauge& gauge) {
-  if (std::abs(look.velocity_rpm) > velocity_noise_rpm) {
+  const auto speed = std::abs(look.velocity_rpm);
+  if (speed > gauge.noise_rpm) {
     if (!settles(look, gauge)) return note(look, true);
     ++unsettled_;
     return false;
   }
-  if (look.told) return note(look, *look.told);
+  if (look.told && (*look.told || speed <= velocity_noise_rpm)) return note(look, *look.told);
   if (!since_) return note(look, moves_);
   const auto band = band_of(gauge);
   if (std::abs(way_between(since_->position, look.position)) > band) return note(look, true);

@@ -8,8 +8,10 @@
 
 namespace axisd::cia402 {
 
-/// A velocity up to this may be noise, r/min: it proves neither rest nor motion.
+/// A velocity up to this may be noise of any drive, r/min: it proves neither rest nor motion.
 inline constexpr int velocity_noise_rpm = 1;
+/// A drive's own threshold (606Fh) counts up to this, r/min: templates and forgotten settings are beyond.
+inline constexpr int most_velocity_noise_rpm = 30;
 
 /// Pulses from one reading of the counter to another: it wraps.
 constexpr std::int64_t way_between(std::int32_t from, std::int32_t to) {
@@ -18,7 +20,8 @@ constexpr std::int64_t way_between(std::int32_t from, std::int32_t to) {
 
 /// Pure. A velocity beyond its noise is a motion. Below, the drive's own word counts; where it has none, the
 /// position does: at rest it stays within half of the in-position window, or where it is, if it is exact. How
-/// long it must do so after a motion follows from the slowest one, 1 r/min.
+/// long it must do so after a motion follows from the slowest one, 1 r/min. So it is, too, where a velocity
+/// is noise by the drive's own threshold alone: that it rests is not taken from its word then.
 ///
 /// What settles still turns a little where the drive takes it for in position, and its noise comes on top: a
 /// shaft that was at rest, and is by the drive's own word, goes on resting for some readings that are little
@@ -34,6 +37,7 @@ class Standstill {
   /// What positions mean, pulses; `window`: Drive::position_window(), 0 where they are exact.
   struct Gauge {
     std::int64_t window = 1, pulses_per_revolution = 1;
+    int noise_rpm = velocity_noise_rpm;  ///< up to which a velocity may be noise
   };
 
   /// Takes a look. True: it moves.

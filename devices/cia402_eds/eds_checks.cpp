@@ -54,6 +54,7 @@ constexpr auto used_if_there = std::to_array<Used>({
     {cia402::object::halt_option, kind},
     {object::commanded_position, kind | bit(EdsPart::mapping)},
     {object::position_window, kind},
+    {object::velocity_threshold, kind},
     {cia402::object::home_offset, kind},
     {cia402::object::homing_method, kind},
     {cia402::object::homing_speed, kind},

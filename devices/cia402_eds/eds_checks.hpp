@@ -42,7 +42,8 @@ using canopen::Object;
 
 inline constexpr Object store_all{0x1010, 1}, restore_all{0x1011, 1}, identity_vendor{0x1018, 1},
     identity_product{0x1018, 2}, commanded_position{0x6062, 0}, position_window{0x6067, 0},
-    velocity_value{0x606C, 0}, homing_methods{0x60E3, 0}, inputs_value{0x60FD, 0}, drive_modes{0x6502, 0};
+    velocity_threshold{0x606F, 0}, velocity_value{0x606C, 0}, homing_methods{0x60E3, 0},
+    inputs_value{0x60FD, 0}, drive_modes{0x6502, 0};
 
 }  // namespace object
 

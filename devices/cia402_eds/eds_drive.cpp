@@ -206,6 +206,8 @@ EdsDrive::EdsDrive(const DriveDescriptor& base, const Eds& eds, const Convention
   model_.objects.velocity = object::velocity_value;
   if (has_inputs) model_.objects.inputs = object::inputs_value;
   if (eds.find(object::position_window) != nullptr) model_.objects.position_window = object::position_window;
+  if (eds.find(object::velocity_threshold) != nullptr)
+    model_.objects.velocity_threshold = object::velocity_threshold;
   const auto* commanded = eds.find(object::commanded_position);
   if (conventions.closed_loop && commanded != nullptr && commanded->mappable)
     model_.objects.commanded_position = object::commanded_position;

@@ -36,6 +36,7 @@ constexpr auto rows = std::to_array<ObjectRow>({
     {0x6067, 0, 4, plain, rw, 0, u32_high, 10, stays},
     {0x6068, 0, 2, plain, rw, 0, 0xFFFF, 5, stays},
     {0x606C, 0, 4, sign, ro, i32_low, i32_high, 0, maps},
+    {0x606F, 0, 2, plain, rw, 0, 0xFFFF, 100, stays},
     {0x607A, 0, 4, sign, rw, i32_low, i32_high, 0, maps},
     {0x607C, 0, 4, sign, rw, i32_low, i32_high, 0, stays},
     {0x607D, 0, 1, plain, ro, 0, 2, 2, stays},

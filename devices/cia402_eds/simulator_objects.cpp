@@ -55,10 +55,13 @@ std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
 
 /// 606Ch: measured.
 std::int64_t StandardDrive::velocity() const {
-  constexpr double minute = 60, most = std::numeric_limits<std::int32_t>::max();
+  constexpr double minute = 60, most_noise = 30, most = std::numeric_limits<std::int32_t>::max();
   const auto& meter = behaviour_.velocity_wavers_at_rest ? tachometer_ : encoder_;
   const auto per_second = motor_.shaft_speed() * (units_.position / units_.velocity);
-  const auto noise = meter.velocity_noise(now_) / minute / units_.velocity;
+  auto amount = 1 / minute / units_.velocity;
+  if (behaviour_.velocity_wavers_by_threshold)
+    amount = std::clamp(static_cast<double>(dictionary_.get(0x606F)), amount, most_noise * amount);
+  const auto noise = meter.velocity_noise(now_) * amount;
   return std::llround(std::clamp(per_second + noise, -most, most));
 }
 

@@ -14,7 +14,7 @@ struct Behaviour {
   bool homing_attained_early, homing_attained_late;
   bool no_mode_changes_nothing, mode_change_is_target_reached;
   bool acknowledges_late, acknowledgement_ends_with_motion, set_points_change_at_once;
-  bool error_code_kept, velocity_wavers_at_rest, settles_over_30_counts;
+  bool error_code_kept, velocity_wavers_at_rest, velocity_wavers_by_threshold, settles_over_30_counts;
   bool velocity_resumes_after_limit, limit_stops_on_ramp, segmented_uploads;
 };
 

@@ -92,7 +92,7 @@ void give_habits(simulation::SimulatedNodeSettings& settings, Dice& dice) {
        {"halt_release_drops", "halt_release_keeps_velocity_at_0", "set_point_in_halt_refused",
         "homing_attained_forgotten", "homing_goes_on_without_start_bit", "homing_pauses", "acknowledges_late",
         "acknowledgement_ends_with_motion", "set_points_change_at_once", "error_code_kept",
-        "velocity_wavers_at_rest", "segmented_uploads"})
+        "velocity_wavers_at_rest", "velocity_wavers_by_threshold", "segmented_uploads"})
     settings.switches[name] = dice.chance(0.3);
   settings.switches[dice.chance(0.5) ? "homing_attained_early" : "homing_attained_late"] = dice.chance(0.5);
 }

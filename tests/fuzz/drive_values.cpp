@@ -42,7 +42,7 @@ void objects(Input& input) {
   };
   for (const auto object : cia402::state_objects(model)) hold(object);
   (void)cia402::decode_state(model, pulses, values, {.inputs = input.byte(), .outputs = input.byte()},
-                             input.byte() % 2 == 0);
+                             input.byte() % 2);
   (void)cia402::told_motion(model, values, input.byte() % 2 == 0);
   (void)cia402::home_bit(model, values);
   (void)cia402::homing_failed(model, values);

@@ -57,6 +57,34 @@ TEST(Standstill, TheLastOfASettlingIsNoMotion) {
   EXPECT_TRUE(standstill.moves(look(60ms, 8, 4, false), gauge)) << "that is more than both";
 }
 
+/// By its own threshold a velocity of 20 r/min is noise: then the position tells.
+TEST(Standstill, WithinTheDrivesOwnThresholdThePositionTells) {
+  constexpr Standstill::Gauge coarse{.window = 10, .pulses_per_revolution = 1000, .noise_rpm = 20};
+  for (const auto told : {std::optional<bool>(), std::optional(false)}) {
+    Standstill standstill;
+    for (int i = 0; i < 90; ++i)
+      EXPECT_FALSE(standstill.moves(look(20ms * i, 500 + i % 3, i % 2 == 0 ? 20 : -20, told), coarse)) << i;
+    EXPECT_TRUE(standstill.moves(look(1800ms, 520, 15, told), coarse)) << "it has left its place";
+    EXPECT_TRUE(standstill.moves(look(1900ms, 521, -15, told), coarse));
+    EXPECT_FALSE(standstill.moves(look(2500ms, 521, 15, told), coarse)) << "it has stayed";
+    EXPECT_TRUE(standstill.moves(look(2520ms, 521, 70, told), coarse)) << "more than noise and settling";
+  }
+  Standstill standstill;
+  EXPECT_FALSE(standstill.moves(look(0ms, 500, 0, false), coarse));
+  EXPECT_TRUE(standstill.moves(look(20ms, 500, 10, true), coarse)) << "the drive says that it moves";
+}
+
+/// Whatever the threshold, a slow turn leaves the place in the end.
+TEST(Standstill, AHandThatTurnsWithinTheThresholdIsFoundOut) {
+  constexpr Standstill::Gauge coarse{.window = 10, .pulses_per_revolution = 1000, .noise_rpm = 20};
+  Standstill standstill;
+  EXPECT_FALSE(standstill.moves(look(0ms, 500, 0, false), coarse));
+  bool found = false;
+  for (int i = 1; i <= 5; ++i)  // 10 r/min
+    found |= standstill.moves(look(20ms * i, 500 + 10 * 1000 / 60 * i / 50, 10, false), coarse);
+  EXPECT_TRUE(found);
+}
+
 TEST(Standstill, WhatGoesOnIsAMotionThoughTheDriveDeniesIt) {
   for (const int rpm : {2, 3, -2, -3}) {
     Standstill standstill;

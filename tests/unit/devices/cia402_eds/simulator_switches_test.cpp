@@ -148,6 +148,19 @@ TEST(StandardDriveSwitches, VelocityWaversOrIsExactAtRest) {
   }
 }
 
+TEST(StandardDriveSwitches, VelocityWaversByItsThreshold) {
+  for (const bool wavers : {false, true}) {
+    auto bench = Bench({.encoder = {.noise = 1}, .switches = {{"velocity_wavers_by_threshold", wavers}}});
+    int off = 0;
+    for (int i = 0; i < 100; ++i) {
+      bench.run(5ms);
+      EXPECT_LE(std::abs(bench.velocity()), wavers ? 100 : 17);
+      off += std::abs(bench.velocity()) == 100 ? 1 : 0;
+    }
+    EXPECT_EQ(off > 20, wavers);
+  }
+}
+
 TEST(StandardDriveSwitches, PositionSettlesOrIsThereAtOnce) {
   for (const bool settles : {false, true}) {
     auto bench = with("settles_over_30_counts", settles);
