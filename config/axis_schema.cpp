@@ -157,16 +157,14 @@ constexpr KeySpec simulate_keys[] = {
      .kind = Kind::choice,
      .description =
          "What velocities of a drive that its data sheet makes count, where the sheet does not tell "
-         "it: the drive that is simulated, whatever drive: says.",
+         "it: the drive that is simulated, whatever drive: says. Left out, as drive: says.",
      .example = "rpm",
-     .default_value = "pulses_per_second",
      .choices = simulation::velocity_unit_names,
      .apply = [](Target& t, const Value& v) { t.axis->simulation.velocity_unit = v.text; }},
     {.key = "acceleration_unit",
      .kind = Kind::choice,
      .description = "Likewise of its ramps.",
      .example = "rpm_per_second",
-     .default_value = "velocity_per_second",
      .choices = simulation::acceleration_unit_names,
      .apply = [](Target& t, const Value& v) { t.axis->simulation.acceleration_unit = v.text; }},
     {.key = "enabled_at_power_up",

@@ -71,8 +71,8 @@ struct SimulationSettings {
   std::optional<double> positive_limit, negative_limit;
   double start_position = 0;        ///< where the load stands at power-up
   bool enabled_at_power_up = true;  ///< of the models that may power up with their stage on
-  /// As simulation::set_unit_option() takes them.
-  std::string velocity_unit = "pulses_per_second", acceleration_unit = "velocity_per_second";
+  /// As simulation::set_unit_option() takes them. Empty: as `drive:` says.
+  std::string velocity_unit, acceleration_unit;
   /// Of a drive that its data sheet makes, on a simulated bus: read when the file is loaded.
   std::shared_ptr<const canopen::Eds> sheet{};
 };

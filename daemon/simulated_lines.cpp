@@ -18,6 +18,16 @@ namespace {
 /// What is measured wavers and lags as on a real drive, so that who tries axisd without hardware sees it.
 constexpr simulation::EncoderSettings usual_encoder{
     .noise = 1, .following = std::chrono::milliseconds(3), .quantised = true};
+
+/// What nobody says of the drive that is simulated is as `drive:` says of the one that is meant.
+void set_unit(const config::AxisEntry& entry, std::string_view key, const std::string& simulated,
+              simulation::UnitSettings& units) {
+  const auto meant = entry.axis.model_settings.find(std::string(key));
+  const auto* named =
+      meant == entry.axis.model_settings.end() ? nullptr : std::get_if<std::string>(&meant->second);
+  const auto& name = simulated.empty() && named != nullptr ? *named : simulated;
+  if (!name.empty()) simulation::set_unit_option(units, key, name);  // the schema has no other names
+}
 }  // namespace
 
 simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry) {
@@ -27,9 +37,8 @@ simulation::SimulatedNodeSettings simulated_node(const config::AxisEntry& entry)
   simulation::SimulatedNodeSettings node{.address = entry.axis.node, .encoder = usual_encoder};
   node.sheet = simulate.sheet;
   node.units.counts_per_revolution = static_cast<double>(entry.axis.scale.pulses_per_revolution);
-  // The schema has no other names.
-  simulation::set_unit_option(node.units, "velocity_unit", simulate.velocity_unit);
-  simulation::set_unit_option(node.units, "acceleration_unit", simulate.acceleration_unit);
+  set_unit(entry, "velocity_unit", simulate.velocity_unit, node.units);
+  set_unit(entry, "acceleration_unit", simulate.acceleration_unit, node.units);
   auto& mechanics = node.mechanics;
   if (simulate.home_switch) {
     const auto edges =

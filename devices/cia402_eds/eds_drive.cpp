@@ -25,12 +25,14 @@ std::string_view text_setting(const std::map<std::string, SettingValue>& setting
   return text == nullptr ? std::string_view() : std::string_view(*text);
 }
 
+/// Without a number (0, an empty default, or the FFFFFFFFh of templates) nothing is compared.
 std::optional<std::uint32_t> identity_of(const Eds& eds, Object object, std::optional<std::uint32_t> device) {
-  // Without a number (0, or an empty default) nothing is compared.
+  constexpr std::uint32_t nobody = 0xFFFFFFFF;
+  const auto is_number = [](std::uint32_t value) { return value != 0 && value != nobody; };
   const auto* entry = eds.find(object);
-  if (entry != nullptr && entry->known() && entry->known()->value != 0)
-    return static_cast<std::uint32_t>(entry->known()->value);
-  return device.value_or(0) == 0 ? std::nullopt : device;
+  if (entry != nullptr && entry->known())
+    if (const auto told = static_cast<std::uint32_t>(entry->known()->value); is_number(told)) return told;
+  return device && is_number(*device) ? device : std::nullopt;
 }
 
 bool can_home(const Eds& eds) {

@@ -9,10 +9,8 @@ namespace axisd::cia402_eds {
 
 namespace {
 
-using simulation::AccelerationUnit;
 using simulation::CanopenDictionary;
 using simulation::UnitSettings;
-using simulation::VelocityUnit;
 
 constexpr double minute = 60, degrees = 360;
 
@@ -78,10 +76,18 @@ std::optional<double> turns_of(unsigned unit, double encoder) {
   }
 }
 
-double position_of(const CanopenDictionary& dictionary, double encoder) {
+/// What a position factor (6093h) makes of a revolution depends on its maker: it is as many counts as is
+/// meant.
+bool has_position_factor(const CanopenDictionary& dictionary) {
+  const auto feed = dictionary.get(0x6093, 1), counts = dictionary.get(0x6093, 2);
+  return feed > 0 && counts > 0 && feed != counts;
+}
+
+double position_of(const CanopenDictionary& dictionary, const UnitSettings& settings, double encoder) {
   if (const auto unit = si_unit(dictionary, 0x60A8))
     if (const auto turns = turns_of(unit->numerator, encoder)) return unit->factor * *turns;
   if (dimension(dictionary, 0x608A) == degree_index) return notation(dictionary, 0x6089) / degrees;
+  if (has_position_factor(dictionary)) return 1 / settings.counts_per_revolution;
   return 1 / per_revolution(dictionary, 0x6092).value_or(encoder);  // the feed of a revolution
 }
 
@@ -95,20 +101,8 @@ std::optional<double> told_velocity(const CanopenDictionary& dictionary, double 
   return std::nullopt;
 }
 
-double velocity_of(const UnitSettings& settings, double position) {
-  switch (settings.velocity) {
-    case VelocityUnit::rpm:
-      return 1 / minute;
-    case VelocityUnit::tenth_rpm:
-      return 0.1 / minute;
-    case VelocityUnit::milli_revolutions_per_second:
-      return 0.001;
-    case VelocityUnit::degrees_per_second:
-      return 1 / degrees;
-    case VelocityUnit::position_per_second:
-      break;
-  }
-  return position;
+double of_settings(simulation::RateUnit unit, double position) {
+  return unit.revolutions > 0 ? unit.revolutions : position;
 }
 
 std::optional<double> told_acceleration(const CanopenDictionary& dictionary, double encoder) {
@@ -127,10 +121,9 @@ std::optional<double> told_acceleration(const CanopenDictionary& dictionary, dou
 
 ShaftUnits units_of(const CanopenDictionary& dictionary, const UnitSettings& settings) {
   const auto encoder = encoder_of(dictionary, settings);
-  const auto position = position_of(dictionary, encoder);
-  const auto velocity = told_velocity(dictionary, encoder).value_or(velocity_of(settings, position));
-  const auto otherwise =
-      settings.acceleration == AccelerationUnit::rpm_per_second ? 1 / minute : velocity;  // per second
+  const auto position = position_of(dictionary, settings, encoder);
+  const auto velocity = told_velocity(dictionary, encoder).value_or(of_settings(settings.velocity, position));
+  const auto otherwise = settings.acceleration ? of_settings(*settings.acceleration, position) : velocity;
   return {.position = position,
           .velocity = velocity,
           .acceleration = told_acceleration(dictionary, encoder).value_or(otherwise)};

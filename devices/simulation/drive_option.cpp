@@ -4,8 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <iterator>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -32,15 +34,17 @@ bool parse_position(std::string_view value, std::optional<std::int64_t>& into) {
   return into.has_value();
 }
 
-static_assert(std::size(velocity_unit_names) == std::to_underlying(VelocityUnit::degrees_per_second) + 1);
-static_assert(std::size(acceleration_unit_names) == std::to_underlying(AccelerationUnit::rpm_per_second) + 1);
+bool set_velocity_unit(std::string_view value, UnitSettings& units) {
+  const auto unit = rate_unit_named(value);
+  if (unit) units.velocity = *unit;
+  return unit.has_value();
+}
 
-template <class Unit>
-bool parse_unit(std::string_view value, std::span<const std::string_view> names, Unit& into) {
-  const auto found = std::ranges::find(names, value);
-  if (found == names.end()) return false;
-  into = static_cast<Unit>(found - names.begin());
-  return true;
+bool set_acceleration_unit(std::string_view value, UnitSettings& units) {
+  const bool as_velocities = value == acceleration_unit_names[0];
+  const auto unit = rate_unit_named(value == acceleration_unit_names[1] ? "rpm" : value);
+  if (unit || as_velocities) units.acceleration = unit;
+  return unit || as_velocities;
 }
 
 bool parse_switch(std::string_view name, std::string_view value, Switches& switches) {
@@ -129,9 +133,25 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
 
 }  // namespace
 
+std::optional<RateUnit> rate_unit_named(std::string_view name) {
+  if (std::ranges::find(velocity_unit_names, name) == std::end(velocity_unit_names)) return std::nullopt;
+  constexpr double minute = 60, degrees = 360;
+  constexpr std::pair<std::string_view, double> angles[] = {{"rpm", 1 / minute},
+                                                            {"rev_per_second", 1},
+                                                            {"degrees_per_second", 1 / degrees},
+                                                            {"radians_per_second", std::numbers::inv_pi / 2}};
+  const auto angle =
+      std::ranges::find_if(angles, [name](const auto& one) { return name.ends_with(one.first); });
+  if (angle == std::end(angles)) return RateUnit{};
+  double factor = 1;
+  (void)std::from_chars(name.data(), name.data() + name.size() - angle->first.size(),
+                        factor);  // "0.01", or none
+  return RateUnit{factor * angle->second};
+}
+
 bool set_unit_option(UnitSettings& units, std::string_view name, std::string_view value) {
-  if (name == "velocity_unit") return parse_unit(value, velocity_unit_names, units.velocity);
-  if (name == "acceleration_unit") return parse_unit(value, acceleration_unit_names, units.acceleration);
+  if (name == "velocity_unit") return set_velocity_unit(value, units);
+  if (name == "acceleration_unit") return set_acceleration_unit(value, units);
   const auto counts = parse_number<std::uint32_t>(value);
   if (name != "counts" || counts.value_or(0) == 0) return false;
   units.counts_per_revolution = *counts;

@@ -22,13 +22,32 @@ struct DriveOption {
 /// switches, terminals and what switches can be set to are checked by make_node().
 Result<DriveOption> parse_drive(std::string_view text);
 
-/// Of each VelocityUnit and each AccelerationUnit, in their order.
-inline constexpr std::string_view velocity_unit_names[] = {"pulses_per_second", "rpm", "0.1rpm",
-                                                           "0.001rev_per_second", "degrees_per_second"};
+/// Units of velocities: counts of the position, then each angle in 10^0 to 10^-3.
+inline constexpr std::string_view velocity_unit_names[] = {"pulses_per_second",
+                                                           "rpm",
+                                                           "0.1rpm",
+                                                           "0.01rpm",
+                                                           "0.001rpm",
+                                                           "rev_per_second",
+                                                           "0.1rev_per_second",
+                                                           "0.01rev_per_second",
+                                                           "0.001rev_per_second",
+                                                           "degrees_per_second",
+                                                           "0.1degrees_per_second",
+                                                           "0.01degrees_per_second",
+                                                           "0.001degrees_per_second",
+                                                           "radians_per_second",
+                                                           "0.1radians_per_second",
+                                                           "0.01radians_per_second",
+                                                           "0.001radians_per_second"};
 inline constexpr std::string_view acceleration_unit_names[] = {"velocity_per_second", "rpm_per_second"};
 
+/// Nothing: no unit has this name.
+std::optional<RateUnit> rate_unit_named(std::string_view name);
+
 /// Takes over what a data sheet may not tell, by name: counts=N, velocity_unit=NAME, acceleration_unit=NAME.
-/// False: no such option, or no such value; nothing is changed then.
+/// An acceleration may also be named as a velocity: what it counts in a second. False: no such option, or no
+/// such value; nothing is changed then.
 bool set_unit_option(UnitSettings& units, std::string_view name, std::string_view value);
 
 }  // namespace axisd::simulation

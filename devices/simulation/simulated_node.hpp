@@ -120,21 +120,17 @@ struct Mechanics {
   std::optional<double> turn{};  ///< pulses after which a rotary load meets its home switch again, > 0
 };
 
-/// What the velocity objects of a CANopen drive count, where it does not say so itself.
-enum class VelocityUnit : std::uint8_t {
-  position_per_second,
-  rpm,
-  tenth_rpm,
-  milli_revolutions_per_second,
-  degrees_per_second,
+/// What one count of a velocity is in a second, or one of a ramp in a second squared.
+struct RateUnit {
+  double revolutions = 0;  ///< of the motor; 0: a count of the position
+
+  bool operator==(const RateUnit&) const = default;
 };
-/// Likewise its ramps.
-enum class AccelerationUnit : std::uint8_t { velocity_per_second, rpm_per_second };
 /// The units of a drive that is made by its data sheet, as far as the sheet does not tell them.
 struct UnitSettings {
   double counts_per_revolution = 1000;  ///< of the encoder, per motor revolution; > 0
-  VelocityUnit velocity = VelocityUnit::position_per_second;
-  AccelerationUnit acceleration = AccelerationUnit::velocity_per_second;
+  RateUnit velocity{};
+  std::optional<RateUnit> acceleration{};  ///< nothing: that of velocities
 };
 
 enum class SwitchKind : std::uint8_t { home, positive_limit, negative_limit };

@@ -194,6 +194,19 @@ TEST(EdsChecks, ADcfTellsWhoTheDriveIs) {
   EXPECT_EQ(drive.model().identity.product, 0x00402001U);
 }
 
+/// FFFFFFFFh is the number of nobody: of a sheet that is for several products.
+TEST(EdsChecks, ASheetWithoutANumberFitsEveryProduct) {
+  for (const auto* number : {"0", "0xFFFFFFFF"}) {
+    auto eds =
+        canopen::parse_eds(changed("1018sub2", "DefaultValue", fmt::format("DefaultValue={}", number)));
+    ASSERT_TRUE(eds);
+    eds->product = 0xFFFFFFFF;
+    const EdsDrive drive(*find_drive_model("cia402"), *eds, {});
+    EXPECT_EQ(drive.model().identity.product, std::nullopt) << number;
+    EXPECT_NE(drive.model().identity.vendor, std::nullopt);
+  }
+}
+
 TEST(EdsChecks, TheFileIsNamedInErrorsAndWarnings) {
   const auto path =
       std::filesystem::path(::testing::TempDir()) / fmt::format("axisd-checks-{}.eds", getpid());

@@ -11,9 +11,8 @@
 namespace axisd::cia402_eds {
 namespace {
 
-using simulation::AccelerationUnit;
+using simulation::RateUnit;
 using simulation::UnitSettings;
-using simulation::VelocityUnit;
 
 struct Told {
   std::uint16_t index;
@@ -82,24 +81,30 @@ TEST(ShaftUnits, FollowTheOlderIndices) {
   EXPECT_DOUBLE_EQ(units_with({{0x60A9, 0x00B40300}, {0x608C, 0xA4}}).velocity, 1) << "SI units first";
 }
 
+TEST(ShaftUnits, APositionFactorLeavesTheRevolutionThatIsMeant) {
+  const std::initializer_list<Told> factor{
+      {0x608F, 3000, 1}, {0x608F, 18, 2}, {0x6093, 3000, 1}, {0x6093, 18'000, 2}};
+  EXPECT_DOUBLE_EQ(units_with(factor).position, 1.0 / 4000);
+  EXPECT_DOUBLE_EQ(units_with({{0x608F, 2048, 1}, {0x608F, 1, 2}, {0x6093, 1, 1}, {0x6093, 1, 2}}).position,
+                   1.0 / 2048)
+      << "a factor of 1";
+}
+
 TEST(ShaftUnits, AreAsSetWhereNothingIsTold) {
-  const auto with = [](VelocityUnit velocity, AccelerationUnit acceleration) {
+  const auto with = [](RateUnit velocity, std::optional<RateUnit> acceleration) {
     return units_with({},
                       {.counts_per_revolution = 4000, .velocity = velocity, .acceleration = acceleration});
   };
-  const auto per_second = AccelerationUnit::velocity_per_second;
-  EXPECT_DOUBLE_EQ(with(VelocityUnit::rpm, per_second).velocity, 1.0 / 60);
-  EXPECT_DOUBLE_EQ(with(VelocityUnit::rpm, per_second).acceleration, 1.0 / 60);
-  EXPECT_DOUBLE_EQ(with(VelocityUnit::tenth_rpm, per_second).velocity, 0.1 / 60);
-  EXPECT_DOUBLE_EQ(with(VelocityUnit::milli_revolutions_per_second, per_second).velocity, 0.001);
-  EXPECT_DOUBLE_EQ(with(VelocityUnit::degrees_per_second, per_second).velocity, 1.0 / 360);
-  EXPECT_DOUBLE_EQ(with(VelocityUnit::position_per_second, AccelerationUnit::rpm_per_second).acceleration,
-                   1.0 / 60);
+  EXPECT_DOUBLE_EQ(with({1.0 / 60}, {}).velocity, 1.0 / 60);
+  EXPECT_DOUBLE_EQ(with({1.0 / 60}, {}).acceleration, 1.0 / 60) << "per second";
+  EXPECT_DOUBLE_EQ(with({}, {}).velocity, 1.0 / 4000);
+  EXPECT_DOUBLE_EQ(with({}, RateUnit{1.0 / 60}).acceleration, 1.0 / 60);
+  EXPECT_DOUBLE_EQ(with({1}, RateUnit{}).acceleration, 1.0 / 4000);
 }
 
 /// The drive itself: 120 r/min of a shaft with 1000 increments are 2 revolutions in a second.
 TEST(ShaftUnits, MakeTheTrueSpeed) {
-  Bench bench({.units = {.velocity = VelocityUnit::rpm}});
+  Bench bench({.units = {.velocity = {1.0 / 60}}});
   EXPECT_EQ(bench.write(0x6083, 4, 6'000), 0U);
   EXPECT_EQ(bench.write(0x60FF, 4, 120), 0U);
   bench.enable(3);

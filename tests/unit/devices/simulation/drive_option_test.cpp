@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "buses/canopen/eds.hpp"
 #include "devices/simulation/simulator.hpp"
 #include "tests/support/source_tree.hpp"
@@ -52,18 +54,29 @@ TEST(DriveOption, ReadsTheDataSheetAndItsUnits) {
   ASSERT_NE(settings.sheet, nullptr);
   EXPECT_EQ(settings.sheet->product, 0x00402001U);
   EXPECT_EQ(settings.units.counts_per_revolution, 4096);
-  EXPECT_EQ(settings.units.velocity, VelocityUnit::tenth_rpm);
-  EXPECT_EQ(settings.units.acceleration, AccelerationUnit::rpm_per_second);
+  EXPECT_DOUBLE_EQ(settings.units.velocity.revolutions, 0.1 / 60);
+  ASSERT_TRUE(settings.units.acceleration);
+  EXPECT_DOUBLE_EQ(settings.units.acceleration->revolutions, 1.0 / 60);
   EXPECT_EQ(parse_drive("node=3,model=cia402")->settings.sheet, nullptr);
   UnitSettings units;
   EXPECT_TRUE(set_unit_option(units, "velocity_unit", "degrees_per_second"));
-  EXPECT_EQ(units.velocity, VelocityUnit::degrees_per_second);
+  EXPECT_DOUBLE_EQ(units.velocity.revolutions, 1.0 / 360);
   EXPECT_TRUE(set_unit_option(units, "velocity_unit", "pulses_per_second"));
-  EXPECT_EQ(units.velocity, VelocityUnit::position_per_second);
+  EXPECT_EQ(units.velocity, RateUnit{});
   EXPECT_TRUE(set_unit_option(units, "velocity_unit", "0.001rev_per_second"));
-  EXPECT_EQ(units.velocity, VelocityUnit::milli_revolutions_per_second);
+  EXPECT_DOUBLE_EQ(units.velocity.revolutions, 0.001);
+  EXPECT_TRUE(set_unit_option(units, "velocity_unit", "0.01radians_per_second"));
+  EXPECT_DOUBLE_EQ(units.velocity.revolutions, 0.01 / 2 / std::numbers::pi);
+  for (const auto name : velocity_unit_names)
+    EXPECT_TRUE(set_unit_option(units, "velocity_unit", name)) << name;
+  for (const auto* name : {"", "0.1pulses_per_second", "10rpm", "0.5rpm", "turns"})
+    EXPECT_FALSE(set_unit_option(units, "velocity_unit", name)) << name;
+  EXPECT_TRUE(set_unit_option(units, "acceleration_unit", "pulses_per_second"));
+  EXPECT_EQ(units.acceleration, RateUnit{});
+  EXPECT_TRUE(set_unit_option(units, "acceleration_unit", "velocity_per_second"));
+  EXPECT_EQ(units.acceleration, std::nullopt);
   EXPECT_TRUE(set_unit_option(units, "velocity_unit", "rpm"));
-  EXPECT_EQ(units.velocity, VelocityUnit::rpm);
+  EXPECT_DOUBLE_EQ(units.velocity.revolutions, 1.0 / 60);
   const auto missing = parse_drive("node=3,model=cia402,eds=/none.eds");
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().message.find("/none.eds"), std::string::npos);
@@ -77,7 +90,7 @@ TEST(DriveOption, NamesThePartThatIsWrong) {
                                   "eds=",
                                   "counts=0",
                                   "velocity_unit=furlongs",
-                                  "acceleration_unit=rpm",
+                                  "acceleration_unit=turns",
                                   "turn=x",
                                   "positive_limit=far",
                                   "switch.a=maybe",
