@@ -121,7 +121,8 @@ void ProcessTarget::start() {
   if (!wait_until(connected, patience))
     throw std::runtime_error("axisd serves nothing: " + daemon_->output());
   if (daemon_->status() == 2) throw std::invalid_argument(daemon_->output());
-  if (daemon_->status()) throw std::runtime_error("axisd has ended: " + daemon_->output());
+  if (const auto status = daemon_->status())
+    throw std::runtime_error(fmt::format("axisd has ended (status {}): {}", *status, daemon_->output()));
 }
 
 }  // namespace
