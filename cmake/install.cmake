@@ -2,6 +2,9 @@
 # administrator's.
 set(AXISD_PAGE ${CMAKE_SOURCE_DIR}/build/web CACHE PATH "The page of axisd-web, as npm has built it (api/web/README.md)")
 if(AXISD_GRPC)
+  # All that is built for it, but for the page and the Python client.
+  add_custom_target(installation
+                    DEPENDS axisd axisctl axisd-sim axisd-web axisd-cell axisd-link api_reference axisctl_manual)
   install(TARGETS axisd axisctl axisd-sim axisd-web axisd-cell RUNTIME DESTINATION bin)
   install(TARGETS axisd-link RUNTIME DESTINATION lib/axisd)
   install(FILES deploy/axisd.service deploy/axisd-link.service deploy/axisd-link.socket deploy/axisd-web.service

@@ -1,11 +1,14 @@
 #!/bin/bash
 # Builds axisd and installs it on this computer as a systemd service, where it is not Debian with deploy/package.sh's
-# packages: daemon, axisctl, axisd-sim, axisd-link, axisd-web and its page, manual pages, completion, documentation, the
-# Python client. Starts nothing and restarts nothing: a running axisd keeps its axes until the administrator restarts it.
+# packages: daemon, axisctl, axisd-sim, axisd-link, axisd-web and its page, axisd-cell, manual pages, completion,
+# documentation, the Python client. Starts nothing and restarts nothing: a running axisd keeps its axes until the
+# administrator restarts it.
 #   sudo deploy/install.sh                 into /usr
 #   sudo deploy/install.sh --uninstall     removes what it installed; configuration and state stay
 #   DESTDIR=DIR deploy/install.sh          into DIR/usr, for packaging: users and services are left alone
+#   BUILD=DIR ... deploy/install.sh        takes what was built there (target installation), and builds nothing
 set -euo pipefail
+build=${BUILD:+$(readlink -f "$BUILD")}
 cd "$(dirname "$(readlink -f "$0")")/.."
 
 die() { echo "install.sh: $*" >&2; exit 1; }
@@ -21,8 +24,11 @@ under_systemd() { [ -z "$staged" ] && [ -d /run/systemd/system ]; }
 uninstall() {
   [ -f "$list" ] || die "$list is not there: nothing was installed by this script"
   if under_systemd; then
-    systemctl disable --now axisd.service axisd-link.socket axisd-web.service 2>/dev/null || true  # stops the axes
-    systemctl stop axisd-link.service 2>/dev/null || true
+    local unit
+    for unit in axisd-cell.service axisd-web.service axisd.service axisd-link.socket axisd-link.service \
+        axisd-etcd-backup.timer axisd-etcd.service; do  # the end of axisd stops the axes
+      systemctl disable --now "$unit" 2>/dev/null || true
+    done
   fi
   local -A folders=()
   local file folder
@@ -42,7 +48,7 @@ uninstall() {
     journalctl --update-catalog || true
   fi
   [ -n "$staged" ] ||
-    echo "Left: /etc/axisd, /var/lib/axisd and the user axisd. Without them (userdel axisd) nothing is left."
+    echo "Left: /etc/axisd, what begins with axisd in /var/lib and /var/lib/private, and the user axisd (userdel axisd)."
 }
 
 if [ "${1:-}" = --uninstall ]; then
@@ -50,21 +56,25 @@ if [ "${1:-}" = --uninstall ]; then
   exit 0
 fi
 
-packaged=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' axisd axisctl axisd-web python3-axisd axisd-doc 2>/dev/null |
+packaged=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' axisd axisctl axisd-web axisd-cell python3-axisd axisd-doc 2>/dev/null |
   sed -n 's/^installed //p' | xargs) || true
 [ -n "$staged" ] || [ -z "$packaged" ] ||
   die "packages of axisd are installed: remove them first (apt remove $packaged), or make newer ones (deploy/package.sh)"
 if (. /etc/os-release 2>/dev/null && [ "${ID:-}" = debian ] && [ "${VERSION_ID:-}" = 12 ]); then
-  deploy/install-packages.sh build
+  [ -n "$build" ] || deploy/install-packages.sh build
   deploy/install-packages.sh run
 else
   echo "install.sh: not Debian 12: deploy/install-packages.sh names what has to be here, as Debian calls it" >&2
 fi
-cmake --preset release
-cmake --build --preset release --target axisd axisctl axisd-sim axisd-link axisd-web api_reference axisctl_manual
-deploy/page.sh build/web
-rm -f build/release/install_manifest.txt
-cmake --install build/release --prefix /usr --strip
+if [ -z "$build" ]; then
+  cmake --preset release
+  cmake --build --preset release --target installation
+  deploy/page.sh build/web
+  build=build/release
+fi
+installed=$build/install_manifest.txt
+rm -f "$installed"
+cmake --install "$build" --prefix /usr --strip
 
 # The Python client goes where the system's interpreter looks for what its distribution installs.
 scheme=$(/usr/bin/python3 -c 'import sysconfig; print("deb_system" if "deb_system" in sysconfig.get_scheme_names() else sysconfig.get_default_scheme())')
@@ -75,20 +85,20 @@ cp -r api/python/axisd "$stubs"
 /usr/bin/python3 -B api/python/generate.py "$stubs"
 (cd "$stubs" && find axisd -type f -not -path '*/__pycache__/*' -printf '%P\n') | while read -r file; do
   install -D -m 0644 "$stubs/axisd/$file" "$staged$modules/axisd/$file"
-  printf '\n%s' "$modules/axisd/$file" >>build/release/install_manifest.txt
+  printf '\n%s' "$modules/axisd/$file" >>"$installed"
 done
 # What an earlier version had and this one has not is removed.
 if [ -f "$list" ]; then
-  { grep -vxF -f build/release/install_manifest.txt "$list" || true; } | while read -r file; do rm -f "$staged$file"; done
+  { grep -vxF -f "$installed" "$list" || true; } | while read -r file; do rm -f "$staged$file"; done
 fi
-grep . build/release/install_manifest.txt >"$list"
+grep . "$installed" >"$list"
 [ -z "$staged" ] || exit 0
 
 systemd-sysusers /usr/lib/sysusers.d/axisd.conf
 install -d -m 0755 /etc/axisd
 systemd-tmpfiles --create /usr/lib/tmpfiles.d/axisd.conf
-for file in axisd.yaml links web.yaml; do
-  [ -e "/etc/axisd/$file" ] || install -m 0644 "deploy/$file" "/etc/axisd/$file"
+for file in axisd.yaml links web.yaml cell/cell.yaml; do
+  [ -e "/etc/axisd/${file#cell/}" ] || install -m 0644 "deploy/$file" "/etc/axisd/${file#cell/}"
 done
 if command -v udevadm >/dev/null; then
   udevadm control --reload
