@@ -1,7 +1,7 @@
 #!/bin/bash
 # The units of axisd, axisd-cell and its etcd under a real systemd, in a Debian 12 of its own that is booted in namespaces. As
 # root, by hand; some minutes. What systemd takes from a process shows only here.
-#   tests/deploy/units.sh [BUILD]      default: build/release; it is installed there as deploy/install.sh does
+#   tests/deploy/units.sh [BUILD]      default: build/release; deploy/install.sh installs it there, and removes it
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
@@ -37,7 +37,8 @@ mmdebstrap --quiet --variant=minbase \
   --include="systemd,systemd-sysv,dbus,iproute2,procps,openssl,etcd-server,etcd-client,${libraries// /,}" \
   --setup-hook='mkdir -p "$1/etc/systemd/system" && ln -s /dev/null "$1/etc/systemd/system/etcd.service"' \
   bookworm "$root" "$sources"
-DESTDIR=$root cmake --install "$build" --prefix /usr --strip >/dev/null
+DESTDIR=$root BUILD=$build deploy/install.sh >/dev/null
+install -D deploy/install.sh "$root/srv/axisd/deploy/install.sh"
 mkdir -p "$root/etc/axisd"
 cp deploy/axisd.yaml deploy/links "$root/etc/axisd"
 echo '127.0.0.1 localhost' >"$root/etc/hosts"
@@ -198,6 +199,16 @@ ctl 7445 move feeder 20mm --relative --velocity 20mm/s --wait
 inside systemctl stop axisd-cell
 ctl 7443 move feeder 20mm --relative --velocity 20mm/s --wait
 [ "$(process axisd)" = "$daemon" ] || die "axisd was restarted"
-inside systemctl stop axisd
 [ "$(inside systemctl show --property Result --value axisd-cell)" = success ] || die "axisd-cell did not end in order"
+
+step "uninstalling what runs"
+inside systemctl enable --quiet --now axisd axisd-link.socket axisd-etcd axisd-cell
+eventually ctl 7445 list
+ctl 7443 move feeder 390mm --velocity 20mm/s
+inside /srv/axisd/deploy/install.sh --uninstall >"$scratch/log" || { cat "$scratch/log"; die "it was not uninstalled"; }
+inside journalctl --no-pager --unit axisd | grep -q 'stopping what moves: feeder' || die "the moving axis was not stopped"
+! inside pgrep --list-name '^(axisd|etcd)' || die "it still runs"
+left=$(find "$root/etc/systemd/system" "$root/usr" \( -name '*axisd*' -o -name '*axisctl*' \) ! -path '*/etc/systemd/system/*.d*')
+[ -z "$left" ] || die "that is left: $left"
+[ -f "$root/etc/axisd/axisd.yaml" ] && [ -d "$root/var/lib/axisd" ] || die "configuration or state is gone"
 echo "units: ok"
