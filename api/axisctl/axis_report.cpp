@@ -81,7 +81,9 @@ void AxisReport::add_way(const v1::Command& command) {
     return;
   }
   if (command.state() == v1::COMMAND_STATE_DONE && asked.has_position()) {
-    if (at_)
+    if (command.granted().has_distance())  // an axis that turns without end takes the shorter way, too
+      distance_ += std::abs(command.granted().distance());
+    else if (at_)
       distance_ += std::abs(asked.position() - *at_);
     else
       ++not_measured_;
@@ -95,8 +97,10 @@ void AxisReport::add_way(const v1::Command& command) {
 }
 
 std::vector<std::string> AxisReport::lines(std::string_view unit) const {
-  auto way = with_unit(distance_, unit) + " from target to target";
-  if (not_measured_ > 0) way += fmt::format(", without {} motions of which it is not known", not_measured_);
+  auto way = with_unit(distance_, unit) + " from start to target";
+  if (not_measured_ > 0)
+    way += fmt::format(", without {} motion{} of which it is not known", not_measured_,
+                       not_measured_ == 1 ? "" : "s");
   return {
       fmt::format("{:<18}{}{}", "motions:", sum(motions_), parts(motions_)),
       fmt::format("{:<18}{}", "distance:", way),

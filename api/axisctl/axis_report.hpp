@@ -31,9 +31,9 @@ class AxisReport {
   std::map<std::string, std::uint64_t> faults_;   ///< by reason
   std::uint64_t stops_ = 0, refused_ = 0, unknown_ = 0;
   std::uint64_t eeprom_writes_ = 0;  ///< registers
-  double distance_ = 0;              ///< of what is done, from target to target
+  double distance_ = 0;              ///< of what is done, from start to target
   std::uint64_t not_measured_ = 0;   ///< motions that it does not have
-  std::optional<double> at_;         ///< the target that was reached last, as long as nothing else moved it
+  std::optional<double> at_;         ///< what was reached last and still holds: old records tell no way
 };
 
 }  // namespace axisd::axisctl

@@ -240,7 +240,7 @@ Plan Planner::aimed(Plan plan, const PositionTracker::Target& target, const Posi
   plan.target = target;
   plan.positive = positive(target, tracker);
   plan.granted.position = scale_->to_units(target.counter + tracker.offset());
-  if (target.distance) plan.granted.distance = *plan.granted.position - tracker.position();
+  plan.granted.distance = *plan.granted.position - tracker.position();  // of an absolute move, too
   plan.predicted = duration(plan, target.counter - tracker.counter());
   return plan;
 }

@@ -113,7 +113,7 @@ class Audit(AuditScenario):
         report = machine.axisctl("report", "feeder")
         self.assertEqual((report.returncode, report.stderr), (0, ""))
         self.assertRegex(report.stdout, r"motions: +2: 2 done\n")
-        self.assertRegex(report.stdout, r"distance: +7 mm from target to target\n")
+        self.assertRegex(report.stdout, r"distance: +7 mm from start to target\n")
         self.assertRegex(report.stdout, r"stops: +1\n")
         self.assertEqual(json.loads(machine.axisctl("--json", "report", "feeder").stdout)["distance"], 7)
 

@@ -28,7 +28,7 @@ void expect_moves(Rig& rig, const Action& action, double mm) {
   const auto moved = rig.complete(action);
   EXPECT_EQ(moved.state, CommandState::done) << describe(moved);
   EXPECT_NEAR(rig.load_mm() - before, mm, 0.12);
-  if (moved.kind == CommandKind::move_relative) EXPECT_NEAR(*moved.granted.distance, mm, 0.12);
+  EXPECT_NEAR(*moved.granted.distance, mm, 0.12);
 }
 
 TEST(M19, AShaftTurnedWhileReleasedIsTheNewBase) {

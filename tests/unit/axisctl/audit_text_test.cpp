@@ -139,10 +139,22 @@ TEST(AxisReport, CountsWhatTheAuditTells) {
   EXPECT_THAT(report.lines("mm"),
               testing::ElementsAre(
                   "motions:          6: 5 done, 1 unknown",
-                  "distance:         31 mm from target to target, without 2 motions of which it is not known",
+                  "distance:         31 mm from start to target, without 2 motions of which it is not known",
                   "stops:            1", "faults:           1: 1 alarm", "refused:          3",
                   "unknown outcomes: 1", "EEPROM writes:    4 registers"));
   EXPECT_EQ(report.values().fields().at("distance").number_value(), 31);
+}
+
+TEST(AxisReport, MeasuresTheWayThatWasGranted) {
+  AxisReport report;
+  report.add(ended(v1::COMMAND_KIND_HOME));
+  for (const auto& [position, way] : {std::pair{100.0, 100.0}, {350.0, -110.0}, {10.0, 20.0}}) {
+    auto move = moved(v1::COMMAND_KIND_MOVE_ABSOLUTE, position);
+    move.mutable_event()->mutable_command_change()->mutable_command()->mutable_granted()->set_distance(way);
+    report.add(move);
+  }
+  EXPECT_EQ(report.values().fields().at("distance").number_value(), 230);
+  EXPECT_EQ(report.values().fields().at("distance_not_known").number_value(), 1) << "that of homing";
 }
 
 }  // namespace
