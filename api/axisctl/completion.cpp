@@ -116,7 +116,7 @@ void complete_names(const CLI::App& command, const std::string& name,
   if (arguments.empty()) return;
   place.subject = arguments.front();
   if (group == "device" && name == "NAME") place.names = Names::device_values;
-  if (group == "drive" && name.starts_with("NAME")) place.names = Names::parameters;
+  if (group == "drive" && (name.starts_with("NAME") || name == "PATTERN")) place.names = Names::parameters;
 }
 
 void complete_value(const CLI::App& command, const CLI::Option& option,

@@ -55,6 +55,7 @@ TEST_F(Completion, KnowsWhoseParameters) {
   EXPECT_EQ(read.names, Names::parameters);
   EXPECT_EQ(read.subject, "feeder");
   EXPECT_EQ(read.behind, "");
+  EXPECT_EQ(at({"drive", "parameters", "feeder", "sta"}).names, Names::parameters);
   EXPECT_EQ(at({"drive", "write", "feeder", "sta"}).behind, "=");
   EXPECT_EQ(at({"drive", "write", "feeder", "start_speed=1"}).names, Names::none);
 }
