@@ -3,20 +3,25 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <chrono>
 #include <functional>
-#include <optional>
 #include <utility>
+#include <vector>
 
 #include "api/tls/expiry.hpp"
 
 namespace axisd {
 namespace {
 
-/// Of the certificate that is served now.
-std::function<std::optional<WallTime>()> certificate_expiry(std::shared_ptr<const tls::Live> live) {
+/// Of what is served now; what has no end is left out.
+std::function<std::vector<metrics::FileExpiry>()> expiry_of(std::shared_ptr<const tls::Live> live) {
   if (!live) return {};
   return [live = std::move(live)] {
-    return std::optional(tls::first_expiry(live->served()->contents.certificate));
+    const auto now = std::chrono::system_clock::now();
+    std::vector<metrics::FileExpiry> all;
+    for (const auto& file : tls::expiries(live->paths(), live->served()->contents, now))
+      if (file.at != WallTime::max()) all.push_back({.key = file.key, .at = file.at});
+    return all;
   };
 }
 
@@ -29,7 +34,7 @@ Metering::Metering(const Parts& parts)
                 .reading = [this] { return meter_.latest(); },
                 .journal_syncs = [&journal = parts.journal] { return journal.sync_times(); },
                 .budgets = parts.budgets,
-                .certificate_expires = certificate_expiry(parts.tls)}) {}
+                .files_expire = expiry_of(parts.tls)}) {}
 
 void Metering::start() {
   if (!settings_.listen.empty()) meter_.start();

@@ -56,13 +56,16 @@ WallTime first_expiry(const std::string& text) {
 }
 
 std::vector<Expiry> expiries(const Files& paths, const Files& contents, WallTime now) {
-  std::vector<Expiry> all{
-      {.path = paths.certificate, .what = "the certificate", .at = first_expiry(contents.certificate)},
-      {.path = paths.client_ca,
-       .what = "an authority of the clients",
-       .at = next_expiry(contents.client_ca, now)}};
+  std::vector<Expiry> all{{.path = paths.certificate,
+                           .what = "the certificate",
+                           .at = first_expiry(contents.certificate),
+                           .key = "certificate"},
+                          {.path = paths.client_ca,
+                           .what = "an authority of the clients",
+                           .at = next_expiry(contents.client_ca, now),
+                           .key = "client_ca"}};
   if (!paths.crl.empty())
-    all.push_back({.path = paths.crl, .what = "the CRL", .at = next_update(contents.crl)});
+    all.push_back({.path = paths.crl, .what = "the CRL", .at = next_update(contents.crl), .key = "crl"});
   return all;
 }
 

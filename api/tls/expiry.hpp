@@ -19,8 +19,9 @@ namespace axisd::tls {
 /// A file that is of use for some time only.
 struct Expiry {
   std::string path;
-  std::string_view what;  ///< "the certificate", "an authority of the clients", "the CRL": a literal
-  WallTime at;            ///< the first thing in it that ends
+  std::string_view what;      ///< "the certificate", "an authority of the clients", "the CRL": a literal
+  WallTime at;                ///< the first thing in it that ends; the last time that there is: nothing does
+  std::string_view key = {};  ///< below server.tls: a literal
 };
 
 /// Of all files; authorities that have expired beside others that have not are left out. `contents`: as

@@ -216,7 +216,7 @@ void write_machine(Exposition& to, const MachineInfo& info) {
 }
 
 void write_daemon(Exposition& to, const core::MachineReading& reading, const LatencyHistogram& journal_syncs,
-                  std::optional<WallTime> certificate_expires) {
+                  const std::vector<FileExpiry>& files_expire) {
   to.family("axisd_core_longest_handler_seconds", MetricType::gauge,
             "The longest that the core was busy with one thing in the last minute.");
   to.sample({}, in_seconds(reading.longest_handler));
@@ -227,11 +227,10 @@ void write_daemon(Exposition& to, const core::MachineReading& reading, const Lat
             "The command journal cannot be written: nothing new is started.");
   to.sample({}, reading.journal_fails ? 1 : 0);
   to.family("axisd_certificate_expiry_timestamp_seconds", MetricType::gauge,
-            "When the first certificate of server.tls.certificate expires, in Unix time.");
-  if (certificate_expires)
-    to.sample(
-        {},
-        std::chrono::duration_cast<std::chrono::seconds>(certificate_expires->time_since_epoch()).count());
+            "When the first certificate or list in a file of server.tls ends, in Unix time.");
+  for (const auto& file : files_expire)
+    to.sample(Labels().with("file", file.key),
+              std::chrono::duration_cast<std::chrono::seconds>(file.at.time_since_epoch()).count());
 }
 
 void write_process(Exposition& to) {

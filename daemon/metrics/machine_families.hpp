@@ -1,7 +1,7 @@
 // The families of metrics, by what they are about. Each is written whether or not it has a sample.
 #pragma once
 
-#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "api/exposition/exposition.hpp"
@@ -9,6 +9,12 @@
 #include "devices/budget.hpp"
 
 namespace axisd::metrics {
+
+/// When a file of `server.tls` is of no more use.
+struct FileExpiry {
+  std::string_view key;  ///< "certificate", "client_ca" or "crl": a literal
+  WallTime at;
+};
 
 void write_buses(Exposition& to, const std::vector<core::BusReading>& buses);
 /// Delays of stops, beside what is promised of them.
@@ -18,7 +24,7 @@ void write_stops(Exposition& to, const std::vector<core::BusReading>& buses,
 void write_tallies(Exposition& to, const core::Tallies& tallies);
 void write_machine(Exposition& to, const MachineInfo& info);
 void write_daemon(Exposition& to, const core::MachineReading& reading, const LatencyHistogram& journal_syncs,
-                  std::optional<WallTime> certificate_expires);
+                  const std::vector<FileExpiry>& files_expire);
 /// What Prometheus knows of any process.
 void write_process(Exposition& to);
 

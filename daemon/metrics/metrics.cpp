@@ -33,7 +33,7 @@ std::string Metrics::render(Format format) const {
   write_stops(to, reading->buses, sources_.budgets);
   write_tallies(to, reading->tallies);
   write_daemon(to, *reading, sources_.journal_syncs(),
-               sources_.certificate_expires ? sources_.certificate_expires() : std::nullopt);
+               sources_.files_expire ? sources_.files_expire() : std::vector<FileExpiry>{});
   write_process(to);
   to.family("axisd_metrics_scrapes_total", MetricType::counter, "Scrapes that were answered.");
   to.sample({}, scrapes_);

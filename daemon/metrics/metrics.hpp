@@ -4,13 +4,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "api/exposition/exposition.hpp"
 #include "daemon/core/meter.hpp"
+#include "daemon/metrics/machine_families.hpp"
 #include "devices/budget.hpp"
 #include "devices/machine.hpp"
 
@@ -21,9 +21,8 @@ struct Sources {
   Machine* machine = nullptr;  ///< for what axes and devices publish; nothing else is asked of it
   std::function<core::MachineReadingPtr()> reading;  ///< not nullptr
   std::function<LatencyHistogram()> journal_syncs;
-  std::vector<BusBudgetReport> budgets;  ///< the published bounds
-  /// The first in the chain that the server shows; nothing: no TLS. Empty: likewise.
-  std::function<std::optional<WallTime>()> certificate_expires{};
+  std::vector<BusBudgetReport> budgets;                     ///< the published bounds
+  std::function<std::vector<FileExpiry>()> files_expire{};  ///< of server.tls; nullptr: no TLS
 };
 
 /// What a scrape gets. Labels have the names of the configuration and constants of this program, never what a

@@ -325,6 +325,8 @@ TEST_F(TlsFiles, EndIsToldThirtyDaysAheadAndEveryDay) {
   const auto all = tls::expiries(files_, *tls::read(files_), now);
   ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(all[0].path, files_.certificate);
+  EXPECT_EQ(all[0].key, "certificate");
+  EXPECT_EQ(all[1].key, "client_ca");
   EXPECT_GT(all[0].at, now + 47h);
   EXPECT_LE(all[0].at, now + 49h);
   EXPECT_EQ(all[0].at, tls::first_expiry(certificates_.read("server.crt")));

@@ -38,7 +38,11 @@ class MetricsTest : public ::testing::Test {
        .budgets = {{.predicted = {.bus = "line-a",
                                   .stops = {{.axes = 1, .last_frame = 6ms, .standstill = 20ms},
                                             {.axes = 2, .last_frame = 9ms, .standstill = 30ms}}}}},
-       .certificate_expires = [] { return std::optional(WallTime(1'800'000'000s)); }}};
+       .files_expire =
+           [] {
+             return std::vector<FileExpiry>{{.key = "certificate", .at = WallTime(1'800'000'000s)},
+                                            {.key = "crl", .at = WallTime(1'700'000'000s)}};
+           }}};
 };
 
 TEST_F(MetricsTest, SaysWhatAxesPublish) {
@@ -73,7 +77,8 @@ TEST_F(MetricsTest, BoundsStandBesideWhatWasSeen) {
            R"(axisd_stop_frame_bound_seconds{bus="line-a",scope="all"} 0.009)",
            R"(axisd_bus_transactions_total{bus="line-a",class="motion",outcome="answered"} 7)",
            R"(axisd_bus_transactions_total{bus="line-a",class="stop",outcome="no_reply"} 0)",
-           "axisd_certificate_expiry_timestamp_seconds 1800000000",
+           R"(axisd_certificate_expiry_timestamp_seconds{file="certificate"} 1800000000)",
+           R"(axisd_certificate_expiry_timestamp_seconds{file="crl"} 1700000000)",
        })
     EXPECT_THAT(text, HasSubstr(std::string("\n") + line + "\n"));
 }
