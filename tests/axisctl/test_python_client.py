@@ -369,6 +369,18 @@ class Errors(ClientTest):
             async for _ in self.machine.axis("nobody").watch():
                 self.fail("no state expected")
 
+    def test_an_address_is_what_axisctl_takes(self):
+        for given, meant in {"press-1": "press-1:7443", "press-1:8000": "press-1:8000", "::1": "[::1]:7443",
+                             "[fe80::1]": "[fe80::1]:7443", "unix:/run/axisd": "unix:/run/axisd",
+                             "dns:///press-1": "dns:///press-1"}.items():
+            self.assertEqual(axisd.connect(given).server, meant)
+        self.assertEqual(axisd.connect("press-1", stop_server="press-1").stop_server, "press-1:7444")
+        self.assertIsNone(axisd.connect("press-1").stop_server)
+        self.assertEqual(axisd.connect_cell("press-1").server, "press-1:7445")
+        for wrong in ("press-1:65536", "press-1:0", "press-1:", "[::1]:70000"):
+            with self.assertRaises(ValueError):
+                axisd.connect(wrong)
+
     def test_certificates_belong_together(self):
         with self.assertRaises(ValueError):
             axisd.connect("localhost:1", tls_key="key.pem")

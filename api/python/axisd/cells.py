@@ -9,6 +9,7 @@ from types import TracebackType
 
 import grpc.aio
 
+from .address import USUAL_CELL_PORT, with_port
 from .axis import Axis
 from .calls import Seconds
 from .cell.v1 import cell_service_pb2, cell_service_pb2_grpc
@@ -17,8 +18,6 @@ from .cell_types import CellEvent, CellInfo, CellMachine, CellReleased, CellStop
 from .drives import Cursor
 from .machine import Machine, channel_to
 
-_USUAL_PORT = 7445
-
 
 def connect_cell(entrance: str | None = None, *, tls_ca: str | pathlib.Path | None = None,
                  tls_certificate: str | pathlib.Path | None = None, tls_key: str | pathlib.Path | None = None,
@@ -26,10 +25,8 @@ def connect_cell(entrance: str | None = None, *, tls_ca: str | pathlib.Path | No
     """A cell, by HOST:PORT of the entrance of any of its machines (without a port 7445), to be used as `async with`. Without
     a name that of $AXISD_CELL, else localhost. Connects with the first call. `timeout` as of connect()."""
     if entrance is None:
-        entrance = os.environ.get("AXISD_CELL", "localhost")
-    if ":" not in entrance:
-        entrance = f"{entrance}:{_USUAL_PORT}"
-    return Cell(entrance, tls_ca, tls_certificate, tls_key, timeout)
+        entrance = os.environ.get("AXISD_CELL") or "localhost"
+    return Cell(with_port(entrance, USUAL_CELL_PORT), tls_ca, tls_certificate, tls_key, timeout)
 
 
 class MemberMachine(Machine):

@@ -15,6 +15,7 @@ import grpc.aio
 from google.protobuf.field_mask_pb2 import FieldMask
 
 from . import tls_trouble
+from .address import USUAL_PORT, USUAL_STOP_PORT, with_port
 from .audit import AuditRecord
 from .axis import Axis
 from .budget import BusBudget
@@ -69,17 +70,19 @@ def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = No
             tls_certificate: str | pathlib.Path | None = None, tls_key: str | pathlib.Path | None = None,
             timeout: float = 10.0, stop_server: str | None = None, speak_for: str | None = None,
             role: str | None = None) -> Machine:
-    """A machine, by HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
-    localhost:7443. Connects with the first call. `timeout` limits how long the daemon may take to answer, not how long
-    a motion may take. Stops are repeated until then while the daemon cannot be reached. `stop_server`: its stop lane;
-    without it that of $AXISD_STOP_SERVER if `server` is not given either, else next to `server`. `speak_for`: of a delegate: the person whom
-    all calls are made for; `role`: what they may do ("viewer", "operator", "maintainer"), at most what the delegate may."""
+    """A machine, by HOST, HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
+    localhost; without a port 7443. Connects with the first call. `timeout` limits how long the daemon may take to answer,
+    not how long a motion may take. Stops are repeated until then while the daemon cannot be reached. `stop_server`: its
+    stop lane; without it that of $AXISD_STOP_SERVER if `server` is not given either, else next to `server`. `speak_for`: of
+    a delegate: the person whom all calls are made for; `role`: what they may do ("viewer", "operator", "maintainer"), at
+    most what the delegate may."""
     if server is None:
-        server = os.environ.get("AXISD_SERVER", "localhost:7443")
+        server = os.environ.get("AXISD_SERVER") or "localhost"
         # Never beside a server that was named: another machine's lane would stop another machine's axis.
         if stop_server is None:
             stop_server = os.environ.get("AXISD_STOP_SERVER")
-    return Machine(server, tls_ca, tls_certificate, tls_key, timeout, stop_server, speak_for, role)
+    return Machine(with_port(server, USUAL_PORT), tls_ca, tls_certificate, tls_key, timeout,
+                   with_port(stop_server, USUAL_STOP_PORT) if stop_server else None, speak_for, role)
 
 
 class Machine:
