@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <string_view>
+#include <system_error>
+
+#include "api/axisctl/error.hpp"
 
 namespace axisd::axisctl {
 namespace {
@@ -14,13 +18,27 @@ bool is_ipv6(std::string_view text) {
   return std::ranges::count(text, ':') > 1 && text.find_first_not_of(characters) == text.npos;
 }
 
+/// gRPC takes the rest of a number that is too large, and 443 where there is none.
+bool is_port(std::string_view text) {
+  std::uint16_t port = 0;
+  const auto* const end = text.data() + text.size();
+  const auto [behind, error] = std::from_chars(text.data(), end, port);
+  return error == std::errc{} && behind == end && port != 0;
+}
+
 }  // namespace
 
 std::string with_port(const std::string& address, std::uint16_t port) {
   if (is_ipv6(address)) return fmt::format("[{}]:{}", address, port);
   const bool bracketed = address.starts_with('[') && address.ends_with(']');
-  if (address.empty() || (!bracketed && address.find_first_of(":/") != std::string::npos)) return address;
-  return fmt::format("{}:{}", address, port);
+  if (address.empty() || address.starts_with("unix:")) return address;
+  if (!bracketed && address.find('/') != std::string::npos) return address;
+  const auto colon = bracketed ? std::string::npos : address.rfind(':');
+  if (colon == std::string::npos) return fmt::format("{}:{}", address, port);
+  const auto behind = std::string_view(address).substr(colon + 1);
+  if (behind.find_first_not_of("0123456789") == behind.npos && !is_port(behind))
+    throw Failure(ExitCode::usage, fmt::format("'{}': a port is a number from 1 to 65535", address));
+  return address;
 }
 
 }  // namespace axisd::axisctl

@@ -12,7 +12,7 @@ inline constexpr std::uint16_t usual_port = 7443, usual_stop_port = 7444;
 inline constexpr std::uint16_t usual_cell_port = 7445;
 
 /// With a port: "press-1" is "press-1:7443", "::1" is "[::1]:7443". What has a port, "unix:PATH" and other
-/// names of gRPC's stay as they are.
+/// names of gRPC's stay as they are. Throws Failure: the port is none.
 [[nodiscard]] std::string with_port(const std::string& address, std::uint16_t port);
 
 }  // namespace axisd::axisctl

@@ -122,6 +122,7 @@ Client::Client(Connection connection) : connection_(std::move(connection)) {
   const auto trusted = credentials(connection_);
   const auto& person = connection_.speaks_for;
   const auto address = connection_.address();
+  if (address.empty()) throw Failure(ExitCode::usage, "--server is empty; it is the daemon's HOST:PORT");
   channel_ = channel_to(address, trusted, person);
   stop_channel_ = channel_to(address, trusted, person);
   if (connection_.through_entrance()) {
