@@ -1,6 +1,6 @@
 // Pictures of each screen: light, dark, on a panel, in Chinese. They are looked at by people.
 import { after, before, test } from 'node:test';
-import type { Browser } from 'playwright-core';
+import type { Browser, Page } from 'playwright-core';
 import { closeAll, launch, open, picture, ready, type Look } from './support';
 
 let browser: Browser;
@@ -11,12 +11,14 @@ const screens = ['machine', 'axis/feeder', 'scope/feeder', 'groups', 'terminals'
 const looks: [string, Look][] = [
   ['light', {}], ['dark', { theme: 'dark' }], ['panel', { panel: true, width: 1280, height: 800, touch: true }], ['zh', { lang: 'zh' }]];
 
+/** Also where a field that was typed into is further down. */
+const fromTheTop = (page: Page) => page.evaluate(() => document.querySelector('main')!.scrollTo(0, 0));
+
 for (const [name, look] of looks) {
   test(`pictures: ${name}`, async () => {
     const opened = await open(browser, { ...look, path: '/axis/feeder' });
     const { page } = opened;
     await ready(page);
-    await page.evaluate(() => { (window as { done?: boolean }).done = false; });
     const fields = page.locator('.controls .move input');
     if (look.panel) {
       await fields.first().click();
@@ -29,16 +31,15 @@ for (const [name, look] of looks) {
     }
     await page.locator('[data-act="move"]').click();
     await page.waitForTimeout(1300);
+    await fromTheTop(page);
     await picture(page, `${name}-moving`);
     await page.waitForTimeout(2600);
-    await fields.nth(0).evaluate(() => {});
     for (const screen of screens) {
-      const [id, of] = screen.split('/');
+      const [id] = screen.split('/');
       await page.locator(`nav a[href="/${id}"]`).click();
       await page.waitForTimeout(id === 'scope' || id === 'buses' ? 900 : 350);
       await picture(page, `${name}-${id}`);
-      void of;
-    }
+      }
     await page.locator('[data-stop="all"]').click();
     await page.locator('nav a[href="/machine"]').click();
     await page.waitForTimeout(400);
@@ -49,3 +50,22 @@ for (const [name, look] of looks) {
     await opened.close();
   });
 }
+
+test('pictures: for the README', async () => {
+  const opened = await open(browser, { width: 1200, height: 860, path: '/axis/feeder' });
+  const { page } = opened;
+  await ready(page);
+  await page.waitForTimeout(1200);
+  await page.locator('.controls .move input').nth(0).fill('260');
+  await page.locator('.controls .move input').nth(1).fill('80');
+  await page.locator('[data-act="move"]').click();
+  await page.waitForTimeout(1300);
+  await fromTheTop(page);
+  await picture(page, 'readme-axis');
+  await page.setViewportSize({ width: 1200, height: 720 });
+  await page.evaluate(() => { document.documentElement.dataset['theme'] = 'dark'; });
+  await page.locator('nav a[href="/machine"]').click();
+  await page.waitForTimeout(350);
+  await picture(page, 'readme-machine');
+  await opened.close();
+});
