@@ -321,6 +321,13 @@ def jog_request(press, hold=1.0, velocity=2.0, axis="spinner"):
                               options={"request_id": press})
 
 
+def move_request(valid=2.0, velocity=2.0):
+    """Goes on by itself."""
+    return axis_pb.MoveVelocityRequest(
+        axis="spinner", velocity=velocity,
+        options={"request_id": str(uuid.uuid4()), "not_after": {"seconds": int(time.time() + valid)}})
+
+
 class Finger(threading.Thread):
     """Holds a button: renews one press until it is let go, or the lane is gone."""
 

@@ -226,9 +226,10 @@ class Persons(WebScenario):
         self.gateway.start()
         self.page = Page(self.gateway)
 
-    def enable(self, page, request_id="once", **headers):
-        request = axis_pb.EnableRequest(axis="spinner", options={"request_id": request_id})
-        return page.call("AxisService/Enable", request, axis_pb.EnableResponse, **headers)
+    def disable(self, page, **headers):
+        """What takes a role."""
+        request = axis_pb.DisableRequest(axis="spinner", options={"request_id": "once"})
+        return page.call("AxisService/Disable", request, axis_pb.DisableResponse, **headers)
 
     def test_nobody_may_ask_for_anything(self):
         for _ in range(2):
@@ -252,7 +253,7 @@ class Persons(WebScenario):
         status, answer = self.page.session()
         self.assertEqual((status, answer["name"], answer["role"], answer["how"]), (200, "anna", "operator", "password"))
         self.assertGreater(answer["expires_in_s"], 0)
-        self.assertEqual(self.enable(self.page).command.client, f"anna via {OWN_NAME}")
+        self.assertEqual(self.disable(self.page).command.client, f"anna via {OWN_NAME}")
         self.assertEqual(self.page.log_out(), 204)
         self.assertEqual(self.page.session()[0], 401)
 
@@ -275,12 +276,12 @@ class Persons(WebScenario):
     def test_each_may_do_what_its_role_says(self):
         viewer = Page(self.gateway)
         viewer.log_in("bert", "battery staple")
-        status, message, detail = self.enable(viewer)
+        status, message, detail = self.disable(viewer)
         self.assertEqual((status, detail.reason), (7, error_pb.REASON_ACCESS_DENIED))
         self.assertIn("bert via", message)
         # Whatever a page says of itself.
         for forged in ({"axisd_user": "anna", "axisd_role": "maintainer"}, {"axisd_role": "operator"}):
-            self.assertEqual(self.enable(viewer, **forged)[0], 7)
+            self.assertEqual(self.disable(viewer, **forged)[0], 7)
         answer = viewer.call("AxisService/Stop", axis_pb.StopRequest(axis="spinner"), axis_pb.StopResponse,
                              axisd_user="anna")
         self.assertEqual(answer.command.client, f"bert via {OWN_NAME}")
@@ -312,7 +313,7 @@ class Persons(WebScenario):
         self.gateway.user("add", "anna", "--role", "viewer", password="correct horse")
         wait_for(lambda: self.page.session()[0] == 401, "the session of another role has ended")
         self.assertEqual(self.page.log_in("anna", "correct horse")[0], 204)
-        self.assertEqual(self.enable(self.page)[0], 7)
+        self.assertEqual(self.disable(self.page)[0], 7)
         pathlib.Path(self.gateway.users).unlink()
         self.assertEqual(self.page.session()[0], 200, "a file that is gone lets nobody in, and nobody out")
         self.assertEqual(Page(self.gateway).session()[0], 401)
@@ -356,8 +357,8 @@ class Tls(WebScenario):
         self.gateway.tls = self.trusting("panel-1")
         page = Page(self.gateway)
         self.assertEqual(page.session(), (200, {"name": "panel-1", "role": "operator", "how": "certificate", "expires_in_s": 0}))
-        request = axis_pb.EnableRequest(axis="spinner", options={"request_id": "once"})
-        answer = page.call("AxisService/Enable", request, axis_pb.EnableResponse)
+        request = axis_pb.DisableRequest(axis="spinner", options={"request_id": "once"})
+        answer = page.call("AxisService/Disable", request, axis_pb.DisableResponse)
         self.assertEqual(answer.command.client, f"panel-1 via {OWN_NAME}")
         self.gateway.tls = self.trusting("stranger")
         self.assertEqual(Page(self.gateway).session()[1]["role"], "viewer")

@@ -2,10 +2,11 @@
 import http.client
 import os
 import signal
+import time
 import unittest
 
-from harness import DONE, OWN_NAME, axis_pb, command_pb, lease_pb, system_pb, wait_for
-from support import ANSWER, DELEGATE, ECHO, LATE, REFUSED, LaneRefused, Page, WebScenario, frame, jog_request
+from harness import DONE, OWN_NAME, axis_pb, command_pb, group_pb, lease_pb, pb, system_pb, wait_for
+from support import ANSWER, DELEGATE, ECHO, LATE, REFUSED, LaneRefused, Page, WebScenario, frame, jog_request, move_request
 
 
 class Motion(WebScenario):
@@ -112,10 +113,64 @@ class Motion(WebScenario):
         self.assertEqual(lane.ask("AxisService/Stop", axis_pb.StopRequest(axis="spinner"))[:2], (ANSWER, 0))
         self.assertEqual(self.subject.sim.shaft().starts, 0)
 
-    def test_a_jog_by_a_call_is_refused(self):
-        status, message, _ = self.page.call("AxisService/Jog", jog_request("by a call"), axis_pb.JogResponse)
-        self.assertEqual((status, message), (9, "a jog goes over the lane"))
+    def test_what_starts_something_by_a_call_is_refused(self):
+        for method, request in (("AxisService/Jog", jog_request("by a call")), ("StopService/Jog", jog_request("by a call")),
+                                ("AxisService/MoveVelocity", move_request()), ("AxisService/Enable", axis_pb.EnableRequest()),
+                                ("GroupService/MoveGroup", group_pb.MoveGroupRequest()),
+                                ("SystemService/ReleaseStopAll", system_pb.ReleaseStopAllRequest())):
+            status, message, _ = self.page.call(method, request, axis_pb.JogResponse)
+            self.assertEqual((status, message), (9, f"{method.split('/')[1]} goes over the lane"))
         self.assertEqual(self.subject.sim.shaft().starts, 0)
+
+    def moves(self):
+        """A move is under way, by an answer that came in time, as on a computer that is busy not each does."""
+        while (answer := self.wire.ask("AxisService/MoveVelocity", move_request()))[0] == LATE:
+            pass
+        self.command(answer, axis_pb.MoveVelocityResponse)
+        self.subject.sim.wait_moving()
+
+    def stands_behind(self, asked):
+        """All of these are answered, and nobody stops anything any more: the gateway has."""
+        while asked:
+            asked.discard(self.wire.receive()[1])
+        wait_for(lambda: self.subject.client.state("spinner").state == pb.STATE_STANDSTILL, "it stands")
+        self.stands_for_good()
+
+    def test_a_move_goes_on_without_its_page(self):
+        self.moves()
+        self.wire.close()
+        time.sleep(0.5)
+        self.assertTrue(self.subject.sim.shaft().moving)
+        self.command(self.lane(self.page).ask("AxisService/Halt", axis_pb.HaltRequest(axis="spinner")), axis_pb.HaltResponse)
+        self.stands_for_good()
+
+    def test_a_move_that_was_held_up_moves_nothing(self):
+        self.assertEqual(self.wire.ask("AxisService/MoveVelocity", move_request(), late=0.5)[0], LATE)
+        undated = axis_pb.MoveVelocityRequest(axis="spinner", velocity=2.0)
+        kind, status, message, _ = self.wire.ask("AxisService/MoveVelocity", undated)
+        self.assertEqual((kind, status), (REFUSED, 3), message)
+        kind, status, _, _ = self.wire.ask("AxisService/MoveVelocity", move_request(valid=-2.0))
+        self.assertIn((kind, status), ((ANSWER, 9), (ANSWER, 4), (LATE, 0)))
+        self.stands_for_good()
+        self.assertEqual(self.subject.sim.shaft().starts, 0)
+
+    def test_a_move_and_a_stop_behind_it_leave_it_standing(self):
+        for kind in ("Halt", "Stop", "QuickStop"):
+            asked = set()
+            for _ in range(8):
+                asked.add(self.wire.send("AxisService/MoveVelocity", move_request()))
+                asked.add(self.wire.send(f"AxisService/{kind}", axis_pb.HaltRequest(axis="spinner")))  # each has it at this place
+            self.stands_behind(asked)
+
+    def test_a_move_whose_daemon_hangs_is_halted_when_it_goes_on(self):
+        daemon = self.subject.daemon.process.pid
+        self.addCleanup(os.kill, daemon, signal.SIGCONT)
+        os.kill(daemon, signal.SIGSTOP)
+        asked = {self.wire.send("AxisService/MoveVelocity", move_request(valid=30.0)),
+                 self.wire.send("AxisService/Stop", axis_pb.StopRequest(axis="spinner"))}
+        time.sleep(0.5)
+        os.kill(daemon, signal.SIGCONT)
+        self.stands_behind(asked)
 
     def test_a_stop_by_a_call_outlives_its_page(self):
         request = axis_pb.HaltRequest(axis="spinner", options={"wait_until": DONE})
@@ -180,7 +235,7 @@ class Motion(WebScenario):
         self.was_halted()
 
     def test_only_what_belongs_there_is_taken(self):
-        kind, status, message, _ = self.wire.ask("AxisService/Enable", axis_pb.EnableRequest(axis="spinner"))
+        kind, status, message, _ = self.wire.ask("AxisService/GetAxis", axis_pb.GetAxisRequest(axis="spinner"))
         self.assertEqual((kind, status, message), (REFUSED, 12, "the lane takes no such call"))
         self.assertEqual(self.wire.ask("AxisService/Jog", b"\xff")[0], REFUSED)
         kind, status, message, _ = self.wire.ask("AxisService/Stop", axis_pb.StopRequest(axis="nobody"))

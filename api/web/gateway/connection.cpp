@@ -260,11 +260,15 @@ void Connection::begin_call() {
   if (!identify(true))
     return refuse(refused_call(401, {.code = code::unauthenticated, .message = "nobody is logged in"}));
   const auto target = view(parser_->get().target());
-  // Nothing would end it when the page is gone, and a Halt could overtake it.
-  if (target.ends_with("/Jog"))
-    return refuse(failed_call({.code = code::failed_precondition, .message = "a jog goes over the lane"}));
   const auto method = method_of_path(target);
-  stopping_ = method && is_stop(*method);
+  const auto kind = method ? std::optional(kind_of(*method)) : std::nullopt;
+  // A call may be held up for long, and a stop that is asked for meanwhile comes before it. Of a jog,
+  // whatever service it is asked of, nothing would see that the page is gone.
+  if (kind == LaneKind::start || kind == LaneKind::release || target.ends_with("/Jog"))
+    return refuse(
+        failed_call({.code = code::failed_precondition,
+                     .message = fmt::format("{} goes over the lane", target.substr(target.rfind('/') + 1))}));
+  stopping_ = kind == LaneKind::stop;
   stream_ = (stopping_ ? gateway_.stops : gateway_.streams).take(known_.person.key());
   if (!stream_)
     return refuse(refused_call(

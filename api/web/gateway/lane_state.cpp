@@ -1,7 +1,6 @@
 #include "api/web/gateway/lane_state.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "api/web/gateway/big_endian.hpp"
@@ -9,53 +8,6 @@
 
 namespace axisd::web {
 namespace {
-
-struct Known {
-  LaneMethod method;
-  std::string_view path;
-};
-constexpr std::array<Known, 8> methods{{
-    {LaneMethod::halt, "/axisd.v1.AxisService/Halt"},
-    {LaneMethod::stop, "/axisd.v1.AxisService/Stop"},
-    {LaneMethod::quick_stop, "/axisd.v1.AxisService/QuickStop"},
-    {LaneMethod::jog, "/axisd.v1.AxisService/Jog"},
-    {LaneMethod::group_halt, "/axisd.v1.GroupService/GroupHalt"},
-    {LaneMethod::group_stop, "/axisd.v1.GroupService/GroupStop"},
-    {LaneMethod::stop_all, "/axisd.v1.SystemService/StopAll"},
-    {LaneMethod::renew_lease, "/axisd.v1.LeaseService/RenewLease"},
-}};
-
-v1::JogRequest jog_of(std::string_view message, bool& readable) {
-  v1::JogRequest request;
-  readable = request.ParseFromArray(message.data(), static_cast<int>(message.size()));
-  return request;
-}
-
-Duration hold_of(const v1::JogRequest& request) {
-  if (!request.has_hold()) return LaneState::usual_hold;
-  // What is out of range is refused by the daemon; here it only must not overflow.
-  const auto seconds = std::clamp<std::int64_t>(request.hold().seconds(), 0, 2);
-  const auto hold = std::chrono::seconds(seconds) +
-                    std::chrono::nanoseconds(std::clamp(request.hold().nanos(), 0, 999'999'999));
-  return std::min<Duration>(hold, LaneState::longest_hold);
-}
-
-/// The axis that a stop is for; empty: it is not for one, or is not readable, which the daemon tells.
-std::string axis_of(LaneMethod method, std::string_view message) {
-  const auto read = [&](auto request) {
-    return request.ParseFromArray(message.data(), static_cast<int>(message.size())) ? request.axis() : "";
-  };
-  switch (method) {
-    case LaneMethod::halt:
-      return read(v1::HaltRequest());
-    case LaneMethod::stop:
-      return read(v1::StopRequest());
-    case LaneMethod::quick_stop:
-      return read(v1::QuickStopRequest());
-    default:
-      return {};
-  }
-}
 
 /// It is not known whether the daemon has executed the call. What the daemon itself says has details.
 bool is_open(const CallStatus& status) {
@@ -77,23 +29,6 @@ void refuse(std::uint32_t id, int why, std::string message, LaneEffects& effects
 }
 
 }  // namespace
-
-std::string_view main_path_of(LaneMethod method) {
-  return std::ranges::find(methods, method, &Known::method)->path;
-}
-
-std::string_view name_of(LaneMethod method) {
-  const auto path = main_path_of(method);
-  return path.substr(path.rfind('/') + 1);
-}
-
-bool is_stop(LaneMethod method) { return method != LaneMethod::jog && method != LaneMethod::renew_lease; }
-
-std::optional<LaneMethod> method_of_path(std::string_view path) {
-  const auto found = std::ranges::find(methods, path, &Known::path);
-  if (found == methods.end()) return std::nullopt;
-  return found->method;
-}
 
 LaneEffects LaneState::receive(std::string_view bytes, TimePoint now) {
   if (closed_) return {};
@@ -136,15 +71,34 @@ void LaneState::echo(const LaneRequest& request, TimePoint now, LaneEffects& eff
 
 void LaneState::carry_out(const LaneRequest& request, LaneMethod method, Duration lateness, TimePoint now,
                           LaneEffects& effects) {
-  if (is_stop(method)) return stop(request, method, now, effects);
-  if (method == LaneMethod::jog) return jog(request, lateness, now, effects);
+  const auto kind = kind_of(method);
+  if (kind == LaneKind::stop) return stop(request, method, now, effects);
+  if (kind == LaneKind::jog) return jog(request, lateness, now, effects);
   if (lateness > latest) {
     effects.emplace_back(LaneSend{lane_reply(LaneReply::late, request.id)});
   } else if (auto why = refusal_of_move(); why.code != 0) {
     refuse(request.id, why.code, std::move(why.message), effects);
+  } else if (kind == LaneKind::start) {
+    start(request, method, effects);
   } else {
-    call(method, {.method = method, .id = request.id}, std::string(request.message), patience_of_moves,
-         effects);
+    call(method, {.method = method, .id = request.id}, std::string(request.message),
+         kind == LaneKind::release ? patience_of_starts : patience_of_moves, effects);
+  }
+}
+
+void LaneState::start(const LaneRequest& request, LaneMethod method, LaneEffects& effects) {
+  auto axes = axes_of_start(method, request.message);
+  if (!axes) return refuse(request.id, code::invalid_argument, std::move(axes).error(), effects);
+  call(method, {.method = method, .id = request.id, .axes = *std::move(axes)}, std::string(request.message),
+       patience_of_starts, effects);
+}
+
+void LaneState::overtake(std::string_view axis) {
+  for (auto& [number, pending] : calls_) {
+    const auto kind = kind_of(pending.method);
+    if (kind == LaneKind::start &&
+        (axis.empty() || std::ranges::find(pending.axes, axis) != pending.axes.end()))
+      pending.overtaken = true;
   }
 }
 
@@ -159,17 +113,9 @@ CallStatus LaneState::refusal_of_move() const {
 }
 
 void LaneState::jog(const LaneRequest& request, Duration lateness, TimePoint now, LaneEffects& effects) {
-  bool readable = false;
-  const auto jog = jog_of(request.message, readable);
-  const auto wrong = [&](std::string why) {
-    refuse(request.id, code::invalid_argument, std::move(why), effects);
-  };
-  if (!readable || jog.axis().empty()) return wrong("no JogRequest of an axis");
-  if (jog.options().request_id().empty())
-    return wrong("a jog on the lane needs a request_id, one for each press");
-  if (jog.options().wait_until() == v1::WAIT_UNTIL_DONE)
-    return wrong("a jog on the lane is not waited for until it is done");
-  const Press press{.axis = jog.axis(), .id = jog.options().request_id(), .hold = hold_of(jog)};
+  const auto readable = press_of(request.message);
+  if (!readable) return refuse(request.id, code::invalid_argument, readable.error(), effects);
+  const auto& press = *readable;
   if (lateness > latest) {
     bar_start(press);
     effects.emplace_back(LaneSend{lane_reply(LaneReply::late, request.id)});
@@ -188,16 +134,19 @@ void LaneState::jog(const LaneRequest& request, Duration lateness, TimePoint now
 }
 
 void LaneState::stop(const LaneRequest& request, LaneMethod method, TimePoint now, LaneEffects& effects) {
+  auto axis = axis_of_stop(method, request.message);
+  if (!axis.empty() || is_stop_of_many(method)) overtake(axis);
+  if (method == LaneMethod::stop_all)
+    for (auto& [number, pending] : calls_)
+      if (pending.method == LaneMethod::release_stop_all) pending.overtaken = true;
   if (stops_ >= most_stops)
     return refuse(request.id, code::resource_exhausted, "too many stops of this page wait for their answers",
                   effects);
-  auto axis = axis_of(method, request.message);
   if (!axis.empty()) let_go(axis, now);
   call(method, {.method = method, .id = request.id, .axis = std::move(axis)}, std::string(request.message),
        patience_of_stops, effects);
   // Who stops more than one axis is not jogging any of them, whether or not it is one of those.
-  if (method == LaneMethod::stop_all || method == LaneMethod::group_stop || method == LaneMethod::group_halt)
-    halt_all(now, effects);
+  if (is_stop_of_many(method)) halt_all(now, effects);
 }
 
 void LaneState::call(LaneMethod method, Pending pending, std::string message, Duration patience,
@@ -298,13 +247,26 @@ LaneEffects LaneState::answered(std::uint64_t number, const CallStatus& status, 
     --(is_stop(ended.method) ? stops_ : moves_);
     if (!closed_) effects.emplace_back(LaneSend{lane_reply(LaneReply::answer, *ended.id, status, response)});
     if (ended.method == LaneMethod::jog) jog_answered(ended, outcome_of(status, response), now, effects);
+    if (ended.overtaken) overtaken_answered(ended, status, now, effects);
     return effects;
   }
+  if (ended.method != LaneMethod::halt) return effects;
   const bool again = is_open(status) || status.code == code::resource_exhausted;
   const auto state = jogging(ended.axis);
   if (again && now + pause < ended.until && (state == Jogging::none || state == Jogging::ending))
     owed_[ended.axis] = {.at = now + pause, .until = ended.until};
   return effects;
+}
+
+void LaneState::overtaken_answered(const Pending& ended, const CallStatus& status, TimePoint now,
+                                   LaneEffects& effects) {
+  const bool open = is_open(status) && !status.not_sent;
+  if (status.code != 0 && !open) return;
+  if (ended.method == LaneMethod::release_stop_all)
+    return call(LaneMethod::stop_all, {.method = LaneMethod::stop_all}, {}, patience_of_stops, effects);
+  for (const auto& axis : ended.axes) own_halt(axis, now + longest_hold, now, effects);
+  if (!open) return;
+  for (const auto& axis : ended.axes) owe_another(axis, now);
 }
 
 void LaneState::jog_answered(const Pending& jog, Outcome outcome, TimePoint now, LaneEffects& effects) {
@@ -353,6 +315,7 @@ LaneEffects LaneState::close(TimePoint now) {
   LaneEffects effects;
   if (std::exchange(closed_, true)) return effects;
   halt_all(now, effects);
+  overtake({});  // nobody sees any more what becomes of it
   return effects;
 }
 

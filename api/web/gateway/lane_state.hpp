@@ -20,6 +20,10 @@
 //
 // A renewal that is refused ends nothing, as what it was to renew goes on until its hold is over. A press
 // that was refused, or came too late, stays refused: else it would start while nobody expects it any more.
+//
+// What goes on by itself once it has started, a move say, goes to the daemon on another connection than stops
+// do: there a stop may overtake it. So a Halt of each of its axes follows its answer, where a stop, or the
+// end of the lane, came before that. In the same way a StopAll follows a release that it may have overtaken.
 #pragma once
 
 #include <cstdint>
@@ -33,22 +37,12 @@
 
 #include "api/web/gateway/grpc_web.hpp"
 #include "api/web/gateway/lane_message.hpp"
+#include "api/web/gateway/lane_method.hpp"
 #include "api/web/gateway/lateness.hpp"
 #include "api/web/gateway/rates.hpp"
 #include "buses/clock.hpp"
 
 namespace axisd::web {
-
-enum class LaneMethod : std::uint8_t {
-  halt,
-  stop,
-  quick_stop,
-  jog,
-  group_halt,
-  group_stop,
-  stop_all,
-  renew_lease
-};
 
 /// A call to the daemon.
 struct LaneCall {
@@ -80,9 +74,6 @@ class LaneState {
   static constexpr Duration longest_round_trip = std::chrono::milliseconds(300);
   /// So late is no message of a link that works: the page begins anew.
   static constexpr Duration lost = std::chrono::seconds(5);
-  /// What the daemon takes for a jog that says nothing, and its longest (M16).
-  static constexpr Duration usual_hold = std::chrono::milliseconds(300),
-                            longest_hold = std::chrono::seconds(2);
   /// Calls that wait for their answers.
   static constexpr int most_moves = 32, most_stops = 64;
   /// Messages in a second, and at once.
@@ -92,6 +83,8 @@ class LaneState {
   /// A start that comes late is worse than none, and a stop is better late than never.
   static constexpr Duration patience_of_moves = std::chrono::seconds(1),
                             patience_of_stops = std::chrono::seconds(30);
+  /// Longer than a page's start is valid (not_after): what is open then starts no more.
+  static constexpr Duration patience_of_starts = std::chrono::seconds(10);
   /// Axes of which a refused press is remembered.
   static constexpr std::size_t most_barred = 256;
 
@@ -127,15 +120,13 @@ class LaneState {
     LaneMethod method = LaneMethod::halt;
     std::optional<std::uint32_t> id{};  ///< of the page; nothing: it is the gateway's own Halt
     std::string axis{};
-    std::string press{};  ///< of a jog: its request_id
-    TimePoint until{};    ///< own: no Halt is worth more attempts from then on
+    std::string press{};              ///< of a jog: its request_id
+    std::vector<std::string> axes{};  ///< of a start
+    bool overtaken = false;           ///< a stop that came behind it may be executed before it
+    TimePoint until{};                ///< own: no Halt is worth more attempts from then on
   };
   /// What an answer says of a jog.
   enum class Outcome : std::uint8_t { runs, over, refused, unknown };
-  struct Press {
-    std::string axis, id;
-    Duration hold{};
-  };
   struct Owed {
     TimePoint at{}, until{};
   };
@@ -146,7 +137,10 @@ class LaneState {
   void carry_out(const LaneRequest& request, LaneMethod method, Duration lateness, TimePoint now,
                  LaneEffects& effects);
   void jog(const LaneRequest& request, Duration lateness, TimePoint now, LaneEffects& effects);
+  void start(const LaneRequest& request, LaneMethod method, LaneEffects& effects);
   void stop(const LaneRequest& request, LaneMethod method, TimePoint now, LaneEffects& effects);
+  /// A stop of that axis comes behind what is on its way; empty: of each.
+  void overtake(std::string_view axis);
   /// Why a press or a renewal is not carried out; code 0: it may be.
   [[nodiscard]] CallStatus refusal_of_move() const;
   void call(LaneMethod method, Pending pending, std::string message, Duration patience, LaneEffects& effects);
@@ -156,6 +150,8 @@ class LaneState {
   Axes::iterator halt(Axes::iterator axis, TimePoint now, LaneEffects& effects);
   void halt_all(TimePoint now, LaneEffects& effects);
   void jog_answered(const Pending& jog, Outcome outcome, TimePoint now, LaneEffects& effects);
+  void overtaken_answered(const Pending& ended, const CallStatus& status, TimePoint now,
+                          LaneEffects& effects);
   void own_halt(const std::string& axis, TimePoint until, TimePoint now, LaneEffects& effects);
   void owe_another(const std::string& axis, TimePoint now);
   [[nodiscard]] bool is_barred(const std::string& axis, std::string_view press) const;
@@ -178,14 +174,5 @@ class LaneState {
   /// Presses that were refused, until the axis gets another one or a stop.
   std::map<std::string, std::string, std::less<>> barred_;
 };
-
-/// "Halt": the name of the call, in StopService and in its own.
-[[nodiscard]] std::string_view name_of(LaneMethod method);
-/// "/axisd.v1.AxisService/Halt": where the daemon's main address has it.
-[[nodiscard]] std::string_view main_path_of(LaneMethod method);
-/// Not a press or a renewal: it may be asked for twice.
-[[nodiscard]] bool is_stop(LaneMethod method);
-/// What that path asks for; nothing: the lane does not take it.
-[[nodiscard]] std::optional<LaneMethod> method_of_path(std::string_view path);
 
 }  // namespace axisd::web

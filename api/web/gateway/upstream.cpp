@@ -86,6 +86,8 @@ void Upstream::ask(LaneMethod method, std::string_view message, const Person& pe
                    Done done) {
   if (is_stop(method))
     stop(method, message, person, timeout, std::move(done));
+  else if (!is_at_stop_lane(method))
+    start_at_main(method, message, person, timeout, std::move(done));
   else
     press(method, message, person, timeout, std::move(done));
 }
@@ -113,6 +115,25 @@ void Upstream::press(LaneMethod method, std::string_view message, const Person& 
              });
   if (method == LaneMethod::jog)
     presses_.emplace(number, Press{.who = person.key(), .call = std::move(call)});
+}
+
+void Upstream::start_at_main(LaneMethod method, std::string_view message, const Person& person,
+                             Duration timeout, Done done) {
+  const bool reachable = main_.channel->GetState(true) == GRPC_CHANNEL_READY;
+  auto room = reachable ? starts_.take(person.key()) : std::nullopt;
+  if (!room) {
+    CallStatus why{.code = reachable ? code::resource_exhausted : code::unavailable,
+                   .message = reachable ? "too many starts wait for their answers" : "axisd does not answer",
+                   .not_sent = true};
+    boost::asio::post(executor_, [done = std::move(done), why = std::move(why)] { done(why, {}); });
+    return;
+  }
+  (void)ask_at(main_, std::string(main_path_of(method)), message, person, timeout,
+               [place = std::make_shared<Shares::Place>(*std::move(room)), done = std::move(done)](
+                   const CallStatus& status, const std::string& response) mutable {
+                 place.reset();
+                 done(status, response);
+               });
 }
 
 void Upstream::stop(LaneMethod method, std::string_view message, const Person& person, Duration timeout,

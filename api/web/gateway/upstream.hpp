@@ -19,6 +19,7 @@
 #include "api/web/gateway/lane_state.hpp"
 #include "api/web/gateway/person.hpp"
 #include "api/web/gateway/settings.hpp"
+#include "api/web/gateway/shares.hpp"
 #include "buses/error.hpp"
 
 namespace axisd::web {
@@ -40,8 +41,9 @@ class Upstream {
                                             const Person& person, std::optional<Duration> timeout,
                                             Call::Events events);
   /// A call of a page's lane. Where the stop lane cannot be reached, or has no room, stops go to the main
-  /// address, behind the end of presses that wait for their answers; whatever starts or renews something is
-  /// refused. `done` is called later, once.
+  /// address, behind the end of presses that wait for their answers; a press or a renewal is refused. What
+  /// starts something that goes on by itself, and releases, go to the main address, or are refused: none of
+  /// them waits here for a connection. `done` is called later, once.
   void ask(LaneMethod method, std::string_view message, const Person& person, Duration timeout, Done done);
 
   /// Connects where that has been lost. To be called every second or so: gRPC connects only while somebody
@@ -53,6 +55,8 @@ class Upstream {
   [[nodiscard]] int open() const { return open_; }
 
  private:
+  /// Starts and releases that wait for their answers: of all, and of each person.
+  static constexpr int most_starts = 64, most_starts_each = 16;
   struct Link {
     std::shared_ptr<grpc::Channel> channel;
     std::unique_ptr<grpc::GenericStub> stub;
@@ -64,6 +68,8 @@ class Upstream {
   std::shared_ptr<Call> ask_at(Link& link, std::string path, std::string_view message, const Person& person,
                                Duration timeout, Done done);
   void press(LaneMethod method, std::string_view message, const Person& person, Duration timeout, Done done);
+  void start_at_main(LaneMethod method, std::string_view message, const Person& person, Duration timeout,
+                     Done done);
   void stop(LaneMethod method, std::string_view message, const Person& person, Duration timeout, Done done);
   void stop_at_main(LaneMethod method, std::string_view message, const Person& person, Duration timeout,
                     Done done);
@@ -77,6 +83,7 @@ class Upstream {
   Link main_, lane_;
   int open_ = 0;
   LaneRoom room_;
+  Shares starts_{most_starts, most_starts_each};
   struct Press {
     std::string who;
     std::shared_ptr<Call> call;

@@ -295,9 +295,9 @@ TEST_F(LaneTest, CallsHaveTheirTime) {
   close();
   fail(numbers.size() - 1, code::unavailable);
   wait(LaneState::pause);
-  EXPECT_THAT(patience, ElementsAre(LaneState::patience_of_moves, LaneState::patience_of_stops,
-                                    LaneState::patience_of_moves, LaneState::longest_hold,
-                                    LaneState::longest_hold - LaneState::pause))
+  EXPECT_THAT(patience,
+              ElementsAre(LaneState::patience_of_moves, LaneState::patience_of_stops,
+                          LaneState::patience_of_moves, longest_hold, longest_hold - LaneState::pause))
       << "a Halt of the gateway: what is left of it";
 }
 
@@ -363,9 +363,9 @@ TEST_F(LaneTest, ALinkThatIsFarTooLateBeginsAnew) {
 }
 
 TEST_F(LaneTest, OtherCallsAreRefused) {
-  say("axisd.v1.AxisService/MoveAbsolute", "");
-  say("axisd.v1.AxisService/Enable", "");
-  say("axisd.v1.AxisService/ReleaseStop", "");
+  say("axisd.v1.AxisService/GetAxis", "");
+  say("axisd.v1.AxisService/Disable", "");
+  say("axisd.v1.LeaseService/AcquireLease", "");
   say("Jog", "");
   EXPECT_THAT(taken(), ElementsAre("refused", "refused", "refused", "refused"));
 }

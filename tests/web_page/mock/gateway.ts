@@ -9,13 +9,10 @@ import { createConnectRouter } from '@connectrpc/connect';
 import { Role } from '@proto/access_pb';
 import { AxisService } from '@proto/axis_service_pb';
 import { ErrorDetailSchema, StatusDetailsSchema } from '@proto/error_pb';
-import { GroupService } from '@proto/group_service_pb';
-import { LeaseService } from '@proto/lease_service_pb';
-import { SystemService } from '@proto/system_service_pb';
 import { CommandKind } from '@proto/types_pb';
 import { FakeMachine, models, Refused } from './machine';
 import type { Model } from './axis';
-import { serve, type World } from './services';
+import { laneOnlyPaths, serve, type LaneCalls, type World } from './services';
 import { ServerSocket } from './socket';
 
 const types: { [ending: string]: string } = { html: 'text/html; charset=utf-8', js: 'text/javascript', css: 'text/css', svg: 'image/svg+xml' };
@@ -39,12 +36,13 @@ export class MockGateway {
   private readonly sockets = new Set<Socket>();
   private readonly lanes = new Set<ServerSocket>();
   private readonly handlers;
+  private readonly laneCalls: LaneCalls;
 
   constructor(private readonly files: string, axes: readonly Model[] = models) {
     this.machine = new FakeMachine(axes);
     this.world = { machine: this.machine, role: Role.MAINTAINER, streams: 0, silent: false };
     const router = createConnectRouter({ grpcWeb: true, grpc: false, connect: false });
-    serve(router, this.world);
+    this.laneCalls = serve(router, this.world);
     this.handlers = new Map(router.handlers.map((handler) => [handler.requestPath, handler]));
     this.server = createServer((request, response) => void this.answer(request, response).catch(() => response.destroy()));
     this.server.on('connection', (socket) => { this.sockets.add(socket); socket.on('close', () => this.sockets.delete(socket)); });
@@ -105,7 +103,7 @@ export class MockGateway {
 
   private async call(path: string, request: IncomingMessage, response: ServerResponse): Promise<void> {
     const handler = this.handlers.get(path);
-    if (handler === undefined) { response.writeHead(404).end(); return; }
+    if (handler === undefined || laneOnlyPaths.has(path.slice(1))) { response.writeHead(404).end(); return; }
     if (request.headers['content-type'] !== 'application/grpc-web+proto') { response.writeHead(415).end(); return; }
     if (!this.allowed()) { response.writeHead(401, { 'content-type': 'application/grpc-web+proto', 'grpc-status': '16' }).end(); return; }
     const gone = new AbortController();
@@ -141,45 +139,11 @@ export class MockGateway {
     if (length === 0) return answered(3, id, 0, '', new Uint8Array(), new Uint8Array(8).fill(7));
     this.lane.push({ at: performance.now(), method });
     const body = message.subarray(10 + length);
-    const { machine } = this;
-    const run: { [method: string]: () => Uint8Array } = {
-      'axisd.v1.AxisService/Jog': () => {
-        const { input, output } = AxisService.method.jog;
-        const { axis, velocity, hold, options } = fromBinary(input, body);
-        jogged.add(axis);
-        return toBinary(output, create(output, { command: machine.jog(axis, velocity!, hold === undefined ? 300 : Number(hold.seconds) * 1000 + hold.nanos / 1e6, options) }));
-      },
-      'axisd.v1.AxisService/Halt': () => {
-        const { input, output } = AxisService.method.halt;
-        const { axis, options } = fromBinary(input, body);
-        return toBinary(output, create(output, { command: machine.stop(axis, CommandKind.HALT, options) }));
-      },
-      'axisd.v1.AxisService/Stop': () => {
-        const { input, output } = AxisService.method.stop;
-        const { axis, options } = fromBinary(input, body);
-        return toBinary(output, create(output, { command: machine.stop(axis, CommandKind.STOP, options) }));
-      },
-      'axisd.v1.SystemService/StopAll': () => {
-        const { output } = SystemService.method.stopAll;
-        return toBinary(output, create(output, { results: machine.stopAll(machine.client).map((command) => ({ axis: command.axis, command })) }));
-      },
-      'axisd.v1.GroupService/GroupStop': () => {
-        const { input, output } = GroupService.method.groupStop;
-        const names = fromBinary(input, body).group === 'transfer' ? ['feeder', 'turntable'] : [];
-        return toBinary(output, create(output, { results: names.map((name) => ({ name, outcome: { case: 'command' as const, value: machine.stop(name, CommandKind.STOP) } })) }));
-      },
-      'axisd.v1.LeaseService/RenewLease': () => {
-        const { input, output } = LeaseService.method.renewLease;
-        const lease = machine.leases.get(fromBinary(input, body).leaseToken);
-        if (lease === undefined) throw new Refused(create(ErrorDetailSchema, { reason: 27, message: 'the lease is over' }));
-        lease.until = Date.now() + lease.ttl;
-        return toBinary(output, create(output, {}));
-      },
-    };
-    const carry = run[method];
+    if (method === 'axisd.v1.AxisService/Jog') jogged.add(fromBinary(AxisService.method.jog.input, body).axis);
+    const carry = this.laneCalls.get(method);
     if (carry === undefined) return answered(4, id, 12, `${method} does not go by the lane`, new Uint8Array(), new Uint8Array());
     try {
-      return answered(1, id, 0, '', new Uint8Array(), carry());
+      return answered(1, id, 0, '', new Uint8Array(), carry(body));
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
       const details = toBinary(StatusDetailsSchema, create(StatusDetailsSchema, { code: error.code, message: error.rawMessage, details: [

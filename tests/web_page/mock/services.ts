@@ -1,7 +1,7 @@
 // The services of the contract, over the machine that is made up.
-import { create } from '@bufbuild/protobuf';
+import { create, fromBinary, toBinary, type DescService } from '@bufbuild/protobuf';
 import { DurationSchema as DurationOf, timestampFromMs, type Duration } from '@bufbuild/protobuf/wkt';
-import type { ConnectRouter } from '@connectrpc/connect';
+import type { ConnectRouter, ServiceImpl } from '@connectrpc/connect';
 import { Role } from '@proto/access_pb';
 import { AxisService } from '@proto/axis_service_pb';
 import { BusBudgetSchema, type BusBudget } from '@proto/budget_pb';
@@ -65,12 +65,33 @@ const leaseOf = (lease: FakeLease) => create(LeaseSchema, { client: lease.client
 
 const groups = [create(GroupSchema, { name: 'transfer', axes: ['feeder', 'turntable'], maxArrivalError: span(50) })];
 
-export function serve(router: ConnectRouter, world: World): void {
+/** What goes over the lane alone, as it would come late by a call. */
+const laneOnly: readonly [DescService, readonly string[]][] = [
+  [AxisService, ['enable', 'home', 'moveAbsolute', 'moveRelative', 'moveVelocity', 'reset', 'setPosition', 'releaseStop', 'jog']],
+  [GroupService, ['moveGroup']], [SystemService, ['releaseStopAll']]];
+const onLane: readonly [DescService, readonly string[]][] = [
+  ...laneOnly, [AxisService, ['halt', 'stop', 'quickStop']], [GroupService, ['groupHalt', 'groupStop']], [SystemService, ['stopAll']], [LeaseService, ['renewLease']]];
+
+const pathOf = (service: DescService, name: string): string => `${service.typeName}/${service.method[name]!.name}`;
+
+/** "axisd.v1.AxisService/Home" */
+export const laneOnlyPaths: ReadonlySet<string> = new Set(laneOnly.flatMap(([service, names]) => names.map((name) => pathOf(service, name))));
+
+/** From the bytes of a request to those of its response, by "axisd.v1.AxisService/Stop". */
+export type LaneCalls = ReadonlyMap<string, (body: Uint8Array) => Uint8Array>;
+
+/** Answers calls, and gives what answers those of the lane. */
+export function serve(router: ConnectRouter, world: World): LaneCalls {
+  const implemented = new Map<DescService, object>();
+  const answer = <T extends DescService>(service: T, by: Partial<ServiceImpl<T>>): void => {
+    router.service(service, by);
+    implemented.set(service, by);
+  };
   const { machine } = world;
   const now = (id: string) => machine.commands.find((command) => command.id === id)!;
   const moves = new Map<string, { move: GroupMove; begun: number }>();
 
-  router.service(AxisService, {
+  answer(AxisService, {
     listAxes: () => ({ axes: [...machine.axes.values()].map((axis) => axis.snapshot(Date.now())) }),
     getAxis: ({ axis }) => ({ state: machine.axis(axis).snapshot(Date.now()) }),
     async *watchAxes({ period }, { signal }) {
@@ -123,11 +144,11 @@ export function serve(router: ConnectRouter, world: World): void {
       return { command: now(command.id) };
     },
   });
-  router.service(CommandService, {
+  answer(CommandService, {
     listCommands: ({ axis, limit }) => ({ commands: machine.commands.filter((command) => axis === '' || command.axis === axis).slice(0, limit || 20) }),
     getCommand: ({ id }) => ({ command: now(id) }),
   });
-  router.service(EventService, {
+  answer(EventService, {
     async *watchEvents({ instanceId, afterSequence }, { signal }) {
       let seen = instanceId === machine.instance ? Number(afterSequence ?? 0n) : 0;
       for (let first = true; !signal.aborted; first = false) {
@@ -138,7 +159,7 @@ export function serve(router: ConnectRouter, world: World): void {
       }
     },
   });
-  router.service(LeaseService, {
+  answer(LeaseService, {
     acquireLease({ axes, ttl, label, take }) {
       const members = axes.flatMap((name) => groups.find((group) => group.name === name)?.axes ?? [name]);
       const lease = machine.lease(members, ms(ttl, 2000), label, take);
@@ -157,7 +178,7 @@ export function serve(router: ConnectRouter, world: World): void {
     },
     listLeases: () => ({ leases: [...machine.leases.values()].map(leaseOf) }),
   });
-  router.service(BusService, {
+  answer(BusService, {
     listBuses: () => ({ buses: ['line-a', 'line-b', 'can0'].map((name) => create(BusSchema, {
       name, port: 'sim', baud: name === 'can0' ? 1_000_000 : 115_200, open: true, simulated: true, kind: name === 'can0' ? BusKind.CANOPEN : BusKind.MODBUS_RTU,
       ...(name === 'can0' ? { network: { link: NetworkLink.UP } } : {}) })) }),
@@ -167,7 +188,7 @@ export function serve(router: ConnectRouter, world: World): void {
       while (!signal.aborted) { yield { buses: statistics(machine), missed: 0n }; await pause(ms(period, 1000), signal); }
     },
   });
-  router.service(GroupService, {
+  answer(GroupService, {
     listGroups: () => ({ groups }),
     moveGroup({ group, targets, options, arriveTogether }) {
       const commands = targets.map(({ axis, target }) => {
@@ -197,7 +218,7 @@ export function serve(router: ConnectRouter, world: World): void {
     groupHalt: ({ group, axes }) => ({ results: members(group, axes).map((name) => ({ name, outcome: { case: 'command' as const, value: machine.stop(name, CommandKind.HALT) } })) }),
     groupStop: ({ group, axes }) => ({ results: members(group, axes).map((name) => ({ name, outcome: { case: 'command' as const, value: machine.stop(name, CommandKind.STOP) } })) }),
   });
-  router.service(SystemService, {
+  answer(SystemService, {
     getInfo: () => ({ machine: 'press-1', version: '1.0', instanceId: machine.instance, inhibited: machine.inhibitedBy !== '', inhibitedBy: machine.inhibitedBy,
                       client: `${machine.client} via web.press-1`, identity: 'web.press-1', role: world.role }),
     stopAll: () => ({ results: machine.stopAll(machine.client).map((command) => ({ axis: command.axis, command })) }),
@@ -213,6 +234,12 @@ export function serve(router: ConnectRouter, world: World): void {
     },
     acceptState: () => ({}),
   });
+  return new Map(onLane.flatMap(([service, names]) => names.flatMap((name) => {
+    const run = (implemented.get(service) as { [name: string]: ((request: unknown) => object) | undefined })[name];
+    const { input, output } = service.method[name]!;
+    return run === undefined ? []
+      : [[pathOf(service, name), (body: Uint8Array) => toBinary(output, create(output, run(fromBinary(input, body)) as never))] as const];
+  })));
 }
 
 const members = (group: string, axes: readonly string[]): string[] => [...(groups.find(({ name }) => name === group)?.axes ?? []), ...axes];

@@ -1,11 +1,13 @@
-// Commands of this page. Each is sent once, under the page's lease, valid for two seconds by the daemon's clock: one that is
-// held up on its way is refused there.
-import { create } from '@bufbuild/protobuf';
+// Commands of this page. Each is sent once, over the lane, under the page's lease, valid for two seconds by the daemon's clock:
+// one that is held up on its way is dropped by the gateway, and one that is held up there refused by the daemon.
 import { BufferMode, CommandState, WaitUntil, type Command } from '@proto/types_pb';
 import type { CommandOptionsSchema } from '@proto/types_pb';
 import type { MessageInitShape } from '@bufbuild/protobuf';
-import { MoveGroupRequestSchema, type GroupMove, type GroupTarget } from '@proto/group_service_pb';
-import { store, tokenFor } from './app';
+import type { DescMessage, DescMethodUnary } from '@bufbuild/protobuf';
+import { AxisService } from '@proto/axis_service_pb';
+import { GroupService, type GroupMove, type GroupTarget } from '@proto/group_service_pb';
+import { lane, store, tokenFor } from './app';
+import { byLane, NoAnswer } from './lane/calls';
 import { timestamp } from './model/wire';
 import { CALL_MS, clients, problem } from './transport/clients';
 import { notify, settle, type Text } from './ui/notices';
@@ -56,16 +58,24 @@ async function commanded(what: string, call: () => Promise<Command | undefined>)
     void follow(id, what, command);
     return true;
   } catch (error) {
-    const detail = problem(error);
-    settle(id, 'error', { key: 'command.refused', values: { what } },
-           [reasonWord(detail.reason), detail.message, detail.remedy].filter(Boolean).join(': '));
+    refused(id, what, error);
     return false;
   }
 }
 
+function refused(id: number, what: string, error: unknown): void {
+  settle(id, 'error', { key: error instanceof NoAnswer ? 'command.unknown' : 'command.refused', values: { what } }, wordsOf(error));
+}
+
 const reasonWord = (reason: number): string => { const key = reasonKey(reason); return key === null ? '' : t(key); };
 
-const timed = { timeoutMs: CALL_MS };
+function wordsOf(error: unknown): string {
+  const detail = problem(error);
+  return [reasonWord(detail.reason), detail.message, detail.remedy].filter(Boolean).join(': ');
+}
+
+const start = <I extends DescMessage, O extends DescMessage>(method: DescMethodUnary<I, O>, request: MessageInitShape<I>) =>
+  byLane(lane, method, request);
 const needed = (token: bigint) => {
   const given = options(token);
   if (given === null) throw new Error(t('page.nothing-live'));
@@ -73,19 +83,19 @@ const needed = (token: bigint) => {
 };
 
 export const enable = (axis: string) => commanded(`${t('action.enable')} ${axis}`, async () =>
-  (await clients.axes.enable({ axis, options: needed(tokenFor(axis)) }, timed)).command);
+  (await start(AxisService.method.enable, { axis, options: needed(tokenFor(axis)) })).command);
 export const disable = (axis: string) => commanded(`${t('action.disable')} ${axis}`, async () =>
-  (await clients.axes.disable({ axis, options: needed(tokenFor(axis)) }, timed)).command);
+  (await clients.axes.disable({ axis, options: needed(tokenFor(axis)) }, { timeoutMs: CALL_MS })).command);
 export const home = (axis: string) => commanded(`${t('action.home')} ${axis}`, async () =>
-  (await clients.axes.home({ axis, options: needed(tokenFor(axis)) }, timed)).command);
+  (await start(AxisService.method.home, { axis, options: needed(tokenFor(axis)) })).command);
 export const reset = (axis: string) => commanded(`${t('action.reset')} ${axis}`, async () =>
-  (await clients.axes.reset({ axis, options: needed(tokenFor(axis)) }, timed)).command);
+  (await start(AxisService.method.reset, { axis, options: needed(tokenFor(axis)) })).command);
 export const moveTo = (axis: string, position: number, velocity: number | undefined, unit: string) =>
-  commanded(`${t('action.move')} ${axis} ${position} ${unit}`, async () => (await clients.axes.moveAbsolute(
-    { axis, position, ...(velocity === undefined ? {} : { velocity }), options: needed(tokenFor(axis)) }, timed)).command);
+  commanded(`${t('action.move')} ${axis} ${position} ${unit}`, async () => (await start(AxisService.method.moveAbsolute,
+    { axis, position, ...(velocity === undefined ? {} : { velocity }), options: needed(tokenFor(axis)) })).command);
 export const moveBy = (axis: string, distance: number, velocity: number | undefined, unit: string) =>
-  commanded(`${t('action.move')} ${axis} ${distance > 0 ? '+' : ''}${distance} ${unit}`, async () => (await clients.axes.moveRelative(
-    { axis, distance, ...(velocity === undefined ? {} : { velocity }), options: needed(tokenFor(axis)) }, timed)).command);
+  commanded(`${t('action.move')} ${axis} ${distance > 0 ? '+' : ''}${distance} ${unit}`, async () => (await start(AxisService.method.moveRelative,
+    { axis, distance, ...(velocity === undefined ? {} : { velocity }), options: needed(tokenFor(axis)) })).command);
 
 /** A move of several axes. Null: it was refused, and said so. */
 export async function moveGroup(group: string, targets: readonly Omit<GroupTarget, '$typeName' | '$unknown'>[], together: boolean,
@@ -93,14 +103,12 @@ export async function moveGroup(group: string, targets: readonly Omit<GroupTarge
   const what = `${t('action.move')} ${group}`;
   const id = notify('busy', { key: 'command.sent', values: { what } });
   try {
-    const request = create(MoveGroupRequestSchema, { group, targets: targets.map((target) => ({ ...target })), arriveTogether: together,
-                                                     options: needed(token) });
-    const { move } = await clients.groups.moveGroup(request, timed);
+    const { move } = await start(GroupService.method.moveGroup, {
+      group, targets: targets.map((target) => ({ ...target })), arriveTogether: together, options: needed(token) });
     settle(id, 'busy', { key: 'command.accepted', values: { what } });
     return move ?? null;
   } catch (error) {
-    const detail = problem(error);
-    settle(id, 'error', { key: 'command.refused', values: { what } }, [reasonWord(detail.reason), detail.message, detail.remedy].filter(Boolean).join(': '));
+    refused(id, what, error);
     return null;
   }
 }
@@ -113,8 +121,7 @@ export async function asked(what: Text, call: () => Promise<unknown>): Promise<b
     settle(id, 'done', what);
     return true;
   } catch (error) {
-    const detail = problem(error);
-    settle(id, 'error', what, [reasonWord(detail.reason), detail.message, detail.remedy].filter(Boolean).join(': '));
+    settle(id, 'error', what, wordsOf(error));
     return false;
   }
 }

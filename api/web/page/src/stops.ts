@@ -52,9 +52,6 @@ async function sent<I extends DescMessage, O extends DescMessage>(
   return Promise.any([onLane, fallback()]).catch((error: AggregateError) => { throw error.errors[1]; });
 }
 
-const words = (error: unknown): ErrorDetail | string =>
-  typeof error === 'object' && error !== null && '$typeName' in error ? error as ErrorDetail : problem(error);
-
 async function reported(what: StopReport['what'], of: string, run: () => Promise<StopOutcome[]>): Promise<void> {
   const begun = performance.now();
   const mine: StopReport = { what, of, at: new Date(), answered: null, outcomes: [], failed: null };
@@ -65,8 +62,7 @@ async function reported(what: StopReport['what'], of: string, run: () => Promise
   try {
     put({ outcomes: await run() });
   } catch (error) {
-    const said = words(error);
-    put({ failed: typeof said === 'string' ? said : said.message });
+    put({ failed: problem(error).message });
   }
 }
 

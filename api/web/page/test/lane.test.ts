@@ -1,7 +1,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { decodeAnswer, encodeRequest, Kind, MOST_BYTES, VERSION } from '../src/lane/frame';
+import { byLane, NoAnswer } from '../src/lane/calls';
 import { Lane, LaneClosed, type Socket } from '../src/lane/lane';
+import { fromBinary, toBinary, create } from '@bufbuild/protobuf';
+import { AxisService } from '@proto/axis_service_pb';
 
 test('a request is laid out as the contract says', () => {
   const bytes = encodeRequest(0x01020304, 0x1_0a0b0c0d + 0.7, 'axisd.v1.AxisService/Stop', new Uint8Array([9, 8]));
@@ -140,4 +143,35 @@ test('stopped, it is closed and stays so', () => {
   assert.ok(socket.closed);
   world.advance(60_000);
   assert.equal(world.sockets.length, 1);
+});
+
+const { home } = AxisService.method;
+const lastId = (socket: FakeSocket) => new DataView(socket.sent.at(-1)!.buffer).getUint32(1);
+
+test('a start goes over the lane, and its answer is the response', async () => {
+  const [lane, , socket] = opened();
+  const waiting = byLane(lane, home, { axis: 'feeder' });
+  const sent = socket.sent.at(-1)!;
+  assert.equal(new TextDecoder().decode(sent.subarray(10, 10 + sent[9]!)), 'axisd.v1.AxisService/Home');
+  assert.equal(fromBinary(home.input, sent.subarray(10 + sent[9]!)).axis, 'feeder');
+  socket.answer(1, Kind.answer, [...toBinary(home.output, create(home.output, { command: { id: 'c-1' } }))]);
+  assert.equal((await waiting).command!.id, 'c-1');
+});
+
+test('a start that was not sent, was dropped as late or was refused says so', async () => {
+  await assert.rejects(byLane(new Lane(new FakeWorld()), home, { axis: 'feeder' }), /lane to the machine is closed/);
+  const [lane, , socket] = opened();
+  const late = byLane(lane, home, { axis: 'feeder' });
+  socket.answer(1, Kind.droppedAsLate);
+  await assert.rejects(late, /held up on its way/);
+  const refused = byLane(lane, home, { axis: 'feeder' });
+  socket.onmessage!({ data: answerBytes(Kind.refused, lastId(socket), 9, 'too many', [], []).buffer });
+  await assert.rejects(refused, /too many/);
+});
+
+test('of a start on a lane that is lost nobody knows what became', async () => {
+  const [lane, , socket] = opened();
+  const waiting = byLane(lane, home, { axis: 'feeder' });
+  socket.onclose!();
+  await assert.rejects(waiting, NoAnswer);
 });

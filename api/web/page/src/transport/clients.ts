@@ -9,7 +9,7 @@ import { GroupService } from '@proto/group_service_pb';
 import { LeaseService } from '@proto/lease_service_pb';
 import { SystemService } from '@proto/system_service_pb';
 import { ErrorDetailSchema, Reason, type ErrorDetail } from '@proto/error_pb';
-import { create } from '@bufbuild/protobuf';
+import { create, isMessage } from '@bufbuild/protobuf';
 
 const transport = createGrpcWebTransport({
   baseUrl: globalThis.location?.origin ?? 'http://localhost',
@@ -33,6 +33,7 @@ export const CALL_MS = 2000;
 
 /** What went wrong, as the daemon says it; of what is not the daemon's the message alone. */
 export function problem(error: unknown): ErrorDetail {
+  if (isMessage(error, ErrorDetailSchema)) return error;  // over the lane
   const wrapped = ConnectError.from(error);
   const [detail] = wrapped.findDetails(ErrorDetailSchema);
   if (detail !== undefined) return detail;

@@ -1,6 +1,9 @@
 // What is asked before it is done: releases, and taking control from somebody else. Stops are never asked about.
-import { refreshMachine, store, takeControl, tokenFor } from '../app';
+import { AxisService } from '@proto/axis_service_pb';
+import { SystemService } from '@proto/system_service_pb';
+import { lane, refreshMachine, store, takeControl, tokenFor } from '../app';
 import { t } from '../i18n';
+import { byLane } from '../lane/calls';
 import { asked } from '../motion';
 import { CALL_MS, clients } from '../transport/clients';
 import { Reason } from '@proto/error_pb';
@@ -12,7 +15,7 @@ const timed = { timeoutMs: CALL_MS };
 export function askReleaseAll(): void {
   const by = store.info.peek()?.inhibitedBy ?? '';
   confirmed(t('release-all.title'), t('release-all.text', { who: by || '?' }), t('action.release-all'), () => {
-    void asked({ key: 'release-all.done' }, () => clients.system.releaseStopAll({}, timed)).then(() => refreshMachine());
+    void asked({ key: 'release-all.done' }, () => byLane(lane, SystemService.method.releaseStopAll, {})).then(() => refreshMachine());
   });
 }
 
@@ -21,7 +24,7 @@ export function askRelease(axis: string): void {
   const who = holds.map(({ holder }) => holder).join(', ') || '?';
   confirmed(t('release.title', { axis }), t('release.text', { who }), t('action.release-hold'), () => {
     void asked({ key: 'release.done', values: { axis } },
-               () => clients.axes.releaseStop({ axis, everybody: true, leaseToken: tokenFor(axis) }, timed));
+               () => byLane(lane, AxisService.method.releaseStop, { axis, everybody: true, leaseToken: tokenFor(axis) }));
   });
 }
 
