@@ -5,10 +5,9 @@ import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { after, afterEach, before, test } from 'node:test';
 import type { Browser, BrowserServer, CDPSession, Page } from 'playwright-core';
-import { Stack, type Truth } from './stack';
+import { CHROMIUM, sleep, Stack, until, type Truth } from './stack';
 
 const { chromium } = createRequire(process.env['AXISD_WEB_MODULES']!)('playwright-core') as typeof import('playwright-core');
-const CHROMIUM = process.env['AXISD_CHROMIUM'] ?? '/usr/bin/chromium';
 const AXIS = 'turntable';
 /** From the last renewal to standstill: the hold, the ramp, and the readings that show it. */
 const HOLD_MS = 300;
@@ -17,8 +16,6 @@ const RAMP_MS = 300;
 const SLACK_MS = process.env['AXISD_SANITIZE'] ? 1500 : 150;
 /** How long nothing may move afterwards. */
 const QUIET_MS = 3000;
-
-const needed = (name: string): string => process.env[name] ?? (() => { throw new Error(`${name} is not set`); })();
 
 let stack: Stack;
 let server: BrowserServer;
@@ -30,7 +27,7 @@ async function startBrowser(): Promise<void> {
 }
 
 before(async () => {
-  stack = new Stack({ axisd: needed('AXISD'), web: needed('AXISD_WEB'), axisctl: needed('AXISCTL'), page: needed('AXISD_WEB_PAGE'), demo: needed('AXISD_DEMO') });
+  stack = new Stack();
   await stack.start();
   await startBrowser();
 });
@@ -40,17 +37,6 @@ after(async () => {
   await stack?.close();
 });
 afterEach(async () => { for (const context of browser.contexts()) await context.close().catch(() => {}); });
-
-const sleep = (ms: number) => new Promise((resolve) => setTimeout(resolve, ms));
-
-async function until(holds: () => Promise<boolean>, what: string, atMost: number): Promise<number> {
-  const begun = performance.now();
-  while (!(await holds())) {
-    if (performance.now() - begun > atMost) throw new Error(`not within ${atMost} ms: ${what}`);
-    await sleep(5);
-  }
-  return performance.now() - begun;
-}
 
 /** A page of the axis, under control, enabled, with a finger on the button and the axis in motion. */
 async function held(touch = false): Promise<{ page: Page; cdp: CDPSession; at: { x: number; y: number } }> {
@@ -259,47 +245,32 @@ test('a finger holds for long: it moves on, started once', async () => {
   await restsForGood(1000);
 });
 
-/** Asks for a command by hand, and gives the text with which it is refused. */
-async function refusal(...words: string[]): Promise<string> {
-  return stack.axisctl(...words).then(() => '', (error: { stderr: string }) => error.stderr);
-}
-
-test('a button that cannot be used shows the text of the refusal, and its remedy leads out', async () => {
-  const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
-  const page = await context.newPage();
-  await stack.axisctl('disable', 'pusher', '--wait');
-  await page.goto(`${stack.url}/axis/pusher?panel=0&lang=en`);
-  await page.locator('.controls [data-remedy="take-control"]').click();
-  await page.locator('[data-act="give-back"]').waitFor();
-  const lease = async () => (JSON.parse(await stack.axisctl('lease', 'list', '--json')) as { leases?: unknown[] }).leases?.length ?? 0;
-  assert.equal(await lease(), 1);
-  const shown = async (what: string) => {
-    const line = page.locator('.controls .reasons li', { hasText: what });
-    await line.waitFor();
-    return (await line.locator('[data-explain]').textContent())!;
-  };
-  const field = (index: number) => page.locator('.controls .move input').nth(index);
-  // Everybody is the same client here, so a command without the page's token is refused for that: give control back to ask.
-  const situations: [string, string, string[], (() => Promise<void>)?][] = [
-    ['off', 'Home', ['home', 'pusher']],
-    ['not homed', 'Move', ['move', 'pusher', '50mm'], async () => { await page.locator('[data-remedy="enable"]').click(); await page.locator('[data-act="disable"]').waitFor(); await field(0).fill('50'); }],
-    ['too fast', 'Move', ['move', 'pusher', '--relative', '5mm', '--velocity', '900mm/s'],
-      async () => { await page.locator('.controls .choice .button', { hasText: 'by' }).click(); await field(0).fill('5'); await field(1).fill('900'); }],
-    ['too slow', 'Move', ['move', 'pusher', '--relative', '5mm', '--velocity', '0.01mm/s'], async () => { await field(1).fill('0.01'); }]];
-  for (const [what, label, words, reach] of situations) {
-    await reach?.();
-    await sleep(400);
-    const text = await shown(label);
-    await page.locator('[data-act="give-back"]').click();
-    await page.locator('.controls [data-act="take-control"]').waitFor();
-    // The command line tells the address in between.
-    const said = (await refusal(...words)).replace(/line-\w+ node \d+: /, '');
-    assert.ok(said.includes(text), `${what}: '${text}' is not what is said: ${said}`);
-    await page.locator('.controls .row [data-act="take-control"]').click();
-    await page.locator('[data-act="give-back"]').waitFor();
+test('a move whose packet is held up moves nothing, and one before a stop is ended by it', async () => {
+  const { page } = await held();
+  const before = await stack.truth(AXIS);
+  const field = page.locator('.controls .move input').first();
+  await page.locator('.controls .choice .button', { hasText: 'by' }).click();
+  await field.fill('90');
+  const move = page.locator('[data-act="move"]:not([aria-disabled="true"])');
+  await move.waitFor();
+  stack.network.cut();
+  await move.click();
+  await sleep(1500);
+  stack.network.join();
+  await page.locator('.notices li.error', { hasText: 'held up on its way' }).waitFor();
+  const { rest } = await restsForGood(100);
+  assert.equal(rest.starts, before.starts, 'it was started by a packet that came late');
+  // Behind one another, however the network holds them up.
+  for (const ms of [0, 30, 60]) {
+    await move.waitFor();
+    stack.network.cut();
+    await move.click();
+    await page.evaluate((axis) => document.querySelector(`[data-stop="${axis}"]`)!.dispatchEvent(new MouseEvent('click', { detail: 0, bubbles: true })), AXIS);
+    await sleep(ms);
+    stack.network.join();
+    await until(async () => await page.locator('.report .outcomes li').count() === 1, 'the stop is answered', 5000);
+    await restsForGood(3000);
   }
-  await page.locator('[data-remedy="use"]').click();
-  await until(async () => await page.locator('.controls .reasons li', { hasText: 'Move' }).count() === 0, 'the remedy leads out', 3000);
 });
 
 test('STOP ALL: every axis says what became of it, and a question comes before the release', async () => {

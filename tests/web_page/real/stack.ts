@@ -82,6 +82,21 @@ export class Network {
   }
 }
 
+const needed = (name: string): string => process.env[name] ?? (() => { throw new Error(`${name} is not set`); })();
+
+export const CHROMIUM = process.env['AXISD_CHROMIUM'] ?? '/usr/bin/chromium';
+export const sleep = (ms: number) => new Promise<void>((resolve) => setTimeout(resolve, ms));
+
+/** Waits until something holds; how long that took. */
+export async function until(holds: () => Promise<boolean>, what: string, atMost: number): Promise<number> {
+  const begun = performance.now();
+  while (!(await holds())) {
+    if (performance.now() - begun > atMost) throw new Error(`not within ${atMost} ms: ${what}`);
+    await sleep(5);
+  }
+  return performance.now() - begun;
+}
+
 export class Stack {
   readonly folder = mkdtempSync(join(tmpdir(), 'axisd-web-real-'));
   url = '';
@@ -91,15 +106,17 @@ export class Stack {
   private daemon: ChildProcess | null = null;
   private gateway: ChildProcess | null = null;
 
-  constructor(private readonly programs: { axisd: string; web: string; axisctl: string; page: string; demo: string }) {}
+  private readonly programs = { axisd: needed('AXISD'), web: needed('AXISD_WEB'), axisctl: needed('AXISCTL'), page: needed('AXISD_WEB_PAGE'),
+                                demo: needed('AXISD_DEMO') };
 
-  async start(): Promise<void> {
+  /** `change`: of the demo's configuration. */
+  async start(change: (yaml: string) => string = (yaml) => yaml): Promise<void> {
     const port = await freePort();
     this.server = `127.0.0.1:${port}`;
     const demo = readFileSync(this.programs.demo, 'utf8')
       .replace('state_directory: /tmp/axisd-demo', `state_directory: ${join(this.folder, 'state')}`)
       .replace('listen: localhost:7443', `listen: 127.0.0.1:${port}\n  stop_listen: 127.0.0.1:${await freePort()}`);
-    writeFileSync(join(this.folder, 'axisd.yaml'), demo);
+    writeFileSync(join(this.folder, 'axisd.yaml'), change(demo));
     this.port = await freePort();
     writeFileSync(join(this.folder, 'users'), '', { mode: 0o600 });  // nobody: whoever is at this computer is let in
     const stop = /stop_listen: ([\d.]+:\d+)/.exec(demo)![1]!;

@@ -5,10 +5,10 @@ import { Role } from '@proto/access_pb';
 import { Reason, type ErrorDetail } from '@proto/error_pb';
 import type { AxisState } from '@proto/types_pb';
 import type { ExplainRequestSchema } from '@proto/system_service_pb';
-import { roleFor, store, tokenFor } from './app';
+import { lane, roleFor, store, tokenFor } from './app';
 import { t } from './i18n';
 import { reasonKey } from './i18n/names';
-import { remedyOf, type Remedy } from './model/remedy';
+import { remedyOf, type Asked, type Remedy } from './model/remedy';
 import { CALL_MS, clients } from './transport/clients';
 
 export type CommandCase = MessageInitShape<typeof ExplainRequestSchema>['command'];
@@ -16,13 +16,14 @@ export type CommandCase = MessageInitShape<typeof ExplainRequestSchema>['command
 /** One thing in the way. */
 export interface Obstacle { word: string; text: string; remedy: Remedy | null; hint: string }
 
-export interface Question { key: string; command: CommandCase; asked: { position?: number; velocity?: number; held?: boolean } }
+/** `probe`: it is refused in any case, for what that tells. */
+export interface Question { key: string; command: CommandCase; asked: Asked; probe?: true }
 
 export interface Answer { obstacle: Obstacle | null; details: readonly ErrorDetail[] }
 
 const reasonWord = (reason: Reason): string => { const key = reasonKey(reason); return key === null ? '' : t(key); };
 
-export function obstacleOf(detail: ErrorDetail, asked: Question['asked']): Obstacle {
+export function obstacleOf(detail: ErrorDetail, asked: Asked): Obstacle {
   return { word: reasonWord(detail.reason), text: detail.message, remedy: remedyOf(detail, asked), hint: detail.remedy };
 }
 
@@ -34,6 +35,7 @@ export function pageObstacle(axis: string): Obstacle | null {
     return { word: t('reason.access-denied'), text: t('page.role-too-small'), remedy: { act: 'show', screen: 'people' }, hint: '' };
   }
   if (tokenFor(axis) === 0n) return { word: '', text: t('page.observer'), remedy: { act: 'take-control' }, hint: '' };
+  if (lane.state.value !== 'open') return { word: '', text: t('page.lane-closed'), remedy: null, hint: '' };
   return null;
 }
 
@@ -46,8 +48,11 @@ export function signature(state: AxisState): string {
 }
 
 const SETTLE_MS = 80;
+/** Not all that is in the way shows in the state of the axis. */
+export const AGAIN_MS = 1000;
 
-/** Asks the daemon anew whenever the axis or a question changes. Ends with `stop`. */
+/** Asks the daemon anew whenever the axis or a question changes, and now and then while something is in the way. Ends with
+ * `stop`. */
 export function watchExplanations(axis: string, questions: ReadonlySignal<readonly Question[]>) {
   const answers = signal<ReadonlyMap<string, Answer>>(new Map());
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -62,9 +67,17 @@ export function watchExplanations(axis: string, questions: ReadonlySignal<readon
         const { obstacles } = await clients.system.explain({ axis, command: command!, leaseToken: token },
                                                            { timeoutMs: CALL_MS, signal: own.signal });
         const details = obstacles.flatMap(({ blocking, detail }) => (blocking && detail !== undefined ? [detail] : []));
-        return [key, { obstacle: details[0] === undefined ? null : obstacleOf(details[0], { ...values, held: (store.axis(axis)?.state.peek().holds.length ?? 0) > 0 }), details }];
+        const state = store.axis(axis)?.state.peek();
+        const from = command!.case === 'moveRelative' && state !== undefined ? { base: state.position } : {};
+        const meant: Asked = { ...values, ...from, held: (state?.holds.length ?? 0) > 0 };
+        return [key, { obstacle: details[0] === undefined ? null : obstacleOf(details[0], meant), details }];
       }));
-      if (!own.signal.aborted) answers.value = new Map(found);
+      if (own.signal.aborted) return;
+      const said = new Map(found);
+      answers.value = said;
+      if (list.some(({ key, probe }) => probe === undefined && said.get(key)!.obstacle !== null)) {
+        timer = setTimeout(() => { if (store.live.peek()) void ask(list, token); }, AGAIN_MS);
+      }
     } catch {
       // Asked anew with the next change; what is unknown forbids nothing, as the daemon decides.
       if (!own.signal.aborted) asked = '';

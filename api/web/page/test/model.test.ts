@@ -181,6 +181,9 @@ test('remedies: what a reason leads to', () => {
   assert.deepEqual(remedyOf(detail(Reason.SOFT_LIMIT, { minimum: 0, maximum: 400, unit: 'mm' }), { position: 500 }), { act: 'use', field: 'position', value: 400 });
   assert.deepEqual(remedyOf(detail(Reason.OUT_OF_RANGE, { minimum: 1, maximum: 90, unit: 'mm/s' }), { position: 5, velocity: 200 }), { act: 'use', field: 'velocity', value: 90 });
   assert.equal(remedyOf(detail(Reason.OUT_OF_RANGE, { minimum: 1, maximum: 90, unit: 'ms' }), { position: 5 }), null);
+  const limits = detail(Reason.SOFT_LIMIT, { minimum: 0, maximum: 150, unit: 'mm' });
+  assert.deepEqual(remedyOf(limits, { position: 400, base: 99.996 }), { act: 'use', field: 'position', value: 50 }, 'a distance ends within the limits');
+  assert.deepEqual(remedyOf(limits, { position: -400, base: 99.996 }), { act: 'use', field: 'position', value: -99.99 });
 });
 
 test('the nearest value that is permitted is permitted when it is written with few digits', () => {

@@ -15,8 +15,16 @@ export function nearest(asked: number, minimum: number, maximum: number): number
   return rounded > maximum ? Math.floor(maximum * grain) / grain : rounded;
 }
 
+/** What was asked for. `base`: `position` is a distance from there. `held`: a stop is held. */
+export interface Asked { position?: number; velocity?: number; held?: boolean; base?: number }
+
+/** A distance that ends within a range of positions, in hundredths: the base may waver by a count or two. */
+export function nearestDistance(asked: number, base: number, minimum: number, maximum: number): number {
+  return Math.trunc(Math.min(maximum - base, Math.max(minimum - base, asked)) * 100) / 100;
+}
+
 /** Null: time, or somebody at the machine, has to do it; the text says what. */
-export function remedyOf(detail: ErrorDetail, asked: { position?: number; velocity?: number; held?: boolean }): Remedy | null {
+export function remedyOf(detail: ErrorDetail, asked: Asked): Remedy | null {
   switch (detail.reason) {
     case Reason.NOT_TRUSTED: return { act: 'home' };
     case Reason.DISABLED: return { act: 'enable' };
@@ -38,7 +46,9 @@ export function remedyOf(detail: ErrorDetail, asked: { position?: number; veloci
       const velocity = permitted.unit.endsWith('/s');
       const value = velocity ? asked.velocity : asked.position;
       if (value === undefined || permitted.unit === 'ms') return null;
-      return { act: 'use', field: velocity ? 'velocity' : 'position', value: nearest(value, permitted.minimum, permitted.maximum) };
+      const { minimum, maximum } = permitted;
+      if (!velocity && asked.base !== undefined) return { act: 'use', field: 'position', value: nearestDistance(value, asked.base, minimum, maximum) };
+      return { act: 'use', field: velocity ? 'velocity' : 'position', value: nearest(value, minimum, maximum) };
     }
     default: return null;
   }

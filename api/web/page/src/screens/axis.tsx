@@ -16,7 +16,6 @@ import { StateMark, tone } from '../ui/marks';
 import { Choice } from '../ui/choices';
 import { askTakeControl } from '../ui/questions';
 import { leaseText, noteText, positionText, stateText, trustText, velocityText } from '../ui/words';
-import { plainName } from '../model/cell';
 import { AxisLogs } from './axis-logs';
 import { MotionPlot } from './motion-plot';
 import { rangesOf, niceSpeed } from '../model/ranges';
@@ -36,7 +35,7 @@ function Head({ entry }: { entry: AxisEntry }) {
   const note = noteText(state);
   return (
     <section class={`axis-head ${tone(state)} ${entry.stale.value ? 'stale' : ''}`} aria-label={name}>
-      <h1>{plainName(name)}</h1>
+      <h1>{name}</h1>
       <span class="badge"><StateMark state={state} />{stateText(state, entry.age.value)}</span>
       <output class="big">{position}</output>
       <span class="speed">{velocity} <span class="target">{target}</span></span>
@@ -78,11 +77,12 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
       { key: mode.value, asked: { ...(to === null ? {} : { position: to }), ...profile },
         command: mode.value === 'to' ? { case: 'moveAbsolute', value: { position: to ?? entry.state.peek().position, ...profile } }
           : { case: 'moveRelative', value: { distance: to ?? 1, ...profile } } },
-      { key: 'ranges', command: { case: 'moveAbsolute', value: { position: FAR, velocity: FAR } }, asked: { position: FAR } },
+      { key: 'ranges', command: { case: 'moveAbsolute', value: { position: FAR, velocity: FAR } }, asked: { position: FAR }, probe: true },
     ];
     if (jog !== null) {
-      list.push({ key: 'jog+', command: { case: 'jog', value: { velocity: jog.slow } }, asked: { velocity: jog.slow } },
-                { key: 'jog-', command: { case: 'jog', value: { velocity: -jog.slow } }, asked: { velocity: jog.slow } });
+      // What forbids the slow speed forbids the fast one.
+      list.push({ key: 'jog+', command: { case: 'jog', value: { velocity: jog.fast } }, asked: { velocity: jog.fast } },
+                { key: 'jog-', command: { case: 'jog', value: { velocity: -jog.fast } }, asked: { velocity: jog.fast } });
     }
     return list;
   });
@@ -149,7 +149,9 @@ function AxisOf({ entry }: { entry: AxisEntry }) {
         </div>
         <JogPad key={name} axis={name} speeds={speeds.value} unit={unit} plus={acts['jog+']!} minus={acts['jog-']!} typedSpeed={jogSpeed} />
         <Explanations acts={told} axis={name} unit={unit}
-                      use={({ field, value }) => { (field === 'velocity' ? velocity : position).value = String(Number(value.toFixed(4))); }} />
+                      use={({ field, value }, { id }) => {
+                        (id.startsWith('jog') ? jogSpeed : field === 'velocity' ? velocity : position).value = String(Number(value.toFixed(4)));
+                      }} />
       </section>
       <MotionPlot entry={entry} active={active} scope={() => go('scope', name)} />
       <AxisLogs name={name} entry={entry} />

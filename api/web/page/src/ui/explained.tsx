@@ -66,7 +66,7 @@ export function RemedyButton({ remedy, axis, axes, unit, use }:
 
 /** The reasons of some buttons, each once, naming the buttons that it keeps from being used. */
 export function Explanations({ acts, axis, axes, unit, use }:
-    { acts: readonly Act[]; axis: string; axes?: readonly string[]; unit: string; use?: (value: Use) => void }) {
+    { acts: readonly Act[]; axis: string; axes?: readonly string[]; unit: string; use?: (value: Use, act: Act) => void }) {
   const groups = new Map<string, { labels: string[]; act: Act }>();
   for (const act of acts) {
     if (act.obstacle === null) continue;
@@ -85,7 +85,7 @@ export function Explanations({ acts, axis, axes, unit, use }:
           <li key={text} id={describedBy(act)}>
             <span class="what">{labels.join(', ')}</span>
             <span class="text">{word !== '' && <b>{word}. </b>}<span data-explain="">{text}</span>{remedy === null && hint !== '' && <i> {hint}</i>}</span>
-            {remedy !== null && !inTheWay && <RemedyButton remedy={remedy} axis={axis} unit={unit} {...(axes ? { axes } : {})} {...(use ? { use } : {})} />}
+            {remedy !== null && !inTheWay && <RemedyButton remedy={remedy} axis={axis} unit={unit} {...(axes ? { axes } : {})} {...(use ? { use: (value: Use) => use(value, act) } : {})} />}
           </li>
         );
       })}
