@@ -27,9 +27,9 @@ DELEGATE = f"access: {{ roles: {{ {OWN_NAME}: maintainer }}, delegates: {{ {OWN_
 
 
 class Web:
-    """A running gateway. `keys` are lines of its configuration."""
+    """A running gateway. `keys` are lines of its configuration, `axisd` is that which says whom it is for."""
 
-    def __init__(self, machine, keys="", prefix=(), tls=None):
+    def __init__(self, machine, keys="", prefix=(), tls=None, axisd=None):
         self.machine, self.tls = machine, tls
         self.page = pathlib.Path(machine.path("page"))
         (self.page / "assets").mkdir(parents=True, exist_ok=True)
@@ -39,10 +39,14 @@ class Web:
         self.users = machine.path("users")
         self.config = machine.path("web.yaml")
         pathlib.Path(self.config).write_text(
-            f"listen: localhost:0\naxisd: {{ server: \"unix:{machine.socket}\" }}\nfiles: {self.page}\n"
+            f"listen: localhost:0\n{axisd or self.whom(machine)}\nfiles: {self.page}\n"
             f"users: {self.users}\n{keys}")
         os.close(os.open(self.users, os.O_CREAT | os.O_WRONLY, 0o600))  # nobody yet
         self.prefix, self.notify, self.program, self.port = prefix, None, None, 0
+
+    @staticmethod
+    def whom(machine):
+        return f"axisd: {{ server: \"unix:{machine.socket}\" }}"
 
     def user(self, *words, password=None):
         done = subprocess.run([AXISD_WEB, "--config", self.config, "user", *words], capture_output=True, text=True,
@@ -161,8 +165,8 @@ class Page:
             return None if head[0] & 0x80 else response_type.FromString(content)
         return connection, following
 
-    def lane(self, origin=None, protocol="axisd-lane-1"):
-        return Lane(self, origin, protocol)
+    def lane(self, origin=None, protocol="axisd-lane-1", machine=None):
+        return Lane(self, origin, protocol, machine)
 
 
 def frame(message):
@@ -199,13 +203,13 @@ class LaneRefused(Exception):
 class Lane:
     """A page's WebSocket, by hand."""
 
-    def __init__(self, page, origin=None, protocol="axisd-lane-1"):
+    def __init__(self, page, origin=None, protocol="axisd-lane-1", machine=None):
         self.page, self._ids, self._lock, self._sending = page, 0, threading.Lock(), threading.Lock()
         web = page.web
         self.socket = web.raw()
         if web.tls:
             self.socket = web.tls.wrap_socket(self.socket, server_hostname="localhost")
-        lines = ["GET /lane HTTP/1.1", f"Host: localhost:{web.port}", "Upgrade: websocket", "Connection: Upgrade",
+        lines = [f"GET /lane{f'?machine={machine}' if machine else ''} HTTP/1.1", f"Host: localhost:{web.port}", "Upgrade: websocket", "Connection: Upgrade",
                  "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode(), "Sec-WebSocket-Version: 13",
                  f"Sec-WebSocket-Protocol: {protocol}", f"Origin: {origin or web.origin}"]
         if page.cookie:

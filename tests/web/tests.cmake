@@ -4,7 +4,7 @@ if(AXISD_GRPC)
   axisd_test(test_web SOURCES ${sources} LINK axisd_web)
 
   find_program(AXISD_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
-  foreach(scenario IN ITEMS gateway lane)
+  foreach(scenario IN ITEMS gateway lane machines)
     set(name ${AXISD_TEST_PREFIX}web.${scenario})
     add_test(NAME ${name} COMMAND ${AXISD_PYTHON} -B ${CMAKE_CURRENT_LIST_DIR}/test_${scenario}.py)
     set_tests_properties(${name} PROPERTIES LABELS e2e TIMEOUT 600

@@ -31,6 +31,9 @@ constexpr std::size_t most_ahead = 4096;
 /// lost.
 constexpr Duration drained_for = std::chrono::seconds(2);
 
+/// Which machine of several a call is for.
+constexpr std::string_view machine_header = "axisd-machine";
+
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
 }  // namespace
@@ -221,7 +224,7 @@ void Connection::serve_file(std::string_view path) {
 }
 
 void Connection::serve_health() {
-  const auto trouble = gateway_.upstream->trouble();
+  const auto trouble = gateway_.trouble();
   answer(trouble.empty() ? plain(200, "ok") : plain(503, trouble));
 }
 
@@ -232,13 +235,19 @@ void Connection::begin_lane() {
   if (!accepts(header(http::field::sec_websocket_protocol), lane_protocol))
     return refuse(plain(400, fmt::format("the subprotocol is {}", lane_protocol)));
   if (!identify(true)) return refuse(plain(401, "nobody is logged in"));
+  const auto target = view(request.target());
+  constexpr std::string_view query = "/lane?machine=";
+  auto* daemon =
+      gateway_.machine(target.starts_with(query) ? target.substr(query.size()) : std::string_view());
+  if (daemon == nullptr) return refuse(plain(404, "there is no such machine"));
   auto place = gateway_.lanes.take(known_.person.key());
   if (!place) return refuse(plain(429, "there are too many lanes"));
   phase_ = Phase::closed;  // what goes on here is the lane
   deadline_.reset();
   http::request<http::empty_body> head;
   head.base() = request.base();
-  std::make_shared<LaneSocket>(gateway_, std::move(transport_), known_, *std::move(place), *std::move(place_))
+  std::make_shared<LaneSocket>(gateway_, *daemon, std::move(transport_), known_, *std::move(place),
+                               *std::move(place_))
       ->start(std::move(head));
 }
 
@@ -259,6 +268,9 @@ void Connection::begin_call() {
   if (const auto objected = objection_to_call()) return refuse(*objected);
   if (!identify(true))
     return refuse(refused_call(401, {.code = code::unauthenticated, .message = "nobody is logged in"}));
+  daemon_ = gateway_.machine(header(machine_header));
+  if (daemon_ == nullptr)
+    return refuse(refused_call(404, {.code = code::not_found, .message = "there is no such machine"}));
   const auto target = view(parser_->get().target());
   const auto method = method_of_path(target);
   const auto kind = method ? std::optional(kind_of(*method)) : std::nullopt;
@@ -288,7 +300,7 @@ void Connection::start_call() {
   auto timeout = grpc_text::timeout_of(header("grpc-timeout"));
   if (stopping_)
     timeout = std::min<Duration>(timeout.value_or(Duration::max()), LaneState::patience_of_stops);
-  call_ = gateway_.upstream->start(
+  call_ = daemon_->start(
       std::string(view(parser_->get().target())), *message, known_.person, timeout,
       {.message = [self = shared_from_this()](const grpc::ByteBuffer& part) { self->pass_on(part); },
        .done = [self = shared_from_this()](const CallStatus& status) { self->end_call(status); }});

@@ -101,8 +101,9 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
   std::optional<RequestParser> parser_;
   bool watching_ = false, keep_alive_ = false, head_sent_ = false, ever_known_ = false;
   Known known_{};
-  bool acting_ = false;    ///< a call is read or carried out
-  bool stopping_ = false;  ///< which is a stop
+  bool acting_ = false;         ///< a call is read or carried out
+  bool stopping_ = false;       ///< which is a stop
+  Upstream* daemon_ = nullptr;  ///< whom the call is for
   std::shared_ptr<Call> call_;
   std::optional<Shares::Place> stream_;
   std::string out_;

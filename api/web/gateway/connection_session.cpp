@@ -31,6 +31,16 @@ std::int64_t seconds_until(TimePoint when, TimePoint now) {
   return std::chrono::duration_cast<std::chrono::seconds>(when - now).count();
 }
 
+/// A member of a JSON object; empty: there is one machine, which has no name here.
+std::string machines_json(const Machines& machines) {
+  std::string list;
+  for (const auto& [name, upstream] : machines)
+    if (!name.empty())
+      list += fmt::format(R"({}{{"name":{},"trouble":{}}})", list.empty() ? "" : ",", json_text(name),
+                          json_text(upstream->trouble()));
+  return list.empty() ? list : fmt::format(R"(,"machines":[{}])", list);
+}
+
 std::string session_json(const Session& session, TimePoint end, TimePoint now, bool own) {
   return fmt::format(
       R"({{"id":{},"name":{},"role":{},"peer":{},"begun_s":{},"used_s":{},"expires_in_s":{},"own":{}}})",
@@ -51,9 +61,9 @@ void Connection::serve_session() {
   for (const auto& session : gateway_.sessions.list())
     if (session.id == known_.session)
       left = seconds_until(gateway_.sessions.end_of(session), gateway_.clock.now());
-  answer(json(200, fmt::format(R"({{"name":{},"role":{},"how":"{}","expires_in_s":{}}})",
+  answer(json(200, fmt::format(R"({{"name":{},"role":{},"how":"{}","expires_in_s":{}{}}})",
                                json_text(known_.person.name), json_text(known_.person.role),
-                               to_string(known_.person.how), left)));
+                               to_string(known_.person.how), left, machines_json(gateway_.machines))));
 }
 
 void Connection::log_in() {

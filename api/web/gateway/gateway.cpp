@@ -1,5 +1,6 @@
 #include "api/web/gateway/gateway.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -25,13 +26,13 @@ SessionLimits session_limits(const Settings& settings) {
 }  // namespace
 
 Gateway::Gateway(boost::asio::io_context& context, Clock& time, const Settings& said, Assets page,
-                 People known, std::unique_ptr<Upstream> daemon, const std::string& client_ca)
+                 People known, Machines daemons, const std::string& client_ca)
     : io(context),
       clock(time),
       settings(said),
       assets(std::move(page)),
       people(std::move(known)),
-      upstream(std::move(daemon)),
+      machines(std::move(daemons)),
       passwords(context.get_executor()),
       connections(said.limits.connections, said.limits.connections_each),
       streams(said.limits.streams, said.limits.streams_each),
@@ -45,7 +46,7 @@ Gateway::Gateway(boost::asio::io_context& context, Clock& time, const Settings& 
 
 void Gateway::tick() {
   timer_ = clock.call_at(clock.now() + tick_period, [this] { tick(); });
-  upstream->stay_connected();
+  for (const auto& [name, upstream] : machines) upstream->stay_connected();
   sessions.expire(clock.now());
   if (!people.refresh()) return;
   spdlog::info("{} users", people.users().size());
@@ -91,6 +92,18 @@ std::optional<Known> Gateway::by_certificate(const std::string& certificate) con
   return Known{.person = {.name = std::move(name), .role = std::move(role), .how = How::certificate}};
 }
 
+Upstream* Gateway::machine(std::string_view name) const {
+  const auto found = machines.find(name);
+  return found == machines.end() ? nullptr : found->second.get();
+}
+
+std::string Gateway::trouble() const {
+  for (const auto& [name, upstream] : machines)
+    if (const auto trouble = upstream->trouble(); !trouble.empty())
+      return name.empty() ? trouble : fmt::format("{}: {}", name, trouble);
+  return {};
+}
+
 void Gateway::enter(const std::shared_ptr<Guest>& guest) {
   std::erase_if(guests_, [](const auto& known) { return known.expired(); });
   guests_.push_back(guest);
@@ -121,6 +134,9 @@ void Gateway::end_all() {
   for (const auto& guest : guests()) guest->close();
 }
 
-bool Gateway::deserted() { return guests().empty() && upstream->open() == 0; }
+bool Gateway::deserted() {
+  return guests().empty() &&
+         std::ranges::all_of(machines, [](const auto& machine) { return machine.second->open() == 0; });
+}
 
 }  // namespace axisd::web

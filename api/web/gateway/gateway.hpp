@@ -3,6 +3,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,12 +44,15 @@ struct Known {
   std::uint64_t session = 0;
 };
 
+/// By their names; of a gateway of one machine: that one, without a name.
+using Machines = std::map<std::string, std::unique_ptr<Upstream>, std::less<>>;
+
 /// Thread: the one that runs `io`.
 class Gateway {
  public:
   /// `client_ca`: PEM, of whose certificates stand for persons; empty: nobody's.
   Gateway(boost::asio::io_context& io, Clock& clock, const Settings& settings, Assets assets, People people,
-          std::unique_ptr<Upstream> upstream, const std::string& client_ca);
+          Machines machines, const std::string& client_ca);
   Gateway(const Gateway&) = delete;
 
   /// Who made a request. `cookie`: its header; `certificate`: of the connection (PEM). Errors: nobody.
@@ -58,6 +62,11 @@ class Gateway {
   [[nodiscard]] static std::string_view cookie_name(bool encrypted) {
     return encrypted ? "__Host-axisd" : "axisd";
   }
+
+  /// nullptr: there is none of that name. Empty is the name of the only one, and of no other.
+  [[nodiscard]] Upstream* machine(std::string_view name) const;
+  /// Empty: everything can be asked of all of them.
+  [[nodiscard]] std::string trouble() const;
 
   void enter(const std::shared_ptr<Guest>& guest);
   /// Ends the guest that has been idle for longest. False: there is none.
@@ -73,7 +82,7 @@ class Gateway {
   const Settings settings;
   const Assets assets;
   People people;
-  const std::unique_ptr<Upstream> upstream;
+  const Machines machines;
   LoginPauses pauses;
   PasswordWorker passwords;
   Shares connections, streams, lanes;

@@ -27,9 +27,10 @@ std::uint64_t random_number() {
 
 }  // namespace
 
-LaneSocket::LaneSocket(Gateway& gateway, Transport transport, Known known, Shares::Place lane,
-                       Shares::Place connection)
+LaneSocket::LaneSocket(Gateway& gateway, Upstream& daemon, Transport transport, Known known,
+                       Shares::Place lane, Shares::Place connection)
     : gateway_(gateway),
+      daemon_(daemon),
       known_(std::move(known)),
       lane_(std::move(lane)),
       connection_(std::move(connection)),
@@ -88,12 +89,11 @@ void LaneSocket::carry_out(const LaneEffects& effects) {
 }
 
 void LaneSocket::ask(const LaneCall& call) {
-  gateway_.upstream->ask(
-      call.method, call.message, known_.person, call.patience,
-      [self = shared_from_this(), number = call.number](const CallStatus& status,
-                                                        const std::string& response) {
-        self->carry_out(self->state_.answered(number, status, response, self->gateway_.clock.now()));
-      });
+  daemon_.ask(call.method, call.message, known_.person, call.patience,
+              [self = shared_from_this(), number = call.number](const CallStatus& status,
+                                                                const std::string& response) {
+                self->carry_out(self->state_.answered(number, status, response, self->gateway_.clock.now()));
+              });
 }
 
 void LaneSocket::watch_time() {

@@ -25,7 +25,8 @@ namespace axisd::web {
 class LaneSocket final : public Guest, public std::enable_shared_from_this<LaneSocket> {
  public:
   using Head = boost::beast::http::request<boost::beast::http::empty_body>;
-  LaneSocket(Gateway& gateway, Transport transport, Known known, Shares::Place lane,
+  /// `daemon`: the machine that the lane is for; outlives it.
+  LaneSocket(Gateway& gateway, Upstream& daemon, Transport transport, Known known, Shares::Place lane,
              Shares::Place connection);
   /// `head`: asks for a WebSocket.
   void start(Head head);
@@ -48,6 +49,7 @@ class LaneSocket final : public Guest, public std::enable_shared_from_this<LaneS
   void watch_time();
 
   Gateway& gateway_;
+  Upstream& daemon_;
   const Known known_;
   Shares::Place lane_, connection_;
   boost::beast::websocket::stream<Transport> socket_;

@@ -110,10 +110,20 @@ void end(boost::asio::io_context& io, Gateway& gateway, Listener& listener, int 
 int serve(const Settings& settings, Ground ground) {
   boost::asio::io_context io{1};
   AsioClock clock(io);
-  auto upstream = Upstream::make(io.get_executor(), clock, settings.axisd);
-  if (!upstream) return give_up(upstream.error());
+  Machines machines;
+  const auto connect = [&](const std::string& name, const DaemonSettings& daemon) -> Result<void> {
+    auto upstream = Upstream::make(io.get_executor(), clock, daemon);
+    if (!upstream) return fail(std::move(upstream).error());
+    machines.emplace(name, *std::move(upstream));
+    return {};
+  };
+  if (settings.machines.empty()) {
+    if (auto done = connect({}, settings.axisd); !done) return give_up(done.error());
+  }
+  for (const auto& [name, daemon] : settings.machines)
+    if (auto done = connect(name, daemon); !done) return give_up(done.error());
   Gateway gateway(io, clock, settings, std::move(ground.assets), std::move(ground.people),
-                  *std::move(upstream), ground.client_ca);
+                  std::move(machines), ground.client_ca);
   auto listener = Listener::open(gateway, std::move(ground.tls));
   if (!listener) program::leave_at_once(give_up(listener.error()));
   if (gateway.people.nobody() && !settings.tls)

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "api/settings/key_table.hpp"
@@ -20,6 +22,36 @@ using Key = settings::Key<Settings>;
 
 TlsSettings& tls_of(Settings& settings) { return settings.tls ? *settings.tls : settings.tls.emplace(); }
 
+void read_machine(DaemonSettings& machine, const Node& value, Diagnostics& diagnostics) {
+  machine.server.clear();
+  if (value.kind == Node::Kind::scalar) {
+    machine.server = value.text;
+  } else {
+    settings::for_each_entry(
+        value, diagnostics, "this has to be an address, or a section", [&](const Node& key, const Node& of) {
+          constexpr std::array<std::string_view, 2> names{"server", "stop_server"};
+          const auto known = std::ranges::find(names, key.text);
+          if (known == names.end())
+            return diagnostics.add(key.mark, fmt::format("unknown key {}", config::quoted(key.text)),
+                                   config::suggest(key.text, names));
+          if (const auto text = settings::text_of(of, key.text, diagnostics))
+            (known == names.begin() ? machine.server : machine.stop_server) = *text;
+        });
+  }
+  if (machine.server.empty())
+    diagnostics.add(value.mark, "a machine needs 'server'", "write press-1: HOST:7443");
+}
+
+void read_machines(Settings& settings, const Node& section, Diagnostics& diagnostics) {
+  settings::for_each_entry(
+      section, diagnostics, "this has to be a section", [&](const Node& key, const Node& value) {
+        if (!is_machine_name(key.text))
+          diagnostics.add(key.mark, fmt::format("{} is no name of a machine", config::quoted(key.text)),
+                          "a letter, then letters, digits, - or _; lower case");
+        read_machine(settings.machines[key.text], value, diagnostics);
+      });
+}
+
 constexpr std::int64_t day = std::int64_t{24} * 3600 * 1000;
 
 constexpr Key keys[] = {
@@ -32,6 +64,7 @@ constexpr Key keys[] = {
     {.path = "axisd.tls.ca", .text = [](Settings& s) { return &s.axisd.ca; }},
     {.path = "axisd.tls.certificate", .text = [](Settings& s) { return &s.axisd.certificate; }},
     {.path = "axisd.tls.key", .text = [](Settings& s) { return &s.axisd.key; }},
+    {.path = "machines", .value = read_machines},
     {.path = "files", .text = [](Settings& s) { return &s.files; }},
     {.path = "users", .text = [](Settings& s) { return &s.users; }},
     {.path = "sessions.idle",
@@ -103,6 +136,11 @@ void check(const Settings& settings, Diagnostics& diagnostics, const Node& root)
                     "write tls: { certificate, key }, or listen: localhost:7480");
   if (settings.tls && (settings.tls->certificate.empty() || settings.tls->key.empty()))
     diagnostics.add(mark("tls"), "'tls' needs 'certificate' and 'key'", "");
+  const auto* axisd = root.find("axisd");
+  if (!settings.machines.empty() && axisd != nullptr && axisd->kind == Node::Kind::section &&
+      (axisd->find("server") != nullptr || axisd->find("stop_server") != nullptr))
+    diagnostics.add(mark("machines"), "'machines' are several, and 'axisd.server' is one",
+                    "write each of them below 'machines'");
   if (settings.axisd.certificate.empty() != settings.axisd.key.empty())
     diagnostics.add(mark("axisd"), "'axisd.tls.certificate' and 'axisd.tls.key' belong together", "");
   if (!settings.axisd.certificate.empty() && settings.axisd.ca.empty())
@@ -113,6 +151,14 @@ void check(const Settings& settings, Diagnostics& diagnostics, const Node& root)
 }
 
 }  // namespace
+
+bool is_machine_name(std::string_view name) {
+  constexpr std::size_t longest = 64;
+  const auto is_letter = [](char c) { return c >= 'a' && c <= 'z'; };
+  return !name.empty() && name.size() <= longest && is_letter(name.front()) &&
+         std::ranges::all_of(
+             name, [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '_' || c == '-'; });
+}
 
 LoadedSettings read_settings(std::string_view text, const std::string& file_name) {
   Diagnostics diagnostics(file_name);
@@ -125,6 +171,11 @@ LoadedSettings read_settings(std::string_view text, const std::string& file_name
   settings::read_keys<Settings>(**document, keys, settings, diagnostics);
   settings.users_named = (*document)->kind == Node::Kind::section && (*document)->find("users") != nullptr;
   check(settings, diagnostics, **document);
+  for (auto& [name, machine] : settings.machines) {
+    machine.ca = settings.axisd.ca;
+    machine.certificate = settings.axisd.certificate;
+    machine.key = settings.axisd.key;
+  }
   if (!diagnostics.empty()) return {{}, diagnostics.sorted()};
   return {std::move(settings), {}};
 }

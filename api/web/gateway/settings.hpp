@@ -1,6 +1,7 @@
 // What /etc/axisd/web.yaml says.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,7 +18,7 @@ struct TlsSettings {
   std::string client_ca;  ///< whose certificates stand for persons; empty: nobody's
 };
 
-/// `axisd:` the daemon, or the entrance of a cell.
+/// `axisd:` the daemon.
 struct DaemonSettings {
   std::string server = "localhost:7443";
   std::string stop_server;           ///< of its stop lane; empty: next to `server`
@@ -40,6 +41,8 @@ struct Settings {
   std::string listen = "localhost:7480";
   std::optional<TlsSettings> tls;
   DaemonSettings axisd;
+  /// Several machines in place of one, by their names; each with the certificates of `axisd`.
+  std::map<std::string, DaemonSettings, std::less<>> machines;
   std::string files = "/usr/share/axisd-web";  ///< the page
   std::string users = "/var/lib/axisd-web/users";
   bool users_named = false;  ///< the file says it
@@ -55,6 +58,9 @@ struct LoadedSettings {
 /// Reads and checks a file completely. Blocks for the disk.
 [[nodiscard]] LoadedSettings load_settings(const std::string& path);
 [[nodiscard]] LoadedSettings read_settings(std::string_view text, const std::string& file_name);
+
+/// [a-z][a-z0-9_-]*, at most 64 letters.
+[[nodiscard]] bool is_machine_name(std::string_view name);
 
 /// Keys of the file, as "limits.body": for the test that each has an effect.
 [[nodiscard]] std::vector<std::string_view> setting_keys();

@@ -28,6 +28,27 @@ TEST(Settings, HaveDefaultsForAComputerOfItsOwn) {
   EXPECT_FALSE(settings.users_named);
 }
 
+constexpr std::string_view several = R"(
+axisd: { tls: { ca: d, certificate: e, key: f } }
+machines: { press-1: one:7443, press-2: { server: two:7443, stop_server: two:7500 } }
+)";
+
+TEST(Settings, ReadSeveralMachines) {
+  EXPECT_THAT(findings(several), IsEmpty());
+  const auto machines = read_settings(several, "web.yaml").settings.value().machines;
+  ASSERT_EQ(machines.size(), 2U);
+  const auto& [first, second] = std::pair(machines.at("press-1"), machines.at("press-2"));
+  EXPECT_EQ(first.server + first.stop_server + first.ca + first.certificate + first.key, "one:7443def");
+  EXPECT_EQ(second.server + second.stop_server + second.ca, "two:7443two:7500d");
+}
+
+TEST(Settings, TellWhatIsWrongWithMachines) {
+  const auto all = findings("axisd: { server: one:7443 }\nmachines: { Press: { servr: a }, b: {} }\n");
+  for (const auto* text : {"'Press' is no name of a machine", "unknown key", "a machine needs 'server'",
+                           "'machines' are several, and 'axisd.server' is one"})
+    EXPECT_THAT(all, HasSubstr(text));
+}
+
 TEST(Settings, ReadEveryKey) {
   constexpr std::string_view text = R"(
 listen: 0.0.0.0:443
@@ -53,7 +74,8 @@ limits: { connections: 11, connections_each: 12, streams: 13, streams_each: 14, 
   EXPECT_THAT((std::vector{s.limits.log_in, s.limits.request, s.limits.idle, s.limits.stalled}),
               testing::ElementsAre(18s, 19s, 20s, 21s));
   for (const auto key : setting_keys())
-    EXPECT_THAT(std::string(text), HasSubstr(std::string(key.substr(key.rfind('.') + 1)) + ":"))
+    EXPECT_THAT(std::string(text) + std::string(several),
+                HasSubstr(std::string(key.substr(key.rfind('.') + 1)) + ":"))
         << "not shown here";
 }
 

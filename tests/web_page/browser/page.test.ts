@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import type { Browser, Page } from 'playwright-core';
 import { Role } from '@proto/access_pb';
-import { axeSource, closeAll, launch, open, ready, until } from './support';
+import { closeAll, launch, open, ready, until, violations } from './support';
 
 let browser: Browser;
 before(async () => { browser = await launch(); });
@@ -94,14 +94,7 @@ test('axe finds nothing, on any screen, in light and dark', async () => {
     for (const screen of screens) {
       await page.locator(`nav a[href="/${screen}"]`).click();
       await page.waitForTimeout(300);
-      // The page's own rules forbid scripts from elsewhere; the debugger may.
-      await page.evaluate(readFileSync(axeSource, 'utf8'));
-      const found = await page.evaluate(async () => {
-        const { axe } = window as unknown as { axe: { run(options: object): Promise<{ violations: { id: string; nodes: { html: string; failureSummary: string }[] }[] }> } };
-        const { violations } = await axe.run({ rules: { 'color-contrast-enhanced': { enabled: true } } });
-        return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html, failureSummary }) => `${html} ${failureSummary}`).join(' | ').slice(0, 600)}`);
-      });
-      assert.deepEqual(found, [], `${screen}, ${theme}`);
+      assert.deepEqual(await violations(page), [], `${screen}, ${theme}`);
     }
     await opened.close();
   }

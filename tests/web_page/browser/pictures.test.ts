@@ -47,6 +47,10 @@ for (const [name, look] of looks) {
     await page.locator('nav a[href="/axis"]').click();
     await page.waitForTimeout(400);
     await picture(page, `${name}-explained`);
+    opened.gateway.machines = [{ name: 'press-1', trouble: '' }, { name: 'press-2', trouble: 'axisd does not answer at press-2:7443' }];
+    await page.goto(`${opened.url}/`);
+    await page.locator('tr[data-machine="press-1"]', { hasText: '6' }).waitFor();
+    await picture(page, `${name}-machines`);
     await opened.close();
   });
 }

@@ -1,6 +1,6 @@
 // What the browser tests share: the built page behind a gateway that is made up, in Debian's Chromium.
 import { createRequire } from 'node:module';
-import { mkdirSync } from 'node:fs';
+import { mkdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser, BrowserContext, Page } from 'playwright-core';
 import { MockGateway } from '../mock/gateway';
@@ -79,4 +79,13 @@ export async function ready(page: Page): Promise<void> {
   await page.locator('[data-act="disable"]').waitFor();
 }
 
-export const axeSource = axePath;
+/** What axe finds wrong with what is shown. */
+export async function violations(page: Page): Promise<string[]> {
+  // The page's own rules forbid scripts from elsewhere; the debugger may.
+  await page.evaluate(readFileSync(axePath, 'utf8'));
+  return page.evaluate(async () => {
+    const { axe } = window as unknown as { axe: { run(options: object): Promise<{ violations: { id: string; nodes: { html: string; failureSummary: string }[] }[] }> } };
+    const { violations: found } = await axe.run({ rules: { 'color-contrast-enhanced': { enabled: true } } });
+    return found.map(({ id, nodes }) => `${id}: ${nodes.map(({ html, failureSummary }) => `${html} ${failureSummary}`).join(' | ').slice(0, 600)}`);
+  });
+}

@@ -31,6 +31,10 @@ export class MockGateway {
   password: string | null = null;
   /** Requests that asked for anything. */
   readonly requests: string[] = [];
+  /** Several machines, which are all this one. */
+  machines: { name: string; trouble: string }[] = [];
+  /** Whom the calls were for. */
+  readonly askedOf = new Set<string>();
   private signedIn = false;
   private readonly server: Server;
   private readonly sockets = new Set<Socket>();
@@ -47,7 +51,7 @@ export class MockGateway {
     this.server = createServer((request, response) => void this.answer(request, response).catch(() => response.destroy()));
     this.server.on('connection', (socket) => { this.sockets.add(socket); socket.on('close', () => this.sockets.delete(socket)); });
     this.server.on('upgrade', (request, stream) => {
-      if (request.url !== '/lane' || !this.allowed()) { stream.destroy(); return; }
+      if (!/^\/lane(\?machine=[a-z0-9-]+)?$/.test(request.url!) || !this.allowed()) { stream.destroy(); return; }
       this.openLane(new ServerSocket(stream, request, 'axisd-lane-1'));
     });
   }
@@ -97,7 +101,7 @@ export class MockGateway {
     } else if (!this.allowed()) response.writeHead(401).end();
     else {
       const how = this.password === null ? 'loopback' : 'password';
-      response.writeHead(200, { 'content-type': 'application/json' }).end(JSON.stringify({ name: 'shift-a', how, expires_in_s: 3600 }));
+      response.writeHead(200, { 'content-type': 'application/json' }).end(JSON.stringify({ name: 'shift-a', how, expires_in_s: 3600, ...(this.machines.length > 0 ? { machines: this.machines } : {}) }));
     }
   }
 
@@ -106,6 +110,7 @@ export class MockGateway {
     if (handler === undefined || laneOnlyPaths.has(path.slice(1))) { response.writeHead(404).end(); return; }
     if (request.headers['content-type'] !== 'application/grpc-web+proto') { response.writeHead(415).end(); return; }
     if (!this.allowed()) { response.writeHead(401, { 'content-type': 'application/grpc-web+proto', 'grpc-status': '16' }).end(); return; }
+    this.askedOf.add(String(request.headers['axisd-machine'] ?? ''));
     const gone = new AbortController();
     response.on('close', () => gone.abort());
     const header = new Headers();

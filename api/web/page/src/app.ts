@@ -10,6 +10,7 @@ import { Kind } from './lane/frame';
 import { browserWorld, Lane } from './lane/lane';
 import { Store, STREAM_MS } from './model/store';
 import { detailOf, duration } from './model/wire';
+import { machine } from './route';
 import { clients, CALL_MS, problem, signedOut } from './transport/clients';
 import { refreshSession, session } from './transport/session';
 import { keepOpen } from './transport/stream';
@@ -17,7 +18,11 @@ import { notify } from './ui/notices';
 
 export const store = new Store();
 export const visible = signal(document.visibilityState === 'visible');
-const signedIn = computed(() => session.value.at === 'in');
+/** The machine of this page is one of the gateway's. */
+const signedIn = computed(() => {
+  const now = session.value;
+  return now.at === 'in' && (now.machines.length === 0 ? machine === '' : now.machines.some(({ name }) => name === machine));
+});
 const wanted = computed(() => visible.value && signedIn.value);
 
 /** Screens that need more than the latest states say so while they are shown. */
@@ -88,7 +93,7 @@ export function roleFor(axis: string): Role {
 
 // The lane.
 
-const laneUrl = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/lane`;
+const laneUrl = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/lane${machine === '' ? '' : `?machine=${machine}`}`;
 export const lane = new Lane(browserWorld(laneUrl));
 const laneTick = signal(0);
 setInterval(() => { laneTick.value += 1; }, 250);

@@ -27,26 +27,43 @@ export const places: readonly Place[] = [
 
 export interface Route { screen: string; of: string }
 
-/** "/axis/press-1/feeder": the screen, and what it is of. What is not known is the machine's screen. */
+/** "/axis/feeder": the screen, and what it is of. What is not known is the machine's screen. */
 export function parse(path: string): Route {
   const [, screen = '', ...rest] = path.split('/');
   const known = places.some(({ id, ready }) => ready && id === screen);
   return known ? { screen, of: decodeURIComponent(rest.join('/')) } : { screen: 'machine', of: '' };
 }
 
-const path = signal(typeof location === 'undefined' ? '/' : location.pathname);
+/** "/@press-1/axis/feeder": the machine, of a gateway that serves several, and the rest. */
+export function split(path: string): { machine: string; path: string } {
+  const [, name = '', rest = ''] = /^\/@([a-z][a-z0-9_-]*)(\/.*)?$/.exec(path) ?? [];
+  return name === '' ? { machine: '', path } : { machine: name, path: rest || '/' };
+}
+
+const asked = split(typeof location === 'undefined' ? '/' : location.pathname);
+/** What this page is of; empty: there is one machine, or none was chosen yet. Another one is another page: nothing of this one,
+ * no control of an axis above all, goes along. */
+export const { machine } = asked;
+const path = signal(asked.path);
 export const route = computed(() => parse(path.value));
 /** The axis that was looked at last: STOP beside STOP ALL is for it. */
 export const lastAxis = signal('');
 
+const within = (screen: string, of: string) => `/${screen}${of === '' ? '' : `/${of.split('/').map(encodeURIComponent).join('/')}`}`;
+export const hrefOf = (screen: string, of = ''): string => `${machine === '' ? '' : `/@${machine}`}${within(screen, of)}`;
+
 export function go(screen: string, of = ''): void {
-  const next = `/${screen}${of === '' ? '' : `/${of.split('/').map(encodeURIComponent).join('/')}`}`;
+  const next = within(screen, of);
   if (next === path.peek()) return;
-  history.pushState(null, '', next);
+  history.pushState(null, '', hrefOf(screen, of));
   path.value = next;
   document.querySelector('main')?.scrollTo(0, 0);
 }
 
 if (typeof addEventListener === 'function' && typeof location !== 'undefined') {
-  addEventListener('popstate', () => { path.value = location.pathname; });
+  addEventListener('popstate', () => {
+    const now = split(location.pathname);
+    if (now.machine === machine) path.value = now.path;
+    else location.reload();
+  });
 }

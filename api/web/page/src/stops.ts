@@ -11,7 +11,7 @@ import { HaltRequestSchema, HaltResponseSchema } from '@proto/axis_service_pb';
 import { lane } from './app';
 import { Kind } from './lane/frame';
 import { detailOf } from './model/wire';
-import { clients, problem } from './transport/clients';
+import { clients, clientsOf, problem } from './transport/clients';
 import { notify } from './ui/notices';
 
 /** What became of a stop of one axis: the command is looked up as it goes on. */
@@ -92,6 +92,14 @@ export function stopAll(): Promise<void> {
     if (notDurable !== undefined) notify('warning', { plain: notDurable.message }, notDurable.remedy);
     return results.map(({ axis, command, error }) => ({ axis, command: command ?? null, error: error ?? null }));
   });
+}
+
+/** Each of several machines, by a call: this page has a lane to none of them. */
+export function stopMachines(names: readonly string[]): Promise<void> {
+  return reported('stop-all', '', () => Promise.all(names.map((name): Promise<StopOutcome> =>
+    clientsOf(name).system.stopAll({ waitUntil: WaitUntil.ACCEPTED }).then(
+      ({ results }) => ({ axis: name, command: null, error: results.find(({ error }) => error !== undefined)?.error ?? null }),
+      (error: unknown) => ({ axis: name, command: null, error: problem(error) })))));
 }
 
 const groupOutcomes = (results: readonly GroupStopResult[]): StopOutcome[] => results.map(({ name, outcome }) => ({

@@ -2,7 +2,6 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { create } from '@bufbuild/protobuf';
 import { ErrorDetailSchema, Reason } from '@proto/error_pb';
-import { machineOf, machinesOf, plainName } from '../src/model/cell';
 import { csv, isoTime } from '../src/model/csv';
 import { valueAt } from '../src/model/cursor';
 import { ageNow, PollMeter, ServerClock, staleAfter } from '../src/model/fresh';
@@ -12,6 +11,7 @@ import { moveTime } from '../src/model/profile';
 import { niceSpeed, rangesOf } from '../src/model/ranges';
 import { AFTER_MS, BEFORE_MS, fires, Recorder, type Record } from '../src/model/record';
 import { nearest, remedyOf } from '../src/model/remedy';
+import { parse, split } from '../src/route';
 import { align, KEPT_MS, listed, Series, thin, type Sample } from '../src/model/series';
 
 const sample = (at: number, change: Partial<Sample> = {}): Sample => ({
@@ -199,12 +199,12 @@ test('ranges are read from what stands in the way', () => {
   assert.deepEqual(ranges, { position: [0, 400], velocity: [0.5, 100] });
 });
 
-test('cells name axes by their machines', () => {
-  assert.deepEqual(machinesOf(['press-1/feeder', 'press-1/lifter', 'press-2/feeder']), ['press-1', 'press-2']);
-  assert.deepEqual(machinesOf(['feeder']), []);
-  assert.equal(machineOf('press-1/feeder'), 'press-1');
-  assert.equal(plainName('press-1/feeder'), 'feeder');
-  assert.equal(plainName('feeder'), 'feeder');
+test('addresses: the machine, and what is shown of it', () => {
+  assert.deepEqual(split('/axis/feeder'), { machine: '', path: '/axis/feeder' });
+  assert.deepEqual(split('/@press-1/axis/feeder'), { machine: 'press-1', path: '/axis/feeder' });
+  assert.deepEqual(split('/@press-1'), { machine: 'press-1', path: '/' });
+  assert.deepEqual(split('/@Press 1/axis'), { machine: '', path: '/@Press 1/axis' }, 'no name of a machine');
+  assert.deepEqual(parse(split('/@press-1/axis/feeder').path), { screen: 'axis', of: 'feeder' });
 });
 
 test('histograms', () => {

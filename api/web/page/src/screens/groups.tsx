@@ -18,9 +18,9 @@ import { StateMark, tone } from '../ui/marks';
 import { askTakeControl } from '../ui/questions';
 import { pressed } from '../ui/stop-rail';
 import { positionText, stateText } from '../ui/words';
-import { go } from '../route';
+import { go, hrefOf } from '../route';
 import { Choice } from '../ui/choices';
-import { signature } from '../explain';
+import { AGAIN_MS, signature } from '../explain';
 
 const moves = signal<ReadonlyMap<string, GroupMove>>(new Map());
 const ended = (state: CommandState) => state >= CommandState.DONE;
@@ -83,9 +83,10 @@ function useMemberObstacle(group: Group): Signal<Obstacle | null> {
     return entry === undefined ? '' : `${signature(entry.state.value)}#${tokenFor(axis)}`;
   }).join(';'));
   const key = watched.value;
+  const again = useSignal(0);
   useEffect(() => {
     const controller = new AbortController();
-    const timer = setTimeout(async () => {
+    let timer = setTimeout(async () => {
       for (const axis of group.axes) {
         try {
           const { obstacles } = await clients.system.explain(
@@ -94,7 +95,8 @@ function useMemberObstacle(group: Group): Signal<Obstacle | null> {
           const first = obstacles.find(({ blocking, detail }) => blocking && detail !== undefined && detail.permitted === undefined)?.detail;
           if (first !== undefined) {
             const obstacle = obstacleOf(first, { held: (store.axis(axis)?.state.peek().holds.length ?? 0) > 0 });
-            found.value = { ...obstacle, text: `${axis}: ${obstacle.text}` };
+            found.value = { ...obstacle, text: obstacle.text.startsWith(`${axis}: `) ? obstacle.text : `${axis}: ${obstacle.text}` };
+            timer = setTimeout(() => { again.value += 1; }, AGAIN_MS);
             return;
           }
         } catch { return; }
@@ -102,7 +104,7 @@ function useMemberObstacle(group: Group): Signal<Obstacle | null> {
       found.value = null;
     }, 100);
     return () => { clearTimeout(timer); controller.abort(); };
-  }, [key]);
+  }, [key, again.value]);
   return found;
 }
 
@@ -131,7 +133,7 @@ function GroupCard({ group }: { group: Group }) {
           const state = entry.state.value;
           return (
             <li key={axis} class={`${tone(state)} ${entry.stale.value ? 'stale' : ''}`}>
-              <a href={`/axis/${axis}`} onClick={(event) => { event.preventDefault(); go('axis', axis); }}>{axis}</a>
+              <a href={hrefOf('axis', axis)} onClick={(event) => { event.preventDefault(); go('axis', axis); }}>{axis}</a>
               <span class="badge"><StateMark state={state} />{stateText(state, entry.age.value)}</span>
               <b class="number">{positionText(state, entry.stale.value)}</b>
               <NumberField value={targets.get(axis)!} label={t('axis.move-to')} unit={state.unit} />

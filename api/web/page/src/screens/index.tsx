@@ -25,6 +25,6 @@ export function Screen() {
     case 'groups': return <GroupsScreen />;
     case 'events': return <EventsScreen />;
     case 'people': return <PeopleScreen />;
-    default: return <MachineScreen of={of} />;
+    default: return <MachineScreen />;
   }
 }

@@ -3,9 +3,8 @@ import { useComputed } from '@preact/signals';
 import { memo } from 'preact/compat';
 import { store, tokenFor } from '../app';
 import { t } from '../i18n';
-import { machineOf, machinesOf, plainName } from '../model/cell';
 import type { AxisEntry } from '../model/store';
-import { go } from '../route';
+import { go, hrefOf } from '../route';
 import { stopAxis } from '../stops';
 import { StateMark, tone } from '../ui/marks';
 import { pressed } from '../ui/stop-rail';
@@ -25,7 +24,7 @@ const Row = memo(function Row({ entry }: { entry: AxisEntry }) {
   const note = useComputed(() => noteText(entry.state.value));
   return (
     <tr class={look} data-axis={name}>
-      <th scope="row"><a href={`/axis/${name}`} onClick={(event) => { event.preventDefault(); go('axis', name); }}>{plainName(name)}</a></th>
+      <th scope="row"><a href={hrefOf('axis', name)} onClick={(event) => { event.preventDefault(); go('axis', name); }}>{name}</a></th>
       <td class="state"><span class="badge"><RowMark entry={entry} />{words}</span></td>
       <td class="number position"><b>{position}</b><small class="age">{age}</small></td>
       <td class="number velocity">{velocity}</td>
@@ -44,33 +43,21 @@ function RowMark({ entry }: { entry: AxisEntry }) {
   return <StateMark state={entry.state.peek()} />;
 }
 
-export function MachineScreen({ of }: { of: string }) {
+export function MachineScreen() {
   const names = store.names.value;
-  const machines = machinesOf(names);
-  const shown = of === '' ? names : names.filter((name) => machineOf(name) === of);
   if (names.length === 0) return <p class="empty">{store.live.value ? t('page.no-axes') : t('live.connecting')}</p>;
   return (
-    <>
-      {machines.length > 0 && (
-        <div class="choice machines" role="group" aria-label={t('cell.machines')}>
-          <button class="button" aria-pressed={of === ''} onClick={() => go('machine')}>{t('cell.all')}</button>
-          {machines.map((machine) => (
-            <button key={machine} class="button" aria-pressed={of === machine} onClick={() => go('machine', machine)}>{machine}</button>
-          ))}
-        </div>
-      )}
-      <table class="axes">
-        <caption class="unseen">{t('nav.machine')}</caption>
-        <thead><tr>
-          <th scope="col">{t('column.axis')}</th><th scope="col">{t('column.state')}</th><th scope="col" class="number">{t('column.position')}</th>
-          <th scope="col" class="number">{t('column.velocity')}</th><th scope="col">{t('column.trust')}</th>
-          <th scope="col">{t('column.control')}</th><th scope="col">{t('column.note')}</th><th scope="col"><span class="unseen">{t('stop.one')}</span></th>
-        </tr></thead>
-        <tbody>{shown.map((name) => {
-          const entry = store.axis(name);
-          return entry === undefined ? null : <Row key={name} entry={entry} />;
-        })}</tbody>
-      </table>
-    </>
+    <table class="axes">
+      <caption class="unseen">{t('nav.machine')}</caption>
+      <thead><tr>
+        <th scope="col">{t('column.axis')}</th><th scope="col">{t('column.state')}</th><th scope="col" class="number">{t('column.position')}</th>
+        <th scope="col" class="number">{t('column.velocity')}</th><th scope="col">{t('column.trust')}</th>
+        <th scope="col">{t('column.control')}</th><th scope="col">{t('column.note')}</th><th scope="col"><span class="unseen">{t('stop.one')}</span></th>
+      </tr></thead>
+      <tbody>{names.map((name) => {
+        const entry = store.axis(name);
+        return entry === undefined ? null : <Row key={name} entry={entry} />;
+      })}</tbody>
+    </table>
   );
 }

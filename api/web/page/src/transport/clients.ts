@@ -10,12 +10,21 @@ import { LeaseService } from '@proto/lease_service_pb';
 import { SystemService } from '@proto/system_service_pb';
 import { ErrorDetailSchema, Reason, type ErrorDetail } from '@proto/error_pb';
 import { create, isMessage } from '@bufbuild/protobuf';
+import { machine } from '../route';
 
-const transport = createGrpcWebTransport({
+const transportTo = (name: string) => createGrpcWebTransport({
   baseUrl: globalThis.location?.origin ?? 'http://localhost',
   useBinaryFormat: true,
   fetch: (input, init) => fetch(input, { ...init, credentials: 'same-origin', redirect: 'error' }),
+  interceptors: name === '' ? [] : [(next) => (request) => { request.header.set('axisd-machine', name); return next(request); }],
 });
+const transport = transportTo(machine);
+
+/** What is asked of any machine of several. */
+export const clientsOf = (name: string) => {
+  const to = transportTo(name);
+  return { axes: createClient(AxisService, to), system: createClient(SystemService, to) };
+};
 
 export const clients = {
   axes: createClient(AxisService, transport),

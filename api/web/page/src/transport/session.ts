@@ -6,7 +6,11 @@ export type Session =
   | { at: 'out' }
   /** The gateway does not answer. */
   | { at: 'unreachable' }
-  | { at: 'in'; name: string; how: 'password' | 'certificate' | 'loopback' };
+  /** `machines`: that the gateway serves; none: there is one, which has no name here. */
+  | { at: 'in'; name: string; how: 'password' | 'certificate' | 'loopback'; machines: readonly Machine[] };
+
+/** `trouble`: why nothing can be asked of it; empty: it can. */
+export interface Machine { name: string; trouble: string }
 
 export const session = signal<Session>({ at: 'unknown' });
 
@@ -16,9 +20,9 @@ export async function refreshSession(): Promise<void> {
     const answer = await fetch('/session', { credentials: 'same-origin' });
     if (answer.status === 401) { session.value = { at: 'out' }; return; }
     if (!answer.ok) throw new Error(answer.statusText);
-    const { name, how } = await answer.json() as { name: string; how: 'password' | 'certificate' | 'loopback' };
-    const now = session.value;
-    if (now.at !== 'in' || now.name !== name || now.how !== how) session.value = { at: 'in', name, how };
+    const { name, how, machines = [] } = await answer.json() as { name: string; how: 'password' | 'certificate' | 'loopback'; machines?: Machine[] };
+    const next: Session = { at: 'in', name, how, machines };
+    if (JSON.stringify(next) !== JSON.stringify(session.value)) session.value = next;
   } catch {
     if (session.value.at !== 'in') session.value = { at: 'unreachable' };
   }

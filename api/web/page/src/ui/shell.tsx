@@ -4,7 +4,7 @@ import { lane, laneTakes, states, store, leases, endControl } from '../app';
 import { LANE_MS } from '../hold/machine';
 import { clockFormat, t } from '../i18n';
 import { roleKey } from '../i18n/names';
-import { places, route, go, lastAxis } from '../route';
+import { places, route, go, hrefOf, lastAxis, machine } from '../route';
 import { session } from '../transport/session';
 import { problem } from '../transport/clients';
 import { Dialog } from './dialog';
@@ -32,7 +32,8 @@ function Head() {
   const role = info === null ? null : roleKey(info.role);
   return (
     <header>
-      <a class="machine" href="/" onClick={(event) => { event.preventDefault(); go('machine'); }}>{info?.machine ?? 'axisd'}</a>
+      {machine !== '' && <a href="/">{t('cell.all')}</a>}
+      <a class="machine" href={hrefOf('machine')} onClick={(event) => { event.preventDefault(); go('machine'); }}>{info?.machine ?? 'axisd'}</a>
       <Fact>{t('head.axes', { count: store.names.value.length })}</Fact>
       {store.statistics.value.map(({ bus, utilisation }) => <Fact key={bus} label={bus}>{Math.round(utilisation * 100)} %</Fact>)}
       <LaneFact />
@@ -48,7 +49,7 @@ function Nav() {
       {places.filter(({ ready }) => ready).map(({ id, title }) => {
         const of = id === 'axis' ? lastAxis.value || store.names.value[0] || '' : '';
         return (
-          <a key={id} href={`/${id}`} aria-current={screen === id ? 'page' : undefined}
+          <a key={id} href={hrefOf(id)} aria-current={screen === id ? 'page' : undefined}
              onClick={(event) => { event.preventDefault(); go(id, of); }}>
             {icons[id]}<span>{t(title)}</span>
           </a>

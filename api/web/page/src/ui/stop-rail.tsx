@@ -1,6 +1,6 @@
 // The stops: on every screen, at one place. They never ask, and need no lease and no role.
 import { report, stopAll, stopAxis } from '../stops';
-import { route, lastAxis } from '../route';
+import { route, lastAxis, machine } from '../route';
 import { store } from '../app';
 import { t } from '../i18n';
 import { CommandState, type Command } from '@proto/types_pb';
@@ -29,7 +29,7 @@ export function StopRail() {
   const axis = stopTarget();
   return (
     <div class="stops" role="region" aria-label={t('stop.region')}>
-      <button class="stop all" data-stop="all" {...pressed(() => void stopAll())}>{t('stop.all')}</button>
+      <button class="stop all" data-stop="all" {...pressed(() => void stopAll())}>{t('stop.all')}{machine !== '' && <span class="of">{machine}</span>}</button>
       {axis !== '' && (
         <button class="stop" data-stop={axis} {...pressed(() => void stopAxis(axis))}>
           {t('stop.one')}<span class="of">{axis}</span>
@@ -44,7 +44,7 @@ function outcomeText(axis: string, command: Command | null, error: unknown): str
   const now = store.commands.value.find(({ id }) => id === command?.id) ?? command;
   const entry = store.axis(axis);
   const state = entry === undefined ? '' : stateText(entry.state.value, entry.age.value);
-  if (now === null || now.state === CommandState.ACCEPTED || now.state === CommandState.ACTIVE) return `${t('stop.sent')} · ${state}`;
+  if (now === null || now.state === CommandState.ACCEPTED || now.state === CommandState.ACTIVE) return [t('stop.sent'), state].filter(Boolean).join(' · ');
   return `${endText(now)} · ${state}${now.cause ? ` · ${now.cause.message}` : ''}`;
 }
 
