@@ -19,7 +19,7 @@ run=(libabsl20220623 libatomic1 libfmt9 libgrpc++1.51 libmodbus5 libnghttp2-14 l
 test=(
   can-utils chromium clang-format-19 clang-tidy-19 e2fsprogs etcd-client etcd-server fish fonts-wqy-microhei groff-base iproute2 libclang-rt-19-dev mypy openssl procps prometheus python3-can
   python3-grpcio python3-jsonschema python3-pymodbus python3-serial python3-serial-asyncio
-  python3-setuptools python3-venv python3-wheel python3-yaml shellcheck systemd user-mode-linux zsh
+  python3-setuptools python3-venv python3-wheel python3-yaml shellcheck systemd user-mode-linux xvfb zsh
 )
 package=(
   debhelper dh-python dpkg-dev fakeroot iproute2 lintian mmdebstrap pybuild-plugin-pyproject python3-all python3-setuptools

@@ -4,20 +4,19 @@
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { after, afterEach, before, test } from 'node:test';
-import type { Browser, BrowserServer, CDPSession, Page } from 'playwright-core';
-import { CHROMIUM, sleep, Stack, until, type Truth } from './stack';
+import type { Browser, BrowserServer, Page } from 'playwright-core';
+import { AXIS, Hold } from './hold';
+import { CHROMIUM, sleep, Stack, until } from './stack';
 
 const { chromium } = createRequire(process.env['AXISD_WEB_MODULES']!)('playwright-core') as typeof import('playwright-core');
-const AXIS = 'turntable';
 /** From the last renewal to standstill: the hold, the ramp, and the readings that show it. */
 const HOLD_MS = 300;
 const RAMP_MS = 300;
 /** A daemon with sanitizers, on a busy computer, shows later that it rests. */
 const SLACK_MS = process.env['AXISD_SANITIZE'] ? 1500 : 150;
-/** How long nothing may move afterwards. */
-const QUIET_MS = 3000;
 
 let stack: Stack;
+let hold: Hold;
 let server: BrowserServer;
 let browser: Browser;
 
@@ -28,6 +27,7 @@ async function startBrowser(): Promise<void> {
 
 before(async () => {
   stack = new Stack();
+  hold = new Hold(stack);
   await stack.start();
   await startBrowser();
 });
@@ -38,50 +38,9 @@ after(async () => {
 });
 afterEach(async () => { for (const context of browser.contexts()) await context.close().catch(() => {}); });
 
-/** A page of the axis, under control, enabled, with a finger on the button and the axis in motion. */
-async function held(touch = false): Promise<{ page: Page; cdp: CDPSession; at: { x: number; y: number } }> {
-  // What an earlier row left behind: after the daemon's end nobody knows what became of the jog.
-  if ((await stack.axisctl('state', AXIS, '--json')).includes('STATE_ERROR_STOP')) await stack.axisctl('reset', AXIS, '--wait');
-  const context = await browser.newContext({ viewport: { width: 1440, height: 900 }, hasTouch: touch });
-  const page = await context.newPage();
-  await page.goto(`${stack.url}/axis/${AXIS}?panel=0&theme=light&lang=en`);
-  await page.locator('.controls [data-act="take-control"]').click();
-  await page.locator('[data-act="give-back"]').waitFor();
-  const enable = page.locator('[data-act="enable"]:not([aria-disabled="true"])');
-  if (await page.locator('[data-act="disable"]').count() === 0) await enable.click();
-  const button = page.locator('[data-jog="+"]:not([aria-disabled="true"])');
-  await button.waitFor();
-  await until(async () => await page.locator('.fact.warn').count() === 0, 'the lane is quick', 10_000);
-  const box = (await button.boundingBox())!;
-  const at = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
-  const cdp = await context.newCDPSession(page);
-  return { page, cdp, at };
-}
-
-async function pressed(touch = false) {
-  const opened = await held(touch);
-  const { page, cdp, at } = opened;
-  if (touch) await cdp.send('Input.dispatchTouchEvent', { type: 'touchStart', touchPoints: [{ ...at, id: 1 }] });
-  else { await page.mouse.move(at.x, at.y); await page.mouse.down(); }
-  await until(async () => (await stack.truth(AXIS)).moving, 'it moves', 5000).catch(async (error: Error) => {
-    throw new Error(`${error.message}: ${await page.locator('.controls').innerText()} ${await page.locator('.axis-head').innerText()}`);
-  });
-  await sleep(300);
-  return opened;
-}
-
-/** It comes to rest, and then nothing moves, although the button may still be down. */
-async function restsForGood(atMost: number): Promise<{ rest: Truth; took: number }> {
-  const took = await until(async () => !(await stack.truth(AXIS)).moving, 'it rests', atMost);
-  const rest = await stack.truth(AXIS);
-  for (const end = performance.now() + QUIET_MS; performance.now() < end; await sleep(100)) {
-    const now = await stack.truth(AXIS);
-    assert.equal(now.moving, false, 'it moved afterwards');
-    assert.ok(Math.abs(now.position - rest.position) < 0.05, `it moved afterwards: from ${rest.position} to ${now.position}`);
-    assert.equal(now.starts, rest.starts, 'it was started again');
-  }
-  return { rest, took };
-}
+const held = (touch = false) => hold.held(browser, touch);
+const pressed = (touch = false) => hold.pressed(browser, touch);
+const restsForGood = (atMost: number) => hold.restsForGood(atMost);
 
 /** By the time of the last renewal that went through the network. */
 async function restsAfterLastRenewal(): Promise<void> {
@@ -255,7 +214,7 @@ test('a move whose packet is held up moves nothing, and one before a stop is end
   await move.waitFor();
   stack.network.cut();
   await move.click();
-  await sleep(1500);
+  await sleep(700);  // not so long that control would be lost
   stack.network.join();
   await page.locator('.notices li.error', { hasText: 'held up on its way' }).waitFor();
   const { rest } = await restsForGood(100);

@@ -19,10 +19,57 @@ async function freePort(): Promise<number> {
   return port;
 }
 
+/** A machine of many axes on simulated lines of 20, which turn endlessly. */
+export function manyAxes(count: number): (demo: string) => string {
+  return (demo) => {
+    const head = demo.slice(0, demo.indexOf('\nbuses:'));
+    const lines = Array.from({ length: Math.ceil(count / 20) }, (_, line) =>
+      `  line-${line}:\n    modbus_rtu: { port: sim, baud: 115200, format: 8N1, turnaround_max: 20 ms }\n`);
+    const axes = Array.from({ length: count }, (_, axis) =>
+      `  axis-${axis}:\n    bus: line-${Math.floor(axis / 20)}\n    node: ${axis % 20 + 1}\n    model: ykd2405pr\n    unit: deg\n` +
+      '    scale: { microstep: 4000 pulses/rev, gear: 10/1 }\n    limits: { velocity: 180 deg/s, acceleration_time: 300 ms }\n');
+    return `${head}\nbuses:\n${lines.join('')}axes:\n${axes.join('')}`;
+  };
+}
+
+/** What a tap hears: a message of the stream of states, as it goes by. */
+export type Tap = (message: Uint8Array) => void;
+
+/** Finds the messages in the chunked answer to one request. */
+class States {
+  private bytes = Buffer.alloc(0);
+  private inBody = false;
+
+  constructor(private readonly wanted = false) {}
+
+  hear(data: Buffer, tap: Tap): void {
+    if (!this.wanted) return;
+    this.bytes = Buffer.concat([this.bytes, data]);
+    if (!this.inBody) {
+      const end = this.bytes.indexOf('\r\n\r\n');
+      if (end < 0) return;
+      this.bytes = this.bytes.subarray(end + 4);
+      this.inBody = true;
+    }
+    for (;;) {
+      const line = this.bytes.indexOf('\r\n');
+      if (line < 0) return;
+      const size = parseInt(this.bytes.toString('latin1', 0, line), 16);
+      if (this.bytes.length < line + 2 + size + 2) return;
+      const frame = this.bytes.subarray(line + 2, line + 2 + size);
+      // One frame a chunk, as the gateway sends them; the last one has trailers.
+      if (frame[0] === 0) tap(frame.subarray(5));
+      this.bytes = this.bytes.subarray(line + 2 + size + 2);
+    }
+  }
+}
+
 /** Passes bytes on, unless it is cut; looks into what goes up on the lane. */
 export class Network {
   /** When each message of a method went up, by performance.now(). */
   readonly sent: { at: number; method: string }[] = [];
+  /** Null: nobody listens. */
+  tap: Tap | null = null;
   private isCut = false;
   private readonly pairs = new Set<[Socket, Socket]>();
   private server!: Server;
@@ -38,12 +85,17 @@ export class Network {
       for (const socket of pair) socket.setNoDelay(true);
       let buffered: Buffer<ArrayBuffer> = Buffer.alloc(0);
       let lane = false;
+      let states = new States();
       near.on('data', (data) => {
         far.write(data);
+        if (data.toString('latin1', 0, 64).startsWith('POST ')) states = new States(/WatchAxes/.test(data.toString('latin1', 0, 64)));
         if (!lane) { lane = data.toString('latin1').startsWith('GET /lane'); return; }
         buffered = this.look(Buffer.concat([buffered, data]));
       });
-      far.on('data', (data) => near.write(data));
+      far.on('data', (data) => {
+        if (this.tap !== null) states.hear(data, this.tap);
+        near.write(data);
+      });
       for (const [one, other] of [[near, far], [far, near]] as const) {
         one.on('error', () => other.destroy());
         one.on('close', () => { other.destroy(); this.pairs.delete(pair); });
@@ -143,11 +195,14 @@ export class Stack {
     throw new Error(`axisd-web is not ready: ${said} ${readFileSync(join(this.folder, 'web.log'), 'utf8')}`);
   }
 
+  /** What it has to be asked with (AXISD_SERVER). */
+  get address(): string { return this.server; }
+
   /** Waits until all axes are there. */
   async answers(): Promise<void> {
     for (let tries = 0; tries < 100; ++tries) {
       const text = await this.axisctl('list').catch(() => '');
-      if (text.includes('turntable') && !/configuring|offline/.test(text)) return;
+      if (/turntable|axis-0/.test(text) && !/configuring|offline/.test(text)) return;
       await new Promise((resolve) => setTimeout(resolve, 100));
     }
     throw new Error(`axisd does not answer: ${readFileSync(join(this.folder, 'axisd.log'), 'utf8')}`);
