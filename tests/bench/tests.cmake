@@ -31,7 +31,7 @@ if(AXISD_GRPC)
   target_link_libraries(bench_full_journal PRIVATE axisd_core)
   add_custom_target(bench_programs DEPENDS bench_can bench_index bench_bare_loop bench_bare_waits bench_modbus_loop bench_untimed_line bench_rpc_client
                                            bench_command_client bench_full_journal bench_bare_server bench_index_client
-                                           bench_index_loop bench_sync_counter axisd axisd-sim axisctl axisd-cell)
+                                           bench_index_loop bench_sync_counter axisd axisd-sim axisctl axisd-cell axisd-web)
   set(include_file ${CMAKE_CURRENT_BINARY_DIR}/bench_programs_include.cmake)
   set(text "")
   foreach(command bring-up core)
@@ -74,6 +74,8 @@ if(AXISD_GRPC)
     "--only nobody --only \"rapid reset\" --only \"10,000 silent connections\" --report-only)\n"
     "add_test(bench.hang /usr/bin/python3 -B ${CMAKE_CURRENT_LIST_DIR}/hang_bench.py ${CMAKE_BINARY_DIR} --hangs 2 --axes 2 --patience 5 "
     "--report-only)\n"
+    "add_test(bench.page node ${CMAKE_CURRENT_LIST_DIR}/page_bench.mjs ${CMAKE_BINARY_DIR} stop 2)\n"
+    "set_tests_properties(bench.page PROPERTIES LABELS slow TIMEOUT 300)\n"
     "set_tests_properties(bench.rtu bench.stop_all bench.index bench.rpc bench.cell bench.machine bench.admission bench.siege bench.siege_kill bench.hang PROPERTIES LABELS slow TIMEOUT 300 RESOURCE_LOCK port)\n"
     "set_tests_properties(bench.bring-up bench.core bench.index_on_can bench.groups_on_can bench.virtual_rates bench.virtual_stops bench.virtual_done "
     "bench.virtual_groups bench.sync_in_guest PROPERTIES LABELS slow TIMEOUT 300)\n"

@@ -42,7 +42,7 @@ class States {
 
   constructor(private readonly wanted = false) {}
 
-  hear(data: Buffer, tap: Tap): void {
+  hear(data: Buffer, tap: Tap | null): void {
     if (!this.wanted) return;
     this.bytes = Buffer.concat([this.bytes, data]);
     if (!this.inBody) {
@@ -58,7 +58,7 @@ class States {
       if (this.bytes.length < line + 2 + size + 2) return;
       const frame = this.bytes.subarray(line + 2, line + 2 + size);
       // One frame a chunk, as the gateway sends them; the last one has trailers.
-      if (frame[0] === 0) tap(frame.subarray(5));
+      if (frame[0] === 0) tap?.(frame.subarray(5));
       this.bytes = this.bytes.subarray(line + 2 + size + 2);
     }
   }
@@ -93,7 +93,7 @@ export class Network {
         buffered = this.look(Buffer.concat([buffered, data]));
       });
       far.on('data', (data) => {
-        if (this.tap !== null) states.hear(data, this.tap);
+        states.hear(data, this.tap);
         near.write(data);
       });
       for (const [one, other] of [[near, far], [far, near]] as const) {
