@@ -238,6 +238,25 @@ test('hold to run: a page that hung for 3 s renews nothing, and halts', async ()
   await opened.close();
 });
 
+test('a click that a busy page hears too late starts nothing, and the page says so', async () => {
+  const opened = await open(browser, { path: '/axis/feeder' });
+  const { page, gateway } = opened;
+  await ready(page);
+  await page.locator('.controls .move input').first().fill('150');
+  const move = page.locator('[data-act="move"]:not([aria-disabled="true"])');
+  const box = (await move.boundingBox())!;
+  const hang = page.evaluate(() => { const end = performance.now() + 1000; while (performance.now() < end); });
+  // Without waiting for what the page says to each part of it.
+  const cdp = await opened.context.newCDPSession(page);
+  const at = { x: box.x + box.width / 2, y: box.y + box.height / 2, button: 'left', clickCount: 1 } as const;
+  await Promise.all([cdp.send('Input.dispatchMouseEvent', { type: 'mousePressed', ...at }), cdp.send('Input.dispatchMouseEvent', { type: 'mouseReleased', ...at }), hang]);
+  await page.locator('.notices', { hasText: 'too busy to hear that in time' }).waitFor();
+  assert.equal(gateway.machine.axis('feeder').gone, 0);
+  await move.click();
+  await until(() => gateway.machine.axis('feeder').moving, 'it moves');
+  await opened.close();
+});
+
 test('hold to run by keys: an arrow moves with the dead-man key only, and never by repeat', async () => {
   const opened = await open(browser, { path: '/axis/feeder' });
   const { page, gateway } = opened;

@@ -3,6 +3,7 @@ import { signal } from '@preact/signals';
 import type { ComponentChildren } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import { t } from '../i18n';
+import { ifMeant } from './meant';
 
 interface Open { title: string; body: ComponentChildren; wide?: boolean }
 
@@ -26,7 +27,7 @@ export function confirmed(title: string, text: string, action: string, run: () =
     <p>{text}</p>
     <div class="row end">
       <button class="button" onClick={closeDialog}>{t('action.cancel')}</button>
-      <button class="button primary" onClick={() => { closeDialog(); run(); }}>{action}</button>
+      <button class="button primary" onClick={ifMeant(() => { closeDialog(); run(); })}>{action}</button>
     </div>
   </> });
 }

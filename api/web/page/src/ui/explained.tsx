@@ -9,6 +9,7 @@ import { decimals, shown } from '../model/numbers';
 import { enable, home, reset } from '../motion';
 import { go } from '../route';
 import { haltAxis } from '../stops';
+import { ifMeant } from './meant';
 
 export interface Act { id: string; label: string; obstacle: Obstacle | null }
 
@@ -18,7 +19,7 @@ export function ActButton({ act, run, primary, children }:
   const blocked = act.obstacle !== null;
   return (
     <button class={`button ${primary && !blocked ? 'primary' : ''}`} aria-disabled={blocked} data-act={act.id}
-            aria-describedby={blocked ? describedBy(act) : undefined} onClick={() => { if (!blocked) run(); }}>
+            aria-describedby={blocked ? describedBy(act) : undefined} onClick={ifMeant(() => { if (!blocked) run(); })}>
       {children ?? act.label}
     </button>
   );
@@ -61,7 +62,7 @@ export function RemedyButton({ remedy, axis, axes, unit, use }:
       case 'use': use?.(remedy); break;
     }
   };
-  return <button class="button remedy" data-remedy={remedy.act} onClick={run}>{remedyLabel(remedy, unit)}</button>;
+  return <button class="button remedy" data-remedy={remedy.act} onClick={ifMeant(run)}>{remedyLabel(remedy, unit)}</button>;
 }
 
 /** The reasons of some buttons, each once, naming the buttons that it keeps from being used. */
