@@ -2,11 +2,20 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import type { Browser } from 'playwright-core';
-import { closeAll, launch, open, ready, until, violations } from './support';
+import { assertReachable, closeAll, launch, open, ready, until, violations } from './support';
 
 let browser: Browser;
 before(async () => { browser = await launch(); });
 after(() => closeAll(browser));
+
+test('several machines on a panel: everything is in reach', async () => {
+  const opened = await open(browser, { panel: true, width: 1280, height: 800, touch: true });
+  opened.gateway.machines = [{ name: 'press-1', trouble: '' }, { name: 'press-2', trouble: '' }];
+  await opened.page.goto(`${opened.url}/`);
+  await opened.page.locator('tr[data-machine="press-2"]', { hasText: '6 axes' }).waitFor();
+  await assertReachable(opened.page, 'machines');
+  await opened.close();
+});
 
 test('several machines: a list of them, and of each its own page; STOP ALL of the list is for all of them', async () => {
   const opened = await open(browser);

@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import type { Browser, Page } from 'playwright-core';
 import { Role } from '@proto/access_pb';
-import { closeAll, launch, open, ready, until, violations } from './support';
+import { assertReachable, closeAll, launch, open, ready, until, violations } from './support';
 
 let browser: Browser;
 before(async () => { browser = await launch(); });
@@ -42,27 +42,7 @@ test('panel: stops and jog buttons are 20 mm, the rest at least 72 px, 4 mm apar
     await page.locator(`nav a[href="/${screen}"]`).click();
     await page.locator(`nav a[href="/${screen}"][aria-current]`).waitFor();
     await page.waitForTimeout(150);
-    const boxes = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>('button, a[href], select, input')]
-      .filter((element) => element.checkVisibility()).map((element) => {
-        const target = element.closest('.field')?.querySelector('.box') ?? element;
-        const { x, y, width, height } = target.getBoundingClientRect();
-        return { what: `${element.tagName} ${element.textContent?.slice(0, 30)}`, big: element.matches('.stop, [data-jog]'), inline: element.matches('header a, p a'),
-                 x, y, width, height };
-      }));
-    for (const box of boxes) {
-      if (box.inline) continue;
-      const least = box.big ? 118 : 72;
-      assert.ok(box.width >= least - 0.5 || (!box.big && box.what.startsWith('A ')), `${screen}: ${box.what} is ${box.width} px wide`);
-      assert.ok(box.height >= least - 0.5, `${screen}: ${box.what} is ${box.height} px high`);
-    }
-    for (const [index, a] of boxes.entries()) {
-      for (const b of boxes.slice(index + 1)) {
-        if (a.inline || b.inline) continue;
-        const dx = Math.max(a.x, b.x) - Math.min(a.x + a.width, b.x + b.width);
-        const dy = Math.max(a.y, b.y) - Math.min(a.y + a.height, b.y + b.height);
-        assert.ok(Math.max(dx, dy) >= 23.4, `${screen}: ${a.what} and ${b.what} are ${Math.max(dx, dy).toFixed(1)} px apart`);
-      }
-    }
+    await assertReachable(page, screen);
   }
   await opened.close();
 });

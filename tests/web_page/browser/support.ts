@@ -1,4 +1,5 @@
 // What the browser tests share: the built page behind a gateway that is made up, in Debian's Chromium.
+import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { mkdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -88,4 +89,29 @@ export async function violations(page: Page): Promise<string[]> {
     const { violations: found } = await axe.run({ rules: { 'color-contrast-enhanced': { enabled: true } } });
     return found.map(({ id, nodes }) => `${id}: ${nodes.map(({ html, failureSummary }) => `${html} ${failureSummary}`).join(' | ').slice(0, 600)}`);
   });
+}
+
+/** On a panel: what can be pressed is large enough, and far enough from what else can be. */
+export async function assertReachable(page: Page, screen: string): Promise<void> {
+  const boxes = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>('button, a[href], select, input')]
+    .filter((element) => element.checkVisibility()).map((element) => {
+      const target = element.closest('.field')?.querySelector('.box') ?? element;
+      const { x, y, width, height } = target.getBoundingClientRect();
+      return { what: `${element.tagName} ${element.textContent?.slice(0, 30)}`, big: element.matches('.stop, [data-jog]'), inline: element.matches('header a, p a'),
+               x, y, width, height };
+    }));
+  for (const box of boxes) {
+    if (box.inline) continue;
+    const least = box.big ? 118 : 72;
+    assert.ok(box.width >= least - 0.5 || (!box.big && box.what.startsWith('A ')), `${screen}: ${box.what} is ${box.width} px wide`);
+    assert.ok(box.height >= least - 0.5, `${screen}: ${box.what} is ${box.height} px high`);
+  }
+  for (const [index, a] of boxes.entries()) {
+    for (const b of boxes.slice(index + 1)) {
+      if (a.inline || b.inline) continue;
+      const dx = Math.max(a.x, b.x) - Math.min(a.x + a.width, b.x + b.width);
+      const dy = Math.max(a.y, b.y) - Math.min(a.y + a.height, b.y + b.height);
+      assert.ok(Math.max(dx, dy) >= 23.4, `${screen}: ${a.what} and ${b.what} are ${Math.max(dx, dy).toFixed(1)} px apart`);
+    }
+  }
 }

@@ -103,7 +103,7 @@ export const de: Texts = {
   'cell.moving': '{count} in Bewegung',
   'cell.faulty': '{count} in Fehlerstopp',
   'cell.offline': '{count} offline',
-  'cell.silent': 'keine Antwort: {why}',
+  'cell.silent': 'stumm: {why}',
   'axis.controls': 'Bedienung',
   'axis.move-to': 'Fahren nach',
   'axis.move-by': 'Fahren um',

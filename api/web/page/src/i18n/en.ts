@@ -102,7 +102,7 @@ export const en = {
   'cell.moving': '{count} moving',
   'cell.faulty': '{count} in error stop',
   'cell.offline': '{count} offline',
-  'cell.silent': 'no answer: {why}',
+  'cell.silent': 'silent: {why}',
   'axis.controls': 'Controls',
   'axis.move-to': 'Move to',
   'axis.move-by': 'Move by',

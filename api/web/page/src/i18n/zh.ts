@@ -103,7 +103,7 @@ export const zh: Texts = {
   'cell.moving': '{count} 个在运动',
   'cell.faulty': '{count} 个错误停止',
   'cell.offline': '{count} 个离线',
-  'cell.silent': '无应答：{why}',
+  'cell.silent': '无响应：{why}',
   'axis.controls': '操作',
   'axis.move-to': '移动到',
   'axis.move-by': '移动',

@@ -84,7 +84,11 @@ export function CellScreen({ machines }: { machines: readonly Machine[] }) {
               );
             })}</tbody>
           </table>
-          <div class="settings"><LanguageChoice /><ThemeChoice /><PanelChoice /></div>
+          <div class="settings">
+            <span class="caption">{t('settings.language')}</span><LanguageChoice />
+            <span class="caption">{t('settings.theme')}</span><ThemeChoice />
+            <span class="caption">{t('settings.size')}</span><PanelChoice />
+          </div>
         </main>
       </div>
     </div>
