@@ -12,17 +12,14 @@ import { Store, STREAM_MS } from './model/store';
 import { detailOf, duration } from './model/wire';
 import { machine } from './route';
 import { clients, CALL_MS, problem, signedOut } from './transport/clients';
-import { refreshSession, session } from './transport/session';
+import { refreshSession, serves, session } from './transport/session';
 import { keepOpen } from './transport/stream';
 import { notify } from './ui/notices';
 
 export const store = new Store();
 export const visible = signal(document.visibilityState === 'visible');
 /** The machine of this page is one of the gateway's. */
-const signedIn = computed(() => {
-  const now = session.value;
-  return now.at === 'in' && (now.machines.length === 0 ? machine === '' : now.machines.some(({ name }) => name === machine));
-});
+const signedIn = computed(() => serves(session.value, machine));
 const wanted = computed(() => visible.value && signedIn.value);
 
 /** Screens that need more than the latest states say so while they are shown. */

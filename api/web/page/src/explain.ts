@@ -76,7 +76,10 @@ export function watchExplanations(axis: string, questions: ReadonlySignal<readon
       const said = new Map(found);
       answers.value = said;
       if (list.some(({ key, probe }) => probe === undefined && said.get(key)!.obstacle !== null)) {
-        timer = setTimeout(() => { if (store.live.peek()) void ask(list, token); }, AGAIN_MS);
+        timer = setTimeout(() => {
+          if (store.live.peek()) void ask(list, token);
+          else asked = '';  // so that it is, as soon as something is live
+        }, AGAIN_MS);
       }
     } catch {
       // Asked anew with the next change; what is unknown forbids nothing, as the daemon decides.

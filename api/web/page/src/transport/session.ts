@@ -12,6 +12,10 @@ export type Session =
 /** `trouble`: why nothing can be asked of it; empty: it can. */
 export interface Machine { name: string; trouble: string }
 
+/** Whether somebody is logged in where there is that machine; empty: one without a name. */
+export const serves = (now: Session, machine: string): boolean =>
+  now.at === 'in' && (now.machines.length === 0 ? machine === '' : now.machines.some(({ name }) => name === machine));
+
 export const session = signal<Session>({ at: 'unknown' });
 
 /** Asks the gateway. */
