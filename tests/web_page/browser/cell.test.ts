@@ -39,6 +39,11 @@ test('several machines: a list of them, and of each its own page; STOP ALL of th
   await until(() => gateway.machine.leases.size === 0, 'control does not go along');
   await page.locator('.stops [data-stop="all"]').click();
   await until(() => gateway.askedOf.has('press-2') && gateway.machine.inhibitedBy !== '', 'every machine is asked, also one that was silent');
+  // An address that leads to another machine.
+  gateway.machines = [{ name: 'press-2', trouble: '' }];
+  await page.goto(`${url}/@press-2/axis/feeder`);
+  await page.locator('.controls .reasons', { hasText: 'This page is of press-2, and what answers is press-1' }).waitFor();
+  gateway.machines = [{ name: 'press-1', trouble: '' }];
   await page.goto(`${url}/@press-9/machine`);
   await page.locator('tr[data-machine="press-1"]').waitFor();
   await opened.close();

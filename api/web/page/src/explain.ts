@@ -9,6 +9,7 @@ import { lane, roleFor, store, tokenFor } from './app';
 import { t } from './i18n';
 import { reasonKey } from './i18n/names';
 import { remedyOf, type Asked, type Remedy } from './model/remedy';
+import { machine } from './route';
 import { CALL_MS, clients } from './transport/clients';
 
 export type CommandCase = MessageInitShape<typeof ExplainRequestSchema>['command'];
@@ -30,6 +31,9 @@ export function obstacleOf(detail: ErrorDetail, asked: Asked): Obstacle {
 /** What forbids any command of this page, before the daemon is asked; null: nothing. Reads signals. */
 export function pageObstacle(axis: string): Obstacle | null {
   if (!store.live.value) return { word: '', text: t('page.nothing-live'), remedy: { act: 'reconnect' }, hint: '' };
+  const there = store.info.value?.machine ?? '';
+  // An address that leads to another machine moves what nobody here looks at.
+  if (machine !== '' && there !== machine) return { word: '', text: t('page.other-machine', { machine, there: there || '?' }), remedy: null, hint: '' };
   const role = roleFor(axis);
   if (role === Role.NONE || role === Role.VIEWER) {
     return { word: t('reason.access-denied'), text: t('page.role-too-small'), remedy: { act: 'show', screen: 'people' }, hint: '' };

@@ -29,6 +29,7 @@ export const de: Texts = {
   'page.nothing-live': 'Nichts ist aktuell: Die Seite hört nichts von der Maschine.',
   'page.observer': 'Diese Seite schaut nur zu: zuerst die Bedienung übernehmen.',
   'page.lane-closed': 'Die Spur zur Maschine ist zu und öffnet sich wieder von selbst. Bis dahin werden nur Stopps gesendet.',
+  'page.other-machine': 'Diese Seite ist die von {machine}, und es antwortet {there}: Sehen Sie nach \'machines\' in der Konfiguration von axisd-web.',
   'page.late-click': 'Die Seite war zu beschäftigt und hörte es zu spät: nichts wurde getan. Drücken Sie noch einmal.',
   'page.role-too-small': 'Sie dürfen zusehen und anhalten. Zum Bewegen brauchen Sie die Rolle Bediener.',
   'action.enable': 'Freigeben',

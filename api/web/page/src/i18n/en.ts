@@ -28,6 +28,7 @@ export const en = {
   'page.nothing-live': 'Nothing is live: the page does not hear from the machine.',
   'page.observer': 'This page looks on only: take control first.',
   'page.lane-closed': 'The lane to the machine is closed, and opens again by itself. Until then only stops are sent.',
+  'page.other-machine': 'This page is of {machine}, and what answers is {there}: look at \'machines\' in the configuration of axisd-web.',
   'page.late-click': 'The page was too busy to hear that in time: nothing was done. Press again.',
   'page.role-too-small': 'You may look on, and stop. To move, you need the role operator.',
   'action.enable': 'Enable',

@@ -29,6 +29,7 @@ export const zh: Texts = {
   'page.nothing-live': '没有实时数据：页面收不到机器的消息。',
   'page.observer': '本页面仅供查看：请先接管控制。',
   'page.lane-closed': '与机器的通道已关闭，会自动重新打开。在此之前只发送停止指令。',
+  'page.other-machine': '此页面属于 {machine}，但应答的是 {there}：请检查 axisd-web 配置中的 machines。',
   'page.late-click': '页面过于繁忙，未能及时响应：未执行任何操作。请再按一次。',
   'page.role-too-small': '您可以查看和停止。要移动，您需要操作员角色。',
   'action.enable': '使能',
