@@ -66,8 +66,8 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
 
   // The log-in.
   void log_in();
-  void compare_password(const std::string& name, const std::string& password);
-  void logged_in(const std::string& name, const std::string& proof, bool fits);
+  void ask_authority(const Credentials& credentials);
+  void logged_in(const std::string& name, const std::optional<Admitted>& admitted);
   void refuse_log_in(std::string_view reason, std::string_view message, Duration pause);
   void log_out();
 

@@ -81,39 +81,35 @@ void Connection::log_in() {
     parser_->get().body() = {};
     if (!name || !password || name->size() > longest_user_name || password->size() > longest_password)
       return answer(json(400, R"({"reason":"no_log_in","message":"a name and a password are needed"})"));
-    compare_password(*name, *password);
+    ask_authority({.name = *name, .secret = *password});
   });
 }
 
-void Connection::compare_password(const std::string& name, const std::string& password) {
-  const auto pause = gateway_.pauses.left(peer_, name, gateway_.clock.now());
+void Connection::ask_authority(const Credentials& credentials) {
+  const auto pause = gateway_.pauses.left(peer_, credentials.name, gateway_.clock.now());
   if (pause > Duration::zero())
     return refuse_log_in("too_soon", "too many failed attempts: wait a moment", pause);
-  const auto* user = find_user(gateway_.people.users(), name);
-  const auto proof = user == nullptr ? std::string() : user->hash;
-  const bool taken = gateway_.passwords.compare(
-      proof, password,
-      [self = shared_from_this(), name, proof](bool fits) { self->logged_in(name, proof, fits); });
+  const bool taken = gateway_.authority->ask(
+      credentials, [self = shared_from_this(), name = credentials.name](
+                       const std::optional<Admitted>& admitted) { self->logged_in(name, admitted); });
   if (!taken) refuse_log_in("busy", "others log in: try again", std::chrono::seconds(1));
 }
 
-void Connection::logged_in(const std::string& name, const std::string& proof, bool fits) {
+void Connection::logged_in(const std::string& name, const std::optional<Admitted>& admitted) {
   const auto now = gateway_.clock.now();
-  const auto* user = find_user(gateway_.people.users(), name);
-  const bool is_known = fits && user != nullptr && user->hash == proof;
   // Whoever has left by now counts all the same.
-  if (is_known)
+  if (admitted)
     gateway_.pauses.succeeded(peer_, name);
   else
     gateway_.pauses.failed(peer_, name, now);
   if (phase_ == Phase::closed) return;
-  if (!is_known) {
+  if (!admitted) {
     if (gateway_.may_tell()) spdlog::warn("log-in from {} failed", peer_);
     return refuse_log_in("wrong", "name or password is wrong", gateway_.pauses.left(peer_, name, now));
   }
-  if (gateway_.may_tell()) spdlog::info("{} ({}) has logged in from {}", name, user->role, peer_);
-  const auto token =
-      gateway_.sessions.begin({.name = name, .role = user->role, .how = How::password}, peer_, proof, now);
+  const auto& person = admitted->person;
+  if (gateway_.may_tell()) spdlog::info("{} ({}) has logged in from {}", person.name, person.role, peer_);
+  const auto token = gateway_.sessions.begin(person, peer_, admitted->proof, now);
   ever_known_ = true;
   Answer begun{.status = 204};
   begun.headers.emplace_back("Set-Cookie", fmt::format("{}={}; {}HttpOnly; SameSite=Strict; Path=/",

@@ -33,7 +33,7 @@ Gateway::Gateway(boost::asio::io_context& context, Clock& time, const Settings& 
       assets(std::move(page)),
       people(std::move(known)),
       machines(std::move(daemons)),
-      passwords(context.get_executor()),
+      authority(std::make_unique<PasswordAuthority>(people, context.get_executor())),
       connections(said.limits.connections, said.limits.connections_each),
       streams(said.limits.streams, said.limits.streams_each),
       lanes(said.limits.lanes, said.limits.lanes_each),
@@ -48,12 +48,11 @@ void Gateway::tick() {
   timer_ = clock.call_at(clock.now() + tick_period, [this] { tick(); });
   for (const auto& [name, upstream] : machines) upstream->stay_connected();
   sessions.expire(clock.now());
-  if (!people.refresh()) return;
+  const bool others = people.refresh();
+  sessions.end_if(
+      [this](const Session& session) { return !authority->stands(session.person, session.proof); });
+  if (!others) return;
   spdlog::info("{} users", people.users().size());
-  sessions.end_if([this](const Session& session) {
-    const auto* user = find_user(people.users(), session.person.name);
-    return user == nullptr || user->role != session.person.role || user->hash != session.proof;
-  });
   for (const auto& guest : guests())
     if (const auto* person = guest->person(); person != nullptr && guest->session() == 0 && !stands(*person))
       guest->close();

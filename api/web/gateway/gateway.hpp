@@ -12,6 +12,7 @@
 
 #include "api/tls/identity.hpp"
 #include "api/web/gateway/assets.hpp"
+#include "api/web/gateway/authority.hpp"
 #include "api/web/gateway/login_pauses.hpp"
 #include "api/web/gateway/people.hpp"
 #include "api/web/gateway/person.hpp"
@@ -84,7 +85,7 @@ class Gateway {
   People people;
   const Machines machines;
   LoginPauses pauses;
-  PasswordWorker passwords;
+  const std::unique_ptr<Authority> authority;
   Shares connections, streams, lanes;
   Shares stops;  ///< calls that stop something, which other calls leave their places
   Sessions sessions;
