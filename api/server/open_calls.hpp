@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -34,29 +35,54 @@ class OpenCalls {
   using Judge = std::function<std::optional<Error>()>;
   /// Between two looks at calls that have a judge.
   static constexpr Duration judged_every = std::chrono::seconds(1);
+  /// A client has so long to take an answer.
+  static constexpr Duration taken_within = std::chrono::seconds(2);
 
-  /// False: the server is shutting down, the call must not begin. `judge`: may be empty; asked by tick().
-  [[nodiscard]] bool add(const std::shared_ptr<OpenCall>& call, Judge judge = {}) {
+  /// False: the server is shutting down, the call must not begin. `connection`: as gRPC names it; empty:
+  /// it is not counted. `judge`: may be empty; asked by tick().
+  [[nodiscard]] bool add(const std::shared_ptr<OpenCall>& call, const std::string& connection,
+                         Judge judge = {}) {
     auto shared = judge ? std::make_shared<const Judge>(std::move(judge)) : nullptr;
     const std::lock_guard lock(mutex_);
-    if (!closed_) calls_.emplace(call.get(), Entry{.call = call, .judge = std::move(shared)});
-    return !closed_;
+    if (closed_) return false;
+    calls_.emplace(call.get(), Entry{.call = call, .judge = std::move(shared), .connection = connection});
+    if (!connection.empty()) ++in_progress_[connection];
+    return true;
   }
+  /// Its client has only to take its answer.
+  void answered(const OpenCall* call, TimePoint now) {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = calls_.find(call); found != calls_.end()) found->second.answered_at = now;
+  }
+  /// gRPC is done with it.
   void remove(const OpenCall* call) {
     const std::lock_guard lock(mutex_);
-    calls_.erase(call);
+    if (const auto found = calls_.find(call); found != calls_.end()) {
+      settle(found->second);
+      calls_.erase(found);
+    }
     if (closed_ && calls_.empty()) empty_.notify_all();
   }
-  /// Ends calls that may not go on. When it wants to be called again. Thread: one.
+  /// Calls of that connection that have not been answered, or so lately that their answers may be on their
+  /// way.
+  [[nodiscard]] int in_progress(const std::string& connection) {
+    const std::lock_guard lock(mutex_);
+    const auto found = in_progress_.find(connection);
+    return found == in_progress_.end() ? 0 : found->second;
+  }
+  /// Ends calls that may not go on, and counts those no longer whose answers are not taken. When it wants to
+  /// be called again. Thread: one.
   TimePoint tick(TimePoint now) {
     if (now < next_look_) return next_look_;
     next_look_ = now + judged_every;
     std::vector<std::pair<std::shared_ptr<OpenCall>, std::shared_ptr<const Judge>>> judged;
     {
       const std::lock_guard lock(mutex_);
-      for (const auto& [key, entry] : calls_)
+      for (auto& [key, entry] : calls_) {
+        if (entry.answered_at && now - *entry.answered_at >= taken_within) settle(entry);
         if (auto call = entry.judge ? entry.call.lock() : nullptr)
           judged.emplace_back(std::move(call), entry.judge);
+      }
     }
     for (const auto& [call, judge] : judged)
       if (const auto error = (*judge)()) call->close(to_status(*error));
@@ -77,15 +103,25 @@ class OpenCalls {
   }
 
  private:
-  std::mutex mutex_;
-  std::condition_variable empty_;
-  bool closed_ = false;
   struct Entry {
     std::weak_ptr<OpenCall> call;
     std::shared_ptr<const Judge> judge;  ///< nullptr: it may always go on
+    std::string connection;              ///< empty: nothing is counted
+    std::optional<TimePoint> answered_at;
   };
+  /// Under mutex_.
+  void settle(Entry& entry) {
+    const auto connection = std::exchange(entry.connection, {});
+    const auto found = connection.empty() ? in_progress_.end() : in_progress_.find(connection);
+    if (found != in_progress_.end() && --found->second == 0) in_progress_.erase(found);
+  }
+
+  std::mutex mutex_;
+  std::condition_variable empty_;
+  bool closed_ = false;
   std::unordered_map<const OpenCall*, Entry> calls_;
-  TimePoint next_look_{};  ///< of tick()
+  std::unordered_map<std::string, int> in_progress_;  ///< of each connection that has any
+  TimePoint next_look_{};                             ///< of tick()
 };
 
 }  // namespace axisd::server

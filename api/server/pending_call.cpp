@@ -14,7 +14,7 @@ PendingCall::PendingCall(const Services& services, Admission::Ticket ticket)
 grpc::ServerUnaryReactor* PendingCall::start(const Services& services, grpc::CallbackServerContext* context,
                                              Admission::Ticket ticket, const Ask& ask) {
   const auto call = std::make_shared<PendingCall>(services, std::move(ticket));
-  if (!services.calls->add(call)) return answer(context, shutting_down());
+  if (!services.calls->add(call, context->peer())) return answer(context, shutting_down());
   call->self_ = call;
   ask(call);
   return call.get();
@@ -41,6 +41,7 @@ void PendingCall::OnDone() {
 void PendingCall::finish(const grpc::Status& status) {
   if (std::exchange(finished_, true)) return;
   ticket_.release();
+  calls_->answered(this, monotonic_now());
   Finish(status);
 }
 

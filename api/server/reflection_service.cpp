@@ -68,7 +68,8 @@ class ReflectionStream final : public grpc::ServerBidiReactor<ReflectionMessage,
 
   /// Takes gRPC's share of the stream. False: the server is shutting down. Thread: gRPC.
   [[nodiscard]] bool open() {
-    if (!services_.calls->add(shared_from_this(), services_.callers.judge_of(*context_))) return false;
+    auto judge = services_.callers.judge_of(*context_);
+    if (!services_.calls->add(shared_from_this(), context_->peer(), std::move(judge))) return false;
     self_ = shared_from_this();
     StartRead(&question_);
     return true;
@@ -120,6 +121,7 @@ class ReflectionStream final : public grpc::ServerBidiReactor<ReflectionMessage,
   void end(const grpc::Status& status) {
     if (std::exchange(ended_, true)) return;
     ticket_.release();
+    services_.calls->answered(this, monotonic_now());
     Finish(status);
   }
 

@@ -43,7 +43,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Response>,
   /// Takes gRPC's share of the stream. False: the server is shutting down, the stream must not begin.
   /// Thread: gRPC.
   [[nodiscard]] bool open() {
-    if (!calls_->add(this->shared_from_this(), std::move(judge_))) return false;
+    if (!calls_->add(this->shared_from_this(), context_->peer(), std::move(judge_))) return false;
     self_ = this->shared_from_this();
     return true;
   }
@@ -112,6 +112,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Response>,
     finished_ = true;
     release();
     ticket_.release();
+    calls_->answered(this, monotonic_now());
     this->Finish(*end_with_);
   }
 

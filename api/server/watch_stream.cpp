@@ -24,7 +24,7 @@ WatchStream::WatchStream(const Services& services, grpc::CallbackServerContext* 
       on_ready_(std::move(on_ready)) {}
 
 bool WatchStream::open() {
-  if (!calls_->add(shared_from_this(), std::move(judge_))) return false;
+  if (!calls_->add(shared_from_this(), context_->peer(), std::move(judge_))) return false;
   self_ = shared_from_this();
   return true;
 }
@@ -81,6 +81,7 @@ void WatchStream::begin_close(const grpc::Status& status) {
 void WatchStream::finish() {
   if (std::exchange(finished_, true)) return;
   ticket_.release();
+  calls_->answered(this, monotonic_now());
   Finish(closing_with_.value_or(grpc::Status::CANCELLED));
 }
 

@@ -34,8 +34,8 @@ class JudgedCalls : public ::testing::Test {
 
 TEST_F(JudgedCalls, EndWithinASecondWhenTheyMayNotGoOn) {
   const auto judged = std::make_shared<FakeCall>(), free = std::make_shared<FakeCall>();
-  ASSERT_TRUE(calls_.add(judged, judge()));
-  ASSERT_TRUE(calls_.add(free));
+  ASSERT_TRUE(calls_.add(judged, "", judge()));
+  ASSERT_TRUE(calls_.add(free, ""));
   const auto next = calls_.tick(now_);
   EXPECT_EQ(next, now_ + OpenCalls::judged_every);
   EXPECT_EQ(asked_, 1);
@@ -48,10 +48,37 @@ TEST_F(JudgedCalls, EndWithinASecondWhenTheyMayNotGoOn) {
   EXPECT_TRUE(free->ends.empty());
 }
 
+TEST(OpenCalls, AreInProgressUntilTheirAnswersAreTaken) {
+  OpenCalls calls;
+  const auto first = std::make_shared<FakeCall>(), second = std::make_shared<FakeCall>(),
+             other = std::make_shared<FakeCall>();
+  ASSERT_TRUE(calls.add(first, "ipv4:a:1"));
+  ASSERT_TRUE(calls.add(second, "ipv4:a:1"));
+  ASSERT_TRUE(calls.add(other, "ipv4:a:2"));
+  EXPECT_EQ(calls.in_progress("ipv4:a:1"), 2);
+  EXPECT_EQ(calls.in_progress("ipv4:a:2"), 1);
+  EXPECT_EQ(calls.in_progress("ipv4:a:3"), 0);
+  const auto now = TimePoint{} + std::chrono::hours(1);
+  calls.answered(first.get(), now);
+  EXPECT_EQ(calls.tick(now), now + OpenCalls::judged_every);
+  EXPECT_EQ(calls.in_progress("ipv4:a:1"), 2) << "the answer is on its way";
+  (void)calls.tick(now + OpenCalls::taken_within);
+  (void)calls.tick(now + 2 * OpenCalls::taken_within);
+  EXPECT_EQ(calls.in_progress("ipv4:a:1"), 1) << "its client does not take it";
+  calls.remove(first.get());
+  EXPECT_EQ(calls.in_progress("ipv4:a:1"), 1);
+  calls.remove(second.get());
+  EXPECT_EQ(calls.in_progress("ipv4:a:1"), 0);
+  calls.close_all({}, {});
+  const auto late = std::make_shared<FakeCall>();
+  EXPECT_FALSE(calls.add(late, "ipv4:a:1"));
+  EXPECT_EQ(calls.in_progress("ipv4:a:1"), 0);
+}
+
 TEST_F(JudgedCalls, ThatHaveEndedAreNotAskedOf) {
   auto removed = std::make_shared<FakeCall>(), gone = std::make_shared<FakeCall>();
-  ASSERT_TRUE(calls_.add(removed, judge()));
-  ASSERT_TRUE(calls_.add(gone, judge()));
+  ASSERT_TRUE(calls_.add(removed, "", judge()));
+  ASSERT_TRUE(calls_.add(gone, "", judge()));
   calls_.remove(removed.get());
   gone.reset();
   (void)calls_.tick(now_);
