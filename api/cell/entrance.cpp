@@ -48,7 +48,7 @@ Result<int> Entrance::open() {
                          acceptor_->HandleNewConnection(&parameters);
                        }});
   }
-  if (auto accepting = accept_.start(std::move(entries), {}); !accepting)
+  if (auto accepting = accept_.start(std::move(entries), {}, {}); !accepting)
     return fail(std::move(accepting).error());
   return port;
 }

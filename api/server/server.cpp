@@ -182,11 +182,10 @@ Result<int> Server::start() {
   if (!parts_->server)
     return fail(Reason::internal, "gRPC refuses to start", "see the log; GRPC_VERBOSITY=debug tells more");
   parts_->serving = true;
-  parts_->reply->start([hub = parts_->hub.get(), guard = parts_->guard.get(),
-                        judged = options_.tls ? parts_->calls.get() : nullptr](TimePoint now) {
-    const auto judges_again = judged == nullptr ? TimePoint::max() : judged->tick(now);
-    return std::min({hub->tick(now), guard->tick(now), tell_left_out(now), judges_again});
-  });
+  parts_->reply->start(
+      [hub = parts_->hub.get(), guard = parts_->guard.get(), calls = parts_->calls.get()](TimePoint now) {
+        return std::min({hub->tick(now), guard->tick(now), tell_left_out(now), calls->tick(now)});
+      });
 
   int port = 0;
   std::vector<transport::AcceptLoop::Entry> entries;
@@ -195,7 +194,9 @@ Result<int> Server::start() {
     entries.push_back({.socket = std::move(socket), .hand_over = {}});
     entries.back().hand_over = parts_->way_in(entries.back().socket);
   }
-  if (auto accepting = parts_->accept.start(std::move(entries), options_.peers); !accepting)
+  auto in_progress = [calls = parts_->calls](const std::string& peer) { return calls->in_progress(peer); };
+  if (auto accepting = parts_->accept.start(std::move(entries), options_.peers, std::move(in_progress));
+      !accepting)
     return fail(std::move(accepting).error());
   for (const auto& address : options_.listen)
     spdlog::info("serving on {} ({})", address,

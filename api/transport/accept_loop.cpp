@@ -1,7 +1,6 @@
 #include "api/transport/accept_loop.hpp"
 
 #include <fcntl.h>
-#include <malloc.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -13,10 +12,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cerrno>
-#include <cstdio>
+#include <ranges>
 #include <system_error>
 #include <utility>
 
@@ -33,18 +31,17 @@ constexpr int kept_descriptors = 64;
 constexpr Duration count_every = std::chrono::milliseconds(20);
 /// What has come and was not read yet cannot be taken back from gRPC. It is half of the longest message.
 constexpr int receive_buffer = 128 * 1024;
-constexpr Duration memory_every = heartbeat, trim_every = std::chrono::seconds(2);
+/// Bytes until a connection's streams are counted again: room for some hundred.
+constexpr std::uint64_t count_streams_after = 1024;
+/// Without further bytes: gRPC may have read only a part of what had come. At every look for so long, and now
+/// and then for ever.
+constexpr Duration still_read_for = std::chrono::milliseconds(200),
+                   count_streams_again = std::chrono::seconds(1);
+constexpr Duration memory_every = heartbeat, trim_first_after = std::chrono::seconds(1),
+                   trim_last_after = std::chrono::seconds(64);
+/// gRPC lets go of what a connection had within that time after its end.
+constexpr Duration settled_after = std::chrono::milliseconds(400);
 constexpr std::size_t worth_trimming = std::size_t{16} * 1024 * 1024;
-
-/// Of this process, bytes; 0: the system does not say.
-std::size_t resident() {
-  const FileDescriptor file(open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
-  std::array<char, 128> text{};
-  if (file.get() < 0 || ::read(file.get(), text.data(), text.size() - 1) <= 0) return 0;
-  unsigned long size = 0, pages = 0;
-  if (std::sscanf(text.data(), "%lu %lu", &size, &pages) != 2) return 0;
-  return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-}
 
 int descriptor_limit() {
   rlimit limit{};
@@ -54,7 +51,8 @@ int descriptor_limit() {
 
 }  // namespace
 
-Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Limits& limits) {
+Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Limits& limits,
+                               InProgress in_progress) {
   wake_ = FileDescriptor(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   reserve_ = FileDescriptor(open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (wake_.get() < 0 || reserve_.get() < 0)
@@ -65,8 +63,10 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   first_refused_descriptor_ = std::max(reserve_.get() + 1, descriptor_limit() - kept_descriptors);
   budgets_.emplace(limits);
   memory_limit_ = limits.memory;
-  resident_when_trimmed_ = resident();
+  in_progress_ = std::move(in_progress);
   entries_ = std::move(entries);
+  trimmer_.start();
+  hand_over_.start();
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "axisd-accept");
   return {};
@@ -78,6 +78,8 @@ void AcceptLoop::stop() {
     eventfd_write(wake_.get(), 1);
     thread_.join();
   }
+  hand_over_.stop();
+  trimmer_.stop();
   entries_.clear();
 }
 
@@ -97,7 +99,7 @@ void AcceptLoop::run() {
       polled.push_back({.fd = entry.socket.fd.get(), .events = POLLIN, .revents = 0});
     watched.clear();
     for (const auto& [id, connection] : connections_) {
-      polled.push_back({.fd = connection.get(), .events = POLLRDHUP, .revents = 0});
+      polled.push_back({.fd = connection.fd.get(), .events = POLLRDHUP, .revents = 0});
       watched.push_back(id);
     }
     progress_.store(monotonic_now(), std::memory_order_relaxed);
@@ -127,42 +129,74 @@ void AcceptLoop::run() {
 void AcceptLoop::close(PeerBudgets::Id connection) {
   budgets_->leave(connection);
   connections_.erase(connection);
+  hand_over_.take_back(connection);
 }
 
 void AcceptLoop::count_traffic(TimePoint now) {
   std::map<PeerBudgets::Id, PeerBudgets::Traffic> traffic;
-  for (const auto& [id, connection] : connections_) traffic.emplace(id, traffic_of(connection.get()));
-  for (const auto id : budgets_->count(traffic, now)) cut_off(id);
+  for (const auto& [id, connection] : connections_) traffic.emplace(id, traffic_of(connection.fd.get()));
+  for (const auto id : budgets_->count(traffic, now))
+    cut_off(id, "sends floods of requests that it wants no answers to");
+  count_streams(traffic, now);
 }
 
-void AcceptLoop::cut_off(PeerBudgets::Id id) {
-  const int connection = connections_.at(id).get();
+void AcceptLoop::count_streams(const std::map<PeerBudgets::Id, PeerBudgets::Traffic>& traffic,
+                               TimePoint now) {
+  std::map<std::string, PeerBudgets::Id> asked;
+  for (auto& [id, connection] : connections_) {
+    if (traffic.at(id).received - connection.received_by_then >= count_streams_after) connection.spoke = now;
+    const bool is_due = now - connection.spoke <= still_read_for || connection.streams.idle() > 0 ||
+                        now - connection.counted >= count_streams_again;
+    if (connection.peer.empty() || !is_due) continue;
+    asked.emplace(connection.peer, id);
+    connection.counted = now;
+  }
+  if (asked.empty()) return;
+  const auto peers = std::views::keys(asked);
+  const auto counts = counts_.open({peers.begin(), peers.end()});
+  for (const auto& [peer, id] : asked) {
+    const auto found = counts.find(peer);
+    if (found == counts.end()) continue;  // gRPC does not have it yet
+    auto& connection = connections_.at(id);
+    connection.received_by_then = traffic.at(id).received;
+    const auto open = found->second;
+    connection.streams = {.open = open,
+                          .in_progress = in_progress_ ? in_progress_(peer) : open,
+                          .idle_before = connection.streams.idle()};
+  }
+  std::map<PeerBudgets::Id, OpenStreams> streams;
+  for (const auto& [id, connection] : connections_) streams.emplace(id, connection.streams);
+  for (const auto id : beyond(StreamLimits{}, streams)) {
+    budgets_->blame(id, now);
+    cut_off(id, "keeps too many streams open");
+  }
+}
+
+void AcceptLoop::cut_off(PeerBudgets::Id id, std::string_view why) {
+  const int connection = connections_.at(id).fd.get();
   if (std::has_single_bit(++cut_off_))
-    spdlog::warn(
-        "a client at {} sends floods of requests that it wants no answers to: cut off ({} since start)",
-        address_of_peer(connection), cut_off_);
-  // By a reset, with all that was not read yet. After a shutdown gRPC would still read what comes, for as
-  // long as the peer goes on.
-  const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
-  if (::connect(connection, &nobody, sizeof nobody) != 0) ::shutdown(connection, SHUT_RDWR);
+    spdlog::warn("a client at {} {}: cut off ({} since start)", address_of_peer(connection), why, cut_off_);
+  reset(connection);
   close(id);
 }
 
 void AcceptLoop::look_at_memory(TimePoint now) {
   if (now - looked_ < memory_every) return;
   looked_ = now;
-  const auto bytes = resident();
+  const auto bytes = resident_memory();
   if (bytes > memory_limit_)
-    if (const auto most = budgets_->most_one_sided()) cut_off(*most);
-  // It takes long where there is much, and who floods meanwhile would not be noticed. What is free is used
-  // again first.
-  if (!budgets_->calm(now)) trimmed_ = now;
-  const bool worth_it = bytes >= resident_when_trimmed_ + worth_trimming || cut_off_ != cut_off_when_trimmed_;
-  if (!worth_it || now - trimmed_ < trim_every) return;
-  malloc_trim(0);
+    if (const auto most = budgets_->most_one_sided())
+      cut_off(*most, "has sent most without an answer, and memory is short");
+  if (std::exchange(cut_off_when_looked_, cut_off_) != cut_off_) {
+    cut_off_at_ = now;
+    trim_pause_ = trim_first_after;
+  }
+  // gRPC may take longer to let go than was waited for: it is tried again, later and later.
+  const bool worth_it = bytes >= trimmer_.least() + worth_trimming;
+  if (!worth_it || now - cut_off_at_ < settled_after || now - trimmed_ < trim_pause_) return;
+  trimmer_.trim();
   trimmed_ = now;
-  cut_off_when_trimmed_ = cut_off_;
-  resident_when_trimmed_ = resident();
+  trim_pause_ = std::min(2 * trim_pause_, trim_last_after);
 }
 
 bool AcceptLoop::accept_one(const Entry& entry) {
@@ -186,13 +220,14 @@ bool AcceptLoop::accept_one(const Entry& entry) {
     refuse(place, address);
     return true;
   }
-  connections_.emplace(last_id_, std::move(watched));
+  connections_.emplace(last_id_,
+                       Connection{.fd = std::move(watched), .peer = grpc_name_of_peer(connection.get())});
   if (entry.socket.unix_path.empty()) {
     const int on = 1;
     setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     setsockopt(connection.get(), SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
   }
-  entry.hand_over(std::move(connection));
+  hand_over_.hand_over(last_id_, entry.hand_over, std::move(connection));
   return true;
 }
 
@@ -201,7 +236,7 @@ bool AcceptLoop::make_room(const std::string& address, TimePoint now) {
   for (int look = 0; look < 8; ++look) {
     const auto id = budgets_->gives_way(address, now);
     if (!id) return false;
-    const auto& connection = connections_.at(*id);
+    const auto& connection = connections_.at(*id).fd;
     if (!budgets_->still_gives_way(*id, traffic_of(connection.get()), now)) continue;
     if (std::has_single_bit(++gave_way_))
       spdlog::info("an idle connection from {} gives way to a new one from {} ({} since start)",

@@ -6,26 +6,35 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
+#include "api/transport/hand_over_thread.hpp"
 #include "api/transport/listen.hpp"
+#include "api/transport/memory_trimmer.hpp"
 #include "api/transport/peer_budgets.hpp"
+#include "api/transport/stream_counts.hpp"
+#include "api/transport/stream_limits.hpp"
 
 namespace axisd::transport {
 
 /// Accepts connections and hands them to gRPC. gRPC 1.51's own listener never accepts again after one EMFILE
 /// (CVE-2023-4785); this one keeps a descriptor in reserve, turns the surplus connection away and goes on.
 /// Each connection is watched through a second descriptor: how many an address has, and what it sends without
-/// getting anything for it (PeerBudgets). gRPC 1.51 bounds none of that (CVE-2023-44487).
+/// getting anything for it (PeerBudgets). gRPC is asked how many streams it has open there (StreamCounts).
+/// gRPC 1.51 bounds none of that (CVE-2023-44487).
 class AcceptLoop {
  public:
-  /// Gives a connection to gRPC. Thread: the loop's.
-  using HandOver = std::function<void(FileDescriptor connection)>;
+  using HandOver = HandOverThread::HandOver;
   struct Entry {
     ListeningSocket socket;
     HandOver hand_over;
   };
+  /// How many calls of a connection, by gRPC's name of its other end, are in progress. Empty: nobody knows;
+  /// idle streams are not looked for then. Thread: the loop's.
+  using InProgress = std::function<int(const std::string& peer)>;
 
   AcceptLoop() = default;
   ~AcceptLoop() { stop(); }
@@ -33,7 +42,7 @@ class AcceptLoop {
   AcceptLoop& operator=(const AcceptLoop&) = delete;
 
   /// Connections beyond these limits are closed at once.
-  Result<void> start(std::vector<Entry> entries, const PeerBudgets::Limits& limits);
+  Result<void> start(std::vector<Entry> entries, const PeerBudgets::Limits& limits, InProgress in_progress);
   /// Closes the listening sockets. Idempotent.
   void stop();
 
@@ -45,6 +54,14 @@ class AcceptLoop {
   [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
 
  private:
+  /// One that gRPC has.
+  struct Connection {
+    FileDescriptor fd;  ///< of our own
+    std::string peer;   ///< as gRPC names it; empty: it is not on TCP
+    OpenStreams streams{};
+    std::uint64_t received_by_then{};  ///< bytes, when they were counted last
+    TimePoint spoke{}, counted{};  ///< when it was found to have sent more, and when it was asked for last
+  };
   void run();
   /// False: nothing could be accepted, and trying again at once would spin.
   bool accept_one(const Entry& entry);
@@ -54,20 +71,27 @@ class AcceptLoop {
   void refuse(PeerBudgets::Entry why, const std::string& address);
   /// Cuts off who floods, by what the kernel has counted.
   void count_traffic(TimePoint now);
-  /// Gives back to the system what is free, and cuts off who made it necessary.
+  /// Cuts off who keeps too many streams open. `traffic`: as it was counted just now.
+  void count_streams(const std::map<PeerBudgets::Id, PeerBudgets::Traffic>& traffic, TimePoint now);
+  /// Has what is free given back to the system, and cuts off who made it necessary.
   void look_at_memory(TimePoint now);
-  void cut_off(PeerBudgets::Id id);
+  void cut_off(PeerBudgets::Id id, std::string_view why);
   void close(PeerBudgets::Id connection);
 
   std::vector<Entry> entries_;
+  HandOverThread hand_over_;
   int first_refused_descriptor_ = 0;
   FileDescriptor wake_, reserve_;
   std::optional<PeerBudgets> budgets_;
-  std::map<PeerBudgets::Id, FileDescriptor> connections_;  ///< of each that gRPC has, one of our own
+  StreamCounts counts_;
+  InProgress in_progress_;
+  std::map<PeerBudgets::Id, Connection> connections_;
   PeerBudgets::Id last_id_ = 0;
-  TimePoint counted_{}, looked_{}, trimmed_{};
-  std::size_t memory_limit_ = 0, resident_when_trimmed_ = 0;  ///< bytes
-  std::uint64_t cut_off_ = 0, cut_off_when_trimmed_ = 0, gave_way_ = 0;
+  MemoryTrimmer trimmer_;
+  TimePoint counted_{}, looked_{}, trimmed_{}, cut_off_at_{};
+  std::size_t memory_limit_ = 0;  ///< bytes
+  Duration trim_pause_ = std::chrono::seconds(1);
+  std::uint64_t cut_off_ = 0, cut_off_when_looked_ = 0, gave_way_ = 0;
   std::atomic<std::uint64_t> refused_{0};
   std::atomic<TimePoint> progress_{monotonic_now()};
   std::atomic<bool> stopping_{false};

@@ -82,9 +82,11 @@ void PeerBudgets::leave(Id id) {
   connections_.erase(connection);
 }
 
-bool PeerBudgets::calm(TimePoint now) const {
-  return std::ranges::all_of(
-      addresses_, [&](const auto& entry) { return level_of(entry.second.bucket, now) < limits_.burst / 8; });
+void PeerBudgets::blame(Id id, TimePoint now) {
+  const auto found = connections_.find(id);
+  if (found == connections_.end()) return;
+  auto& bucket = addresses_.at(found->second.address).bucket;
+  bucket = {.level = std::max(level_of(bucket, now), limits_.burst), .since = now};
 }
 
 std::optional<PeerBudgets::Id> PeerBudgets::most_one_sided() const {

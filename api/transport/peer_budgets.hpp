@@ -28,7 +28,7 @@ class PeerBudgets {
     double proportion = 4;
     double rate = 256 * 1024;                 ///< bytes per second
     double burst = 1024 * 1024;               ///< bytes: several of the longest messages
-    double longest_penalty = 10;              ///< seconds until a bucket is empty, at most
+    double longest_penalty = 6;               ///< seconds until a bucket is empty, at most
     Duration idle = std::chrono::seconds(5);  ///< from then on it gives way
     double suspect = 128 * 1024;              ///< bytes: see most_one_sided()
     /// Of the process, in bytes: above it the most one-sided connections end.
@@ -57,13 +57,13 @@ class PeerBudgets {
   /// False: by what it has sent and got by now it does not have to leave.
   [[nodiscard]] bool still_gives_way(Id id, const Traffic& total, TimePoint now);
   void leave(Id id);
+  /// It is cut off for another reason: its address is treated as after a flood.
+  void blame(Id id, TimePoint now);
   /// Takes over what was counted by now. Those to cut off, which are to leave then.
   [[nodiscard]] std::vector<Id> count(const std::map<Id, Traffic>& traffic, TimePoint now);
   /// Who has sent most without getting anything for it since it began: streams that never end take memory
   /// however slowly they are begun. Nothing: nobody has sent more than `suspect`.
   [[nodiscard]] std::optional<Id> most_one_sided() const;
-  /// Nobody floods now, or has done so lately.
-  [[nodiscard]] bool calm(TimePoint now) const;
   [[nodiscard]] std::size_t connections() const { return connections_.size(); }
   /// That are remembered: with connections, or a bucket that is not empty yet.
   [[nodiscard]] std::size_t addresses() const { return addresses_.size(); }

@@ -40,6 +40,33 @@ std::string address_of_peer(int connection) {
   return fmt::format("user {}", user.uid);
 }
 
+std::string grpc_name_of_peer(int connection) {
+  sockaddr_storage peer{};
+  socklen_t size = sizeof peer;
+  if (getpeername(connection, reinterpret_cast<sockaddr*>(&peer), &size) != 0) return {};
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (peer.ss_family == AF_INET) {
+    const auto& ipv4 = reinterpret_cast<const sockaddr_in&>(peer);
+    return fmt::format("ipv4:{}:{}", inet_ntop(AF_INET, &ipv4.sin_addr, text.data(), text.size()),
+                       ntohs(ipv4.sin_port));
+  }
+  if (peer.ss_family != AF_INET6) return {};
+  const auto& ipv6 = reinterpret_cast<const sockaddr_in6&>(peer);
+  if (IN6_IS_ADDR_V4MAPPED(&ipv6.sin6_addr) != 0)
+    return fmt::format("ipv4:{}:{}",
+                       inet_ntop(AF_INET, ipv6.sin6_addr.s6_addr + 12, text.data(), text.size()),
+                       ntohs(ipv6.sin6_port));
+  // Brackets and % are escaped, as in an URI.
+  const auto scope = ipv6.sin6_scope_id == 0 ? std::string() : fmt::format("%25{}", ipv6.sin6_scope_id);
+  return fmt::format("ipv6:%5B{}{}%5D:{}", inet_ntop(AF_INET6, &ipv6.sin6_addr, text.data(), text.size()),
+                     scope, ntohs(ipv6.sin6_port));
+}
+
+void reset(int connection) {
+  const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
+  if (::connect(connection, &nobody, sizeof nobody) != 0) ::shutdown(connection, SHUT_RDWR);
+}
+
 PeerBudgets::Traffic traffic_of(int connection) {
   tcp_info info{};
   socklen_t size = sizeof info;

@@ -14,6 +14,11 @@ namespace axisd::transport {
 [[nodiscard]] std::string address_of_peer(int connection);
 /// The same, of an IPv4 or IPv6 address. Empty: it is none.
 [[nodiscard]] std::string counted_address(const sockaddr_storage& peer);
+/// How gRPC names a peer on TCP, to its port ("ipv4:127.0.0.1:40000"); empty: it is not on TCP.
+[[nodiscard]] std::string grpc_name_of_peer(int connection);
+/// Ends it with all that was not read yet. After a shutdown gRPC would still read what comes, for as long as
+/// the peer goes on.
+void reset(int connection);
 /// What the kernel has counted on it; nothing for unix sockets.
 [[nodiscard]] PeerBudgets::Traffic traffic_of(int connection);
 

@@ -159,13 +159,20 @@ TEST_F(PeerBudgetsTest, AFloodIsCutOffAndKeptOutForAWhile) {
 
 TEST_F(PeerBudgetsTest, NobodyIsKeptOutLongerThanThePenalty) {
   ASSERT_EQ(enter(1, "a"), Entry::granted);
-  EXPECT_TRUE(budgets_.calm(at(now_)));
   EXPECT_THAT(run(1, 1'000'000'000, 0, 1s), ElementsAre(1));
   budgets_.leave(1);
   EXPECT_EQ(enter(2, "a", now_ + 14s), Entry::address_floods);
-  EXPECT_FALSE(budgets_.calm(at(now_ + 18s)));
-  EXPECT_TRUE(budgets_.calm(at(now_ + 19s)));
   EXPECT_EQ(enter(2, "a", now_ + 15s), Entry::granted);
+}
+
+TEST_F(PeerBudgetsTest, WhoeverIsBlamedIsTreatedAsAfterAFlood) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  budgets_.blame(1, at(now_));
+  budgets_.leave(1);
+  budgets_.blame(1, at(now_));  // is gone
+  EXPECT_EQ(enter(2, "a", now_ + 4s), Entry::address_floods);
+  EXPECT_EQ(enter(2, "b", now_ + 4s), Entry::granted);
+  EXPECT_EQ(enter(3, "a", now_ + 6s), Entry::granted);
 }
 
 TEST_F(PeerBudgetsTest, ManyThatFloodALittleAreCutOffTogether) {

@@ -1,0 +1,61 @@
+#include "api/transport/memory_trimmer.hpp"
+
+#include <fcntl.h>
+#include <malloc.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+#include "buses/file_descriptor.hpp"
+
+namespace axisd::transport {
+
+std::size_t resident_memory() {
+  const FileDescriptor file(open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
+  std::array<char, 128> text{};
+  if (file.get() < 0 || ::read(file.get(), text.data(), text.size() - 1) <= 0) return 0;
+  unsigned long size = 0, pages = 0;
+  if (std::sscanf(text.data(), "%lu %lu", &size, &pages) != 2) return 0;
+  return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+void MemoryTrimmer::start() {
+  least_ = resident_memory();
+  thread_ = std::thread([this] { run(); });
+  pthread_setname_np(thread_.native_handle(), "axisd-trim");
+}
+
+void MemoryTrimmer::trim() {
+  {
+    const std::lock_guard lock(mutex_);
+    wanted_ = true;
+  }
+  changed_.notify_one();
+}
+
+void MemoryTrimmer::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  if (thread_.joinable()) thread_.join();
+}
+
+void MemoryTrimmer::run() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return wanted_ || stopping_; });
+    if (stopping_) return;
+    wanted_ = false;
+    lock.unlock();
+    malloc_trim(0);
+    least_ = std::min<std::size_t>(least_, resident_memory());
+    lock.lock();
+  }
+}
+
+}  // namespace axisd::transport
