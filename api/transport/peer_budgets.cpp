@@ -16,7 +16,8 @@ void PeerBudgets::fill(Bucket& bucket, double more, TimePoint now) const {
 
 void PeerBudgets::forget_idle(TimePoint now) {
   std::erase_if(addresses_, [&](const auto& entry) {
-    return entry.second.connections == 0 && level_of(entry.second.bucket, now) <= 0;
+    const auto& [connections, bucket, kept_out_until] = entry.second;
+    return connections == 0 && level_of(bucket, now) <= 0 && now >= kept_out_until;
   });
 }
 
@@ -26,7 +27,8 @@ PeerBudgets::Entry PeerBudgets::enter(Id id, const std::string& address, TimePoi
   forget_idle(now);
   auto& from = addresses_.try_emplace(address, Address{.bucket = {.since = now}}).first->second;
   // First: who floods must not take the places of others.
-  if (level_of(from.bucket, now) > limits_.burst / 2) return Entry::address_floods;
+  if (now < from.kept_out_until || level_of(from.bucket, now) > limits_.burst / 2)
+    return Entry::address_floods;
   if (std::cmp_greater_equal(connections_.size(), limits_.connections)) return Entry::full;
   if (from.connections >= most_of_one()) return Entry::address_full;
   ++from.connections;
@@ -82,11 +84,15 @@ void PeerBudgets::leave(Id id) {
   connections_.erase(connection);
 }
 
+void PeerBudgets::keep_out(Address& address, double level, TimePoint now) const {
+  const auto much = std::min(level, limits_.rate * limits_.longest_penalty) - limits_.burst / 2;
+  const auto time = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(much / limits_.rate));
+  address.kept_out_until = std::max(address.kept_out_until, now + time);
+}
+
 void PeerBudgets::blame(Id id, TimePoint now) {
   const auto found = connections_.find(id);
-  if (found == connections_.end()) return;
-  auto& bucket = addresses_.at(found->second.address).bucket;
-  bucket = {.level = std::max(level_of(bucket, now), limits_.burst), .since = now};
+  if (found != connections_.end()) keep_out(addresses_.at(found->second.address), limits_.burst, now);
 }
 
 std::optional<PeerBudgets::Id> PeerBudgets::most_one_sided() const {
@@ -115,15 +121,18 @@ std::vector<PeerBudgets::Id> PeerBudgets::count(const std::map<Id, Traffic>& tra
   }
   std::vector<Id> cut;
   for (auto& [name, connections] : by_address) {
-    auto& bucket = addresses_.at(name).bucket;
-    auto excess = bucket.level - limits_.burst;
-    bucket.level = std::min(bucket.level, limits_.rate * limits_.longest_penalty);
+    auto& address = addresses_.at(name);
+    auto& level = address.bucket.level;
+    if (level <= limits_.burst) continue;
+    keep_out(address, level, now);
     std::ranges::sort(connections, std::greater{});
-    for (const auto& [level, id] : connections) {
-      if (excess <= 0 || level <= 0) break;
+    for (const auto& [own, id] : connections) {
+      if (level <= limits_.burst || own <= 0) break;
       cut.push_back(id);
-      excess -= level;
+      level -= own;
     }
+    // What is left above it was brought by others that are gone.
+    level = std::clamp(level, 0.0, limits_.burst);
   }
   return cut;
 }

@@ -18,8 +18,9 @@ namespace axisd::transport {
 /// for a while. Bytes: who asks gets answers, so that what is sent is in proportion to what comes back; a
 /// flood (rapid reset, half-open streams, CONTINUATION) brings nothing back. What an address sends beyond
 /// `proportion` times what it gets runs into a bucket that empties at `rate`. Where it is above `burst` those
-/// connections that filled it most are to be cut off, and no further one is let in until it is down to half
-/// of that. Thread: one at a time.
+/// connections that filled it most are to be cut off, and take out of it what they brought: the others are
+/// not to blame. No further one is let in for as long as it would have taken until it is down to half of
+/// that. Thread: one at a time.
 class PeerBudgets {
  public:
   using Id = std::uint64_t;
@@ -76,6 +77,7 @@ class PeerBudgets {
   struct Address {
     int connections = 0;
     Bucket bucket;
+    TimePoint kept_out_until{};
   };
   struct Connection {
     std::string address;
@@ -92,6 +94,8 @@ class PeerBudgets {
   static void look(Connection& connection, const Traffic& total, TimePoint now);
   [[nodiscard]] double level_of(const Bucket& bucket, TimePoint now) const;
   void fill(Bucket& bucket, double more, TimePoint now) const;
+  /// As after a flood that filled its bucket so far.
+  void keep_out(Address& address, double level, TimePoint now) const;
   void forget_idle(TimePoint now);
 
   Limits limits_;

@@ -157,6 +157,18 @@ TEST_F(PeerBudgetsTest, AFloodIsCutOffAndKeptOutForAWhile) {
   EXPECT_EQ(enter(6, "a", now_), Entry::granted) << "its bucket is half empty again";
 }
 
+TEST_F(PeerBudgetsTest, NobodyElseIsToBlameForAFlood) {
+  ASSERT_EQ(enter(1, "a"), Entry::granted);
+  ASSERT_EQ(enter(2, "a"), Entry::granted);
+  traffic_[2] = {.received = 300, .sent = 300};
+  EXPECT_THAT(run(1, 1'000'000, 0, 1s), ElementsAre(1));
+  budgets_.leave(1);
+  traffic_.erase(1);
+  // A long request, in the midst of the penalty, and its answer is not there yet.
+  EXPECT_THAT(run(2, 4000, 0, 250ms), IsEmpty());
+  EXPECT_THAT(run(2, 0, 3000, 1s), IsEmpty());
+}
+
 TEST_F(PeerBudgetsTest, NobodyIsKeptOutLongerThanThePenalty) {
   ASSERT_EQ(enter(1, "a"), Entry::granted);
   EXPECT_THAT(run(1, 1'000'000'000, 0, 1s), ElementsAre(1));
