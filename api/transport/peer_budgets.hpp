@@ -29,7 +29,7 @@ class PeerBudgets {
     double proportion = 4;
     double rate = 256 * 1024;                 ///< bytes per second
     double burst = 1024 * 1024;               ///< bytes: several of the longest messages
-    double longest_penalty = 6;               ///< seconds until a bucket is empty, at most
+    double longest_penalty = 5;               ///< seconds until a bucket is empty, at most
     Duration idle = std::chrono::seconds(5);  ///< from then on it gives way
     double suspect = 128 * 1024;              ///< bytes: see most_one_sided()
     /// Of the process, in bytes: above it the most one-sided connections end.
