@@ -128,7 +128,10 @@ void AcceptLoop::run() {
 /// gRPC closes its own descriptor by itself.
 void AcceptLoop::close(PeerBudgets::Id connection) {
   budgets_->leave(connection);
-  connections_.erase(connection);
+  if (const auto found = connections_.find(connection); found != connections_.end()) {
+    counts_.forget(found->second.peer);
+    connections_.erase(found);
+  }
   hand_over_.take_back(connection);
 }
 

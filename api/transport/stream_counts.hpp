@@ -17,6 +17,8 @@ class StreamCounts {
   /// Of each of these connections, the streams that have begun and that gRPC has not let go of. Without those
   /// that gRPC does not have, or does not know yet.
   [[nodiscard]] std::map<std::string, std::int64_t> open(const std::vector<std::string>& peers);
+  /// It has ended: another one may come from there.
+  void forget(const std::string& peer) { sockets_.erase(peer); }
 
  private:
   void learn();
