@@ -54,7 +54,9 @@ Duration look(Supervision& supervision, const Supervised& parts, bool watched) {
   using Sign = Supervision::Sign;
   parts.doors.ask();
   const auto now = monotonic_now();
-  const auto silent = parts.doors.silent_since(supervision.doors_owe_since(now));
+  const auto owed_since = supervision.doors_owe_since(now);
+  auto silent = parts.doors.silent_since(owed_since);
+  if (parts.server.last_hand_over() <= owed_since) silent.emplace_back("handing connections over");
   const auto found = supervision.look(now, threads_of(parts), silent.empty());
   switch (found.sign) {
     case Sign::alive:

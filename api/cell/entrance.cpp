@@ -48,7 +48,9 @@ Result<int> Entrance::open() {
                          acceptor_->HandleNewConnection(&parameters);
                        }});
   }
-  if (auto accepting = accept_.start(std::move(entries), {}, {}); !accepting)
+  // Those that are passed on are no others here: there is room for all of them, and as many more.
+  const transport::StreamBudget::Limits streams{.lasting = 6144, .idle = 12'288};
+  if (auto accepting = accept_.start(std::move(entries), {}, streams, {}); !accepting)
     return fail(std::move(accepting).error());
   return port;
 }

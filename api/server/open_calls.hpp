@@ -35,8 +35,6 @@ class OpenCalls {
   using Judge = std::function<std::optional<Error>()>;
   /// Between two looks at calls that have a judge.
   static constexpr Duration judged_every = std::chrono::seconds(1);
-  /// A client has so long to take an answer.
-  static constexpr Duration taken_within = std::chrono::seconds(2);
 
   /// False: the server is shutting down, the call must not begin. `connection`: as gRPC names it; empty:
   /// it is not counted. `judge`: may be empty; asked by tick().
@@ -50,9 +48,9 @@ class OpenCalls {
     return true;
   }
   /// Its client has only to take its answer.
-  void answered(const OpenCall* call, TimePoint now) {
+  void answered(const OpenCall* call) {
     const std::lock_guard lock(mutex_);
-    if (const auto found = calls_.find(call); found != calls_.end()) found->second.answered_at = now;
+    if (const auto found = calls_.find(call); found != calls_.end()) settle(found->second);
   }
   /// gRPC is done with it.
   void remove(const OpenCall* call) {
@@ -63,26 +61,22 @@ class OpenCalls {
     }
     if (closed_ && calls_.empty()) empty_.notify_all();
   }
-  /// Calls of that connection that have not been answered, or so lately that their answers may be on their
-  /// way.
+  /// Calls of that connection that have not been answered.
   [[nodiscard]] int in_progress(const std::string& connection) {
     const std::lock_guard lock(mutex_);
     const auto found = in_progress_.find(connection);
     return found == in_progress_.end() ? 0 : found->second;
   }
-  /// Ends calls that may not go on, and counts those no longer whose answers are not taken. When it wants to
-  /// be called again. Thread: one.
+  /// Ends calls that may not go on. When it wants to be called again. Thread: one.
   TimePoint tick(TimePoint now) {
     if (now < next_look_) return next_look_;
     next_look_ = now + judged_every;
     std::vector<std::pair<std::shared_ptr<OpenCall>, std::shared_ptr<const Judge>>> judged;
     {
       const std::lock_guard lock(mutex_);
-      for (auto& [key, entry] : calls_) {
-        if (entry.answered_at && now - *entry.answered_at >= taken_within) settle(entry);
+      for (const auto& [key, entry] : calls_)
         if (auto call = entry.judge ? entry.call.lock() : nullptr)
           judged.emplace_back(std::move(call), entry.judge);
-      }
     }
     for (const auto& [call, judge] : judged)
       if (const auto error = (*judge)()) call->close(to_status(*error));
@@ -106,8 +100,7 @@ class OpenCalls {
   struct Entry {
     std::weak_ptr<OpenCall> call;
     std::shared_ptr<const Judge> judge;  ///< nullptr: it may always go on
-    std::string connection;              ///< empty: nothing is counted
-    std::optional<TimePoint> answered_at;
+    std::string connection;              ///< empty: it is not counted, or not any more
   };
   /// Under mutex_.
   void settle(Entry& entry) {

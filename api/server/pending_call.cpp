@@ -41,7 +41,7 @@ void PendingCall::OnDone() {
 void PendingCall::finish(const grpc::Status& status) {
   if (std::exchange(finished_, true)) return;
   ticket_.release();
-  calls_->answered(this, monotonic_now());
+  calls_->answered(this);
   Finish(status);
 }
 

@@ -121,7 +121,7 @@ class ReflectionStream final : public grpc::ServerBidiReactor<ReflectionMessage,
   void end(const grpc::Status& status) {
     if (std::exchange(ended_, true)) return;
     ticket_.release();
-    services_.calls->answered(this, monotonic_now());
+    services_.calls->answered(this);
     Finish(status);
   }
 

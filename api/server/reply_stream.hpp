@@ -112,7 +112,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Response>,
     finished_ = true;
     release();
     ticket_.release();
-    calls_->answered(this, monotonic_now());
+    calls_->answered(this);
     this->Finish(*end_with_);
   }
 

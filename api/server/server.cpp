@@ -182,10 +182,11 @@ Result<int> Server::start() {
   if (!parts_->server)
     return fail(Reason::internal, "gRPC refuses to start", "see the log; GRPC_VERBOSITY=debug tells more");
   parts_->serving = true;
-  parts_->reply->start(
-      [hub = parts_->hub.get(), guard = parts_->guard.get(), calls = parts_->calls.get()](TimePoint now) {
-        return std::min({hub->tick(now), guard->tick(now), tell_left_out(now), calls->tick(now)});
-      });
+  parts_->reply->start([hub = parts_->hub.get(), guard = parts_->guard.get(),
+                        judged = options_.tls ? parts_->calls.get() : nullptr](TimePoint now) {
+    const auto judges_again = judged == nullptr ? TimePoint::max() : judged->tick(now);
+    return std::min({hub->tick(now), guard->tick(now), tell_left_out(now), judges_again});
+  });
 
   int port = 0;
   std::vector<transport::AcceptLoop::Entry> entries;
@@ -195,7 +196,8 @@ Result<int> Server::start() {
     entries.back().hand_over = parts_->way_in(entries.back().socket);
   }
   auto in_progress = [calls = parts_->calls](const std::string& peer) { return calls->in_progress(peer); };
-  if (auto accepting = parts_->accept.start(std::move(entries), options_.peers, std::move(in_progress));
+  if (auto accepting =
+          parts_->accept.start(std::move(entries), options_.peers, options_.streams, std::move(in_progress));
       !accepting)
     return fail(std::move(accepting).error());
   for (const auto& address : options_.listen)
@@ -232,6 +234,8 @@ std::vector<std::string> Server::services() const {
 std::vector<std::shared_ptr<transport::Knock>> Server::knocks() const { return parts_->accept.knocks(); }
 
 TimePoint Server::last_progress() const { return parts_->accept.last_progress(); }
+
+TimePoint Server::last_hand_over() const { return parts_->accept.last_hand_over(); }
 
 std::uint64_t Server::batches_serialised() const { return parts_->hub->batches_serialised(); }
 

@@ -11,6 +11,7 @@
 #include "api/tls/live.hpp"
 #include "api/transport/knock.hpp"
 #include "api/transport/peer_budgets.hpp"
+#include "api/transport/stream_budget.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
 #include "devices/audit.hpp"
@@ -29,6 +30,7 @@ struct ServerOptions {
   bool reflection = false;
   Admission::Limits limits{};
   transport::PeerBudgets::Limits peers{};
+  transport::StreamBudget::Limits streams{};
   /// A stream whose reader has not read for so long is cancelled.
   Duration stalled_reader_limit = std::chrono::seconds(2);
   /// Who may do what. nullptr: everybody everything.
@@ -74,6 +76,9 @@ class Server {
 
   /// When its accept loop last came round: it lets in who connects. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;
+
+  /// When gRPC was last given a connection that waits for it; now if none waits. Thread: any.
+  [[nodiscard]] TimePoint last_hand_over() const;
 
   /// Batches of axis states serialised since the start. Thread: any.
   [[nodiscard]] std::uint64_t batches_serialised() const;

@@ -81,7 +81,7 @@ void WatchStream::begin_close(const grpc::Status& status) {
 void WatchStream::finish() {
   if (std::exchange(finished_, true)) return;
   ticket_.release();
-  calls_->answered(this, monotonic_now());
+  calls_->answered(this);
   Finish(closing_with_.value_or(grpc::Status::CANCELLED));
 }
 

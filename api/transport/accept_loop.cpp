@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
-#include <ranges>
 #include <system_error>
 #include <utility>
 
@@ -26,22 +25,15 @@ namespace {
 
 // Kept free for serial ports that come back, state files and the like.
 constexpr int kept_descriptors = 64;
-/// A flood of requests lasts no longer before it is noticed: gRPC takes 100,000 a second, of some 10 KiB
-/// each. That it is looked for costs a microsecond for each connection.
-constexpr Duration count_every = std::chrono::milliseconds(20);
+/// A flood of requests lasts no longer before it is noticed: gRPC takes some hundred in a millisecond, of
+/// some 10 KiB each. That it is looked for costs a microsecond for each connection. More often where many
+/// streams may have begun.
+constexpr Duration count_usually = std::chrono::milliseconds(10), count_soon = std::chrono::milliseconds(5);
 /// What has come and was not read yet cannot be taken back from gRPC. It is half of the longest message.
 constexpr int receive_buffer = 128 * 1024;
-/// Bytes until a connection's streams are counted again: room for some hundred.
-constexpr std::uint64_t count_streams_after = 1024;
-/// Without further bytes: gRPC may have read only a part of what had come. At every look for so long, and now
-/// and then for ever.
-constexpr Duration still_read_for = std::chrono::milliseconds(200),
-                   count_streams_again = std::chrono::seconds(1);
-constexpr Duration memory_every = heartbeat, trim_first_after = std::chrono::seconds(1),
-                   trim_last_after = std::chrono::seconds(64);
-/// gRPC lets go of what a connection had within that time after its end.
-constexpr Duration settled_after = std::chrono::milliseconds(400);
-constexpr std::size_t worth_trimming = std::size_t{16} * 1024 * 1024;
+constexpr Duration memory_every = heartbeat;
+/// Of connections that have left: they took more than is worth giving back.
+constexpr std::int64_t many_streams = 1024;
 
 int descriptor_limit() {
   rlimit limit{};
@@ -52,7 +44,7 @@ int descriptor_limit() {
 }  // namespace
 
 Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Limits& limits,
-                               InProgress in_progress) {
+                               const StreamBudget::Limits& streams, InProgress in_progress) {
   wake_ = FileDescriptor(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   reserve_ = FileDescriptor(open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (wake_.get() < 0 || reserve_.get() < 0)
@@ -62,6 +54,8 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   // The kernel gives out the lowest free number, so the number of a new descriptor tells how many are open.
   first_refused_descriptor_ = std::max(reserve_.get() + 1, descriptor_limit() - kept_descriptors);
   budgets_.emplace(limits);
+  streams_.emplace(streams);
+  trims_.emplace(resident_memory());
   memory_limit_ = limits.memory;
   in_progress_ = std::move(in_progress);
   entries_ = std::move(entries);
@@ -99,12 +93,12 @@ void AcceptLoop::run() {
       polled.push_back({.fd = entry.socket.fd.get(), .events = POLLIN, .revents = 0});
     watched.clear();
     for (const auto& [id, connection] : connections_) {
-      polled.push_back({.fd = connection.fd.get(), .events = POLLRDHUP, .revents = 0});
+      polled.push_back({.fd = connection.fd->get(), .events = POLLRDHUP, .revents = 0});
       watched.push_back(id);
     }
     progress_.store(monotonic_now(), std::memory_order_relaxed);
     const auto pause =
-        std::chrono::ceil<std::chrono::milliseconds>(connections_.empty() ? heartbeat : count_every);
+        std::chrono::ceil<std::chrono::milliseconds>(connections_.empty() ? heartbeat : count_every_);
     if (poll(polled.data(), polled.size(), static_cast<int>(pause.count())) < 0 && errno != EINTR) {
       spdlog::error("accept loop: poll: {}", std::generic_category().message(errno));
       return;
@@ -114,9 +108,10 @@ void AcceptLoop::run() {
     bool fine = true;
     for (std::size_t i = 0; i < entries_.size(); ++i)
       if (polled[i + 1].revents != 0) fine = accept_one(entries_[i]) && fine;
-    if (const auto now = monotonic_now(); now - counted_ >= count_every) {
+    if (const auto now = monotonic_now(); now - counted_ >= count_every_) {
       counted_ = now;
       count_traffic(now);
+      look_at_hand_over(now);
       look_at_memory(now);
     }
     // The system is short of memory or descriptors: the connection waits in the backlog.
@@ -128,6 +123,7 @@ void AcceptLoop::run() {
 /// gRPC closes its own descriptor by itself.
 void AcceptLoop::close(PeerBudgets::Id connection) {
   budgets_->leave(connection);
+  streams_gone_ += streams_->leave(connection);
   if (const auto found = connections_.find(connection); found != connections_.end()) {
     counts_.forget(found->second.peer);
     connections_.erase(found);
@@ -137,7 +133,7 @@ void AcceptLoop::close(PeerBudgets::Id connection) {
 
 void AcceptLoop::count_traffic(TimePoint now) {
   std::map<PeerBudgets::Id, PeerBudgets::Traffic> traffic;
-  for (const auto& [id, connection] : connections_) traffic.emplace(id, traffic_of(connection.fd.get()));
+  for (const auto& [id, connection] : connections_) traffic.emplace(id, traffic_of(connection.fd->get()));
   for (const auto id : budgets_->count(traffic, now))
     cut_off(id, "sends floods of requests that it wants no answers to");
   count_streams(traffic, now);
@@ -145,41 +141,59 @@ void AcceptLoop::count_traffic(TimePoint now) {
 
 void AcceptLoop::count_streams(const std::map<PeerBudgets::Id, PeerBudgets::Traffic>& traffic,
                                TimePoint now) {
-  std::map<std::string, PeerBudgets::Id> asked;
-  for (auto& [id, connection] : connections_) {
-    if (traffic.at(id).received - connection.received_by_then >= count_streams_after) connection.spoke = now;
-    const bool is_due = now - connection.spoke <= still_read_for || connection.streams.idle() > 0 ||
-                        now - connection.counted >= count_streams_again;
-    if (connection.peer.empty() || !is_due) continue;
-    asked.emplace(connection.peer, id);
-    connection.counted = now;
-  }
+  for (const auto& [id, total] : traffic) streams_->received(id, total.received);
+  const auto asked = streams_->doubtful(now);
+  count_every_ = asked.empty() ? count_usually : count_soon;
   if (asked.empty()) return;
-  const auto peers = std::views::keys(asked);
-  const auto counts = counts_.open({peers.begin(), peers.end()});
-  for (const auto& [peer, id] : asked) {
+  look_at_streams(asked, now);
+  for (const auto id : streams_->beyond(now)) blame(id, "keeps too many streams open", now);
+}
+
+void AcceptLoop::look_at_streams(const std::vector<PeerBudgets::Id>& ids, TimePoint now) {
+  std::vector<std::string> peers;
+  std::map<PeerBudgets::Id, std::uint64_t> unread;  // before gRPC is asked: it reads on
+  for (const auto id : ids) {
+    const auto& connection = connections_.at(id);
+    peers.push_back(connection.peer);
+    unread.emplace(id, unread_on(connection.fd->get()));
+  }
+  const auto counts = counts_.of(peers);
+  for (const auto& [id, bytes] : unread) {
+    const auto& peer = connections_.at(id).peer;
     const auto found = counts.find(peer);
     if (found == counts.end()) continue;  // gRPC does not have it yet
-    auto& connection = connections_.at(id);
-    connection.received_by_then = traffic.at(id).received;
-    const auto open = found->second;
-    connection.streams = {.open = open,
-                          .in_progress = in_progress_ ? in_progress_(peer) : open,
-                          .idle_before = connection.streams.idle()};
-  }
-  std::map<PeerBudgets::Id, OpenStreams> streams;
-  for (const auto& [id, connection] : connections_) streams.emplace(id, connection.streams);
-  for (const auto id : beyond(StreamLimits{}, streams)) {
-    budgets_->blame(id, now);
-    cut_off(id, "keeps too many streams open");
+    const auto& [started, ended] = found->second;
+    const int in_progress = in_progress_ ? in_progress_(peer) : 0;
+    streams_->seen(id, {.started = started, .ended = ended, .in_progress = in_progress}, bytes, now);
   }
 }
 
+void AcceptLoop::look_at_hand_over(TimePoint now) {
+  for (const auto id : hand_over_.keeping_others(now)) {
+    const auto found = connections_.find(id);
+    if (found == connections_.end()) continue;
+    const auto address = found->second.address;
+    blame(id, "sends without a pause", now);
+    // What else has come from there waits for the same.
+    std::vector<PeerBudgets::Id> others;
+    for (const auto& [other, connection] : connections_)
+      if (connection.address == address && hand_over_.take_back(other)) others.push_back(other);
+    for (const auto other : others) close(other);
+  }
+}
+
+/// Treats its address as after a flood of bytes, too.
+void AcceptLoop::blame(PeerBudgets::Id id, std::string_view why, TimePoint now) {
+  budgets_->blame(id, now);
+  cut_off(id, why);
+}
+
 void AcceptLoop::cut_off(PeerBudgets::Id id, std::string_view why) {
-  const int connection = connections_.at(id).fd.get();
+  const auto& connection = connections_.at(id);
   if (std::has_single_bit(++cut_off_))
-    spdlog::warn("a client at {} {}: cut off ({} since start)", address_of_peer(connection), why, cut_off_);
-  reset(connection);
+    spdlog::warn("a client at {} {}: cut off ({} since start)", connection.address, why, cut_off_);
+  reset(connection.fd->get());
+  trims_->let_go(monotonic_now());
   close(id);
 }
 
@@ -190,16 +204,12 @@ void AcceptLoop::look_at_memory(TimePoint now) {
   if (bytes > memory_limit_)
     if (const auto most = budgets_->most_one_sided())
       cut_off(*most, "has sent most without an answer, and memory is short");
-  if (std::exchange(cut_off_when_looked_, cut_off_) != cut_off_) {
-    cut_off_at_ = now;
-    trim_pause_ = trim_first_after;
+  if (streams_gone_ >= many_streams) {
+    streams_gone_ = 0;
+    trims_->let_go(now);
   }
-  // gRPC may take longer to let go than was waited for: it is tried again, later and later.
-  const bool worth_it = bytes >= trimmer_.least() + worth_trimming;
-  if (!worth_it || now - cut_off_at_ < settled_after || now - trimmed_ < trim_pause_) return;
-  trimmer_.trim();
-  trimmed_ = now;
-  trim_pause_ = std::min(2 * trim_pause_, trim_last_after);
+  if (const auto left = trimmer_.take_left(); left > 0) trims_->trimmed(left);
+  if (trims_->due(now, bytes)) trimmer_.trim();
 }
 
 bool AcceptLoop::accept_one(const Entry& entry) {
@@ -223,14 +233,16 @@ bool AcceptLoop::accept_one(const Entry& entry) {
     refuse(place, address);
     return true;
   }
-  connections_.emplace(last_id_,
-                       Connection{.fd = std::move(watched), .peer = grpc_name_of_peer(connection.get())});
+  const auto shared = std::make_shared<const FileDescriptor>(std::move(watched));
+  const auto peer = grpc_name_of_peer(connection.get());
+  connections_.emplace(last_id_, Connection{.fd = shared, .address = address, .peer = peer});
+  if (!peer.empty()) streams_->enter(last_id_, address);
   if (entry.socket.unix_path.empty()) {
     const int on = 1;
     setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     setsockopt(connection.get(), SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
   }
-  hand_over_.hand_over(last_id_, entry.hand_over, std::move(connection));
+  hand_over_.hand_over(last_id_, entry.hand_over, std::move(connection), shared);
   return true;
 }
 
@@ -239,12 +251,12 @@ bool AcceptLoop::make_room(const std::string& address, TimePoint now) {
   for (int look = 0; look < 8; ++look) {
     const auto id = budgets_->gives_way(address, now);
     if (!id) return false;
-    const auto& connection = connections_.at(*id).fd;
-    if (!budgets_->still_gives_way(*id, traffic_of(connection.get()), now)) continue;
+    const auto& [fd, from, peer] = connections_.at(*id);
+    if (!budgets_->still_gives_way(*id, traffic_of(fd->get()), now)) continue;
     if (std::has_single_bit(++gave_way_))
-      spdlog::info("an idle connection from {} gives way to a new one from {} ({} since start)",
-                   address_of_peer(connection.get()), address, gave_way_);
-    ::shutdown(connection.get(), SHUT_RDWR);
+      spdlog::info("an idle connection from {} gives way to a new one from {} ({} since start)", from,
+                   address, gave_way_);
+    ::shutdown(fd->get(), SHUT_RDWR);
     close(*id);
     return true;
   }

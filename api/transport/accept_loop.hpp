@@ -11,29 +11,30 @@
 #include <thread>
 #include <vector>
 
-#include "api/transport/hand_over_thread.hpp"
+#include "api/transport/hand_over_threads.hpp"
 #include "api/transport/listen.hpp"
 #include "api/transport/memory_trimmer.hpp"
 #include "api/transport/peer_budgets.hpp"
+#include "api/transport/stream_budget.hpp"
 #include "api/transport/stream_counts.hpp"
-#include "api/transport/stream_limits.hpp"
+#include "api/transport/trim_plan.hpp"
 
 namespace axisd::transport {
 
 /// Accepts connections and hands them to gRPC. gRPC 1.51's own listener never accepts again after one EMFILE
 /// (CVE-2023-4785); this one keeps a descriptor in reserve, turns the surplus connection away and goes on.
 /// Each connection is watched through a second descriptor: how many an address has, and what it sends without
-/// getting anything for it (PeerBudgets). gRPC is asked how many streams it has open there (StreamCounts).
-/// gRPC 1.51 bounds none of that (CVE-2023-44487).
+/// getting anything for it (PeerBudgets). gRPC is asked how many streams it has open there where they may be
+/// too many (StreamBudget). gRPC 1.51 bounds none of that (CVE-2023-44487).
 class AcceptLoop {
  public:
-  using HandOver = HandOverThread::HandOver;
+  using HandOver = HandOverThreads::HandOver;
   struct Entry {
     ListeningSocket socket;
     HandOver hand_over;
   };
-  /// How many calls of a connection, by gRPC's name of its other end, are in progress. Empty: nobody knows;
-  /// idle streams are not looked for then. Thread: the loop's.
+  /// How many calls of a connection, by gRPC's name of its other end, are in progress. Empty: nobody knows,
+  /// and none are. Thread: the loop's.
   using InProgress = std::function<int(const std::string& peer)>;
 
   AcceptLoop() = default;
@@ -42,7 +43,8 @@ class AcceptLoop {
   AcceptLoop& operator=(const AcceptLoop&) = delete;
 
   /// Connections beyond these limits are closed at once.
-  Result<void> start(std::vector<Entry> entries, const PeerBudgets::Limits& limits, InProgress in_progress);
+  Result<void> start(std::vector<Entry> entries, const PeerBudgets::Limits& limits,
+                     const StreamBudget::Limits& streams, InProgress in_progress);
   /// Closes the listening sockets. Idempotent.
   void stop();
 
@@ -52,15 +54,15 @@ class AcceptLoop {
   [[nodiscard]] std::vector<std::shared_ptr<Knock>> knocks() const;
   /// When the loop last came round, or was made. Thread: any.
   [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
+  /// When gRPC was last given one of those that wait for it; now if none does. Thread: any.
+  [[nodiscard]] TimePoint last_hand_over() { return hand_over_.last_progress(monotonic_now()); }
 
  private:
-  /// One that gRPC has.
+  /// One that gRPC has, or is about to get.
   struct Connection {
-    FileDescriptor fd;  ///< of our own
-    std::string peer;   ///< as gRPC names it; empty: it is not on TCP
-    OpenStreams streams{};
-    std::uint64_t received_by_then{};  ///< bytes, when they were counted last
-    TimePoint spoke{}, counted{};  ///< when it was found to have sent more, and when it was asked for last
+    HandOverThreads::Watched fd;  ///< of our own
+    std::string address;          ///< as it is counted
+    std::string peer;             ///< as gRPC names it; empty: it is not on TCP
   };
   void run();
   /// False: nothing could be accepted, and trying again at once would spin.
@@ -73,25 +75,33 @@ class AcceptLoop {
   void count_traffic(TimePoint now);
   /// Cuts off who keeps too many streams open. `traffic`: as it was counted just now.
   void count_streams(const std::map<PeerBudgets::Id, PeerBudgets::Traffic>& traffic, TimePoint now);
+  /// Asks gRPC about these.
+  void look_at_streams(const std::vector<PeerBudgets::Id>& ids, TimePoint now);
+  /// Cuts off who keeps the threads that hand over, and whom they have beside them.
+  void look_at_hand_over(TimePoint now);
   /// Has what is free given back to the system, and cuts off who made it necessary.
   void look_at_memory(TimePoint now);
+  void blame(PeerBudgets::Id id, std::string_view why, TimePoint now);
   void cut_off(PeerBudgets::Id id, std::string_view why);
   void close(PeerBudgets::Id connection);
 
   std::vector<Entry> entries_;
-  HandOverThread hand_over_;
+  HandOverThreads hand_over_;
   int first_refused_descriptor_ = 0;
   FileDescriptor wake_, reserve_;
   std::optional<PeerBudgets> budgets_;
+  std::optional<StreamBudget> streams_;
   StreamCounts counts_;
   InProgress in_progress_;
   std::map<PeerBudgets::Id, Connection> connections_;
   PeerBudgets::Id last_id_ = 0;
   MemoryTrimmer trimmer_;
-  TimePoint counted_{}, looked_{}, trimmed_{}, cut_off_at_{};
-  std::size_t memory_limit_ = 0;  ///< bytes
-  Duration trim_pause_ = std::chrono::seconds(1);
-  std::uint64_t cut_off_ = 0, cut_off_when_looked_ = 0, gave_way_ = 0;
+  std::optional<TrimPlan> trims_;
+  TimePoint counted_{}, looked_{};
+  Duration count_every_{};
+  std::size_t memory_limit_ = 0;   ///< bytes
+  std::int64_t streams_gone_ = 0;  ///< of those that have left, since memory was looked after for it
+  std::uint64_t cut_off_ = 0, gave_way_ = 0;
   std::atomic<std::uint64_t> refused_{0};
   std::atomic<TimePoint> progress_{monotonic_now()};
   std::atomic<bool> stopping_{false};

@@ -5,7 +5,6 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
 
@@ -23,7 +22,6 @@ std::size_t resident_memory() {
 }
 
 void MemoryTrimmer::start() {
-  least_ = resident_memory();
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "axisd-trim");
 }
@@ -53,7 +51,7 @@ void MemoryTrimmer::run() {
     wanted_ = false;
     lock.unlock();
     malloc_trim(0);
-    least_ = std::min<std::size_t>(least_, resident_memory());
+    left_ = resident_memory();
     lock.lock();
   }
 }

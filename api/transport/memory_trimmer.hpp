@@ -28,8 +28,9 @@ class MemoryTrimmer {
   void trim();
   /// Waits for what is under way. Idempotent.
   void stop();
-  /// The least that was resident after a time, or at the start, bytes. Thread: any.
-  [[nodiscard]] std::size_t least() const { return least_.load(std::memory_order_relaxed); }
+  /// What was resident after the last time, bytes, told once; 0: nothing new, or the system does not say.
+  /// Thread: any.
+  [[nodiscard]] std::size_t take_left() { return left_.exchange(0, std::memory_order_relaxed); }
 
  private:
   void run();
@@ -37,7 +38,7 @@ class MemoryTrimmer {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool wanted_ = false, stopping_ = false;  ///< under mutex_
-  std::atomic<std::size_t> least_{0};
+  std::atomic<std::size_t> left_{0};
   std::thread thread_;
 };
 

@@ -2,13 +2,16 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 
 namespace axisd::transport {
 
@@ -65,6 +68,24 @@ std::string grpc_name_of_peer(int connection) {
 void reset(int connection) {
   const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
   if (::connect(connection, &nobody, sizeof nobody) != 0) ::shutdown(connection, SHUT_RDWR);
+}
+
+namespace {
+
+/// Who waits for something to read is told from so many bytes on. The system takes no more than it has room
+/// for, and tells of less once it is told of that.
+void tell_from(int connection, int bytes) {
+  ::setsockopt(connection, SOL_SOCKET, SO_RCVLOWAT, &bytes, sizeof bytes);
+}
+
+}  // namespace
+
+void hold_back(int connection) { tell_from(connection, std::numeric_limits<int>::max()); }
+void let_go(int connection) { tell_from(connection, 1); }
+
+std::uint64_t unread_on(int connection) {
+  int bytes = 0;
+  return ::ioctl(connection, SIOCINQ, &bytes) == 0 && bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
 }
 
 PeerBudgets::Traffic traffic_of(int connection) {

@@ -3,6 +3,7 @@
 
 #include <sys/socket.h>
 
+#include <cstdint>
 #include <string>
 
 #include "api/transport/peer_budgets.hpp"
@@ -19,6 +20,12 @@ namespace axisd::transport {
 /// Ends it with all that was not read yet. After a shutdown gRPC would still read what comes, for as long as
 /// the peer goes on.
 void reset(int connection);
+/// Until let_go() nobody is told that there is something to read on it, unless there is no room for more, or
+/// the peer has ended it. Without effect on unix sockets.
+void hold_back(int connection);
+void let_go(int connection);
+/// Bytes that have come and were not read yet.
+[[nodiscard]] std::uint64_t unread_on(int connection);
 /// What the kernel has counted on it; nothing for unix sockets.
 [[nodiscard]] PeerBudgets::Traffic traffic_of(int connection);
 

@@ -2,7 +2,7 @@
 
 #include <grpcpp/resource_quota.h>
 
-#include "api/transport/stream_limits.hpp"
+#include "api/transport/stream_budget.hpp"
 
 namespace axisd::transport {
 
@@ -14,7 +14,7 @@ void limit(grpc::ServerBuilder& builder, const std::string& name) {
     builder.SetCompressionAlgorithmSupportStatus(packed, false);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 8 * 1024);
   // Far above what a server lets one client open: its streams must never keep its Stop waiting.
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, StreamLimits::told);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, StreamBudget::Limits::told);
   // What is read at once becomes streams before anybody can count them: 15 bytes are enough for one.
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, 8 * 1024);
   // A vanished client is noticed within 12 s instead of minutes. Not sooner: a gRPC client without calls

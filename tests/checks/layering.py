@@ -51,7 +51,7 @@ THIRD_PARTY = {
     "yaml-cpp": ["config"],
     "grpc": ["api/program", "api/transport", "api/server", "api/cell", "api/axisctl", "api/web/gateway", "daemon/*"],
     "grpcpp": ["api/transport", "api/server", "api/cell", "api/axisctl", "api/examples", "api/web/gateway", "daemon/*"],
-    "google": ["api/budget", "api/program", "api/transport", "api/server", "api/cell", "api/axisctl", "api/web/gateway", "daemon/*"],
+    "google": ["api/budget", "api/program", "api/server", "api/cell", "api/axisctl", "api/web/gateway", "daemon/*"],
     "openssl": ["api/tls"],
     "nghttp2": ["api/server/lane"],
     "absl": ["api/server/lane"],

@@ -7,8 +7,8 @@
 #include <cerrno>
 #include <list>
 
+#include "api/transport/stream_budget.hpp"
 #include "api/transport/stream_counts.hpp"
-#include "api/transport/stream_limits.hpp"
 #include "axisd/v1/event_service.grpc.pb.h"
 #include "tests/unit/api/serving.hpp"
 
@@ -16,7 +16,7 @@ namespace axisd::testing {
 namespace {
 
 using transport::StreamCounts;
-using transport::StreamLimits;
+using Limits = transport::StreamBudget::Limits;
 
 std::string frame(char kind, char flags, std::uint32_t stream, const std::string& payload) {
   std::string bytes(9, '\0');
@@ -79,10 +79,11 @@ class Leaver {
 /// On both kinds of addresses, which gRPC writes differently.
 class StreamFloods : public ::testing::TestWithParam<int> {
  protected:
-  void SetUp() override {
+  void serve(const Limits& limits = {}) {
     const std::string host = GetParam() == AF_INET ? "127.0.0.1:" : "[::1]:";
     server_ = std::make_unique<server::Server>(
-        machine_, server::ServerOptions{.listen = {host + "0"}, .limits = {.calls = 1000, .streams = 64}});
+        machine_, server::ServerOptions{
+                      .listen = {host + "0"}, .limits = {.calls = 1000, .streams = 64}, .streams = limits});
     const auto port = server_->start();
     ASSERT_TRUE(port) << to_string(port.error());
     target_ = host + std::to_string(*port);
@@ -122,28 +123,36 @@ class StreamFloods : public ::testing::TestWithParam<int> {
 };
 
 TEST_P(StreamFloods, GrpcIsAskedHowManyAreOpen) {
+  serve();
   auto& one = leaver();
   auto& other = leaver();
   one.open(49);
   StreamCounts counts;
   const std::vector peers{name_of(one), name_of(other), std::string("ipv4:127.0.0.1:1")};
-  const std::map<std::string, std::int64_t> all{{peers[0], 50}, {peers[1], 1}};
-  EXPECT_TRUE(eventually([&] { return counts.open(peers) == all; }));
+  const auto open = [&](std::size_t which) {
+    const auto all = counts.of(peers);
+    const auto found = all.find(peers[which]);
+    return found == all.end() ? -1 : found->second.open();
+  };
+  EXPECT_TRUE(eventually([&] { return open(0) == 50 && open(1) == 1; }));
+  EXPECT_EQ(open(2), -1);
   leavers_.pop_front();
-  EXPECT_TRUE(eventually([&] { return !counts.open(peers).contains(peers[0]); })) << "it is gone";
+  EXPECT_TRUE(eventually([&] { return open(0) == -1; })) << "it is gone";
   other.open(1);
-  EXPECT_TRUE(eventually([&] { return counts.open(peers)[peers[1]] == 2; }));
+  EXPECT_TRUE(eventually([&] { return open(1) == 2; }));
 }
 
 TEST_P(StreamFloods, WhoOpensMoreThanOneMayHaveIsCutOff) {
+  serve();
   auto& good = leaver();
   good.open(100);
-  leaver().open(StreamLimits{}.of_one);
+  leaver().open(Limits{}.of_one);
   EXPECT_TRUE(eventually([this] { return leavers_.back().is_cut_off(); }));
   EXPECT_FALSE(good.is_cut_off());
 }
 
 TEST_P(StreamFloods, WhereTheyAreTooManyWhoHasMostIsCutOffAndNoCallInProgress) {
+  serve();
   // More calls in progress on one connection than anybody else has idle streams: they are none.
   const auto channel = connect(target_);
   const auto axes = v1::AxisService::NewStub(channel);
@@ -186,7 +195,7 @@ TEST_P(StreamFloods, WhereTheyAreTooManyWhoHasMostIsCutOffAndNoCallInProgress) {
   ASSERT_TRUE(eventually([this] { return machine_.held() == calls; }));
 
   constexpr int each = 700;
-  while (static_cast<std::int64_t>(leavers_.size()) * each <= StreamLimits{}.idle) leaver().open(each);
+  while (static_cast<std::int64_t>(leavers_.size()) * each <= Limits{}.lasting) leaver().open(each);
   EXPECT_TRUE(eventually([this] { return cut_off() > 0; }));
   EXPECT_EQ(cut_off(), 1) << "the others are few enough together";
 
@@ -196,6 +205,45 @@ TEST_P(StreamFloods, WhereTheyAreTooManyWhoHasMostIsCutOffAndNoCallInProgress) {
   EXPECT_EQ(fine, calls);
   for (auto& watch : watches) watch.context.TryCancel();
   watching.TryCancel();
+}
+
+/// Many connections with a few streams each, and one on which more pass by than any of them keeps.
+TEST_P(StreamFloods, WhoIsBusyKeepsItsConnection) {
+  serve({.of_one = 1000, .lasting = 300, .idle = 1500});
+  const auto axes = v1::AxisService::NewStub(connect(target_));
+  struct Asking {
+    std::unique_ptr<Call> context;
+    v1::GetAxisRequest request;
+    v1::GetAxisResponse response;
+  };
+  std::list<Asking> asking(250);
+  std::atomic<int> good{0}, bad{0}, under_way{0};
+  std::atomic<bool> enough{false};
+  const std::function<void(Asking&)> ask = [&](Asking& one) {
+    one.context = std::make_unique<Call>();
+    one.request.set_axis("feeder");
+    axes->async()->GetAxis(one.context.get(), &one.request, &one.response, [&](const grpc::Status& status) {
+      ++(status.ok() ? good : bad);
+      if (enough || !status.ok()) {
+        --under_way;
+        return;
+      }
+      ask(one);
+    });
+  };
+  for (auto& one : asking) {
+    ++under_way;
+    ask(one);
+  }
+  ASSERT_TRUE(eventually([&] { return good > 1000; }));
+  for (int i = 0; i < 60; ++i) leaver().open(5);
+  EXPECT_TRUE(eventually([&] { return cut_off() > 0; }));
+  const int before = good;
+  EXPECT_TRUE(eventually([&] { return good > before + 5000; }));
+  EXPECT_LT(cut_off(), 30) << "as few as are enough";
+  enough = true;
+  EXPECT_TRUE(eventually([&] { return under_way == 0; }));
+  EXPECT_EQ(bad, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Both, StreamFloods, ::testing::Values(AF_INET, AF_INET6),
