@@ -30,9 +30,9 @@ def notify_socket(directory):
         yield path, notified
 
 
-def resident_mib(pid):
+def resident_mib(pid, line="VmRSS:"):
     status = pathlib.Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    return int(next(line for line in status.splitlines() if line.startswith("VmRSS:")).split()[1]) / 1024
+    return int(next(each for each in status.splitlines() if each.startswith(line)).split()[1]) / 1024
 
 
 def cpu_percent(pid, seconds, each_second):

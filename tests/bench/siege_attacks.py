@@ -155,6 +155,13 @@ def crowd(most, begin):
     return attack
 
 
+def few_each(request, again, message=b""):
+    """A crowd of which each has 17 streams: of `request`, and then of `again`, each with this message or none."""
+    streams = b"".join(frame(1, 4, stream, request if stream == 1 else again) + (frame(0, 0, stream, message) if message else b"")
+                       for stream in range(1, 35, 2))
+    return crowd(95, PREFACE + frame(4, 0, 0) + streams)
+
+
 def slow_prefaces(door, until, count):
     """500 connections that send a byte of the preface each second."""
     peers, sent = [], 0
@@ -324,7 +331,9 @@ ATTACKS = {
     "PING flood": Attack(pings), "SETTINGS flood": Attack(settings), "CONTINUATION flood": Attack(continuation),
     "half-open streams": Attack(half_open), "half-open streams of 15 bytes": Attack(short_half_open),
     "rapid reset": Attack(rapid_reset), "rapid reset, TLS": Attack(rapid_reset, tls=True),
+    "half-open streams, a few each": Attack(few_each(REQUEST_KEPT, REQUEST_AGAIN), at_lane=False),
     "health watchers": Attack(watchers, at_lane=False), "reflection streams": Attack(reflections, at_lane=False),
+    "reflection streams, a few each": Attack(few_each(REFLECT, REFLECT), at_lane=False),
     "group stops": Attack(calls(stop_service_pb2_grpc.StopServiceStub, "GroupStop", stops_of_all), at_main=False,
                           stops=True),
     "compressed messages": Attack(compressed),

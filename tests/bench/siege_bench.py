@@ -41,7 +41,7 @@ BAUD = 115200
 KILL_BOUND = 0.5  # s
 STOP_BOUNDS = 50, 200  # ms: 99 % of the stops, and the longest
 POLLS_KEPT = 0.95  # of the readings of the drives where nobody misbehaves
-MEMORY, MEMORY_LEFT = 256, 32  # MiB: at the end of an attack, and more than before it a while later
+MEMORY, MEMORY_LEFT = 256, 32  # MiB: at any time in an attack, and more than before it a while later
 MOVES_AGAIN = 5  # s after the attack an axis moves again
 ENDING = 5  # s after SIGTERM
 PROCESSES = multiprocessing.get_context("spawn")  # gRPC does not survive a fork
@@ -195,7 +195,7 @@ class Row:
     polls: float  # a second
     cpu: float  # of axisd, % of a core
     busy: float  # the whole computer, %
-    memory: tuple  # MiB: before, at the end of the siege, a while later
+    memory: tuple  # MiB: before, most at any time until the end of the siege, a while later
     moves: float  # s until an axis moves again
     ending: float  # s after SIGTERM
     alarms: int = 0
@@ -210,7 +210,7 @@ class Row:
         return " ".join(name for name, is_met in met.items() if not is_met) or "-"
 
     HEAD = ["sent", "stops lost", "99 %, ms", "longest", "frames 99 %", "longest", "reads lost", "99 %", "longest",
-            "polls/s", "axisd, % CPU", "computer", "MiB before", "under siege", "after", "moves, s", "SIGTERM, s", "alarms",
+            "polls/s", "axisd, % CPU", "computer", "MiB before", "most", "after", "moves, s", "SIGTERM, s", "alarms",
             "beyond", "verdict"]
 
     def cells(self, quiet):
@@ -242,7 +242,7 @@ def siege(given, process, name, main, stops, lane, log):
     for each in besiegers:
         each.start()
     asked = honest(stops, until, halt, 20)
-    end, used, now, under = time.monotonic(), cpu_seconds_by_ticks(process.pid) - cpu, computer(), resident_mib(process.pid)
+    end, used, now, under = time.monotonic(), cpu_seconds_by_ticks(process.pid) - cpu, computer(), resident_mib(process.pid, "VmHWM:")
     read = results.get(timeout=60)
     for each in besiegers:
         each.join(15)
