@@ -77,7 +77,7 @@ class Server {
   /// When its accept loop last came round: it lets in who connects. Thread: any.
   [[nodiscard]] TimePoint last_progress() const;
 
-  /// When gRPC was last given a connection that waits for it; now if none waits. Thread: any.
+  /// When gRPC last took in a connection that it is given; now if it has them all. Thread: any.
   [[nodiscard]] TimePoint last_hand_over() const;
 
   /// Batches of axis states serialised since the start. Thread: any.

@@ -60,7 +60,8 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   in_progress_ = std::move(in_progress);
   entries_ = std::move(entries);
   trimmer_.start();
-  hand_over_.start();
+  tcp_.start();
+  local_.start();
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "axisd-accept");
   return {};
@@ -72,7 +73,8 @@ void AcceptLoop::stop() {
     eventfd_write(wake_.get(), 1);
     thread_.join();
   }
-  hand_over_.stop();
+  tcp_.stop();
+  local_.stop();
   trimmer_.stop();
   entries_.clear();
 }
@@ -111,7 +113,7 @@ void AcceptLoop::run() {
     if (const auto now = monotonic_now(); now - counted_ >= count_every_) {
       counted_ = now;
       count_traffic(now);
-      look_at_hand_over(now);
+      for (auto* way : {&tcp_, &local_}) look_at_hand_over(*way, now);
       look_at_memory(now);
     }
     // The system is short of memory or descriptors: the connection waits in the backlog.
@@ -125,10 +127,10 @@ void AcceptLoop::close(PeerBudgets::Id connection) {
   budgets_->leave(connection);
   streams_gone_ += streams_->leave(connection);
   if (const auto found = connections_.find(connection); found != connections_.end()) {
+    found->second.way->take_back(connection);
     counts_.forget(found->second.peer);
     connections_.erase(found);
   }
-  hand_over_.take_back(connection);
 }
 
 void AcceptLoop::count_traffic(TimePoint now) {
@@ -168,18 +170,19 @@ void AcceptLoop::look_at_streams(const std::vector<PeerBudgets::Id>& ids, TimePo
   }
 }
 
-void AcceptLoop::look_at_hand_over(TimePoint now) {
-  for (const auto id : hand_over_.keeping_others(now)) {
-    const auto found = connections_.find(id);
-    if (found == connections_.end()) continue;
-    const auto address = found->second.address;
-    blame(id, "sends without a pause", now);
-    // What else has come from there waits for the same.
-    std::vector<PeerBudgets::Id> others;
-    for (const auto& [other, connection] : connections_)
-      if (connection.address == address && hand_over_.take_back(other)) others.push_back(other);
-    for (const auto other : others) close(other);
-  }
+void AcceptLoop::look_at_hand_over(HandOverThread& way, TimePoint now) {
+  const auto kept = way.kept_by(now);
+  if (!kept) return;
+  const auto found = connections_.find(kept->id);
+  // It has ended, and gRPC is still at what it had sent.
+  if (found == connections_.end()) return reset(kept->watched->get());
+  const auto address = found->second.address;
+  blame(kept->id, "sends without a pause", now);
+  // What else has come from there waits for the same.
+  std::vector<PeerBudgets::Id> others;
+  for (const auto& [other, connection] : connections_)
+    if (connection.address == address && way.take_back(other)) others.push_back(other);
+  for (const auto other : others) close(other);
 }
 
 /// Treats its address as after a flood of bytes, too.
@@ -224,7 +227,7 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   FileDescriptor watched(fcntl(connection.get(), F_DUPFD_CLOEXEC, 0));
   const bool none_left = watched.get() < 0 || watched.get() >= first_refused_descriptor_;
   const auto now = monotonic_now();
-  const bool counted = entry.socket.unix_path.empty();
+  const bool counted = entry.socket.unix_path.empty();  // on TCP
   auto place = none_left ? PeerBudgets::Entry::full : budgets_->enter(++last_id_, address, now, counted);
   if (!none_left && place != PeerBudgets::Entry::granted && place != PeerBudgets::Entry::address_floods &&
       make_room(address, now))
@@ -235,14 +238,15 @@ bool AcceptLoop::accept_one(const Entry& entry) {
   }
   const auto shared = std::make_shared<const FileDescriptor>(std::move(watched));
   const auto peer = grpc_name_of_peer(connection.get());
-  connections_.emplace(last_id_, Connection{.fd = shared, .address = address, .peer = peer});
+  auto& way = counted ? tcp_ : local_;
+  connections_.emplace(last_id_, Connection{.fd = shared, .way = &way, .address = address, .peer = peer});
   if (!peer.empty()) streams_->enter(last_id_, address);
-  if (entry.socket.unix_path.empty()) {
+  if (counted) {
     const int on = 1;
     setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     setsockopt(connection.get(), SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
   }
-  hand_over_.hand_over(last_id_, entry.hand_over, std::move(connection), shared);
+  way.hand_over(last_id_, entry.hand_over, std::move(connection), shared);
   return true;
 }
 
@@ -251,12 +255,12 @@ bool AcceptLoop::make_room(const std::string& address, TimePoint now) {
   for (int look = 0; look < 8; ++look) {
     const auto id = budgets_->gives_way(address, now);
     if (!id) return false;
-    const auto& [fd, from, peer] = connections_.at(*id);
-    if (!budgets_->still_gives_way(*id, traffic_of(fd->get()), now)) continue;
+    const auto& connection = connections_.at(*id);
+    if (!budgets_->still_gives_way(*id, traffic_of(connection.fd->get()), now)) continue;
     if (std::has_single_bit(++gave_way_))
-      spdlog::info("an idle connection from {} gives way to a new one from {} ({} since start)", from,
-                   address, gave_way_);
-    ::shutdown(fd->get(), SHUT_RDWR);
+      spdlog::info("an idle connection from {} gives way to a new one from {} ({} since start)",
+                   connection.address, address, gave_way_);
+    ::shutdown(connection.fd->get(), SHUT_RDWR);
     close(*id);
     return true;
   }

@@ -1,6 +1,7 @@
 // The daemon's own accept loop.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
 #include <map>
@@ -11,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "api/transport/hand_over_threads.hpp"
+#include "api/transport/hand_over_thread.hpp"
 #include "api/transport/listen.hpp"
 #include "api/transport/memory_trimmer.hpp"
 #include "api/transport/peer_budgets.hpp"
@@ -28,7 +29,7 @@ namespace axisd::transport {
 /// too many (StreamBudget). gRPC 1.51 bounds none of that (CVE-2023-44487).
 class AcceptLoop {
  public:
-  using HandOver = HandOverThreads::HandOver;
+  using HandOver = HandOverThread::HandOver;
   struct Entry {
     ListeningSocket socket;
     HandOver hand_over;
@@ -54,15 +55,19 @@ class AcceptLoop {
   [[nodiscard]] std::vector<std::shared_ptr<Knock>> knocks() const;
   /// When the loop last came round, or was made. Thread: any.
   [[nodiscard]] TimePoint last_progress() const { return progress_.load(std::memory_order_relaxed); }
-  /// When gRPC was last given one of those that wait for it; now if none does. Thread: any.
-  [[nodiscard]] TimePoint last_hand_over() { return hand_over_.last_progress(monotonic_now()); }
+  /// When gRPC last took in one of those that it is given; now if it has them all. Thread: any.
+  [[nodiscard]] TimePoint last_hand_over() {
+    const auto now = monotonic_now();
+    return std::min(tcp_.last_progress(now), local_.last_progress(now));
+  }
 
  private:
   /// One that gRPC has, or is about to get.
   struct Connection {
-    HandOverThreads::Watched fd;  ///< of our own
-    std::string address;          ///< as it is counted
-    std::string peer;             ///< as gRPC names it; empty: it is not on TCP
+    HandOverThread::Watched fd;  ///< of our own
+    HandOverThread* way;         ///< to gRPC
+    std::string address;         ///< as it is counted
+    std::string peer;            ///< as gRPC names it; empty: it is not on TCP
   };
   void run();
   /// False: nothing could be accepted, and trying again at once would spin.
@@ -77,8 +82,8 @@ class AcceptLoop {
   void count_streams(const std::map<PeerBudgets::Id, PeerBudgets::Traffic>& traffic, TimePoint now);
   /// Asks gRPC about these.
   void look_at_streams(const std::vector<PeerBudgets::Id>& ids, TimePoint now);
-  /// Cuts off who keeps the threads that hand over, and whom they have beside them.
-  void look_at_hand_over(TimePoint now);
+  /// Cuts off who keeps the thread that hands over, and what waits from there with it.
+  void look_at_hand_over(HandOverThread& way, TimePoint now);
   /// Has what is free given back to the system, and cuts off who made it necessary.
   void look_at_memory(TimePoint now);
   void blame(PeerBudgets::Id id, std::string_view why, TimePoint now);
@@ -86,7 +91,7 @@ class AcceptLoop {
   void close(PeerBudgets::Id connection);
 
   std::vector<Entry> entries_;
-  HandOverThreads hand_over_;
+  HandOverThread tcp_, local_;  ///< local: unix sockets
   int first_refused_descriptor_ = 0;
   FileDescriptor wake_, reserve_;
   std::optional<PeerBudgets> budgets_;
