@@ -34,6 +34,7 @@ constexpr int receive_buffer = 128 * 1024;
 constexpr Duration memory_every = heartbeat;
 /// Of connections that have left: they took more than is worth giving back.
 constexpr std::int64_t many_streams = 1024;
+constexpr std::string_view floods = "sends floods of requests that it wants no answers to";
 
 int descriptor_limit() {
   rlimit limit{};
@@ -55,6 +56,7 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   first_refused_descriptor_ = std::max(reserve_.get() + 1, descriptor_limit() - kept_descriptors);
   budgets_.emplace(limits);
   streams_.emplace(streams);
+  streams_of_one_ = streams.of_one;
   trims_.emplace(resident_memory());
   memory_limit_ = limits.memory;
   in_progress_ = std::move(in_progress);
@@ -95,7 +97,8 @@ void AcceptLoop::run() {
       polled.push_back({.fd = entry.socket.fd.get(), .events = POLLIN, .revents = 0});
     watched.clear();
     for (const auto& [id, connection] : connections_) {
-      polled.push_back({.fd = connection.fd->get(), .events = POLLRDHUP, .revents = 0});
+      const short asked = connection.still_sends ? POLLRDHUP : 0;  // POLLHUP is told unasked
+      polled.push_back({.fd = connection.fd->get(), .events = asked, .revents = 0});
       watched.push_back(id);
     }
     progress_.store(monotonic_now(), std::memory_order_relaxed);
@@ -106,7 +109,10 @@ void AcceptLoop::run() {
       return;
     }
     for (std::size_t i = 0; i < watched.size(); ++i)
-      if (polled[1 + entries_.size() + i].revents != 0) close(watched[i]);
+      if (const auto told = polled[1 + entries_.size() + i].revents; told == POLLRDHUP)
+        connections_.at(watched[i]).still_sends = false;
+      else if (told != 0)
+        on_end(watched[i]);
     bool fine = true;
     for (std::size_t i = 0; i < entries_.size(); ++i)
       if (polled[i + 1].revents != 0) fine = accept_one(entries_[i]) && fine;
@@ -120,6 +126,20 @@ void AcceptLoop::run() {
     if (!fine) poll(polled.data(), 1, 100);
   }
   connections_.clear();
+}
+
+void AcceptLoop::on_end(PeerBudgets::Id id) {
+  const auto fd = connections_.at(id).fd;
+  for (const auto each : budgets_->count({{id, traffic_of(fd->get())}}, monotonic_now()))
+    cut_off(each, floods);
+  if (!connections_.contains(id)) return;
+  // gRPC reads what a peer has left that is gone. That is right for a Stop, and too much where it may be more
+  // streams than one may have.
+  const bool leaves_much =
+      std::cmp_greater(unread_on(fd->get()) / StreamBudget::least_bytes, streams_of_one_);
+  if (leaves_much && !connections_.at(id).peer.empty())
+    return cut_off(id, "leaves more than it may have open");
+  close(id);
 }
 
 /// gRPC closes its own descriptor by itself.
@@ -136,8 +156,7 @@ void AcceptLoop::close(PeerBudgets::Id connection) {
 void AcceptLoop::count_traffic(TimePoint now) {
   std::map<PeerBudgets::Id, PeerBudgets::Traffic> traffic;
   for (const auto& [id, connection] : connections_) traffic.emplace(id, traffic_of(connection.fd->get()));
-  for (const auto id : budgets_->count(traffic, now))
-    cut_off(id, "sends floods of requests that it wants no answers to");
+  for (const auto id : budgets_->count(traffic, now)) cut_off(id, floods);
   count_streams(traffic, now);
 }
 

@@ -68,6 +68,8 @@ class AcceptLoop {
     HandOverThread* way;         ///< to gRPC
     std::string address;         ///< as it is counted
     std::string peer;            ///< as gRPC names it; empty: it is not on TCP
+    /// Else its peer has ended its sending: gRPC reads what has come, and ends the connection then.
+    bool still_sends = true;
   };
   void run();
   /// False: nothing could be accepted, and trying again at once would spin.
@@ -88,6 +90,8 @@ class AcceptLoop {
   void look_at_memory(TimePoint now);
   void blame(PeerBudgets::Id id, std::string_view why, TimePoint now);
   void cut_off(PeerBudgets::Id id, std::string_view why);
+  /// It is over at both ends. Counts what has come since it was counted last.
+  void on_end(PeerBudgets::Id id);
   void close(PeerBudgets::Id connection);
 
   std::vector<Entry> entries_;
@@ -104,7 +108,8 @@ class AcceptLoop {
   std::optional<TrimPlan> trims_;
   TimePoint counted_{}, looked_{};
   Duration count_every_{};
-  std::size_t memory_limit_ = 0;   ///< bytes
+  std::size_t memory_limit_ = 0;  ///< bytes
+  std::int64_t streams_of_one_ = 0;
   std::int64_t streams_gone_ = 0;  ///< of those that have left, since memory was looked after for it
   std::uint64_t cut_off_ = 0, gave_way_ = 0;
   std::atomic<std::uint64_t> refused_{0};

@@ -162,6 +162,19 @@ def few_each(request, again, message=b""):
     return crowd(95, PREFACE + frame(4, 0, 0) + streams)
 
 
+def burst_then_end(door, until, count):
+    """Half-open streams of 15 bytes, as many as there is room for, and the end at once; again and again."""
+    number = 6000
+    burst = PREFACE + frame(4, 0, 0) + frame(1, 4, 1, REQUEST_KEPT) + \
+        b"".join(frame(1, 4, 1 + 2 * each, REQUEST_AGAIN) for each in range(1, number))
+    while time.monotonic() < until:
+        with contextlib.suppress(OSError), door.enter() as peer:
+            peer.settimeout(0.2)
+            peer.sendall(burst)
+            peer.shutdown(socket.SHUT_WR)
+            count(number)
+
+
 def slow_prefaces(door, until, count):
     """500 connections that send a byte of the preface each second."""
     peers, sent = [], 0
@@ -332,6 +345,7 @@ ATTACKS = {
     "half-open streams": Attack(half_open), "half-open streams of 15 bytes": Attack(short_half_open),
     "rapid reset": Attack(rapid_reset), "rapid reset, TLS": Attack(rapid_reset, tls=True),
     "half-open streams, a few each": Attack(few_each(REQUEST_KEPT, REQUEST_AGAIN), at_lane=False),
+    "half-open streams, then the end": Attack(burst_then_end, at_lane=False),
     "health watchers": Attack(watchers, at_lane=False), "reflection streams": Attack(reflections, at_lane=False),
     "reflection streams, a few each": Attack(few_each(REFLECT, REFLECT), at_lane=False),
     "group stops": Attack(calls(stop_service_pb2_grpc.StopServiceStub, "GroupStop", stops_of_all), at_main=False,

@@ -51,6 +51,14 @@ class Leaver {
     for (int i = 0; i < streams; ++i) frames += frame(1, 4, next_ += 2, "\x83\x86\xc1\xc0\xbf\xbe");
     send(frames);
   }
+  /// It sends no more, and listens until the other end has ended, too. True: that had nothing to say.
+  [[nodiscard]] bool is_turned_away() {
+    ::shutdown(socket_.get(), SHUT_WR);
+    char bytes[4096];
+    bool said_nothing = true;
+    while (::recv(socket_.get(), bytes, sizeof bytes, 0) > 0) said_nothing = false;
+    return said_nothing;
+  }
   /// By a reset: gRPC ends those, too, that do not answer its pings, but not so.
   [[nodiscard]] bool is_cut_off() {
     char bytes[4096];
@@ -79,11 +87,13 @@ class Leaver {
 /// On both kinds of addresses, which gRPC writes differently.
 class StreamFloods : public ::testing::TestWithParam<int> {
  protected:
-  void serve(const Limits& limits = {}) {
+  void serve(const Limits& limits = {}, const transport::PeerBudgets::Limits& peers = {}) {
     const std::string host = GetParam() == AF_INET ? "127.0.0.1:" : "[::1]:";
-    server_ = std::make_unique<server::Server>(
-        machine_, server::ServerOptions{
-                      .listen = {host + "0"}, .limits = {.calls = 1000, .streams = 64}, .streams = limits});
+    server_ = std::make_unique<server::Server>(machine_,
+                                               server::ServerOptions{.listen = {host + "0"},
+                                                                     .limits = {.calls = 1000, .streams = 64},
+                                                                     .peers = peers,
+                                                                     .streams = limits});
     const auto port = server_->start();
     ASSERT_TRUE(port) << to_string(port.error());
     target_ = host + std::to_string(*port);
@@ -140,6 +150,18 @@ TEST_P(StreamFloods, GrpcIsAskedHowManyAreOpen) {
   EXPECT_TRUE(eventually([&] { return open(0) == -1; })) << "it is gone";
   other.open(1);
   EXPECT_TRUE(eventually([&] { return open(1) == 2; }));
+}
+
+/// Each is gone before anybody looks, and gRPC reads all that it leaves.
+TEST_P(StreamFloods, WhatIsSentJustBeforeTheEndCounts) {
+  serve({}, {.rate = 64 * 1024, .burst = 256 * 1024});
+  bool turned_away = false;
+  for (int i = 0; i < 60 && !turned_away; ++i) {
+    leavers_.clear();
+    leaver().open(2000);
+    turned_away = leavers_.back().is_turned_away();
+  }
+  EXPECT_TRUE(turned_away);
 }
 
 TEST_P(StreamFloods, WhoOpensMoreThanOneMayHaveIsCutOff) {
@@ -203,6 +225,7 @@ TEST_P(StreamFloods, WhereTheyAreTooManyWhoHasMostIsCutOffAndNoCallInProgress) {
   machine_.let_go();
   EXPECT_TRUE(eventually([&] { return ended == calls; }));
   EXPECT_EQ(fine, calls);
+  EXPECT_EQ(cut_off(), 1) << "nor later";
   for (auto& watch : watches) watch.context.TryCancel();
   watching.TryCancel();
 }

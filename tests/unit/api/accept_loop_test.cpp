@@ -1,0 +1,115 @@
+// Connections on their way through the accept loop, to a gRPC that does nothing with them by itself.
+#include "api/transport/accept_loop.hpp"
+
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "api/transport/listen.hpp"
+#include "tests/unit/api/serving.hpp"
+
+namespace axisd::testing {
+namespace {
+
+using transport::AcceptLoop;
+using transport::StreamBudget;
+
+constexpr ssize_t hello = transport::PeerBudgets::hello;
+
+class Acceptance : public ::testing::Test {
+ protected:
+  void serve(const transport::PeerBudgets::Limits& limits = {}) {
+    auto sockets = transport::listen_on("127.0.0.1:0", false);
+    ASSERT_TRUE(sockets) << to_string(sockets.error());
+    port_ = sockets->front().port;
+    std::vector<AcceptLoop::Entry> entries;
+    entries.push_back({.socket = std::move(sockets->front()), .hand_over = [this](FileDescriptor connection) {
+                         const std::lock_guard lock(mutex_);
+                         taken_.push_back(std::move(connection));
+                       }});
+    ASSERT_TRUE(loop_.start(std::move(entries), limits, {}, {}));
+  }
+
+  [[nodiscard]] FileDescriptor client() const {
+    FileDescriptor ours(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    const sockaddr_in address{.sin_family = AF_INET,
+                              .sin_port = htons(static_cast<std::uint16_t>(port_)),
+                              .sin_addr = {htonl(INADDR_LOOPBACK)},
+                              .sin_zero = {}};
+    EXPECT_EQ(::connect(ours.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    return ours;
+  }
+  static void send(const FileDescriptor& client, ssize_t bytes) {
+    const std::string text(static_cast<std::size_t>(bytes), 'x');
+    EXPECT_EQ(::send(client.get(), text.data(), text.size(), MSG_NOSIGNAL), bytes);
+  }
+  /// Ends both directions at once.
+  static void vanish(FileDescriptor client) {
+    const linger at_once{.l_onoff = 1, .l_linger = 0};
+    setsockopt(client.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+  }
+  [[nodiscard]] int taken() {
+    const std::lock_guard lock(mutex_);
+    return static_cast<int>(taken_.size());
+  }
+  /// What gRPC finds to read on one of them, bytes; that of one which was cut off is gone.
+  [[nodiscard]] ssize_t left_on(std::size_t which) {
+    const std::lock_guard lock(mutex_);
+    std::string all(200'000, ' ');
+    return ::recv(taken_.at(which).get(), all.data(), all.size(), MSG_PEEK | MSG_DONTWAIT);
+  }
+
+  int port_ = 0;
+  std::mutex mutex_;
+  std::vector<FileDescriptor> taken_;  ///< under mutex_
+  AcceptLoop loop_;
+};
+
+TEST_F(Acceptance, WhoEndsItsSendingKeepsItsPlaceForAsLongAsGrpcHasIt) {
+  serve({.connections = 1});
+  const auto first = client();
+  send(first, hello);
+  ::shutdown(first.get(), SHUT_WR);
+  ASSERT_TRUE(eventually([this] { return taken() == 1; }));
+  char byte = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto other = client();
+    EXPECT_LE(::recv(other.get(), &byte, 1, 0), 0);
+  }
+  ASSERT_EQ(taken(), 1);
+  EXPECT_EQ(left_on(0), hello) << "a Stop just before the end is read";
+  {
+    const std::lock_guard lock(mutex_);
+    ::shutdown(taken_.front().get(), SHUT_RDWR);  // as gRPC does
+  }
+  EXPECT_TRUE(eventually([this] {
+    const auto other = client();
+    return taken() == 2;
+  }));
+}
+
+TEST_F(Acceptance, WhatWhoIsGoneHasLeftIsReadUnlessItIsTooMuch) {
+  serve();
+  constexpr ssize_t little = 4096;
+  constexpr ssize_t much =
+      (StreamBudget::Limits{}.of_one + 1) * static_cast<ssize_t>(StreamBudget::least_bytes);
+  auto small = client();
+  ASSERT_TRUE(eventually([this] { return taken() == 1; }));
+  auto large = client();
+  ASSERT_TRUE(eventually([this] { return taken() == 2; }));
+  send(small, little);
+  send(large, much);
+  ASSERT_TRUE(eventually([&] { return left_on(1) == much; }));
+  vanish(std::move(small));
+  vanish(std::move(large));
+  EXPECT_TRUE(eventually([this] { return left_on(1) <= 0; }));
+  EXPECT_EQ(left_on(0), little);
+}
+
+}  // namespace
+}  // namespace axisd::testing
