@@ -74,6 +74,8 @@ std::map<std::string, StreamCount> StreamCounts::of(const std::vector<std::strin
     if (known == sockets_.end()) continue;
     if (const auto count = streams_in(answer(grpc_channelz_get_socket(known->second))))
       counts.emplace(peer, *count);
+    else
+      sockets_.erase(known);  // it is gone; another one may have come from there
   }
   return counts;
 }

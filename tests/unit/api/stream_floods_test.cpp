@@ -37,8 +37,14 @@ std::string kept(const std::string& name, const std::string& value) {
 /// A client that says its hello, acknowledges nothing, and opens streams of 15 bytes without their message.
 class Leaver {
  public:
-  Leaver(const sockaddr* address, socklen_t size)
+  /// `own`: the address that it comes from; nullptr: any.
+  Leaver(const sockaddr* address, socklen_t size, const sockaddr* own = nullptr)
       : socket_(::socket(address->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    const int on = 1;
+    if (own != nullptr) {
+      setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+      EXPECT_EQ(::bind(socket_.get(), own, size), 0);
+    }
     EXPECT_EQ(::connect(socket_.get(), address, size), 0);
     send("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(4, 0, 0, "") +
          frame(1, 4, 1,
@@ -58,6 +64,12 @@ class Leaver {
     bool said_nothing = true;
     while (::recv(socket_.get(), bytes, sizeof bytes, 0) > 0) said_nothing = false;
     return said_nothing;
+  }
+  /// Ends it at once, so that another one may come from its port.
+  void vanish() {
+    const linger at_once{.l_onoff = 1, .l_linger = 0};
+    setsockopt(socket_.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    socket_ = {};
   }
   /// By a reset: gRPC ends those, too, that do not answer its pings, but not so.
   [[nodiscard]] bool is_cut_off() {
@@ -112,9 +124,9 @@ class StreamFloods : public ::testing::TestWithParam<int> {
     }
   }
 
-  Leaver& leaver() {
+  Leaver& leaver(const sockaddr* own = nullptr) {
     return leavers_.emplace_back(reinterpret_cast<const sockaddr*>(&address_),
-                                 GetParam() == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6));
+                                 GetParam() == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6), own);
   }
   [[nodiscard]] auto cut_off() { return std::ranges::count_if(leavers_, &Leaver::is_cut_off); }
   /// How gRPC names a client.
@@ -150,6 +162,21 @@ TEST_P(StreamFloods, GrpcIsAskedHowManyAreOpen) {
   EXPECT_TRUE(eventually([&] { return open(0) == -1; })) << "it is gone";
   other.open(1);
   EXPECT_TRUE(eventually([&] { return open(1) == 2; }));
+}
+
+TEST_P(StreamFloods, ANewConnectionFromAPortThatWasKnownIsCountedAnew) {
+  serve();
+  StreamCounts counts;
+  const std::vector peers{name_of(leaver())};
+  const auto own = leavers_.back().own_address();
+  const auto open = [&] {
+    const auto all = counts.of(peers);
+    return all.empty() ? -1 : all.begin()->second.open();
+  };
+  EXPECT_TRUE(eventually([&] { return open() == 1; }));
+  leavers_.back().vanish();
+  leaver(reinterpret_cast<const sockaddr*>(&own)).open(2);
+  EXPECT_TRUE(eventually([&] { return open() == 3; }));
 }
 
 /// Each is gone before anybody looks, and gRPC reads all that it leaves.
