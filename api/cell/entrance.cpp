@@ -12,6 +12,19 @@
 
 namespace axisd::cell {
 
+namespace {
+
+/// Calls that are passed on are not known as such here: there is room for all that are permitted, beside what
+/// a machine has room for.
+transport::StreamBudget::Limits streams_beside(const Settings& settings) {
+  transport::StreamBudget::Limits limits;
+  limits.lasting += settings.calls;
+  limits.idle += settings.calls;
+  return limits;
+}
+
+}  // namespace
+
 Entrance::Entrance(Cell& cell, RouteTable& routes, OpenCalls& calls, const Settings& settings,
                    std::shared_ptr<const tls::Live> live)
     : settings_(settings),
@@ -48,9 +61,7 @@ Result<int> Entrance::open() {
                          acceptor_->HandleNewConnection(&parameters);
                        }});
   }
-  // Those that are passed on are no others here: there is room for all of them, and as many more.
-  const transport::StreamBudget::Limits streams{.lasting = 6144, .idle = 12'288};
-  if (auto accepting = accept_.start(std::move(entries), {}, streams, {}); !accepting)
+  if (auto accepting = accept_.start(std::move(entries), {}, streams_beside(settings_), {}); !accepting)
     return fail(std::move(accepting).error());
   return port;
 }
