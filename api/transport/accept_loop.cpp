@@ -31,6 +31,8 @@ constexpr int kept_descriptors = 64;
 constexpr Duration count_usually = std::chrono::milliseconds(10), count_soon = std::chrono::milliseconds(5);
 /// What has come and was not read yet cannot be taken back from gRPC. It is half of the longest message.
 constexpr int receive_buffer = 128 * 1024;
+/// With TLS and all that gRPC sends around it.
+constexpr int most_of_a_stop = 4096;
 constexpr Duration memory_every = heartbeat;
 /// Of connections that have left: they took more than is worth giving back.
 constexpr std::int64_t many_streams = 1024;
@@ -130,8 +132,10 @@ void AcceptLoop::run() {
 
 void AcceptLoop::on_end(PeerBudgets::Id id) {
   const auto fd = connections_.at(id).fd;
-  for (const auto each : budgets_->count({{id, traffic_of(fd->get())}}, monotonic_now()))
-    cut_off(each, floods);
+  const auto beyond = budgets_->count({{id, traffic_of(fd->get())}}, monotonic_now());
+  // Who goes may have left a Stop, and the flood may be that of others at its address.
+  if (std::cmp_greater(unread_on(fd->get()), most_of_a_stop))
+    for (const auto each : beyond) cut_off(each, floods);
   if (!connections_.contains(id)) return;
   // gRPC reads what a peer has left that is gone. That is right for a Stop, and too much where it may be more
   // streams than one may have.

@@ -111,5 +111,22 @@ TEST_F(Acceptance, WhatWhoIsGoneHasLeftIsReadUnlessItIsTooMuch) {
   EXPECT_EQ(left_on(0), little);
 }
 
+/// Others of its address have nearly used up what they all may send: a Stop just before the end is read.
+TEST_F(Acceptance, WhoLeavesLittlePaysForNobodyElse) {
+  constexpr ssize_t stop = 200;
+  constexpr double burst = 10'000;
+  serve({.rate = 1, .burst = burst});
+  const auto other = client();
+  ASSERT_TRUE(eventually([this] { return taken() == 1; }));
+  auto small = client();
+  ASSERT_TRUE(eventually([this] { return taken() == 2; }));
+  send(other, static_cast<ssize_t>(burst) - 100);
+  ASSERT_TRUE(eventually([this] { return left_on(0) == static_cast<ssize_t>(burst) - 100; }));
+  send(small, stop);
+  vanish(std::move(small));
+  EXPECT_TRUE(eventually([this] { return left_on(0) <= 0 || left_on(1) <= 0 || left_on(1) == stop; }));
+  EXPECT_EQ(left_on(1), stop);
+}
+
 }  // namespace
 }  // namespace axisd::testing
