@@ -21,9 +21,8 @@ bool is_ipv6(std::string_view text) {
 /// gRPC takes the rest of a number that is too large, and 443 where there is none.
 bool is_port(std::string_view text) {
   std::uint16_t port = 0;
-  const auto* const end = text.data() + text.size();
-  const auto [behind, error] = std::from_chars(text.data(), end, port);
-  return error == std::errc{} && behind == end && port != 0;
+  const auto [behind, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  return error == std::errc{} && behind == text.data() + text.size() && port != 0;
 }
 
 }  // namespace

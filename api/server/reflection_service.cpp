@@ -109,7 +109,7 @@ class ReflectionStream final : public grpc::ServerBidiReactor<ReflectionMessage,
 
  private:
   template <class Job>
-  void post(Job job) {
+  void post(const Job& job) {
     services_.reply->post([stream = shared_from_this(), job] { job(*stream); });
   }
   void write() {

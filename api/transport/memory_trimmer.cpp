@@ -43,16 +43,17 @@ void MemoryTrimmer::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void MemoryTrimmer::run() {
+bool MemoryTrimmer::wait() {
   std::unique_lock lock(mutex_);
-  while (true) {
-    changed_.wait(lock, [this] { return wanted_ || stopping_; });
-    if (stopping_) return;
-    wanted_ = false;
-    lock.unlock();
+  changed_.wait(lock, [this] { return wanted_ || stopping_; });
+  wanted_ = false;
+  return !stopping_;
+}
+
+void MemoryTrimmer::run() {
+  while (wait()) {
     malloc_trim(0);
     left_ = resident_memory();
-    lock.lock();
   }
 }
 

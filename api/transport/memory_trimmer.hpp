@@ -33,6 +33,8 @@ class MemoryTrimmer {
   [[nodiscard]] std::size_t take_left() { return left_.exchange(0, std::memory_order_relaxed); }
 
  private:
+  /// Until it is wanted. False: it is to stop.
+  bool wait();
   void run();
 
   std::mutex mutex_;
