@@ -20,6 +20,7 @@ test('several machines on a panel: everything is in reach', async () => {
 test('several machines: a list of them, and of each its own page; STOP ALL of the list is for all of them', async () => {
   const opened = await open(browser);
   const { page, gateway, url } = opened;
+  await page.locator('tr[data-axis="feeder"]').waitFor();
   gateway.machines = [{ name: 'press-1', trouble: '' }, { name: 'press-2', trouble: 'axisd does not answer at press-2:7443' }];
   await page.goto(`${url}/?lang=en&panel=0`);
   await page.locator('tr[data-machine="press-1"]', { hasText: '6 axes · 1 in error stop · 1 offline' }).waitFor();
