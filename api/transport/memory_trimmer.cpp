@@ -1,23 +1,16 @@
 #include "api/transport/memory_trimmer.hpp"
 
-#include <fcntl.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstdio>
-
-#include "buses/file_descriptor.hpp"
+#include <fstream>
 
 namespace axisd::transport {
 
 std::size_t resident_memory() {
-  const FileDescriptor file(open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
-  std::array<char, 128> text{};
-  if (file.get() < 0 || ::read(file.get(), text.data(), text.size() - 1) <= 0) return 0;
-  unsigned long size = 0, pages = 0;
-  if (std::sscanf(text.data(), "%lu %lu", &size, &pages) != 2) return 0;
+  std::size_t size = 0, pages = 0;
+  if (!(std::ifstream("/proc/self/statm") >> size >> pages)) return 0;
   return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
