@@ -225,7 +225,9 @@ test('a click that a busy page hears too late starts nothing, and the page says 
   await page.locator('.controls .move input').first().fill('150');
   const move = page.locator('[data-act="move"]:not([aria-disabled="true"])');
   const box = (await move.boundingBox())!;
-  const hang = page.evaluate(() => { const end = performance.now() + 1000; while (performance.now() < end); });
+  const hangs = page.waitForEvent('console', (message) => message.text() === 'hangs');
+  const hang = page.evaluate(() => { console.log('hangs'); const end = performance.now() + 1000; while (performance.now() < end); });
+  await hangs;
   // Without waiting for what the page says to each part of it.
   const cdp = await opened.context.newCDPSession(page);
   const at = { x: box.x + box.width / 2, y: box.y + box.height / 2, button: 'left', clickCount: 1 } as const;
