@@ -23,6 +23,7 @@ struct DriveOption {
 Result<DriveOption> parse_drive(std::string_view text);
 
 /// Units of velocities: counts of the position, then each angle in 10^0 to 10^-3.
+/// Not the table of the driver: what a name means is read here and there independently.
 inline constexpr std::string_view velocity_unit_names[] = {"pulses_per_second",
                                                            "rpm",
                                                            "0.1rpm",
