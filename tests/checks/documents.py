@@ -1,6 +1,6 @@
 """What the documents promise: each rule of motion that is cited has a heading in docs/rules.md, each rule there has a
 test that cites it, and each path that a document cites is in the tree. In rules and glossary, so is each name beside
-a path."""
+a path. README.md stays short."""
 
 import fnmatch
 import re
@@ -11,6 +11,8 @@ import tree
 
 RULES = "docs/rules.md"
 GLOSSARY = "docs/glossary.md"
+README = "README.md"
+README_LINES = 150
 HEADING = re.compile(r"^## M(\d{1,2}) \S", re.MULTILINE)
 # "M14", "M06" and "M22Group" are citations; "M90.0 292.2" is a path of a picture.
 CITATION = re.compile(r"(?<![\w'\"/.+-])M0?([1-9]\d?)(?![\da-z])(?!\.\d)")
@@ -32,7 +34,7 @@ def line_of(text, position):
 
 def is_document(path):
     name = path.as_posix()
-    return name in ("README.md", "CONTRIBUTING.md") or (name.startswith("docs/") and path.suffix == ".md")
+    return name in (README, "CONTRIBUTING.md") or (name.startswith("docs/") and path.suffix == ".md")
 
 
 class Tree:
@@ -134,6 +136,9 @@ def findings(root):
         if path.suffix in CITING and path.as_posix() not in THIS_CHECK:
             texts[path.as_posix()] = tree.text(root, path) or ""
     found = list(rule_findings(texts))
+    lines = texts.get(README, "").count("\n")
+    if lines > README_LINES:
+        found.append(f"{README}:{README_LINES + 1}: {lines} lines, at most {README_LINES}: move something to docs/")
     for name, text in texts.items():
         if is_document(Path(name)):
             found += path_findings(name, text, known)

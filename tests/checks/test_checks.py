@@ -105,6 +105,7 @@ BAD_DOCUMENTS = {  # path -> (text, what the finding says)
     "docs/e.md": ("See `devices/MODEL/gone.cpp`.", "there is no devices/MODEL/gone.cpp"),
     "docs/f.md": ("See `devices/*.cpp` first.", "there is no devices/*.cpp"),
     "docs/g.md": ("See [the rules](../rules.md).", "there is no ../rules.md"),
+    "README.md": ("One more line.\n" * 151, "at most 150"),
 }
 
 BAD_RULES = {  # docs/rules.md -> what the finding says
