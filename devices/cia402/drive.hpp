@@ -25,7 +25,7 @@
 #include "devices/cia402/objects.hpp"
 #include "devices/cia402/seen_objects.hpp"
 #include "devices/cia402/start_pdo.hpp"
-#include "devices/cia402/state_pdos.hpp"
+#include "devices/cia402/state_link.hpp"
 #include "devices/cia402/status_word.hpp"
 #include "devices/cia402/stops_sent.hpp"
 #include "devices/cia402/unit_objects.hpp"
@@ -145,8 +145,8 @@ class Cia402Drive final : public Drive {
   Task<> set_start_pdo();
   /// configure_pdo(), asked for and counted as far as the drive saves it.
   Task<canopen::PdoOutcome> set_pdo(canopen::PdoSettings wanted);
-  void listen(const std::vector<canopen::PdoOutcome>& outcomes);
-  void unsubscribe();
+  /// Nothing of them was configured in this power cycle.
+  void forget_pdos();
   /// Nothing waits for a SYNC in this drive (M24).
   Task<Result<void>> settle(SdoOptions options);
   Task<Result<void>> disarm(SdoOptions options);
@@ -162,7 +162,6 @@ class Cia402Drive final : public Drive {
   void on_emergency(const canopen::Emergency& emergency);
   [[nodiscard]] std::uint16_t alarm_by_emergency() const;
   void on_foreign_command(const std::string& what);
-  void on_pdo(std::size_t index, const can::ReceivedFrame& received);
   [[nodiscard]] bool pdos_usable() const;
   [[nodiscard]] bool alive(TimePoint now) const;
   [[nodiscard]] Duration pdo_patience(TimePoint now) const;
@@ -319,12 +318,8 @@ class Cia402Drive final : public Drive {
   Signal news_;  ///< PDOs completed a reading, or something happened to the node
   std::function<void()> attention_;
   NodeContact contact_;
-  StatePdos pdos_;
-  std::vector<std::uint32_t> subscribed_;
-  std::shared_ptr<void> sync_;
-  int missed_pdos_ = 0;                         ///< readings in a row for which none came in time
+  StateLink state_link_;
   std::optional<std::uint32_t> command_pdo_{};  ///< takes the control word at once
-  std::string link_note_;
   ForeignMaster foreign_;
 
   // Starts in common with others.

@@ -40,12 +40,11 @@ Error Cia402Drive::lost_memory() const {
 void Cia402Drive::forget_power_cycle() {
   canary_.forget();
   words_.forget();
-  unsubscribe();  // its PDOs are what a power-up left of them
+  forget_pdos();  // they are what a power-up left of them
   words_.forget_halt();
   seen_.forget_power_cycle();
   homing_.forget();
   motion_.forget();
-  pdos_.forget();
 }
 
 Task<Result<std::int64_t>> Cia402Drive::read_object(Object object, SdoOptions options) {

@@ -69,6 +69,7 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
       setup_(std::move(context.setup)),
       active_low_(active_low(model, setup_)),
       news_(context.executor, *context.clock),
+      state_link_(*bus_, news_),
       words_(model.neutral_mode),
       canary_(default_block(model)) {
   auto required = required_objects(model, setup_);
@@ -83,10 +84,7 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
   if (!attached) setup_error_ = attached.error();
 }
 
-Cia402Drive::~Cia402Drive() {
-  unsubscribe();
-  bus_->detach(node_.id());
-}
+Cia402Drive::~Cia402Drive() { bus_->detach(node_.id()); }
 
 Task<Result<DriveIdentity>> Cia402Drive::identify(TransactionClass transaction_class) {
   contact_.begin();
@@ -285,20 +283,17 @@ Task<Result<void>> Cia402Drive::set_heartbeat() {
   co_return Result<void>{};
 }
 
-void Cia402Drive::unsubscribe() {
-  for (const auto id : subscribed_) (void)bus_->master().subscribe_pdo(id, {});
-  subscribed_.clear();
-  sync_.reset();
+void Cia402Drive::forget_pdos() {
+  state_link_.close();
   command_pdo_.reset();
   start_pdo_.forget();
 }
 
 Task<Result<void>> Cia402Drive::set_pdos() {
-  unsubscribe();
-  pdos_.begin(*model_, {}, false);
+  forget_pdos();
   const auto why = co_await set_state_pdos();
   if (!why) co_return fail(why.error());
-  link_note_ = why->empty() ? std::string() : "state by SDO polling: " + *why;
+  why->empty() ? state_link_.way().expect() : state_link_.way().refuse(*why);
   // Stops go out by this one at once (M12). The drive may have it so by default (chapter 7, 1600h).
   const auto command = co_await set_pdo({.direction = PdoDirection::receive,
                                          .number = command_number,
@@ -353,7 +348,7 @@ Task<Result<std::string>> Cia402Drive::set_state_pdos() {
   const auto bitrate = bus_->settings().bitrate;
   constexpr auto inhibit_unit = std::chrono::microseconds(100);  // 6.1.2 gives none; CiA 301 does
   auto layout = state_layout(*model_);
-  std::vector<canopen::PdoOutcome> outcomes;
+  std::vector<std::uint32_t> ids;
   for (std::size_t i = 0; i < layout.size(); ++i) {
     canopen::PdoSettings wanted{
         .direction = PdoDirection::transmit,
@@ -372,28 +367,10 @@ Task<Result<std::string>> Cia402Drive::set_state_pdos() {
                       outcome.error->reason != Reason::eeprom_budget;
     if (gone) co_return failed(*outcome.error);
     if (auto why = objection(outcome, wanted); !why.empty()) co_return why;
-    outcomes.push_back(std::move(outcome));
+    ids.push_back(outcome.state.cob_id());
   }
-  pdos_.begin(*model_, std::move(layout), synchronous);
-  listen(outcomes);
-  co_return subscribed_.size() == outcomes.size()
-      ? std::string()
-      : std::string("a TPDO has the identifier of another node's");
-}
-
-void Cia402Drive::listen(const std::vector<canopen::PdoOutcome>& outcomes) {
-  missed_pdos_ = 0;
-  for (std::size_t i = 0; i < outcomes.size(); ++i) {
-    const auto id = outcomes[i].state.cob_id();
-    const auto taken = bus_->master().subscribe_pdo(
-        id, [this, i](const can::ReceivedFrame& received) { on_pdo(i, received); });
-    if (!taken) {
-      pdos_.begin(*model_, {}, false);
-      return unsubscribe();
-    }
-    subscribed_.push_back(id);
-  }
-  if (pdos_.synchronous()) sync_ = bus_->on_sync([this](TimePoint at) { pdos_.on_sync(at); });
+  if (state_link_.listen(*model_, std::move(layout), ids, synchronous)) co_return std::string();
+  co_return std::string("a TPDO has the identifier of another node's");
 }
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context) {

@@ -16,7 +16,6 @@ using std::chrono::milliseconds;
 constexpr auto longest_pdo_wait = milliseconds(60);
 /// Of a node that is alive.
 constexpr auto longest_pdo_wait_alive = milliseconds(100);
-constexpr int missed_in_a_row = 3;
 /// A reading by SDO takes some eight of them: longer than a PDO is waited for.
 constexpr auto slow_answer = milliseconds(10);
 
@@ -61,8 +60,9 @@ void Cia402Drive::on_foreign_command(const std::string& what) {
 }
 
 std::string Cia402Drive::link_note() const {
-  if (!foreign_.concerns(clock_->now())) return link_note_;
-  return link_note_.empty() ? foreign_.text() : foreign_.text() + std::string(between_notes) + link_note_;
+  const auto& of_state = state_link_.way().note();
+  if (!foreign_.concerns(clock_->now())) return of_state;
+  return of_state.empty() ? foreign_.text() : foreign_.text() + std::string(between_notes) + of_state;
 }
 
 /// Of a fault that 603Fh does not name, or of a drive without 603Fh.
@@ -72,16 +72,8 @@ std::uint16_t Cia402Drive::alarm_by_emergency() const {
   return code != 0 ? code : alarm_without_code;
 }
 
-void Cia402Drive::on_pdo(std::size_t index, const can::ReceivedFrame& received) {
-  const auto bits = can::worst_case_bits(received.frame);
-  const auto on_wire = std::chrono::nanoseconds(std::chrono::seconds(1)) * bits /
-                       std::max<std::uint32_t>(bus_->settings().bitrate, 1);
-  if (pdos_.on_pdo(index, received.frame.bytes(), received.at - on_wire, received.at)) news_.notify_all();
-}
-
 bool Cia402Drive::pdos_usable() const {
-  if (subscribed_.empty() || contact_.heartbeat_lost() || contact_.rebooted()) return false;
-  return !pdos_.synchronous() || bus_->sync_running();
+  return state_link_.can_come() && !contact_.heartbeat_lost() && !contact_.rebooted();
 }
 
 /// Its heartbeat came lately: two of them are due in that time.
@@ -98,10 +90,11 @@ bool Cia402Drive::alive(TimePoint now) const {
 Duration Cia402Drive::pdo_patience(TimePoint now) const {
   constexpr auto reply = milliseconds(10);
   constexpr int cycles_alive = 6;
-  if (!pdos_.synchronous()) return longest_pdo_wait;
+  const auto& pdos = state_link_.pdos();
+  if (!pdos.synchronous()) return longest_pdo_wait;
   const auto period = bus_->settings().sync_period;
-  const auto wanted = pdos_.late() ? std::max<Duration>(3 * period + reply, longest_pdo_wait)
-                                   : std::min<Duration>(2 * period + reply, longest_pdo_wait);
+  const auto wanted = pdos.late() ? std::max<Duration>(3 * period + reply, longest_pdo_wait)
+                                  : std::min<Duration>(2 * period + reply, longest_pdo_wait);
   const bool stopping = words_.halt() == KnownWords::Halt::braking;
   if (!alive(now) || stopping) return wanted;
   return std::max(wanted, std::min<Duration>(cycles_alive * period + reply, longest_pdo_wait_alive));
@@ -111,17 +104,17 @@ Duration Cia402Drive::pdo_patience(TimePoint now) const {
 Task<std::optional<Reading>> Cia402Drive::next_pdos() {
   const auto since = clock_->now();
   // A drive that does not send them costs one short wait now and then, and not with every reading.
-  const bool hopeless = missed_pdos_ >= missed_in_a_row && !pdos_.since(since - std::chrono::seconds(1));
+  const bool hopeless =
+      state_link_.way().fails() && !state_link_.pdos().since(since - std::chrono::seconds(1));
   if (!pdos_usable() || hopeless) co_return std::nullopt;
   const auto until = since + pdo_patience(since);
   for (bool in_time = true; in_time && pdos_usable(); in_time = co_await news_.wait_until(until)) {
-    if (auto reading = pdos_.since(since)) {
-      missed_pdos_ = 0;
-      link_note_.clear();
+    if (auto reading = state_link_.pdos().since(since)) {
+      state_link_.way().came();
       co_return reading;
     }
   }
-  if (pdos_usable()) ++missed_pdos_;
+  if (pdos_usable()) state_link_.way().miss();
   co_return std::nullopt;
 }
 
@@ -146,8 +139,7 @@ Task<Result<DriveSample>> Cia402Drive::look(bool by_pdo, SdoOptions options) {
   const auto polled = co_await poll_objects(options);
   if (!polled) co_return fail(polled.error());
   if (contact_.rebooted()) co_return fail(lost_memory());
-  if (missed_pdos_ >= missed_in_a_row && link_note_.empty())
-    link_note_ = "state by SDO polling: its TPDOs do not come";
+  state_link_.way().polled();
   co_return judge(*polled, false);
 }
 

@@ -13,14 +13,6 @@ void StatePdos::begin(const Model& model, std::vector<canopen::PdoMapping> layou
   parts_.resize(layout_.size());
 }
 
-void StatePdos::forget() {
-  for (auto& part : parts_) part.there = false;
-  sync_.reset();
-  previous_sync_.reset();
-  newest_.reset();
-  late_ = false;
-}
-
 bool StatePdos::complete() const {
   return !parts_.empty() && std::ranges::all_of(parts_, [](const Part& part) { return part.there; });
 }

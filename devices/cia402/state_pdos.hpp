@@ -29,8 +29,6 @@ class StatePdos {
  public:
   /// Signs are those of `model`'s dictionary, which outlives this.
   void begin(const Model& model, std::vector<canopen::PdoMapping> layout, bool synchronous);
-  /// Nothing that came counts any more.
-  void forget();
   void on_sync(TimePoint at);
   /// `begin`: of its frame on the wire, `end` likewise. PDOs that are too short are ignored. True: there is a
   /// new reading.
