@@ -324,7 +324,6 @@ class Cia402Drive final : public Drive {
 
   // Starts in common with others.
   StartPdo start_pdo_;
-  std::shared_ptr<AxisGate> start_gate_ = std::make_shared<AxisGate>();  ///< of what is prepared, or proven
 
   // What it is known to hold.
   KnownWords words_;
@@ -334,7 +333,6 @@ class Cia402Drive final : public Drive {
   // What the drive does.
   MotionWatch motion_;
   HomingRun homing_;
-  std::shared_ptr<AxisGate> leave_gate_ = std::make_shared<AxisGate>();
 };
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);

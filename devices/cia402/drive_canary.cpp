@@ -117,7 +117,7 @@ Task<Result<void>> Cia402Drive::write_canary(MotionBlock block, SdoOptions optio
 
 Task<Result<void>> Cia402Drive::check_continuity(TransactionClass transaction_class) {
   const SdoOptions options{.transaction_class = transaction_class};
-  const MotionGuard unbegun{.gate = start_gate_, .epoch = start_gate_->epoch()};
+  const auto unbegun = start_pdo_.guard();
   if (const auto canary = co_await read_canary(options); !canary) co_return fail(canary.error());
   // The link, or the node's state, may have been lost in between.
   if (const auto settled = co_await settle(options); !settled) co_return settled;

@@ -26,8 +26,12 @@ canopen::SdoOptions urgent() { return {.transaction_class = TransactionClass::mo
 /// One drive's move, until it is started or superseded.
 class Cia402Drive::Prepared final : public PreparedMove {
  public:
-  Prepared(Cia402Drive& drive, MotionGuard guard, std::uint64_t epoch)
-      : drive_(&drive), block_(drive.canary_.blocks().front()), guard_(std::move(guard)), epoch_(epoch) {}
+  /// `own`: StartPdo::guard(), from before the first of it was asked for.
+  Prepared(Cia402Drive& drive, MotionGuard guard, MotionGuard own)
+      : drive_(&drive),
+        block_(drive.canary_.blocks().front()),
+        guard_(std::move(guard)),
+        own_(std::move(own)) {}
 
   Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, TimePoint not_after) override {
     auto members = members_of(others);
@@ -71,8 +75,6 @@ class Cia402Drive::Prepared final : public PreparedMove {
     return canopen::for_each_at_once(drive_->executor_, *drive_->clock_, all.moves.size(), std::move(what));
   }
 
-  [[nodiscard]] MotionGuard own() const { return {.gate = drive_->start_gate_, .epoch = epoch_}; }
-
   /// The last look before the trigger; what it found counts for reboot_guard (M6).
   Task<> check(Members& all, std::size_t index) {
     auto& drive = *drive_;
@@ -82,7 +84,7 @@ class Cia402Drive::Prepared final : public PreparedMove {
     auto guard = guard_;
     if (canary)
       guard.not_after = std::min({guard.not_after, all.not_after, *canary + drive.setup_.reboot_guard});
-    const bool superseded = may_send(own(), drive.clock_->now()) != Verdict::send;
+    const bool superseded = may_send(own_, drive.clock_->now()) != Verdict::send;
     if (superseded || !canary) {
       if (!all.refusal)
         all.refusal = canary
@@ -94,7 +96,7 @@ class Cia402Drive::Prepared final : public PreparedMove {
     all.parts[index] = {.node = drive.node_.id(),
                         .cob_id = *drive.start_pdo_.id(),
                         .arm = canopen::number_bytes(control::start_word, word_bytes),
-                        .guards = {guard, own()},
+                        .guards = {guard, own_},
                         .neutral = [&drive] { return drive.neutral_bytes(); },
                         .confirm = [&drive] { return drive.confirm_started(); }};
   }
@@ -126,8 +128,7 @@ class Cia402Drive::Prepared final : public PreparedMove {
 
   Cia402Drive* drive_;
   MotionBlock block_;
-  MotionGuard guard_;
-  std::uint64_t epoch_;
+  MotionGuard guard_, own_;
   std::uint64_t stops_ = 0;
 };
 
@@ -137,7 +138,7 @@ Task<Result<std::unique_ptr<PreparedMove>>> Cia402Drive::prepare_move(MoveProfil
   if (start_pdo_.state() != StartPdo::State::proven)
     co_return fail(error_at(Reason::not_supported, object::control_word,
                             "no start by SYNC: " + start_pdo_.note(), "start it by itself"));
-  const auto epoch = start_gate_->epoch();
+  auto own = start_pdo_.guard();
   const auto block = encode(*model_, setup_.pulses_per_revolution, profile);
   SdoOptions options = urgent();
   options.guard = guard;
@@ -147,7 +148,7 @@ Task<Result<std::unique_ptr<PreparedMove>>> Cia402Drive::prepare_move(MoveProfil
     if (error.outcome == Outcome::unknown) error.outcome = Outcome::not_executed;  // only parameters
     co_return fail(std::move(error));
   }
-  co_return std::make_unique<Prepared>(*this, std::move(guard), epoch);
+  co_return std::make_unique<Prepared>(*this, std::move(guard), std::move(own));
 }
 
 /// All that prepare_move() left stands there still, and the motor at rest.
@@ -197,8 +198,8 @@ canopen::Bytes Cia402Drive::neutral_bytes() const {
 }
 
 void Cia402Drive::give_up_common_start() {
-  start_gate_->raise();
-  bus_->purge_superseded(node_.id(), *start_gate_);
+  start_pdo_.give_up();
+  bus_->purge_superseded(node_.id(), start_pdo_.gate());
 }
 
 Task<> Cia402Drive::follow_waiting(std::uint16_t word) {

@@ -14,11 +14,12 @@ constexpr int attempts = 3;
 
 class Cia402Drive::Loaded final : public LoadedMove {
  public:
-  Loaded(Cia402Drive& drive, MotionGuard guard, std::uint64_t epoch, TimePoint read_at)
+  /// `own`: StartPdo::guard(), from before the first of it was asked for.
+  Loaded(Cia402Drive& drive, MotionGuard guard, MotionGuard own, TimePoint read_at)
       : drive_(&drive),
         block_(drive.canary_.blocks().front()),
         guard_(std::move(guard)),
-        epoch_(epoch),
+        own_(std::move(own)),
         read_at_(read_at) {}
 
   Task<Result<void>> verify() override {
@@ -30,8 +31,7 @@ class Cia402Drive::Loaded final : public LoadedMove {
         if (error.outcome == Outcome::unknown) error.outcome = Outcome::not_executed;  // only read
         co_return fail(std::move(error));
       }
-      const MotionGuard own{.gate = drive_->start_gate_, .epoch = epoch_};
-      if (may_send(own, drive_->clock_->now()) != Verdict::send)
+      if (may_send(own_, drive_->clock_->now()) != Verdict::send)
         co_return fail(drive_->error_at(Reason::superseded, object::control_word,
                                         "the drive was told something else meanwhile", "repeat the move"));
       read_at_ = *canary;
@@ -67,8 +67,7 @@ class Cia402Drive::Loaded final : public LoadedMove {
 
   Cia402Drive* drive_;
   MotionBlock block_;
-  MotionGuard guard_;
-  std::uint64_t epoch_;
+  MotionGuard guard_, own_;
   TimePoint read_at_;  ///< its canary
 };
 
@@ -79,9 +78,9 @@ Task<Result<std::unique_ptr<LoadedMove>>> Cia402Drive::load_move(MoveProfile pro
   Result<TimePoint> ready;
   for (int attempt = 0; attempt < attempts; ++attempt) {
     give_up_leaving();
-    const auto epoch = start_gate_->epoch();
+    auto own = start_pdo_.guard();
     ready = co_await prepare_start(block, OperationMode::profile_position, std::nullopt, options);
-    if (ready) co_return std::make_unique<Loaded>(*this, std::move(guard), epoch, *ready);
+    if (ready) co_return std::make_unique<Loaded>(*this, std::move(guard), std::move(own), *ready);
     if (ready.error().reason != Reason::no_reply) break;
   }
   auto error = ready.error();

@@ -208,16 +208,14 @@ DriveSample Cia402Drive::judge(const Reading& reading, bool of_one_moment) {
 /// Whatever else is begun, or stopped, ends this: nothing of it goes out after that.
 void Cia402Drive::give_up_leaving() {
   give_up_common_start();
-  leave_gate_->raise();
-  bus_->purge_superseded(node_.id(), *leave_gate_);
-  homing_.left();
+  homing_.give_up();
+  bus_->purge_superseded(node_.id(), homing_.gate());
 }
 
 /// Back to position mode, where bit 13 is the power stage alone, and bit 4 to 0; with the halt, which any
 /// start ends. What fails here is done by the next start.
 Task<> Cia402Drive::leave_homing(SdoOptions options) {
-  homing_.left();
-  options.guard = {.gate = leave_gate_, .epoch = leave_gate_->epoch()};
+  options.guard = homing_.go_back();
   const auto held = co_await held_control(options);
   if (!held) co_return;
   const auto word = static_cast<std::uint16_t>((*held & control::state_bits) | control::halt);

@@ -149,11 +149,10 @@ std::optional<Duration> Cia402Drive::quick_stop_time(int rpm) const {
 
 Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   stops_.begin_stop();
-  leave_gate_->raise();
-  bus_->purge_superseded(node_.id(), *leave_gate_);
-  give_up_common_start();
   motion_.stop(stops_.triggers() || homing_.active());
   homing_.stop(words_.homes());
+  bus_->purge_superseded(node_.id(), homing_.gate());
+  give_up_common_start();
   const auto sent = co_await send_stop(kind == StopKind::quick_stop);
   stops_.end_stop(clock_->now());
   co_return sent;

@@ -17,8 +17,19 @@ bool HomingRun::take(const DriveSample& sample, HomingWatch::Signs signs) {
 }
 
 void HomingRun::stop(bool found) {
+  gate_->raise();
   leaving_ = leaving_ || watch_.active() || found;
   watch_.end();
+}
+
+MotionGuard HomingRun::go_back() {
+  leaving_ = false;
+  return {.gate = gate_, .epoch = gate_->epoch()};
+}
+
+void HomingRun::give_up() {
+  gate_->raise();
+  leaving_ = false;
 }
 
 void HomingRun::forget() {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
+#include "buses/gate.hpp"
 #include "devices/cia402/homing_watch.hpp"
 
 namespace axisd::cia402 {
@@ -14,7 +16,8 @@ namespace axisd::cia402 {
 ///   homing  -- take(), it has ended -----------------------------------> leaving
 ///   homing  -- stop() -------------------------------------------------> leaving
 ///   idle    -- stop(), a homing of somebody else was under way --------> leaving
-///   leaving -- left(): position mode is reached, or a start takes over -> idle
+///   leaving -- go_back(); left(): position mode is reached ------------> idle
+///   leaving -- give_up(): something else is begun ---------------------> idle
 ///   any     -- forget() -----------------------------------------------> idle
 ///
 /// Leaving: the drive is to go back to position mode, where bit 13 is the power stage alone.
@@ -34,6 +37,13 @@ class HomingRun {
   /// `found`: the drive homes, and nobody here has begun it.
   void stop(bool found);
   void left() { leaving_ = false; }
+  /// The way back to position mode is begun. What is sent for it has this guard, which give_up() and stop()
+  /// make old.
+  [[nodiscard]] MotionGuard go_back();
+  /// Nothing of the way back is sent any more.
+  void give_up();
+  /// Of that guard.
+  [[nodiscard]] const AxisGate& gate() const { return *gate_; }
   /// The drive was switched off and on.
   void forget();
 
@@ -48,6 +58,7 @@ class HomingRun {
   HomingWatch watch_;
   HomingWatch::Start next_;
   bool leaving_ = false;
+  std::shared_ptr<AxisGate> gate_ = std::make_shared<AxisGate>();
   std::optional<bool> ended_home_;  ///< nothing: as the drive says
 };
 

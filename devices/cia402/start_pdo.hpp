@@ -2,8 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+
+#include "buses/gate.hpp"
 
 namespace axisd::cia402 {
 
@@ -41,6 +44,13 @@ class StartPdo {
   /// Why the drive does not start by SYNC; empty: it does.
   [[nodiscard]] const std::string& note() const { return note_; }
 
+  /// Of a start that is prepared now, or shown: give_up() makes it old.
+  [[nodiscard]] MotionGuard guard() const { return {.gate = gate_, .epoch = gate_->epoch()}; }
+  /// Something else is begun, or may have happened to the drive.
+  void give_up() { gate_->raise(); }
+  /// Of those guards.
+  [[nodiscard]] const AxisGate& gate() const { return *gate_; }
+
   void begin(Work work) { work_ = work; }
   void end_work() { work_ = Work::none; }
   [[nodiscard]] Work work() const { return work_; }
@@ -50,6 +60,7 @@ class StartPdo {
   std::optional<std::uint32_t> id_;
   std::string note_ = "it is not configured yet";
   Work work_ = Work::none;
+  std::shared_ptr<AxisGate> gate_ = std::make_shared<AxisGate>();
 };
 
 }  // namespace axisd::cia402

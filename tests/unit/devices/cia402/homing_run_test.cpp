@@ -48,9 +48,40 @@ TEST(HomingRun, AtHomeTheDriveGoesBackToPositionMode) {
   EXPECT_FALSE(run.take(sample(20ms, 0, false, true), {}));
   EXPECT_EQ(run.state(), State::leaving);
   EXPECT_TRUE(run.is_homed(false, false));
+  const auto guard = run.go_back();
+  EXPECT_EQ(run.state(), State::idle);
+  EXPECT_EQ(may_send(guard, start), Verdict::send);
+  EXPECT_TRUE(run.is_homed(false, false));
+  run.left();
+  EXPECT_EQ(may_send(guard, start), Verdict::send) << "its end takes nothing back";
+}
+
+TEST(HomingRun, WhatElseIsBegunEndsTheWayBack) {
+  auto run = under_way();
+  EXPECT_FALSE(run.take(sample(20ms, 0, false, true), {}));
+  run.give_up();
+  EXPECT_EQ(run.state(), State::idle);
+  run.stop(true);
+  EXPECT_EQ(run.state(), State::leaving);
+  const auto guard = run.go_back();
+  run.give_up();
+  EXPECT_EQ(may_send(guard, start), Verdict::superseded);
+}
+
+TEST(HomingRun, NothingOfTheWayBackIsSentAfterAStop) {
+  auto run = under_way();
+  EXPECT_FALSE(run.take(sample(20ms, 0, false, true), {}));
+  const auto guard = run.go_back();
+  run.stop(false);
+  EXPECT_EQ(may_send(guard, start), Verdict::superseded);
+}
+
+TEST(HomingRun, InPositionModeThereIsNoWayBack) {
+  auto run = under_way();
+  run.stop(false);
+  EXPECT_EQ(run.state(), State::leaving);
   run.left();
   EXPECT_EQ(run.state(), State::idle);
-  EXPECT_TRUE(run.is_homed(false, false));
 }
 
 TEST(HomingRun, OneThatIsOverBetweenTwoReadingsIsKnownByItsWay) {

@@ -81,6 +81,15 @@ TEST(StartPdo, WhatDiffersIsKnownUntilItIsConfiguredAnew) {
   EXPECT_EQ(start.state(), State::unproven);
 }
 
+TEST(StartPdo, WhatWasPreparedIsNotSentAfterSomethingElseWasBegun) {
+  StartPdo start;
+  const auto before = start.guard();
+  EXPECT_EQ(may_send(before, TimePoint{}), Verdict::send);
+  start.give_up();
+  EXPECT_EQ(may_send(before, TimePoint{}), Verdict::superseded);
+  EXPECT_EQ(may_send(start.guard(), TimePoint{}), Verdict::send);
+}
+
 TEST(StartPdo, OneSequenceAtATimeHasTheNode) {
   StartPdo start;
   start.begin(StartPdo::Work::proving);
