@@ -137,4 +137,13 @@ ActiveLow active_low(const Model& model, const DriveSetup& setup) {
   return {.inputs = inputs ? inputs->levels : 0, .outputs = outputs ? outputs->levels : 0};
 }
 
+SetupObjects::SetupObjects(const Model& model, const DriveSetup& setup)
+    : active_low(cia402::active_low(model, setup)) {
+  auto all = required_objects(model, setup);
+  if (all)
+    required = std::move(*all);
+  else
+    error = all.error();
+}
+
 }  // namespace axisd::cia402

@@ -1,6 +1,7 @@
 // Which objects' contents a DriveSetup means, in the order in which they are written (M3). Pure.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -27,5 +28,14 @@ inline constexpr std::string_view terminal_states[] = {"active", "level"};
 /// What the states of terminals show that are active low by the setup. An output that it does not name is
 /// taken as it is shown.
 ActiveLow active_low(const Model& model, const DriveSetup& setup);
+
+/// What a setup means in objects.
+struct SetupObjects {
+  SetupObjects(const Model& model, const DriveSetup& setup);
+
+  std::vector<ObjectSetting> required;  ///< empty if it cannot be had
+  ActiveLow active_low;
+  std::optional<Error> error;  ///< why the drive cannot be configured
+};
 
 }  // namespace axisd::cia402

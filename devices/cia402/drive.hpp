@@ -13,6 +13,7 @@
 #include "buses/canopen/canopen_bus.hpp"
 #include "buses/canopen/pdo_configuration.hpp"
 #include "buses/signal.hpp"
+#include "devices/cia402/configuration.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/foreign_master.hpp"
 #include "devices/cia402/homing_run.hpp"
@@ -309,9 +310,7 @@ class Cia402Drive final : public Drive {
   canopen::CanopenBus* bus_;
   canopen::RemoteNode node_;
   DriveSetup setup_;
-  std::vector<ObjectSetting> required_;  ///< by the setup; empty if it cannot be had (configure() says why)
-  std::optional<Error> setup_error_;
-  ActiveLow active_low_;
+  SetupObjects setup_objects_;
   SeenObjects seen_;
 
   // The way to the drive.

@@ -176,7 +176,7 @@ Task<Result<Drift>> Cia402Drive::check_drift(TransactionClass transaction_class)
     watched.push_back({.address = model_->objects.eeprom_switch->key(),
                        .value = saves_at_rest() ? 0 : 1,
                        .key = "persist"});
-  for (const auto& setting : required_)  // homing's objects are compared before each homing
+  for (const auto& setting : setup_objects_.required)  // homing's objects are compared before each homing
     if (!setting.key.starts_with("homing.")) watched.push_back(setting);
   const auto present = co_await read_values(addresses_of(watched), {.transaction_class = transaction_class});
   if (!present) co_return fail(present.error());

@@ -7,7 +7,6 @@
 
 #include "buses/canopen/cob.hpp"
 #include "buses/canopen/sdo_abort.hpp"
-#include "devices/cia402/configuration.hpp"
 #include "devices/cia402/drive.hpp"
 
 namespace axisd::cia402 {
@@ -67,21 +66,16 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
       bus_(context.canopen),
       node_(context.canopen->master().node(context.node)),
       setup_(std::move(context.setup)),
-      active_low_(active_low(model, setup_)),
+      setup_objects_(model, setup_),
       news_(context.executor, *context.clock),
       state_link_(*bus_, news_),
       words_(model.neutral_mode),
       canary_(default_block(model)) {
-  auto required = required_objects(model, setup_);
-  if (required)
-    required_ = std::move(*required);
-  else
-    setup_error_ = required.error();
   const auto attached = bus_->attach(
       node_.id(), {.on_event = [this](const canopen::NodeEvent& event) { on_event(event); },
                    .on_emergency = [this](const canopen::Emergency& one) { on_emergency(one); },
                    .on_foreign_command = [this](const std::string& what) { on_foreign_command(what); }});
-  if (!attached) setup_error_ = attached.error();
+  if (!attached) setup_objects_.error = attached.error();
 }
 
 Cia402Drive::~Cia402Drive() { bus_->detach(node_.id()); }
@@ -163,7 +157,7 @@ int Cia402Drive::velocity_noise() const {
 }
 
 Task<Result<void>> Cia402Drive::configure() {
-  if (setup_error_) co_return failed(*setup_error_);
+  if (setup_objects_.error) co_return failed(*setup_objects_.error);
   // Before anything else: an EMCY with the identifier 80h would be a SYNC to the others (M24).
   if (const auto set = co_await set_emergency_id(); !set) co_return set;
   // The canary goes first and is read last: a restart in between would undo what was found or written.
@@ -194,7 +188,7 @@ Task<Result<void>> Cia402Drive::configure() {
         !found && found.error().reason == Reason::refused;  // some list it, and do not have it
     if (!found && !missing) co_return fail(found.error());
   }
-  if (const auto done = co_await bring_to(required_); !done) co_return done;
+  if (const auto done = co_await bring_to(setup_objects_.required); !done) co_return done;
   if (const auto halting =
           co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());
       halting)

@@ -48,8 +48,8 @@ constexpr Owner motion_owners[] = {{object::control_word, "AxisService.Enable"},
 }  // namespace
 
 std::string Cia402Drive::configured_by(std::uint32_t address) const {
-  const auto required = std::ranges::find(required_, address, &ObjectSetting::address);
-  if (required != required_.end()) return required->key;
+  const auto required = std::ranges::find(setup_objects_.required, address, &ObjectSetting::address);
+  if (required != setup_objects_.required.end()) return required->key;
   const auto* parameter = find_parameter(model_->descriptor->parameters, address);
   if (parameter == nullptr || !is_writable(*parameter)) return {};
   if (address < first_own_object) return "the CANopen master";
@@ -195,7 +195,8 @@ Task<Result<std::string>> Cia402Drive::restore_factory(std::vector<std::uint8_t>
   if (!model_->objects.restore)
     co_return fail(not_supported("the drive cannot restore its factory settings", "use its maker's tool"));
   // The drive stays out of use until it is configured again, and what is kept there is saved once more.
-  const auto kept = static_cast<std::uint64_t>(std::ranges::count_if(required_, &ObjectSetting::saved));
+  const auto kept =
+      static_cast<std::uint64_t>(std::ranges::count_if(setup_objects_.required, &ObjectSetting::saved));
   const auto saves = 1 + (kept == 0 ? 0 : kept + 2);  // two turn the switch, there and back
   if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   auto address = co_await factory_address(taken);
