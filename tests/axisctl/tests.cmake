@@ -31,8 +31,10 @@ if(AXISD_GRPC)
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_cell.py)
   add_test(NAME python_client.cell_of_fake_machines
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_python_cell.py)
+  add_test(NAME python_client.package
+           COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_python_package.py)
   set_tests_properties(axisctl.against_fake_daemon axisctl.budgets axisctl.cell_of_fake_machines axisctl.drives_against_fake_daemon
                        axisctl.scripts_and_plots axisctl.simulated_drives explain.against_fake_daemon leases.against_fake_daemon python_client.against_fake_daemon python_client.cell_of_fake_machines
-                       state.against_fake_daemon stops.against_fake_daemon tls.trouble_of_clients PROPERTIES
+                       python_client.package state.against_fake_daemon stops.against_fake_daemon tls.trouble_of_clients PROPERTIES
                        ENVIRONMENT "AXISCTL=$<TARGET_FILE:axisctl>" TIMEOUT 600)
 endif()
