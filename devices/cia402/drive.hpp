@@ -151,6 +151,12 @@ class Cia402Drive final : public Drive {
   /// Nothing waits for a SYNC in this drive (M24).
   Task<Result<void>> settle(SdoOptions options);
   Task<Result<void>> disarm(SdoOptions options);
+  enum class Waits : std::uint8_t {
+    nothing,        ///< nor will
+    overwritten,    ///< what did
+    until_retyped,  ///< the same, but the RPDO's type lets the next one wait, too
+  };
+  Task<Result<Waits>> disarm_pdo(std::uint16_t number, SdoOptions options);
   Task<Result<void>> overwrite_waiting(std::uint16_t number, canopen::PdoState state, SdoOptions options);
   [[nodiscard]] bool is_start_pdo(std::uint16_t number, const canopen::PdoState& state) const;
   Task<Result<void>> leave_operational(bool confirmed);
@@ -267,6 +273,9 @@ class Cia402Drive final : public Drive {
   Task<> show_and_judge(std::uint16_t held, SdoOptions options);
   Task<std::string> obstacle_to_proof(SdoOptions options);
   Task<Result<std::string>> show_common_start(std::uint16_t held, SdoOptions options);
+  struct ShownStep;
+  /// True: the drive did as CiA 301 says.
+  Task<Result<bool>> show_step(ShownStep step, std::uint16_t held, SdoOptions options);
   Task<Result<bool>> shows(std::uint16_t word, bool stays, SdoOptions options);
   Task<Result<void>> let_wait(std::uint16_t word, SdoOptions options);
   Task<Result<TimePoint>> check_prepared(MotionBlock block, bool by_sync, SdoOptions options);

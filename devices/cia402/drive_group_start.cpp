@@ -262,19 +262,19 @@ Task<std::string> Cia402Drive::obstacle_to_proof(SdoOptions options) {
   co_return fmt::format("it is shown while the drive is released, and that is in {}", to_string(state));
 }
 
+struct Cia402Drive::ShownStep {
+  std::vector<std::uint16_t> words;  ///< that wait for a SYNC
+  bool restored = false;             ///< the old word was written since the last SYNC
+  bool pre_operational = false;      ///< was passed since they came
+  bool synced = true;
+  std::uint16_t after = 0;  ///< what the control word is to be then
+  const char* otherwise = "";
+};
+
 /// The text: in what the drive differs from CiA 301; empty: in nothing that a start needs.
 Task<Result<std::string>> Cia402Drive::show_common_start(std::uint16_t held, SdoOptions options) {
   const auto other = static_cast<std::uint16_t>(held ^ control::halt);
-  can::SendOptions sync{.transaction_class = TransactionClass::motion, .guard = options.guard};
-  struct Step {
-    std::vector<std::uint16_t> words;  ///< that wait for a SYNC
-    bool restored = false;             ///< the old word was written since the last SYNC
-    bool pre_operational = false;      ///< was passed since they came
-    bool synced = true;
-    std::uint16_t after = 0;  ///< what the control word is to be then
-    const char* otherwise = "";
-  };
-  const Step steps[] = {
+  const ShownStep steps[] = {
       {.words = {other}, .synced = false, .after = held, .otherwise = "its RPDO acts before the SYNC"},
       {.words = {held}, .after = held, .otherwise = "of several RPDOs before a SYNC not the last one counts"},
       {.words = {other}, .after = other, .otherwise = "a SYNC does not make its RPDO act"},
@@ -284,22 +284,29 @@ Task<Result<std::string>> Cia402Drive::show_common_start(std::uint16_t held, Sdo
        .after = held,
        .otherwise = "what waits for a SYNC outlives Pre-Operational"}};
   for (const auto& step : steps) {
-    if (step.restored)
-      if (const auto back = co_await write_object(object::control_word, held, word_bytes, options); !back)
-        co_return fail(back.error());
-    for (const auto word : step.words)
-      if (const auto sent = co_await let_wait(word, options); !sent) co_return fail(sent.error());
-    if (step.pre_operational) {
-      if (const auto left = co_await leave_operational(false); !left) co_return fail(left.error());
-      if (const auto back = co_await enter_operational(); !back) co_return fail(back.error());
-    }
-    if (step.synced)
-      if (const auto sent = co_await bus_->send_sync(sync); !sent) co_return fail(sent.error());
-    const auto as_wanted = co_await shows(step.after, step.after == held, options);
+    const auto as_wanted = co_await show_step(step, held, options);
     if (!as_wanted) co_return fail(as_wanted.error());
     if (!*as_wanted) co_return std::string(step.otherwise);
   }
   co_return std::string();
+}
+
+Task<Result<bool>> Cia402Drive::show_step(ShownStep step, std::uint16_t held, SdoOptions options) {
+  if (step.restored)
+    if (const auto back = co_await write_object(object::control_word, held, word_bytes, options); !back)
+      co_return fail(back.error());
+  for (const auto word : step.words)
+    if (const auto sent = co_await let_wait(word, options); !sent) co_return fail(sent.error());
+  if (step.pre_operational) {
+    if (const auto left = co_await leave_operational(false); !left) co_return fail(left.error());
+    if (const auto back = co_await enter_operational(); !back) co_return fail(back.error());
+  }
+  if (step.synced) {
+    const auto sent =
+        co_await bus_->send_sync({.transaction_class = TransactionClass::motion, .guard = options.guard});
+    if (!sent) co_return fail(sent.error());
+  }
+  co_return co_await shows(step.after, step.after == held, std::move(options));
 }
 
 Task<Result<void>> Cia402Drive::let_wait(std::uint16_t word, SdoOptions options) {

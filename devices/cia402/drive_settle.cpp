@@ -17,6 +17,12 @@ constexpr auto nmt_patience = milliseconds(50);
 /// Two heartbeats, where it has one.
 constexpr auto heartbeat_limit = milliseconds(500);
 
+/// Of an RPDO.
+canopen::Object transmission_type(std::uint16_t number) {
+  constexpr std::uint8_t sub_type = 2;
+  return canopen::communication_object(PdoDirection::receive, number, sub_type);
+}
+
 }  // namespace
 
 /// Another master, or an earlier program, may have armed it; and so may a common start that was given up.
@@ -33,28 +39,35 @@ Task<Result<void>> Cia402Drive::settle(SdoOptions options) {
   co_return Result<void>{};
 }
 
+/// What may wait in one RPDO is overwritten.
+Task<Result<Cia402Drive::Waits>> Cia402Drive::disarm_pdo(std::uint16_t number, SdoOptions options) {
+  const auto type = co_await node_.read_if_there(transmission_type(number), options);
+  if (!type) co_return failed(type.error());
+  if (!*type || **type >= canopen::event_driven_of_manufacturer) co_return Waits::nothing;
+  const auto state = co_await canopen::read_pdo(node_, PdoDirection::receive, number, options);
+  if (!state) co_return failed(state.error());
+  const bool ours = bus_->settings().sync_period > Duration{} && is_start_pdo(number, *state);
+  const bool in_use = ours && start_pdo_.id();
+  if (in_use && !bus_->armed(node_.id())) co_return Waits::nothing;
+  const bool keeps_type = ours && start_pdo_.state() != StartPdo::State::disproven;
+  const auto overwritten = co_await overwrite_waiting(number, *state, std::move(options));
+  if (!overwritten) co_return fail(overwritten.error());
+  co_return keeps_type ? Waits::overwritten : Waits::until_retyped;
+}
+
 /// What an RPDO has received already waits in the drive whatever its type becomes, or is applied by the very
 /// change: it is gone where there are no PDOs, in Pre-Operational. Where it outlives even that, it asks for
 /// nothing new. The RPDO of group starts keeps its type (some drives save it), and holds nothing that this
 /// program did not send.
 Task<Result<void>> Cia402Drive::disarm(SdoOptions options) {
-  constexpr std::uint8_t sub_type = 2;
   constexpr std::uint16_t pdos = 4;
   std::vector<Object> armed;
   bool any = false;
   for (std::uint16_t number = 1; number <= pdos; ++number) {
-    const auto object = canopen::communication_object(PdoDirection::receive, number, sub_type);
-    const auto type = co_await node_.read_if_there(object, options);
-    if (!type) co_return failed(type.error());
-    if (!*type || **type >= canopen::event_driven_of_manufacturer) continue;
-    const auto state = co_await canopen::read_pdo(node_, PdoDirection::receive, number, options);
-    if (!state) co_return failed(state.error());
-    const bool ours = bus_->settings().sync_period > Duration{} && is_start_pdo(number, *state);
-    const bool in_use = ours && start_pdo_.id();
-    if (in_use && !bus_->armed(node_.id())) continue;
-    any = true;
-    if (!ours || start_pdo_.state() == StartPdo::State::disproven) armed.push_back(object);
-    if (const auto done = co_await overwrite_waiting(number, *state, options); !done) co_return done;
+    const auto waits = co_await disarm_pdo(number, options);
+    if (!waits) co_return fail(waits.error());
+    any = any || *waits != Waits::nothing;
+    if (*waits == Waits::until_retyped) armed.push_back(transmission_type(number));
   }
   if (!any) co_return Result<void>{};
   if (const auto left = co_await leave_operational(true); !left) co_return left;
