@@ -1,6 +1,7 @@
 // The transfer that is under way at a node: its frames, what answers them, and how it ends.
 #include <fmt/format.h>
 
+#include <ranges>
 #include <utility>
 
 #include "buses/canopen/cob.hpp"
@@ -111,10 +112,9 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
     target.lane(request->options.transaction_class).push_front(std::move(request));
   } else if (step.kind == Kind::send) {
     active.opened = true;
-    if (target.stop_waits() && active.request->options.transaction_class != TransactionClass::stop)
-      cut(target);
-    else
-      send(target, *step.frame);
+    const bool gives_way =
+        target.stop_waits() && active.request->options.transaction_class != TransactionClass::stop;
+    gives_way ? cut(target) : send(target, *step.frame);
   } else if (step.kind == Kind::done) {
     finish(target, SdoAnswer{.bytes = active.transfer.is_download() ? Bytes{} : active.transfer.bytes(),
                              .size_indicated = active.transfer.size_indicated(),
@@ -128,8 +128,8 @@ void SdoClient::on_reply(std::uint8_t id, const can::ReceivedFrame& received) {
   }
   pump(target);
   if (!others_yield) return;
-  for (auto& [other, node] : nodes_)
-    if (node->yields_until) pump(*node);
+  const auto yields = [](const auto& node) { return node->yields_until.has_value(); };
+  for (auto& node : nodes_ | std::views::values | std::views::filter(yields)) pump(*node);
 }
 
 /// Nobody waits for this reply: late, or of a second node with this node-ID.
