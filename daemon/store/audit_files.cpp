@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <charconv>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -97,6 +98,25 @@ std::expected<Lines, int> for_each_line(int file, const std::function<bool(std::
   }
   return lines;
 }
+
+/// Shows records of after a cursor, and moves it.
+struct Shower {
+  AuditSeen seen;
+  std::size_t most;
+  const AuditAccess::Visit* visit;
+  bool enough = false;
+
+  /// Precondition: numbers rise. False: no more of its file is wanted.
+  bool take(std::uint64_t number, std::string_view line) {
+    if (number > seen.newest) return false;
+    if (number <= seen.cursor) return true;
+    if (most == 0 || enough) return false;
+    --most;
+    seen.cursor = number;
+    enough = !(*visit)(line) || most == 0;
+    return !enough;
+  }
+};
 
 }  // namespace
 
@@ -198,10 +218,13 @@ Result<AuditSeen> look_at_audit(const fs::path& directory, std::uint64_t after, 
                                 WallTime since, std::size_t most, const AuditAccess::Visit& visit) {
   const auto found = find_files(directory);
   if (!found) return fail(found.error());
-  AuditSeen seen{
-      .cursor = std::min(after, newest), .newest = newest, .oldest = found->empty() ? 0 : found->front()};
-  bool enough = false;
-  for (auto first = found->begin(); first != found->end() && !enough; ++first) {
+  Shower shower{.seen = {.cursor = std::min(after, newest),
+                         .newest = newest,
+                         .oldest = found->empty() ? 0 : found->front()},
+                .most = most,
+                .visit = &visit};
+  auto& seen = shower.seen;
+  for (auto first = found->begin(); first != found->end() && !shower.enough; ++first) {
     const auto next = std::next(first);
     if (next != found->end() && *next <= seen.cursor + 1) continue;
     if (*first > newest || seen.cursor >= newest) break;
@@ -216,16 +239,9 @@ Result<AuditSeen> look_at_audit(const fs::path& directory, std::uint64_t after, 
       continue;
     }
     auto number = *first - 1;
-    const auto shown = for_each_line(file.get(), [&](std::string_view line) {
-      ++number;
-      if (number > newest || (next != found->end() && number >= *next)) return false;
-      if (number <= seen.cursor) return true;
-      if (most == 0 || enough) return false;
-      --most;
-      seen.cursor = number;
-      enough = !visit(line) || most == 0;
-      return !enough;
-    });
+    const auto end = next == found->end() ? std::numeric_limits<std::uint64_t>::max() : *next;
+    const auto shown = for_each_line(
+        file.get(), [&](std::string_view line) { return ++number < end && shower.take(number, line); });
     if (!shown) return disk_failed("read", path, shown.error());
   }
   return seen;

@@ -148,15 +148,20 @@ class Court {
     return state != nullptr && !state->state.convictions.empty() && state->journal.line == 0;
   }
 
-  void look_at_journal() {
-    std::uint64_t expected = 0;
+  /// Lines that the journal had, by whatever else is known.
+  [[nodiscard]] std::uint64_t expected_lines() const {
+    auto expected = marked();
     const auto* state = newest();
     for (const auto* each : {state_ ? &*state_ : nullptr, previous_ ? &*previous_ : nullptr})
       if (each != nullptr && each->journal.pair == state->journal.pair)
         expected = std::max(expected, each->journal.line);
-    expected = std::max(expected, marked());
+    return expected;
+  }
+
+  void look_at_journal() {
+    const auto expected = expected_lines();
     verdict_.seen.journal = {.found = journal_ ? journal_->last_number : 0, .expected = expected};
-    const bool anew = begun_anew(state);
+    const bool anew = begun_anew(newest());
     if (anew) verdict_.doubt = "it was to be begun anew";
     if (!journal_) {
       if (found_.journal.kind != FoundFile::Kind::absent || expected > 0)
