@@ -79,32 +79,11 @@ bool parse_wire(std::string_view terminal, std::string_view value, SimulatedNode
   return true;
 }
 
-bool parse_part(std::string_view key, std::string_view value, DriveOption& option) {
-  auto& settings = option.settings;
-  const auto named = [&](std::string_view prefix) {
-    return key.starts_with(prefix) && key.size() > prefix.size();
-  };
-  if (named("switch.")) return parse_switch(key.substr(7), value, settings.switches);
-  if (named("eeprom.")) return parse_eeprom(key.substr(7), value, settings);
-  if (named("encoder.")) return set_encoder_option(settings.encoder, key.substr(8), value);
-  if (named("wire.")) return parse_wire(key.substr(5), value, settings);
-  if (key == "home") return parse_range(value, settings.mechanics);
+bool parse_single(std::string_view key, std::string_view value, SimulatedNodeSettings& settings) {
   if (key == "turn") {
     const auto turn = parse_number<std::uint32_t>(value);
     if (turn) settings.mechanics.turn = *turn;
     return turn && *turn > 0;
-  }
-  if (key == "positive_limit") return parse_position(value, settings.mechanics.positive_limit_from);
-  if (key == "negative_limit") return parse_position(value, settings.mechanics.negative_limit_from);
-  if (key == "eds") {
-    option.sheet = value;
-    return !value.empty();
-  }
-  if (key == "counts" || key == "velocity_unit" || key == "acceleration_unit")
-    return set_unit_option(settings.units, key, value);
-  if (key == "model") {
-    option.model = value;
-    return !value.empty();
   }
   if (key == "node") {
     const auto node = parse_number<std::uint8_t>(value);
@@ -129,6 +108,31 @@ bool parse_part(std::string_view key, std::string_view value, DriveOption& optio
   const auto milliseconds = parse_number<std::uint16_t>(value);
   if (milliseconds) settings.boot_time = std::chrono::milliseconds(*milliseconds);
   return milliseconds.has_value();
+}
+
+bool parse_part(std::string_view key, std::string_view value, DriveOption& option) {
+  auto& settings = option.settings;
+  const auto named = [&](std::string_view prefix) {
+    return key.starts_with(prefix) && key.size() > prefix.size();
+  };
+  if (named("switch.")) return parse_switch(key.substr(7), value, settings.switches);
+  if (named("eeprom.")) return parse_eeprom(key.substr(7), value, settings);
+  if (named("encoder.")) return set_encoder_option(settings.encoder, key.substr(8), value);
+  if (named("wire.")) return parse_wire(key.substr(5), value, settings);
+  if (key == "home") return parse_range(value, settings.mechanics);
+  if (key == "positive_limit") return parse_position(value, settings.mechanics.positive_limit_from);
+  if (key == "negative_limit") return parse_position(value, settings.mechanics.negative_limit_from);
+  if (key == "eds") {
+    option.sheet = value;
+    return !value.empty();
+  }
+  if (key == "counts" || key == "velocity_unit" || key == "acceleration_unit")
+    return set_unit_option(settings.units, key, value);
+  if (key == "model") {
+    option.model = value;
+    return !value.empty();
+  }
+  return parse_single(key, value, settings);
 }
 
 }  // namespace

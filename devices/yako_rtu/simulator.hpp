@@ -108,6 +108,7 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   void on_stopped();
   void finish();
   void on_edge(const InputEdge& edge);
+  void on_motion_edge(const InputEdge& edge);
   void enforce_limits();
   [[nodiscard]] bool limit_active(int direction) const;
   [[nodiscard]] bool blocked(int direction) const;

@@ -172,7 +172,8 @@ void SimulatedDrive::enforce_limits() {
   if (memory_.get(reg::overtravel_stop) == 0 && behaviour_.free_stop_releases) enabled_ = false;
 }
 
-void SimulatedDrive::on_edge(const InputEdge& edge) {
+/// Of terminals that start something.
+void SimulatedDrive::on_motion_edge(const InputEdge& edge) {
   const auto jog = [&](int direction) {
     if (edge.rising)
       begin(endless_plan(Activity::jog, direction));
@@ -180,15 +181,6 @@ void SimulatedDrive::on_edge(const InputEdge& edge) {
       stop_motion(false);
   };
   switch (edge.function) {
-    case Input::alarm_clear:
-      if (edge.rising) clear_alarm();
-      break;
-    case Input::stop:
-      if (edge.rising) stop_motion(false);
-      break;
-    case Input::emergency_stop:
-      if (edge.rising) stop_motion(true);
-      break;
     case Input::position:
       if (edge.rising) begin(position_plan(memory_.get(reg::terminal_move_mode) == 1));
       break;
@@ -216,12 +208,29 @@ void SimulatedDrive::on_edge(const InputEdge& edge) {
       else if (!behaviour_.pv_latched)
         multi_speed_on_ = false;
       break;
+    default:
+      break;
+  }
+}
+
+void SimulatedDrive::on_edge(const InputEdge& edge) {
+  switch (edge.function) {
+    case Input::alarm_clear:
+      if (edge.rising) clear_alarm();
+      break;
+    case Input::stop:
+      if (edge.rising) stop_motion(false);
+      break;
+    case Input::emergency_stop:
+      if (edge.rising) stop_motion(true);
+      break;
     case Input::home:
     case Input::positive_limit:
     case Input::negative_limit:
       homing_edge(edge);
       break;
     default:
+      on_motion_edge(edge);
       break;
   }
   if (edge.function < Input::pin0) return;

@@ -138,6 +138,7 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   void next_set_point();
   void update_velocity();
   void on_edge(const simulation::FunctionEdge& edge);
+  void on_motion_edge(const simulation::FunctionEdge& edge);
   void terminal_start(const Plan& plan);
   [[nodiscard]] bool stop_held() const;
   void enforce_limits();

@@ -203,13 +203,6 @@ void SimulatedDrive::terminal_start(const Plan& plan) {
 }
 
 void SimulatedDrive::on_edge(const simulation::FunctionEdge& edge) {
-  const auto speed = dictionary_.get(0x60FF);
-  const auto jog = [&](int direction) {
-    if (edge.rising)
-      terminal_start(endless_plan(Activity::jog, static_cast<double>(dictionary_.get(0x6081)), direction));
-    else if (activity_ == Activity::jog && motor_.direction() == direction)
-      stop_motion(false);
-  };
   const auto stop = [&](bool at_once) {
     if (!edge.rising) return;
     velocity_held_ = !behaviour_.velocity_resumes_after_terminal;
@@ -239,6 +232,22 @@ void SimulatedDrive::on_edge(const simulation::FunctionEdge& edge) {
     case input_stop_at_once:
       stop(true);
       break;
+    default:
+      on_motion_edge(edge);
+      break;
+  }
+}
+
+/// Of terminals that start something.
+void SimulatedDrive::on_motion_edge(const simulation::FunctionEdge& edge) {
+  const auto speed = dictionary_.get(0x60FF);
+  const auto jog = [&](int direction) {
+    if (edge.rising)
+      terminal_start(endless_plan(Activity::jog, static_cast<double>(dictionary_.get(0x6081)), direction));
+    else if (activity_ == Activity::jog && motor_.direction() == direction)
+      stop_motion(false);
+  };
+  switch (edge.function) {
     case input_position:
       if (edge.rising) terminal_start(plan_of(set_point((control_ & 0x40U) != 0)));
       break;
