@@ -130,6 +130,14 @@ constexpr std::array<TimeUnit, 4> time_units{
     {{"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}, {"min", 60'000'000'000}}};
 constexpr double longest_ns = 100 * 3600e9;
 
+/// What stands behind the e. Nothing: beyond 100.
+std::optional<int> parse_exponent(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  int exponent = 0;
+  const bool fits = std::from_chars(text.data(), text.data() + text.size(), exponent).ec == std::errc();
+  return fits && std::abs(exponent) <= 100 ? std::optional(exponent) : std::nullopt;
+}
+
 }  // namespace
 
 QuantityResult<Decimal> parse_decimal(std::string_view text) {
@@ -149,14 +157,10 @@ QuantityResult<Decimal> parse_decimal(std::string_view text) {
     numerator = numerator * 10 + (all[at] - '0');
     exponent -= fraction ? 1 : 0;
   }
-  if (at < all.size()) {  // the exponent
-    int written = 0;
-    const auto from = all.substr(all[at + 1] == '+' ? at + 2 : at + 1);
-    if (std::from_chars(from.data(), from.data() + from.size(), written).ec != std::errc() ||
-        std::abs(written) > 100) {
-      return too_long(text);
-    }
-    exponent += written;
+  if (at < all.size()) {
+    const auto written = parse_exponent(all.substr(at + 1));
+    if (!written) return too_long(text);
+    exponent += *written;
   }
   if (exponent < -100'000) return too_long(text);
   if (all.front() == '-') numerator = -numerator;

@@ -267,26 +267,51 @@ constexpr KeySpec group_keys[] = {
      .apply = [](Target& t, const Value& v) { t.group->max_arrival_error = v.duration; }},
 };
 
+constexpr KeySpec machine_key = {
+    .key = "machine",
+    .kind = Kind::text,
+    .required = true,
+    .description = "Name of this machine.",
+    .example = "press-2",
+    .pattern = name_pattern,
+    .pattern_hint = "a letter, then letters, digits, - or _; lower case",
+    .apply = [](Target& t, const Value& v) { t.configuration->machine = v.text; }};
+
+constexpr KeySpec state_directory_key = {
+    .key = "state_directory",
+    .kind = Kind::text,
+    .description = "Where the daemon keeps what must survive a restart.",
+    .example = "/var/lib/axisd-2",
+    .default_value = "/var/lib/axisd",
+    .pattern = path_pattern,
+    .pattern_hint = path_hint,
+    .apply = [](Target& t, const Value& v) { t.configuration->state_directory = v.text; }};
+
+constexpr KeySpec control_key = {
+    .key = "control",
+    .kind = Kind::choice,
+    .description =
+        "open: an axis that nobody leases may be commanded by every client; leased: only under a lease.",
+    .example = "leased",
+    .default_value = "open",
+    .choices = controls,
+    .apply = [](Target& t, const Value& v) { t.configuration->leases.required = v.text == "leased"; }};
+
+constexpr KeySpec groups_key = {.key = "groups",
+                                .kind = Kind::named_sections,
+                                .description = "Axes that are moved and stopped together, by name.",
+                                .children = group_keys,
+                                .apply = [](Target& t, const Value& v) {
+                                  t.group = &t.configuration->groups.emplace_back();
+                                  t.group->name = v.text;
+                                }};
+
 }  // namespace
 
 std::span<const KeySpec> schema() {
   static const KeySpec top_keys[] = {
-      {.key = "machine",
-       .kind = Kind::text,
-       .required = true,
-       .description = "Name of this machine.",
-       .example = "press-2",
-       .pattern = name_pattern,
-       .pattern_hint = "a letter, then letters, digits, - or _; lower case",
-       .apply = [](Target& t, const Value& v) { t.configuration->machine = v.text; }},
-      {.key = "state_directory",
-       .kind = Kind::text,
-       .description = "Where the daemon keeps what must survive a restart.",
-       .example = "/var/lib/axisd-2",
-       .default_value = "/var/lib/axisd",
-       .pattern = path_pattern,
-       .pattern_hint = path_hint,
-       .apply = [](Target& t, const Value& v) { t.configuration->state_directory = v.text; }},
+      machine_key,
+      state_directory_key,
       {.key = "server",
        .kind = Kind::section,
        .description = "Where the gRPC API is served.",
@@ -306,14 +331,7 @@ std::span<const KeySpec> schema() {
        .kind = Kind::section,
        .description = "Who asked for what, and what became of it, in files of the state directory.",
        .children = audit_keys},
-      {.key = "control",
-       .kind = Kind::choice,
-       .description =
-           "open: an axis that nobody leases may be commanded by every client; leased: only under a lease.",
-       .example = "leased",
-       .default_value = "open",
-       .choices = controls,
-       .apply = [](Target& t, const Value& v) { t.configuration->leases.required = v.text == "leased"; }},
+      control_key,
       {.key = "leases",
        .kind = Kind::section,
        .description = "How long a client's lease may last before it has to be renewed.",
@@ -344,15 +362,7 @@ std::span<const KeySpec> schema() {
              t.device = &t.configuration->devices.emplace_back();
              t.device->name = v.text;
            }},
-      {.key = "groups",
-       .kind = Kind::named_sections,
-       .description = "Axes that are moved and stopped together, by name.",
-       .children = group_keys,
-       .apply =
-           [](Target& t, const Value& v) {
-             t.group = &t.configuration->groups.emplace_back();
-             t.group->name = v.text;
-           }},
+      groups_key,
   };
   return top_keys;
 }

@@ -142,33 +142,40 @@ std::string Table::clipped_line(const std::vector<Cell>& row, const Columns& sho
   return text;
 }
 
-/// Only the last cell of a group can be wider than its place.
 void Table::add_folded(std::vector<std::string>& lines, const std::vector<Cell>& row,
                        const std::vector<Columns>& groups, const std::vector<std::size_t>& widths,
                        bool colour, std::size_t limit) const {
   for (const auto& group : groups) {
-    std::string text;
-    std::size_t used = 0, owed = &group == &groups.front() ? 0 : indent;
-    for (const auto i : group) {
-      if (i >= row.size()) break;
-      const std::size_t padding = widths[i] - width(row[i].text);
-      if (right_[i] && used + owed + widths[i] <= limit) owed += padding;
-      if (!row[i].text.empty()) {
-        text.append(owed, ' ');
-        used += owed;
-        owed = 0;
-        const auto pieces = wrapped(row[i].text, limit > used ? limit - used : 1);
-        text += coloured(pieces.front(), row[i].colour, colour);
-        for (std::size_t k = 1; k < pieces.size(); ++k) {
-          lines.push_back(std::move(text));
-          text = std::string(used, ' ') + coloured(pieces[k], row[i].colour, colour);
-        }
-        used += width(pieces.back());
-      }
-      owed += (right_[i] ? 0 : padding) + gap;
-    }
+    auto text = add_group(lines, row, group, widths, &group == &groups.front() ? 0 : indent, colour, limit);
     if (!text.empty() || groups.size() == 1) lines.push_back(std::move(text));
   }
+}
+
+/// Only the last cell of a group can be wider than its place. Returns the last line of it.
+std::string Table::add_group(std::vector<std::string>& lines, const std::vector<Cell>& row,
+                             const Columns& group, const std::vector<std::size_t>& widths, std::size_t owed,
+                             bool colour, std::size_t limit) const {
+  std::string text;
+  std::size_t used = 0;
+  for (const auto i : group) {
+    if (i >= row.size()) break;
+    const std::size_t padding = widths[i] - width(row[i].text);
+    if (right_[i] && used + owed + widths[i] <= limit) owed += padding;
+    if (!row[i].text.empty()) {
+      text.append(owed, ' ');
+      used += owed;
+      owed = 0;
+      const auto pieces = wrapped(row[i].text, limit > used ? limit - used : 1);
+      text += coloured(pieces.front(), row[i].colour, colour);
+      for (std::size_t k = 1; k < pieces.size(); ++k) {
+        lines.push_back(std::move(text));
+        text = std::string(used, ' ') + coloured(pieces[k], row[i].colour, colour);
+      }
+      used += width(pieces.back());
+    }
+    owed += (right_[i] ? 0 : padding) + gap;
+  }
+  return text;
 }
 
 void Table::print(bool colour) const {

@@ -52,6 +52,9 @@ class Table {
   void add_folded(std::vector<std::string>& lines, const std::vector<Cell>& row,
                   const std::vector<Columns>& groups, const std::vector<std::size_t>& widths, bool colour,
                   std::size_t limit) const;
+  std::string add_group(std::vector<std::string>& lines, const std::vector<Cell>& row, const Columns& group,
+                        const std::vector<std::size_t>& widths, std::size_t owed, bool colour,
+                        std::size_t limit) const;
 
   std::vector<Cell> header_;
   std::vector<bool> right_;

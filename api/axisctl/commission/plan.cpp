@@ -76,6 +76,23 @@ double stop_seconds(const std::optional<Settings>& settings) {
   return 2 * (1 + ramps);
 }
 
+/// To a motion that goes as far as a switch or a person lets it.
+std::string obstacle_to_motion(const std::vector<StepPlan>& steps, const Record& record) {
+  if (!passed(record, "power on")) return "the power stage is off";
+  if (auto why = unproven_direction(record); !why.empty()) return why;
+  if (auto why = unproven_speed(record); !why.empty()) return why;
+  return failed_switch(steps, record);
+}
+
+/// Homing runs until a switch ends it: one that does not end a motion must not be relied on.
+std::string obstacle_to_homing(const std::vector<StepPlan>& steps, const Record& record) {
+  if (auto why = obstacle_to_motion(steps, record); !why.empty()) return why;
+  for (const auto& other : steps)
+    if ((other.kind == StepKind::limit || other.kind == StepKind::input) && failed(record, other.name))
+      return fmt::format("{} did not pass", other.name);
+  return failed(record, "stop") ? "stop did not pass" : "";
+}
+
 }  // namespace
 
 bool is_limit(const std::string& function) {
@@ -137,18 +154,9 @@ std::string obstacle(const StepPlan& step, const std::vector<StepPlan>& steps, c
       return passed(record, "jog positive") || passed(record, "jog negative") ? "" : "no jog has passed";
     case StepKind::limit:
     case StepKind::stop:
-    case StepKind::home: {
-      if (!passed(record, "power on")) return "the power stage is off";
-      if (auto why = unproven_direction(record); !why.empty()) return why;
-      if (auto why = unproven_speed(record); !why.empty()) return why;
-      if (auto why = failed_switch(steps, record); !why.empty()) return why;
-      if (step.kind != StepKind::home) return {};
-      // Homing runs until a switch ends it: one that does not end a motion must not be relied on.
-      for (const auto& other : steps)
-        if ((other.kind == StepKind::limit || other.kind == StepKind::input) && failed(record, other.name))
-          return fmt::format("{} did not pass", other.name);
-      return failed(record, "stop") ? "stop did not pass" : "";
-    }
+      return obstacle_to_motion(steps, record);
+    case StepKind::home:
+      return obstacle_to_homing(steps, record);
     default:
       return {};
   }

@@ -37,6 +37,15 @@ void watch_link(asio::ip::tcp::socket& socket) {
   set(IPPROTO_TCP, TCP_USER_TIMEOUT, 30'000);
 }
 
+Error_code listen_at(asio::ip::tcp::acceptor& opened, const asio::ip::tcp::endpoint& endpoint) {
+  Error_code error;
+  if (endpoint.protocol() == asio::ip::tcp::v6()) opened.set_option(asio::ip::v6_only(true), error);
+  if (!error) opened.set_option(asio::ip::tcp::acceptor::reuse_address(true), error);
+  if (!error) opened.bind(endpoint, error);
+  if (!error) opened.listen(asio::socket_base::max_listen_connections, error);
+  return error;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<asio::ssl::context>> make_tls(const TlsSettings& settings) {
@@ -94,10 +103,7 @@ Result<void> Listener::listen() {
     Tcp::acceptor acceptor(gateway_.io);
     acceptor.open(endpoint.protocol(), error);
     if (error && !doors_.empty()) continue;  // there is no IPv6 here
-    if (!error && endpoint.protocol() == Tcp::v6()) acceptor.set_option(asio::ip::v6_only(true), error);
-    if (!error) acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
-    if (!error) acceptor.bind(endpoint, error);
-    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+    if (!error) error = listen_at(acceptor, endpoint);
     if (error == boost::system::errc::address_not_available && found.size() > 1) continue;
     if (error)
       return fail(error == asio::error::address_in_use ? Reason::busy : Reason::offline,
