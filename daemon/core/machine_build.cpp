@@ -67,7 +67,7 @@ std::unique_ptr<Axis> MachineCore::make_axis(const AxisSettings& settings, AxisF
                       .book = &book_,
                       .persistence = parts_.persistence,
                       .leases = &leases_.table(),
-                      .inhibited = &inhibited_,
+                      .inhibited = inhibit_.latched(),
                       .state_unaccepted = state_gate_.refusal(),
                       .holds = holds_.of(settings.name),
                       .stop_delays = &stop_delays_[settings.bus],

@@ -78,6 +78,8 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
           [this] {
             for (const auto& axis : axes_) axis->refresh();
           }),
+      inhibit_(*parts_.clock, parts_.persistence,
+               [this](InhibitChange change) { tell_inhibit(std::move(change)); }),
       groups_({.executor = parts_.executor,
                .clock = parts_.clock,
                .book = &book_,
@@ -88,10 +90,6 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
               configuration.groups) {
   events_.keep([this](const Event& event) { audit_.event(event); });
   book_.on_open([this](const CommandPtr& command) { commands_.add(command); });
-  if (parts_.persistence != nullptr) {
-    const auto& inhibit = parts_.persistence->loaded().inhibit;
-    set_inhibit(inhibit.active, inhibit.by);
-  }
   for (const auto& line : configuration.lines) add_line(line);
   for (const auto& network : configuration.networks) add_network(network);
   for (const auto& entry : configuration.axes) {
@@ -135,18 +133,13 @@ void MachineCore::launch(Task<> sequence, const char* name) {
   spawn(parts_.executor, counted(std::move(sequence), sequences_), name);
 }
 
-void MachineCore::set_inhibit(bool inhibited, const std::string& by) {
-  inhibited_ = inhibited;
-  inhibited_by_.store(inhibited ? boost::make_shared<const std::string>(by) : nullptr);
-}
-
-void MachineCore::tell_inhibit(InhibitChange::What what, const std::string& by) {
-  events_.record(parts_.clock->wall(parts_.clock->now()), {}, InhibitChange{.what = what, .by = by});
+void MachineCore::tell_inhibit(InhibitChange change) {
+  events_.record(parts_.clock->wall(parts_.clock->now()), {}, std::move(change));
 }
 
 void MachineCore::start() {
   state_gate_.start();
-  if (inhibited_) tell_inhibit(InhibitChange::What::stands, *inhibited_by());
+  inhibit_.start();
   for (const auto& command : book_.take_interrupted()) commands_.follow(command);
   expect_stops();
   for (std::size_t i = 0; i < lines_.size(); ++i) lines_[i]->start(recorders_[i]->exchange_observer());
@@ -273,42 +266,10 @@ void MachineCore::release_stop(const std::string& axis, const HoldRelease& relea
   });
 }
 
-void MachineCore::save_latch(const std::string& client, std::function<void(std::optional<Error>)> latched) {
-  if (parts_.persistence == nullptr) return latched ? latched(std::nullopt) : void();
-  // Once, whoever comes first: the disk, or the time.
-  auto tell = [kept = std::make_shared<std::function<void(std::optional<Error>)>>(std::move(latched))](
-                  std::optional<Error> error) {
-    if (auto now = std::exchange(*kept, nullptr)) now(std::move(error));
-  };
-  latch_waits_.insert_or_assign(
-      latches_, parts_.clock->call_at(parts_.clock->now() + StopHoldKeeper::longest_wait, [tell] {
-        tell(Error{.reason = Reason::storage,
-                   .message = "the latch of StopAll is not on the disk yet",
-                   .remedy = "keep the machine from moving by other means before the daemon is restarted; "
-                             "check the disk"});
-      }));
-  parts_.persistence->save_inhibit(
-      {.active = true, .by = client, .since = parts_.clock->wall(parts_.clock->now())},
-      [this, client, alive = std::weak_ptr(alive_), latch = latches_, tell](const Result<void>& saved) {
-        if (!saved)
-          log_about(spdlog::level::err, LogKind::storage_failed, {.client = client},
-                    fmt::format("the inhibit would not survive a restart: {}", to_string(saved.error())));
-        if (alive.expired()) return;
-        latch_waits_.erase(latch);
-        if (saved) return tell(std::nullopt);
-        tell_inhibit(InhibitChange::What::not_durable, client);
-        auto error = saved.error();
-        error.message = "the latch of StopAll would not outlive a restart of the daemon: " + error.message;
-        tell(std::move(error));
-      });
-}
-
 std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client, TimePoint arrived,
                                                       std::function<void(std::optional<Error>)> latched,
                                                       const CallOriginPtr& origin) {
-  ++latches_;
-  set_inhibit(true, client);
-  save_latch(client, std::move(latched));
+  inhibit_.latch(client, std::move(latched));
   // The line serves stops in the order in which they are queued.
   const auto rank = [](const Axis& axis) {
     if (axis.snapshot()->link == LinkState::offline) return 2;
@@ -323,30 +284,22 @@ std::vector<Result<CommandPtr>> MachineCore::stop_all(const std::string& client,
     results[i] = submit(axes_[i]->settings().name, StopRequest{.kind = StopKind::stop, .all = true},
                         {.client = client, .arrived = arrived, .origin = origin});
   // After the stops: nobody's look at the events or the log may hold them up.
-  tell_inhibit(InhibitChange::What::latched, client);
+  tell_inhibit({.what = InhibitChange::What::latched, .by = client});
   log_limited(spdlog::level::warn, "StopAll by " + client, "stops",
               "motion is inhibited until it is released", LogKind::stop_all, {.client = client});
   return results;
 }
 
 void MachineCore::release_inhibit(const std::string& client, std::function<void(Result<void>)> done) {
-  auto release = [this, client, latch = latches_, done = std::move(done)](const Result<void>& saved) {
-    // A StopAll that came while this was being saved is nobody's to release but by a release of its own.
-    if (latch != latches_)
-      return done(fail(Reason::inhibited, fmt::format("StopAll was called again by {}", *inhibited_by()),
-                       "release it again if that is right"));
-    if (saved) {
-      set_inhibit(false, client);
-      tell_inhibit(InhibitChange::What::released, client);
+  inhibit_.release(client, [this, client, done = std::move(done)](Result<void> released) {
+    if (released) {
+      tell_inhibit({.what = InhibitChange::What::released, .by = client});
       log_limited(spdlog::level::warn, client, "releases", "StopAll is released", LogKind::stop_all_released,
                   {.client = client});
       for (const auto& axis : axes_) axis->refresh();
     }
-    done(saved);
-  };
-  if (parts_.persistence == nullptr) return release({});
-  parts_.persistence->save_inhibit(
-      {.active = false, .by = client, .since = parts_.clock->wall(parts_.clock->now())}, std::move(release));
+    done(std::move(released));
+  });
 }
 
 std::vector<std::string> MachineCore::stop_moving_axes() {

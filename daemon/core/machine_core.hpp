@@ -20,6 +20,7 @@
 #include "daemon/core/lease_keeper.hpp"
 #include "daemon/core/link_cycler.hpp"
 #include "daemon/core/machine_table.hpp"
+#include "daemon/core/motion_inhibit.hpp"
 #include "daemon/core/reload.hpp"
 #include "daemon/core/state_gate.hpp"
 #include "daemon/core/stop_hold_keeper.hpp"
@@ -104,7 +105,7 @@ class MachineCore {
   /// Ends the inhibit once that is durable.
   void release_inhibit(const std::string& client, std::function<void(Result<void>)> done);
   /// Who latched the inhibit, or nullptr. Thread: any.
-  [[nodiscard]] boost::shared_ptr<const std::string> inhibited_by() const { return inhibited_by_.load(); }
+  [[nodiscard]] boost::shared_ptr<const std::string> inhibited_by() const { return inhibit_.by(); }
   [[nodiscard]] StateGate& state_gate() { return state_gate_; }
   [[nodiscard]] const StateGate& state_gate() const { return state_gate_; }
   /// Stops what moves, for the end of the daemon. Returns the names of these axes.
@@ -175,9 +176,7 @@ class MachineCore {
   BusRecorder& add_recorder(const std::string& bus, int bit_rate);
   void on_event(const std::string& axis, EventContent content);
   void note_fault(const Axis& axis, const EventContent& content);
-  void set_inhibit(bool inhibited, const std::string& by);
-  void tell_inhibit(InhibitChange::What what, const std::string& by);
-  void save_latch(const std::string& client, std::function<void(std::optional<Error>)> latched);
+  void tell_inhibit(InhibitChange change);
 
   MachineParts parts_;
   const std::size_t recorder_memory_;  ///< bytes, of each bus
@@ -190,11 +189,7 @@ class MachineCore {
   LeaseKeeper leases_;
   StopHoldKeeper holds_;
   StateGate state_gate_;
-  bool inhibited_ = false;
-  int latches_ = 0;                          ///< StopAlls so far
-  std::map<int, Clock::Timer> latch_waits_;  ///< of StopAlls whose latch is not known to be durable yet
-  std::shared_ptr<int> alive_ = std::make_shared<int>();  ///< the disk may answer when this is gone
-  boost::atomic_shared_ptr<const std::string> inhibited_by_;
+  MotionInhibit inhibit_;
   std::map<std::string, StopDelays, std::less<>>
       stop_delays_;  ///< by bus; before the axes, which count there
   std::vector<std::unique_ptr<modbus_rtu::RtuBus>> lines_;
