@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/smart_ptr/make_shared.hpp>
 #include <utility>
 
 #include "buses/limited_log.hpp"
@@ -156,10 +155,10 @@ void MachineCore::start() {
 Task<> MachineCore::watch(canopen::CanopenBus& network) {
   auto seen = network.losses();
   std::string told;
-  while (!closing_) {
+  while (!closing()) {
     log_link(network, told);
     co_await network.port_changed().wait();
-    if (closing_ || std::exchange(seen, network.losses()) == network.losses()) continue;
+    if (closing() || std::exchange(seen, network.losses()) == network.losses()) continue;
     for (const auto& axis : axes_)
       if (axis->settings().bus == network.name())
         axis->bus_lost(
@@ -169,10 +168,10 @@ Task<> MachineCore::watch(canopen::CanopenBus& network) {
 
 /// A port that was lost leaves what went before it in a flight record.
 Task<> MachineCore::watch_port(Bus& bus) {
-  while (!closing_) {
+  while (!closing()) {
     const bool was_open = bus.port().open;
     co_await bus.port_changed().wait();
-    if (closing_ || !was_open || bus.port().open) continue;
+    if (closing() || !was_open || bus.port().open) continue;
     flight_recorder_.fault(*find_recorder(bus.name()), {},
                            bus.port().error ? to_string(*bus.port().error) : "the bus was lost");
   }
@@ -224,7 +223,8 @@ Result<CommandPtr> MachineCore::submit(const std::string& axis, const Action& ac
 
 Result<CommandPtr> MachineCore::execute(Axis& axis, const Action& action, const CommandOptions& options) {
   const auto* stop = std::get_if<StopRequest>(&action);
-  if (const auto leaving = leaving_.find(axis.settings().name); leaving != leaving_.end() && stop != nullptr)
+  if (const auto leaving = exchange_.leaving.find(axis.settings().name);
+      leaving != exchange_.leaving.end() && stop != nullptr)
     return hold_stop(leaving->second, axis.settings().name, *stop, options);
   auto command = axis.submit(action, options);
   if (!command) audit_.refused(axis.settings().name, action, options, command.error());
@@ -303,7 +303,7 @@ void MachineCore::release_inhibit(const std::string& client, std::function<void(
 }
 
 std::vector<std::string> MachineCore::stop_moving_axes() {
-  ending_ = true;
+  life_ = std::max(life_, Life::ending);
   std::vector<std::string> stopped;
   for (const auto& axis : axes_) {
     if (axis->at_rest()) continue;
@@ -314,12 +314,12 @@ std::vector<std::string> MachineCore::stop_moving_axes() {
 }
 
 bool MachineCore::at_rest() const {
-  return !reloading_ && !unconfirmed_ &&
+  return exchange_.state != Exchange::State::under_way && !exchange_.unconfirmed &&
          std::ranges::all_of(axes_, [](const auto& axis) { return axis->at_rest(); });
 }
 
 void MachineCore::close() {
-  closing_ = true;
+  life_ = Life::closing;
   flight_recorder_.close();
   leases_.close();
   for (const auto& axis : axes_) axis->close();

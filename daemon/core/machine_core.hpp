@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -134,11 +135,17 @@ class MachineCore {
   /// Ends all sequences; then closed() comes true and the machine can be destroyed. Moves nothing.
   void close();
   [[nodiscard]] bool closed() const;
-  [[nodiscard]] bool closing() const { return closing_; }
+  [[nodiscard]] bool closing() const { return life_ == Life::closing; }
   /// Every bus is open, or it is known why not.
   [[nodiscard]] bool buses_reported() const;
 
  private:
+  enum class Life : std::uint8_t {
+    running,
+    ending,   ///< the daemon ends: no reload is carried out any more
+    closing,  ///< nothing new is begun
+  };
+
   // machine_build.cpp: what the configuration names
   void add_line(const modbus_rtu::LineSettings& line);
   void add_network(const canopen::NetworkSettings& network);
@@ -200,13 +207,8 @@ class MachineCore {
   std::vector<std::unique_ptr<Device>> devices_;
   GroupKeeper groups_;  ///< after the axes, which its moves are of
   int sequences_ = 0;   ///< launched ones that still run
-  bool closing_ = false;
-  int stops_on_their_way_ = 0;  ///< of axes that are leaving
-  bool unconfirmed_ = false;    ///< a stop of such an axis was not confirmed
-  bool ending_ = false;         ///< the daemon is: no reload is carried out any more
-  bool reloading_ = false;
-  Leaving leaving_;  ///< axes that a reload exchanges or removes
-  std::map<std::string, LeftBehind, std::less<>> left_behind_;
+  Life life_ = Life::running;
+  Exchange exchange_;
   std::map<std::string, Axis*, std::less<>> by_name_;
   boost::atomic_shared_ptr<const MachineTable> table_;
 };

@@ -129,11 +129,11 @@ void MachineCore::check_lease_for_reload(const Reload& reload, const Configurati
 
 std::vector<Error> MachineCore::check_reload(const Reload& reload) const {
   std::vector<Error> refusals;
-  if (closing_ || ending_)
+  if (life_ != Life::running)
     refusals.push_back({.reason = Reason::cancelled,
                         .message = "the daemon is shutting down",
                         .remedy = "it reads the file when it is started again"});
-  if (reloading_)
+  if (exchange_.state == Exchange::State::under_way)
     refusals.push_back(
         {.reason = Reason::busy, .message = "another reload is under way", .remedy = "wait for its end"});
   for (const auto& change : reload.changes) {
@@ -182,11 +182,11 @@ void MachineCore::check_parts(const Reload& reload, const ConfigurationChange& c
 
 void MachineCore::reload(Reload reload, ReloadDone done) {
   if (auto refusals = check_reload(reload); !refusals.empty()) return done(std::move(refusals));
-  reloading_ = true;
+  exchange_.state = Exchange::State::under_way;
   for (const auto& change : reload.changes) {
     if (change.kind == Kind::added) continue;
     if (change.section == "axes") {
-      leaving_.try_emplace(change.name);
+      exchange_.leaving.try_emplace(change.name);
       find(change.name)->retire(keeps_position(change));
     } else if (change.section == "devices") {
       for (const auto& device : devices_)
@@ -197,8 +197,9 @@ void MachineCore::reload(Reload reload, ReloadDone done) {
 }
 
 bool MachineCore::has_made_room() const {
-  return stops_on_their_way_ == 0 &&
-         std::ranges::all_of(leaving_, [this](const auto& axis) { return find(axis.first)->closed(); }) &&
+  return exchange_.stops_on_their_way == 0 &&
+         std::ranges::all_of(exchange_.leaving,
+                             [this](const auto& axis) { return find(axis.first)->closed(); }) &&
          std::ranges::all_of(devices_, [](const auto& device) {
            return !device->closing() || (device->closed() && !device->in_use());
          });
@@ -208,17 +209,17 @@ Task<> MachineCore::run_reload(Reload reload, ReloadDone done) {
   for (;;) {
     while (!has_made_room())
       co_await sleep_until(parts_.executor, *parts_.clock, parts_.clock->now() + look_again);
-    const auto name = closing_ ? std::string() : unstopped(reload);
+    const auto name = closing() ? std::string() : unstopped(reload);
     if (name.empty()) break;
     co_await stop_leaving(name);  // others may have got something to do meanwhile
   }
-  if (closing_ || ending_) {
+  if (life_ != Life::running) {
     const Error cause{.reason = Reason::cancelled,
                       .message = "the daemon is shutting down",
                       .remedy = "it reads the file when it is started again"};
-    for (auto& [axis, stops] : leaving_)
+    for (auto& [axis, stops] : exchange_.leaving)
       for (const auto& stop : stops) stop.command->abort(cause);
-    reloading_ = false;
+    exchange_.state = Exchange::State::given_up;
     co_return done({cause});
   }
   carry_out(reload);
@@ -229,8 +230,9 @@ Task<> MachineCore::run_reload(Reload reload, ReloadDone done) {
 std::string MachineCore::unstopped(const Reload& reload) const {
   for (const auto& change : reload.changes) {
     if (change.section != "axes" || change.kind == Kind::added) continue;
-    const bool for_good = ending_ || change.kind == Kind::removed || concerns_another_drive(change);
-    if (for_good && !leaving_.at(change.name).empty()) return change.name;
+    const bool for_good =
+        life_ == Life::ending || change.kind == Kind::removed || concerns_another_drive(change);
+    if (for_good && !exchange_.leaving.at(change.name).empty()) return change.name;
   }
   return {};
 }
@@ -238,7 +240,7 @@ std::string MachineCore::unstopped(const Reload& reload) const {
 /// For whom nobody else confirms them: all of them at once, as each asks for the same.
 Task<> MachineCore::stop_leaving(std::string name) {
   auto& axis = *find(name);
-  const auto stops = std::exchange(leaving_.at(name), {});
+  const auto stops = std::exchange(exchange_.leaving.at(name), {});
   auto kind = StopKind::stop;
   for (const auto& stop : stops) {
     kind = std::max(kind, stop.request.kind);
@@ -252,12 +254,12 @@ Task<> MachineCore::stop_leaving(std::string name) {
                   : Result<DriveSample>(fail(sent.error()));
     if (sample) break;
   }
-  while (sample && sample->moving && parts_.clock->now() < until && !closing_) {
+  while (sample && sample->moving && parts_.clock->now() < until && !closing()) {
     co_await sleep_until(parts_.executor, *parts_.clock, parts_.clock->now() + look_at_motion);
     sample = co_await axis.drive().read_state(TransactionClass::moving_state);
   }
   const bool rests = sample && !sample->moving;
-  unconfirmed_ = unconfirmed_ || !rests;
+  exchange_.unconfirmed = exchange_.unconfirmed || !rests;
   if (!rests) spdlog::error("{}: standstill was not confirmed; look at the machine", name);
   for (const auto& stop : stops) {
     if (rests)
@@ -274,7 +276,7 @@ Task<> MachineCore::stop_leaving(std::string name) {
 /// Whoever confirms it later: its frame goes out now. (The drive is there until all have made room.)
 Task<> MachineCore::send_stop(Axis& axis, StopKind kind) {
   (void)co_await axis.drive().stop(kind);
-  --stops_on_their_way_;
+  --exchange_.stops_on_their_way;
 }
 
 /// Nothing waits in here: whoever looks before or after finds one configuration, whole.
@@ -288,15 +290,15 @@ void MachineCore::carry_out(Reload& reload) {
   parts_.budgets = std::move(reload.budgets);
   publish_table();
   expect_stops();
-  reloading_ = false;
-  auto leaving = std::exchange(leaving_, {});
+  exchange_.state = Exchange::State::none;
+  auto leaving = std::exchange(exchange_.leaving, {});
   for (auto* device : devices) device->start();
   for (auto* axis : axes) {
-    const auto before = left_behind_.find(axis->settings().name);
-    axis->start(before != left_behind_.end() && before->second.answered &&
+    const auto before = exchange_.left_behind.find(axis->settings().name);
+    axis->start(before != exchange_.left_behind.end() && before->second.answered &&
                 before->second.bus == axis->settings().bus && before->second.node == axis->settings().node);
   }
-  left_behind_.clear();
+  exchange_.left_behind.clear();
   tell_reloaded(reload);
   for (auto& [name, stops] : leaving)  // of axes that are gone there are none any more
     for (auto& stop : stops) find(name)->take_stop(stop.request, stop.options, std::move(stop.command));
@@ -313,8 +315,8 @@ std::vector<Axis*> MachineCore::renew_axes(const Reload& reload) {
       axes.push_back(std::move(*kept));
       continue;
     }
-    const auto found = left_behind_.find(settings.name);
-    const auto* before = found == left_behind_.end() ? nullptr : &found->second;
+    const auto found = exchange_.left_behind.find(settings.name);
+    const auto* before = found == exchange_.left_behind.end() ? nullptr : &found->second;
     // A gate belongs to a bus, too: on another one it is a new one, under the same lease.
     const bool moved = before != nullptr && before->bus != settings.bus;
     axes.push_back(make_axis(settings, before == nullptr || moved ? nullptr : before->face));
@@ -355,13 +357,13 @@ void MachineCore::clear_away() {
   const auto forget_node = [this](const std::string& bus, std::uint8_t node) {
     if (auto* line = find_line(bus)) line->set_turnaround_max(node, std::nullopt);
   };
-  for (const auto& [name, stops] : leaving_) {
+  for (const auto& [name, stops] : exchange_.leaving) {
     const auto* axis = find(name);
-    left_behind_.emplace(name, LeftBehind{.face = axis->face(),
-                                          .bus = axis->settings().bus,
-                                          .node = axis->settings().node,
-                                          .answered = axis->answered(),
-                                          .owes_release = axis->owes_release()});
+    exchange_.left_behind.emplace(name, LeftBehind{.face = axis->face(),
+                                                   .bus = axis->settings().bus,
+                                                   .node = axis->settings().node,
+                                                   .answered = axis->answered(),
+                                                   .owes_release = axis->owes_release()});
     forget_node(axis->settings().bus, axis->settings().node);
     groups_.let_go(name);
     by_name_.erase(name);
@@ -394,8 +396,8 @@ CommandPtr MachineCore::hold_stop(std::vector<HeldStop>& stops, const std::strin
   always.request_id.clear();
   auto command = book_.open(axis, request, always);
   stops.push_back({.request = request, .options = std::move(always), .command = command});
-  if (reloading_) {
-    ++stops_on_their_way_;
+  if (exchange_.state == Exchange::State::under_way) {
+    ++exchange_.stops_on_their_way;
     launch(send_stop(*find(axis), request.kind), "stop");
   } else {  // the reload was given up, because the daemon ends
     launch(stop_leaving(axis), "stop");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <string>
@@ -39,6 +40,20 @@ struct LeftBehind {
   std::uint8_t node = 0;
   bool answered = false;      ///< by the drive, until then
   bool owes_release = false;  ///< a lease ended meanwhile, and the axis is to be disabled for it
+};
+
+/// Axes that a reload exchanges or removes, until their successors are there.
+///
+///   none      -- reload() ------------------------------------> under_way
+///   under_way -- all have made room, and it is carried out ---> none
+///   under_way -- all have made room, and the daemon ends -----> given_up
+struct Exchange {
+  enum class State : std::uint8_t { none, under_way, given_up };
+  State state = State::none;
+  Leaving leaving;
+  std::map<std::string, LeftBehind, std::less<>> left_behind;
+  int stops_on_their_way = 0;  ///< of those that are leaving
+  bool unconfirmed = false;    ///< a stop of one of them was not confirmed
 };
 
 }  // namespace axisd::core
